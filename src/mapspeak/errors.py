@@ -1,0 +1,46 @@
+"""The errors mapspeak raises on purpose, and nothing else.
+
+MapspeakError           everything below; carries what is wrong and what to do next
+|- ConfigError          a flag, a world file or a setting that cannot be used
+|- LinkError            the robot cannot be reached, or does not offer what was asked
+|- MapError             a map, or a map file, that cannot be what it claims
+|- GoalError            a goal that cannot be driven to, or a goal id nobody knows
+`- SemanticMapError     the semantic map file or a record in it is wrong
+"""
+
+
+class MapspeakError(Exception):
+    """Something that was asked for cannot be done, with a hint at the next step.
+
+    Attributes:
+        message: What is wrong, with the number and its unit.
+        hint: What the reader can do next; names a tool where a model will read it.
+    """
+
+    def __init__(self, message: str, *, hint: str) -> None:
+        super().__init__(message)
+        self.message = message
+        self.hint = hint
+
+    def __str__(self) -> str:
+        return f"{self.message} {self.hint}"
+
+
+class ConfigError(MapspeakError):
+    """A flag, a world file or a setting cannot be used."""
+
+
+class LinkError(MapspeakError):
+    """The robot cannot be reached, or does not offer what was asked of it."""
+
+
+class MapError(MapspeakError):
+    """A map, or a map file, is not what it claims to be."""
+
+
+class GoalError(MapspeakError):
+    """A goal cannot be driven to, or its id is not known."""
+
+
+class SemanticMapError(MapspeakError):
+    """The semantic map file, or a record meant for it, is wrong."""

@@ -1,0 +1,1 @@
+"""Trials: tasks, agents, scores, reports."""

@@ -1,0 +1,1 @@
+"""The port implemented: one module per way of reaching a robot."""

@@ -1,0 +1,1 @@
+"""Going somewhere: checking goals, driving, exploring."""

@@ -1,0 +1,181 @@
+"""THE PORT: what mapspeak asks of a robot, and the values that cross.
+
+A link (`mapspeak.links`) implements `Robot`; everything above it sees nothing else of the robot.
+Time is the robot's own: a simulated robot may run faster than the wall clock.
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol
+
+from mapspeak.geometry import Pose
+from mapspeak.spatial import OccupancyGrid
+
+__all__ = [
+    "CameraPicture",
+    "Detection",
+    "GoalState",
+    "GoalStatus",
+    "Robot",
+    "RobotDescription",
+    "StampedPose",
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotDescription:
+    """What is fixed about a robot while it is connected.
+
+    Attributes:
+        name: How people call it.
+        radius_m: Of the smallest circle around it.
+        map_name: Which map or building it drives in, as far as the robot can tell.
+        has_camera: It can give pictures.
+        has_detector: It reports what an object detector of its own sees.
+    """
+
+    name: str
+    radius_m: float
+    map_name: str
+    has_camera: bool
+    has_detector: bool
+
+
+@dataclass(frozen=True, slots=True)
+class StampedPose:
+    """Where the robot believes it is, and since when.
+
+    Attributes:
+        pose: In the map frame.
+        stamp_s: Robot time of the estimate.
+    """
+
+    pose: Pose
+    stamp_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraPicture:
+    """One picture of the front camera.
+
+    Attributes:
+        data: The encoded picture.
+        media_type: Such as "image/jpeg".
+        width_px: Columns.
+        height_px: Rows.
+        horizontal_fov_rad: The angle between the left and the right edge; None where unknown.
+        pose: Where the robot believed it stood, in the map frame.
+        stamp_s: Robot time of the exposure.
+    """
+
+    data: bytes
+    media_type: str
+    width_px: int
+    height_px: int
+    horizontal_fov_rad: float | None
+    pose: Pose
+    stamp_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Detection:
+    """One thing that the robot's object detector reports in the current camera view.
+
+    Attributes:
+        label: What it takes the thing for.
+        confidence_ratio: Between 0 and 1.
+        bearing_rad: From the robot's heading, left positive.
+        range_m: From the robot; None where the detector does not measure it.
+    """
+
+    label: str
+    confidence_ratio: float
+    bearing_rad: float
+    range_m: float | None
+
+
+class GoalState(StrEnum):
+    """How a drive stands, as the robot's navigation reports it."""
+
+    ACCEPTED = "accepted"
+    DRIVING = "driving"
+    ARRIVED = "arrived"
+    BLOCKED = "blocked"
+    CANCELLED = "cancelled"
+    REJECTED = "rejected"
+    LOST = "lost"
+
+    @property
+    def is_final(self) -> bool:
+        """True when nothing more will happen."""
+        return self not in (GoalState.ACCEPTED, GoalState.DRIVING)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GoalStatus:
+    """How a drive stands now.
+
+    Attributes:
+        state: See `GoalState`.
+        distance_left_m: Along the planned path; None where the robot does not say.
+        n_recoveries: How often it had to try again.
+        reason: Why it ended as it did; empty while it drives.
+    """
+
+    state: GoalState
+    distance_left_m: float | None = None
+    n_recoveries: int = 0
+    reason: str = ""
+
+
+class Robot(Protocol):
+    """A robot with a map, a pose, perhaps a camera, and navigation.
+
+    Methods raise `LinkError` when the robot cannot be reached or does not offer what was asked.
+    """
+
+    @property
+    def description(self) -> RobotDescription:
+        """What is fixed about this robot."""
+        ...
+
+    @property
+    def now_s(self) -> float:
+        """Robot time."""
+        ...
+
+    async def sleep(self, duration_s: float) -> None:
+        """Returns when that much robot time has passed."""
+        ...
+
+    async def fetch_map(self) -> OccupancyGrid:
+        """Gives the latest map."""
+        ...
+
+    async def fetch_pose(self) -> StampedPose:
+        """Gives where the robot believes it is."""
+        ...
+
+    async def fetch_picture(self) -> CameraPicture:
+        """Takes a picture with the front camera."""
+        ...
+
+    async def fetch_detections(self) -> tuple[Detection, ...]:
+        """Gives what the robot's own object detector reports in the camera view."""
+        ...
+
+    async def send_goal(self, goal: Pose) -> str:
+        """Starts a drive in the robot's navigation and gives the id it is known by."""
+        ...
+
+    async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
+        """Gives how a drive stands, also after it has ended."""
+        ...
+
+    async def cancel_goal(self, robot_goal_id: str) -> None:
+        """Asks the navigation to end a drive; the robot comes to a stand."""
+        ...
+
+    async def stop(self) -> None:
+        """Ends every drive and commands zero velocity, at once."""
+        ...

@@ -1,0 +1,1 @@
+"""A world with one robot, stepped by hand: no clock, no network, no port."""

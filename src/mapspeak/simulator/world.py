@@ -1,0 +1,84 @@
+"""A world as it truly is: walls, doors, objects, rooms; read from a file that people write."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from mapspeak.geometry import Point, Pose
+
+
+class RoomClass(StrEnum):
+    """What a person would call a region of the floor."""
+
+    ROOM = "room"
+    CORRIDOR = "corridor"
+    OPEN_SPACE = "open_space"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wall:
+    """A straight piece of wall, already cut where doors are.
+
+    Attributes:
+        start: One end of its centre line.
+        end: The other end.
+        thickness_m: Across the centre line.
+        height_m: From the floor.
+    """
+
+    start: Point
+    end: Point
+    thickness_m: float
+    height_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorldObject:
+    """A thing in the world.
+
+    Attributes:
+        name: Unique in its world.
+        kind: One of `mapspeak.simulator.models.KINDS`.
+        pose: Where its own frame stands on the floor plan; its front faces along its x axis.
+        base_height_m: How high above the floor it hangs; None for the kind's usual height.
+    """
+
+    name: str
+    kind: str
+    pose: Pose
+    base_height_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrueRoom:
+    """A room, corridor or open space as a person would outline it on the plan.
+
+    Attributes:
+        name: Unique in its world.
+        room_class: What it is.
+        outline: The corners, in order.
+    """
+
+    name: str
+    room_class: RoomClass
+    outline: tuple[Point, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class World:
+    """Everything that is true of a world. Scoring may read it; tools never do.
+
+    Attributes:
+        name: Such as "warehouse".
+        title: A sentence about it.
+        walls: All walls.
+        objects: All things.
+        rooms: The truth about rooms.
+        start: Where the robot stands at first, in the world's own frame.
+    """
+
+    name: str
+    title: str
+    walls: tuple[Wall, ...]
+    objects: tuple[WorldObject, ...]
+    rooms: tuple[TrueRoom, ...]
+    start: Pose
