@@ -1,0 +1,1 @@
+"""Measurements of mapspeak, one module each; `./run bench` runs them."""

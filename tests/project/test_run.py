@@ -1,0 +1,163 @@
+"""./run makes the environment once, and again when it must; a fake uv stands for the network."""
+
+import shutil
+import signal
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+CHECKOUT = Path(__file__).parents[2]
+SYSTEM_TOOLS = "cat chmod cksum dirname ls mkdir rm rmdir sed sh"
+
+# Keeps a log of its calls; its environment's Python repeats what it is told.
+FAKE_UV = """#!/bin/sh
+echo "$*" >>"$UV_LOG"
+case $1 in
+venv)
+    for target; do :; done
+    mkdir -p "$target/bin"
+    printf '#!/bin/sh\\necho python "$@"\\n' >"$target/bin/python"
+    chmod +x "$target/bin/python"
+    ;;
+pip)
+    echo "uv speaks on stdout"
+    [ ! -e "$UV_LOG.kill" ] || kill -KILL 0
+    ;;
+esac
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Desk:
+    """A copy of what ./run needs, and a PATH with nothing but the system's tools and a fake uv."""
+
+    checkout: Path
+    tools: Path
+    uv_log: Path
+
+    def start(self, *command: str, checkout: Path | None = None) -> subprocess.Popen[str]:
+        return subprocess.Popen(  # noqa: S603 - our own script
+            [(checkout or self.checkout) / "run", *command],
+            cwd=self.tools,
+            env={"PATH": str(self.tools), "UV_LOG": str(self.uv_log)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+
+    def run(self, *command: str, checkout: Path | None = None) -> tuple[int, str, str]:
+        process = self.start(*command, checkout=checkout)
+        stdout, stderr = process.communicate(timeout=30)
+        return process.returncode, stdout, stderr
+
+    def calls_of_uv(self) -> list[str]:
+        calls = self.uv_log.read_text().splitlines() if self.uv_log.exists() else []
+        self.uv_log.unlink(missing_ok=True)
+        return [call.split()[0] for call in calls]
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Desk:
+    checkout, tools = tmp_path / "a checkout", tmp_path / "bin"
+    for folder in (checkout, tools):
+        folder.mkdir()
+    for name in ("run", "pyproject.toml"):
+        shutil.copy(CHECKOUT / name, checkout)
+    shutil.copytree(CHECKOUT / "constraints", checkout / "constraints")
+    for name in SYSTEM_TOOLS.split():
+        (tools / name).symlink_to(shutil.which(name) or pytest.fail(f"no {name} here"))
+    (tools / "sleep").symlink_to(shutil.which("true") or pytest.fail("no true here"))
+    (tools / "uv").write_text(FAKE_UV)
+    (tools / "uv").chmod(0o755)
+    return Desk(checkout=checkout, tools=tools, uv_log=tmp_path / "uv.log")
+
+
+MADE = ["venv", "pip", "pip"]
+FILLED = ["pip", "pip"]
+
+
+def test_the_first_call_makes_the_environment_and_stdout_is_the_commands_alone(desk: Desk) -> None:
+    assert desk.run("python", "-V", "two words")[:2] == (0, "python -V two words\n")
+    assert desk.calls_of_uv() == MADE
+
+
+def test_the_second_call_installs_nothing(desk: Desk) -> None:
+    desk.run("python")
+    desk.calls_of_uv()
+    assert desk.run("python", "again") == (0, "python again\n", "")
+    assert desk.calls_of_uv() == []
+
+
+def test_other_pins_are_installed_into_the_environment_that_is_there(desk: Desk) -> None:
+    desk.run("python")
+    desk.calls_of_uv()
+    with (desk.checkout / "constraints" / "runtime.txt").open("a") as pins:
+        pins.write("another==1.0\n")
+    assert desk.run("python")[0] == 0
+    assert desk.calls_of_uv() == FILLED
+
+
+def test_the_tests_need_more_packages_than_the_product(desk: Desk) -> None:
+    desk.run("python")
+    desk.calls_of_uv()
+    assert desk.run("test", "one.py")[:2] == (0, "python -m pytest one.py\n")
+    assert desk.calls_of_uv() == FILLED
+    assert desk.run("python")[0] == 0
+    assert desk.calls_of_uv() == []
+
+
+def test_an_interrupted_installation_is_done_again_from_the_start(desk: Desk) -> None:
+    kill = Path(f"{desk.uv_log}.kill")
+    kill.touch()
+    assert desk.run("python")[:2] == (-signal.SIGKILL, "")
+    kill.unlink()
+    desk.calls_of_uv()
+    assert desk.run("python")[0] == 0
+    assert desk.calls_of_uv() == MADE
+
+
+def test_a_checkout_that_moved_gets_a_new_environment(desk: Desk, tmp_path: Path) -> None:
+    desk.run("python")
+    desk.calls_of_uv()
+    moved = desk.checkout.rename(tmp_path / "elsewhere")
+    assert desk.run("python", checkout=moved)[0] == 0
+    assert desk.calls_of_uv() == MADE
+
+
+def test_without_python_and_uv_it_says_what_to_install(desk: Desk) -> None:
+    (desk.tools / "uv").unlink()
+    code, stdout, stderr = desk.run("demo")
+    assert (code, stdout) == (1, "")
+    for system in ("apt install python3", "dnf install", "brew install", "wsl --install"):
+        assert system in stderr
+
+
+def test_two_calls_at_once_make_one_environment(desk: Desk) -> None:
+    both = [desk.start("python", name) for name in ("one", "two")]
+    assert [process.communicate(timeout=30)[0] for process in both] == [
+        "python one\n",
+        "python two\n",
+    ]
+    assert desk.calls_of_uv() == MADE
+
+
+def test_a_lock_that_a_killed_call_left_behind_is_freed(desk: Desk) -> None:
+    ended = subprocess.Popen(["true"])  # noqa: S607 - any process that has ended
+    ended.wait()
+    (desk.checkout / ".venv.lock" / str(ended.pid)).mkdir(parents=True)
+    assert desk.run("python")[0] == 0
+    assert not (desk.checkout / ".venv.lock").exists()
+
+
+def test_help_needs_no_environment(desk: Desk) -> None:
+    code, stdout, _ = desk.run("help")
+    assert code == 0
+    assert "./run demo" in stdout
+    assert not (desk.checkout / ".venv").exists()
+
+
+def test_the_script_is_executable_for_everyone() -> None:
+    assert (CHECKOUT / "run").stat().st_mode & 0o111 == 0o111
