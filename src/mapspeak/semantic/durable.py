@@ -1,0 +1,180 @@
+"""One file that is replaced as a whole, and is on the disk when a write returns.
+
+A crash at any moment leaves the file as it was before or as it is after, never in between.
+"""
+
+import contextlib
+import errno
+import os
+import stat
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from filelock import FileLock, Timeout
+
+from mapspeak.errors import SemanticMapError
+
+MAX_BYTES = 20_000_000
+"""A larger file is taken for something else than a semantic map."""
+
+_POLL_S = 0.005
+_FOLDER_CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP)
+
+
+@dataclass(frozen=True, slots=True)
+class Fingerprint:
+    """What tells one state of a file from another without reading it."""
+
+    device: int
+    inode: int
+    n_bytes: int
+    modified_ns: int
+
+    @classmethod
+    def of(cls, status: os.stat_result) -> "Fingerprint":
+        """Takes it from what the file system says of a file."""
+        return cls(status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
+
+
+class DurableFile:
+    """A file that several processes read and replace; all faults are `SemanticMapError`s.
+
+    Args:
+        path: Where it is; a symbolic link is followed. It need not exist yet.
+        lock_timeout_s: How long a writer waits for another one.
+    """
+
+    def __init__(self, path: Path, *, lock_timeout_s: float) -> None:
+        self.path = path
+        self._lock_timeout_s = lock_timeout_s
+
+    def fingerprint(self) -> Fingerprint | None:
+        """Gives the file's present state; None where there is no file."""
+        with self._explained("look at"):
+            status = self._status()
+            return None if status is None else Fingerprint.of(status)
+
+    def read(self) -> tuple[bytes, Fingerprint | None]:
+        """Gives the content and the state it belongs to; nothing and None where no file is."""
+        with self._explained("read"):
+            status = self._status()
+            if status is None:
+                return b"", None
+            self._require_ordinary(status)
+            with self.path.open("rb") as file:
+                # Taken before reading: a change meanwhile shows as another fingerprint later.
+                fingerprint = Fingerprint.of(os.fstat(file.fileno()))
+                return file.read(MAX_BYTES + 1), fingerprint
+
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keeps other writers that use this class away for the time of a `with` block."""
+        target = self._target()
+        lock_path = target.with_name(f".{target.name}.lock")
+        with self._explained("lock"):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            lock = FileLock(lock_path)
+            try:
+                lock.acquire(timeout=self._lock_timeout_s, poll_interval=_POLL_S)
+            except Timeout as error:
+                message = f"Another program has held {lock_path} for {self._lock_timeout_s:g} s."
+                hint = "Write again; if it stays so, end the other program that writes this map."
+                raise SemanticMapError(message, hint=hint) from error
+        try:
+            yield
+        finally:
+            lock.release()
+
+    def replace(self, content: bytes, *, expected: Fingerprint | None) -> Fingerprint | None:
+        """Puts a new content in place, for a caller that holds the lock.
+
+        Returns:
+            The state after; None, with nothing done, where the file is not in the expected state.
+        """
+        target = self._target()
+        self._require_small(len(content))
+        with self._explained("write"):
+            status = self._status()
+            if status is not None and not os.access(target, os.W_OK):
+                raise PermissionError(errno.EACCES, "the file is read-only")
+            temporary = target.with_name(f".{target.name}.tmp")
+            # Only a crash leaves one behind: the lock is held.
+            temporary.unlink(missing_ok=True)
+            try:
+                after = _write_new(temporary, content, like=status)
+                if self.fingerprint() != expected:
+                    return None
+                temporary.replace(target)
+            finally:
+                temporary.unlink(missing_ok=True)
+            _sync_folder(target.parent)
+            return after
+
+    def _target(self) -> Path:
+        with self._explained("find"):
+            return Path(os.path.realpath(self.path))
+
+    def _status(self) -> os.stat_result | None:
+        try:
+            return self.path.stat()
+        except FileNotFoundError:
+            return None
+
+    def _require_ordinary(self, status: os.stat_result) -> None:
+        if not stat.S_ISREG(status.st_mode):
+            kind = "a folder" if stat.S_ISDIR(status.st_mode) else "no ordinary file"
+            hint = "Name a YAML file, such as semantic_map.yaml in that folder."
+            raise SemanticMapError(f"{self.path} is {kind}.", hint=hint)
+        self._require_small(status.st_size)
+
+    def _require_small(self, n_bytes: int) -> None:
+        if n_bytes > MAX_BYTES:
+            message = f"{self.path} has {n_bytes / 1e6:.1f} MB; at most {MAX_BYTES / 1e6:.0f} MB."
+            raise SemanticMapError(message, hint="Split the map, or remove waypoints from it.")
+
+    @contextlib.contextmanager
+    def _explained(self, verb: str) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            reason = error.strerror or str(error)
+            message = f"Cannot {verb} {self.path}: {reason}."
+            hint = (
+                "Check that the file and its folder exist, may be written to, and have room; "
+                "in a container, mount the folder, not the file alone."
+            )
+            raise SemanticMapError(message, hint=hint) from error
+
+
+def _write_new(path: Path, content: bytes, *, like: os.stat_result | None) -> Fingerprint:
+    with path.open("xb") as file:
+        if like is not None:
+            _take_after(path, like)
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+        return Fingerprint.of(os.fstat(file.fileno()))
+
+
+def _take_after(path: Path, like: os.stat_result) -> None:
+    """Gives a new file the owner, as far as we may, and the permissions of another."""
+    if sys.platform != "win32":
+        with contextlib.suppress(PermissionError):
+            os.chown(path, like.st_uid, like.st_gid)
+    path.chmod(stat.S_IMODE(like.st_mode))
+
+
+def _sync_folder(folder: Path) -> None:
+    """Makes the new name of a file last, where the system can."""
+    if sys.platform == "win32":
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in _FOLDER_CANNOT_SYNC:
+            raise
+    finally:
+        os.close(descriptor)

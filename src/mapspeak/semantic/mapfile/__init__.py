@@ -1,0 +1,9 @@
+"""The semantic map file as text: read with the place of every fault, edited with comments kept.
+
+Nothing here opens a file; `mapspeak.semantic.store` does.
+"""
+
+from mapspeak.semantic.mapfile.document import MapDocument, parse_document
+from mapspeak.semantic.mapfile.rewriting import bound_to, with_waypoint, without_waypoint
+
+__all__ = ["MapDocument", "bound_to", "parse_document", "with_waypoint", "without_waypoint"]

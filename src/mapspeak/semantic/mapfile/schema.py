@@ -1,0 +1,262 @@
+"""What one record of the semantic map file must say; turned into a waypoint, and back."""
+
+import difflib
+import math
+from collections.abc import Iterator
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    ValidationError,
+)
+
+from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.semantic.mapfile.tree import Data, ListNode, MappingNode, Node, TextError
+from mapspeak.semantic.waypoint import Landmark, Waypoint, clean_line
+
+FILE_VERSION = 1
+
+_Words = Annotated[str, Field(pattern=r"\S")]
+
+
+def _nothing_as_empty(value: object) -> object:
+    return [] if value is None else value
+
+
+def _label_alone(value: object) -> object:
+    return {"label": value} if isinstance(value, str) else value
+
+
+def _time_with_zone(value: object) -> datetime | None:
+    time = datetime.fromisoformat(value) if isinstance(value, str) else None
+    if value is not None and (time is None or time.tzinfo is None):
+        raise ValueError
+    return time
+
+
+def _line_or_none(text: str | None) -> str | None:
+    return clean_line(text or "") or None
+
+
+class _PoseEntry(BaseModel):
+    """A pose, strictly: an overlooked `yaw` would turn the robot the wrong way."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    x: FiniteFloat
+    y: FiniteFloat
+    yaw_deg: FiniteFloat
+
+    def to_pose(self) -> Pose:
+        return Pose(self.x, self.y, wrap_angle(math.radians(self.yaw_deg)))
+
+
+class _LandmarkEntry(BaseModel):
+    """A landmark; a bare label counts as one."""
+
+    label: _Words
+    purpose: str | None = None
+    bearing_deg: FiniteFloat | None = None
+    range_m: Annotated[FiniteFloat, Field(ge=0)] | None = None
+    note: str | None = None
+
+    def to_landmark(self) -> Landmark:
+        bearing_rad = None if self.bearing_deg is None else math.radians(self.bearing_deg)
+        return Landmark(
+            label=self.label,
+            purpose=self.purpose,
+            bearing_rad=bearing_rad,
+            range_m=self.range_m,
+            note=self.note,
+        )
+
+
+_Landmarks = Annotated[
+    list[Annotated[_LandmarkEntry, BeforeValidator(_label_alone)]],
+    BeforeValidator(_nothing_as_empty),
+]
+
+
+class _WaypointEntry(BaseModel):
+    """One item of the list `waypoints`; other keys are people's own notes."""
+
+    name: _Words
+    description: str | None = None
+    pose: _PoseEntry
+    safety_landmarks: _Landmarks = []
+    functional_landmarks: _Landmarks = []
+    geometric_features: Annotated[list[_Words], BeforeValidator(_nothing_as_empty)] = []
+    stamp_s: FiniteFloat | None = None
+    recorded_at: Annotated[datetime | None, BeforeValidator(_time_with_zone)] = None
+
+    def to_waypoint(self, map_id: str | None) -> Waypoint:
+        return Waypoint(
+            name=self.name,
+            description=self.description or "",
+            pose=self.pose.to_pose(),
+            safety_landmarks=tuple(entry.to_landmark() for entry in self.safety_landmarks),
+            functional_landmarks=tuple(entry.to_landmark() for entry in self.functional_landmarks),
+            geometric_features=tuple(self.geometric_features),
+            stamp_s=self.stamp_s,
+            recorded_at=self.recorded_at,
+            map_id=map_id,
+        )
+
+
+class _FileEntry(BaseModel):
+    """What stands beside the records; other keys are people's own notes."""
+
+    version: Literal["1"] | None = None
+    map: Annotated[str | None, AfterValidator(_line_or_none)] = None
+    waypoints: Annotated[list[Any], BeforeValidator(_nothing_as_empty)] = []
+
+
+_FILE_KEYS = frozenset(_FileEntry.model_fields)
+_WAYPOINT_KEYS = frozenset(_WaypointEntry.model_fields)
+_LANDMARK_KEYS = frozenset(_LandmarkEntry.model_fields)
+
+_EXAMPLES = {
+    "version": "version: 1",
+    "map": "map: warehouse",
+    "waypoints": "waypoints: []",
+    "name": "name: dock corner",
+    "description": "description: A corner beside the loading dock.",
+    "pose": "pose: {x: 1.20, y: -3.40, yaw_deg: 90.0}",
+    "safety_landmarks": "safety_landmarks: [exit sign, {label: fire hose, range_m: 3.5}]",
+    "functional_landmarks": "functional_landmarks: [{label: tap, purpose: water, bearing_deg: 20}]",
+    "geometric_features": "geometric_features: [corner of two walls]",
+    "stamp_s": "stamp_s: 12.5",
+    "recorded_at": "recorded_at: 2026-11-02T10:30:00+00:00",
+}
+_EXPECTED = {
+    "missing": "is missing",
+    "extra_forbidden": "is not a key that belongs here",
+    "float_parsing": "is not a number",
+    "float_type": "is not a number",
+    "finite_number": "is not a finite number",
+    "greater_than_equal": "is below zero",
+    "string_type": "is not text",
+    "string_pattern_mismatch": "is empty",
+    "literal_error": "is not a version that this mapspeak reads",
+    "list_type": "is not a list",
+    "model_type": "is not a mapping of keys to values",
+    "value_error": "is not a date and time with a time zone",
+}
+
+
+def waypoint_from(data: Data, *, map_id: str | None) -> Waypoint:
+    """Gives the waypoint that a record describes.
+
+    Raises:
+        ValidationError: The record does not say what it must (see `fault_in`).
+    """
+    return _WaypointEntry.model_validate(data).to_waypoint(map_id)
+
+
+def map_id_from(data: Data) -> str | None:
+    """Gives the map that a file says it belongs to, if any.
+
+    Raises:
+        ValidationError: The file's own keys do not say what they must (see `fault_in`).
+    """
+    return _FileEntry.model_validate(data).map
+
+
+def record_data(waypoint: Waypoint) -> dict[str, Data]:
+    """Gives what a record says of a waypoint: millimetres and hundredths of a degree."""
+    pose = waypoint.pose
+    time = waypoint.recorded_at
+    return {
+        "name": waypoint.name,
+        "description": waypoint.description,
+        "pose": {"x": _length(pose.x), "y": _length(pose.y), "yaw_deg": _angle(pose.yaw_rad)},
+        "safety_landmarks": [_landmark_data(thing) for thing in waypoint.safety_landmarks],
+        "functional_landmarks": [_landmark_data(thing) for thing in waypoint.functional_landmarks],
+        "geometric_features": list(waypoint.geometric_features),
+        "stamp_s": None if waypoint.stamp_s is None else _length(waypoint.stamp_s),
+        "recorded_at": None if time is None else time.isoformat(timespec="seconds"),
+    }
+
+
+def find_misspelt_keys(data: Data) -> Iterator[tuple[str, str]]:
+    """Gives unknown keys that look like known ones, each with the known one."""
+    if not isinstance(data, dict):
+        return
+    yield from _lookalikes(data, _WAYPOINT_KEYS)
+    for key in ("safety_landmarks", "functional_landmarks"):
+        landmarks = data.get(key)
+        for landmark in landmarks if isinstance(landmarks, list) else []:
+            yield from _lookalikes(landmark, _LANDMARK_KEYS)
+
+
+def find_misspelt_keys_of_file(data: Data) -> Iterator[tuple[str, str]]:
+    """Gives unknown keys beside the records that look like known ones."""
+    yield from _lookalikes(data, _FILE_KEYS)
+
+
+def fault_in(node: Node, error: ValidationError) -> TextError:
+    """Gives the first thing that is wrong with a record, and where it stands."""
+    first, *others = error.errors()
+    place, path = _locate(node, first["loc"])
+    shown = f", '{first['input']}'," if isinstance(first["input"], str) else ""
+    expected = _EXPECTED.get(first["type"], f"is wrong: {first['msg']}")
+    more = f" {len(others)} more faults follow in this record." if others else ""
+    example = _EXAMPLES.get(str(first["loc"][0]) if first["loc"] else "", _EXAMPLES["name"])
+    return TextError(
+        f"{path}{shown} {expected}.{more}", hint=f"Write it like `{example}`.", offset=place.start
+    )
+
+
+def _locate(node: Node, location: tuple[int | str, ...]) -> tuple[Node, str]:
+    """Gives the innermost node on the way to a fault, and the whole way in words."""
+    path = "The record"
+    for step in location:
+        path = str(step) if path == "The record" else f"{path}.{step}"
+        if isinstance(node, MappingNode):
+            node = node.find_value(str(step)) or node
+        elif isinstance(node, ListNode) and isinstance(step, int):
+            node = node.items[step]
+    return node, path
+
+
+def _lookalikes(data: Data, known_keys: frozenset[str]) -> Iterator[tuple[str, str]]:
+    if not isinstance(data, dict) or data.keys() <= known_keys:
+        return
+    for key in data:
+        if key not in known_keys:
+            for known in difflib.get_close_matches(key, sorted(known_keys), n=1, cutoff=0.7):
+                yield key, known
+
+
+def _landmark_data(landmark: Landmark) -> Data:
+    entries: dict[str, Data] = {
+        "label": landmark.label,
+        "bearing_deg": None if landmark.bearing_rad is None else _angle(landmark.bearing_rad),
+        "range_m": None if landmark.range_m is None else _length(landmark.range_m),
+        "purpose": landmark.purpose,
+        "note": landmark.note,
+    }
+    said = [key for key, value in entries.items() if value is not None]
+    return landmark.label if said == ["label"] else {key: entries[key] for key in said}
+
+
+def _length(value: float) -> str:
+    return _decimals(value, 3)
+
+
+def _angle(angle_rad: float) -> str:
+    degrees = round(math.degrees(wrap_angle(angle_rad)), 2)
+    return _decimals(180.0 if degrees == -180.0 else degrees, 2)
+
+
+def _decimals(value: float, n_decimals: int) -> str:
+    """Gives a number with one decimal less where that one is a zero: 1.20, 1.205, 90.0."""
+    # Adding zero turns -0.0 into 0.0.
+    text = f"{round(value, n_decimals) + 0.0:.{n_decimals}f}"
+    return text.removesuffix("0")
