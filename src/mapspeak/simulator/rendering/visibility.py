@@ -1,0 +1,224 @@
+"""Which triangle each pixel shows: a depth buffer filled tile by tile, from coarse to fine.
+
+At each level, every triangle is paired with the tiles that it may touch. A triangle that covers a
+whole tile hides all that lies behind it there, so most of what is hidden falls away before any
+pixel is looked at. What is left at the finest level is compared pixel by pixel.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.simulator.rendering.projection import (
+    FloatArray,
+    IntArray,
+    Projection,
+    Viewpoint,
+    find_in_view,
+    project,
+    widen,
+)
+from mapspeak.simulator.rendering.scene import Scene
+
+__all__ = ["Visibility", "find_nearest", "look"]
+
+FINE_PX = 8
+COARSE_PX = 32
+NOTHING = -1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Visibility:
+    """What each pixel shows.
+
+    Attributes:
+        triangles: Which triangles of the scene may be seen, shape (n,).
+        edges: Their edge functions, as in `Projection`, shape (n, 3, 3).
+        rows: Which of these each pixel shows, shape (height, width); -1 for nothing.
+        inverse_depth: One over the depth along the optical axis, 1/m, likewise; 0 for nothing.
+    """
+
+    triangles: IntArray
+    edges: FloatArray
+    rows: NDArray[np.int32]
+    inverse_depth: NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pairs:
+    """Triangles and the tiles they may touch.
+
+    Attributes:
+        rows: Of the projection.
+        columns_px: The left edge of the tile.
+        lines_px: The top edge of the tile.
+        covers: The triangle fills the tile.
+    """
+
+    rows: IntArray
+    columns_px: IntArray
+    lines_px: IntArray
+    covers: NDArray[np.bool_]
+
+    def chosen(self, which: NDArray[np.bool_] | IntArray) -> "_Pairs":
+        return _Pairs(
+            self.rows[which], self.columns_px[which], self.lines_px[which], self.covers[which]
+        )
+
+
+def look(scene: Scene, viewpoint: Viewpoint) -> Visibility:
+    """Gives what each pixel of a view shows."""
+    in_view = find_in_view(scene.group_centres, scene.group_radii_m, viewpoint)
+    chosen = np.flatnonzero(in_view[scene.groups])
+    projection = project(scene.triangles.corners[chosen], viewpoint)
+    rows, inverse_depth = find_nearest(projection, viewpoint)
+    return Visibility(chosen[projection.triangles], projection.edges, rows, inverse_depth)
+
+
+def find_nearest(
+    projection: Projection, viewpoint: Viewpoint
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Gives which row of a projection is nearest at each pixel, and one over its depth."""
+    pairs = _pair_with_tiles(projection, viewpoint)
+    return _compare_pixels(pairs, projection.edges, viewpoint)
+
+
+def _pair_with_tiles(projection: Projection, viewpoint: Viewpoint) -> _Pairs:
+    """Gives each triangle with the fine tiles in which it may be the nearest."""
+    edges, bounds_px = projection.edges, projection.bounds_px
+    wide = widen(edges)
+    pairs = _drop_missed(_pair_with_coarse_tiles(bounds_px), wide, COARSE_PX)
+    pairs = _drop_hidden(pairs, edges, viewpoint, COARSE_PX)
+    pairs = _drop_missed(_drop_outside(_split(pairs), bounds_px), wide, FINE_PX)
+    return _drop_hidden(pairs, edges, viewpoint, FINE_PX)
+
+
+def _pair_with_coarse_tiles(bounds_px: FloatArray) -> _Pairs:
+    low = np.floor(bounds_px[:, :2] / COARSE_PX).astype(np.intp)
+    high = np.ceil(bounds_px[:, 2:] / COARSE_PX).astype(np.intp)
+    size = np.maximum(high - low, 1)
+    n_tiles = size[:, 0] * size[:, 1]
+    rows = np.repeat(np.arange(len(bounds_px)), n_tiles)
+    nth = np.arange(len(rows)) - np.repeat(np.cumsum(n_tiles) - n_tiles, n_tiles)
+    line, column = np.divmod(nth, size[rows, 0])
+    columns_px = (low[rows, 0] + column) * COARSE_PX
+    lines_px = (low[rows, 1] + line) * COARSE_PX
+    return _Pairs(rows, columns_px, lines_px, np.zeros(len(rows), dtype=bool))
+
+
+def _split(pairs: _Pairs) -> _Pairs:
+    """Gives the fine tiles of each coarse one."""
+    offsets = np.arange(0, COARSE_PX, FINE_PX)
+    down, right = (grid.ravel() for grid in np.meshgrid(offsets, offsets, indexing="ij"))
+    return _Pairs(
+        np.repeat(pairs.rows, len(down)),
+        (pairs.columns_px[:, None] + right).ravel(),
+        (pairs.lines_px[:, None] + down).ravel(),
+        np.repeat(pairs.covers, len(down)),
+    )
+
+
+def _drop_outside(pairs: _Pairs, bounds_px: FloatArray) -> _Pairs:
+    """Drops the tiles beside a triangle's bounds."""
+    left, top, right, bottom = bounds_px.T
+    rows = pairs.rows
+    touches = pairs.covers | (
+        (pairs.columns_px + FINE_PX > left[rows])
+        & (pairs.columns_px < right[rows])
+        & (pairs.lines_px + FINE_PX > top[rows])
+        & (pairs.lines_px < bottom[rows])
+    )
+    return pairs.chosen(touches)
+
+
+def _drop_missed(pairs: _Pairs, edges: FloatArray, tile_px: int) -> _Pairs:
+    """Drops pairs whose tile lies wholly beyond an edge, and notes which tiles are covered."""
+    touches = np.ones(len(pairs.rows), dtype=bool)
+    covers = np.ones(len(pairs.rows), dtype=bool)
+    for i in range(3):
+        lowest, highest = _range_on_tiles(edges[:, i], pairs, tile_px)
+        touches &= highest >= 0
+        covers &= lowest >= 0
+    return _Pairs(pairs.rows, pairs.columns_px, pairs.lines_px, covers).chosen(touches)
+
+
+def _drop_hidden(pairs: _Pairs, edges: FloatArray, viewpoint: Viewpoint, tile_px: int) -> _Pairs:
+    """Drops pairs that lie behind a triangle which covers the tile."""
+    farthest, nearest = _range_on_tiles(edges.sum(axis=1), pairs, tile_px)
+    n_lines, n_columns = _count_tiles(viewpoint, tile_px)
+    tiles = pairs.lines_px // tile_px * n_columns + pairs.columns_px // tile_px
+    hidden_beyond = np.zeros(n_columns * n_lines)
+    np.maximum.at(hidden_beyond, tiles[pairs.covers], farthest[pairs.covers])
+    return pairs.chosen(nearest >= hidden_beyond[tiles])
+
+
+def _count_tiles(viewpoint: Viewpoint, tile_px: int) -> tuple[int, int]:
+    """Gives how many lines and columns of tiles hold the picture, in whole coarse tiles."""
+    n_lines, n_columns = (
+        -(-size_px // COARSE_PX) * (COARSE_PX // tile_px)
+        for size_px in (viewpoint.height_px, viewpoint.width_px)
+    )
+    return n_lines, n_columns
+
+
+def _range_on_tiles(
+    plane: FloatArray, pairs: _Pairs, tile_px: int
+) -> tuple[FloatArray, FloatArray]:
+    """Gives the least and greatest value of linear functions on the pixel centres of tiles."""
+    a, b, c = plane[pairs.rows].T
+    at_first = a * (pairs.columns_px + 0.5) + b * (pairs.lines_px + 0.5) + c
+    across, along = a * (tile_px - 1), b * (tile_px - 1)
+    lowest = at_first + np.minimum(across, 0) + np.minimum(along, 0)
+    highest = at_first + np.maximum(across, 0) + np.maximum(along, 0)
+    return lowest, highest
+
+
+def _compare_pixels(
+    pairs: _Pairs, edges: FloatArray, viewpoint: Viewpoint
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    n_lines, n_columns = _count_tiles(viewpoint, FINE_PX)
+    rows = np.full((n_columns * n_lines, FINE_PX, FINE_PX), NOTHING, dtype=np.int32)
+    nearest = np.zeros((n_columns * n_lines, FINE_PX, FINE_PX), dtype=np.float32)
+    tiles = pairs.lines_px // FINE_PX * n_columns + pairs.columns_px // FINE_PX
+    wide_edges, inverse_depth = widen(edges), edges.sum(axis=1)
+    for layer in _layers(tiles):
+        tile, row = tiles[layer], pairs.rows[layer]
+        depth = _on_pixels(inverse_depth[row], pairs, layer)
+        wins = depth > nearest[tile]
+        partial = np.flatnonzero(~pairs.covers[layer])
+        for i in range(3):
+            within = _on_pixels(wide_edges[row[partial], i], pairs, layer[partial]) >= 0
+            wins[partial] &= within
+        nearest[tile] = np.where(wins, depth, nearest[tile])
+        rows[tile] = np.where(wins, row[:, None, None].astype(np.int32), rows[tile])
+    shape = (n_lines, n_columns)
+    return _as_picture(rows, shape, viewpoint), _as_picture(nearest, shape, viewpoint)
+
+
+def _layers(tiles: IntArray) -> list[IntArray]:
+    """Splits pairs so that no tile comes twice in a layer."""
+    order = np.argsort(tiles, kind="stable")
+    ordered = tiles[order]
+    starts = np.flatnonzero(np.diff(ordered, prepend=-1))
+    rank = np.arange(len(tiles)) - np.repeat(starts, np.diff(starts, append=len(tiles)))
+    by_rank = np.argsort(rank, kind="stable")
+    ends = np.cumsum(np.bincount(rank)) if len(rank) else np.empty(0, dtype=np.intp)
+    return np.split(order[by_rank], ends[:-1]) if len(ends) else []
+
+
+def _on_pixels(plane: FloatArray, pairs: _Pairs, which: IntArray) -> NDArray[np.float32]:
+    """Gives linear functions at every pixel of their tiles, shape (n, tile, tile)."""
+    a, b, c = plane.T
+    at_corner = a * pairs.columns_px[which] + b * pairs.lines_px[which] + c
+    steps = np.arange(FINE_PX) + 0.5
+    along_line = (at_corner[:, None] + a[:, None] * steps).astype(np.float32)
+    down = (b[:, None] * steps).astype(np.float32)
+    return np.asarray(along_line[:, None, :] + down[:, :, None])
+
+
+def _as_picture(tiles: NDArray[Any], shape: tuple[int, int], viewpoint: Viewpoint) -> NDArray[Any]:
+    picture = tiles.reshape(*shape, FINE_PX, FINE_PX).swapaxes(1, 2)
+    flat = picture.reshape(shape[0] * FINE_PX, shape[1] * FINE_PX)
+    return flat[: viewpoint.height_px, : viewpoint.width_px]
