@@ -1,0 +1,386 @@
+"""Map files as Nav2's map_server reads them and its map_saver writes them: a .yaml and a picture.
+
+The rules are those of `nav2_map_server` since 2025: single precision, `occupied_thresh` and
+`free_thresh` themselves belong to occupied and free, transparent pixels are unknown. (Releases
+before that left out the equality and averaged transparency into the grey of trinary maps.)
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, ValidationError
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+from mapspeak.errors import MapError
+from mapspeak.geometry import Pose
+from mapspeak.spatial.grid import FREE_MAX, UNKNOWN, OccupancyGrid
+
+__all__ = [
+    "MAX_CELLS",
+    "LoadedMap",
+    "MapFileWarning",
+    "MapMode",
+    "load_map",
+    "load_picture",
+    "write_map",
+]
+
+Grey = NDArray[np.uint8]
+
+MAX_CELLS = 80_000_000
+"""About 8,900 x 8,900 cells, or 450 x 450 m at 5 cm."""
+
+_FREE, _OCCUPIED = 0, 100
+_UNKNOWN_GREY, _FREE_GREY, _OCCUPIED_GREY = 205, 254, 0
+_DEFAULT_OCCUPIED_THRESH, _DEFAULT_FREE_THRESH = 0.65, 0.196
+_SAVED_FREE_MAX, _SAVED_OCCUPIED_MIN = 25, 65
+_PICTURE_SUFFIXES = {".pgm", ".png", ".bmp", ".jpg", ".jpeg"}
+_PICTURE_FORMATS = ("PPM", "PNG", "BMP", "JPEG")
+_EXAMPLES = {
+    "image": "image: map.pgm",
+    "resolution": "resolution: 0.05",
+    "origin": "origin: [-10.0, -10.0, 0.0]",
+    "occupied_thresh": "occupied_thresh: 0.65",
+    "free_thresh": "free_thresh: 0.196",
+    "negate": "negate: 0",
+    "mode": "mode: trinary",
+}
+
+
+class MapMode(StrEnum):
+    """How the greys of a map's picture stand for occupancy.
+
+    Trinary: free, occupied or unknown. Scale: the same, and between the thresholds a probability.
+    Raw: the grey itself is the occupancy, and anything above 100 is unknown.
+    """
+
+    TRINARY = "trinary"
+    SCALE = "scale"
+    RAW = "raw"
+
+
+@dataclass(frozen=True, slots=True)
+class MapFileWarning:
+    """Something in a map file that loads, but hardly as its maker meant it.
+
+    Attributes:
+        message: What is odd, with numbers.
+        hint: What to change.
+    """
+
+    message: str
+    hint: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LoadedMap:
+    """A map from files; compared by identity.
+
+    Attributes:
+        grid: The map.
+        name: The file's name without its ending.
+        warnings: What deserves a second look.
+    """
+
+    grid: OccupancyGrid
+    name: str
+    warnings: tuple[MapFileWarning, ...]
+
+
+def _lowered(value: object) -> object:
+    return value.lower() if isinstance(value, str) else value
+
+
+class _Description(BaseModel):
+    """The .yaml beside a map's picture."""
+
+    model_config = ConfigDict(frozen=True)
+
+    image: str = Field(min_length=1)
+    resolution: FiniteFloat = Field(gt=0)
+    origin: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+    occupied_thresh: FiniteFloat
+    free_thresh: FiniteFloat
+    negate: bool
+    mode: Annotated[MapMode, BeforeValidator(_lowered)] = MapMode.TRINARY
+
+
+def load_map(path: Path) -> LoadedMap:
+    """Reads a map_server .yaml and the picture it names.
+
+    Raises:
+        MapError: A file is missing, damaged, too large, or says what cannot be.
+    """
+    description = _read_description(path)
+    grey, alpha = _read_picture(path.parent / description.image)
+    return _build_map(description, grey, alpha, path)
+
+
+def load_picture(path: Path, *, resolution_m: float, origin: Pose | None = None) -> LoadedMap:
+    """Reads a map's picture that has no .yaml: dark is occupied, 205 unknown, 254 and 255 free.
+
+    Raises:
+        MapError: The file is missing, damaged or too large, or the resolution is not positive.
+    """
+    grey, alpha = _read_picture(path)
+    pose = origin or Pose(0.0, 0.0, 0.0)
+    description = _Description.model_construct(
+        image=path.name,
+        resolution=resolution_m,
+        origin=(pose.x, pose.y, pose.yaw_rad),
+        occupied_thresh=_DEFAULT_OCCUPIED_THRESH,
+        free_thresh=_DEFAULT_FREE_THRESH,
+        negate=False,
+        mode=MapMode.TRINARY,
+    )
+    return _build_map(description, grey, alpha, path)
+
+
+def write_map(grid: OccupancyGrid, path: Path, *, mode: MapMode = MapMode.TRINARY) -> Path:
+    """Writes a map as map_saver does: the .yaml at the path, the picture beside it.
+
+    Trinary keeps free (up to 25), occupied (from 65) and unknown, the values between become
+    unknown. Scale and raw keep every value; scale needs a .png for its transparent pixels.
+
+    Returns:
+        The path of the picture.
+
+    Raises:
+        MapError: The path does not end in .yaml, or cannot be written.
+    """
+    if path.suffix not in {".yaml", ".yml"}:
+        raise MapError(
+            f"A map is written to a .yaml file, not to {path.name}.",
+            hint=f"Use {path.with_suffix('.yaml').name}; the picture gets the same name.",
+        )
+    picture_path = path.with_suffix(".png" if mode is MapMode.SCALE else ".pgm")
+    try:
+        _save_picture(grid, picture_path, mode)
+        _save_description(grid, path, picture_path.name, mode)
+    except OSError as error:
+        raise MapError(
+            f"The map cannot be written to {path}: {error.strerror or error}.",
+            hint="Choose a folder that exists and may be written to.",
+        ) from error
+    return picture_path
+
+
+def _build_map(description: _Description, grey: Grey, alpha: Grey | None, path: Path) -> LoadedMap:
+    """Gives the grid of a picture's greys; row 0 is the lowest line of the picture."""
+    occupancy_of = _occupancy_of_grey(description)
+    cells = occupancy_of[grey]
+    if alpha is not None and description.mode is not MapMode.RAW:
+        cells[alpha < 255] = UNKNOWN
+    x, y, yaw_rad = description.origin
+    grid = OccupancyGrid(
+        cells=cells[::-1], resolution_m=description.resolution, origin=Pose(x, y, yaw_rad)
+    )
+    warnings = _find_warnings(description, occupancy_of, grey, grid)
+    return LoadedMap(grid=grid, name=path.stem, warnings=warnings)
+
+
+def _occupancy_of_grey(description: _Description) -> NDArray[np.int8]:
+    """Gives the occupancy of each of the 256 greys, in the single precision map_server uses."""
+    shade = np.arange(256, dtype=np.float32) / np.float32(255)
+    if description.mode is MapMode.RAW:
+        greys = np.arange(256)
+        return np.where(greys <= _OCCUPIED, greys, UNKNOWN).astype(np.int8)
+    occupied_ratio = shade if description.negate else np.float32(1) - shade
+    free_thresh = np.float32(description.free_thresh)
+    is_occupied = occupied_ratio >= np.float32(description.occupied_thresh)
+    is_free = occupied_ratio <= free_thresh
+    between = np.full(256, UNKNOWN, dtype=np.float32)
+    if description.mode is MapMode.SCALE and not (is_occupied | is_free).all():
+        span = np.float32(description.occupied_thresh - description.free_thresh)
+        between = np.floor((occupied_ratio - free_thresh) / span * np.float32(100) + 0.5)
+    occupancy = np.where(is_free, _FREE, np.where(is_occupied, _OCCUPIED, between))
+    return occupancy.astype(np.int8)
+
+
+def _find_warnings(
+    description: _Description,
+    occupancy_of: NDArray[np.int8],
+    grey: Grey,
+    grid: OccupancyGrid,
+) -> tuple[MapFileWarning, ...]:
+    warnings = []
+    n_unknown_grey = int(np.count_nonzero(grey == _UNKNOWN_GREY))
+    is_trinary = description.mode is MapMode.TRINARY
+    if is_trinary and n_unknown_grey and 0 <= occupancy_of[_UNKNOWN_GREY] <= FREE_MAX:
+        warnings.append(
+            MapFileWarning(
+                f"{n_unknown_grey:,} cells ({n_unknown_grey / grey.size:.0%}) have the grey 205 "
+                f"that map_saver writes for unknown, but load as free: free_thresh is "
+                f"{description.free_thresh:g}.",
+                "If nobody has seen those places, set free_thresh: 0.196.",
+            )
+        )
+    is_crossed = description.free_thresh >= description.occupied_thresh
+    if is_crossed and description.mode is not MapMode.RAW:
+        warnings.append(
+            MapFileWarning(
+                f"free_thresh {description.free_thresh:g} is not below occupied_thresh "
+                f"{description.occupied_thresh:g}.",
+                "The usual values are free_thresh: 0.196 and occupied_thresh: 0.65.",
+            )
+        )
+    if not grid.free.any():
+        warnings.append(
+            MapFileWarning(
+                "No cell of the map is free.",
+                "Check negate and the thresholds: with negate: 0 white is free.",
+            )
+        )
+    return tuple(warnings)
+
+
+def _read_description(path: Path) -> _Description:
+    if path.suffix.lower() in _PICTURE_SUFFIXES:
+        raise MapError(
+            f"{path.name} is a picture, not the .yaml of a map.",
+            hint="Give the .yaml beside it, or the picture with its resolution in metres per cell.",
+        )
+    document = _parse_yaml(path)
+    try:
+        return _Description.model_validate(dict(document))
+    except ValidationError as error:
+        raise _say_wrong_value(path, document, error) from error
+
+
+def _parse_yaml(path: Path) -> CommentedMap:
+    try:
+        document = YAML(typ="rt", pure=True).load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise MapError(
+            f"There is no map file {path}.", hint="Check the path of the .yaml file."
+        ) from error
+    except OSError as error:
+        raise MapError(
+            f"{path} cannot be read: {error.strerror or error}.",
+            hint="Give the path of a .yaml file that may be read.",
+        ) from error
+    except (UnicodeDecodeError, YAMLError) as error:
+        raise MapError(
+            f"{path.name}{_line_of(error)} is not YAML.",
+            hint="A map's .yaml holds lines such as 'resolution: 0.05'.",
+        ) from error
+    if not isinstance(document, CommentedMap):
+        raise MapError(
+            f"{path.name} does not describe a map: it has no keys.",
+            hint="It needs image, resolution, origin, negate, occupied_thresh and free_thresh.",
+        )
+    return document
+
+
+def _line_of(error: Exception) -> str:
+    mark = error.problem_mark if isinstance(error, MarkedYAMLError) else None
+    return f" line {mark.line + 1}" if mark is not None else ""
+
+
+def _say_wrong_value(path: Path, document: CommentedMap, error: ValidationError) -> MapError:
+    """Gives the first fault pydantic found, with the line of the file it stands in."""
+    fault = error.errors()[0]
+    key = str(fault["loc"][0])
+    if key not in document:
+        return MapError(
+            f"{path.name} has no {key}.",
+            hint=f"Add a line for it, such as '{_EXAMPLES[key]}'; map_server refuses it too.",
+        )
+    line = document.lc.value(key)[0] + 1
+    return MapError(
+        f"{path.name} line {line}: {key} cannot be {document[key]!r}: {fault['msg']}.",
+        hint=f"Write a line such as '{_EXAMPLES[key]}'.",
+    )
+
+
+def _read_picture(path: Path) -> tuple[Grey, Grey | None]:
+    """Gives the greys of a picture, and its alpha channel if it has one."""
+    try:
+        with Image.open(path, formats=_PICTURE_FORMATS) as picture:
+            _check_size(path, picture.width, picture.height)
+            return _channels(picture)
+    except FileNotFoundError as error:
+        raise MapError(
+            f"The map's picture {path} is missing.",
+            hint="Put it there, or correct the line 'image:' of the .yaml.",
+        ) from error
+    except (Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
+        raise _say_too_large(path, "far more") from error
+    except (OSError, SyntaxError, ValueError, EOFError) as error:
+        raise MapError(
+            f"The map's picture {path.name} cannot be read: {error}.",
+            hint="It may be cut off or of another type; a .pgm or .png is wanted.",
+        ) from error
+
+
+def _check_size(path: Path, width: int, height: int) -> None:
+    if width * height > MAX_CELLS:
+        raise _say_too_large(path, f"{width:,} x {height:,}")
+
+
+def _say_too_large(path: Path, size: str) -> MapError:
+    return MapError(
+        f"The map's picture {path.name} has {size} pixels; the limit is {MAX_CELLS:,}.",
+        hint="Cut the map to the part that is needed, or make it with a coarser resolution.",
+    )
+
+
+def _channels(picture: Image.Image) -> tuple[Grey, Grey | None]:
+    """Gives grey and alpha of any kind of picture; colours count by their brightness (Rec. 601)."""
+    if picture.mode.startswith("I"):
+        wide = np.asarray(picture).astype(np.int64)
+        return ((wide * 255 + 32767) // 65535).astype(np.uint8), None
+    if picture.has_transparency_data:
+        with_alpha = picture.convert("RGBA")
+        return np.asarray(with_alpha.convert("L")), np.asarray(with_alpha.getchannel("A"))
+    return np.asarray(picture.convert("L")), None
+
+
+def _save_picture(grid: OccupancyGrid, path: Path, mode: MapMode) -> None:
+    from_top = grid.cells[::-1]
+    grey = _grey_of_occupancy(mode)[from_top.astype(np.intp)]
+    if mode is MapMode.SCALE:
+        alpha = np.where(from_top == UNKNOWN, 0, 255).astype(np.uint8)
+        Image.fromarray(np.stack([grey, grey, grey, alpha], axis=2)).save(path)
+    else:
+        header = f"P5\n{grid.n_cols} {grid.n_rows}\n255\n"
+        path.write_bytes(header.encode("ascii") + grey.tobytes())
+
+
+def _grey_of_occupancy(mode: MapMode) -> Grey:
+    """Gives the grey of each occupancy from 0 to 100, and last, at index -1, that of unknown."""
+    occupancy = np.arange(101)
+    if mode is MapMode.RAW:
+        greys, unknown = occupancy, 255
+    elif mode is MapMode.SCALE:
+        greys, unknown = (255 * (100 - occupancy) + 50) // 100, 128
+    else:
+        is_free, is_occupied = occupancy <= _SAVED_FREE_MAX, occupancy >= _SAVED_OCCUPIED_MIN
+        between = np.where(is_occupied, _OCCUPIED_GREY, _UNKNOWN_GREY)
+        greys, unknown = np.where(is_free, _FREE_GREY, between), _UNKNOWN_GREY
+    return np.append(greys, unknown).astype(np.uint8)
+
+
+def _save_description(grid: OccupancyGrid, path: Path, image: str, mode: MapMode) -> None:
+    """Writes the .yaml; in scale mode with thresholds that leave every value as it is."""
+    origin = CommentedSeq(float(v) for v in (grid.origin.x, grid.origin.y, grid.origin.yaw_rad))
+    origin.fa.set_flow_style()
+    is_scale = mode is MapMode.SCALE
+    document = {
+        "image": image,
+        "mode": mode.value,
+        "resolution": float(grid.resolution_m),
+        "origin": origin,
+        "negate": 0,
+        "occupied_thresh": 1.0 if is_scale else _DEFAULT_OCCUPIED_THRESH,
+        "free_thresh": 0.0 if is_scale else _DEFAULT_FREE_THRESH,
+    }
+    with path.open("w", encoding="utf-8") as file:
+        YAML(pure=True).dump(document, file)

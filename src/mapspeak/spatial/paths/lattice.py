@@ -1,0 +1,150 @@
+"""The cells a robot's centre may be in and the moves between them.
+
+On large maps two by two cells make one cell of the lattice. It has a move where the fine cells
+have one, so that nothing opens or closes by looking coarser.
+"""
+
+import dataclasses
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.geometry import Point
+from mapspeak.spatial.grid import IntArray, Mask, OccupancyGrid
+from mapspeak.spatial.paths.clearance import Clearance, clearance_m
+from mapspeak.spatial.paths.wavefront import BITS, Moves
+
+__all__ = ["Lattice", "build_coarse_lattice", "build_fine_lattice", "moves_within", "restrict"]
+
+Number = TypeVar("Number", np.bool_, np.float32)
+
+LARGE_MAP = 500_000
+"""Number of cells from which distances are computed on two by two cells."""
+_EAST, _NORTH, _WEST, _SOUTH, _NORTH_EAST, _NORTH_WEST, _SOUTH_WEST, _SOUTH_EAST = BITS
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Lattice:
+    """A grid's passable cells, perhaps two by two, and where one can go from each.
+
+    Attributes:
+        grid: The map it belongs to.
+        passable: True where the robot's centre may be; the shape of the map.
+        factor: How many of the map's cells make the side of one of the lattice.
+        moves: The directions in which each lattice cell may be left, as bits.
+        is_open: True where a lattice cell can be entered.
+        clearance_m: The largest within each lattice cell.
+    """
+
+    grid: OccupancyGrid
+    passable: Mask
+    factor: int
+    moves: Moves
+    is_open: Mask
+    clearance_m: Clearance
+
+    @property
+    def cell_size_m(self) -> float:
+        """The side of one lattice cell."""
+        return self.grid.resolution_m * self.factor
+
+    @property
+    def n_cols(self) -> int:
+        """Lattice cells per row."""
+        return int(self.moves.shape[1])
+
+    def index_at(self, point: Point) -> int | None:
+        """Gives the flat index of the cell at a point; None where the robot cannot be."""
+        cell = self.grid.cell_at(point)
+        if not (self.grid.contains(cell) and self.passable[cell.row, cell.col]):
+            return None
+        index = int(self.indices(np.array([cell.row]), np.array([cell.col]))[0])
+        return index if self.is_open.flat[index] else None
+
+    def indices(self, rows: IntArray, cols: IntArray) -> IntArray:
+        """Gives the flat indices of the lattice cells that hold cells of the map."""
+        return (rows // self.factor) * self.n_cols + cols // self.factor
+
+
+def build_fine_lattice(grid: OccupancyGrid, radius_m: float) -> Lattice:
+    """Gives the lattice with one cell for each cell of the map."""
+    clearance = clearance_m(grid)
+    passable = grid.free & (clearance >= radius_m)
+    return Lattice(
+        grid=grid,
+        passable=passable,
+        factor=1,
+        moves=moves_within(passable),
+        is_open=passable,
+        clearance_m=clearance,
+    )
+
+
+def build_coarse_lattice(grid: OccupancyGrid, radius_m: float) -> Lattice:
+    """Gives the lattice that suits the map's size: of two by two cells where it is large."""
+    fine = build_fine_lattice(grid, radius_m)
+    return fine if grid.cells.size < LARGE_MAP else _halve(fine)
+
+
+def restrict(lattice: Lattice, mask: Mask) -> Lattice:
+    """Gives a fine lattice that can be entered inside the mask only."""
+    is_open = lattice.is_open & mask
+    return dataclasses.replace(lattice, is_open=is_open, moves=moves_within(is_open))
+
+
+def moves_within(mask: Mask) -> Moves:
+    """Gives the moves between neighbouring cells of the mask."""
+    return _moves(mask[:, :-1] & mask[:, 1:], mask[:-1] & mask[1:])
+
+
+def _halve(fine: Lattice) -> Lattice:
+    n_rows, n_cols = fine.passable.shape
+    padding = ((0, n_rows % 2), (0, n_cols % 2))
+    low_left, low_right, high_left, high_right = _quarters(np.pad(fine.passable, padding))
+    is_open = _hang_together(low_left, low_right, high_left, high_right)
+    to_east = (low_right[:, :-1] & low_left[:, 1:]) | (high_right[:, :-1] & high_left[:, 1:])
+    to_north = (high_left[:-1] & low_left[1:]) | (high_right[:-1] & low_right[1:])
+    clearances = _quarters(np.pad(fine.clearance_m, padding))
+    return Lattice(
+        grid=fine.grid,
+        passable=fine.passable,
+        factor=2,
+        moves=_moves(
+            to_east & is_open[:, :-1] & is_open[:, 1:], to_north & is_open[:-1] & is_open[1:]
+        ),
+        is_open=is_open,
+        clearance_m=np.maximum.reduce(clearances),
+    )
+
+
+def _quarters(values: NDArray[Number]) -> tuple[NDArray[Number], ...]:
+    """Gives the low left, low right, high left and high right cell of each two by two cells."""
+    return values[0::2, 0::2], values[0::2, 1::2], values[1::2, 0::2], values[1::2, 1::2]
+
+
+def _hang_together(low_left: Mask, low_right: Mask, high_left: Mask, high_right: Mask) -> Mask:
+    """True where there are passable ones among four cells, and they touch by their sides."""
+    rising = low_left & high_right & ~low_right & ~high_left
+    falling = low_right & high_left & ~low_left & ~high_right
+    some = low_left | low_right | high_left | high_right
+    return some & ~(rising | falling)
+
+
+def _moves(to_east: Mask, to_north: Mask) -> Moves:
+    """Gives all moves from those to the east and to the north.
+
+    A diagonal move needs both ways around its corner, so that no wall's corner is cut.
+    """
+    moves = np.zeros((to_east.shape[0], to_north.shape[1]), dtype=np.uint8)
+    moves[:, :-1] |= to_east * _EAST
+    moves[:, 1:] |= to_east * _WEST
+    moves[:-1] |= to_north * _NORTH
+    moves[1:] |= to_north * _SOUTH
+    is_square = to_east[:-1] & to_east[1:] & to_north[:, :-1] & to_north[:, 1:]
+    moves[:-1, :-1] |= is_square * _NORTH_EAST
+    moves[:-1, 1:] |= is_square * _NORTH_WEST
+    moves[1:, 1:] |= is_square * _SOUTH_WEST
+    moves[1:, :-1] |= is_square * _SOUTH_EAST
+    return moves

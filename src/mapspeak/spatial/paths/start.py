@@ -1,0 +1,56 @@
+"""Where a search begins, also when the robot seems to stand where it cannot be.
+
+A robot that has just started knows nothing of the floor below it, and one that has parked at a
+wall is nearer to it than a planner likes. Both hop to passable cells near by first.
+"""
+
+import numpy as np
+
+from mapspeak.geometry import Point
+from mapspeak.spatial.grid import Cell, IntArray
+from mapspeak.spatial.paths.lattice import Lattice, moves_within
+from mapspeak.spatial.paths.wavefront import Costs, Seeds, spread
+
+__all__ = ["find_seeds"]
+
+HOP_MARGIN_M = 0.5
+"""How much further than its own radius a robot may hop."""
+HOP_COST = 3.0
+"""A metre of hop is worth this much of a way: enough to get into passable cells soon."""
+WALL_COST = 30.0
+"""A metre of hop through a wall: out of it the near way, never through to the other side."""
+
+
+def find_seeds(lattice: Lattice, start: Point, *, radius_m: float) -> Seeds | None:
+    """Gives the lattice cells where a way from the start begins; None where there are none."""
+    index = lattice.index_at(start)
+    if index is not None:
+        return Seeds(np.array([index]), np.zeros(1, dtype=np.float32))
+    cell = lattice.grid.cell_at(start)
+    if not lattice.grid.contains(cell):
+        return None
+    rows, cols, costs = _hops(lattice, cell, reach_m=radius_m + HOP_MARGIN_M)
+    indices = lattice.indices(rows, cols)
+    is_open = lattice.is_open.ravel()[indices]
+    return _cheapest(indices[is_open], costs[is_open]) if is_open.any() else None
+
+
+def _hops(lattice: Lattice, start: Cell, *, reach_m: float) -> tuple[IntArray, IntArray, Costs]:
+    """Gives the passable cells in reach of a hop, and what the hop costs in lattice cells."""
+    reach = int(np.ceil(reach_m / lattice.grid.resolution_m))
+    top, left = max(start.row - reach, 0), max(start.col - reach, 0)
+    window = (slice(top, start.row + reach + 1), slice(left, start.col + reach + 1))
+    occupied = lattice.grid.occupied[window]
+    weights = np.where(occupied, WALL_COST, HOP_COST).astype(np.float32)
+    at = (start.row - top) * occupied.shape[1] + start.col - left
+    seed = Seeds(np.array([at]), np.zeros(1, dtype=np.float32))
+    spent = spread(moves_within(np.ones_like(occupied)), weights, seed).reshape(occupied.shape)
+    rows, cols = np.nonzero(lattice.passable[window] & (spent <= HOP_COST * reach))
+    return rows + top, cols + left, spent[rows, cols] / np.float32(lattice.factor)
+
+
+def _cheapest(indices: IntArray, costs: Costs) -> Seeds:
+    """Gives each index once, with its least cost."""
+    order = np.lexsort((costs, indices))
+    unique, first = np.unique(indices[order], return_index=True)
+    return Seeds(unique, costs[order][first])

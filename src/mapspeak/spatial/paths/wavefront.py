@@ -1,0 +1,131 @@
+"""Least costs over a graph of cells, a whole ring of cells per step.
+
+Every move costs at least one, so all cells whose cost lies between k and k + 1 are settled once
+the rings before are, and can be handled together: Dijkstra's algorithm with buckets as wide as the
+shortest edge (Denardo and Fox, "Shortest-route methods: 1. Reaching, pruning, and buckets", 1979).
+A ring is a few numpy calls, which is what makes this fast without compiled code of our own.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.spatial.grid import IntArray
+
+__all__ = ["BITS", "STEPS", "Costs", "Moves", "Seeds", "offsets", "spread"]
+
+Costs = NDArray[np.float32]
+Moves = NDArray[np.uint8]
+
+BITS = (1 << np.arange(8)).astype(np.uint8)
+"""The bit of each direction in a cell's moves: east, north, west, south, then the diagonals
+north-east, north-west, south-west, south-east. North is the next row."""
+STEPS = np.array([1.0] * 4 + [math.sqrt(2.0)] * 4, dtype=np.float32)
+"""The length of a move in each direction, in cells."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seeds:
+    """Where a wavefront starts.
+
+    Attributes:
+        cells: Flat indices, each once.
+        costs: What has been spent to be there.
+    """
+
+    cells: IntArray
+    costs: Costs
+
+
+def offsets(n_cols: int) -> IntArray:
+    """Gives the change of the flat index for each direction."""
+    east, north = 1, n_cols
+    straight = [east, north, -east, -north]
+    diagonal = [north + east, north - east, -north - east, -north + east]
+    return np.array(straight + diagonal, dtype=np.intp)
+
+
+def spread(
+    moves: Moves, weights: Costs, seeds: Seeds, *, goal: int | None = None, limit: float = math.inf
+) -> Costs:
+    """Gives the least cost to every cell, flat; infinite where the wave does not come.
+
+    Args:
+        moves: Shape (rows, cols); the directions in which each cell may be left. No move may leave
+            the array, so the outermost cells have none outwards.
+        weights: What a unit of way costs in each cell, at least 1; a move costs its length times
+            the mean of both ends.
+        seeds: Where to start.
+        goal: Stop once this cell is settled.
+        limit: Stop beyond this cost.
+    """
+    front = _Front(moves, weights.ravel(), seeds)
+    while (ring := front.next_ring()) is not None:
+        if front.level > limit or (goal is not None and front.is_settled[goal]):
+            break
+        front.advance(ring)
+    return front.costs
+
+
+class _Front:
+    """The wave under way: costs so far, and the cells waiting in their buckets."""
+
+    def __init__(self, moves: Moves, weights: Costs, seeds: Seeds) -> None:
+        n_cells = moves.size
+        self.costs: Costs = np.full(n_cells, np.inf, dtype=np.float32)
+        self.is_settled = np.zeros(n_cells, dtype=np.bool_)
+        self.level = -1
+        self._moves = moves.ravel()
+        self._weights = weights
+        self._is_weighted = bool((weights != 1).any())
+        self._offsets = offsets(moves.shape[1])[:, None]
+        self._last_writer = np.zeros(n_cells, dtype=np.intp)
+        self._waiting: dict[int, list[IntArray]] = {}
+        self.costs[seeds.cells] = seeds.costs
+        self._wait(seeds.cells, seeds.costs)
+
+    def next_ring(self) -> IntArray | None:
+        """Takes the cells of the next bucket that holds any, each once, and settles them."""
+        while self._waiting:
+            self.level = min(self._waiting)
+            cells = np.concatenate(self._waiting.pop(self.level))
+            cells = self._unique(cells[~self.is_settled[cells]])
+            if cells.size:
+                self.is_settled[cells] = True
+                return cells
+        return None
+
+    def advance(self, ring: IntArray) -> None:
+        """Moves from the ring's cells to their neighbours where that is cheaper than so far."""
+        costs = self.costs[ring] + self._move_costs(ring)
+        targets = ring + self._offsets
+        is_better = ((self._moves[ring] & BITS[:, None]) != 0) & (
+            costs < self.costs.take(targets, mode="clip")
+        )
+        reached = targets[is_better]
+        if reached.size:
+            np.minimum.at(self.costs, reached, costs[is_better])
+            self._wait(reached, self.costs[reached])
+
+    def _move_costs(self, ring: IntArray) -> Costs:
+        if not self._is_weighted:
+            return STEPS[:, None]
+        ends = self._weights.take(ring + self._offsets, mode="clip")
+        means = (self._weights[ring] + ends) * np.float32(0.5)
+        return np.asarray(STEPS[:, None] * means, dtype=np.float32)
+
+    def _wait(self, cells: IntArray, costs: Costs) -> None:
+        buckets = costs.astype(np.intp)
+        first, last = int(buckets.min()), int(buckets.max())
+        for bucket in range(first, last + 1):
+            chosen = cells if first == last else cells[buckets == bucket]
+            if chosen.size:
+                self._waiting.setdefault(bucket, []).append(chosen)
+
+    def _unique(self, cells: IntArray) -> IntArray:
+        order = np.arange(cells.size)
+        self._last_writer[cells] = order
+        is_last = self._last_writer[cells] == order
+        return np.asarray(cells[is_last])

@@ -1,0 +1,179 @@
+"""Drawing with ink: smooth polygons, strokes and text on a canvas of palette numbers.
+
+Coordinates are real pixels: the middle of the pixel in the top left corner is (0.5, 0.5).
+Everything is drawn the same way: a patch says how much of each pixel is covered, which becomes a
+step between white and the colour, on a white halo that keeps it apart from what lies below.
+"""
+
+import functools
+import unicodedata
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from mapspeak.errors import MapspeakError
+from mapspeak.spatial.grid import FloatArray
+from mapspeak.spatial.picture.palette import N_RAMP_LEVELS, PAPER, RAMPS, Canvas, Colour
+
+__all__ = [
+    "LABEL_SIZE_PX",
+    "NUMBER_SIZE_PX",
+    "clip_segment",
+    "draw_polygon",
+    "draw_stroke",
+    "stamp",
+    "text_patch",
+]
+
+
+LABEL_SIZE_PX = 16
+NUMBER_SIZE_PX = 14
+_SHIFT = 4
+_HALO_FROM = 96
+_INK_FROM = 24
+_TALL_AND_DEEP = "Hg|"
+
+
+def draw_polygon(canvas: Canvas, corners: FloatArray, colour: Colour, *, halo_px: int = 2) -> None:
+    """Fills a polygon with corners (u, v) of shape (n, 2)."""
+    patch, top_left = _patch_around(corners, 2)
+    cv2.fillPoly(patch, [_in_subpixels(corners, top_left)], (255,), cv2.LINE_AA, _SHIFT)
+    stamp(canvas, patch, top_left, colour, halo_px=halo_px)
+
+
+def draw_stroke(
+    canvas: Canvas, points: FloatArray, colour: Colour, *, width_px: int, halo_px: int = 1
+) -> None:
+    """Draws a line through points (u, v) of shape (n, 2) that lie on the canvas or near it."""
+    patch, top_left = _patch_around(points, width_px + 2)
+    cv2.polylines(
+        patch,
+        [_in_subpixels(points, top_left)],
+        isClosed=False,
+        color=(255,),
+        thickness=width_px,
+        lineType=cv2.LINE_AA,
+        shift=_SHIFT,
+    )
+    stamp(canvas, patch, top_left, colour, halo_px=halo_px)
+
+
+def clip_segment(start: FloatArray, end: FloatArray, size: FloatArray) -> FloatArray | None:
+    """Gives the part of a segment inside the box from (0, 0) to size, shape (2, 2), or None.
+
+    The method is that of Liang and Barsky (1984): the parameters at which each side is crossed.
+    """
+    step = end - start
+    first, last = 0.0, 1.0
+    for axis in (0, 1):
+        if step[axis] == 0:
+            if not 0 <= start[axis] <= size[axis]:
+                return None
+            continue
+        crossings = sorted((-start[axis] / step[axis], (size[axis] - start[axis]) / step[axis]))
+        first, last = max(first, crossings[0]), min(last, crossings[1])
+    return np.stack([start + first * step, start + last * step]) if first < last else None
+
+
+def text_patch(text: str, size_px: int) -> Canvas:
+    """Gives lines of text as a patch, centred; all single lines of one size are equally high."""
+    rows = [_line_patch(line, size_px) for line in text.split("\n")]
+    if len(rows) == 1:
+        return rows[0]
+    width = max(row.shape[1] for row in rows)
+    return np.concatenate([_centred(row, width) for row in rows])
+
+
+def stamp(
+    canvas: Canvas,
+    patch: Canvas,
+    top_left: tuple[int, int],
+    colour: Colour = Colour.INK,
+    *,
+    halo_px: int = 2,
+) -> None:
+    """Puts a patch on the canvas with its halo, cut off where it leaves the canvas.
+
+    Args:
+        canvas: Palette numbers; changed in place.
+        patch: How much of each pixel is covered, 0 to 255.
+        top_left: The column and row of the patch's first pixel.
+        colour: Of the ink.
+        halo_px: How far white reaches around it.
+    """
+    padded = cv2.copyMakeBorder(
+        patch, halo_px, halo_px, halo_px, halo_px, cv2.BORDER_CONSTANT, value=(0,)
+    )
+    left, top = top_left[0] - halo_px, top_left[1] - halo_px
+    cut_left, cut_top = max(0, -left), max(0, -top)
+    target = canvas[
+        top + cut_top : max(0, top + padded.shape[0]),
+        left + cut_left : max(0, left + padded.shape[1]),
+    ]
+    coverage = padded[cut_top : cut_top + target.shape[0], cut_left : cut_left + target.shape[1]]
+    if coverage.size == 0:
+        return
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * halo_px + 1, 2 * halo_px + 1))
+    halo = cv2.dilate(padded, kernel)[cut_top:, cut_left:][: target.shape[0], : target.shape[1]]
+    target[halo >= _HALO_FROM] = PAPER
+    is_inked = coverage >= _INK_FROM
+    levels = coverage[is_inked].astype(np.intp) * N_RAMP_LEVELS // 256
+    target[is_inked] = RAMPS[colour][levels]
+
+
+def _patch_around(points: FloatArray, rim_px: int) -> tuple[Canvas, tuple[int, int]]:
+    """Gives an empty patch with room for the points, and where its first pixel lies."""
+    left, top = (int(value) - rim_px for value in np.floor(points.min(axis=0)))
+    right, bottom = (int(value) + rim_px for value in np.ceil(points.max(axis=0)))
+    return np.zeros((bottom - top, right - left), dtype=np.uint8), (left, top)
+
+
+def _in_subpixels(points: FloatArray, top_left: tuple[int, int]) -> NDArray[np.int32]:
+    """Gives the points as OpenCV wants them: integers, and (0, 0) in the middle of a pixel."""
+    local = points - np.array(top_left) - 0.5
+    return np.asarray(np.rint(local * (1 << _SHIFT)), dtype=np.int32)
+
+
+@functools.lru_cache(maxsize=2048)
+def _line_patch(text: str, size_px: int) -> Canvas:
+    """Gives one line; kept, because the same numbers and ids are written again and again."""
+    font, ascent_px, height_px = _font(size_px)
+    written = _printable(text)
+    picture = Image.new("L", ((len(written) + 2) * size_px, height_px))
+    ImageDraw.Draw(picture).text((size_px, ascent_px), written, fill=255, font=font, anchor="ls")
+    pixels = np.asarray(picture)
+    used = np.flatnonzero(pixels.any(axis=0))
+    patch = pixels[:, used[0] : used[-1] + 1].copy() if used.size else pixels[:, :size_px].copy()
+    patch.setflags(write=False)
+    return patch
+
+
+@functools.cache
+def _font(size_px: int) -> tuple[ImageFont.FreeTypeFont, int, int]:
+    """Gives Pillow's own scalable font, how far it rises over the base line, and a line's height.
+
+    Raises:
+        MapspeakError: Pillow was built without FreeType, and so has no such font.
+    """
+    font = ImageFont.load_default(size_px)
+    if not isinstance(font, ImageFont.FreeTypeFont):
+        raise MapspeakError(
+            "This Pillow cannot draw text: it was built without FreeType.",
+            hint="Install Pillow's own wheel: pip install --force-reinstall pillow.",
+        )
+    _, top, _, bottom = font.getbbox(_TALL_AND_DEEP, anchor="ls")
+    return font, round(-top), round(bottom - top)
+
+
+def _centred(row: Canvas, width: int) -> Canvas:
+    left = (width - row.shape[1]) // 2
+    return np.pad(row, ((0, 0), (left, width - row.shape[1] - left)))
+
+
+def _printable(text: str) -> str:
+    """Gives the text in the letters the font has: accents dropped, others replaced."""
+    plain = unicodedata.normalize("NFKD", text)
+    kept = (sign for sign in plain if not unicodedata.combining(sign))
+    return "".join(sign if " " <= sign <= "~" or sign == "°" else "?" for sign in kept)

@@ -1,0 +1,111 @@
+"""What can be drawn on a map: marks, lines and areas, with no knowledge of what they stand for."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.errors import MapError
+from mapspeak.geometry import Point
+from mapspeak.spatial.picture.palette import Colour
+
+__all__ = ["Line", "LineStyle", "Mark", "Region", "RegionLayer", "Shape"]
+
+_MAX_LABEL = np.iinfo(np.uint16).max
+
+
+class Shape(StrEnum):
+    """The symbol of a mark."""
+
+    CIRCLE = "circle"
+    SQUARE = "square"
+    DIAMOND = "diamond"
+    TRIANGLE = "triangle"
+    CROSS = "cross"
+
+
+class LineStyle(StrEnum):
+    """How a line is drawn."""
+
+    SOLID = "solid"
+    DASHED = "dashed"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mark:
+    """A symbol at a place, with a short label beside it.
+
+    Attributes:
+        point: Where it stands.
+        label: The text beside it, such as an id; empty for none.
+        shape: The symbol; None for the label alone.
+        colour: Of the symbol.
+    """
+
+    point: Point
+    label: str
+    shape: Shape | None = Shape.CIRCLE
+    colour: Colour = Colour.BLUE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Line:
+    """A line through points of the map.
+
+    Attributes:
+        points: At least two.
+        style: Solid or dashed.
+        colour: Of the line.
+        width_px: Its thickness in the picture.
+    """
+
+    points: tuple[Point, ...]
+    style: LineStyle = LineStyle.SOLID
+    colour: Colour = Colour.BLUE
+    width_px: int = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Region:
+    """An area of the floor with a name.
+
+    Attributes:
+        label: The number its cells carry in the layer's array.
+        text: What is written in it; empty for none.
+        colour: Of its pale fill; None for one that differs from the neighbours'.
+        is_hatched: It is hatched too.
+    """
+
+    label: int
+    text: str
+    colour: Colour | None = None
+    is_hatched: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RegionLayer:
+    """Areas that do not overlap, as one array of numbers; compared by identity.
+
+    Attributes:
+        labels: uint16, the shape of the grid's cells; 0 belongs to no region.
+        regions: Those that are drawn.
+
+    Raises:
+        MapError: A label is not between 0 and 65535, or the array has not two dimensions.
+    """
+
+    labels: NDArray[np.uint16]
+    regions: tuple[Region, ...]
+
+    def __post_init__(self) -> None:
+        labels = np.asarray(self.labels)
+        in_range = labels.size == 0 or (labels.min() >= 0 and labels.max() <= _MAX_LABEL)
+        if labels.ndim != 2 or not in_range:
+            raise MapError(
+                f"The region labels have {labels.ndim} dimensions or leave 0..{_MAX_LABEL}.",
+                hint="Give an array of the grid's shape with small positive numbers, 0 for none.",
+            )
+        locked = np.array(labels, dtype=np.uint16, order="C")
+        locked.setflags(write=False)
+        object.__setattr__(self, "labels", locked)

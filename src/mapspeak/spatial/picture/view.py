@@ -1,0 +1,143 @@
+"""Where a map lies in a picture: pixels, and the one conversion between them and the world."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.geometry import Point
+from mapspeak.spatial.grid import FloatArray
+
+__all__ = ["NORTH_UP_RAD", "Box", "Pixel", "View"]
+
+
+NORTH_UP_RAD = math.pi / 2
+"""The view in which the map's y axis points up and its x axis to the right."""
+
+_BORDER_SLACK_PX = 1e-6
+"""Rounding in the last digits must not push a cell's corner into the pixel before it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pixel:
+    """One pixel of a picture: column u from the left, row v from the top."""
+
+    u: int
+    v: int
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A rectangle of pixels; right and bottom are the first pixels outside."""
+
+    left: int
+    top: int
+    right: int
+    bottom: int
+
+    @property
+    def width(self) -> int:
+        """Pixels from left to right."""
+        return self.right - self.left
+
+    @property
+    def height(self) -> int:
+        """Pixels from top to bottom."""
+        return self.bottom - self.top
+
+    def contains(self, pixel: Pixel) -> bool:
+        """True when the pixel lies inside."""
+        return self.left <= pixel.u < self.right and self.top <= pixel.v < self.bottom
+
+    def overlaps(self, other: "Box") -> bool:
+        """True when the two share a pixel."""
+        return (
+            self.left < other.right
+            and other.left < self.right
+            and self.top < other.bottom
+            and other.top < self.bottom
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """The exact transform between metres in the map and pixels of one picture.
+
+    Attributes:
+        corner: The point of the map in the top left corner of the map area.
+        up_rad: The direction in the map that points up in the picture; pi/2 is y up.
+        pixels_per_m: The scale, the same along both axes.
+        area: The part of the picture that shows the map.
+        width_px: Columns of the whole picture.
+        height_px: Rows of the whole picture.
+    """
+
+    corner: Point
+    up_rad: float
+    pixels_per_m: float
+    area: Box
+    width_px: int
+    height_px: int
+
+    def pixel_at(self, point: Point) -> Pixel:
+        """Gives the pixel a point falls in, which may lie outside the picture (see `shows`)."""
+        u, v = self.fractional_pixels_at(np.array([[point.x, point.y]]))[0]
+        return Pixel(math.floor(u + _BORDER_SLACK_PX), math.floor(v + _BORDER_SLACK_PX))
+
+    def point_at(self, pixel: Pixel) -> Point:
+        """Gives the point of the map in the middle of a pixel."""
+        x, y = self.points_at(np.array([[pixel.u + 0.5, pixel.v + 0.5]]))[0]
+        return Point(float(x), float(y))
+
+    def shows(self, point: Point) -> bool:
+        """True when the point lies in the part of the map that the picture shows."""
+        return self.area.contains(self.pixel_at(point))
+
+    def fractional_pixels_at(self, points: FloatArray) -> FloatArray:
+        """Gives (u, v) of shape (n, 2) as real numbers; a pixel's middle is at +0.5, +0.5.
+
+        For an unturned map that fills the picture at one pixel per cell this is eq. 3 of the paper.
+        """
+        dx, dy = points[:, 0] - self.corner.x, points[:, 1] - self.corner.y
+        cos, sin = math.cos(self.up_rad), math.sin(self.up_rad)
+        u = self.area.left + self.pixels_per_m * (sin * dx - cos * dy)
+        v = self.area.top - self.pixels_per_m * (cos * dx + sin * dy)
+        return np.stack([u, v], axis=1)
+
+    def area_pixels_at(self, points: FloatArray) -> FloatArray:
+        """Gives (u, v) as real numbers, counted from the top left corner of the map area."""
+        pixels = self.fractional_pixels_at(points)
+        return np.stack([pixels[:, 0] - self.area.left, pixels[:, 1] - self.area.top], axis=1)
+
+    def area_of(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Gives the map area of a picture's array, sharing its memory."""
+        return picture[self.area.top : self.area.bottom, self.area.left : self.area.right]
+
+    def points_at(self, pixels: FloatArray) -> FloatArray:
+        """Gives the points of the map for (u, v) as real numbers, shape (n, 2)."""
+        right_m = (pixels[:, 0] - self.area.left) / self.pixels_per_m
+        up_m = (self.area.top - pixels[:, 1]) / self.pixels_per_m
+        cos, sin = math.cos(self.up_rad), math.sin(self.up_rad)
+        x = self.corner.x + sin * right_m + cos * up_m
+        y = self.corner.y - cos * right_m + sin * up_m
+        return np.stack([x, y], axis=1)
+
+    def area_corners(self) -> FloatArray:
+        """Gives the four corners of the map area as points of the map, shape (4, 2)."""
+        area = self.area
+        return self.points_at(
+            np.array(
+                [
+                    [area.left, area.top],
+                    [area.right, area.top],
+                    [area.right, area.bottom],
+                    [area.left, area.bottom],
+                ],
+                dtype=np.float64,
+            )
+        )
+
+    def heading_at(self, yaw_rad: float) -> float:
+        """Gives a yaw of the map as an angle in the picture, counter-clockwise from its right."""
+        return yaw_rad - self.up_rad + NORTH_UP_RAD
