@@ -1,9 +1,11 @@
-"""A world as it truly is: walls, doors, objects, rooms; read from a file that people write."""
+"""A world as it truly is: walls, doors, objects, rooms. `worldfiles` reads it from a file."""
 
 from dataclasses import dataclass
 from enum import StrEnum
 
 from mapspeak.geometry import Point, Pose
+
+__all__ = ["Door", "RoomClass", "TrueRoom", "Wall", "World", "WorldObject"]
 
 
 class RoomClass(StrEnum):
@@ -29,6 +31,21 @@ class Wall:
     end: Point
     thickness_m: float
     height_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Door:
+    """A gap that was cut into a wall.
+
+    Attributes:
+        name: Unique in its world.
+        pose: The middle of the gap on the wall's centre line; its x axis looks along the wall.
+        width_m: Between the two ends of the wall.
+    """
+
+    name: str
+    pose: Pose
+    width_m: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,6 +79,15 @@ class TrueRoom:
     room_class: RoomClass
     outline: tuple[Point, ...]
 
+    def contains(self, point: Point) -> bool:
+        """True when a point of the world's own frame lies inside the outline."""
+        n_crossings = 0
+        for start, end in zip(self.outline, (*self.outline[1:], self.outline[0]), strict=True):
+            if (start.y > point.y) != (end.y > point.y):
+                share = (point.y - start.y) / (end.y - start.y)
+                n_crossings += start.x + share * (end.x - start.x) > point.x
+        return n_crossings % 2 == 1
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class World:
@@ -74,6 +100,7 @@ class World:
         objects: All things.
         rooms: The truth about rooms.
         start: Where the robot stands at first, in the world's own frame.
+        doors: Where walls were cut.
     """
 
     name: str
@@ -82,3 +109,4 @@ class World:
     objects: tuple[WorldObject, ...]
     rooms: tuple[TrueRoom, ...]
     start: Pose
+    doors: tuple[Door, ...] = ()

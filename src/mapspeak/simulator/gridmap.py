@@ -1,0 +1,173 @@
+"""The map that SLAM writes: a grid of log-odds that grows as the robot sees more.
+
+Occupancy grids with log-odds are Moravec and Elfes, "High resolution maps from wide angle sonar"
+(1985); the values published are Cartographer's: -1 unknown, else the probability in percent.
+"""
+
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.geometry import Pose
+from mapspeak.spatial import UNKNOWN, OccupancyGrid
+
+__all__ = ["CELL_SIZE_M", "LogOddsMap"]
+
+FloatArray = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+CELL_SIZE_M = 0.05
+_GROWTH_CELLS = 64
+"""The map grows by whole blocks of this many cells, so that it seldom has to."""
+
+_HIT = math.log(0.6 / 0.4)
+_MISS = math.log(0.4 / 0.6)
+_CERTAIN = math.log(0.98 / 0.02)
+
+_SAME_SURFACE_M = 0.25
+"""Neighbouring returns no further apart than this are taken to lie on one surface."""
+
+_SUBCELL_BITS = 6
+"""Binary places of a cell that OpenCV keeps when it draws."""
+
+
+class LogOddsMap:
+    """A grid around the place where the robot first stood, which is (0, 0) of the map frame."""
+
+    def __init__(self) -> None:
+        self._log_odds = np.zeros((2 * _GROWTH_CELLS, 2 * _GROWTH_CELLS), dtype=np.float32)
+        self._is_seen = np.zeros(self._log_odds.shape, dtype=bool)
+        self._n_hits = np.zeros(self._log_odds.shape)
+        self._hit_cols = np.zeros(self._log_odds.shape)
+        self._hit_rows = np.zeros(self._log_odds.shape)
+        self._row_of_zero = _GROWTH_CELLS
+        self._col_of_zero = _GROWTH_CELLS
+
+    @property
+    def occupied(self) -> Mask:
+        """True where something more likely stands than not."""
+        return self._log_odds > 0
+
+    @property
+    def is_seen(self) -> Mask:
+        """True where a scan has shown floor or a surface."""
+        return self._is_seen
+
+    def fractional_cells(self, points: FloatArray) -> FloatArray:
+        """Gives (col, row) of map points as real numbers, both 0 at the corner of the array."""
+        return points / CELL_SIZE_M + (self._col_of_zero, self._row_of_zero)
+
+    def surface_at(
+        self, rows: NDArray[np.intp], cols: NDArray[np.intp]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Gives where the returns of occupied cells lie on average: col and row as real numbers."""
+        n_hits = np.maximum(self._n_hits[rows, cols], 1.0)
+        return (
+            cols + self._hit_cols[rows, cols] / n_hits,
+            rows + self._hit_rows[rows, cols] / n_hits,
+        )
+
+    def insert(self, ends_in_map: FloatArray, is_return: Mask) -> None:
+        """Marks what one scan saw: surfaces, and the floor between them and the LiDAR.
+
+        Args:
+            ends_in_map: Where the beams end, in the order of their angles, shape (n, 2); a beam
+                without a return ends at the LiDAR itself.
+            is_return: True for the beams that ended at something, shape (n,).
+        """
+        self._grow_to_hold(ends_in_map)
+        is_hit = self._add_surface(_join_returns(ends_in_map, is_return))
+        is_free = self._seen_through(self.fractional_cells(ends_in_map), is_return) & ~is_hit
+        self._log_odds[is_free] += _MISS
+        self._log_odds[is_hit] += _HIT
+        np.clip(self._log_odds, -_CERTAIN, _CERTAIN, out=self._log_odds)
+        self._is_seen |= is_free | is_hit
+
+    def publish(self, *, stamp_s: float) -> OccupancyGrid:
+        """Gives the map as ROS knows it."""
+        percent = np.rint(100.0 / (1.0 + np.exp(-self._log_odds)))
+        cells = np.where(self._is_seen, percent, UNKNOWN).astype(np.int8)
+        rows, cols = _extent(self._is_seen)
+        return OccupancyGrid(
+            cells=cells[rows, cols],
+            resolution_m=CELL_SIZE_M,
+            origin=Pose(
+                (cols.start - self._col_of_zero) * CELL_SIZE_M,
+                (rows.start - self._row_of_zero) * CELL_SIZE_M,
+            ),
+            stamp_s=stamp_s,
+        )
+
+    def _add_surface(self, points_in_map: FloatArray) -> Mask:
+        """Adds points of surfaces to the means of their cells and gives those cells."""
+        places = self.fractional_cells(points_in_map)
+        corners = np.floor(places)
+        cols, rows = corners.astype(np.intp).T
+        np.add.at(self._n_hits, (rows, cols), 1.0)
+        np.add.at(self._hit_cols, (rows, cols), places[:, 0] - corners[:, 0])
+        np.add.at(self._hit_rows, (rows, cols), places[:, 1] - corners[:, 1])
+        is_hit = np.zeros(self._log_odds.shape, dtype=bool)
+        is_hit[rows, cols] = True
+        return is_hit
+
+    def _seen_through(self, ends: FloatArray, is_return: Mask) -> Mask:
+        """Gives the inside of the star of beams.
+
+        The line from one return to the next is left out: where beams graze a wall it runs along
+        the wall, which no beam has shown to be free.
+        """
+        picture = np.zeros(self._log_odds.shape, dtype=np.uint8)
+        corners = _fixed(ends)
+        cv2.fillPoly(picture, [corners], 1, shift=_SUBCELL_BITS)
+        sides = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+        between_returns = list(sides[is_return & np.roll(is_return, -1)])
+        cv2.polylines(picture, between_returns, isClosed=False, color=0, shift=_SUBCELL_BITS)
+        return picture.astype(bool)
+
+    def _grow_to_hold(self, ends_in_map: FloatArray) -> None:
+        cells = self.fractional_cells(ends_in_map)
+        margin = 2.0
+        low = np.ceil((margin - cells.min(axis=0)) / _GROWTH_CELLS).clip(0).astype(int)
+        size = np.array(self._log_odds.shape[::-1])
+        high = np.ceil((cells.max(axis=0) + margin - size) / _GROWTH_CELLS).clip(0).astype(int)
+        if not low.any() and not high.any():
+            return
+        (left, below), (right, above) = low * _GROWTH_CELLS, high * _GROWTH_CELLS
+        widths = ((below, above), (left, right))
+        self._log_odds = np.pad(self._log_odds, widths)
+        self._is_seen = np.pad(self._is_seen, widths)
+        self._n_hits = np.pad(self._n_hits, widths)
+        self._hit_cols = np.pad(self._hit_cols, widths)
+        self._hit_rows = np.pad(self._hit_rows, widths)
+        self._row_of_zero += int(below)
+        self._col_of_zero += int(left)
+
+
+def _join_returns(ends_in_map: FloatArray, is_return: Mask) -> FloatArray:
+    """Gives the returns, and points between neighbours that seem to lie on one surface.
+
+    Far away, or on a wall that the beams graze, returns lie apart. A map of single dots would draw
+    the next scan's dots onto them, and the pose with them.
+    """
+    steps = np.roll(ends_in_map, -1, axis=0) - ends_in_map
+    gaps_m = np.hypot(steps[:, 0], steps[:, 1])
+    is_joined = is_return & np.roll(is_return, -1) & (gaps_m <= _SAME_SURFACE_M)
+    n_points = np.where(is_joined, np.ceil(gaps_m / (CELL_SIZE_M / 2)), is_return).astype(np.intp)
+    beam = np.repeat(np.arange(len(ends_in_map)), n_points)
+    nth = np.arange(len(beam)) - np.repeat(np.cumsum(n_points) - n_points, n_points)
+    return np.asarray(ends_in_map[beam] + (nth / n_points[beam])[:, None] * steps[beam])
+
+
+def _fixed(cells: FloatArray) -> NDArray[np.int32]:
+    """Gives fractional cells as OpenCV draws them: whole numbers are the middles of pixels."""
+    return np.round((cells - 0.5) * (1 << _SUBCELL_BITS)).astype(np.int32)
+
+
+def _extent(is_seen: Mask) -> tuple[slice, slice]:
+    """Gives the rows and columns that hold everything seen; all of them where nothing is."""
+    rows, cols = np.flatnonzero(is_seen.any(axis=1)), np.flatnonzero(is_seen.any(axis=0))
+    if not len(rows):
+        return slice(0, is_seen.shape[0]), slice(0, is_seen.shape[1])
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(cols[0]), int(cols[-1]) + 1)

@@ -1,0 +1,213 @@
+"""A world with one robot, stepped by hand: what its robot knows, and apart from it the truth.
+
+Each step is one tick of 0.05 s of robot time: navigation or teleoperation commands a velocity, the
+body moves, the wheels report, and at every second tick the LiDAR measures and SLAM learns.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.errors import GoalError
+from mapspeak.geometry import Pose
+from mapspeak.simulator.avoidance import Obstacles
+from mapspeak.simulator.body import RobotBody
+from mapspeak.simulator.camera import HORIZONTAL_FOV_RAD, Camera
+from mapspeak.simulator.detector import SimulatedDetection, SimulatedDetector
+from mapspeak.simulator.lidar import Lidar, LidarScan
+from mapspeak.simulator.mapping import Mapper
+from mapspeak.simulator.motion import BODY_BAND_M, STANDING, Odometry, Velocity
+from mapspeak.simulator.navigator import DriveState, DriveStatus, Navigator, Senses
+from mapspeak.simulator.slices import slice_world
+from mapspeak.simulator.truth import Truth
+from mapspeak.simulator.world import World
+from mapspeak.spatial import OccupancyGrid
+
+__all__ = ["TICK_S", "CameraShot", "Simulation"]
+
+TICK_S = 0.05
+_TICKS_PER_SCAN = 2
+_TELEOPERATION_TIMEOUT_S = 0.5
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class CameraShot:
+    """One picture of the front camera; compared by identity.
+
+    Attributes:
+        rgb: 0 to 255, shape (height, width, 3).
+        horizontal_fov_rad: The angle between the left and the right edge.
+    """
+
+    rgb: NDArray[np.uint8]
+    horizontal_fov_rad: float
+
+
+class Simulation:
+    """One world and its robot.
+
+    Attributes:
+        truth: What no robot may know; for scoring alone.
+
+    Args:
+        world: Where the robot drives.
+        seed: Of all noise; the same seed and the same commands give the same run.
+    """
+
+    def __init__(self, world: World, *, seed: int) -> None:
+        solids = slice_world(world, low_m=BODY_BAND_M[0], high_m=BODY_BAND_M[1])
+        for_lidar, for_wheels, for_detector = np.random.default_rng(seed).spawn(3)
+        self._world = world
+        self._n_ticks = 0
+        self._body = RobotBody(solids, world.start)
+        self._lidar = Lidar(solids, random=for_lidar)
+        self._odometry = Odometry(random=for_wheels)
+        self._detector = SimulatedDetector(random=for_detector)
+        self._mapper = Mapper()
+        self._navigator = Navigator()
+        self._ended: dict[int, DriveStatus] = {}
+        self._goal_id = 0
+        self._teleoperation = STANDING
+        self._teleoperated_until_s = -math.inf
+        self.truth = Truth(world, self._body, self._mapper)
+        self._measure()
+
+    # --- time ---
+
+    @property
+    def time_s(self) -> float:
+        """Robot time since the start."""
+        return self._n_ticks * TICK_S
+
+    def step(self) -> None:
+        """Lets one tick of robot time pass."""
+        step = self._body.move(self._command(), TICK_S)
+        self._n_ticks += 1
+        self._odometry.record(step)
+        self._mapper.follow_odometry(self._odometry.odom_from_base)
+        if self._n_ticks % _TICKS_PER_SCAN == 0:
+            self._measure()
+
+    # --- what the robot knows ---
+
+    @property
+    def world_name(self) -> str:
+        """Where the robot drives, by name."""
+        return self._world.name
+
+    @property
+    def pose_in_map(self) -> Pose:
+        """Where the robot believes it is, by SLAM."""
+        return self._mapper.map_from_base
+
+    @property
+    def odom_from_base(self) -> Pose:
+        """Where the wheels alone say it is."""
+        return self._odometry.odom_from_base
+
+    @property
+    def velocity(self) -> Velocity:
+        """How fast the wheels turn it."""
+        return self._body.velocity
+
+    @property
+    def scan(self) -> LidarScan:
+        """The latest turn of the LiDAR."""
+        return self._scan
+
+    def map(self) -> OccupancyGrid:
+        """Gives the SLAM map; the same one until it has changed."""
+        return self._mapper.publish(stamp_s=self.time_s)
+
+    def take_picture(self) -> CameraShot:
+        """Takes a picture with the front camera."""
+        rgb = self._camera.render(self._body.world_from_base)
+        return CameraShot(rgb=rgb, horizontal_fov_rad=HORIZONTAL_FOV_RAD)
+
+    def detect(self) -> tuple[SimulatedDetection, ...]:
+        """Gives what the simulated detector reports of the camera's view, from left to right."""
+        return self._detector.detect(self._camera.observe(self._body.world_from_base))
+
+    # --- driving ---
+
+    def start_goal(self, goal: Pose) -> int:
+        """Sends the robot to a pose in the map and gives the drive's id; an earlier drive ends."""
+        self._navigator.give_up(DriveState.PREEMPTED, "A newer goal replaced it.")
+        self._keep_status()
+        self._goal_id += 1
+        self._teleoperated_until_s = -math.inf
+        self._navigator.start(goal)
+        return self._goal_id
+
+    def goal_status(self, goal_id: int) -> DriveStatus:
+        """Gives how a drive stands, also after it has ended.
+
+        Raises:
+            GoalError: No drive has that id.
+        """
+        if goal_id == self._goal_id and goal_id > 0:
+            return self._navigator.status
+        if goal_id not in self._ended:
+            raise GoalError(
+                f"The robot knows no drive with the id {goal_id}.",
+                hint="Use the id that starting the drive gave.",
+            )
+        return self._ended[goal_id]
+
+    def cancel_goal(self, goal_id: int) -> None:
+        """Ends a drive if it still goes on; the robot comes to a stand.
+
+        Raises:
+            GoalError: No drive has that id.
+        """
+        if self.goal_status(goal_id).state is DriveState.DRIVING:
+            self._navigator.give_up(DriveState.CANCELLED, "It was cancelled.")
+
+    def stop(self) -> None:
+        """Ends every drive and brings the robot to a stand."""
+        self._teleoperated_until_s = -math.inf
+        self._navigator.give_up(DriveState.CANCELLED, "The robot was stopped.")
+
+    def set_velocity(self, velocity: Velocity) -> None:
+        """Drives by hand for half a second at most; a drive under way ends.
+
+        Nothing but the bumper protects the robot meanwhile, as on a real one.
+        """
+        self._navigator.give_up(DriveState.CANCELLED, "Somebody drives by hand.")
+        self._teleoperation = velocity
+        self._teleoperated_until_s = self.time_s + _TELEOPERATION_TIMEOUT_S
+
+    # --- inside ---
+
+    @cached_property
+    def _camera(self) -> Camera:
+        return Camera(self._world)
+
+    def _command(self) -> Velocity:
+        if self.time_s < self._teleoperated_until_s:
+            return self._teleoperation
+        if not self._navigator.is_driving:
+            return STANDING
+        return self._navigator.steer(self._senses())
+
+    def _senses(self) -> Senses:
+        now_from_scan = self._odometry.odom_from_base.inverse() @ self._odom_at_scan
+        return Senses(
+            now_s=self.time_s,
+            pose=self.pose_in_map,
+            speed_mps=self._body.velocity.speed_mps,
+            obstacles=Obstacles.seen_from(self._scan.points_in_base, now_from_scan),
+            map=self.map(),
+        )
+
+    def _measure(self) -> None:
+        self._scan = self._lidar.scan(self._body.world_from_base, stamp_s=self.time_s)
+        self._odom_at_scan = self._odometry.odom_from_base
+        self._mapper.add_scan(self._scan)
+
+    def _keep_status(self) -> None:
+        if self._goal_id > 0:
+            self._ended[self._goal_id] = self._navigator.status

@@ -1,0 +1,127 @@
+"""The world cut flat: the outlines of everything solid within a band of heights.
+
+What the LiDAR meets, what the robot bumps into and what is free floor all come from here.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.geometry import Point, Pose
+from mapspeak.simulator.models import find_kind, footprint
+from mapspeak.simulator.world import Wall, World, WorldObject
+
+__all__ = ["Slice", "fill_outlines", "slice_world"]
+
+FloatArray = NDArray[np.float64]
+
+_SUBCELL_BITS = 6
+"""Binary places of a pixel that OpenCV keeps when it fills an outline."""
+_FINER = 4
+"""Outlines are filled on so many times finer pixels: OpenCV fills each pixel that it touches."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Slice:
+    """The outlines of everything solid within a band of heights, in the world frame.
+
+    Attributes:
+        outlines: One array of shape (n, 2) for each solid part, its corners in order.
+        edges: Shape (m, 4): the sides of all outlines as x, y of one end and x, y of the other.
+    """
+
+    outlines: tuple[FloatArray, ...]
+    edges: FloatArray = field(init=False)
+
+    def __post_init__(self) -> None:
+        sides = [np.hstack([corners, np.roll(corners, -1, axis=0)]) for corners in self.outlines]
+        edges = np.concatenate(sides) if sides else np.empty((0, 4))
+        edges.setflags(write=False)
+        object.__setattr__(self, "edges", edges)
+
+    def distance_to(self, point: Point) -> float:
+        """Gives how far a point is from the nearest side; infinite where nothing is solid."""
+        if not len(self.edges):
+            return math.inf
+        start, end = self.edges[:, :2], self.edges[:, 2:]
+        along = end - start
+        to_point = np.array([point.x, point.y]) - start
+        squared = np.maximum(np.einsum("ij,ij->i", along, along), 1e-12)
+        share = np.clip(np.einsum("ij,ij->i", to_point, along) / squared, 0.0, 1.0)
+        gap = to_point - share[:, None] * along
+        return float(np.sqrt(np.einsum("ij,ij->i", gap, gap).min()))
+
+    def is_solid_at(self, point: Point) -> bool:
+        """True when a point lies inside a solid part."""
+        place = (float(point.x), float(point.y))
+        return any(
+            cv2.pointPolygonTest(corners.astype(np.float32), place, measureDist=False) > 0
+            for corners in self.outlines
+        )
+
+    def has_room_at(self, point: Point, *, radius_m: float) -> bool:
+        """True when a round body fits at a point."""
+        return self.distance_to(point) >= radius_m and not self.is_solid_at(point)
+
+
+def slice_world(world: World, *, low_m: float, high_m: float) -> Slice:
+    """Cuts a world: gives what is solid anywhere between two heights above the floor."""
+    outlines = [_outline_wall(wall) for wall in world.walls if low_m < wall.height_m]
+    for thing in world.objects:
+        outlines.extend(_outline_object(thing, low_m, high_m))
+    return Slice(tuple(outlines))
+
+
+def fill_outlines(
+    outlines: Sequence[FloatArray],
+    *,
+    shape: tuple[int, int],
+    origin: Point,
+    cell_size_m: float,
+    least_ratio: float = 0.5,
+) -> NDArray[np.bool_]:
+    """Gives a mask of cells, True where enough of a cell lies inside an outline.
+
+    Args:
+        outlines: As in `Slice.outlines`, in the frame of the grid.
+        shape: Rows and columns of the mask.
+        origin: The outer corner of its row 0 and column 0.
+        cell_size_m: The side of a cell.
+        least_ratio: How much of a cell is enough.
+    """
+    n_rows, n_cols = shape
+    picture = np.zeros((n_rows * _FINER, n_cols * _FINER), dtype=np.uint8)
+    scale = _FINER / cell_size_m
+    for corners in outlines:
+        # OpenCV puts whole numbers at the middle of a pixel, we at its corner.
+        placed = (corners - (origin.x, origin.y)) * scale - 0.5
+        fixed = np.round(placed * (1 << _SUBCELL_BITS)).astype(np.int32)
+        cv2.fillPoly(picture, [fixed], 1, shift=_SUBCELL_BITS)
+    shares = picture.reshape(n_rows, _FINER, n_cols, _FINER).mean(axis=(1, 3))
+    return np.asarray(shares >= least_ratio)
+
+
+def _outline_wall(wall: Wall) -> FloatArray:
+    half = wall.thickness_m / 2
+    length = wall.start.distance_to(wall.end)
+    world_from_wall = Pose(wall.start.x, wall.start.y, wall.start.bearing_to(wall.end))
+    return _place(
+        (Point(0, -half), Point(length, -half), Point(length, half), Point(0, half)),
+        world_from_wall,
+    )
+
+
+def _outline_object(thing: WorldObject, low_m: float, high_m: float) -> Iterator[FloatArray]:
+    usual_m = find_kind(thing.kind).base_height_m
+    lifted_m = 0.0 if thing.base_height_m is None else thing.base_height_m - usual_m
+    for corners in footprint(thing.kind, low_m - lifted_m, high_m - lifted_m):
+        yield _place(corners, thing.pose)
+
+
+def _place(corners: Sequence[Point], world_from_part: Pose) -> FloatArray:
+    placed = [world_from_part.transform(corner) for corner in corners]
+    return np.array([(point.x, point.y) for point in placed])

@@ -1,0 +1,191 @@
+"""What is true of a simulation and no robot may know: for scoring alone.
+
+Cells of truth grids lie in the map frame, which starts where the robot starts, and share their
+borders with the cells of the robot's own map.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.simulator.body import RobotBody
+from mapspeak.simulator.gridmap import CELL_SIZE_M
+from mapspeak.simulator.lidar import BEAM_DIRECTIONS, MAX_RANGE_M, measure_ranges
+from mapspeak.simulator.mapping import Mapper
+from mapspeak.simulator.motion import BODY_BAND_M, BODY_RADIUS_M
+from mapspeak.simulator.scanmatch import place_points
+from mapspeak.simulator.slices import FloatArray, fill_outlines, slice_world
+from mapspeak.simulator.world import TrueRoom, World
+from mapspeak.spatial import UNKNOWN, OccupancyGrid
+
+__all__ = ["MeasuredRoom", "TrueFloor", "Truth"]
+
+Mask = NDArray[np.bool_]
+
+_MARGIN_M = 0.5
+_FREE, _SOLID = 0, 100
+_TOUCHED_RATIO = 1e-6
+_LOOK_EVERY_M = 0.5
+"""The spacing of the places from which an ideal LiDAR looks."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasuredRoom:
+    """A room with its areas.
+
+    Attributes:
+        room: As the world file outlines it.
+        outline_area_m2: Inside the outline, walls and furniture included.
+        free_area_m2: Floor that nothing stands on.
+    """
+
+    room: TrueRoom
+    outline_area_m2: float
+    free_area_m2: float
+
+
+class TrueFloor:
+    """The floor of a world as cells of the map frame; built once, when first asked for."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._solids = slice_world(world, low_m=BODY_BAND_M[0], high_m=BODY_BAND_M[1])
+        self._map_from_world = world.start.inverse()
+
+    @cached_property
+    def rooms(self) -> tuple[MeasuredRoom, ...]:
+        """All rooms with their areas."""
+        free = self.solid.cells == _FREE
+        return tuple(self._measure(room, free) for room in self._world.rooms)
+
+    @cached_property
+    def solid(self) -> OccupancyGrid:
+        """Gives 100 where something solid takes half of a cell, 0 elsewhere, over the world."""
+        return self._rasterise(least_ratio=0.5)
+
+    def _rasterise(self, *, least_ratio: float) -> OccupancyGrid:
+        corners = np.concatenate([self._in_map(outline) for outline in self._solids.outlines])
+        low = np.floor((corners.min(axis=0) - _MARGIN_M) / CELL_SIZE_M).astype(int)
+        high = np.ceil((corners.max(axis=0) + _MARGIN_M) / CELL_SIZE_M).astype(int)
+        n_cols, n_rows = (high - low).tolist()
+        origin = Point(*(low * CELL_SIZE_M).tolist())
+        is_solid = fill_outlines(
+            [self._in_map(outline) for outline in self._solids.outlines],
+            shape=(n_rows, n_cols),
+            origin=origin,
+            cell_size_m=CELL_SIZE_M,
+            least_ratio=least_ratio,
+        )
+        return _grid(np.where(is_solid, _SOLID, _FREE), origin)
+
+    @cached_property
+    def standable(self) -> Mask:
+        """True at the cells of `solid` where the robot can come to stand from its start."""
+        is_clear = self._clearance_m >= BODY_RADIUS_M
+        _, labels = cv2.connectedComponents(is_clear.astype(np.uint8), connectivity=4)
+        start = self.solid.cell_at(Point(0.0, 0.0))
+        label = labels[start.row, start.col]
+        return np.asarray((labels == label) & is_clear)
+
+    @cached_property
+    def visible(self) -> OccupancyGrid:
+        """What a perfect robot could map: 0 free floor that it can see, 100 solid, else -1.
+
+        As on every map made by a LiDAR, a cell that a surface touches is solid.
+        """
+        is_seen = np.zeros(self.solid.cells.shape, dtype=np.uint8)
+        for point in self._lookouts():
+            world_from_base = self._world.start @ Pose(point.x, point.y)
+            ranges = np.minimum(measure_ranges(self._solids.edges, world_from_base), MAX_RANGE_M)
+            star = (BEAM_DIRECTIONS * ranges[:, None] + (point.x, point.y)) / CELL_SIZE_M
+            origin = self.solid.origin
+            placed = star - (origin.x / CELL_SIZE_M, origin.y / CELL_SIZE_M) - 0.5
+            cv2.fillPoly(is_seen, [np.round(placed * 64).astype(np.int32)], 1, shift=6)
+        is_solid = self._rasterise(least_ratio=_TOUCHED_RATIO).cells == _SOLID
+        cells = np.where(is_solid, _SOLID, np.where(is_seen > 0, _FREE, UNKNOWN))
+        return _grid(cells, self.solid.origin.point)
+
+    @cached_property
+    def _clearance_m(self) -> FloatArray:
+        is_free = (self.solid.cells == _FREE).astype(np.uint8)
+        distance = cv2.distanceTransform(is_free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        return np.asarray(distance, dtype=np.float64) * CELL_SIZE_M
+
+    def _lookouts(self) -> list[Point]:
+        """Gives places where the robot can stand, spread over a square lattice."""
+        rows, cols = np.nonzero(self.standable)
+        every = round(_LOOK_EVERY_M / CELL_SIZE_M)
+        # One place for each square of the lattice, so that narrow places have theirs too.
+        _, first = np.unique(
+            np.stack([rows // every, cols // every], axis=1), axis=0, return_index=True
+        )
+        places = self.solid.points_at(rows[first], cols[first])
+        return [Point(float(x), float(y)) for x, y in places]
+
+    def _measure(self, room: TrueRoom, free: Mask) -> MeasuredRoom:
+        outline = self._in_map(np.array([(corner.x, corner.y) for corner in room.outline]))
+        inside = fill_outlines(
+            [outline],
+            shape=free.shape,
+            origin=self.solid.origin.point,
+            cell_size_m=CELL_SIZE_M,
+        )
+        return MeasuredRoom(
+            room=room,
+            outline_area_m2=float(cv2.contourArea(outline.astype(np.float32))),
+            free_area_m2=int((inside & free).sum()) * CELL_SIZE_M**2,
+        )
+
+    def _in_map(self, points_in_world: FloatArray) -> FloatArray:
+        return place_points(self._map_from_world, points_in_world)
+
+
+class Truth:
+    """How a running simulation truly stands."""
+
+    def __init__(self, world: World, body: RobotBody, mapper: Mapper) -> None:
+        self.world = world
+        self.floor = TrueFloor(world)
+        self._body = body
+        self._mapper = mapper
+
+    @property
+    def pose_in_world(self) -> Pose:
+        """Where the robot stands, as the world file counts."""
+        return self._body.world_from_base
+
+    @property
+    def pose(self) -> Pose:
+        """Where the robot stands in a map without errors, which starts where the robot did."""
+        return self.world.start.inverse() @ self._body.world_from_base
+
+    @property
+    def slam_error_m(self) -> float:
+        """How far the robot's own pose is off."""
+        return self.pose.point.distance_to(self._mapper.map_from_base.point)
+
+    @property
+    def slam_error_rad(self) -> float:
+        """How far the robot's own heading is off."""
+        return abs(wrap_angle(self.pose.yaw_rad - self._mapper.map_from_base.yaw_rad))
+
+    @property
+    def n_collisions(self) -> int:
+        """How often the robot has bumped into something."""
+        return self._body.n_collisions
+
+    @property
+    def driven_m(self) -> float:
+        """How far the robot has driven."""
+        return self._body.driven_m
+
+
+def _grid(cells: NDArray[np.integer[Any]], origin: Point) -> OccupancyGrid:
+    return OccupancyGrid(
+        cells=cells.astype(np.int8), resolution_m=CELL_SIZE_M, origin=Pose(origin.x, origin.y)
+    )
