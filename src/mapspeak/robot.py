@@ -31,14 +31,14 @@ class RobotDescription:
         radius_m: Of the smallest circle around it.
         map_name: Which map or building it drives in, as far as the robot can tell.
         has_camera: It can give pictures.
-        has_detector: It reports what an object detector of its own sees.
+        detector: What its own object detector is called; None where it has none.
     """
 
     name: str
     radius_m: float
     map_name: str
     has_camera: bool
-    has_detector: bool
+    detector: str | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +102,7 @@ class GoalState(StrEnum):
     ARRIVED = "arrived"
     BLOCKED = "blocked"
     CANCELLED = "cancelled"
+    PREEMPTED = "preempted"
     REJECTED = "rejected"
     LOST = "lost"
 

@@ -186,6 +186,21 @@ def test_a_hop_does_not_go_through_a_wall() -> None:
     assert find_path(grid, beside_the_wall, Point(1.6, 1.0), radius_m=0.3) is None
 
 
+def test_a_robot_that_sees_itself_as_an_obstacle_can_leave() -> None:
+    cells = np.zeros((60, 60), np.int8)
+    cells[28:32, 28:32] = 100
+    grid = OccupancyGrid(cells=cells, resolution_m=0.05)
+    for goal in (Point(0.5, 1.5), Point(2.5, 1.5)):
+        assert find_path(grid, Point(1.5, 1.5), goal, radius_m=0.25) is not None
+
+
+def test_a_robot_with_no_passable_cell_near_has_no_path() -> None:
+    cells = np.full((80, 80), 100, np.int8)
+    cells[60:, 60:] = 0
+    grid = OccupancyGrid(cells=cells, resolution_m=0.05)
+    assert find_path(grid, Point(1.0, 1.0), Point(3.5, 3.5), radius_m=0.2) is None
+
+
 def test_there_is_no_path_from_outside_the_map() -> None:
     grid = grid_from_text("...")
     assert find_path(grid, Point(-5.0, 0.5), Point(1.5, 0.5), radius_m=0.0) is None

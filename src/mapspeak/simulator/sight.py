@@ -15,13 +15,19 @@ EYE_BAND_M = (1.05, 1.15)
 """What is as high as the camera hides what lies behind it."""
 OWN_SIZE_M = 0.5
 """The thing itself, and the wall it hangs on, do not hide it."""
+SIDEWAYS_M = (-0.2, -0.1, 0.0, 0.1, 0.2)
+"""A thing has some width: it is in sight when any part of it is."""
 
 
 def is_in_sight(world: World, place: Point, thing: WorldObject) -> bool:
-    """True when nothing as high as the camera stands between a place and a thing's middle."""
+    """True when nothing as high as the camera hides all of a thing from a place."""
     solids = slice_world(world, low_m=EYE_BAND_M[0], high_m=EYE_BAND_M[1])
-    distance_m = place.distance_to(thing.pose.point)
-    facing = Pose(place.x, place.y, place.bearing_to(thing.pose.point))
     ahead = int(np.argmin(np.abs(BEAM_ANGLES_RAD)))
-    free_m = float(measure_ranges(solids.edges, facing)[ahead])
-    return math.isinf(free_m) or free_m >= distance_m - OWN_SIZE_M
+    across = Pose(thing.pose.x, thing.pose.y, place.bearing_to(thing.pose.point))
+    for sideways_m in SIDEWAYS_M:
+        part = across.transform(Point(0.0, sideways_m))
+        facing = Pose(place.x, place.y, place.bearing_to(part))
+        free_m = float(measure_ranges(solids.edges, facing)[ahead])
+        if math.isinf(free_m) or free_m >= place.distance_to(part) - OWN_SIZE_M:
+            return True
+    return False

@@ -30,6 +30,8 @@ __all__ = ["TICK_S", "CameraShot", "Simulation"]
 
 TICK_S = 0.05
 _TICKS_PER_SCAN = 2
+_DETECTOR_SIZE_PX = (320, 240)
+"""The detector judges by shares of the picture; half its size is as good and four times quicker."""
 _TELEOPERATION_TIMEOUT_S = 0.5
 
 
@@ -129,7 +131,11 @@ class Simulation:
 
     def detect(self) -> tuple[SimulatedDetection, ...]:
         """Gives what the simulated detector reports of the camera's view, from left to right."""
-        return self._detector.detect(self._camera.observe(self._body.world_from_base))
+        width_px, height_px = _DETECTOR_SIZE_PX
+        view = self._camera.observe(
+            self._body.world_from_base, width_px=width_px, height_px=height_px
+        )
+        return self._detector.detect(view)
 
     # --- driving ---
 

@@ -15,10 +15,10 @@ __all__ = ["find_seeds"]
 
 HOP_MARGIN_M = 0.5
 """How much further than its own radius a robot may hop."""
+HOP_CHOICE_M = 0.3
+"""How much further than the nearest cell the hop may go, where the way is shorter from there."""
 HOP_COST = 3.0
 """A metre of hop is worth this much of a way: enough to get into passable cells soon."""
-WALL_COST = 30.0
-"""A metre of hop through a wall: out of it the near way, never through to the other side."""
 
 
 def find_seeds(lattice: Lattice, start: Point, *, radius_m: float) -> Seeds | None:
@@ -36,17 +36,23 @@ def find_seeds(lattice: Lattice, start: Point, *, radius_m: float) -> Seeds | No
 
 
 def _hops(lattice: Lattice, start: Cell, *, reach_m: float) -> tuple[IntArray, IntArray, Costs]:
-    """Gives the passable cells in reach of a hop, and what the hop costs in lattice cells."""
+    """Gives passable cells in reach of a hop, and what it costs more than that to the nearest.
+
+    One cell of wall costs more than any hop around it: a robot that seems to stand in a wall
+    leaves it on the near side, and no other hop goes through a wall.
+    """
     reach = int(np.ceil(reach_m / lattice.grid.resolution_m))
     top, left = max(start.row - reach, 0), max(start.col - reach, 0)
     window = (slice(top, start.row + reach + 1), slice(left, start.col + reach + 1))
-    occupied = lattice.grid.occupied[window]
-    weights = np.where(occupied, WALL_COST, HOP_COST).astype(np.float32)
+    occupied, passable = lattice.grid.occupied[window], lattice.passable[window]
+    weights = np.where(occupied, HOP_COST * occupied.size, HOP_COST).astype(np.float32)
     at = (start.row - top) * occupied.shape[1] + start.col - left
     seed = Seeds(np.array([at]), np.zeros(1, dtype=np.float32))
     spent = spread(moves_within(np.ones_like(occupied)), weights, seed).reshape(occupied.shape)
-    rows, cols = np.nonzero(lattice.passable[window] & (spent <= HOP_COST * reach))
-    return rows + top, cols + left, spent[rows, cols] / np.float32(lattice.factor)
+    more = spent - spent[passable].min(initial=np.inf)
+    choice = HOP_COST * HOP_CHOICE_M / lattice.grid.resolution_m
+    rows, cols = np.nonzero(passable & (more <= choice))
+    return rows + top, cols + left, more[rows, cols] / np.float32(lattice.factor)
 
 
 def _cheapest(indices: IntArray, costs: Costs) -> Seeds:

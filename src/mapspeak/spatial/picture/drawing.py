@@ -106,7 +106,14 @@ def draw_map(
     extent = _extent(grid, up_rad, zoom, layers.robot)
     spacing_m = even_spacing_m(max(extent.width_m, extent.height_m))
     margins = axes.margins_for(extent, spacing_m, up_rad=up_rad)
-    view = plan.plan_view(grid, extent, up_rad=up_rad, margins=margins, max_edge_px=max_edge_px)
+    view = plan.plan_view(
+        grid,
+        extent,
+        up_rad=up_rad,
+        margins=margins,
+        max_edge_px=max_edge_px,
+        steps_per_pixel=2,
+    )
     canvas = np.full((view.height_px, view.width_px), PAPER, dtype=np.uint8)
     inside = view.area_of(canvas)
     inside[:] = ground.paint_ground(grid, view)

@@ -153,7 +153,8 @@ def _first_cells(n_pixels: int, cells_per_pixel: float) -> IntArray:
     """Gives the first cell of each pixel in a row; a cell belongs to the pixel its middle is in."""
     pixels = np.arange(n_pixels)
     if cells_per_pixel < 1:
-        return pixels // round(1 / cells_per_pixel)
+        earlier: IntArray = np.floor(pixels * cells_per_pixel + 1e-6).astype(np.intp)
+        return earlier
     first: IntArray = np.ceil(pixels * cells_per_pixel - 0.5 - 1e-9).astype(np.intp)
     return first
 

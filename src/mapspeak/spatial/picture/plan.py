@@ -146,12 +146,19 @@ def extent_of_zoom(grid: OccupancyGrid, up_rad: float, zoom: Zoom) -> Extent:
 
 
 def plan_view(
-    grid: OccupancyGrid, extent: Extent, *, up_rad: float, margins: Margins, max_edge_px: int
+    grid: OccupancyGrid,
+    extent: Extent,
+    *,
+    up_rad: float,
+    margins: Margins,
+    max_edge_px: int,
+    steps_per_pixel: int = 1,
 ) -> View:
     """Gives the view that shows an extent as large as the edge allows.
 
-    Cells of a grid whose axes are the picture's become blocks of a whole number of pixels, or
-    pixels cover several cells; a turned grid may have any scale.
+    Cells of a grid whose axes are the picture's become blocks of pixels, or pixels cover several
+    cells; a turned grid may have any scale. The side of a block is a whole number of pixels; with
+    two steps per pixel it may be one and a half, in turns of 1 and 2 pixels.
 
     Raises:
         MapError: The edge is not between 320 and 1072 pixels.
@@ -165,7 +172,9 @@ def plan_view(
     room_height = max_edge_px - margins.top_px - margins.bottom_px
     pixels_per_m = min(room_width / extent.width_m, room_height / extent.height_m)
     if is_aligned(grid, up_rad) and pixels_per_m * grid.resolution_m >= 1:
-        pixels_per_m = math.floor(pixels_per_m * grid.resolution_m + 1e-9) / grid.resolution_m
+        pixels_per_cell = pixels_per_m * grid.resolution_m
+        steps = steps_per_pixel if pixels_per_cell < 2 else 1
+        pixels_per_m = math.floor(steps * pixels_per_cell + 1e-9) / steps / grid.resolution_m
     width_px = min(room_width, _n_pixels(extent.width_m * pixels_per_m))
     height_px = min(room_height, _n_pixels(extent.height_m * pixels_per_m))
     return _laid_out(extent, up_rad, pixels_per_m, (width_px, height_px), margins)

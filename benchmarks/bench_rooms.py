@@ -1,0 +1,235 @@
+"""How long it takes to divide a map into rooms, in one thread, and how well it agrees with people.
+
+`python -m benchmarks.bench_rooms MAPS` scores against maps that people have divided. MAPS holds
+folders of maps; each map is a folder with `map.png` (0 occupied, 205 unknown, 254 free),
+`rooms.png` (16-bit region numbers, 0 for none) and `meta.json` (the resolution; per region its
+number, and its class if known: "room" or "hallway"). Only cells that are free in the map and
+numbered by people are counted.
+"""
+
+import json
+import statistics
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.figure import Figure
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.mapfiles import load_picture
+from mapspeak.spatial.rooms import RoomClass, RoomMap, find_rooms
+
+__all__ = ["main", "measure"]
+
+N_RUNS = 3
+ROOM_CELLS = 120
+RESOLUTION_M = 0.05
+RANKS = {"smallest": 0, "second": 1, "largest": -1}
+
+Numbers = NDArray[np.intp]
+Ratios = NDArray[np.float64]
+
+
+def measure() -> Iterator[Figure]:
+    """Gives the median CPU time for drawn buildings of three sizes."""
+    cv2.setNumThreads(1)
+    for n_cells in (1000, 2000, 4000):
+        grid = _building(n_cells)
+        times_ms = [_timed(grid)[1] for _ in range(N_RUNS)]
+        name = f"{n_cells} x {n_cells}, {len(find_rooms(grid).regions)} rooms"
+        yield Figure(name=name, value=statistics.median(times_ms), unit="ms")
+
+
+def _building(n_cells: int) -> OccupancyGrid:
+    """Gives rooms of 6 x 6 m, each with a door to the next, and scattered furniture."""
+    generator = np.random.default_rng(n_cells)
+    cells = np.zeros((n_cells, n_cells), dtype=np.int8)
+    cells[generator.random(cells.shape) < 0.002] = 100
+    for wall in range(0, n_cells, ROOM_CELLS):
+        cells[wall : wall + 3, :] = cells[:, wall : wall + 3] = 100
+    for wall in range(ROOM_CELLS, n_cells, ROOM_CELLS):
+        for room in range(0, n_cells, ROOM_CELLS):
+            door = slice(room + ROOM_CELLS // 2 - 9, room + ROOM_CELLS // 2 + 9)
+            cells[wall : wall + 3, door] = cells[door, wall : wall + 3] = 0
+    return OccupancyGrid(cells=cells, resolution_m=RESOLUTION_M)
+
+
+def _timed(grid: OccupancyGrid) -> tuple[RoomMap, float]:
+    started_s = time.process_time()
+    rooms = find_rooms(grid)
+    return rooms, (time.process_time() - started_s) * 1e3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Score:
+    """How one map was divided; None where people gave no classes.
+
+    Attributes:
+        group: The folder the map's folder lies in.
+        name: The map's folder.
+        f1_50: F1 of regions that agree with an intersection over union of at least 0.5.
+        f1_75: The same for 0.75.
+        n_found: Regions found.
+        n_true: Regions people drew.
+        class_ratio: The share of agreeing regions with the right class.
+        hallways: True positives, false positives and misses among them, hallway as positive.
+        ranks_right: Which rooms by size, hallways left out, are the right ones.
+        time_ms: CPU time.
+    """
+
+    group: str
+    name: str
+    f1_50: float
+    f1_75: float
+    n_found: int
+    n_true: int
+    class_ratio: float | None
+    hallways: tuple[int, int, int] | None
+    ranks_right: dict[str, bool] | None
+    time_ms: float
+
+
+def score_map(folder: Path) -> Score:
+    """Divides one map and compares it with what people drew."""
+    meta = json.loads((folder / "meta.json").read_text())
+    loaded = load_picture(folder / "map.png", resolution_m=meta["resolution"])
+    rooms, time_ms = _timed(loaded.grid)
+    truth = cv2.imread(str(folder / "rooms.png"), cv2.IMREAD_UNCHANGED)[::-1].astype(np.intp)
+    overlap = _overlap(rooms.labels.astype(np.intp), truth, loaded.grid.free & (truth > 0))
+    agreement = _agreement(overlap)
+    classes = {room["id"]: room["class"] for room in meta["rooms"] if "class" in room}
+    pairs = [(int(i), int(j)) for i, j in np.argwhere(agreement >= 0.5)]
+    return Score(
+        group=folder.parent.name,
+        name=folder.name,
+        f1_50=_f1(overlap, agreement, 0.5),
+        f1_75=_f1(overlap, agreement, 0.75),
+        n_found=int((overlap[1:].sum(axis=1) > 0).sum()),
+        n_true=int((overlap[:, 1:].sum(axis=0) > 0).sum()),
+        class_ratio=_class_ratio(rooms, classes, pairs) if classes else None,
+        hallways=_hallways(rooms, classes, pairs) if classes else None,
+        ranks_right=_ranks_right(rooms, classes, overlap, agreement) if classes else None,
+        time_ms=time_ms,
+    )
+
+
+def _overlap(found: Numbers, truth: Numbers, counted: NDArray[np.bool_]) -> Numbers:
+    """Gives the number of shared cells; row by region found, column by region drawn."""
+    shape = (int(found.max(initial=0)) + 1, int(truth.max(initial=0)) + 1)
+    flat = found[counted] * shape[1] + truth[counted]
+    return np.bincount(flat, minlength=shape[0] * shape[1]).reshape(shape)
+
+
+def _agreement(overlap: Numbers) -> Ratios:
+    """Gives the intersection over union; above 0.5 it pairs regions one to one."""
+    union = overlap.sum(axis=1, keepdims=True) + overlap.sum(axis=0, keepdims=True) - overlap
+    ratios: Ratios = overlap / np.maximum(union, 1)
+    ratios[0] = ratios[:, 0] = 0
+    return ratios
+
+
+def _f1(overlap: Numbers, agreement: Ratios, least: float) -> float:
+    n_found = int((overlap[1:].sum(axis=1) > 0).sum())
+    n_true = int((overlap[:, 1:].sum(axis=0) > 0).sum())
+    return 2 * int((agreement >= least).sum()) / max(n_found + n_true, 1)
+
+
+def _is_hallway(rooms: RoomMap, index: int) -> bool:
+    return rooms.regions[index - 1].room_class is RoomClass.CORRIDOR
+
+
+def _class_ratio(
+    rooms: RoomMap, classes: dict[int, str], pairs: list[tuple[int, int]]
+) -> float | None:
+    right = [_is_hallway(rooms, i) == (classes[j] == "hallway") for i, j in pairs]
+    return statistics.mean(right) if right else None
+
+
+def _hallways(
+    rooms: RoomMap, classes: dict[int, str], pairs: list[tuple[int, int]]
+) -> tuple[int, int, int]:
+    said = [(_is_hallway(rooms, i), classes[j] == "hallway") for i, j in pairs]
+    return (
+        sum(found and true for found, true in said),
+        sum(found and not true for found, true in said),
+        sum(true and not found for found, true in said),
+    )
+
+
+def _ranks_right(
+    rooms: RoomMap, classes: dict[int, str], overlap: Numbers, agreement: Ratios
+) -> dict[str, bool]:
+    found = sorted(
+        (region.free_area_m2, region.index)
+        for region in rooms.regions
+        if region.room_class is not RoomClass.CORRIDOR
+    )
+    areas = overlap.sum(axis=0)
+    true = sorted((int(areas[j]), j) for j, named in classes.items() if named == "room")
+    return {
+        name: len(found) > abs(rank) and bool(agreement[found[rank][1], true[rank][1]] >= 0.5)
+        for name, rank in RANKS.items()
+    }
+
+
+@click.command()
+@click.argument("maps", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="The scores of every map as JSON.")
+def main(maps: Path, *, as_json: bool) -> None:
+    """Scores the division of every map in MAPS that people have divided."""
+    cv2.setNumThreads(1)
+    scores = [score_map(found.parent) for found in sorted(maps.glob("*/*/rooms.png"))]
+    if as_json:
+        click.echo(json.dumps([asdict(score) for score in scores], indent=2))
+        return
+    _show(scores)
+
+
+def _show(scores: Sequence[Score]) -> None:
+    columns = ("maps", "n", "F1@.5", "F1@.75", "class", "hallway F1", *RANKS, "ms", "ms, most")
+    table = Table(*columns)
+    groups = sorted({score.group for score in scores})
+    for group in groups:
+        table.add_row(group, *_row([score for score in scores if score.group == group]))
+    table.add_row("all", *_row(scores))
+    Console(width=110).print(table)
+
+
+def _row(scores: Sequence[Score]) -> list[str]:
+    times_ms = [score.time_ms for score in scores]
+    ranks = [score.ranks_right for score in scores if score.ranks_right]
+    return [
+        str(len(scores)),
+        _mean(score.f1_50 for score in scores),
+        _mean(score.f1_75 for score in scores),
+        _mean(score.class_ratio for score in scores),
+        _hallway_f1(scores),
+        *(f"{sum(rank[name] for rank in ranks)}/{len(ranks)}" for name in RANKS),
+        f"{statistics.mean(times_ms):.0f}",
+        f"{max(times_ms):.0f}",
+    ]
+
+
+def _mean(values: Iterable[float | None]) -> str:
+    known = [value for value in values if value is not None]
+    return f"{statistics.mean(known):.3f}" if known else "-"
+
+
+def _hallway_f1(scores: Sequence[Score]) -> str:
+    counts: list[Any] = [score.hallways for score in scores if score.hallways]
+    if not counts:
+        return "-"
+    right, wrong, missed = (sum(column) for column in zip(*counts, strict=True))
+    return f"{2 * right / max(2 * right + wrong + missed, 1):.3f}"
+
+
+if __name__ == "__main__":
+    main()

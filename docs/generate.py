@@ -1,0 +1,100 @@
+"""Writes what the documents say about tools, from the tools themselves: `./run docs`.
+
+A table stands between `<!-- tools -->` and `<!-- /tools -->` in each document that has one, and
+`docs/reference/tools.md` is written whole.
+"""
+
+import asyncio
+import json
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+from mcp_types import Tool
+
+from fakes import FakeRobot, two_rooms
+from mapspeak.semantic import SemanticMapStore
+from mapspeak.server import build_server
+from mapspeak.server.tools import build_toolsets
+from mapspeak.session import Session
+
+__all__ = ["main", "write_documents"]
+
+ROOT = Path(__file__).parents[1]
+REFERENCE = ROOT / "docs" / "reference" / "tools.md"
+SNAPSHOT = ROOT / "tests" / "snapshots" / "tools.json"
+WITH_TABLES = (ROOT / "README.md",)
+TABLE = re.compile(r"(?<=<!-- tools -->\n).*?(?=<!-- /tools -->)", re.DOTALL)
+
+
+def main() -> None:
+    """Writes every document anew; with --check it only says whether that would change one."""
+    stale = [path for path, text in write_documents().items() if _read(path) != text]
+    if "--check" in sys.argv:
+        sys.exit(f"Out of date, run ./run docs: {', '.join(map(str, stale))}" if stale else 0)
+    for path, text in write_documents().items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+
+def write_documents() -> dict[Path, str]:
+    """Gives the text of each generated document."""
+    session = Session(FakeRobot(two_rooms()), SemanticMapStore(Path("unused.yaml")), lease_s=60.0)
+    groups = build_toolsets(session)
+    listed = asyncio.run(build_server(session, toolsets=groups).list_tools())
+    by_name = {tool.name: tool for tool in listed}
+    toolsets = {name: [by_name[tool.name] for tool in tools] for name, tools in groups.items()}
+    documents = {path: TABLE.sub(_table(toolsets), _read(path)) for path in WITH_TABLES}
+    documents[REFERENCE] = _reference(toolsets)
+    documents[SNAPSHOT] = _snapshot(listed)
+    return documents
+
+
+def _table(toolsets: dict[str, list[Tool]]) -> str:
+    lines = ["| tool | what it does | toolset |", "|---|---|---|"]
+    lines += [
+        f"| `{tool.name}` | {_first_sentence(tool)} | {name} |"
+        for name, tools in toolsets.items()
+        for tool in tools
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _reference(toolsets: dict[str, list[Tool]]) -> str:
+    parts = ["# Tools\n\nGenerated from the code by `./run docs`."]
+    for name, tools in toolsets.items():
+        parts.append(f"## Toolset `{name}`")
+        parts += [_section(tool) for tool in tools]
+    return "\n\n".join(parts) + "\n"
+
+
+def _section(tool: Tool) -> str:
+    lines = [f"### `{tool.name}`", "", tool.description or "", ""]
+    required = tool.input_schema.get("required", [])
+    for name, schema in tool.input_schema.get("properties", {}).items():
+        need = "required" if name in required else "optional"
+        lines.append(f"- `{name}` ({need}): {schema.get('description', '')}{_bounds(schema)}")
+    return "\n".join(lines).rstrip()
+
+
+def _bounds(schema: dict[str, Any]) -> str:
+    low, high = schema.get("minimum"), schema.get("maximum")
+    return "" if low is None or high is None else f"; {low:g} to {high:g}"
+
+
+def _first_sentence(tool: Tool) -> str:
+    return re.split(r"(?<=\.)\s", tool.description or "", maxsplit=1)[0]
+
+
+def _snapshot(listed: list[Tool]) -> str:
+    tools = [tool.model_dump(mode="json", by_alias=True, exclude_none=True) for tool in listed]
+    return json.dumps(tools, indent=1) + "\n"
+
+
+def _read(path: Path) -> str:
+    return path.read_text(encoding="utf-8") if path.exists() else ""
+
+
+if __name__ == "__main__":
+    main()

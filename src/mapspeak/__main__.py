@@ -1,0 +1,5 @@
+"""`python -m mapspeak` is `mapspeak`."""
+
+from mapspeak.cli import main
+
+main()

@@ -1,0 +1,123 @@
+"""An MCP client that keeps account: every call, its answer, and the pictures in it."""
+
+import base64
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+from mcp.client import Client
+from mcp_types import CallToolResult, ImageContent, TextContent
+
+from mapspeak.errors import LinkError
+
+__all__ = ["Answer", "CallRecord", "Picture", "ToolClient"]
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A picture in a tool's answer.
+
+    Attributes:
+        data: The encoded picture.
+        media_type: Such as "image/png".
+    """
+
+    data: bytes
+    media_type: str
+
+    @property
+    def suffix(self) -> str:
+        """The file name's ending."""
+        return ".jpg" if self.media_type == "image/jpeg" else ".png"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """What a tool answered.
+
+    Attributes:
+        text: All text in it.
+        pictures: All pictures in it.
+        report: The structured part; empty where there is none.
+        is_error: The tool could not do what was asked; the text says why.
+    """
+
+    text: str
+    pictures: tuple[Picture, ...]
+    report: dict[str, Any]
+    is_error: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CallRecord:
+    """One call as it happened.
+
+    Attributes:
+        tool: Its name.
+        arguments: What it was called with.
+        text: What it answered.
+        is_error: It answered with an error.
+        wall_s: How long it took by the wall clock.
+    """
+
+    tool: str
+    arguments: dict[str, Any]
+    text: str
+    is_error: bool
+    wall_s: float
+
+
+@dataclass(slots=True)
+class ToolClient:
+    """Calls tools over MCP and remembers every call.
+
+    Attributes:
+        client: The connected MCP client.
+        calls: Every call so far.
+    """
+
+    client: Client
+    calls: list[CallRecord] = field(default_factory=list)
+
+    async def call(self, tool: str, **arguments: object) -> Answer:
+        """Calls a tool and gives its answer, also when that is an error."""
+        begun_s = time.perf_counter()
+        result = await self.client.call_tool(tool, arguments)
+        answer = _read(result)
+        self.calls.append(
+            CallRecord(
+                tool=tool,
+                arguments=arguments,
+                text=answer.text,
+                is_error=answer.is_error,
+                wall_s=time.perf_counter() - begun_s,
+            )
+        )
+        return answer
+
+    async def demand(self, tool: str, **arguments: object) -> Answer:
+        """Calls a tool that has to succeed.
+
+        Raises:
+            LinkError: It did not; its text says why.
+        """
+        answer = await self.call(tool, **arguments)
+        if answer.is_error:
+            raise LinkError(f"{tool} failed: {answer.text}", hint="See the calls before it.")
+        return answer
+
+
+def _read(result: CallToolResult) -> Answer:
+    texts = [part.text for part in result.content if isinstance(part, TextContent)]
+    pictures = [
+        Picture(base64.b64decode(part.data), part.mime_type)
+        for part in result.content
+        if isinstance(part, ImageContent)
+    ]
+    report = result.structured_content or {}
+    return Answer(
+        text="\n".join(texts),
+        pictures=tuple(pictures),
+        report=dict(report),
+        is_error=bool(result.is_error),
+    )

@@ -1,0 +1,112 @@
+"""Reading the text of `look_at_map` as a model does: the tables, the pose, the picture's scale."""
+
+import io
+import math
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from PIL import Image
+
+from mapspeak.errors import MapError
+from mapspeak.geometry import Pose
+from mapspeak.spatial import UNKNOWN, OccupancyGrid
+
+__all__ = ["MapReading", "Row", "read_map_picture", "read_map_text"]
+
+UNKNOWN_GREY = 127
+
+POSE = re.compile(r"Robot: x (-?[\d.]+), y (-?[\d.]+), yaw (-?[\d.]+) deg")
+PLACEMENT = re.compile(
+    r"has (\d+) px per cell of ([\d.]+) m; lower left corner at x (-?[\d.]+), y (-?[\d.]+)\."
+)
+HEADING = re.compile(r"^## (\w+)")
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One line of a table.
+
+    Attributes:
+        id: The first column.
+        cells: Every column by its heading.
+    """
+
+    id: str
+    cells: dict[str, str]
+
+    def number(self, column: str) -> float:
+        """Gives a column as a number; infinite where the table says there is none."""
+        match = re.match(r"-?[\d.]+", self.cells[column])
+        return float(match.group()) if match else math.inf
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MapReading:
+    """What the text of `look_at_map` says.
+
+    Attributes:
+        pose: Where the robot is.
+        tables: Rows by the name of their table: Rooms, Doors, Frontiers, Places.
+    """
+
+    pose: Pose
+    tables: dict[str, tuple[Row, ...]]
+
+    def rows(self, table: str) -> tuple[Row, ...]:
+        """Gives the rows of a table; none where it is not there."""
+        return self.tables.get(table, ())
+
+
+def read_map_text(text: str) -> MapReading:
+    """Reads what `look_at_map` answered.
+
+    Raises:
+        MapError: The text names no pose.
+    """
+    match = POSE.search(text)
+    if match is None:
+        raise MapError("The text names no robot pose.", hint="Give the text of look_at_map.")
+    x, y, yaw_deg = (float(part) for part in match.groups())
+    return MapReading(pose=Pose(x, y, math.radians(yaw_deg)), tables=_read_tables(text))
+
+
+def _read_tables(text: str) -> dict[str, tuple[Row, ...]]:
+    tables: dict[str, tuple[Row, ...]] = {}
+    for block in re.split(r"^(?=## )", text, flags=re.MULTILINE):
+        heading = HEADING.match(block)
+        lines = [line for line in block.splitlines() if " | " in line]
+        if heading is None or not lines:
+            continue
+        columns = _split(lines[0])
+        rows = (dict(zip(columns, _split(line), strict=False)) for line in lines[1:])
+        tables[heading.group(1)] = tuple(Row(row[columns[0]], row) for row in rows)
+    return tables
+
+
+def _split(line: str) -> list[str]:
+    return [part.strip() for part in line.split(" | ")]
+
+
+def read_map_picture(text: str, picture: bytes) -> OccupancyGrid:
+    """Reads the grid back from `subscribe_map_as_image`, by the grey levels of the paper's eq. 1.
+
+    Raises:
+        MapError: The text does not say where whole cells lie in the picture.
+    """
+    match = PLACEMENT.search(text)
+    if match is None:
+        raise MapError(
+            "The text does not say how many pixels a cell has.",
+            hint="A map of more than 1000 cells along a side is drawn smaller; read its file.",
+        )
+    n_pixels = int(match.group(1))
+    resolution_m, x, y = (float(part) for part in match.groups()[1:])
+    pixels = np.flipud(np.asarray(Image.open(io.BytesIO(picture)).convert("L")))
+    grey = pixels[n_pixels // 2 :: n_pixels, n_pixels // 2 :: n_pixels].astype(np.int16)
+    occupancy = np.rint(100 * (255 - grey) / 255).astype(np.int8)
+    return OccupancyGrid(
+        cells=np.where(grey == UNKNOWN_GREY, UNKNOWN, occupancy),
+        resolution_m=resolution_m,
+        origin=Pose(x, y),
+    )

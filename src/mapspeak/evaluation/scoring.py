@@ -1,0 +1,111 @@
+"""Scores from the simulator's truth: the world file and the state log, never the model's words."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mapspeak.geometry import Point, Pose
+from mapspeak.simulator import (
+    MeasuredRoom,
+    RoomClass,
+    StateRecord,
+    TrueFloor,
+    World,
+    is_in_sight,
+)
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.coverage import Coverage, measure_coverage
+
+__all__ = ["FireToolScore", "RoomScore", "Scorer"]
+
+BESIDE_M = 5.0
+"""A robot that stands this near to a thing, with a free line of sight, has been led to it.
+
+The paper's goal is the waypoint from which the thing was seen, 3 to 4 m away from it.
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RoomScore:
+    """Whether the robot stands in the smallest room.
+
+    Attributes:
+        is_success: It does.
+        chosen_room: The name of the room it stands in; None when in none.
+        chosen_room_area_m2: Its free floor.
+        smallest_room_area_m2: The free floor of the smallest one.
+        final_pose: Where it truly stands.
+    """
+
+    is_success: bool
+    chosen_room: str | None
+    chosen_room_area_m2: float | None
+    smallest_room_area_m2: float
+    final_pose: Pose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FireToolScore:
+    """Whether the robot was led to a fire extinguisher.
+
+    Attributes:
+        is_success: One is in sight and near.
+        nearest: The name of the nearest one in sight; None when none is.
+        distance_m: To that one, else to the nearest of all.
+    """
+
+    is_success: bool
+    nearest: str | None
+    distance_m: float
+
+
+class Scorer:
+    """Knows one world's truth."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._floor = TrueFloor(world)
+
+    def score_map(self, grid: OccupancyGrid) -> Coverage:
+        """Compares a robot's map with what a perfect robot could have mapped."""
+        return measure_coverage(grid, self._floor.visible)
+
+    def score_smallest_room(self, pose: Pose) -> RoomScore:
+        """Scores the paper's Task 2 from where the robot truly stands."""
+        rooms = [room for room in self._floor.rooms if room.room.room_class is RoomClass.ROOM]
+        smallest = min(rooms, key=lambda room: room.free_area_m2)
+        here = self._find_room(pose.point)
+        return RoomScore(
+            is_success=here is smallest,
+            chosen_room=None if here is None else here.room.name,
+            chosen_room_area_m2=None if here is None else here.free_area_m2,
+            smallest_room_area_m2=smallest.free_area_m2,
+            final_pose=pose,
+        )
+
+    def score_fire_tool(self, pose: Pose) -> FireToolScore:
+        """Scores the paper's Task 3 from where the robot truly stands."""
+        here = self._world.start.transform(pose.point)
+        tools = [thing for thing in self._world.objects if thing.kind == "fire_extinguisher"]
+        in_sight = [tool for tool in tools if is_in_sight(self._world, here, tool)]
+        nearest = min(in_sight or tools, key=lambda tool: here.distance_to(tool.pose.point))
+        distance_m = here.distance_to(nearest.pose.point)
+        return FireToolScore(
+            is_success=bool(in_sight) and distance_m <= BESIDE_M,
+            nearest=nearest.name if in_sight else None,
+            distance_m=distance_m,
+        )
+
+    def _find_room(self, point_in_map: Point) -> MeasuredRoom | None:
+        point = self._world.start.transform(point_in_map)
+        return next(
+            (room for room in self._floor.rooms if room.room.contains(point)),
+            None,
+        )
+
+
+def slam_rmse_m(records: Sequence[StateRecord]) -> float:
+    """Gives the root mean square error of the robot's own pose over a run."""
+    if not records:
+        return math.nan
+    return math.sqrt(sum(record.slam_error_m**2 for record in records) / len(records))

@@ -1,0 +1,243 @@
+"""The simulated robot behind the port, on a virtual clock or paced to real time."""
+
+import io
+from collections.abc import AsyncGenerator, Callable
+from contextlib import asynccontextmanager
+from enum import StrEnum
+from typing import TypeVar
+
+import anyio
+import anyio.to_thread
+from PIL import Image
+
+from mapspeak.geometry import Pose
+from mapspeak.robot import (
+    CameraPicture,
+    Detection,
+    GoalState,
+    GoalStatus,
+    RobotDescription,
+    StampedPose,
+)
+from mapspeak.simulator import BODY_RADIUS_M, TICK_S, DriveState, Simulation
+from mapspeak.spatial import OccupancyGrid
+
+__all__ = ["Clock", "SimulatedRobot", "open_simulated_robot"]
+
+CHUNK_S = 0.25
+"""Robot time computed in one go; a command waits at most for one such chunk."""
+EPSILON_S = 1e-6
+LATE_S = 1.0
+"""A machine that falls this far behind the wall clock is not rushed to catch up."""
+JPEG_QUALITY = 85
+
+T = TypeVar("T")
+
+
+class Clock(StrEnum):
+    """What makes a simulated robot's time pass."""
+
+    REAL = "real"
+    VIRTUAL = "virtual"
+
+
+STATE_OF_DRIVE = {
+    DriveState.DRIVING: GoalState.DRIVING,
+    DriveState.ARRIVED: GoalState.ARRIVED,
+    DriveState.BLOCKED: GoalState.BLOCKED,
+    DriveState.CANCELLED: GoalState.CANCELLED,
+    DriveState.PREEMPTED: GoalState.PREEMPTED,
+}
+
+
+class SimulatedRobot:
+    """A `Robot` whose world is computed here. Time passes only while somebody waits.
+
+    Every touch of the simulation happens in a worker thread, one at a time, so that the event loop
+    stays free to answer a stop.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        *,
+        has_detector: bool,
+        after_step: Callable[[], None] | None = None,
+    ) -> None:
+        self._simulation = simulation
+        self._has_detector = has_detector
+        self._after_step = after_step or _do_nothing
+        self._turn = anyio.Lock()
+
+    @property
+    def description(self) -> RobotDescription:
+        """What is fixed about this robot."""
+        return RobotDescription(
+            name="simulated robot",
+            radius_m=BODY_RADIUS_M,
+            map_name=self._simulation.world_name,
+            has_camera=True,
+            detector="simulated detector" if self._has_detector else None,
+        )
+
+    @property
+    def now_s(self) -> float:
+        """Robot time: seconds since the simulation began."""
+        return self._simulation.time_s
+
+    async def sleep(self, duration_s: float) -> None:
+        """Lets that much robot time pass, as fast as it can be computed."""
+        deadline_s = self.now_s + duration_s
+        while self.now_s < deadline_s - EPSILON_S:
+            await self.advance_to(min(deadline_s, self.now_s + CHUNK_S))
+
+    async def fetch_map(self) -> OccupancyGrid:
+        """Gives the map that the simulated SLAM publishes."""
+        return await self._run(self._simulation.map)
+
+    async def fetch_pose(self) -> StampedPose:
+        """Gives the pose that the simulated SLAM believes in."""
+        return await self._run(
+            lambda: StampedPose(self._simulation.pose_in_map, self._simulation.time_s)
+        )
+
+    async def fetch_picture(self) -> CameraPicture:
+        """Draws what the front camera sees."""
+        return await self._run(self._take_picture)
+
+    async def fetch_detections(self) -> tuple[Detection, ...]:
+        """Gives what the simulated detector reports; nothing when it is switched off."""
+        if not self._has_detector:
+            return ()
+        return await self._run(self._detect)
+
+    async def send_goal(self, goal: Pose) -> str:
+        """Starts a drive in the simulated navigation."""
+        return str(await self._run(lambda: self._simulation.start_goal(goal)))
+
+    async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
+        """Gives how a drive stands."""
+        return await self._run(lambda: self._goal_status(robot_goal_id))
+
+    async def cancel_goal(self, robot_goal_id: str) -> None:
+        """Ends a drive."""
+        await self._run(lambda: self._simulation.cancel_goal(_number(robot_goal_id)))
+
+    async def stop(self) -> None:
+        """Ends every drive and commands zero velocity."""
+        await self._run(self._simulation.stop)
+
+    async def advance_to(self, until_s: float) -> None:
+        """Computes the world up to that robot time."""
+        await self._run(lambda: self._advance_to(until_s))
+
+    async def _run(self, work: Callable[[], T]) -> T:
+        async with self._turn:
+            return await anyio.to_thread.run_sync(work)
+
+    def _advance_to(self, until_s: float) -> None:
+        while self._simulation.time_s < until_s - EPSILON_S:
+            self._simulation.step()
+            self._after_step()
+
+    def _goal_status(self, robot_goal_id: str) -> GoalStatus:
+        status = self._simulation.goal_status(_number(robot_goal_id))
+        return GoalStatus(
+            state=STATE_OF_DRIVE[status.state],
+            distance_left_m=status.distance_left_m,
+            n_recoveries=status.n_recoveries,
+            reason=status.reason,
+        )
+
+    def _take_picture(self) -> CameraPicture:
+        picture = self._simulation.take_picture()
+        encoded = io.BytesIO()
+        Image.fromarray(picture.rgb).save(encoded, format="JPEG", quality=JPEG_QUALITY)
+        height_px, width_px = picture.rgb.shape[:2]
+        return CameraPicture(
+            data=encoded.getvalue(),
+            media_type="image/jpeg",
+            width_px=width_px,
+            height_px=height_px,
+            horizontal_fov_rad=picture.horizontal_fov_rad,
+            pose=self._simulation.pose_in_map,
+            stamp_s=self._simulation.time_s,
+        )
+
+    def _detect(self) -> tuple[Detection, ...]:
+        return tuple(
+            Detection(
+                label=seen.label,
+                confidence_ratio=seen.confidence_ratio,
+                bearing_rad=seen.bearing_rad,
+                range_m=seen.range_m,
+            )
+            for seen in self._simulation.detect()
+        )
+
+
+class PacedRobot(SimulatedRobot):
+    """The same robot, whose time passes as the wall clock's does while `keep_pace` runs."""
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        *,
+        has_detector: bool,
+        after_step: Callable[[], None] | None = None,
+    ) -> None:
+        super().__init__(simulation, has_detector=has_detector, after_step=after_step)
+        self._moved_on = anyio.Event()
+
+    async def sleep(self, duration_s: float) -> None:
+        """Returns when that much robot time has passed."""
+        deadline_s = self.now_s + duration_s
+        while self.now_s < deadline_s - EPSILON_S:
+            await self._moved_on.wait()
+
+    async def keep_pace(self) -> None:
+        """Lets robot time pass as the wall clock does, until cancelled."""
+        wall_s, robot_s = anyio.current_time(), self.now_s
+        while True:
+            due_s = robot_s + anyio.current_time() - wall_s
+            await self.advance_to(min(due_s, self.now_s + CHUNK_S))
+            self._moved_on.set()
+            self._moved_on = anyio.Event()
+            if due_s - self.now_s > LATE_S:
+                wall_s, robot_s = anyio.current_time(), self.now_s
+            await anyio.sleep(TICK_S)
+
+
+@asynccontextmanager
+async def open_simulated_robot(
+    simulation: Simulation,
+    *,
+    clock: Clock,
+    has_detector: bool,
+    after_step: Callable[[], None] | None = None,
+) -> AsyncGenerator[SimulatedRobot]:
+    """Offers a simulation as a robot while the context lasts.
+
+    Args:
+        simulation: The world and the robot in it.
+        clock: What makes its time pass.
+        has_detector: Offers what the simulated detector sees.
+        after_step: Called after each step of the simulation, in its thread.
+    """
+    if clock is Clock.VIRTUAL:
+        yield SimulatedRobot(simulation, has_detector=has_detector, after_step=after_step)
+        return
+    robot = PacedRobot(simulation, has_detector=has_detector, after_step=after_step)
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(robot.keep_pace)
+        yield robot
+        tasks.cancel_scope.cancel()
+
+
+def _number(robot_goal_id: str) -> int:
+    """Gives the simulation's own id; an id of another robot is none of its."""
+    return int(robot_goal_id) if robot_goal_id.isdecimal() else 0
+
+
+def _do_nothing() -> None:
+    """Stands for the observer that nobody asked for."""

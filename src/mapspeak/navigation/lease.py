@@ -1,0 +1,32 @@
+"""The dead-man lease: a robot drives only while somebody is there who asked for it."""
+
+from collections.abc import Generator
+from contextlib import contextmanager
+
+import anyio
+
+__all__ = ["Lease"]
+
+
+class Lease:
+    """Knows since when no client has been heard. Wall time: it is about clients, not the robot."""
+
+    def __init__(self, duration_s: float) -> None:
+        self.duration_s = duration_s
+        self._n_calls = 0
+        self._last_heard_s = float("-inf")
+
+    @contextmanager
+    def call(self) -> Generator[None]:
+        """Marks a client's call: heard when it begins and when it ends."""
+        self._n_calls += 1
+        try:
+            yield
+        finally:
+            self._n_calls -= 1
+            self._last_heard_s = anyio.current_time()
+
+    @property
+    def is_over(self) -> bool:
+        """True when no call is under way and the last one is too long ago."""
+        return not self._n_calls and anyio.current_time() - self._last_heard_s > self.duration_s

@@ -1,0 +1,171 @@
+"""The MCP server around a session: chosen tools, readable errors, lean schemas."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from mcp.server import MCPServer
+from mcp.server.mcpserver import Context
+from mcp.server.mcpserver.exceptions import ToolError
+from mcp_types import CallToolResult, InputRequiredResult
+from mcp_types import Tool as ListedTool
+from pydantic import ValidationError
+
+from mapspeak import __version__
+from mapspeak.errors import ConfigError, MapspeakError
+from mapspeak.server.prompts import add_prompts, read_text
+from mapspeak.server.tools import build_toolsets
+from mapspeak.server.toolset import Effect, Tool
+from mapspeak.session import Session
+
+__all__ = ["DEFAULT_TOOLSETS", "MapspeakServer", "build_server"]
+
+DEFAULT_TOOLSETS = ("look", "drive", "paper")
+
+
+class MapspeakServer(MCPServer[Any]):
+    """An MCP server whose every call passes one door: the client is heard, errors are readable."""
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(
+            "mapspeak",
+            title="mapspeak: a robot's map, eyes and memory of places",
+            instructions=read_text("instructions"),
+            version=__version__,
+            log_level="WARNING",
+        )
+        self._session = session
+
+    async def call_tool(
+        self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None = None
+    ) -> CallToolResult | InputRequiredResult:
+        """Calls a tool; what went wrong on purpose reaches the model with its hint."""
+        with self._session.client_is_heard():
+            try:
+                return await super().call_tool(name, arguments, context)
+            except ToolError as error:
+                readable = _explain(name, error.__cause__)
+                if readable is None:
+                    raise
+                raise ToolError(readable) from error.__cause__
+
+    async def note_hang_up(self) -> None:
+        """Stops a drive that nobody is there for any more."""
+        await self._session.client_is_gone()
+
+    async def list_tools(self) -> list[ListedTool]:
+        """Lists the tools with schemas freed of what no model needs."""
+        listed = await super().list_tools()
+        return [
+            tool.model_copy(
+                update={
+                    "input_schema": _lean(tool.input_schema),
+                    "output_schema": _lean(tool.output_schema),
+                }
+            )
+            for tool in listed
+        ]
+
+
+def build_server(
+    session: Session,
+    *,
+    toolsets: Iterable[str] = DEFAULT_TOOLSETS,
+    tools: Iterable[str] = (),
+    is_read_only: bool = False,
+) -> MapspeakServer:
+    """Builds the server with the chosen tools, always in the same order.
+
+    Args:
+        session: What the tools work on.
+        toolsets: Names of the groups to offer.
+        tools: Single tools to offer besides.
+        is_read_only: Leaves out every tool that changes something; stopping stays.
+
+    Raises:
+        ConfigError: There is no such toolset or tool.
+    """
+    server = MapspeakServer(session)
+    for tool in choose_tools(session, toolsets=toolsets, tools=tools, is_read_only=is_read_only):
+        server.add_tool(
+            tool.function,
+            title=tool.title,
+            description=tool.description,
+            annotations=tool.annotations,
+            meta=tool.meta,
+            structured_output=tool.has_report,
+        )
+    add_prompts(server)
+    return server
+
+
+def choose_tools(
+    session: Session, *, toolsets: Iterable[str], tools: Iterable[str], is_read_only: bool
+) -> list[Tool]:
+    """Gives the chosen tools in their fixed order.
+
+    Raises:
+        ConfigError: There is no such toolset or tool.
+    """
+    known = build_toolsets(session)
+    chosen_sets, chosen_tools = set(toolsets), set(tools)
+    _check_names("toolset", chosen_sets, set(known))
+    _check_names("tool", chosen_tools, {tool.name for group in known.values() for tool in group})
+    return [
+        tool
+        for toolset, group in known.items()
+        for tool in group
+        if (toolset in chosen_sets or tool.name in chosen_tools)
+        and (not is_read_only or tool.effect in (Effect.READS, Effect.STOPS))
+    ]
+
+
+def _check_names(what: str, asked: set[str], known: set[str]) -> None:
+    strangers = sorted(asked - known)
+    if strangers:
+        raise ConfigError(
+            f"There is no {what} named {', '.join(map(repr, strangers))}.",
+            hint=f"Choose from {', '.join(sorted(known))}.",
+        )
+
+
+def _explain(name: str, cause: BaseException | None) -> str | None:
+    match cause:
+        case MapspeakError():
+            return str(cause)
+        case ValidationError():
+            faults = [_fault(error["loc"], error["msg"]) for error in cause.errors()]
+            return f"{name} was called with wrong arguments: {'; '.join(faults)}."
+        case _:
+            return None
+
+
+def _fault(location: tuple[int | str, ...], message: str) -> str:
+    where = ".".join(str(part) for part in location) or "arguments"
+    return f"{where}: {message[:1].lower()}{message[1:]}"
+
+
+def _lean(schema: Any) -> Any:  # noqa: ANN401 - JSON of any shape
+    """Strips what no model needs: titles, notes on classes, and longhand for "or nothing"."""
+    if isinstance(schema, list):
+        return [_lean(item) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    lean = {
+        key: {name: _lean(part) for name, part in value.items()}
+        if key in ("properties", "$defs")
+        else _lean(value)
+        for key, value in schema.items()
+        if not (key == "title" and isinstance(value, str))
+    }
+    for definition in lean.get("$defs", {}).values():
+        definition.pop("description", None)
+    return _with_short_nullables(lean)
+
+
+def _with_short_nullables(schema: dict[str, Any]) -> dict[str, Any]:
+    """Writes `anyOf: [number, null]` as `type: [number, null]`, and no default of null."""
+    options = schema.get("anyOf", [])
+    if len(options) != 2 or options[1] != {"type": "null"} or "type" not in options[0]:
+        return schema
+    rest = {k: v for k, v in schema.items() if k not in ("anyOf", "default")}
+    return {**options[0], **rest, "type": [options[0]["type"], "null"]}

@@ -1,0 +1,30 @@
+"""What the server tells a model before it starts: instructions, and the paper's two prompts.
+
+The exploration prompt is the paper's appendix word for word. The paper describes its semantic
+filtering policy without quoting it; the three categories are in the paper's words.
+"""
+
+from importlib import resources
+
+from mcp.server import MCPServer
+
+__all__ = ["add_prompts", "read_text"]
+
+
+def read_text(name: str) -> str:
+    """Gives one of the texts that come with the server: instructions, exploration, ..."""
+    return (resources.files("mapspeak.server") / "texts" / f"{name}.txt").read_text("utf-8").strip()
+
+
+def add_prompts(server: MCPServer) -> None:
+    """Registers the paper's exploration prompt and its semantic filtering policy."""
+
+    @server.prompt(title="Explore and map (the paper's exploration prompt)")
+    def exploration() -> str:
+        """Explores the building waypoint by waypoint and records what is seen."""
+        return f"{read_text('exploration')}\n\n{read_text('semantic_policy')}"
+
+    @server.prompt(title="Semantic map policy")
+    def semantic_policy() -> str:
+        """Says which observations belong into the semantic map."""
+        return read_text("semantic_policy")

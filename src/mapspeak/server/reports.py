@@ -1,0 +1,197 @@
+"""What the model reads: frozen reports, each field with one line of explanation."""
+
+import math
+from typing import Self
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from mapspeak.geometry import Pose
+from mapspeak.navigation.atlas import RememberedPlace, number_places
+from mapspeak.navigation.drive import DriveReport
+from mapspeak.robot import GoalState, StampedPose
+from mapspeak.semantic import Landmark, SemanticMap, WriteReceipt, name_key
+
+__all__ = [
+    "DriveAnswer",
+    "LandmarkReport",
+    "MemoryAnswer",
+    "PoseAnswer",
+    "PoseReport",
+    "WaypointReport",
+    "WriteAnswer",
+]
+
+
+class Report(BaseModel):
+    """Base of all reports: frozen."""
+
+    model_config = ConfigDict(frozen=True)
+
+
+class PoseReport(Report):
+    """A pose in the map frame."""
+
+    x: float = Field(description="metres")
+    y: float = Field(description="metres")
+    yaw_deg: float = Field(description="counter-clockwise from +x")
+
+    @classmethod
+    def of(cls, pose: Pose) -> Self:
+        """Makes the report of a pose, rounded to millimetres and tenths of a degree."""
+        return cls(
+            x=round(pose.x, 3) + 0.0,
+            y=round(pose.y, 3) + 0.0,
+            yaw_deg=round(math.degrees(pose.yaw_rad), 1) + 0.0,
+        )
+
+
+class PoseAnswer(Report):
+    """Where the robot is."""
+
+    pose: PoseReport
+    place: str = Field(description="the room or corridor it stands in, by id")
+    age_s: float = Field(description="seconds since the estimate")
+
+    @classmethod
+    def of(cls, stamped: StampedPose, *, place: str, now_s: float) -> Self:
+        """Makes the report of a stamped pose."""
+        age_s = max(0.0, round(now_s - stamped.stamp_s, 2))
+        return cls(pose=PoseReport.of(stamped.pose), place=place, age_s=age_s)
+
+
+NEXT_STEP = {
+    GoalState.ACCEPTED: "Call wait_for_goal; stop_robot or cancel_goal end it.",
+    GoalState.DRIVING: "Call wait_for_goal; stop_robot or cancel_goal end it.",
+    GoalState.ARRIVED: "The robot stands at the goal.",
+    GoalState.BLOCKED: "Call look_at_map, then choose another place or another way.",
+    GoalState.CANCELLED: "The robot stands still; send a new goal when ready.",
+    GoalState.PREEMPTED: "A newer goal is under way; ask for that one.",
+    GoalState.REJECTED: "Call look_at_map and choose a place inside known free space.",
+    GoalState.LOST: "The robot no longer answers for this goal; check it, then send a new one.",
+}
+
+
+class DriveAnswer(Report):
+    """How a drive stands."""
+
+    goal_id: str
+    place: str
+    goal: PoseReport
+    state: GoalState = Field(description="accepted and driving go on, all others are final")
+    robot: PoseReport = Field(description="where it is now")
+    distance_left_m: float | None = Field(description="by path")
+    elapsed_s: float
+    reason: str
+    next_step: str
+
+    @classmethod
+    def of(cls, report: DriveReport) -> Self:
+        """Makes the report of a drive."""
+        left_m = report.status.distance_left_m
+        return cls(
+            goal_id=report.drive.goal_id,
+            state=report.status.state,
+            place=report.drive.place,
+            goal=PoseReport.of(report.drive.goal),
+            robot=PoseReport.of(report.pose),
+            distance_left_m=None if left_m is None else round(left_m, 2),
+            elapsed_s=round(report.elapsed_s, 1),
+            reason=report.status.reason,
+            next_step=NEXT_STEP[report.status.state],
+        )
+
+
+class LandmarkReport(Report):
+    """A thing seen from a remembered place."""
+
+    label: str
+    purpose: str | None = None
+    bearing_deg: float | None = Field(None, description="from the pose's heading, left positive")
+    range_m: float | None = None
+
+    @classmethod
+    def of(cls, landmark: Landmark) -> Self:
+        """Makes the report of a landmark."""
+        bearing_rad = landmark.bearing_rad
+        return cls(
+            label=landmark.label,
+            purpose=landmark.purpose,
+            bearing_deg=None if bearing_rad is None else round(math.degrees(bearing_rad), 1),
+            range_m=None if landmark.range_m is None else round(landmark.range_m, 2),
+        )
+
+
+class WaypointReport(Report):
+    """A remembered place: what was observed there, never an instruction."""
+
+    id: str = Field(description="takes you there with navigate_to")
+    name: str
+    description: str
+    pose: PoseReport
+    safety_landmarks: list[LandmarkReport]
+    functional_landmarks: list[LandmarkReport]
+    geometric_features: list[str]
+
+    @classmethod
+    def of(cls, place: RememberedPlace) -> Self:
+        """Makes the report of a remembered place."""
+        waypoint = place.waypoint
+        return cls(
+            id=place.id,
+            name=waypoint.name,
+            description=waypoint.description,
+            pose=PoseReport.of(waypoint.pose),
+            safety_landmarks=[LandmarkReport.of(each) for each in waypoint.safety_landmarks],
+            functional_landmarks=[
+                LandmarkReport.of(each) for each in waypoint.functional_landmarks
+            ],
+            geometric_features=list(waypoint.geometric_features),
+        )
+
+
+class MemoryAnswer(Report):
+    """What is remembered."""
+
+    map: str | None = Field(description="the map that the poses belong to")
+    n_places: int = Field(description="in all, also those not shown")
+    waypoints: list[WaypointReport]
+    warnings: list[str]
+
+    @classmethod
+    def of(cls, memory: SemanticMap, name: str | None) -> Self:
+        """Makes the report of all places, or of the one of that name or id."""
+        places = number_places(memory.waypoints)
+        shown = [place for place in places if name is None or _is_called(place, name)]
+        return cls(
+            map=memory.map_id,
+            n_places=len(places),
+            waypoints=[WaypointReport.of(place) for place in shown],
+            warnings=list(memory.warnings),
+        )
+
+
+class WriteAnswer(Report):
+    """What was remembered."""
+
+    id: str = Field(description="takes you there with navigate_to")
+    name: str
+    pose: PoseReport
+    is_new: bool = Field(description="false: a place of that name was updated")
+    n_places: int = Field(description="remembered in all")
+
+    @classmethod
+    def of(cls, receipt: WriteReceipt, memory: SemanticMap) -> Self:
+        """Makes the report of a write, with the id that the place has in the memory now."""
+        places = number_places(memory.waypoints)
+        stored = next(place for place in places if _is_called(place, receipt.name))
+        return cls(
+            id=stored.id,
+            name=stored.waypoint.name,
+            pose=PoseReport.of(stored.waypoint.pose),
+            is_new=receipt.is_created,
+            n_places=receipt.n_waypoints,
+        )
+
+
+def _is_called(place: RememberedPlace, name: str) -> bool:
+    return name_key(place.waypoint.name) == name_key(name) or place.id == name.strip().upper()

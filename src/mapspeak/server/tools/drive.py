@@ -1,0 +1,127 @@
+"""The tools that move the robot, and those that stop it."""
+
+from typing import Annotated
+
+from mcp.server.mcpserver import Context
+from pydantic import Field
+
+from mapspeak.navigation.drive import DriveReport, OnProgress
+from mapspeak.server.reports import DriveAnswer
+from mapspeak.server.tables import say_pose
+from mapspeak.server.toolset import Effect, Tool
+from mapspeak.session import Session
+
+__all__ = ["DriveTools"]
+
+LONGEST_WAIT_S = 25.0
+
+Place = Annotated[
+    str | None,
+    Field(description="an id from look_at_map (R3, C1, D1, F2, W5) or a remembered name"),
+]
+Metres = Annotated[float | None, Field(description="metres, map frame", allow_inf_nan=False)]
+Degrees = Annotated[
+    float | None,
+    Field(description="heading on arrival, degrees counter-clockwise from +x", allow_inf_nan=False),
+]
+Wait = Annotated[
+    float, Field(description="seconds to wait for the end of the drive", ge=0, le=LONGEST_WAIT_S)
+]
+GoalId = Annotated[str | None, Field(description="from navigate_to; the latest when left out")]
+
+
+class DriveTools:
+    """Sending the robot somewhere, waiting, cancelling, stopping."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    def tools(self) -> list[Tool]:
+        """Gives the tools in their order."""
+        return [
+            Tool(
+                function=self.navigate_to,
+                title="Drive to a place",
+                effect=Effect.MOVES,
+                has_report=True,
+                is_entry=True,
+            ),
+            Tool(
+                function=self.wait_for_goal,
+                title="Wait for a drive",
+                effect=Effect.READS,
+                has_report=True,
+            ),
+            Tool(
+                function=self.cancel_goal,
+                title="Cancel a drive",
+                effect=Effect.STOPS,
+            ),
+            Tool(
+                function=self.stop_robot, title="Stop the robot", effect=Effect.STOPS, is_entry=True
+            ),
+        ]
+
+    async def navigate_to(
+        self,
+        context: Context,
+        place: Place = None,
+        x: Metres = None,
+        y: Metres = None,
+        yaw_deg: Degrees = None,
+        wait_s: Wait = 20.0,
+    ) -> DriveAnswer:
+        """Drives the robot to a place: an id, a remembered name, or x and y.
+
+        Use it to go anywhere. The goal is checked first; a refused goal comes with one that works.
+        Answers `arrived` or, after wait_s, a goal_id for wait_for_goal. A newer goal replaces the
+        older one.
+        """
+        goal = await self._session.find_goal(place=place, x=x, y=y, yaw_deg=yaw_deg)
+        drive = await self._session.drives.start(goal.pose, place=goal.name)
+        return await self._wait(context, drive.goal_id, wait_s)
+
+    async def wait_for_goal(
+        self, context: Context, goal_id: GoalId = None, wait_s: Wait = 20.0
+    ) -> DriveAnswer:
+        """Waits until a drive ends, or wait_s, and says how it stands.
+
+        Use it after navigate_to; with wait_s=0 it only asks.
+        """
+        return await self._wait(context, goal_id, wait_s)
+
+    async def cancel_goal(self, goal_id: GoalId = None) -> str:
+        """Ends one drive; the robot comes to a stand.
+
+        Use stop_robot instead when anything is urgent.
+        """
+        report = await self._session.drives.cancel(goal_id)
+        return (
+            f"{report.drive.goal_id} to {report.drive.place}: {report.status.state}. "
+            f"The robot is at {say_pose(report.pose)}."
+        )
+
+    async def stop_robot(self) -> str:
+        """Stops the robot at once and ends every drive.
+
+        Use it whenever going on could do harm; it works during any other call.
+        """
+        await self._session.drives.stop()
+        return "The robot was told to stop; no drive is under way."
+
+    async def _wait(self, context: Context, goal_id: str | None, wait_s: float) -> DriveAnswer:
+        report = await self._session.drives.wait(
+            goal_id, wait_s=wait_s, on_progress=_tell_progress(context)
+        )
+        return DriveAnswer.of(report)
+
+
+def _tell_progress(context: Context) -> OnProgress:
+    async def tell(report: DriveReport) -> None:
+        left_m = report.status.distance_left_m
+        left = "" if left_m is None else f", {left_m:.1f} m left"
+        await context.report_progress(
+            report.elapsed_s, message=f"{report.drive.goal_id} {report.status.state}{left}"
+        )
+
+    return tell

@@ -1,0 +1,18 @@
+"""Every toolset by its name."""
+
+from mapspeak.server.tools.drive import DriveTools
+from mapspeak.server.tools.look import LookTools
+from mapspeak.server.tools.paper import PaperTools
+from mapspeak.server.toolset import Tool
+from mapspeak.session import Session
+
+__all__ = ["build_toolsets"]
+
+
+def build_toolsets(session: Session) -> dict[str, list[Tool]]:
+    """Gives every toolset by its name, in the order in which tools are listed."""
+    return {
+        "look": LookTools(session).tools(),
+        "drive": DriveTools(session).tools(),
+        "paper": PaperTools(session).tools(),
+    }

@@ -1,0 +1,129 @@
+"""How a server reaches its clients: stdio, or streaming HTTP with its doors closed by default."""
+
+import ipaddress
+import secrets
+from collections.abc import Awaitable, Callable
+
+import uvicorn
+from mcp.server.transport_security import TransportSecuritySettings
+from starlette.responses import PlainTextResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from mapspeak.errors import ConfigError
+from mapspeak.server.app import MapspeakServer
+
+__all__ = ["serve_http", "serve_stdio"]
+
+
+async def serve_stdio(server: MapspeakServer) -> None:
+    """Serves one client over standard input and output until it hangs up."""
+    await server.run_stdio_async()
+
+
+async def serve_http(server: MapspeakServer, address: str, *, token: str | None = None) -> None:
+    """Serves clients over streaming HTTP at `/mcp`; `/health` answers "ok".
+
+    Foreign Host and Origin headers are refused. Outside this machine a bearer token is demanded.
+
+    Raises:
+        ConfigError: The address is no HOST:PORT, or it is reachable from outside without a token.
+    """
+    host, port = _parse_address(address)
+    if token is None and not _is_loopback(host):
+        raise ConfigError(
+            f"{host} can be reached from other machines, and no token is set.",
+            hint="Set MAPSPEAK_HTTP_TOKEN, or serve on 127.0.0.1.",
+        )
+    # Cancellation is lost with json_response or stateless_http: never use either for a robot.
+    app = server.streamable_http_app(transport_security=_security(host, port), host=host)
+    app.add_route("/health", _say_ok)
+    watched: ASGIApp = HangUpWatch(app, server.note_hang_up)
+    guarded = watched if token is None else TokenGuard(watched, token)
+    config = uvicorn.Config(guarded, host=host, port=port, log_level="warning")
+    await uvicorn.Server(config).serve()
+
+
+class HangUpWatch:
+    """Notices a client that is gone before its answer was: nobody else tells a running tool."""
+
+    def __init__(self, app: ASGIApp, on_hang_up: Callable[[], Awaitable[None]]) -> None:
+        self._app = app
+        self._on_hang_up = on_hang_up
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Passes the request on, watching both directions."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        is_answered = False
+
+        async def watch_send(message: Message) -> None:
+            nonlocal is_answered
+            await send(message)
+            is_body = message["type"] == "http.response.body"
+            is_answered = is_answered or (is_body and not message.get("more_body", False))
+
+        async def watch_receive() -> Message:
+            message = await receive()
+            if message["type"] == "http.disconnect" and not is_answered:
+                await self._on_hang_up()
+            return message
+
+        await self._app(scope, watch_receive, watch_send)
+
+
+class TokenGuard:
+    """Lets only requests through that carry the bearer token."""
+
+    def __init__(self, app: ASGIApp, token: str) -> None:
+        self._app = app
+        self._expected = f"Bearer {token}".encode()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Passes the request on, or answers 401."""
+        if scope["type"] == "http" and not self._is_welcome(scope):
+            refusal = PlainTextResponse(
+                "A bearer token is needed.", 401, headers={"WWW-Authenticate": "Bearer"}
+            )
+            await refusal(scope, receive, send)
+            return
+        await self._app(scope, receive, send)
+
+    def _is_welcome(self, scope: Scope) -> bool:
+        given = dict(scope["headers"]).get(b"authorization", b"")
+        return scope["path"] == "/health" or secrets.compare_digest(given, self._expected)
+
+
+async def _say_ok(_request: object) -> PlainTextResponse:
+    return PlainTextResponse("ok")
+
+
+def _security(host: str, port: int) -> TransportSecuritySettings:
+    if not _is_loopback(host):
+        # The token is what guards here; the names by which others reach this machine are unknown.
+        return TransportSecuritySettings(enable_dns_rebinding_protection=False)
+    names = {host, "localhost", "127.0.0.1", "[::1]"}
+    return TransportSecuritySettings(
+        enable_dns_rebinding_protection=True,
+        allowed_hosts=[f"{name}:{port}" for name in sorted(names)],
+        allowed_origins=[f"http://{name}:{port}" for name in sorted(names)],
+    )
+
+
+def _parse_address(address: str) -> tuple[str, int]:
+    host, _, port = address.rpartition(":")
+    host = host.strip("[]") or "127.0.0.1"
+    if not port.isdecimal() or not 0 < int(port) < 65536:
+        raise ConfigError(
+            f"{address!r} is no address to serve on.", hint="Give HOST:PORT, as 127.0.0.1:8766."
+        )
+    return host, int(port)
+
+
+def _is_loopback(host: str) -> bool:
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False

@@ -1,0 +1,122 @@
+"""The one stateful object: a robot, its latest atlas, its memory, its drives, its clients."""
+
+import logging
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from typing import TypeVar
+
+import anyio
+import anyio.to_thread
+
+from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import Point
+from mapspeak.navigation.atlas import Atlas
+from mapspeak.navigation.drive import DriveBook
+from mapspeak.navigation.lease import Lease
+from mapspeak.navigation.places import NamedPose, choose_goal
+from mapspeak.robot import Robot
+from mapspeak.semantic import SemanticMap, SemanticMapStore
+
+__all__ = ["Session"]
+
+WATCH_S = 0.5
+
+T = TypeVar("T")
+
+logger = logging.getLogger(__name__)
+
+
+class Session:
+    """Holds what tools share. It holds; it does not compute.
+
+    Attributes:
+        robot: The port to the robot.
+        memory: The semantic map's file.
+        drives: Every drive of the robot.
+    """
+
+    def __init__(self, robot: Robot, memory: SemanticMapStore, *, lease_s: float) -> None:
+        self.robot = robot
+        self.memory = memory
+        self.drives = DriveBook(robot)
+        self._lease = Lease(lease_s)
+        self._atlas: Atlas | None = None
+        self._surveying = anyio.Lock()
+
+    def client_is_heard(self) -> AbstractContextManager[None]:
+        """Marks a client's call, so that the robot knows somebody is there."""
+        return self._lease.call()
+
+    async def client_is_gone(self) -> None:
+        """Stops the robot when a client went away in the middle of something."""
+        if self.drives.under_way is not None:
+            logger.warning("A client hung up during a drive: stopping the robot.")
+            await self.drives.stop()
+
+    async def compute(self, work: Callable[[], T]) -> T:
+        """Does heavy work in a thread, so that a stop is answered meanwhile."""
+        return await anyio.to_thread.run_sync(work)
+
+    async def fetch_atlas(self) -> Atlas:
+        """Gives the map as it is now, with everything on it under its id."""
+        async with self._surveying:
+            grid = await self.robot.fetch_map()
+            stamped = await self.robot.fetch_pose()
+            memory = await self.compute(self._recall)
+            self._atlas = Atlas(
+                grid,
+                stamped.pose,
+                memory,
+                radius_m=self.robot.description.radius_m,
+                looked_from=self.drives.frontiers_reached,
+                previous=self._atlas,
+            )
+            return self._atlas
+
+    async def find_room_id(self, point: Point) -> str | None:
+        """Gives the room a point lies in, by the rooms that were found last.
+
+        Raises:
+            LinkError: The robot has no map yet.
+        """
+        atlas = self._atlas or await self.fetch_atlas()
+        rooms = atlas.latest_rooms
+        if rooms is None:
+            rooms = await self.compute(lambda: atlas.rooms)
+        region = rooms.find_region_at(point)
+        return None if region is None else region.id
+
+    async def find_goal(
+        self, *, place: str | None, x: float | None, y: float | None, yaw_deg: float | None
+    ) -> NamedPose:
+        """Gives the pose to drive to for a place or for coordinates, checked against the map.
+
+        Raises:
+            GoalError: Neither or both were given, or the robot cannot drive there; the hint names
+                the nearest pose that would work.
+        """
+        atlas = await self.fetch_atlas()
+        return await self.compute(
+            lambda: choose_goal(atlas, place=place, x=x, y=y, yaw_deg=yaw_deg)
+        )
+
+    def _recall(self) -> SemanticMap:
+        """Gives what is remembered; a broken file costs the memory, not the map."""
+        try:
+            return self.memory.read()
+        except SemanticMapError as error:
+            return SemanticMap(warnings=(str(error),))
+
+    async def keep_watch(self) -> None:
+        """Stops a driving robot when no client has been heard for too long; until cancelled."""
+        while True:
+            await anyio.sleep(WATCH_S)
+            if self._lease.is_over and self.drives.under_way is not None:
+                logger.warning("No client for %.0f s: stopping the robot.", self._lease.duration_s)
+                await self.drives.stop()
+
+    async def close(self) -> None:
+        """Leaves the robot standing."""
+        with anyio.CancelScope(shield=True):
+            if self.drives.under_way is not None:
+                await self.drives.stop()

@@ -1,0 +1,113 @@
+"""What a person would say about each region: its size, its shape, what it is and why."""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from mapspeak.geometry import Point
+from mapspeak.spatial.rooms.room_map import RoomClass
+from mapspeak.spatial.rooms.segmentation import Segmentation
+
+CORRIDOR_ELONGATION = 3.0
+CORRIDOR_ELONGATION_WITH_DOORS = 2.0
+CORRIDOR_NEIGHBOURS = 4
+OPEN_SPACE_WIDTH_M = 8.0
+OPEN_SPACE_AREA_M2 = 100.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shape:
+    """The measures of one region; the fields are those of `Region`."""
+
+    free_area_m2: float
+    floor_area_m2: float
+    length_m: float
+    width_m: float
+    heading_rad: float
+    widest: Point
+    clearance_m: float
+
+    @property
+    def elongation(self) -> float:
+        """Area over the square of the widest clearance diameter: 1 for a square, more if long."""
+        return self.floor_area_m2 / max(2 * self.clearance_m, 1e-6) ** 2
+
+
+def measure_regions(segmentation: Segmentation) -> list[Shape]:
+    """Gives the measures of every region, in the order of their numbers."""
+    windows = _find_windows(segmentation)
+    return [_measure(segmentation, index, window) for index, window in enumerate(windows, start=1)]
+
+
+def _find_windows(segmentation: Segmentation) -> list[tuple[slice, slice]]:
+    labels = segmentation.labels
+    n = int(labels.max(initial=0))
+    if n == 0:
+        return []
+    low = np.full((2, n + 1), max(labels.shape), np.intp)
+    high = np.zeros((2, n + 1), np.intp)
+    for axis, places in enumerate(np.nonzero(labels)):
+        number = labels[labels > 0]
+        np.minimum.at(low[axis], number, places)
+        np.maximum.at(high[axis], number, places + 1)
+    return [
+        (slice(int(low[0, i]), int(high[0, i])), slice(int(low[1, i]), int(high[1, i])))
+        for i in range(1, n + 1)
+    ]
+
+
+def _measure(segmentation: Segmentation, index: int, window: tuple[slice, slice]) -> Shape:
+    raster = segmentation.raster
+    inside = segmentation.labels[window] == index
+    clearance = np.where(inside, segmentation.floor.clearance_m[window], 0)
+    row, col = np.unravel_index(int(np.argmax(clearance)), clearance.shape)
+    length, width, heading = _bounding_rectangle(inside)
+    return Shape(
+        free_area_m2=int((inside & (raster.free[window] > 0)).sum()) * raster.cell_area_m2,
+        floor_area_m2=int(inside.sum()) * raster.cell_area_m2,
+        length_m=length * raster.cell_size_m,
+        width_m=width * raster.cell_size_m,
+        heading_rad=(heading + raster.grid.origin.yaw_rad) % math.pi,
+        widest=raster.point_at(window[0].start + row + 0.5, window[1].start + col + 0.5),
+        clearance_m=float(clearance[row, col]),
+    )
+
+
+def _bounding_rectangle(
+    inside: np.ndarray[tuple[int, ...], np.dtype[np.bool_]],
+) -> tuple[float, float, float]:
+    """Gives length, width and direction of the smallest turned rectangle, in cells and radians."""
+    outline, _ = cv2.findContours(
+        inside.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE
+    )
+    corners = cv2.convexHull(np.concatenate(outline))
+    (_, (one, other), angle_deg) = cv2.minAreaRect(corners)
+    if one < other:
+        one, other, angle_deg = other, one, angle_deg + 90
+    return one + 1, other + 1, math.radians(angle_deg)
+
+
+def classify(shape: Shape, *, n_doors: int, n_neighbours: int) -> tuple[RoomClass, str]:
+    """Gives what a region is, and the numbers that say so."""
+    size = f"{shape.length_m:.3g} x {_breadth(shape):.2g} m, {_count(n_doors, 'door')}"
+    long = shape.elongation > CORRIDOR_ELONGATION
+    joining = (
+        shape.elongation > CORRIDOR_ELONGATION_WITH_DOORS and n_neighbours >= CORRIDOR_NEIGHBOURS
+    )
+    if long or joining:
+        return RoomClass.CORRIDOR, size
+    is_wide = 2 * shape.clearance_m >= OPEN_SPACE_WIDTH_M
+    if is_wide and shape.floor_area_m2 >= OPEN_SPACE_AREA_M2:
+        return RoomClass.OPEN_SPACE, f"{size}, {2 * shape.clearance_m:.2g} m wide at the widest"
+    return RoomClass.ROOM, size
+
+
+def _breadth(shape: Shape) -> float:
+    """Gives the width a person would name: that of a winding corridor is not its rectangle's."""
+    return min(shape.width_m, 2 * shape.clearance_m)
+
+
+def _count(n: int, noun: str) -> str:
+    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"

@@ -1,0 +1,74 @@
+"""The floor that rooms are cut from: what a robot could drive on if the furniture were gone."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.spatial.rooms.raster import Picture, Raster
+from mapspeak.spatial.rooms.settings import RoomSettings
+from mapspeak.spatial.rooms.walls import find_wall_directions, find_walls
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Floor:
+    """The floor of a raster, and the walls around it.
+
+    Attributes:
+        floor: 1 on floor, furniture and small unseen pockets, else 0.
+        wall: 1 on wall, else 0.
+        directions_deg: The main directions of the walls, from 0 to 90 degrees.
+        clearance_m: How far each floor cell is from what is not floor.
+    """
+
+    floor: Picture
+    wall: Picture
+    directions_deg: list[float]
+    clearance_m: NDArray[np.float32]
+
+
+def build_floor(raster: Raster, settings: RoomSettings) -> Floor:
+    """Gives the floor with its furniture cleared away."""
+    directions = find_wall_directions(raster.occupied, least_ratio=settings.direction_ratio)
+    wall = find_walls(raster, directions, settings)
+    floor = raster.free | (raster.occupied & (1 - wall))
+    floor |= _find_pockets(floor, wall, settings.pocket_area_m2 / raster.cell_area_m2)
+    return Floor(
+        floor=floor,
+        wall=wall,
+        directions_deg=directions,
+        clearance_m=_clearance(floor, raster.cell_size_m),
+    )
+
+
+def _clearance(floor: Picture, cell_size_m: float) -> NDArray[np.float32]:
+    framed = cv2.copyMakeBorder(floor, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
+    cells = cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return np.ascontiguousarray(cells[1:-1, 1:-1] * cell_size_m, dtype=np.float32)
+
+
+def _find_pockets(floor: Picture, wall: Picture, largest: float) -> Picture:
+    """Gives the small unseen areas that border on floor more than on wall."""
+    unseen = (1 - floor) & (1 - wall)
+    n, label, stats, _ = cv2.connectedComponentsWithStats(unseen, connectivity=4)
+    small = stats[:, cv2.CC_STAT_AREA] < largest
+    small[0] = False
+    border = np.zeros(n)
+    at_wall = np.zeros(n)
+    for here, there in _NEIGHBOURS:
+        rows, cols = np.nonzero((unseen[here] > 0) & (unseen[there] == 0))
+        pocket = label[here][rows, cols]
+        border += np.bincount(pocket, minlength=n)
+        at_wall += np.bincount(pocket, weights=wall[there][rows, cols], minlength=n)
+    is_pocket = small & (at_wall <= border / 2)
+    return np.asarray(is_pocket[label], np.uint8)
+
+
+_NEIGHBOURS = (
+    (np.s_[:-1, :], np.s_[1:, :]),
+    (np.s_[1:, :], np.s_[:-1, :]),
+    (np.s_[:, :-1], np.s_[:, 1:]),
+    (np.s_[:, 1:], np.s_[:, :-1]),
+)
+"""The cells that have a neighbour below, above, right and left; and those neighbours."""

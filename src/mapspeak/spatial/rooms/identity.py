@@ -1,0 +1,149 @@
+"""The same room keeps the same id while the map grows, shifts its origin or is turned."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.spatial.rooms.room_map import Door, Region, RoomMap, Vanished
+
+_SAMPLES = 200_000
+_SAME_DOOR_M = 0.6
+_REMAINS_RATIO = 0.25
+"""A vanished region became every region that covers at least this share of what is still seen."""
+
+
+def match_rooms(previous: RoomMap, current: RoomMap) -> RoomMap:
+    """Gives the current map with the ids of the previous one where they mean the same place.
+
+    Regions are matched one to one by overlap in world coordinates, the largest overlap first;
+    doors by place. New ones get ids never used before; lost ones are remembered.
+    """
+    overlap = _count_overlap(previous, current)
+    ids = _match_regions(previous, current, overlap)
+    door_ids = _match_doors(previous, current, ids)
+    return RoomMap(
+        grid=current.grid,
+        labels=current.labels,
+        regions=tuple(_rename(region, ids, door_ids) for region in current.regions),
+        doors=tuple(_rename_door(door, ids, door_ids) for door in current.doors),
+        vanished=_remember(previous, current, overlap, ids, door_ids),
+    )
+
+
+def _count_overlap(previous: RoomMap, current: RoomMap) -> NDArray[np.float64]:
+    """Gives the shared area in square metres; row by previous, column by current index."""
+    rows, cols = np.nonzero(previous.labels)
+    every = max(1, rows.size // _SAMPLES)
+    rows, cols = rows[::every], cols[::every]
+    here = previous.labels[rows, cols].astype(np.intp)
+    there_row, there_col = current.grid.cells_at(previous.grid.points_at(rows, cols))
+    inside = (there_row >= 0) & (there_row < current.grid.n_rows)
+    inside &= (there_col >= 0) & (there_col < current.grid.n_cols)
+    there = np.zeros(here.size, np.intp)
+    there[inside] = current.labels[there_row[inside], there_col[inside]]
+    shape = (len(previous.regions) + 1, len(current.regions) + 1)
+    counts = np.bincount(here * shape[1] + there, minlength=shape[0] * shape[1]).reshape(shape)
+    return np.asarray(counts * (every * previous.grid.resolution_m**2), np.float64)
+
+
+def _match_regions(
+    previous: RoomMap, current: RoomMap, overlap: NDArray[np.float64]
+) -> dict[str, str]:
+    """Gives the final id for each id of the current map."""
+    old = {region.index: region.id for region in previous.regions}
+    new = {region.index: region.id for region in current.regions}
+    ids: dict[str, str] = {}
+    rows, cols = np.nonzero(overlap[1:, 1:])
+    pairs = sorted(
+        zip((rows + 1).tolist(), (cols + 1).tolist(), strict=True),
+        key=lambda pair: (-overlap[pair], pair),
+    )
+    for before, now in pairs:
+        if before in old and now in new:
+            ids[new.pop(now)] = old.pop(before)
+    return ids | _fresh(new.values(), _used(previous))
+
+
+def _used(previous: RoomMap) -> set[str]:
+    used = {region.id for region in previous.regions} | {door.id for door in previous.doors}
+    return used | {gone.id for gone in previous.vanished}
+
+
+def _fresh(wanted: Iterable[str], used: set[str]) -> dict[str, str]:
+    """Gives each wanted id the next number after all that were used with its letter."""
+    highest: dict[str, int] = {}
+    for name in used:
+        highest[name[0]] = max(highest.get(name[0], 0), int(name[1:]))
+    fresh = {}
+    for name in wanted:
+        highest[name[0]] = highest.get(name[0], 0) + 1
+        fresh[name] = f"{name[0]}{highest[name[0]]}"
+    return fresh
+
+
+def _match_doors(previous: RoomMap, current: RoomMap, ids: dict[str, str]) -> dict[str, str]:
+    """Gives the final id for each door id of the current map, the nearest doors matched first."""
+    near = [
+        (before.place.distance_to(now.place), before.id, now.id)
+        for before in previous.doors
+        for now in current.doors
+        if before.place.distance_to(now.place)
+        <= _SAME_DOOR_M * (2 if _joins_same(before, now, ids) else 1)
+    ]
+    matched: dict[str, str] = {}
+    for _, before_id, now_id in sorted(near):
+        if now_id not in matched and before_id not in matched.values():
+            matched[now_id] = before_id
+    new = [door.id for door in current.doors if door.id not in matched]
+    return matched | _fresh(new, _used(previous))
+
+
+def _joins_same(before: Door, now: Door, ids: dict[str, str]) -> bool:
+    return set(before.region_ids) == {ids[name] for name in now.region_ids}
+
+
+def _rename(region: Region, ids: dict[str, str], door_ids: dict[str, str]) -> Region:
+    return replace(
+        region,
+        id=ids[region.id],
+        door_ids=tuple(sorted((door_ids[name] for name in region.door_ids), key=_order)),
+        neighbour_ids=tuple(sorted((ids[name] for name in region.neighbour_ids), key=_order)),
+    )
+
+
+def _order(name: str) -> tuple[str, int]:
+    return name[0], int(name[1:])
+
+
+def _rename_door(door: Door, ids: dict[str, str], door_ids: dict[str, str]) -> Door:
+    first, second = door.region_ids
+    return replace(door, id=door_ids[door.id], region_ids=(ids[first], ids[second]))
+
+
+def _remember(
+    previous: RoomMap,
+    current: RoomMap,
+    overlap: NDArray[np.float64],
+    ids: dict[str, str],
+    door_ids: dict[str, str],
+) -> tuple[Vanished, ...]:
+    """Gives everything that is no longer there, with what became of it by now."""
+    kept = set(ids.values()) | set(door_ids.values())
+    final = {region.index: ids[region.id] for region in current.regions}
+    became = {region.id: _heirs(overlap[region.index], final) for region in previous.regions}
+    lost = {name: heirs for name, heirs in became.items() if name not in kept}
+    lost |= {door.id: () for door in previous.doors if door.id not in kept}
+    for gone in previous.vanished:
+        heirs = {heir for name in gone.became for heir in became.get(name, ())}
+        lost[gone.id] = tuple(sorted(heirs, key=_order))
+    return tuple(Vanished(id=name, became=lost[name]) for name in sorted(lost, key=_order))
+
+
+def _heirs(shared: NDArray[np.float64], final: dict[int, str]) -> tuple[str, ...]:
+    seen = float(shared[1:].sum())
+    names = [
+        name for index, name in final.items() if seen and shared[index] >= _REMAINS_RATIO * seen
+    ]
+    return tuple(sorted(names, key=_order))

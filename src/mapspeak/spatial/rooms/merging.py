@@ -1,0 +1,148 @@
+"""Basins merged into rooms: a border stays only where a person would draw one."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.spatial.rooms.basins import BasinLabels, Heights, Saddle
+from mapspeak.spatial.rooms.frames import Frames
+from mapspeak.spatial.rooms.settings import RoomSettings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Border:
+    """A saddle that divides two places, and the metres of wall in line with it."""
+
+    saddle: Saddle
+    wall_m: float
+
+
+class _Forest:
+    """Basins joined into places, each with its clearance (its highest peak) and its area."""
+
+    def __init__(self, clearance_m: list[float], area_m2: list[float]) -> None:
+        self._parent = list(range(len(clearance_m)))
+        self.clearance_m = clearance_m
+        self.area_m2 = area_m2
+
+    def place(self, basin: int) -> int:
+        """Gives the place a basin belongs to by now."""
+        while self._parent[basin] != basin:
+            self._parent[basin] = self._parent[self._parent[basin]]
+            basin = self._parent[basin]
+        return basin
+
+    def sides(self, saddle: Saddle) -> tuple[int, int]:
+        """Gives the two places at a saddle, the narrower first."""
+        one, other = self.place(saddle.first), self.place(saddle.second)
+        return (one, other) if self.clearance_m[one] <= self.clearance_m[other] else (other, one)
+
+    def join(self, narrow: int, wide: int) -> None:
+        """Makes the narrower place part of the wider one."""
+        self._parent[narrow] = wide
+        self.area_m2[wide] += self.area_m2[narrow]
+
+
+def merge_basins(
+    basins: BasinLabels,
+    clearance_m: Heights,
+    saddles: list[Saddle],
+    *,
+    frames: Frames,
+    cell_area_m2: float,
+    settings: RoomSettings,
+) -> NDArray[np.int32]:
+    """Gives room numbers from 1, the largest room first; 0 where no room is."""
+    forest = _plant(basins, clearance_m, cell_area_m2)
+    _join_equal_widths(forest, saddles, settings.same_width_ratio)
+    borders = _join_open_borders(forest, saddles, frames, settings)
+    _absorb_small(forest, borders, settings)
+    return _number_by_area(basins, forest, settings.room_area_m2)
+
+
+def _plant(basins: BasinLabels, clearance_m: Heights, cell_area_m2: float) -> _Forest:
+    n = int(basins.max(initial=0)) + 1
+    peak = np.zeros(n, np.float32)
+    np.maximum.at(peak, basins.ravel(), clearance_m.ravel())
+    area = np.bincount(basins.ravel(), minlength=n) * cell_area_m2
+    return _Forest(peak.tolist(), area.tolist())
+
+
+def _join_equal_widths(forest: _Forest, saddles: list[Saddle], same_ratio: float) -> None:
+    """Joins the many peaks of one room or corridor, so that it is judged as a whole."""
+    for saddle in saddles:
+        narrow, wide = forest.sides(saddle)
+        clearance_m = forest.clearance_m[narrow]
+        is_open = saddle.height >= same_ratio * clearance_m
+        if narrow != wide and is_open and clearance_m >= same_ratio * forest.clearance_m[wide]:
+            forest.join(narrow, wide)
+
+
+def _join_open_borders(
+    forest: _Forest, saddles: list[Saddle], frames: Frames, settings: RoomSettings
+) -> list[_Border]:
+    """Joins across every saddle that divides nothing, from the highest down; gives the others."""
+    borders = []
+    for saddle in saddles:
+        narrow, wide = forest.sides(saddle)
+        if narrow == wide:
+            continue
+        wall_m = frames.measure(saddle.row, saddle.col, saddle.height)
+        if _is_door(forest.clearance_m[narrow], saddle, wall_m, settings) or _is_mouth(
+            forest, narrow, wide, saddle, settings
+        ):
+            borders.append(_Border(saddle=saddle, wall_m=wall_m))
+        else:
+            forest.join(narrow, wide)
+    return borders
+
+
+def _is_door(clearance_m: float, saddle: Saddle, wall_m: float, settings: RoomSettings) -> bool:
+    """True for a narrow place; the more wall is in line with it, the less narrow it need be."""
+    if 2 * saddle.height > settings.door_width_m:
+        return False
+    share = min(wall_m / settings.frame_m, 1.0)
+    limit = settings.gap_ratio + share * (settings.door_ratio - settings.gap_ratio)
+    return saddle.height <= limit * clearance_m
+
+
+def _is_mouth(
+    forest: _Forest, narrow: int, wide: int, saddle: Saddle, settings: RoomSettings
+) -> bool:
+    """True where a corridor opens into a much wider place without getting narrower."""
+    clearance_m, area_m2 = forest.clearance_m[narrow], forest.area_m2[narrow]
+    return (
+        2 * saddle.height <= settings.mouth_width_m
+        and clearance_m <= settings.mouth_ratio * forest.clearance_m[wide]
+        and area_m2 >= settings.mouth_elongation * (2 * clearance_m) ** 2
+        and area_m2 >= settings.mouth_area_m2
+    )
+
+
+def _absorb_small(forest: _Forest, borders: list[_Border], settings: RoomSettings) -> None:
+    """Joins what is too small for a room across its widest border, until nothing is."""
+    changed = True
+    while changed:
+        changed = False
+        for border in borders:
+            narrow, wide = forest.sides(border.saddle)
+            area_m2 = min(forest.area_m2[narrow], forest.area_m2[wide])
+            if narrow != wide and area_m2 < _least_area(border, settings):
+                forest.join(narrow, wide)
+                changed = True
+
+
+def _least_area(border: _Border, settings: RoomSettings) -> float:
+    """Gives how large a place behind this border must be: a niche has no door frame."""
+    is_framed = border.wall_m >= settings.frame_m / 2
+    return settings.room_area_m2 if is_framed else settings.niche_area_m2
+
+
+def _number_by_area(basins: BasinLabels, forest: _Forest, room_area_m2: float) -> NDArray[np.int32]:
+    places = [forest.place(basin) for basin in range(len(forest.area_m2))]
+    rooms = {place for place in places[1:] if forest.area_m2[place] >= room_area_m2}
+    ordered = sorted(rooms, key=lambda place: (-forest.area_m2[place], place))
+    number = {place: rank for rank, place in enumerate(ordered, start=1)}
+    table = np.array([0] + [number.get(place, 0) for place in places[1:]], np.int32)
+    return table[basins]

@@ -1,0 +1,117 @@
+"""The raster on which rooms are found: cropped to the known, near one cell size for every map."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.errors import MapError
+from mapspeak.geometry import Point
+from mapspeak.spatial.grid import FREE_MAX, UNKNOWN, FloatArray, OccupancyGrid
+
+Picture = NDArray[np.uint8]
+
+MAX_GRID_CELLS = 120_000_000
+MAX_RASTER_CELLS = 5_000_000
+MAX_UPSCALING = 4
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Raster:
+    """The known part of a map at a working resolution.
+
+    Attributes:
+        free: 1 where a robot can be, else 0.
+        occupied: 1 where something stands, else 0.
+        cell_size_m: The side of one raster cell.
+        first_row: The row of the grid at which the raster begins.
+        first_col: The column of the grid at which the raster begins.
+        scale: Raster cells per grid cell along one side; below 1 when the raster is coarser.
+        grid: The map it was made from.
+    """
+
+    free: Picture
+    occupied: Picture
+    cell_size_m: float
+    first_row: int
+    first_col: int
+    scale: float
+    grid: OccupancyGrid
+
+    @property
+    def cell_area_m2(self) -> float:
+        """The area of one raster cell."""
+        return self.cell_size_m**2
+
+    def point_at(self, row: float, col: float) -> Point:
+        """Gives the place of a point of the raster; a cell's centre lies at +0.5, +0.5."""
+        rows = np.array([self.first_row + row / self.scale - 0.5])
+        cols = np.array([self.first_col + col / self.scale - 0.5])
+        xy: FloatArray = self.grid.points_at(rows, cols)
+        return Point(float(xy[0, 0]), float(xy[0, 1]))
+
+
+def build_raster(grid: OccupancyGrid, *, cell_size_m: float) -> Raster:
+    """Gives the known part of a map in cells of about the wanted size.
+
+    Raises:
+        MapError: The map has more cells than can be handled.
+    """
+    if grid.cells.size > MAX_GRID_CELLS:
+        raise MapError(
+            f"The map has {grid.cells.size} cells, more than {MAX_GRID_CELLS}.",
+            hint="Ask for a part of it, or for a map at a coarser resolution.",
+        )
+    rows, cols = _known_window(grid)
+    known = grid.cells[rows, cols]
+    shrink, grow = _factors(known.size, grid.resolution_m, cell_size_m)
+    if known.size == 0:
+        known = np.full((1, 1), UNKNOWN, np.int8)
+    free = _resize((known >= 0) & (known <= FREE_MAX), shrink=shrink, grow=grow, full=True)
+    occupied = _resize(known > FREE_MAX, shrink=shrink, grow=grow, full=False)
+    free &= 1 - occupied
+    return Raster(
+        free=free,
+        occupied=occupied,
+        cell_size_m=grid.resolution_m * shrink / grow,
+        first_row=rows.start,
+        first_col=cols.start,
+        scale=grow / shrink,
+        grid=grid,
+    )
+
+
+def _known_window(grid: OccupancyGrid) -> tuple[slice, slice]:
+    known = grid.cells >= 0
+    return _extent(np.any(known, axis=1)), _extent(np.any(known, axis=0))
+
+
+def _extent(used: NDArray[np.bool_]) -> slice:
+    places = np.flatnonzero(used)
+    return slice(int(places[0]), int(places[-1]) + 1) if places.size else slice(0, 0)
+
+
+def _factors(n_cells: int, resolution_m: float, cell_size_m: float) -> tuple[int, int]:
+    """Gives by how much to shrink and to grow; one of the two is 1."""
+    shrink = max(1, round(cell_size_m / resolution_m))
+    while n_cells / shrink**2 > MAX_RASTER_CELLS:
+        shrink += 1
+    grow = min(MAX_UPSCALING, max(1, round(resolution_m / cell_size_m)))
+    while grow > 1 and n_cells * grow**2 > MAX_RASTER_CELLS:
+        grow -= 1
+    return (shrink, 1) if shrink > 1 else (1, grow)
+
+
+def _resize(mask: NDArray[np.bool_], *, shrink: int, grow: int, full: bool) -> Picture:
+    """Resizes a mask; a shrunk cell is set when any of its cells is, or for `full` half of them."""
+    picture = mask.astype(np.uint8)
+    if grow > 1:
+        return np.repeat(np.repeat(picture, grow, axis=0), grow, axis=1)
+    if shrink == 1:
+        return picture
+    high, wide = (-(-side // shrink) for side in picture.shape)
+    padded = np.zeros((high * shrink, wide * shrink), np.uint8)
+    padded[: picture.shape[0], : picture.shape[1]] = picture
+    share = cv2.resize(padded * np.uint8(255), (wide, high), interpolation=cv2.INTER_AREA)
+    return (share >= (127 if full else 1)).astype(np.uint8)

@@ -1,0 +1,167 @@
+"""What a map looks like once it is divided: regions, the doors between them, and how they join."""
+
+from collections import deque
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.errors import MapError
+from mapspeak.geometry import Point
+from mapspeak.spatial.grid import OccupancyGrid
+
+Labels = NDArray[np.int16]
+
+
+class RoomClass(StrEnum):
+    """What a person would call a region of the floor."""
+
+    ROOM = "room"
+    CORRIDOR = "corridor"
+    OPEN_SPACE = "open_space"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Region:
+    """A room, a corridor or an open space.
+
+    Attributes:
+        id: "R3", "C1" or "O2"; the same from call to call once regions were matched.
+        index: The region's number in the label array of its map.
+        room_class: What it is.
+        reason: Why it is that, in words with numbers.
+        free_area_m2: Floor on which nothing stands.
+        floor_area_m2: Floor with what stands on it.
+        length_m: Along the longer side of the smallest rectangle around it.
+        width_m: Along the shorter side.
+        heading_rad: Direction of the longer side in the map frame, from 0 up to pi.
+        widest: The floor point farthest from any wall; a good place for a label.
+        clearance_m: How far that point is from the nearest wall.
+        door_ids: The doors that lead out of it.
+        neighbour_ids: The regions behind those doors.
+    """
+
+    id: str
+    index: int
+    room_class: RoomClass
+    reason: str
+    free_area_m2: float
+    floor_area_m2: float
+    length_m: float
+    width_m: float
+    heading_rad: float
+    widest: Point
+    clearance_m: float
+    door_ids: tuple[str, ...] = ()
+    neighbour_ids: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Door:
+    """A narrow place where two regions meet, with or without a leaf in it.
+
+    Attributes:
+        id: "D4"; the same from call to call once regions were matched.
+        place: The middle of its narrowest line.
+        width_m: From post to post.
+        region_ids: The two regions it joins.
+    """
+
+    id: str
+    place: Point
+    width_m: float
+    region_ids: tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Vanished:
+    """A region or door of an earlier map that is no longer found.
+
+    Attributes:
+        id: What it was called.
+        became: The regions that now cover its place; empty when nothing does.
+    """
+
+    id: str
+    became: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RoomMap:
+    """A map divided into regions; compared by identity.
+
+    Attributes:
+        grid: The map that was divided.
+        labels: Shape of the grid; 0 belongs to no region, else `Region.index`. Furniture counts
+            to the region it stands in.
+        regions: Ordered by index, largest first when nothing came before.
+        doors: All of them.
+        vanished: Ids of earlier maps that are no longer used, never given out again.
+    """
+
+    grid: OccupancyGrid
+    labels: Labels
+    regions: tuple[Region, ...]
+    doors: tuple[Door, ...]
+    vanished: tuple[Vanished, ...] = ()
+
+    def __post_init__(self) -> None:
+        labels = np.array(self.labels, dtype=np.int16, order="C")
+        labels.setflags(write=False)
+        object.__setattr__(self, "labels", labels)
+
+    def region(self, region_id: str) -> Region:
+        """Gives the region with this id, following regions that were merged into another.
+
+        Raises:
+            MapError: No region has or had this id.
+        """
+        for region in self.regions:
+            if region.id == region_id:
+                return region
+        became = [gone.became for gone in self.vanished if gone.id == region_id]
+        known = {region.id for region in self.regions}
+        if became and len(became[0]) == 1 and became[0][0] in known:
+            return self.region(became[0][0])
+        names = ", ".join(region.id for region in self.regions) or "none"
+        raise MapError(f"This map has no region {region_id}.", hint=f"Its regions are: {names}.")
+
+    def find_region_at(self, point: Point) -> Region | None:
+        """Gives the region a point lies in, or None."""
+        cell = self.grid.cell_at(point)
+        if not self.grid.contains(cell):
+            return None
+        index = int(self.labels[cell.row, cell.col])
+        return next((region for region in self.regions if region.index == index), None)
+
+    def doors_between(self, first_id: str, second_id: str) -> tuple[Door, ...]:
+        """Gives the doors that join two regions."""
+        pair = {first_id, second_id}
+        return tuple(door for door in self.doors if set(door.region_ids) == pair)
+
+    def find_way(self, start_id: str, goal_id: str) -> tuple[str, ...] | None:
+        """Gives the regions from start to goal through the fewest doors, or None.
+
+        Raises:
+            MapError: One of the two is not a region of this map.
+        """
+        start, goal = self.region(start_id).id, self.region(goal_id).id
+        came_from: dict[str, str] = {start: start}
+        queue = deque([start])
+        while queue:
+            here = queue.popleft()
+            if here == goal:
+                return _walk_back(came_from, goal)
+            for neighbour in self.region(here).neighbour_ids:
+                if neighbour not in came_from:
+                    came_from[neighbour] = here
+                    queue.append(neighbour)
+        return None
+
+
+def _walk_back(came_from: dict[str, str], goal: str) -> tuple[str, ...]:
+    way = [goal]
+    while came_from[way[-1]] != way[-1]:
+        way.append(came_from[way[-1]])
+    return tuple(reversed(way))

@@ -1,0 +1,113 @@
+"""Walls told apart from furniture by what walls do: they run straight, far, and in line."""
+
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.spatial.rooms.raster import Picture, Raster
+from mapspeak.spatial.rooms.settings import RoomSettings
+
+MAX_DIRECTIONS = 8
+ANY_DIRECTION_STEP_DEG = 7.5
+SLENDER_RATIO = 0.37
+"""Area over the square of the diagonal: 0.5 for a square, 0.39 for a disc, 0.3 for 3 to 1."""
+_EDGE_BLUR_CELLS = 1.5
+_BELL_DEG = 2.0
+
+
+def find_walls(raster: Raster, directions_deg: list[float], settings: RoomSettings) -> Picture:
+    """Gives 1 where an obstacle is wall: a long run in a main direction, or in line with one."""
+    cells = _Lengths(raster, settings)
+    occupied = raster.occupied
+    thick = cv2.dilate(occupied, np.ones((3, 3), np.uint8))
+    large, slender = _sort_obstacles(raster.free, cells.island)
+    wall = np.zeros_like(occupied)
+    for angle_deg in directions_deg:
+        for turned_deg in (angle_deg, angle_deg + 90):
+            long_run = _open(thick, cells.wall, turned_deg) & occupied & large
+            piece = _open(thick, cells.piece, turned_deg) & occupied & (large | slender)
+            in_line = _dilate(long_run, 2 * cells.reach, turned_deg)
+            wall |= long_run | (piece & in_line)
+    for turned_deg in np.arange(0.0, 180.0, ANY_DIRECTION_STEP_DEG).tolist():
+        wall |= _open(thick, cells.any_wall, turned_deg) & occupied & large
+    return wall
+
+
+class _Lengths:
+    """The settings for walls, in raster cells."""
+
+    def __init__(self, raster: Raster, settings: RoomSettings) -> None:
+        self.wall = settings.wall_length_m / raster.cell_size_m
+        self.any_wall = 2 * self.wall
+        self.reach = settings.wall_reach_m / raster.cell_size_m
+        self.piece = settings.wall_piece_m / raster.cell_size_m
+        self.island = settings.island_size_m / raster.cell_size_m
+
+
+def _open(picture: cv2.typing.MatLike, length: float, angle_deg: float) -> Picture:
+    kernel = _line(length, angle_deg)
+    return np.asarray(cv2.morphologyEx(picture, cv2.MORPH_OPEN, kernel), np.uint8)
+
+
+def _dilate(picture: Picture, length: float, angle_deg: float) -> Picture:
+    return np.asarray(cv2.dilate(picture, _line(length, angle_deg)), np.uint8)
+
+
+def _line(length: float, angle_deg: float) -> Picture:
+    half = math.ceil(length / 2)
+    picture = np.zeros((2 * half + 1, 2 * half + 1), np.uint8)
+    dx = math.cos(math.radians(angle_deg)) * length / 2
+    dy = math.sin(math.radians(angle_deg)) * length / 2
+    ends = [(round(half + sign * dx), round(half + sign * dy)) for sign in (-1, 1)]
+    cv2.line(picture, ends[0], ends[1], 1)
+    return picture
+
+
+def _sort_obstacles(free: Picture, largest_island: float) -> tuple[Picture, Picture]:
+    """Gives 1 on obstacles too large to be islands of furniture, and 1 on slender islands.
+
+    An island is an obstacle that can be driven around. A piece of wall is slender; a pillar, a
+    chair and a box are not.
+    """
+    solid = cv2.copyMakeBorder(1 - free, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=1)
+    _, label, stats, _ = cv2.connectedComponentsWithStats(solid, connectivity=8)
+    label = label[1:-1, 1:-1]
+    across = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
+    is_large = across >= largest_island
+    is_slender = stats[:, cv2.CC_STAT_AREA] <= SLENDER_RATIO * across**2
+    is_large[0] = is_slender[0] = False
+    return is_large.astype(np.uint8)[label], is_slender.astype(np.uint8)[label]
+
+
+def find_wall_directions(occupied: Picture, *, least_ratio: float) -> list[float]:
+    """Gives the main directions of walls in degrees from 0 to 90, the strongest first.
+
+    They are the peaks of the histogram of gradient angles modulo 90 degrees, each with at least
+    `least_ratio` of the highest.
+    """
+    histogram = _angle_histogram(occupied)
+    highest = float(histogram.max())
+    if highest <= 0:
+        return []
+    around = np.stack([np.roll(histogram, shift) for shift in range(-6, 7)]).max(axis=0)
+    peaks = np.flatnonzero((histogram >= around) & (histogram >= least_ratio * highest))
+    strongest = sorted(peaks.tolist(), key=lambda peak: (-histogram[peak], peak))
+    return [peak + 0.5 for peak in strongest[:MAX_DIRECTIONS]]
+
+
+def _angle_histogram(occupied: Picture) -> NDArray[np.float64]:
+    soft = cv2.GaussianBlur(occupied.astype(np.float32), (0, 0), _EDGE_BLUR_CELLS)
+    across = cv2.Sobel(soft, cv2.CV_32F, 1, 0)
+    along = cv2.Sobel(soft, cv2.CV_32F, 0, 1)
+    strength, angle = cv2.cartToPolar(across, along, angleInDegrees=True)
+    strong = strength > 0.3 * strength.max()
+    counts = np.bincount(
+        angle[strong].astype(np.intp) % 90,
+        weights=strength[strong].astype(np.float64),
+        minlength=90,
+    )
+    bell = np.exp(-0.5 * (np.arange(-8, 9) / _BELL_DEG) ** 2)
+    wrapped = np.concatenate([counts[-8:], counts, counts[:8]])
+    return np.convolve(wrapped, bell / bell.sum(), mode="valid")

@@ -1,0 +1,130 @@
+"""What every link promises, whatever robot is behind it."""
+
+import io
+from collections.abc import AsyncGenerator, Callable
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+
+import pytest
+from PIL import Image
+
+from fakes import FakeRobot, two_rooms
+from mapspeak.errors import MapspeakError
+from mapspeak.geometry import Pose
+from mapspeak.links.simulated import Clock, open_simulated_robot
+from mapspeak.robot import GoalState, GoalStatus, Robot
+from mapspeak.simulator import Simulation, load_world
+
+pytestmark = pytest.mark.anyio
+
+OpenRobot = Callable[[], AbstractAsyncContextManager[Robot]]
+
+
+@asynccontextmanager
+async def open_fake() -> AsyncGenerator[Robot]:
+    yield FakeRobot(two_rooms())
+
+
+@asynccontextmanager
+async def open_simulated() -> AsyncGenerator[Robot]:
+    simulation = Simulation(load_world("warehouse"), seed=1)
+    async with open_simulated_robot(simulation, clock=Clock.VIRTUAL, has_detector=True) as robot:
+        yield robot
+
+
+@pytest.fixture(params=[open_fake, open_simulated], ids=["fake", "simulated"])
+def open_robot(request: pytest.FixtureRequest) -> OpenRobot:
+    chosen: OpenRobot = request.param
+    return chosen
+
+
+async def ahead(robot: Robot, distance_m: float) -> Pose:
+    here = (await robot.fetch_pose()).pose
+    return here @ Pose(distance_m, 0.0)
+
+
+async def until_over(robot: Robot, goal_id: str) -> GoalStatus:
+    deadline_s = robot.now_s + 60.0
+    status = await robot.fetch_goal_status(goal_id)
+    while not status.state.is_final and robot.now_s < deadline_s:
+        await robot.sleep(0.2)
+        status = await robot.fetch_goal_status(goal_id)
+    return status
+
+
+async def test_the_robot_stands_on_free_floor_of_its_own_map(open_robot: OpenRobot) -> None:
+    async with open_robot() as robot:
+        grid = await robot.fetch_map()
+        cell = grid.cell_at((await robot.fetch_pose()).pose.point)
+    assert grid.contains(cell)
+    assert grid.free[cell.row, cell.col]
+
+
+async def test_a_drive_ends_where_it_was_sent(open_robot: OpenRobot) -> None:
+    async with open_robot() as robot:
+        goal = await ahead(robot, 1.0)
+        status = await until_over(robot, await robot.send_goal(goal))
+        pose = (await robot.fetch_pose()).pose
+    assert status.state is GoalState.ARRIVED
+    assert pose.point.distance_to(goal.point) < 0.25
+
+
+async def test_a_drive_says_how_far_is_left_while_it_goes_on(open_robot: OpenRobot) -> None:
+    async with open_robot() as robot:
+        goal_id = await robot.send_goal(await ahead(robot, 1.0))
+        await robot.sleep(0.3)
+        status = await robot.fetch_goal_status(goal_id)
+    assert not status.state.is_final
+    assert status.distance_left_m == pytest.approx(0.9, abs=0.25)
+
+
+async def test_a_cancelled_drive_leaves_the_robot_standing(open_robot: OpenRobot) -> None:
+    async with open_robot() as robot:
+        goal_id = await robot.send_goal(await ahead(robot, 1.5))
+        await robot.sleep(0.5)
+        await robot.cancel_goal(goal_id)
+        await robot.sleep(1.0)
+        before = (await robot.fetch_pose()).pose
+        await robot.sleep(1.0)
+        after = (await robot.fetch_pose()).pose
+        status = await robot.fetch_goal_status(goal_id)
+    assert status.state is GoalState.CANCELLED
+    assert after.point.distance_to(before.point) < 0.02
+
+
+async def test_stopping_ends_the_drive_under_way(open_robot: OpenRobot) -> None:
+    async with open_robot() as robot:
+        goal_id = await robot.send_goal(await ahead(robot, 1.5))
+        await robot.sleep(0.5)
+        await robot.stop()
+        status = await robot.fetch_goal_status(goal_id)
+    assert status.state is GoalState.CANCELLED
+
+
+async def test_a_new_goal_ends_the_one_before(open_robot: OpenRobot) -> None:
+    async with open_robot() as robot:
+        first = await robot.send_goal(await ahead(robot, 1.5))
+        second = await robot.send_goal(await ahead(robot, 0.5))
+        replaced = await robot.fetch_goal_status(first)
+        status = await until_over(robot, second)
+    assert replaced.state in (GoalState.CANCELLED, GoalState.PREEMPTED)
+    assert status.state is GoalState.ARRIVED
+
+
+async def test_a_goal_that_nobody_sent_is_an_error(open_robot: OpenRobot) -> None:
+    async with open_robot() as robot:
+        with pytest.raises(MapspeakError):
+            await robot.fetch_goal_status("no such goal")
+
+
+async def test_robot_time_passes_while_one_sleeps(open_robot: OpenRobot) -> None:
+    async with open_robot() as robot:
+        before_s = robot.now_s
+        await robot.sleep(1.0)
+    assert robot.now_s == pytest.approx(before_s + 1.0, abs=0.06)
+
+
+async def test_a_picture_is_as_large_as_it_says(open_robot: OpenRobot) -> None:
+    async with open_robot() as robot:
+        picture = await robot.fetch_picture()
+    decoded = Image.open(io.BytesIO(picture.data))
+    assert decoded.size == (picture.width_px, picture.height_px)

@@ -1,0 +1,82 @@
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mapspeak.evaluation.reading import read_map_text
+from mapspeak.spatial.mapfiles import load_map
+
+SMALL_FLAT = """
+title: A flat with a hall and two rooms, to be explored in a minute.
+start: {at: [1.0, 1.0], yaw_deg: 0}
+walls:
+  - line: [[0, 0], [8, 0], [8, 6], [0, 6], [0, 0]]
+  - line: [[0, 3], [8, 3]]
+  - line: [[5, 3], [5, 6]]
+doors:
+  - {name: large room door, at: [2, 3], width_m: 1.0}
+  - {name: small room door, at: [6.5, 3], width_m: 1.0}
+rooms:
+  - {name: hall, class: open_space, outline: [[0, 0], [8, 0], [8, 3], [0, 3]]}
+  - {name: large room, class: room, outline: [[0, 3], [5, 3], [5, 6], [0, 6]]}
+  - {name: small room, class: room, outline: [[5, 3], [8, 3], [8, 6], [5, 6]]}
+objects:
+  - {name: extinguisher, kind: fire_extinguisher, at: [7.9, 1.5], yaw_deg: 180}
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the demo has run in a small flat, over a real server process."""
+    folder = tmp_path_factory.mktemp("demo")
+    world = folder / "flat.yaml"
+    world.write_text(SMALL_FLAT)
+    command = [sys.executable, "-m", "mapspeak", "demo", "--quiet"]
+    done = subprocess.run(  # noqa: S603 - our own program
+        [*command, "--world", str(world), "--out", str(folder / "out")],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder / "out"
+
+
+def test_all_three_tasks_succeed_by_the_simulators_truth(folder: Path) -> None:
+    report = json.loads((folder / "report.json").read_text())
+    assert report["coverage_recall"] > 0.98
+    assert report["collisions"] == 0
+    assert report["task2"]["success"]
+    assert report["task3"]["success"]
+    assert report["task3"]["nearest_object"] == "extinguisher"
+
+
+def test_the_map_it_leaves_is_one_that_map_server_loads(folder: Path) -> None:
+    loaded = load_map(folder / "map.yaml")
+    assert loaded.grid.resolution_m == 0.05
+    assert loaded.grid.free.sum() * 0.05**2 > 40
+
+
+def test_what_was_seen_is_in_the_semantic_map(folder: Path) -> None:
+    assert "fire extinguisher" in (folder / "semantic_map.yaml").read_text()
+
+
+def test_the_page_needs_nothing_from_elsewhere(folder: Path) -> None:
+    page = (folder / "report.html").read_text()
+    assert "data:image/png;base64," in page
+    assert "http://" not in page
+    assert "https://" not in page
+
+
+def test_every_picture_is_kept(folder: Path) -> None:
+    names = {path.name for path in (folder / "pictures").iterdir()}
+    assert {name.rpartition("_")[2] for name in names} == {"map.png", "camera.jpg"}
+    assert (folder / "trajectory.png").stat().st_size > 1000
+
+
+def test_a_text_without_a_pose_is_no_map_text() -> None:
+    with pytest.raises(Exception, match="names no robot pose"):
+        read_map_text("## Rooms\nid | kind\nR1 | room")

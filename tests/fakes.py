@@ -1,0 +1,153 @@
+"""A robot for tests: it drives in straight lines on a map drawn as text, on a clock of its own."""
+
+import io
+import math
+
+from PIL import Image
+
+from drawing import grid_from_text
+from mapspeak.errors import GoalError, LinkError
+from mapspeak.geometry import Point, Pose
+from mapspeak.robot import (
+    CameraPicture,
+    Detection,
+    GoalState,
+    GoalStatus,
+    RobotDescription,
+    StampedPose,
+)
+from mapspeak.spatial import OccupancyGrid
+
+SPEED_MPS = 1.0
+START = Pose(1.5, 1.4, 0.0)
+
+TWO_ROOMS = """
+##############################
+#............#...............#
+#............#...............#
+#............#...............#
+#............................#
+#............................#
+#............................#
+#............#...............#
+#............#...............#
+#............#...............#
+##############################
+"""
+
+
+def two_rooms() -> OccupancyGrid:
+    """Two rooms side by side, joined by a door 0.75 m wide, in cells of 0.25 m."""
+    return grid_from_text(TWO_ROOMS, resolution_m=0.25)
+
+
+class FakeRobot:
+    """Implements the port with a straight-line drive; every answer can be changed by a test."""
+
+    def __init__(
+        self,
+        grid: OccupancyGrid | None = None,
+        *,
+        pose: Pose = START,
+        has_camera: bool = True,
+    ) -> None:
+        self.grid = grid
+        self.pose = pose
+        self.has_camera = has_camera
+        self.detections: tuple[Detection, ...] = ()
+        self.n_stops = 0
+        self.goals: dict[str, Pose] = {}
+        self.ended: dict[str, GoalStatus] = {}
+        self._now_s = 0.0
+        self._current: str | None = None
+
+    @property
+    def description(self) -> RobotDescription:
+        return RobotDescription(
+            name="fake robot",
+            radius_m=0.2,
+            map_name="two-rooms",
+            has_camera=self.has_camera,
+            detector="fake detector" if self.detections else None,
+        )
+
+    @property
+    def now_s(self) -> float:
+        return self._now_s
+
+    async def sleep(self, duration_s: float) -> None:
+        self._now_s += duration_s
+        self._advance(duration_s)
+
+    async def fetch_map(self) -> OccupancyGrid:
+        if self.grid is None:
+            raise LinkError("No map has arrived yet.", hint="Start SLAM or a map server.")
+        return self.grid
+
+    async def fetch_pose(self) -> StampedPose:
+        return StampedPose(self.pose, self._now_s)
+
+    async def fetch_picture(self) -> CameraPicture:
+        if not self.has_camera:
+            raise LinkError("This robot has no camera.", hint="Use look_at_map instead.")
+        encoded = io.BytesIO()
+        Image.new("RGB", (64, 48), "grey").save(encoded, format="JPEG")
+        return CameraPicture(
+            data=encoded.getvalue(),
+            media_type="image/jpeg",
+            width_px=64,
+            height_px=48,
+            horizontal_fov_rad=math.radians(90),
+            pose=self.pose,
+            stamp_s=self._now_s,
+        )
+
+    async def fetch_detections(self) -> tuple[Detection, ...]:
+        return self.detections
+
+    async def send_goal(self, goal: Pose) -> str:
+        if self._current is not None:
+            self._end(GoalState.PREEMPTED)
+        goal_id = f"fake-{len(self.goals) + 1}"
+        self.goals[goal_id] = goal
+        self._current = goal_id
+        return goal_id
+
+    async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
+        if robot_goal_id not in self.goals:
+            raise GoalError("No such goal.", hint="Send one.")
+        if robot_goal_id in self.ended:
+            return self.ended[robot_goal_id]
+        left_m = self.pose.point.distance_to(self.goals[robot_goal_id].point)
+        return GoalStatus(state=GoalState.DRIVING, distance_left_m=left_m)
+
+    async def cancel_goal(self, robot_goal_id: str) -> None:
+        if robot_goal_id == self._current:
+            self._end(GoalState.CANCELLED)
+
+    async def stop(self) -> None:
+        self.n_stops += 1
+        if self._current is not None:
+            self._end(GoalState.CANCELLED)
+
+    def _end(self, state: GoalState) -> None:
+        assert self._current is not None
+        self.ended[self._current] = GoalStatus(state=state, distance_left_m=0.0)
+        self._current = None
+
+    def _advance(self, duration_s: float) -> None:
+        if self._current is None:
+            return
+        goal = self.goals[self._current]
+        left_m = self.pose.point.distance_to(goal.point)
+        step_m = SPEED_MPS * duration_s
+        if left_m <= step_m:
+            self.pose = goal
+            self._end(GoalState.ARRIVED)
+            return
+        share = step_m / left_m
+        here = Point(
+            self.pose.x + share * (goal.x - self.pose.x),
+            self.pose.y + share * (goal.y - self.pose.y),
+        )
+        self.pose = Pose(here.x, here.y, self.pose.point.bearing_to(goal.point))

@@ -1,0 +1,51 @@
+"""A server over a fake robot, with a client connected to it in memory."""
+
+from collections.abc import AsyncGenerator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+from mcp.client import Client
+from mcp_types import CallToolResult, ImageContent, TextContent
+
+from fakes import FakeRobot
+from mapspeak.semantic import SemanticMapStore
+from mapspeak.server import DEFAULT_TOOLSETS, build_server
+from mapspeak.session import Session
+
+MODES = ("auto", "legacy")
+
+
+@asynccontextmanager
+async def connect(
+    robot: FakeRobot,
+    folder: Path,
+    *,
+    mode: str = "auto",
+    toolsets: tuple[str, ...] = DEFAULT_TOOLSETS,
+    tools: tuple[str, ...] = (),
+    is_read_only: bool = False,
+) -> AsyncGenerator[Client]:
+    """Gives a client of a server over that robot, with its memory in that folder."""
+    memory = SemanticMapStore(folder / "semantic_map.yaml", map_id=robot.description.map_name)
+    session = Session(robot, memory, lease_s=60.0)
+    server = build_server(session, toolsets=toolsets, tools=tools, is_read_only=is_read_only)
+    async with Client(server, mode=mode) as client:
+        yield client
+
+
+def text_of(result: CallToolResult) -> str:
+    """Gives all text of an answer."""
+    return "\n".join(part.text for part in result.content if isinstance(part, TextContent))
+
+
+def pictures_of(result: CallToolResult) -> list[ImageContent]:
+    """Gives all pictures of an answer."""
+    return [part for part in result.content if isinstance(part, ImageContent)]
+
+
+def report_of(result: CallToolResult) -> dict[str, Any]:
+    """Gives the structured part of an answer that is no error."""
+    assert not result.is_error, text_of(result)
+    assert result.structured_content is not None
+    return dict(result.structured_content)

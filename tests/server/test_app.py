@@ -1,0 +1,88 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from fakes import FakeRobot, two_rooms
+from mapspeak.errors import ConfigError
+from served import MODES, connect, text_of
+
+pytestmark = pytest.mark.anyio
+
+PAPER_TOOLS = {
+    "subscribe_map_as_image",
+    "draw_map_axis",
+    "draw_robot_pose",
+    "write_semantic_data",
+    "get_semantic_data",
+}
+MOST_BYTES = 12_000
+
+
+@pytest.mark.parametrize("mode", MODES)
+async def test_the_papers_tools_are_there_by_default(tmp_path: Path, mode: str) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, mode=mode) as client:
+        names = {tool.name for tool in (await client.list_tools()).tools}
+        instructions = client.instructions or ""
+    assert names >= PAPER_TOOLS
+    assert "robot" in instructions
+
+
+async def test_every_argument_is_described_and_no_title_is_sent(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        tools = (await client.list_tools()).tools
+    for tool in tools:
+        for name, schema in tool.input_schema.get("properties", {}).items():
+            assert schema.get("description"), f"{tool.name}: {name}"
+        assert '"title"' not in json.dumps(tool.input_schema)
+        assert tool.annotations is not None
+
+
+async def test_the_tool_list_is_short(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        listed = await client.list_tools()
+    sent = listed.model_dump_json(by_alias=True, exclude_none=True)
+    assert len(sent) <= MOST_BYTES
+
+
+async def test_read_only_leaves_out_what_moves_or_remembers_but_stopping_stays(
+    tmp_path: Path,
+) -> None:
+    async with connect(
+        FakeRobot(two_rooms()), tmp_path, tools=("navigate_to",), is_read_only=True
+    ) as client:
+        names = {tool.name for tool in (await client.list_tools()).tools}
+        result = await client.call_tool("navigate_to", {"place": "R2"})
+    assert not names & {"navigate_to", "write_semantic_data"}
+    assert names >= {"stop_robot", "cancel_goal", "look_at_map"}
+    assert result.is_error
+
+
+async def test_single_tools_can_be_chosen(tmp_path: Path) -> None:
+    async with connect(
+        FakeRobot(two_rooms()), tmp_path, toolsets=(), tools=("look_at_map",)
+    ) as client:
+        names = [tool.name for tool in (await client.list_tools()).tools]
+    assert names == ["look_at_map"]
+
+
+async def test_a_toolset_that_does_not_exist_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"'look2'.*look"):
+        async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=("look2",)):
+            pass
+
+
+async def test_wrong_arguments_are_explained_without_a_link_to_a_library(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        result = await client.call_tool("navigate_to", {"place": "R1", "wait_s": 900})
+    assert result.is_error
+    assert "wait_s" in text_of(result)
+    assert "pydantic" not in text_of(result)
+
+
+async def test_the_papers_prompts_are_offered(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        prompt = await client.get_prompt("exploration")
+    text = prompt.messages[0].content.model_dump()["text"]
+    assert "Select ONE waypoint >= 5 m away toward the largest unexplored area." in text
+    assert "safety landmarks" in text

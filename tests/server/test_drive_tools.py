@@ -1,0 +1,107 @@
+from pathlib import Path
+
+import pytest
+
+from fakes import FakeRobot, two_rooms
+from served import MODES, connect, report_of, text_of
+
+pytestmark = pytest.mark.anyio
+
+
+@pytest.mark.parametrize("mode", MODES)
+async def test_a_short_drive_is_answered_with_arrived(tmp_path: Path, mode: str) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, mode=mode) as client:
+        result = await client.call_tool("navigate_to", {"x": 2.0, "y": 1.4, "yaw_deg": 90})
+    answer = report_of(result)
+    assert answer["state"] == "arrived"
+    assert answer["robot"] == {"x": 2.0, "y": 1.4, "yaw_deg": 90.0}
+
+
+async def test_a_long_drive_is_a_job_that_can_be_asked_about(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        begun = report_of(
+            await client.call_tool("navigate_to", {"x": 6.0, "y": 1.4, "wait_s": 1.0})
+        )
+        assert begun["state"] == "driving"
+        assert begun["distance_left_m"] == pytest.approx(3.5, abs=0.3)
+        ended = report_of(await client.call_tool("wait_for_goal", {"goal_id": begun["goal_id"]}))
+    assert ended["state"] == "arrived"
+
+
+async def test_the_id_of_a_room_is_a_goal(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        answer = report_of(await client.call_tool("navigate_to", {"place": "r2"}))
+        pose = report_of(await client.call_tool("get_robot_pose", {}))
+    assert answer["place"] == "R2"
+    assert pose["place"] == "R2"
+
+
+async def test_a_remembered_name_is_a_goal(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        await client.call_tool(
+            "write_semantic_data", {"name": "Dock corner", "description": "a dock"}
+        )
+        await client.call_tool("navigate_to", {"x": 6.0, "y": 1.4})
+        answer = report_of(await client.call_tool("navigate_to", {"place": "dock  CORNER"}))
+    assert answer["robot"] == {"x": 1.5, "y": 1.4, "yaw_deg": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("goal", "says"),
+    [
+        ({"x": 3.3, "y": 0.7}, "nearest pose that works"),
+        ({"x": 40.0, "y": 40.0}, "map"),
+        ({"place": "R9"}, "R1"),
+        ({"x": 1.0}, "both x and y"),
+        ({}, "both x and y"),
+        ({"place": "R1", "x": 1.0, "y": 1.0}, "either a place or both"),
+        ({"x": "nan", "y": 0.0}, "finite"),
+        ({"x": "inf", "y": 0.0}, "finite"),
+    ],
+)
+async def test_a_goal_that_makes_no_sense_is_refused_with_the_next_step(
+    tmp_path: Path, goal: dict[str, object], says: str
+) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        result = await client.call_tool("navigate_to", goal)
+    assert result.is_error
+    assert says in text_of(result)
+    assert not robot.goals
+
+
+async def test_a_newer_goal_replaces_the_older_one(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        first = report_of(await client.call_tool("navigate_to", {"place": "R2", "wait_s": 0}))
+        await client.call_tool("navigate_to", {"x": 2.0, "y": 1.4})
+        asked = await client.call_tool("wait_for_goal", {"goal_id": first["goal_id"]})
+    assert report_of(asked)["state"] == "preempted"
+
+
+async def test_a_cancelled_drive_is_cancelled(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        await client.call_tool("navigate_to", {"place": "R2", "wait_s": 0})
+        answer = text_of(await client.call_tool("cancel_goal", {}))
+    assert "G1 to R2: cancelled" in answer
+
+
+async def test_stopping_ends_every_drive(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        await client.call_tool("navigate_to", {"place": "R2", "wait_s": 0})
+        await client.call_tool("stop_robot", {})
+        answer = report_of(await client.call_tool("wait_for_goal", {"wait_s": 0}))
+    assert robot.n_stops == 1
+    assert answer["state"] == "cancelled"
+
+
+async def test_a_goal_id_that_nobody_gave_is_an_error(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        nothing_yet = await client.call_tool("wait_for_goal", {})
+        await client.call_tool("navigate_to", {"x": 2.0, "y": 1.4})
+        unknown = await client.call_tool("cancel_goal", {"goal_id": "G77"})
+    assert "navigate_to" in text_of(nothing_yet)
+    assert unknown.is_error
+    assert "G1" in text_of(unknown)

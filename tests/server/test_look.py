@@ -1,0 +1,79 @@
+import base64
+import io
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from fakes import FakeRobot, two_rooms
+from mapspeak.evaluation.reading import read_map_picture, read_map_text
+from mapspeak.robot import Detection
+from served import MODES, connect, pictures_of, report_of, text_of
+
+pytestmark = pytest.mark.anyio
+
+
+@pytest.mark.parametrize("mode", MODES)
+async def test_one_look_gives_a_picture_and_every_fact_of_it_as_text(
+    tmp_path: Path, mode: str
+) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, mode=mode) as client:
+        result = await client.call_tool("look_at_map", {})
+    reading = read_map_text(text_of(result))
+    assert [row.id for row in reading.rows("Rooms")] == ["R2", "R1"]
+    assert reading.rows("Doors")[0].cells["joins"] == "R1 R2"
+    assert (reading.pose.x, reading.pose.y) == (1.5, 1.4)
+    picture = Image.open(io.BytesIO(base64.b64decode(pictures_of(result)[0].data)))
+    assert max(picture.size) <= 1000
+    assert result.structured_content is None
+
+
+async def test_only_the_layers_asked_for_are_listed(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        result = await client.call_tool("look_at_map", {"layers": ["doors"]})
+    assert read_map_text(text_of(result)).tables.keys() == {"Doors"}
+
+
+async def test_a_robot_without_a_map_yet_says_what_to_start(tmp_path: Path) -> None:
+    async with connect(FakeRobot(None), tmp_path) as client:
+        result = await client.call_tool("look_at_map", {})
+        pose = await client.call_tool("get_robot_pose", {})
+    assert result.is_error
+    assert "Start SLAM" in text_of(result)
+    assert report_of(pose)["place"] == "no map yet"
+
+
+async def test_a_robot_without_a_camera_says_what_to_use_instead(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms(), has_camera=False), tmp_path) as client:
+        result = await client.call_tool("look_through_camera", {})
+    assert result.is_error
+    assert "look_at_map" in text_of(result)
+
+
+async def test_what_the_robots_detector_reports_stands_beside_the_picture(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    robot.detections = (
+        Detection(label="ladder", confidence_ratio=0.9, bearing_rad=-0.5, range_m=2.0),
+    )
+    async with connect(robot, tmp_path) as client:
+        result = await client.call_tool("look_through_camera", {})
+    assert "- ladder, bearing -29 deg, range 2.0 m, confidence 0.90" in text_of(result)
+    assert pictures_of(result)[0].mime_type == "image/jpeg"
+
+
+async def test_the_papers_picture_gives_the_grid_back_cell_by_cell(tmp_path: Path) -> None:
+    grid = two_rooms()
+    async with connect(FakeRobot(grid), tmp_path) as client:
+        result = await client.call_tool("subscribe_map_as_image", {})
+    picture = base64.b64decode(pictures_of(result)[0].data)
+    read_back = read_map_picture(text_of(result), picture)
+    assert (read_back.cells == grid.cells).all()
+    assert (read_back.origin, read_back.resolution_m) == (grid.origin, grid.resolution_m)
+
+
+@pytest.mark.parametrize("tool", ["draw_map_axis", "draw_robot_pose"])
+async def test_each_of_the_papers_drawings_works_alone(tmp_path: Path, tool: str) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        result = await client.call_tool(tool, {})
+    assert len(pictures_of(result)) == 1
+    assert "A grid line every" in text_of(result)
