@@ -102,7 +102,8 @@ def score_map(folder: Path) -> Score:
     meta = json.loads((folder / "meta.json").read_text())
     loaded = load_picture(folder / "map.png", resolution_m=meta["resolution"])
     rooms, time_ms = _timed(loaded.grid)
-    truth = cv2.imread(str(folder / "rooms.png"), cv2.IMREAD_UNCHANGED)[::-1].astype(np.intp)
+    picture = cv2.imread(str(folder / "rooms.png"), cv2.IMREAD_UNCHANGED)
+    truth = np.asarray(picture, np.intp)[::-1]
     overlap = _overlap(rooms.labels.astype(np.intp), truth, loaded.grid.free & (truth > 0))
     agreement = _agreement(overlap)
     classes = {room["id"]: room["class"] for room in meta["rooms"] if "class" in room}
@@ -200,7 +201,7 @@ def _show(scores: Sequence[Score]) -> None:
     for group in groups:
         table.add_row(group, *_row([score for score in scores if score.group == group]))
     table.add_row("all", *_row(scores))
-    Console(width=110).print(table)
+    Console(width=120).print(table)
 
 
 def _row(scores: Sequence[Score]) -> list[str]:

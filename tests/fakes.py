@@ -3,6 +3,7 @@
 import io
 import math
 
+import anyio
 from PIL import Image
 
 from drawing import grid_from_text
@@ -58,6 +59,9 @@ class FakeRobot:
         self.n_stops = 0
         self.goals: dict[str, Pose] = {}
         self.ended: dict[str, GoalStatus] = {}
+        self.map_was_asked_for = anyio.Event()
+        self.may_give_map = anyio.Event()
+        self.may_give_map.set()
         self._now_s = 0.0
         self._current: str | None = None
 
@@ -80,6 +84,8 @@ class FakeRobot:
         self._advance(duration_s)
 
     async def fetch_map(self) -> OccupancyGrid:
+        self.map_was_asked_for.set()
+        await self.may_give_map.wait()
         if self.grid is None:
             raise LinkError("No map has arrived yet.", hint="Start SLAM or a map server.")
         return self.grid

@@ -72,7 +72,13 @@ def _split_names(
     show_default=True,
     help="sim[:WORLD], where WORLD is a shipped world or a world file.",
 )
-@click.option("--seed", default=0, show_default=True, help="Of the simulated robot's noise.")
+@click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Of the simulated robot's noise.",
+)
 @click.option(
     "--clock",
     type=click.Choice(["real", "virtual"]),
@@ -98,7 +104,7 @@ def _split_names(
     "--semantic-map",
     type=click.Path(path_type=Path),
     default=None,
-    help="The YAML file of remembered places; ./semantic_map.yaml unless given.",
+    help="The YAML file of remembered places; one per map in the user's data folder unless given.",
 )
 @click.option(
     "--state-log",
@@ -167,7 +173,7 @@ async def _serve(options: ServeOptions) -> None:
             if options.http is None:
                 await serve_stdio(server)
             else:
-                await serve_http(server, options.http, token=os.environ.get(TOKEN_VARIABLE))
+                await serve_http(server, options.http, token=os.environ.get(TOKEN_VARIABLE) or None)
         finally:
             await session.close()
             tasks.cancel_scope.cancel()
@@ -210,13 +216,18 @@ async def _end_on_signal(session: "Session") -> None:
 def _usual_semantic_map(map_name: str) -> Path:
     """Gives a file that stays when an MCP client starts the server in another folder."""
     folder = Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share") / "mapspeak"
-    folder.mkdir(parents=True, exist_ok=True)
     return folder / f"{re.sub(r'[^A-Za-z0-9_.-]+', '_', map_name)}.yaml"
 
 
 @cli.command()
 @click.option("--world", default=DEFAULT_WORLD, show_default=True, help="A world or world file.")
-@click.option("--seed", default=0, show_default=True, help="Of the simulated robot's noise.")
+@click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Of the simulated robot's noise.",
+)
 @click.option(
     "--out",
     "folder",

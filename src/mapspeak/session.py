@@ -47,11 +47,12 @@ class Session:
         """Marks a client's call, so that the robot knows somebody is there."""
         return self._lease.call()
 
-    async def client_is_gone(self) -> None:
-        """Stops the robot when a client went away in the middle of something."""
-        if self.drives.under_way is not None:
-            logger.warning("A client hung up during a drive: stopping the robot.")
-            await self.drives.stop()
+    async def client_is_gone(self, client: str) -> None:
+        """Stops the robot when the client that sent it somewhere has gone away."""
+        drive = self.drives.under_way
+        if self.drives.is_busy and (drive is None or drive.client == client):
+            logger.warning("The client hung up during its drive: stopping the robot.")
+            await self.drives.stop("The client that sent the robot hung up.")
 
     async def compute(self, work: Callable[[], T]) -> T:
         """Does heavy work in a thread, so that a stop is answered meanwhile."""
@@ -68,7 +69,7 @@ class Session:
                 stamped.pose,
                 memory,
                 radius_m=self.robot.description.radius_m,
-                looked_from=self.drives.frontiers_reached,
+                looked_from=self.drives.frontiers_tried,
                 previous=self._atlas,
             )
             return self._atlas
@@ -111,12 +112,12 @@ class Session:
         """Stops a driving robot when no client has been heard for too long; until cancelled."""
         while True:
             await anyio.sleep(WATCH_S)
-            if self._lease.is_over and self.drives.under_way is not None:
+            if self._lease.is_over and self.drives.is_busy:
                 logger.warning("No client for %.0f s: stopping the robot.", self._lease.duration_s)
-                await self.drives.stop()
+                await self.drives.stop(f"No client was heard for {self._lease.duration_s:.0f} s.")
 
     async def close(self) -> None:
         """Leaves the robot standing."""
         with anyio.CancelScope(shield=True):
-            if self.drives.under_way is not None:
-                await self.drives.stop()
+            if self.drives.is_busy:
+                await self.drives.stop("The server ended.")

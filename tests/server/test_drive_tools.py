@@ -1,8 +1,15 @@
 from pathlib import Path
 
+import anyio
 import pytest
+from mcp_types import CallToolResult
 
 from fakes import FakeRobot, two_rooms
+from mapspeak.geometry import Pose
+from mapspeak.navigation.drive import DriveReport
+from mapspeak.robot import GoalState
+from mapspeak.semantic import SemanticMapStore
+from mapspeak.session import Session
 from served import MODES, connect, report_of, text_of
 
 pytestmark = pytest.mark.anyio
@@ -46,6 +53,17 @@ async def test_a_remembered_name_is_a_goal(tmp_path: Path) -> None:
         await client.call_tool("navigate_to", {"x": 6.0, "y": 1.4})
         answer = report_of(await client.call_tool("navigate_to", {"place": "dock  CORNER"}))
     assert answer["robot"] == {"x": 1.5, "y": 1.4, "yaw_deg": 0.0}
+
+
+async def test_a_thing_that_remembered_places_speak_of_is_answered_with_those_places(
+    tmp_path: Path,
+) -> None:
+    record = {"name": "west", "description": "by the sink", "safety_landmarks": ["extinguisher"]}
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        await client.call_tool("write_semantic_data", record)
+        result = await client.call_tool("navigate_to", {"place": "extinguisher"})
+    assert result.is_error
+    assert "W1 (west)" in text_of(result)
 
 
 @pytest.mark.parametrize(
@@ -95,6 +113,51 @@ async def test_stopping_ends_every_drive(tmp_path: Path) -> None:
         answer = report_of(await client.call_tool("wait_for_goal", {"wait_s": 0}))
     assert robot.n_stops == 1
     assert answer["state"] == "cancelled"
+
+
+async def test_a_stop_holds_for_a_goal_that_is_still_being_checked(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    answers: dict[str, CallToolResult] = {}
+    async with connect(robot, tmp_path) as client, anyio.create_task_group() as tasks:
+
+        async def navigate() -> None:
+            answers["drive"] = await client.call_tool("navigate_to", {"place": "R2"})
+
+        async def stop_when_asked_for_the_map() -> None:
+            await robot.map_was_asked_for.wait()
+            await client.call_tool("stop_robot", {})
+            robot.may_give_map.set()
+
+        robot.may_give_map = anyio.Event()
+        tasks.start_soon(navigate)
+        tasks.start_soon(stop_when_asked_for_the_map)
+    assert answers["drive"].is_error
+    assert "stopped" in text_of(answers["drive"])
+    assert not robot.goals
+
+
+async def test_who_gives_up_waiting_for_a_drive_gives_up_the_drive(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    session = Session(robot, SemanticMapStore(tmp_path / "m.yaml"), lease_s=60.0)
+    with session.drives.preparing() as ticket:
+        drive = await session.drives.start(Pose(6.0, 1.4), place="there", ticket=ticket)
+    with anyio.CancelScope() as scope:
+
+        async def give_up(_report: DriveReport) -> None:
+            scope.cancel()
+            await anyio.lowlevel.checkpoint()
+
+        await session.drives.wait(drive.goal_id, wait_s=20.0, on_progress=give_up)
+    assert (await session.drives.report()).status.state is GoalState.CANCELLED
+
+
+async def test_an_argument_that_does_not_exist_is_not_dropped_without_a_word(
+    tmp_path: Path,
+) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        result = await client.call_tool("navigate_to", {"place": "R2", "yaw": 90})
+    assert result.is_error
+    assert "no argument yaw; it has: place, wait_s, x, y, yaw_deg" in text_of(result)
 
 
 async def test_a_goal_id_that_nobody_gave_is_an_error(tmp_path: Path) -> None:

@@ -55,6 +55,26 @@ async def test_a_place_can_be_recalled_by_its_id(tmp_path: Path) -> None:
     assert recalled["n_places"] == 2
 
 
+@pytest.mark.parametrize(
+    "record",
+    [
+        {"name": "W1", "description": "x"},
+        {"name": "a", "description": "x", "x": 1e300, "y": 0.0},
+        {"name": "a", "description": "x", "yaw_deg": "inf"},
+        {"name": "a", "description": "x", "safety_landmarks": ["long" * 100]},
+    ],
+)
+async def test_a_record_that_would_mislead_is_refused(
+    tmp_path: Path, record: dict[str, object]
+) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        result = await client.call_tool("write_semantic_data", record)
+        recalled = report_of(await client.call_tool("get_semantic_data", {}))
+    assert result.is_error
+    assert "Error executing" not in text_of(result)
+    assert recalled["n_places"] == 0
+
+
 async def test_half_a_pose_is_refused(tmp_path: Path) -> None:
     async with connect(FakeRobot(two_rooms()), tmp_path) as client:
         result = await client.call_tool(

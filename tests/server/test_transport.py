@@ -55,8 +55,8 @@ async def test_a_client_that_goes_before_its_answer_has_come_is_noticed(
 ) -> None:
     noticed: list[str] = []
 
-    async def note() -> None:
-        noticed.append("gone")
+    async def note(client: str) -> None:
+        noticed.append(client)
 
     await ask(HangUpWatch(Answering(*messages), note))
     assert len(noticed) == n_hang_ups
@@ -65,9 +65,12 @@ async def test_a_client_that_goes_before_its_answer_has_come_is_noticed(
 async def test_a_drive_ends_when_its_client_is_gone(tmp_path: Path) -> None:
     robot = FakeRobot(two_rooms())
     session = Session(robot, SemanticMapStore(tmp_path / "m.yaml"), lease_s=60.0)
-    goal = await session.find_goal(place=None, x=6.0, y=1.4, yaw_deg=None)
-    await session.drives.start(goal.pose, place=goal.name)
-    await build_server(session).note_hang_up()
+    with session.drives.preparing() as ticket:
+        goal = await session.find_goal(place=None, x=6.0, y=1.4, yaw_deg=None)
+        await session.drives.start(goal.pose, place=goal.name, ticket=ticket, client="mine")
+    await build_server(session).note_hang_up("another")
+    assert session.drives.under_way is not None
+    await build_server(session).note_hang_up("mine")
     assert robot.n_stops == 1
     assert session.drives.under_way is None
 

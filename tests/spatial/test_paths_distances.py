@@ -73,7 +73,7 @@ def test_several_seeds_each_start_with_what_they_have_cost() -> None:
     east, west = 1, 4
     moves = np.array([[east] + [east | west] * 3 + [west]], dtype=np.uint8)
     seeds = Seeds(np.array([0, 4]), np.array([0.0, 2.5], dtype=np.float32))
-    costs = spread(moves, np.ones((1, 5), dtype=np.float32), seeds)
+    costs = spread(moves, None, seeds)
     assert costs.tolist() == [0.0, 1.0, 2.0, 3.0, 2.5]
 
 

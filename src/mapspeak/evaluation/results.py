@@ -50,12 +50,12 @@ class Task2Report(_Report):
     @classmethod
     def of(cls, score: RoomScore) -> Self:
         """Makes it from a score."""
-        chosen_m2 = score.chosen_room_area_m2
+        chosen_m2, smallest_m2 = score.chosen_room_area_m2, score.smallest_room_area_m2
         return cls(
             success=score.is_success,
             chosen_room=score.chosen_room,
             chosen_room_area_m2=None if chosen_m2 is None else round(chosen_m2, 2),
-            smallest_room_area_m2=round(score.smallest_room_area_m2, 2),
+            smallest_room_area_m2=None if smallest_m2 is None else round(smallest_m2, 2),
             final_pose=PoseFigures.of(score.final_pose),
         )
 
@@ -75,7 +75,7 @@ class Task3Report(_Report):
             success=score.is_success and waypoint is not None,
             waypoint=waypoint,
             nearest_object=score.nearest,
-            distance_to_object_m=round(score.distance_m, 2),
+            distance_to_object_m=None if score.distance_m is None else round(score.distance_m, 2),
         )
 
 

@@ -33,14 +33,14 @@ class RoomScore:
         is_success: It does.
         chosen_room: The name of the room it stands in; None when in none.
         chosen_room_area_m2: Its free floor.
-        smallest_room_area_m2: The free floor of the smallest one.
+        smallest_room_area_m2: The free floor of the smallest one; None in a world without rooms.
         final_pose: Where it truly stands.
     """
 
     is_success: bool
     chosen_room: str | None
     chosen_room_area_m2: float | None
-    smallest_room_area_m2: float
+    smallest_room_area_m2: float | None
     final_pose: Pose
 
 
@@ -51,12 +51,12 @@ class FireToolScore:
     Attributes:
         is_success: One is in sight and near.
         nearest: The name of the nearest one in sight; None when none is.
-        distance_m: To that one, else to the nearest of all.
+        distance_m: To that one, else to the nearest of all; None in a world without any.
     """
 
     is_success: bool
     nearest: str | None
-    distance_m: float
+    distance_m: float | None
 
 
 class Scorer:
@@ -73,13 +73,13 @@ class Scorer:
     def score_smallest_room(self, pose: Pose) -> RoomScore:
         """Scores the paper's Task 2 from where the robot truly stands."""
         rooms = [room for room in self._floor.rooms if room.room.room_class is RoomClass.ROOM]
-        smallest = min(rooms, key=lambda room: room.free_area_m2)
+        smallest = min(rooms, key=lambda room: room.free_area_m2, default=None)
         here = self._find_room(pose.point)
         return RoomScore(
-            is_success=here is smallest,
+            is_success=here is not None and here is smallest,
             chosen_room=None if here is None else here.room.name,
             chosen_room_area_m2=None if here is None else here.free_area_m2,
-            smallest_room_area_m2=smallest.free_area_m2,
+            smallest_room_area_m2=None if smallest is None else smallest.free_area_m2,
             final_pose=pose,
         )
 
@@ -87,6 +87,8 @@ class Scorer:
         """Scores the paper's Task 3 from where the robot truly stands."""
         here = self._world.start.transform(pose.point)
         tools = [thing for thing in self._world.objects if thing.kind == "fire_extinguisher"]
+        if not tools:
+            return FireToolScore(is_success=False, nearest=None, distance_m=None)
         in_sight = [tool for tool in tools if is_in_sight(self._world, here, tool)]
         nearest = min(in_sight or tools, key=lambda tool: here.distance_to(tool.pose.point))
         distance_m = here.distance_to(nearest.pose.point)

@@ -68,6 +68,7 @@ class SimulatedRobot:
         self._has_detector = has_detector
         self._after_step = after_step or _do_nothing
         self._turn = anyio.Lock()
+        self._looking = anyio.Lock()
 
     @property
     def description(self) -> RobotDescription:
@@ -103,13 +104,16 @@ class SimulatedRobot:
 
     async def fetch_picture(self) -> CameraPicture:
         """Draws what the front camera sees."""
-        return await self._run(self._take_picture)
+        # Drawing takes long and needs only the pose: a stop must not wait for it.
+        async with self._looking:
+            return await anyio.to_thread.run_sync(self._take_picture)
 
     async def fetch_detections(self) -> tuple[Detection, ...]:
         """Gives what the simulated detector reports; nothing when it is switched off."""
         if not self._has_detector:
             return ()
-        return await self._run(self._detect)
+        async with self._looking:
+            return await anyio.to_thread.run_sync(self._detect)
 
     async def send_goal(self, goal: Pose) -> str:
         """Starts a drive in the simulated navigation."""

@@ -5,7 +5,8 @@ background, so a simulated robot's time stands still between two questions.
 """
 
 import re
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Generator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import anyio
@@ -32,6 +33,7 @@ class Drive:
         place: What the goal was called when it was asked for.
         robot_goal_id: What the robot's navigation calls it.
         started_s: Robot time at which it was sent.
+        client: Who asked for it; empty where there can be only one.
         final: How it ended, once it has.
     """
 
@@ -40,6 +42,7 @@ class Drive:
     place: str
     robot_goal_id: str
     started_s: float
+    client: str = ""
     final: GoalStatus | None = None
 
 
@@ -70,6 +73,8 @@ class DriveBook:
         self._robot = robot
         self._drives: dict[str, Drive] = {}
         self._n_started = 0
+        self._n_stops = 0
+        self._n_preparing = 0
         self._starting = anyio.Lock()
 
     @property
@@ -84,20 +89,43 @@ class DriveBook:
         return latest if latest is not None and latest.final is None else None
 
     @property
-    def frontiers_reached(self) -> tuple[Point, ...]:
-        """Where the robot has arrived when it was sent to a frontier."""
+    def frontiers_tried(self) -> tuple[Point, ...]:
+        """Where the robot has arrived, or could not get to, when it was sent to a frontier."""
         return tuple(
             drive.goal.point
             for drive in self._drives.values()
             if FRONTIER.fullmatch(drive.place)
             and drive.final is not None
-            and drive.final.state is GoalState.ARRIVED
+            and drive.final.state in (GoalState.ARRIVED, GoalState.BLOCKED)
         )
 
-    async def start(self, goal: Pose, *, place: str) -> Drive:
-        """Sends a goal to the robot; a drive that was under way ends as preempted."""
+    @property
+    def is_busy(self) -> bool:
+        """True while a drive is under way or being prepared."""
+        return self.under_way is not None or self._n_preparing > 0
+
+    @contextmanager
+    def preparing(self) -> Generator[int]:
+        """Marks that a goal is being checked, and gives the ticket to start its drive with."""
+        self._n_preparing += 1
+        try:
+            yield self._n_stops
+        finally:
+            self._n_preparing -= 1
+
+    async def start(self, goal: Pose, *, place: str, ticket: int, client: str = "") -> Drive:
+        """Sends a goal to the robot; a drive that was under way ends as preempted.
+
+        Raises:
+            GoalError: The robot was stopped after the ticket was given.
+        """
         async with self._starting:
             await self._preempt()
+            if ticket != self._n_stops:
+                raise GoalError(
+                    "The robot was stopped while this goal was being checked.",
+                    hint="Call navigate_to again when it may drive.",
+                )
             robot_goal_id = await self._robot.send_goal(goal)
             self._n_started += 1
             drive = Drive(
@@ -106,6 +134,7 @@ class DriveBook:
                 place=place,
                 robot_goal_id=robot_goal_id,
                 started_s=self._robot.now_s,
+                client=client,
             )
             self._drives[drive.goal_id] = drive
             self._forget_old()
@@ -127,7 +156,20 @@ class DriveBook:
     async def wait(
         self, goal_id: str | None, *, wait_s: float, on_progress: OnProgress
     ) -> DriveReport:
-        """Waits until a drive ends or that much robot time has passed; gives how it stands then."""
+        """Waits until a drive ends or that much robot time has passed; gives how it stands then.
+
+        Whoever gives up waiting gives up the drive: the robot comes to a stand.
+        """
+        try:
+            return await self._wait(goal_id, wait_s, on_progress)
+        except anyio.get_cancelled_exc_class():
+            with anyio.CancelScope(shield=True):
+                await self.cancel(goal_id)
+            raise
+
+    async def _wait(
+        self, goal_id: str | None, wait_s: float, on_progress: OnProgress
+    ) -> DriveReport:
         deadline_s = self._robot.now_s + wait_s
         next_progress_s = self._robot.now_s + PROGRESS_S
         report = await self.report(goal_id)
@@ -149,12 +191,17 @@ class DriveBook:
             await self._robot.cancel_goal(report.drive.robot_goal_id)
         return await self.report(report.drive.goal_id)
 
-    async def stop(self) -> None:
-        """Stops the robot and ends whatever was under way."""
+    async def stop(self, reason: str = "The robot was stopped.") -> None:
+        """Stops the robot and ends what was under way; what is being prepared does not start."""
+        self._n_stops += 1
         with anyio.CancelScope(shield=True):
             await self._robot.stop()
-        if self.under_way is not None:
-            await self.report(self.under_way.goal_id)
+            drive = self.under_way
+            if drive is not None:
+                report = await self.report(drive.goal_id)
+                if report.status.state is GoalState.CANCELLED:
+                    ended = replace(report.drive, final=replace(report.status, reason=reason))
+                    self._drives[drive.goal_id] = ended
 
     def _find(self, goal_id: str | None) -> Drive:
         drive = self.latest if goal_id is None else self._drives.get(goal_id.strip().upper())

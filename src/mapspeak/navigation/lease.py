@@ -5,13 +5,23 @@ from contextlib import contextmanager
 
 import anyio
 
+from mapspeak.errors import ConfigError
+
 __all__ = ["Lease"]
 
 
 class Lease:
-    """Knows since when no client has been heard. Wall time: it is about clients, not the robot."""
+    """Knows since when no client has been heard. Wall time: it is about clients, not the robot.
+
+    Raises:
+        ConfigError: The duration is not above zero.
+    """
 
     def __init__(self, duration_s: float) -> None:
+        if not duration_s > 0:
+            raise ConfigError(
+                f"A lease of {duration_s} s is no lease.", hint="Give a positive number of seconds."
+            )
         self.duration_s = duration_s
         self._n_calls = 0
         self._last_heard_s = float("-inf")

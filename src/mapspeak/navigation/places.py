@@ -8,11 +8,12 @@ from mapspeak.errors import GoalError
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.navigation.atlas import Atlas, RememberedPlace
 from mapspeak.navigation.goals import GoalCheck, check_goal
-from mapspeak.semantic import name_key
+from mapspeak.semantic import SemanticMap, Waypoint, find_waypoints, name_key
 from mapspeak.spatial.rooms import Door, Region
 
-__all__ = ["NamedPose", "choose_goal", "find_place"]
+__all__ = ["NamedPose", "choose_goal", "find_place", "looks_like_id"]
 
+MOST_NAMED = 12
 ID = re.compile(r"(?P<letter>[A-Za-z])(?P<number>\d+)")
 
 
@@ -41,8 +42,13 @@ def find_place(atlas: Atlas, place: str) -> NamedPose:
     if pose is None:
         pose = _find_by_name(atlas, wanted)
     if pose is None:
-        raise GoalError(_what_became_of(atlas, wanted), hint=_known_places(atlas))
+        raise GoalError(_what_became_of(atlas, wanted), hint=_known_places(atlas, wanted))
     return NamedPose(wanted.upper() if match else wanted, pose)
+
+
+def looks_like_id(name: str) -> bool:
+    """True for what is read as an id of the map: a letter and a number."""
+    return ID.fullmatch(name.strip()) is not None
 
 
 def _find_by_id(atlas: Atlas, place_id: str) -> Pose | None:
@@ -96,19 +102,37 @@ def _what_became_of(atlas: Atlas, place: str) -> str:
         return f"{gone.id} is no longer found: its floor is now {' and '.join(gone.became)}."
     if gone is not None:
         return f"{gone.id} is no longer found on the map."
-    if re.fullmatch(r"[Ff]\d+", place):
+    if re.fullmatch(r"[Ff]\d+", place) and int(place[1:]) <= atlas.frontiers.n_named:
         return f"Frontier {place.upper()} is gone: what lay behind it has been seen or refused."
-    return f"There is no place called {place!r}."
+    return f"There is no place called {place[:80]!r}."
 
 
-def _known_places(atlas: Atlas) -> str:
-    ids = [region.id for region in atlas.rooms.regions]
-    ids += [frontier.id for frontier in atlas.frontiers.frontiers]
-    ids += [each.id for each in atlas.places]
-    if not ids:
-        return "The map has no places yet; call look_at_map."
-    shown = ", ".join(ids[:20]) + (f" and {len(ids) - 20} more" if len(ids) > 20 else "")
-    return f"Known places: {shown}. Call look_at_map to see them."
+def _known_places(atlas: Atlas, wanted: str) -> str:
+    mentioned = [
+        f"{place.id} ({place.waypoint.name})"
+        for match in find_waypoints(SemanticMap(waypoints=_waypoints(atlas)), wanted)
+        for place in atlas.places
+        if place.waypoint is match.waypoint
+    ]
+    if mentioned:
+        return f"Remembered places that speak of it: {', '.join(mentioned)}. Go to one of them."
+    groups = {
+        "rooms": [region.id for region in atlas.rooms.regions],
+        "doors": [door.id for door in atlas.rooms.doors],
+        "frontiers": [frontier.id for frontier in atlas.frontiers.frontiers],
+        "remembered": [place.id for place in atlas.places],
+    }
+    known = [f"{name} {_some_of(ids)}" for name, ids in groups.items() if ids]
+    return f"Known are {'; '.join(known) or 'no places yet'}. Call look_at_map to see them."
+
+
+def _some_of(ids: list[str]) -> str:
+    shown = " ".join(ids[:MOST_NAMED])
+    return shown if len(ids) <= MOST_NAMED else f"{shown} and {len(ids) - MOST_NAMED} more"
+
+
+def _waypoints(atlas: Atlas) -> tuple[Waypoint, ...]:
+    return tuple(place.waypoint for place in atlas.places)
 
 
 def choose_goal(

@@ -34,12 +34,14 @@ class MapspeakServer(MCPServer[Any]):
             log_level="WARNING",
         )
         self._session = session
+        self._arguments: dict[str, frozenset[str]] = {}
 
     async def call_tool(
         self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None = None
     ) -> CallToolResult | InputRequiredResult:
         """Calls a tool; what went wrong on purpose reaches the model with its hint."""
         with self._session.client_is_heard():
+            self._check_arguments(name, arguments)
             try:
                 return await super().call_tool(name, arguments, context)
             except ToolError as error:
@@ -48,9 +50,28 @@ class MapspeakServer(MCPServer[Any]):
                     raise
                 raise ToolError(readable) from error.__cause__
 
-    async def note_hang_up(self) -> None:
+    def offer(self, tool: Tool) -> None:
+        """Adds a tool to those that can be called."""
+        self._arguments[tool.name] = tool.arguments
+        self.add_tool(
+            tool.function,
+            title=tool.title,
+            description=tool.description,
+            annotations=tool.annotations,
+            meta=tool.meta,
+            structured_output=tool.has_report,
+        )
+
+    def _check_arguments(self, name: str, given: dict[str, Any]) -> None:
+        """Refuses arguments that would be dropped without a word, such as yaw for yaw_deg."""
+        strangers = sorted(set(given) - self._arguments.get(name, frozenset(given)))
+        if strangers:
+            known = ", ".join(sorted(self._arguments[name])) or "none"
+            raise ToolError(f"{name} has no argument {', '.join(strangers)}; it has: {known}.")
+
+    async def note_hang_up(self, client: str) -> None:
         """Stops a drive that nobody is there for any more."""
-        await self._session.client_is_gone()
+        await self._session.client_is_gone(client)
 
     async def list_tools(self) -> list[ListedTool]:
         """Lists the tools with schemas freed of what no model needs."""
@@ -86,14 +107,7 @@ def build_server(
     """
     server = MapspeakServer(session)
     for tool in choose_tools(session, toolsets=toolsets, tools=tools, is_read_only=is_read_only):
-        server.add_tool(
-            tool.function,
-            title=tool.title,
-            description=tool.description,
-            annotations=tool.annotations,
-            meta=tool.meta,
-            structured_output=tool.has_report,
-        )
+        server.offer(tool)
     add_prompts(server)
     return server
 

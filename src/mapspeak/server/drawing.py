@@ -24,8 +24,11 @@ __all__ = ["AtlasPicture", "draw_atlas", "draw_rooms"]
 
 LEGEND = (
     "White free, grey unknown, black walls; coloured floors are rooms, hatched ones corridors; "
-    "square door, triangle frontier, diamond remembered place, arrow robot."
+    "square door, triangle frontier, diamond remembered place, arrow robot, dashed line the way to "
+    "the best frontier, ring the origin."
 )
+
+WITH_PATH = frozenset({Layer.PATH, Layer.FRONTIERS})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +50,7 @@ def draw_atlas(atlas: Atlas, layers: frozenset[Layer]) -> AtlasPicture:
         atlas.grid,
         layers=MapLayers(
             regions=_rooms(atlas.rooms) if Layer.ROOMS in layers else None,
-            lines=_path_to_first_frontier(atlas) if Layer.PATH in layers else (),
+            lines=_path_to_first_frontier(atlas) if layers >= WITH_PATH else (),
             marks=(
                 *(_doors(atlas.rooms) if Layer.DOORS in layers else ()),
                 *(_frontiers(atlas) if Layer.FRONTIERS in layers else ()),

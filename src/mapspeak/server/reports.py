@@ -9,7 +9,7 @@ from mapspeak.geometry import Pose
 from mapspeak.navigation.atlas import RememberedPlace, number_places
 from mapspeak.navigation.drive import DriveReport
 from mapspeak.robot import GoalState, StampedPose
-from mapspeak.semantic import Landmark, SemanticMap, WriteReceipt, name_key
+from mapspeak.semantic import Landmark, SemanticMap, Waypoint, WriteReceipt, name_key
 
 __all__ = [
     "DriveAnswer",
@@ -87,7 +87,8 @@ class DriveAnswer(Report):
     @classmethod
     def of(cls, report: DriveReport) -> Self:
         """Makes the report of a drive."""
-        left_m = report.status.distance_left_m
+        is_there = report.status.state is GoalState.ARRIVED
+        left_m = 0.0 if is_there else report.status.distance_left_m
         return cls(
             goal_id=report.drive.goal_id,
             state=report.status.state,
@@ -176,7 +177,8 @@ class WriteAnswer(Report):
     id: str = Field(description="takes you there with navigate_to")
     name: str
     pose: PoseReport
-    is_new: bool = Field(description="false: a place of that name was updated")
+    is_new: bool
+    replaced: str = Field(description="the record before")
     n_places: int = Field(description="remembered in all")
 
     @classmethod
@@ -189,8 +191,17 @@ class WriteAnswer(Report):
             name=stored.waypoint.name,
             pose=PoseReport.of(stored.waypoint.pose),
             is_new=receipt.is_created,
+            replaced=_say_previous(receipt.previous),
             n_places=receipt.n_waypoints,
         )
+
+
+def _say_previous(previous: Waypoint | None) -> str:
+    if previous is None:
+        return ""
+    pose = PoseReport.of(previous.pose)
+    labels = ", ".join(landmark.label for landmark in previous.landmarks) or "no landmarks"
+    return f"{previous.description} ({pose.x}, {pose.y}, {pose.yaw_deg} deg; {labels})"
 
 
 def _is_called(place: RememberedPlace, name: str) -> bool:

@@ -16,6 +16,7 @@ __all__ = ["Layer", "describe_atlas"]
 Item = TypeVar("Item")
 
 MOST_ROWS = 30
+MOST_FRONTIERS = 10
 AXES = "Metres in the map frame, x right and y up in the picture; yaw counter-clockwise from x."
 LONGEST_NAME = 40
 
@@ -116,9 +117,10 @@ def _door_row(atlas: Atlas, door: Door) -> Sequence[str]:
 def _frontier_table(atlas: Atlas) -> str:
     return _table(
         "Frontiers to the unknown, best first",
-        ("id", "go to x, y, yaw", "length m", "may show m2", "path m", "from", "why"),
+        ("id", "go to x, y, yaw", "length m", "at most m2 to see", "path m", "from", "why"),
         atlas.frontiers.frontiers,
         lambda frontier: _frontier_row(atlas, frontier),
+        most_rows=MOST_FRONTIERS,
     )
 
 
@@ -168,11 +170,13 @@ def _table(
     columns: Sequence[str],
     items: Sequence[Item],
     row: Callable[[Item], Sequence[str]],
+    *,
+    most_rows: int = MOST_ROWS,
 ) -> str:
     if not items:
         return f"## {heading}: none"
-    shown = [row(item) for item in islice(items, MOST_ROWS)]
-    cut = f" (showing {MOST_ROWS} of {len(items)})" if len(items) > MOST_ROWS else ""
+    shown = [row(item) for item in islice(items, most_rows)]
+    cut = f" (showing {most_rows} of {len(items)})" if len(items) > most_rows else ""
     return "\n".join([f"## {heading}{cut}", *_lines([columns, *shown])])
 
 

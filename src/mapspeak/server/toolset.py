@@ -44,6 +44,11 @@ class Tool:
         return self.function.__name__
 
     @property
+    def arguments(self) -> frozenset[str]:
+        """The names of what it takes."""
+        return frozenset(inspect.signature(self.function).parameters) - {"context"}
+
+    @property
     def description(self) -> str:
         """What a model reads: the docstring, a line for each of its paragraphs."""
         paragraphs = inspect.cleandoc(self.function.__doc__ or "").split("\n\n")

@@ -2,6 +2,7 @@
 
 import ipaddress
 import secrets
+import socket
 from collections.abc import Awaitable, Callable
 
 import uvicorn
@@ -39,14 +40,19 @@ async def serve_http(server: MapspeakServer, address: str, *, token: str | None 
     app.add_route("/health", _say_ok)
     watched: ASGIApp = HangUpWatch(app, server.note_hang_up)
     guarded = watched if token is None else TokenGuard(watched, token)
-    config = uvicorn.Config(guarded, host=host, port=port, log_level="warning")
-    await uvicorn.Server(config).serve()
+    config = uvicorn.Config(guarded, log_level="warning")
+    with _listen(host, port) as listener:
+        await uvicorn.Server(config).serve(sockets=[listener])
 
 
 class HangUpWatch:
-    """Notices a client that is gone before its answer was: nobody else tells a running tool."""
+    """Notices a client that is gone before its answer was, or that ends its session.
 
-    def __init__(self, app: ASGIApp, on_hang_up: Callable[[], Awaitable[None]]) -> None:
+    Nobody else tells a running tool. Clients are told apart by their session; those of a protocol
+    without sessions count as one.
+    """
+
+    def __init__(self, app: ASGIApp, on_hang_up: Callable[[str], Awaitable[None]]) -> None:
         self._app = app
         self._on_hang_up = on_hang_up
 
@@ -55,6 +61,7 @@ class HangUpWatch:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
+        client = dict(scope["headers"]).get(b"mcp-session-id", b"").decode("latin-1")
         is_answered = False
 
         async def watch_send(message: Message) -> None:
@@ -66,9 +73,11 @@ class HangUpWatch:
         async def watch_receive() -> Message:
             message = await receive()
             if message["type"] == "http.disconnect" and not is_answered:
-                await self._on_hang_up()
+                await self._on_hang_up(client)
             return message
 
+        if scope.get("method") == "DELETE":
+            await self._on_hang_up(client)
         await self._app(scope, watch_receive, watch_send)
 
 
@@ -118,6 +127,17 @@ def _parse_address(address: str) -> tuple[str, int]:
             f"{address!r} is no address to serve on.", hint="Give HOST:PORT, as 127.0.0.1:8766."
         )
     return host, int(port)
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        return socket.create_server((host, port), family=family)
+    except OSError as error:
+        raise ConfigError(
+            f"{host}:{port} cannot be served on: {error.strerror or error}.",
+            hint="Choose another port, or end the program that has this one.",
+        ) from error
 
 
 def _is_loopback(host: str) -> bool:

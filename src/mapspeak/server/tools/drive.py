@@ -22,7 +22,10 @@ Place = Annotated[
 Metres = Annotated[float | None, Field(description="metres, map frame", allow_inf_nan=False)]
 Degrees = Annotated[
     float | None,
-    Field(description="heading on arrival, degrees counter-clockwise from +x", allow_inf_nan=False),
+    Field(
+        description="heading on arrival, counter-clockwise from +x; goes with place too",
+        allow_inf_nan=False,
+    ),
 ]
 Wait = Annotated[
     float, Field(description="seconds to wait for the end of the drive", ge=0, le=LONGEST_WAIT_S)
@@ -77,8 +80,12 @@ class DriveTools:
         Answers `arrived` or, after wait_s, a goal_id for wait_for_goal. A newer goal replaces the
         older one.
         """
-        goal = await self._session.find_goal(place=place, x=x, y=y, yaw_deg=yaw_deg)
-        drive = await self._session.drives.start(goal.pose, place=goal.name)
+        drives = self._session.drives
+        with drives.preparing() as ticket:
+            goal = await self._session.find_goal(place=place, x=x, y=y, yaw_deg=yaw_deg)
+            drive = await drives.start(
+                goal.pose, place=goal.name, ticket=ticket, client=_client_of(context)
+            )
         return await self._wait(context, drive.goal_id, wait_s)
 
     async def wait_for_goal(
@@ -114,6 +121,11 @@ class DriveTools:
             goal_id, wait_s=wait_s, on_progress=_tell_progress(context)
         )
         return DriveAnswer.of(report)
+
+
+def _client_of(context: Context) -> str:
+    """Gives the HTTP session that calls; empty on stdio and for clients without one."""
+    return (context.headers or {}).get("mcp-session-id", "")
 
 
 def _tell_progress(context: Context) -> OnProgress:

@@ -9,6 +9,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.navigation.goals import FARTHEST_M
+from mapspeak.navigation.places import looks_like_id
 from mapspeak.semantic import Landmark, Waypoint
 from mapspeak.server.reports import MemoryAnswer, WriteAnswer
 from mapspeak.server.tables import say_pose
@@ -50,19 +52,28 @@ Name = Annotated[
     Field(description="unique; an existing name is updated", min_length=1, max_length=120),
 ]
 Description = Annotated[str, Field(description="the place in a sentence or two", max_length=2000)]
+Label = Annotated[str, Field(min_length=1, max_length=120)]
+Feature = Annotated[str, Field(max_length=300)]
 Landmarks = Annotated[
-    list[str | LandmarkInput] | None,
-    Field(description="labels, or objects with label, purpose, bearing_deg, range_m"),
+    list[Label | LandmarkInput] | None,
+    Field(
+        max_length=50, description="labels, or objects with label, purpose, bearing_deg, range_m"
+    ),
 ]
 Features = Annotated[
-    list[str] | None,
-    Field(description="lasting layout: corridors, walls, openings, obstacles"),
+    list[Feature] | None,
+    Field(max_length=50, description="lasting layout: corridors, walls, openings, obstacles"),
 ]
 Metres = Annotated[
     float | None,
-    Field(description="observation pose in metres; the robot's now when left out"),
+    Field(
+        description="where from, metres; else the robot's",
+        allow_inf_nan=False,
+    ),
 ]
-Degrees = Annotated[float | None, Field(description="observation heading, degrees")]
+Degrees = Annotated[
+    float | None, Field(description="observation heading, degrees", allow_inf_nan=False)
+]
 WaypointName = Annotated[
     str | None, Field(description="one remembered place by name; all when left out")
 ]
@@ -151,6 +162,7 @@ class PaperTools:
         Use it at every waypoint after look_through_camera. Keep what lasts (safety equipment, fixed
         equipment, layout); leave out people, loose boxes and guesses.
         """
+        _check_name(name)
         waypoint = Waypoint(
             name=name,
             description=description,
@@ -167,7 +179,8 @@ class PaperTools:
     async def get_semantic_data(self, name: WaypointName = None) -> MemoryAnswer:
         """Recalls remembered places with pose, landmarks and layout; they are observations.
 
-        Use it to find an object, a function or a place, then navigate_to its id (W1).
+        Use it to find an object, a function or a place, then navigate_to its id (W1): that is where
+        it was seen from; bearing and range lead on from there.
         """
         memory = await self._session.compute(self._session.memory.read)
         return MemoryAnswer.of(memory, name)
@@ -184,7 +197,20 @@ class PaperTools:
         yaw_rad = here.yaw_rad if yaw_deg is None else wrap_angle(math.radians(yaw_deg))
         if x is None or y is None:
             return Pose(here.x, here.y, yaw_rad)
+        if max(abs(x), abs(y)) > FARTHEST_M:
+            raise SemanticMapError(
+                f"({x:g}, {y:g}) lies farther away than any map reaches.",
+                hint="Give metres in the map frame, or leave x and y out for the robot's own pose.",
+            )
         return Pose(x, y, yaw_rad)
+
+
+def _check_name(name: str) -> None:
+    if looks_like_id(name):
+        raise SemanticMapError(
+            f"{name!r} reads like the id of a place on the map.",
+            hint="Give a name in words, such as 'dock corner'.",
+        )
 
 
 def _landmarks(given: Sequence[str | LandmarkInput] | None) -> tuple[Landmark, ...]:

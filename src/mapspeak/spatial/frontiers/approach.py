@@ -1,21 +1,25 @@
 """From a border with the unknown to the nearest place where the robot can stand."""
 
+import math
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
 from mapspeak.spatial.frontiers.edges import Border
-from mapspeak.spatial.grid import Cell, FloatArray, IntArray
+from mapspeak.spatial.grid import Cell, FloatArray, IntArray, Mask, OccupancyGrid
+from mapspeak.spatial.paths.clearance import clearance_m
 from mapspeak.spatial.paths.distances import DistanceField
-from mapspeak.spatial.paths.lattice import Lattice, build_fine_lattice
+from mapspeak.spatial.paths.lattice import moves_within
 from mapspeak.spatial.paths.trace import descend
-from mapspeak.spatial.paths.wavefront import Costs, Seeds, spread
+from mapspeak.spatial.paths.wavefront import Costs, Moves, Seeds, spread
 
-__all__ = ["Approach", "build_approach", "build_wide_approach"]
+__all__ = ["Approach", "build_approach"]
 
-NARROWEST_WEIGHT = 1000.0
-"""What a cell beside a wall costs a way that looks for width; enough to go round a room."""
+DETOUR_M = 1.5
+"""How far around the shortest way a wider one is looked for."""
+MOST_WEIGHT = 50.0
+"""What the narrowest cell costs a way that looks for width."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -25,55 +29,75 @@ class Approach:
     The robot itself may be too wide for the floor in between; a look over it is what counts.
 
     Attributes:
-        floor: All free cells and the moves between them.
-        weights: What a cell of way costs.
-        costs: To each cell, flat; infinite where no floor leads.
+        grid: The map.
+        radius_m: Of the robot.
+        reachable: Where it can get to.
+        moves: Between free cells.
+        costs: The length in cells to each, flat; infinite where no floor leads.
     """
 
-    floor: Lattice
-    weights: Costs
+    grid: OccupancyGrid
+    radius_m: float
+    reachable: Mask
+    moves: Moves
     costs: Costs
 
-    def costs_of(self, border: Border) -> FloatArray:
-        """Gives the costs to each cell of a border."""
-        flat = border.rows * self.floor.n_cols + border.cols
-        return np.asarray(self.costs[flat], dtype=np.float64)
+    def distances_m(self, border: Border) -> FloatArray:
+        """Gives the metres from the reachable floor to each cell of a border."""
+        costs = self.costs[border.rows * self.grid.n_cols + border.cols]
+        return np.asarray(costs * self.grid.resolution_m, dtype=np.float64)
 
     def nearest_reachable(self, cell: Cell) -> Cell:
         """Gives the reachable cell that a free cell is joined to."""
-        rows, cols = self.way_to(cell)
+        rows, cols = self._way_to(cell)
         return Cell(int(rows[0]), int(cols[0]))
 
-    def way_to(self, cell: Cell) -> tuple[IntArray, IntArray]:
+    def gap_width_m(self, cell: Cell) -> float:
+        """Gives how wide the widest way to a free cell is, at its narrowest."""
+        window = self._window(*self._way_to(cell))
+        near = OccupancyGrid(cells=self.grid.cells[window], resolution_m=self.grid.resolution_m)
+        clearances_m = clearance_m(near)
+        lacking = self.radius_m / np.maximum(clearances_m, self.grid.resolution_m)
+        weights = np.clip(lacking**3, 1.0, MOST_WEIGHT).astype(np.float32)
+        moves = moves_within(near.free)
+        costs = spread(moves, weights, _seeds(self.reachable[window]))
+        goal = (cell.row - window[0].start) * near.n_cols + cell.col - window[1].start
+        way = descend(moves, weights, costs, goal)
+        return 2 * float(clearances_m.ravel()[way].min())
+
+    def _way_to(self, cell: Cell) -> tuple[IntArray, IntArray]:
         """Gives the cells from the reachable floor to a free cell, both ends included."""
-        goal = cell.row * self.floor.n_cols + cell.col
-        way = descend(self.floor, self.weights, self.costs, goal)
-        rows, cols = np.divmod(way, self.floor.n_cols)
+        way = descend(self.moves, None, self.costs, cell.row * self.grid.n_cols + cell.col)
+        rows, cols = np.divmod(way, self.grid.n_cols)
         return rows, cols
+
+    def _window(self, rows: IntArray, cols: IntArray) -> tuple[slice, slice]:
+        """Gives the part of the map around some cells."""
+        margin = math.ceil(DETOUR_M / self.grid.resolution_m)
+        return (
+            slice(max(int(rows.min()) - margin, 0), int(rows.max()) + margin + 1),
+            slice(max(int(cols.min()) - margin, 0), int(cols.max()) + margin + 1),
+        )
 
 
 def build_approach(distances: DistanceField) -> Approach:
-    """Builds the shortest approach to all free cells; its costs are lengths in cells."""
-    floor = build_fine_lattice(distances.lattice.grid, 0.0)
-    return _approach(floor, distances, np.ones(floor.moves.shape, dtype=np.float32))
-
-
-def build_wide_approach(distances: DistanceField) -> Approach:
-    """Builds the approach that makes detours for width, as to say how wide the widest way is."""
-    floor = build_fine_lattice(distances.lattice.grid, 0.0)
-    lacking = distances.radius_m / np.maximum(floor.clearance_m, floor.grid.resolution_m)
-    weights = np.clip(lacking, 1.0, None) ** 4
-    return _approach(floor, distances, np.minimum(weights, NARROWEST_WEIGHT).astype(np.float32))
-
-
-def _approach(floor: Lattice, distances: DistanceField, weights: Costs) -> Approach:
+    """Builds the approach to all free cells of the map that the distances belong to."""
+    grid = distances.lattice.grid
     reachable = distances.build_reachable_mask()
-    beyond = (floor.passable & ~reachable).view(np.uint8)
+    moves = moves_within(grid.free)
+    beyond = (grid.free & ~reachable).view(np.uint8)
     rim = reachable & (cv2.dilate(beyond, np.ones((3, 3), dtype=np.uint8)) > 0)
-    cells = np.flatnonzero(rim)
-    costs = np.full(reachable.size, np.inf, dtype=np.float32)
-    if cells.size:
-        seeds = Seeds(cells, np.zeros(cells.size, dtype=np.float32))
-        costs = spread(floor.moves, weights, seeds)
+    costs = spread(moves, None, _seeds(rim))
     costs[reachable.ravel()] = 0.0
-    return Approach(floor=floor, weights=weights, costs=costs)
+    return Approach(
+        grid=grid,
+        radius_m=distances.radius_m,
+        reachable=reachable,
+        moves=moves,
+        costs=costs,
+    )
+
+
+def _seeds(mask: Mask) -> Seeds:
+    cells = np.flatnonzero(mask)
+    return Seeds(cells, np.zeros(cells.size, dtype=np.float32))

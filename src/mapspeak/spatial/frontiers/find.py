@@ -17,7 +17,6 @@ from mapspeak.spatial.frontiers.judging import (
     Lookout,
     find_lookouts,
     refuse,
-    with_gap_widths,
 )
 from mapspeak.spatial.frontiers.ranking import gain_rate, rank
 from mapspeak.spatial.frontiers.reporting import build_report
@@ -58,7 +57,7 @@ def find_frontiers(
     ]
     frontiers = [each for each in judged if isinstance(each, Frontier)]
     refused = [each for each in judged if isinstance(each, RefusedFrontier)]
-    return build_report(grid, rank(distances, frontiers), with_gap_widths(distances, refused))
+    return build_report(grid, rank(distances, frontiers), refused)
 
 
 def _judge(
@@ -66,7 +65,7 @@ def _judge(
 ) -> Frontier | RefusedFrontier:
     """Gives the border with the best place to look beyond it, or says why there is none."""
     grid = distances.lattice.grid
-    lookouts = find_lookouts(approach, border, radius_m=distances.radius_m)
+    lookouts = find_lookouts(approach, border)
     if isinstance(lookouts, RefusedFrontier):
         return lookouts
     new = [each for each in lookouts if not _is_near(grid.point_at(each.stand), looked_from)]

@@ -1,18 +1,16 @@
 """Whether the robot can look beyond a border with the unknown: from where, or why not."""
 
-import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
 
 from mapspeak.geometry import Point
-from mapspeak.spatial.frontiers.approach import Approach, build_wide_approach
+from mapspeak.spatial.frontiers.approach import Approach
 from mapspeak.spatial.frontiers.edges import Border
 from mapspeak.spatial.frontiers.frontier import RefusalReason, RefusedFrontier
 from mapspeak.spatial.grid import Cell, IntArray, OccupancyGrid
-from mapspeak.spatial.paths.distances import DistanceField
 
-__all__ = ["Lookout", "find_lookouts", "refuse", "with_gap_widths"]
+__all__ = ["Lookout", "find_lookouts", "refuse"]
 
 TARGET_EVERY_M = 1.0
 """Of a longer border, several places are looked at."""
@@ -34,38 +32,20 @@ class Lookout:
     target: Cell
 
 
-def find_lookouts(
-    approach: Approach, border: Border, *, radius_m: float
-) -> list[Lookout] | RefusedFrontier:
+def find_lookouts(approach: Approach, border: Border) -> list[Lookout] | RefusedFrontier:
     """Finds places to look beyond a border from, all along it, or says why there is none."""
-    grid = approach.floor.grid
-    away_m = approach.costs_of(border) * grid.resolution_m
+    grid, radius_m = approach.grid, approach.radius_m
+    away_m = approach.distances_m(border)
     if border.length_m < least_length_m(radius_m):
         return refuse(grid, border, RefusalReason.SPECKLE, f"speckle: {border.length_m:.2f} m")
     if not np.isfinite(away_m).any():
         return refuse(grid, border, RefusalReason.NO_WAY, "behind a wall: no way over known floor")
     near = np.flatnonzero(away_m <= radius_m + REACH_M)
     if not near.size:
-        sentence = f"too narrow for the robot: it needs {2 * radius_m:.2f} m"
-        return refuse(grid, border, RefusalReason.TOO_NARROW, sentence)
+        return _refuse_gap(approach, border, int(away_m.argmin()))
     n_targets = min(max(round(border.length_m / TARGET_EVERY_M), 1), MOST_TARGETS)
     targets = _spread_out(border.rows[near], border.cols[near], n_targets)
     return [Lookout(approach.nearest_reachable(target), target) for target in targets]
-
-
-def with_gap_widths(
-    distances: DistanceField, refused: list[RefusedFrontier]
-) -> list[RefusedFrontier]:
-    """Gives refusals with the width of the gap where the way is too narrow."""
-    if all(each.reason is not RefusalReason.TOO_NARROW for each in refused):
-        return refused
-    approach = build_wide_approach(distances)
-    return [
-        _with_gap_width(approach, each, distances.radius_m)
-        if each.reason is RefusalReason.TOO_NARROW
-        else each
-        for each in refused
-    ]
 
 
 def refuse(
@@ -107,10 +87,10 @@ def _middle(rows: IntArray, cols: IntArray) -> int:
     return int(((rows - rows.mean()) ** 2 + (cols - cols.mean()) ** 2).argmin())
 
 
-def _with_gap_width(
-    approach: Approach, refused: RefusedFrontier, radius_m: float
-) -> RefusedFrontier:
-    way = approach.way_to(approach.floor.grid.cell_at(refused.anchor))
-    width_m = 2 * float(approach.floor.clearance_m[way].min())
-    sentence = f"too narrow for the robot: {width_m:.1f} m wide, it needs {2 * radius_m:.1f} m"
-    return dataclasses.replace(refused, sentence=sentence)
+def _refuse_gap(approach: Approach, border: Border, nearest: int) -> RefusedFrontier:
+    cell = Cell(int(border.rows[nearest]), int(border.cols[nearest]))
+    sentence = (
+        f"too narrow for the robot: {approach.gap_width_m(cell):.1f} m wide, "
+        f"it needs {2 * approach.radius_m:.1f} m"
+    )
+    return refuse(approach.grid, border, RefusalReason.TOO_NARROW, sentence)

@@ -58,13 +58,12 @@ def _sentence(
         return "No free floor is known yet."
     if verdict is FrontierVerdict.NONE_LEFT:
         return "No frontier is left: all known floor ends at walls."
-    count = f"{len(ranked)} to go to" if ranked else "none to go to"
-    return f"Frontiers: {count}{_refusals(refused)}."
+    if verdict is FrontierVerdict.ALL_REFUSED:
+        return f"No frontier is left to go to; refused are {_refusals(refused)}."
+    others = f"; refused are {_refusals(refused)}" if refused else ""
+    return f"{len(ranked)} frontier{'s' if len(ranked) > 1 else ''} to go to{others}."
 
 
 def _refusals(refused: list[RefusedFrontier]) -> str:
-    if not refused:
-        return ""
     by_reason = Counter(each.reason for each in refused)
-    parts = [f"{n} {IN_WORDS[reason]}" for reason, n in by_reason.most_common()]
-    return f", {len(refused)} refused ({', '.join(parts)})"
+    return ", ".join(f"{n} {IN_WORDS[reason]}" for reason, n in by_reason.most_common())

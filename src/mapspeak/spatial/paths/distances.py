@@ -53,8 +53,7 @@ class DistanceField:
         goal = self.lattice.index_at(point)
         if goal is None or not math.isfinite(self.costs[goal]):
             return None
-        ones = np.ones(self.lattice.moves.shape, dtype=np.float32)
-        way = descend(self.lattice, ones, self.costs, goal)
+        way = descend(self.lattice.moves, None, self.costs, goal)
         return find_path_near(self.lattice, way, (self.start, point), radius_m=self.radius_m)
 
     def build_reachable_mask(self) -> Mask:
@@ -81,6 +80,6 @@ def distances_from(grid: OccupancyGrid, start: Point, *, radius_m: float) -> Dis
     seeds = find_seeds(lattice, start, radius_m=radius_m)
     costs = np.full(lattice.moves.size, np.inf, dtype=np.float32)
     if seeds is not None:
-        costs = spread(lattice.moves, np.ones(lattice.moves.shape, dtype=np.float32), seeds)
+        costs = spread(lattice.moves, None, seeds)
     costs.setflags(write=False)
     return DistanceField(start=start, radius_m=radius_m, lattice=lattice, costs=costs)

@@ -64,7 +64,7 @@ def _find_way(
     if goal is None or seeds is None:
         return None
     costs = spread(lattice.moves, weights, seeds, goal=goal)
-    return descend(lattice, weights, costs, goal) if np.isfinite(costs[goal]) else None
+    return descend(lattice.moves, weights, costs, goal) if np.isfinite(costs[goal]) else None
 
 
 def _wall_weights(lattice: Lattice, radius_m: float) -> Costs:

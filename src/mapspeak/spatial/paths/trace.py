@@ -10,7 +10,7 @@ from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 from mapspeak.spatial.paths.lattice import Lattice
 from mapspeak.spatial.paths.path import Path
 from mapspeak.spatial.paths.sight import mean_on_line
-from mapspeak.spatial.paths.wavefront import BITS, STEPS, Costs, offsets
+from mapspeak.spatial.paths.wavefront import BITS, STEPS, Costs, Moves, offsets
 
 __all__ = ["descend", "pull_straight", "straighten"]
 
@@ -20,19 +20,25 @@ ROUNDING = 1e-3
 """How much two costs of the same way may differ, in cells and as a share."""
 
 
-def descend(lattice: Lattice, weights: Costs, costs: Costs, goal: int) -> IntArray:
-    """Gives the flat indices of the cheapest way to the goal, from the seed where it begins."""
-    directions = offsets(lattice.n_cols)
-    moves, flat_weights = lattice.moves.ravel(), weights.ravel()
+def descend(moves: Moves, weights: Costs | None, costs: Costs, goal: int) -> IntArray:
+    """Gives the flat indices of the cheapest way to the goal, from the seed where it begins.
+
+    The arguments are those of `spread` and the costs that it gave.
+    """
+    directions = offsets(moves.shape[1])
+    flat_moves = moves.ravel()
+    flat_weights = None if weights is None else weights.ravel()
     way = [goal]
     while True:
         cell = way[-1]
-        is_open = (moves[cell] & BITS) != 0
+        is_open = (flat_moves[cell] & BITS) != 0
         neighbours = cell + directions[is_open]
         if not neighbours.size:
             break
-        means = (flat_weights[neighbours] + flat_weights[cell]) * np.float32(0.5)
-        totals = costs[neighbours] + STEPS[is_open] * means
+        lengths = STEPS[is_open]
+        if flat_weights is not None:
+            lengths = lengths * ((flat_weights[neighbours] + flat_weights[cell]) * np.float32(0.5))
+        totals = costs[neighbours] + lengths
         best = int(totals.argmin())
         if totals[best] > costs[cell] + ROUNDING:
             break

@@ -47,23 +47,20 @@ def offsets(n_cols: int) -> IntArray:
     return np.array(straight + diagonal, dtype=np.intp)
 
 
-def spread(
-    moves: Moves, weights: Costs, seeds: Seeds, *, goal: int | None = None, limit: float = math.inf
-) -> Costs:
+def spread(moves: Moves, weights: Costs | None, seeds: Seeds, *, goal: int | None = None) -> Costs:
     """Gives the least cost to every cell, flat; infinite where the wave does not come.
 
     Args:
         moves: Shape (rows, cols); the directions in which each cell may be left. No move may leave
             the array, so the outermost cells have none outwards.
         weights: What a unit of way costs in each cell, at least 1; a move costs its length times
-            the mean of both ends.
+            the mean of both ends. None where all cells cost 1.
         seeds: Where to start.
         goal: Stop once this cell is settled.
-        limit: Stop beyond this cost.
     """
-    front = _Front(moves, weights.ravel(), seeds)
+    front = _Front(moves, None if weights is None else weights.ravel(), seeds)
     while (ring := front.next_ring()) is not None:
-        if front.level > limit or (goal is not None and front.is_settled[goal]):
+        if goal is not None and front.is_settled[goal]:
             break
         front.advance(ring)
     return front.costs
@@ -72,16 +69,14 @@ def spread(
 class _Front:
     """The wave under way: costs so far, and the cells waiting in their buckets."""
 
-    def __init__(self, moves: Moves, weights: Costs, seeds: Seeds) -> None:
+    def __init__(self, moves: Moves, weights: Costs | None, seeds: Seeds) -> None:
         n_cells = moves.size
         self.costs: Costs = np.full(n_cells, np.inf, dtype=np.float32)
         self.is_settled = np.zeros(n_cells, dtype=np.bool_)
-        self.level = -1
         self._moves = moves.ravel()
         self._weights = weights
-        self._is_weighted = bool((weights != 1).any())
         self._offsets = offsets(moves.shape[1])[:, None]
-        self._last_writer = np.zeros(n_cells, dtype=np.intp)
+        self._last_writer = np.zeros(n_cells, dtype=np.int32)
         self._waiting: dict[int, list[IntArray]] = {}
         self.costs[seeds.cells] = seeds.costs
         self._wait(seeds.cells, seeds.costs)
@@ -89,8 +84,7 @@ class _Front:
     def next_ring(self) -> IntArray | None:
         """Takes the cells of the next bucket that holds any, each once, and settles them."""
         while self._waiting:
-            self.level = min(self._waiting)
-            cells = np.concatenate(self._waiting.pop(self.level))
+            cells = np.concatenate(self._waiting.pop(min(self._waiting)))
             cells = self._unique(cells[~self.is_settled[cells]])
             if cells.size:
                 self.is_settled[cells] = True
@@ -105,18 +99,19 @@ class _Front:
             costs < self.costs.take(targets, mode="clip")
         )
         reached = targets[is_better]
-        if reached.size:
-            np.minimum.at(self.costs, reached, costs[is_better])
-            self._wait(reached, self.costs[reached])
+        np.minimum.at(self.costs, reached, costs[is_better])
+        self._wait(reached, self.costs[reached])
 
     def _move_costs(self, ring: IntArray) -> Costs:
-        if not self._is_weighted:
+        if self._weights is None:
             return STEPS[:, None]
         ends = self._weights.take(ring + self._offsets, mode="clip")
         means = (self._weights[ring] + ends) * np.float32(0.5)
         return np.asarray(STEPS[:, None] * means, dtype=np.float32)
 
     def _wait(self, cells: IntArray, costs: Costs) -> None:
+        if not cells.size:
+            return
         buckets = costs.astype(np.intp)
         first, last = int(buckets.min()), int(buckets.max())
         for bucket in range(first, last + 1):
@@ -125,7 +120,7 @@ class _Front:
                 self._waiting.setdefault(bucket, []).append(chosen)
 
     def _unique(self, cells: IntArray) -> IntArray:
-        order = np.arange(cells.size)
+        order = np.arange(cells.size, dtype=np.int32)
         self._last_writer[cells] = order
         is_last = self._last_writer[cells] == order
         return np.asarray(cells[is_last])

@@ -7,19 +7,27 @@ import cv2
 import numpy as np
 
 from mapspeak.geometry import Point
+from mapspeak.spatial.grid import Mask
 from mapspeak.spatial.rooms.room_map import RoomClass
 from mapspeak.spatial.rooms.segmentation import Segmentation
 
 CORRIDOR_ELONGATION = 3.0
 CORRIDOR_ELONGATION_WITH_DOORS = 2.0
 CORRIDOR_NEIGHBOURS = 4
+ISLAND_RATIO = 0.1
+"""Something that stands free in a region is ignored up to this share of its floor."""
 OPEN_SPACE_WIDTH_M = 8.0
 OPEN_SPACE_AREA_M2 = 100.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shape:
-    """The measures of one region; the fields are those of `Region`."""
+    """The measures of one region; the fields are those of `Region`, and two more.
+
+    Attributes:
+        open_clearance_m: The largest clearance if what stands free in the region were gone.
+        mean_clearance_m: The mean distance of its floor from the nearest wall.
+    """
 
     free_area_m2: float
     floor_area_m2: float
@@ -28,11 +36,13 @@ class Shape:
     heading_rad: float
     widest: Point
     clearance_m: float
+    open_clearance_m: float
+    mean_clearance_m: float
 
     @property
     def elongation(self) -> float:
         """Area over the square of the widest clearance diameter: 1 for a square, more if long."""
-        return self.floor_area_m2 / max(2 * self.clearance_m, 1e-6) ** 2
+        return self.floor_area_m2 / max(2 * self.open_clearance_m, 1e-6) ** 2
 
 
 def measure_regions(segmentation: Segmentation) -> list[Shape]:
@@ -72,12 +82,26 @@ def _measure(segmentation: Segmentation, index: int, window: tuple[slice, slice]
         heading_rad=(heading + raster.grid.origin.yaw_rad) % math.pi,
         widest=raster.point_at(window[0].start + row + 0.5, window[1].start + col + 0.5),
         clearance_m=float(clearance[row, col]),
+        open_clearance_m=max(clearance[row, col], _open_clearance(inside) * raster.cell_size_m),
+        mean_clearance_m=float(clearance[inside].mean()),
     )
 
 
-def _bounding_rectangle(
-    inside: np.ndarray[tuple[int, ...], np.dtype[np.bool_]],
-) -> tuple[float, float, float]:
+def _open_clearance(inside: Mask) -> float:
+    """Gives the clearance in cells once small holes are filled, such as a partition's; or 0."""
+    outside = cv2.copyMakeBorder(
+        (~inside).astype(np.uint8), 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=1
+    )
+    n, label, stats, _ = cv2.connectedComponentsWithStats(outside, connectivity=4)
+    is_island = stats[:, cv2.CC_STAT_AREA] <= ISLAND_RATIO * int(inside.sum())
+    is_island[0] = is_island[label[0, 0]] = False
+    if n <= 2 or not is_island.any():
+        return 0.0
+    whole = ((outside == 0) | is_island[label]).astype(np.uint8)
+    return float(cv2.distanceTransform(whole, cv2.DIST_L2, cv2.DIST_MASK_PRECISE).max()) - 0.5
+
+
+def _bounding_rectangle(inside: Mask) -> tuple[float, float, float]:
     """Gives length, width and direction of the smallest turned rectangle, in cells and radians."""
     outline, _ = cv2.findContours(
         inside.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE
@@ -91,11 +115,12 @@ def _bounding_rectangle(
 
 def classify(shape: Shape, *, n_doors: int, n_neighbours: int) -> tuple[RoomClass, str]:
     """Gives what a region is, and the numbers that say so."""
-    size = f"{shape.length_m:.3g} x {_breadth(shape):.2g} m, {_count(n_doors, 'door')}"
     long = shape.elongation > CORRIDOR_ELONGATION
     joining = (
         shape.elongation > CORRIDOR_ELONGATION_WITH_DOORS and n_neighbours >= CORRIDOR_NEIGHBOURS
     )
+    length_m, width_m = walked_size(shape) if long or joining else (shape.length_m, shape.width_m)
+    size = f"{length_m:.3g} x {width_m:.2g} m, {_count(n_doors, 'door')}"
     if long or joining:
         return RoomClass.CORRIDOR, size
     is_wide = 2 * shape.clearance_m >= OPEN_SPACE_WIDTH_M
@@ -104,9 +129,13 @@ def classify(shape: Shape, *, n_doors: int, n_neighbours: int) -> tuple[RoomClas
     return RoomClass.ROOM, size
 
 
-def _breadth(shape: Shape) -> float:
-    """Gives the width a person would name: that of a winding corridor is not its rectangle's."""
-    return min(shape.width_m, 2 * shape.clearance_m)
+def walked_size(shape: Shape) -> tuple[float, float]:
+    """Gives length along and width across a corridor, however often it bends.
+
+    In a long strip the mean distance from the nearer side is a quarter of the width.
+    """
+    width_m = 4 * shape.mean_clearance_m
+    return shape.floor_area_m2 / width_m, width_m
 
 
 def _count(n: int, noun: str) -> str:

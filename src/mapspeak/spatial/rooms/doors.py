@@ -74,7 +74,7 @@ def _split(
                 first=pair[0],
                 second=pair[1],
                 place=segmentation.raster.point_at(rows[best] + 0.5, cols[best] + 0.5),
-                width_m=2 * float(clearance.max()) - cell_size_m,
+                width_m=2 * float(clearance.max()),
             )
         )
     return sorted(openings, key=lambda opening: -opening.width_m)

@@ -1,11 +1,13 @@
 """Rooms, corridors and doors found on an occupancy grid."""
 
+from collections import defaultdict
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.spatial.grid import OccupancyGrid
-from mapspeak.spatial.rooms.description import Shape, classify, measure_regions
+from mapspeak.spatial.rooms.description import Shape, classify, measure_regions, walked_size
 from mapspeak.spatial.rooms.doors import Opening, find_openings
 from mapspeak.spatial.rooms.identity import match_rooms
 from mapspeak.spatial.rooms.raster import Raster, build_raster
@@ -61,11 +63,20 @@ def _name(
         )
         for number, opening in enumerate(openings, start=1)
     )
+    own_doors = _doors_by_region(doors)
     regions = tuple(
-        _region(index, ids[index - 1], shape, classes[index - 1], doors)
+        _region(index, ids[index - 1], shape, classes[index - 1], own_doors[ids[index - 1]])
         for index, shape in enumerate(shapes, start=1)
     )
     return regions, doors
+
+
+def _doors_by_region(doors: tuple[Door, ...]) -> defaultdict[str, list[Door]]:
+    by_region: defaultdict[str, list[Door]] = defaultdict(list)
+    for door in doors:
+        for region_id in door.region_ids:
+            by_region[region_id].append(door)
+    return by_region
 
 
 def _others(n_regions: int, openings: list[Opening]) -> list[list[int]]:
@@ -91,10 +102,11 @@ def _region(
     region_id: str,
     shape: Shape,
     room_class: tuple[RoomClass, str],
-    doors: tuple[Door, ...],
+    doors: list[Door],
 ) -> Region:
-    own = [door for door in doors if region_id in door.region_ids]
-    behind = {other for door in own for other in door.region_ids if other != region_id}
+    behind = {other for door in doors for other in door.region_ids if other != region_id}
+    is_corridor = room_class[0] is RoomClass.CORRIDOR
+    length_m, width_m = walked_size(shape) if is_corridor else (shape.length_m, shape.width_m)
     return Region(
         id=region_id,
         index=index,
@@ -102,12 +114,12 @@ def _region(
         reason=room_class[1],
         free_area_m2=shape.free_area_m2,
         floor_area_m2=shape.floor_area_m2,
-        length_m=shape.length_m,
-        width_m=shape.width_m,
+        length_m=length_m,
+        width_m=width_m,
         heading_rad=shape.heading_rad,
         widest=shape.widest,
         clearance_m=shape.clearance_m,
-        door_ids=tuple(door.id for door in own),
+        door_ids=tuple(door.id for door in doors),
         neighbour_ids=tuple(sorted(behind, key=lambda other: (other[0], int(other[1:])))),
     )
 

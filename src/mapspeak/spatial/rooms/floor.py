@@ -34,6 +34,7 @@ def build_floor(raster: Raster, settings: RoomSettings) -> Floor:
     wall = find_walls(raster, directions, settings)
     floor = raster.free | (raster.occupied & (1 - wall))
     floor |= _find_pockets(floor, wall, settings.pocket_area_m2 / raster.cell_area_m2)
+    floor = _drop_crumbs(floor, settings.room_area_m2 / raster.cell_area_m2)
     return Floor(
         floor=floor,
         wall=wall,
@@ -42,10 +43,20 @@ def build_floor(raster: Raster, settings: RoomSettings) -> Floor:
     )
 
 
+def _drop_crumbs(floor: Picture, smallest: float) -> Picture:
+    """Gives the floor without parts that nothing joins and that are too small for a room."""
+    _, label, stats, _ = cv2.connectedComponentsWithStats(floor, connectivity=4)
+    is_kept = stats[:, cv2.CC_STAT_AREA] >= smallest
+    is_kept[0] = False
+    return np.asarray(is_kept[label], np.uint8)
+
+
 def _clearance(floor: Picture, cell_size_m: float) -> NDArray[np.float32]:
+    """Gives the way from each cell's centre to the edge of the nearest cell that is no floor."""
     framed = cv2.copyMakeBorder(floor, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
     cells = cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    return np.ascontiguousarray(cells[1:-1, 1:-1] * cell_size_m, dtype=np.float32)
+    to_edge = np.maximum(cells[1:-1, 1:-1] - 0.5, 0.0) * cell_size_m
+    return np.ascontiguousarray(to_edge, dtype=np.float32)
 
 
 def _find_pockets(floor: Picture, wall: Picture, largest: float) -> Picture:

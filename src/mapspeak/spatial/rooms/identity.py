@@ -1,7 +1,10 @@
 """The same room keeps the same id while the map grows, shifts its origin or is turned."""
 
-from collections.abc import Iterable
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,17 +90,36 @@ def _match_doors(previous: RoomMap, current: RoomMap, ids: dict[str, str]) -> di
     """Gives the final id for each door id of the current map, the nearest doors matched first."""
     near = [
         (before.place.distance_to(now.place), before.id, now.id)
-        for before in previous.doors
-        for now in current.doors
+        for before, now in _neighbours(previous.doors, current.doors)
         if before.place.distance_to(now.place)
         <= _SAME_DOOR_M * (2 if _joins_same(before, now, ids) else 1)
     ]
     matched: dict[str, str] = {}
+    taken: set[str] = set()
     for _, before_id, now_id in sorted(near):
-        if now_id not in matched and before_id not in matched.values():
+        if now_id not in matched and before_id not in taken:
             matched[now_id] = before_id
+            taken.add(before_id)
     new = [door.id for door in current.doors if door.id not in matched]
     return matched | _fresh(new, _used(previous))
+
+
+def _neighbours(
+    previous: tuple[Door, ...], current: tuple[Door, ...]
+) -> Iterator[tuple[Door, Door]]:
+    """Gives the pairs of doors less than twice the matching distance apart, and a few more."""
+    tiles: defaultdict[tuple[int, int], list[Door]] = defaultdict(list)
+    for before in previous:
+        tiles[_tile(before)].append(before)
+    for now in current:
+        x, y = _tile(now)
+        for tile in product((x - 1, x, x + 1), (y - 1, y, y + 1)):
+            yield from ((before, now) for before in tiles.get(tile, ()))
+
+
+def _tile(door: Door) -> tuple[int, int]:
+    side_m = 2 * _SAME_DOOR_M
+    return math.floor(door.place.x / side_m), math.floor(door.place.y / side_m)
 
 
 def _joins_same(before: Door, now: Door, ids: dict[str, str]) -> bool:
@@ -143,7 +165,5 @@ def _remember(
 
 def _heirs(shared: NDArray[np.float64], final: dict[int, str]) -> tuple[str, ...]:
     seen = float(shared[1:].sum())
-    names = [
-        name for index, name in final.items() if seen and shared[index] >= _REMAINS_RATIO * seen
-    ]
-    return tuple(sorted(names, key=_order))
+    heirs = np.flatnonzero((shared > 0) & (shared >= _REMAINS_RATIO * seen)).tolist()
+    return tuple(sorted((final[index] for index in heirs if index), key=_order))

@@ -9,6 +9,9 @@ from mapspeak.spatial.rooms.basins import BasinLabels, Heights, Saddle
 from mapspeak.spatial.rooms.frames import Frames
 from mapspeak.spatial.rooms.settings import RoomSettings
 
+MAX_ROOMS = int(np.iinfo(np.int16).max)
+"""As many as the labels can tell apart; smaller rooms than these are left out."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Border:
@@ -88,23 +91,29 @@ def _join_open_borders(
         narrow, wide = forest.sides(saddle)
         if narrow == wide:
             continue
-        wall_m = frames.measure(saddle.row, saddle.col, saddle.height)
-        if _is_door(forest.clearance_m[narrow], saddle, wall_m, settings) or _is_mouth(
-            forest, narrow, wide, saddle, settings
-        ):
-            borders.append(_Border(saddle=saddle, wall_m=wall_m))
+        clearance_m = forest.clearance_m[narrow]
+        if _is_narrow(clearance_m, saddle, settings):
+            wall_m = frames.measure(saddle.row, saddle.col, saddle.height)
+            if saddle.height <= _door_ratio(wall_m, settings) * clearance_m:
+                borders.append(_Border(saddle=saddle, wall_m=wall_m))
+                continue
+        if _is_mouth(forest, narrow, wide, saddle, settings):
+            borders.append(_Border(saddle=saddle, wall_m=0.0))
         else:
             forest.join(narrow, wide)
     return borders
 
 
-def _is_door(clearance_m: float, saddle: Saddle, wall_m: float, settings: RoomSettings) -> bool:
-    """True for a narrow place; the more wall is in line with it, the less narrow it need be."""
-    if 2 * saddle.height > settings.door_width_m:
-        return False
+def _is_narrow(clearance_m: float, saddle: Saddle, settings: RoomSettings) -> bool:
+    """True where a door could be, if there is enough wall in line with it."""
+    is_door_wide = 2 * saddle.height <= settings.door_width_m
+    return is_door_wide and saddle.height <= settings.door_ratio * clearance_m
+
+
+def _door_ratio(wall_m: float, settings: RoomSettings) -> float:
+    """Gives how narrow a door must be: the more wall is in line with it, the less."""
     share = min(wall_m / settings.frame_m, 1.0)
-    limit = settings.gap_ratio + share * (settings.door_ratio - settings.gap_ratio)
-    return saddle.height <= limit * clearance_m
+    return settings.gap_ratio + share * (settings.door_ratio - settings.gap_ratio)
 
 
 def _is_mouth(
@@ -143,6 +152,6 @@ def _number_by_area(basins: BasinLabels, forest: _Forest, room_area_m2: float) -
     places = [forest.place(basin) for basin in range(len(forest.area_m2))]
     rooms = {place for place in places[1:] if forest.area_m2[place] >= room_area_m2}
     ordered = sorted(rooms, key=lambda place: (-forest.area_m2[place], place))
-    number = {place: rank for rank, place in enumerate(ordered, start=1)}
+    number = {place: rank for rank, place in enumerate(ordered[:MAX_ROOMS], start=1)}
     table = np.array([0] + [number.get(place, 0) for place in places[1:]], np.int32)
     return table[basins]

@@ -33,8 +33,8 @@ class Region:
         reason: Why it is that, in words with numbers.
         free_area_m2: Floor on which nothing stands.
         floor_area_m2: Floor with what stands on it.
-        length_m: Along the longer side of the smallest rectangle around it.
-        width_m: Along the shorter side.
+        length_m: The longer side of the smallest rectangle around it; of a corridor, along it.
+        width_m: The shorter side; of a corridor, across it.
         heading_rad: Direction of the longer side in the map frame, from 0 up to pi.
         widest: The floor point farthest from any wall; a good place for a label.
         clearance_m: How far that point is from the nearest wall.

@@ -10,6 +10,7 @@ class RoomSettings:
     Attributes:
         cell_size_m: The raster on which rooms are found, whatever the map's resolution.
         wall_length_m: A straight run of occupied cells this long, in a main direction, is wall.
+        oblique_length_m: The same for any other direction.
         wall_reach_m: Shorter runs in line with a wall belong to it, up to this far from its ends.
         wall_piece_m: The shortest run that can be such a piece.
         island_size_m: An obstacle that can be walked around is wall only if it is larger.
@@ -32,6 +33,7 @@ class RoomSettings:
 
     cell_size_m: float = 0.05
     wall_length_m: float = 1.2
+    oblique_length_m: float = 2.4
     wall_reach_m: float = 1.2
     wall_piece_m: float = 0.2
     island_size_m: float = 2.0

@@ -10,7 +10,7 @@ from mapspeak.spatial.rooms.raster import Picture, Raster
 from mapspeak.spatial.rooms.settings import RoomSettings
 
 MAX_DIRECTIONS = 8
-ANY_DIRECTION_STEP_DEG = 7.5
+OBLIQUE_STEP_DEG = 7.5
 SLENDER_RATIO = 0.37
 """Area over the square of the diagonal: 0.5 for a square, 0.39 for a disc, 0.3 for 3 to 1."""
 _EDGE_BLUR_CELLS = 1.5
@@ -18,7 +18,10 @@ _BELL_DEG = 2.0
 
 
 def find_walls(raster: Raster, directions_deg: list[float], settings: RoomSettings) -> Picture:
-    """Gives 1 where an obstacle is wall: a long run in a main direction, or in line with one."""
+    """Gives 1 where an obstacle is wall: a long run in a main direction, or in line with one.
+
+    A run of twice that length is wall in any direction, and so are long curved walls.
+    """
     cells = _Lengths(raster, settings)
     occupied = raster.occupied
     thick = cv2.dilate(occupied, np.ones((3, 3), np.uint8))
@@ -30,8 +33,8 @@ def find_walls(raster: Raster, directions_deg: list[float], settings: RoomSettin
             piece = _open(thick, cells.piece, turned_deg) & occupied & (large | slender)
             in_line = _dilate(long_run, 2 * cells.reach, turned_deg)
             wall |= long_run | (piece & in_line)
-    for turned_deg in np.arange(0.0, 180.0, ANY_DIRECTION_STEP_DEG).tolist():
-        wall |= _open(thick, cells.any_wall, turned_deg) & occupied & large
+    for turned_deg in np.arange(0.0, 180.0, OBLIQUE_STEP_DEG).tolist():
+        wall |= _open(thick, cells.oblique, turned_deg) & occupied & large
     return wall
 
 
@@ -40,7 +43,7 @@ class _Lengths:
 
     def __init__(self, raster: Raster, settings: RoomSettings) -> None:
         self.wall = settings.wall_length_m / raster.cell_size_m
-        self.any_wall = 2 * self.wall
+        self.oblique = settings.oblique_length_m / raster.cell_size_m
         self.reach = settings.wall_reach_m / raster.cell_size_m
         self.piece = settings.wall_piece_m / raster.cell_size_m
         self.island = settings.island_size_m / raster.cell_size_m

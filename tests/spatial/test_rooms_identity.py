@@ -1,0 +1,165 @@
+"""Rooms keep their ids while a map grows, moves its origin and changes its mind."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from mapspeak.geometry import Point, Pose
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.rooms import RoomMap, Vanished, find_rooms, match_rooms
+
+Cells = NDArray[np.int8]
+
+RESOLUTION_M = 0.05
+ROOM_CELLS = 80
+
+
+def row_of_rooms(n_rooms: int, *, closed: tuple[int, ...] = (), open_wall: int = 0) -> Cells:
+    """Draws rooms of 4 x 4 m in a row, a door of 0.9 m between each two.
+
+    Args:
+        n_rooms: How many.
+        closed: Walls without a door, counted from 1.
+        open_wall: A wall that is not there at all.
+    """
+    cells = np.zeros((ROOM_CELLS + 4, n_rooms * ROOM_CELLS + 4), np.int8)
+    cells[:4] = cells[-4:] = 100
+    for wall in range(n_rooms + 1):
+        left = wall * ROOM_CELLS
+        cells[:, left : left + 4] = 100
+        if 0 < wall < n_rooms and wall not in closed:
+            cells[30:48, left : left + 4] = 0
+        if wall == open_wall != 0:
+            cells[4:-4, left : left + 4] = 0
+    return cells
+
+
+def divide(cells: Cells, *, origin: Pose | None = None, previous: RoomMap | None = None) -> RoomMap:
+    grid = OccupancyGrid(
+        cells=cells, resolution_m=RESOLUTION_M, origin=origin or Pose(0.0, 0.0, 0.0)
+    )
+    return find_rooms(grid, previous=previous)
+
+
+def id_at(rooms: RoomMap, x: float, y: float = 2.0) -> str:
+    region = rooms.find_region_at(Point(x, y))
+    assert region is not None
+    return region.id
+
+
+def test_the_same_map_again_has_the_same_ids() -> None:
+    before = divide(row_of_rooms(3))
+
+    after = divide(row_of_rooms(3), previous=before)
+
+    assert after.regions == before.regions
+    assert after.doors == before.doors
+    assert after.vanished == ()
+
+
+def test_matching_afterwards_is_the_same_as_finding_with_the_previous_map() -> None:
+    before, grown = divide(row_of_rooms(2)), divide(row_of_rooms(4))
+
+    matched = match_rooms(before, grown)
+
+    assert matched.regions == divide(row_of_rooms(4), previous=before).regions
+
+
+def test_a_room_found_later_gets_a_new_id() -> None:
+    before = divide(row_of_rooms(2))
+
+    after = divide(row_of_rooms(3), previous=before)
+
+    assert id_at(after, 2.0) == id_at(before, 2.0)
+    assert id_at(after, 6.0) == id_at(before, 6.0)
+    assert id_at(after, 10.0) == "R3"
+    assert {door.id for door in after.doors} == {"D1", "D2"}
+    assert after.doors_between("R3", id_at(after, 6.0))[0].id == "D2"
+
+
+def test_ids_stay_when_the_map_grows_to_the_left_and_moves_its_origin() -> None:
+    before = divide(row_of_rooms(2))
+
+    after = divide(row_of_rooms(4), origin=Pose(-8.0, 0.0), previous=before)
+
+    assert [id_at(after, x) for x in (2.0, 6.0)] == [id_at(before, x) for x in (2.0, 6.0)]
+    assert {id_at(after, x) for x in (-2.0, -6.0)} == {"R3", "R4"}
+
+
+@settings(max_examples=10, deadline=None)
+@given(quarter=st.integers(0, 3), x=st.floats(-20.0, 20.0), y=st.floats(-20.0, 20.0))
+def test_ids_stay_when_the_grid_is_turned_about_the_same_building(
+    quarter: int, x: float, y: float
+) -> None:
+    cells = row_of_rooms(3)
+    frame = Pose(x, y, 0.3)
+    before = divide(cells, origin=frame)
+    height, width = (side * RESOLUTION_M for side in cells.shape)
+    corner = (Pose(0, 0, 0), Pose(width, 0, np.pi / 2), Pose(width, height, np.pi))
+    turn = (*corner, Pose(0, height, -np.pi / 2))[quarter]
+
+    after = divide(np.rot90(cells, quarter), origin=frame @ turn, previous=before)
+
+    for region in before.regions:
+        there = after.find_region_at(region.widest)
+        assert there is not None
+        assert there.id == region.id
+    assert {door.id for door in after.doors} == {door.id for door in before.doors}
+
+
+def test_two_rooms_that_turn_out_to_be_one_are_remembered_as_merged() -> None:
+    before = divide(row_of_rooms(3))
+    first, second = id_at(before, 2.0), id_at(before, 6.0)
+
+    after = divide(row_of_rooms(3, open_wall=1), previous=before)
+
+    kept = id_at(after, 2.0)
+    lost = second if kept == first else first
+    assert id_at(after, 6.0) == kept
+    assert Vanished(id=lost, became=(kept,)) in after.vanished
+    assert after.region(lost).id == kept
+
+
+def test_an_id_that_was_given_up_is_not_given_out_again() -> None:
+    first = divide(row_of_rooms(3))
+    merged = divide(row_of_rooms(3, open_wall=1), previous=first)
+
+    again = divide(row_of_rooms(3), previous=merged)
+
+    lost = {gone.id for gone in merged.vanished if gone.id.startswith("R")}
+    assert len(again.regions) == 3
+    assert lost.isdisjoint(region.id for region in again.regions)
+    assert "R4" in {region.id for region in again.regions}
+
+
+def test_a_region_that_merged_twice_points_to_the_last_one() -> None:
+    first = divide(row_of_rooms(3))
+    second = divide(row_of_rooms(3, open_wall=1), previous=first)
+    blank = row_of_rooms(3, open_wall=1)
+    blank[4:-4, 2 * ROOM_CELLS : 2 * ROOM_CELLS + 4] = 0
+
+    third = divide(blank, previous=second)
+
+    (only,) = third.regions
+    for region in first.regions:
+        assert third.region(region.id).id == only.id
+
+
+def test_a_door_that_was_closed_is_remembered() -> None:
+    before = divide(row_of_rooms(3))
+    (door,) = before.doors_between(id_at(before, 2.0), id_at(before, 6.0))
+
+    after = divide(row_of_rooms(3, closed=(1,)), previous=before)
+
+    assert door.id not in {kept.id for kept in after.doors}
+    assert Vanished(id=door.id, became=()) in after.vanished
+
+
+def test_a_different_building_shares_no_ids() -> None:
+    before = divide(row_of_rooms(2))
+
+    after = divide(row_of_rooms(2), origin=Pose(100.0, 0.0), previous=before)
+
+    assert {region.id for region in after.regions} == {"R3", "R4"}
+    assert {gone.id for gone in after.vanished} == {"R1", "R2", "D1"}

@@ -1,0 +1,140 @@
+"""What must not change when the same building is mapped in another way."""
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from mapspeak.geometry import Pose
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.rooms import RoomMap, find_rooms
+
+Cells = NDArray[np.int8]
+Labels = NDArray[np.int16]
+
+RESOLUTION_M = 0.05
+N_ROWS, N_COLS = 200, 280
+
+
+def building() -> Cells:
+    """Draws 14 x 10 m: three rooms above a corridor, two below, tables and chairs."""
+    cells = np.zeros((N_ROWS, N_COLS), np.int8)
+    for row in (0, 76, 116, N_ROWS - 4):
+        cells[row : row + 4] = 100
+    for col, rows in ((0, slice(None)), (N_COLS - 4, slice(None)), (150, slice(0, 76))):
+        cells[rows, col : col + 4] = 100
+    for col in (90, 180):
+        cells[116:, col : col + 4] = 100
+    for row, col in ((76, 60), (76, 200), (116, 30), (116, 120), (116, 220)):
+        cells[row : row + 4, col : col + 18] = 0
+    cells[150:156, 30:50] = cells[30:50, 60:64] = 100
+    cells[170:172, 120:150:6] = cells[40:44, 200:240:10] = 100
+    return cells
+
+
+def divide(
+    cells: Cells, *, resolution_m: float = RESOLUTION_M, origin: Pose | None = None
+) -> RoomMap:
+    origin = origin or Pose(0.0, 0.0, 0.0)
+    return find_rooms(OccupancyGrid(cells=cells, resolution_m=resolution_m, origin=origin))
+
+
+def assert_same_regions(expected: Labels, found: Labels, *, least: float = 0.9) -> None:
+    """Checks that each region has a counterpart with an intersection over union of `least`."""
+    n_expected, n_found = int(expected.max()), int(found.max())
+    assert n_found == n_expected
+    for i in range(1, n_expected + 1):
+        mine = expected == i
+        ratios = [
+            (mine & (found == j)).sum() / (mine | (found == j)).sum() for j in range(1, n_found + 1)
+        ]
+        assert max(ratios) >= least
+
+
+@pytest.fixture(scope="module")
+def labels() -> Labels:
+    return divide(building()).labels
+
+
+def test_the_building_has_five_rooms_and_a_corridor() -> None:
+    rooms = divide(building())
+
+    assert sorted(region.id for region in rooms.regions) == ["C1", "R1", "R2", "R3", "R4", "R5"]
+    assert len(rooms.doors) == 5
+
+
+def test_the_same_map_gives_the_same_answer() -> None:
+    first, second = divide(building()), divide(building())
+
+    assert first.regions == second.regions
+    assert first.doors == second.doors
+    assert np.array_equal(first.labels, second.labels)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_mirrored_map_has_the_mirrored_rooms(labels: Labels, axis: int) -> None:
+    mirrored = divide(np.flip(building(), axis)).labels
+
+    assert_same_regions(labels, np.flip(mirrored, axis))
+
+
+@settings(max_examples=15, deadline=None)
+@given(angle_deg=st.floats(0.0, 360.0))
+def test_a_turned_map_has_the_turned_rooms(angle_deg: float) -> None:
+    side = 380
+    there = cv2.getRotationMatrix2D((N_COLS / 2, N_ROWS / 2), angle_deg, 1.0)
+    there[:, 2] += np.array([side / 2 - N_COLS / 2, side / 2 - N_ROWS / 2])
+    picture = (building() + 1).astype(np.uint8)
+    turned = cv2.warpAffine(picture, there, (side, side), flags=cv2.INTER_NEAREST, borderValue=0)
+
+    found = divide(turned.astype(np.int8) - np.int8(1)).labels
+
+    back = cv2.invertAffineTransform(there)
+    upright = cv2.warpAffine(found, back, (N_COLS, N_ROWS), flags=cv2.INTER_NEAREST)
+    free = building() == 0
+    expected = divide(building()).labels
+    assert_same_regions(np.where(free, expected, 0), np.where(free, upright, 0))
+
+
+def test_a_map_of_twice_the_resolution_has_the_same_rooms(labels: Labels) -> None:
+    fine = np.kron(building(), np.ones((2, 2), np.int8))
+
+    found = divide(fine, resolution_m=RESOLUTION_M / 2).labels
+
+    assert_same_regions(labels, found[::2, ::2])
+
+
+def test_a_map_of_half_the_resolution_has_the_same_rooms(labels: Labels) -> None:
+    coarse = building().reshape(N_ROWS // 2, 2, N_COLS // 2, 2).max(axis=(1, 3))
+
+    found = divide(coarse, resolution_m=RESOLUTION_M * 2).labels
+
+    assert_same_regions(labels[::2, ::2], found)
+
+
+@settings(max_examples=10, deadline=None)
+@given(before=st.integers(0, 40), after=st.integers(0, 40))
+def test_unknown_ground_around_a_map_changes_nothing(before: int, after: int) -> None:
+    padded = np.pad(building(), ((before, after), (after, before)), constant_values=-1)
+
+    found = divide(padded).labels
+
+    window = found[before : before + N_ROWS, after : after + N_COLS]
+    assert np.array_equal(window, divide(building()).labels)
+
+
+def test_another_origin_moves_places_and_changes_nothing_else(labels: Labels) -> None:
+    moved = divide(building(), origin=Pose(-12.3, 4.5, 2.0))
+
+    assert np.array_equal(moved.labels, labels)
+
+
+def test_free_cells_may_have_any_value_up_to_49(labels: Labels) -> None:
+    cells = building()
+    noise = np.random.default_rng(7).integers(0, 50, cells.shape).astype(np.int8)
+
+    found = divide(np.where(cells == 0, noise, cells)).labels
+
+    assert np.array_equal(found, labels)
