@@ -345,3 +345,24 @@ def test_a_map_is_written_only_to_a_yaml_file(tmp_path: Path) -> None:
 def test_a_map_that_cannot_be_written_says_where(tmp_path: Path) -> None:
     with pytest.raises(MapError, match="nowhere"):
         write_map(grid_from_text("."), tmp_path / "nowhere" / "map.yaml")
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "resolution: 2001-99-99",
+        "resolution: !!int abc",
+        "resolution: 1e-300",
+        "resolution: 1e300",
+        "origin: [1.0e300, 0, 0]",
+        "resolution: " + 4000 * "[",
+    ],
+)
+def test_a_value_that_no_map_can_have_is_refused_without_a_trace(tmp_path: Path, line: str) -> None:
+    write_map(grid_from_text("..\n.."), tmp_path / "map.yaml")
+    file = tmp_path / "map.yaml"
+    key = line.partition(":")[0]
+    kept = [each for each in file.read_text().splitlines() if not each.startswith(key)]
+    file.write_text("\n".join([*kept, line]))
+    with pytest.raises(MapError):
+        load_map(file)

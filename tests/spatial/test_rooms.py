@@ -285,7 +285,7 @@ def test_noise_has_no_rooms_worth_a_name() -> None:
 def test_a_partition_that_stands_free_makes_no_corridor_of_a_room() -> None:
     room = np.full((180, 180), 100, np.int8)
     room[4:-4, 4:-4] = 0
-    room[88:91, 55:125] = 100
+    room[88:91, 62:118] = 100
 
     (region,) = find_rooms(OccupancyGrid(cells=room, resolution_m=0.05)).regions
 

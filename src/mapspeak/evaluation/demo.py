@@ -8,7 +8,9 @@ from pathlib import Path
 
 from mcp.client import Client
 from mcp.client.stdio import StdioServerParameters
+from mcp.shared.exceptions import MCPError
 
+from mapspeak.errors import LinkError
 from mapspeak.evaluation.client import ToolClient
 from mapspeak.evaluation.page import Moment
 from mapspeak.evaluation.policy import PolicyResult, ScriptedPolicy
@@ -53,6 +55,10 @@ async def run_demo(options: DemoOptions, on_progress: Callable[[Moment], None]) 
             tools = ToolClient(client)
             policy = ScriptedPolicy(tools, recorder.take)
             result = await policy.run()
+    except* MCPError as group:
+        raise LinkError(
+            "The server ended before the demo did.", hint="Its last words stand above."
+        ) from group
     finally:
         calls = [] if tools is None else tools.calls
         report = DemoReport.of(

@@ -49,12 +49,12 @@ class StateLog:
         self._last_s = float("-inf")
         try:
             self._file = path.open("w", encoding="utf-8")
+            self.note()
         except OSError as error:
             raise ConfigError(
                 f"The state log {path} cannot be written: {error.strerror}.",
                 hint="Choose another file with --state-log.",
             ) from error
-        self.note()
 
     def note(self) -> None:
         """Writes a record when the last one is old enough."""

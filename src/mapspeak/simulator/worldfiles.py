@@ -167,7 +167,7 @@ def _parse_yaml(text: str, label: str) -> CommentedMap:
         mark = error.problem_mark
         line = mark.line + 1 if mark else 1
         raise _fault_at(label, line, str(error.problem)) from error
-    except YAMLError as error:
+    except (ValueError, RecursionError, YAMLError) as error:
         raise _fault_at(label, 1, str(error)) from error
     if not isinstance(tree, CommentedMap):
         raise _fault_at(label, 1, "a world file is a mapping of keys such as walls and start")

@@ -18,6 +18,9 @@ UNKNOWN = -1
 FREE_MAX = 49
 """The highest occupancy that counts as free: Cartographer publishes free cells as 0 to 49."""
 
+LEAST_RESOLUTION_M, LARGEST_RESOLUTION_M = 0.0005, 100.0
+FARTHEST_ORIGIN_M = 1e8
+
 Mask = NDArray[np.bool_]
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -42,8 +45,8 @@ class OccupancyGrid:
         stamp_s: Robot time at which the map was made.
 
     Raises:
-        MapError: The array is not two-dimensional, holds other values, or the resolution is not a
-            positive number.
+        MapError: The array is not two-dimensional, holds other values, or resolution or origin are
+            none that a map can have.
     """
 
     cells: NDArray[np.int8]
@@ -137,14 +140,16 @@ def _check(cells: NDArray[np.integer[Any]], resolution_m: float, origin: Pose) -
             f"A map has two dimensions, this array has {cells.ndim}.",
             hint="Give an array of shape (rows, cols).",
         )
-    if not (np.isfinite(resolution_m) and resolution_m > 0):
+    if not LEAST_RESOLUTION_M <= resolution_m <= LARGEST_RESOLUTION_M:
         raise MapError(
             f"The map's resolution is {resolution_m} m per cell.",
-            hint="It must be a positive number of metres, such as 0.05.",
+            hint=f"It must be a positive number of metres, {LEAST_RESOLUTION_M} to "
+            f"{LARGEST_RESOLUTION_M}, such as 0.05.",
         )
-    if not origin.is_finite():
+    if not (origin.is_finite() and max(abs(origin.x), abs(origin.y)) <= FARTHEST_ORIGIN_M):
         raise MapError(
-            f"The map's origin is not finite: {origin}.", hint="Give numbers for x, y and yaw."
+            f"The map's origin is no place on Earth: {origin}.",
+            hint="Give numbers of metres for x and y, and of radians for yaw.",
         )
     if cells.size and (int(cells.min()) < UNKNOWN or int(cells.max()) > 100):
         raise MapError(

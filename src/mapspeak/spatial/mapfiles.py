@@ -266,7 +266,7 @@ def _parse_yaml(path: Path) -> CommentedMap:
             f"{path} cannot be read: {error.strerror or error}.",
             hint="Give the path of a .yaml file that may be read.",
         ) from error
-    except (UnicodeDecodeError, YAMLError) as error:
+    except (ValueError, RecursionError, YAMLError) as error:
         raise MapError(
             f"{path.name}{_line_of(error)} is not YAML.",
             hint="A map's .yaml holds lines such as 'resolution: 0.05'.",
@@ -293,9 +293,10 @@ def _say_wrong_value(path: Path, document: CommentedMap, error: ValidationError)
             f"{path.name} has no {key}.",
             hint=f"Add a line for it, such as '{_EXAMPLES[key]}'; map_server refuses it too.",
         )
-    line = document.lc.value(key)[0] + 1
+    own_lines: dict[str, list[int]] = document.lc.data or {}
+    where = f" line {own_lines[key][0] + 1}" if key in own_lines else ""
     return MapError(
-        f"{path.name} line {line}: {key} cannot be {document[key]!r}: {fault['msg']}.",
+        f"{path.name}{where}: {key} cannot be {document[key]!r}: {fault['msg']}.",
         hint=f"Write a line such as '{_EXAMPLES[key]}'.",
     )
 

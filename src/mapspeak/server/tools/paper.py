@@ -56,9 +56,7 @@ Label = Annotated[str, Field(min_length=1, max_length=120)]
 Feature = Annotated[str, Field(max_length=300)]
 Landmarks = Annotated[
     list[Label | LandmarkInput] | None,
-    Field(
-        max_length=50, description="labels, or objects with label, purpose, bearing_deg, range_m"
-    ),
+    Field(max_length=50, description="labels, or objects with more"),
 ]
 Features = Annotated[
     list[Feature] | None,
