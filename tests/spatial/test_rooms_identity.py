@@ -163,3 +163,16 @@ def test_a_different_building_shares_no_ids() -> None:
 
     assert {region.id for region in after.regions} == {"R3", "R4"}
     assert {gone.id for gone in after.vanished} == {"R1", "R2", "D1"}
+
+
+def test_a_region_that_turns_out_to_be_a_corridor_keeps_its_number() -> None:
+    seen_so_far = np.zeros((34, 104), np.int8)
+    seen_so_far[:2] = seen_so_far[-2:] = seen_so_far[:, :2] = seen_so_far[:, -2:] = 100
+    whole = np.zeros((34, 404), np.int8)
+    whole[:2] = whole[-2:] = whole[:, :2] = whole[:, -2:] = 100
+    before = divide(seen_so_far)
+    after = divide(whole, previous=before)
+    assert [region.id for region in before.regions] == ["R1"]
+    assert [region.id for region in after.regions] == ["C1"]
+    assert after.region("R1").id == "C1"
+    assert not after.vanished

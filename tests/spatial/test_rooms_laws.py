@@ -61,7 +61,7 @@ def labels() -> Labels:
 def test_the_building_has_five_rooms_and_a_corridor() -> None:
     rooms = divide(building())
 
-    assert sorted(region.id for region in rooms.regions) == ["C1", "R1", "R2", "R3", "R4", "R5"]
+    assert sorted(region.id for region in rooms.regions) == ["C2", "R1", "R3", "R4", "R5", "R6"]
     assert len(rooms.doors) == 5
 
 

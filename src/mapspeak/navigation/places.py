@@ -52,9 +52,9 @@ def looks_like_id(name: str) -> bool:
 
 
 def _find_by_id(atlas: Atlas, place_id: str) -> Pose | None:
-    for region in atlas.rooms.regions:
-        if region.id == place_id:
-            return _region_pose(atlas, region)
+    region = atlas.rooms.find_region(place_id)
+    if region is not None:
+        return _region_pose(atlas, region)
     for door in atlas.rooms.doors:
         if door.id == place_id:
             return _door_pose(atlas, door)

@@ -11,11 +11,9 @@ from mapspeak.spatial.rooms.description import Shape, classify, measure_regions,
 from mapspeak.spatial.rooms.doors import Opening, find_openings
 from mapspeak.spatial.rooms.identity import match_rooms
 from mapspeak.spatial.rooms.raster import Raster, build_raster
-from mapspeak.spatial.rooms.room_map import Door, Labels, Region, RoomClass, RoomMap
+from mapspeak.spatial.rooms.room_map import LETTER, Door, Labels, Region, RoomClass, RoomMap
 from mapspeak.spatial.rooms.segmentation import segment
 from mapspeak.spatial.rooms.settings import RoomSettings
-
-_LETTER = {RoomClass.ROOM: "R", RoomClass.CORRIDOR: "C", RoomClass.OPEN_SPACE: "O"}
 
 
 def find_rooms(
@@ -89,12 +87,7 @@ def _others(n_regions: int, openings: list[Opening]) -> list[list[int]]:
 
 
 def _ids(classes: list[RoomClass]) -> list[str]:
-    count = dict.fromkeys(RoomClass, 0)
-    ids = []
-    for room_class in classes:
-        count[room_class] += 1
-        ids.append(f"{_LETTER[room_class]}{count[room_class]}")
-    return ids
+    return [f"{LETTER[room_class]}{number}" for number, room_class in enumerate(classes, start=1)]
 
 
 def _region(

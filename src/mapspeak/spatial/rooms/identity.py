@@ -21,17 +21,24 @@ def match_rooms(previous: RoomMap, current: RoomMap) -> RoomMap:
     """Gives the current map with the ids of the previous one where they mean the same place.
 
     Regions are matched one to one by overlap in world coordinates, the largest overlap first;
-    doors by place. New ones get ids never used before; lost ones are remembered.
+    doors by place. A region keeps its number; its letter says what it is taken for now. New ones
+    get numbers never used before; lost ones are remembered.
     """
     overlap = _count_overlap(previous, current)
     ids = _match_regions(previous, current, overlap)
     door_ids = _match_doors(previous, current, ids)
+    vanished = _remember(previous, current, overlap, ids, door_ids)
+    now = {ids[region.id]: f"{region.id[0]}{ids[region.id][1:]}" for region in current.regions}
+    final = {name: now[kept] for name, kept in ids.items()}
     return RoomMap(
         grid=current.grid,
         labels=current.labels,
-        regions=tuple(_rename(region, ids, door_ids) for region in current.regions),
-        doors=tuple(_rename_door(door, ids, door_ids) for door in current.doors),
-        vanished=_remember(previous, current, overlap, ids, door_ids),
+        regions=tuple(_rename(region, final, door_ids) for region in current.regions),
+        doors=tuple(_rename_door(door, final, door_ids) for door in current.doors),
+        vanished=tuple(
+            Vanished(id=gone.id, became=tuple(now.get(name, name) for name in gone.became))
+            for gone in vanished
+        ),
     )
 
 
@@ -75,14 +82,16 @@ def _used(previous: RoomMap) -> set[str]:
 
 
 def _fresh(wanted: Iterable[str], used: set[str]) -> dict[str, str]:
-    """Gives each wanted id the next number after all that were used with its letter."""
-    highest: dict[str, int] = {}
+    """Gives each wanted id the next number after all that regions, or doors, have used."""
+    highest = dict.fromkeys((True, False), 0)
     for name in used:
-        highest[name[0]] = max(highest.get(name[0], 0), int(name[1:]))
+        is_door = name[0] == "D"
+        highest[is_door] = max(highest[is_door], int(name[1:]))
     fresh = {}
     for name in wanted:
-        highest[name[0]] = highest.get(name[0], 0) + 1
-        fresh[name] = f"{name[0]}{highest[name[0]]}"
+        is_door = name[0] == "D"
+        highest[is_door] += 1
+        fresh[name] = f"{name[0]}{highest[is_door]}"
     return fresh
 
 

@@ -22,12 +22,16 @@ class RoomClass(StrEnum):
     OPEN_SPACE = "open_space"
 
 
+LETTER = {RoomClass.ROOM: "R", RoomClass.CORRIDOR: "C", RoomClass.OPEN_SPACE: "O"}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Region:
     """A room, a corridor or an open space.
 
     Attributes:
-        id: "R3", "C1" or "O2"; the same from call to call once regions were matched.
+        id: "R3", "C1" or "O2". The number stays from call to call once regions were matched, and
+            no two regions share it; the letter says what the region is now.
         index: The region's number in the label array of its map.
         room_class: What it is.
         reason: Why it is that, in words with numbers.
@@ -112,20 +116,24 @@ class RoomMap:
         object.__setattr__(self, "labels", labels)
 
     def region(self, region_id: str) -> Region:
-        """Gives the region with this id, following regions that were merged into another.
+        """Gives the region with this number, following regions that were merged into another.
 
         Raises:
             MapError: No region has or had this id.
         """
-        for region in self.regions:
-            if region.id == region_id:
-                return region
-        became = [gone.became for gone in self.vanished if gone.id == region_id]
+        found = self.find_region(region_id)
+        if found is not None:
+            return found
+        became = [gone.became for gone in self.vanished if _is_same(gone.id, region_id)]
         known = {region.id for region in self.regions}
         if became and len(became[0]) == 1 and became[0][0] in known:
             return self.region(became[0][0])
         names = ", ".join(region.id for region in self.regions) or "none"
         raise MapError(f"This map has no region {region_id}.", hint=f"Its regions are: {names}.")
+
+    def find_region(self, region_id: str) -> Region | None:
+        """Gives the region with this number, whatever it was taken for when it got its id."""
+        return next((each for each in self.regions if _is_same(each.id, region_id)), None)
 
     def find_region_at(self, point: Point) -> Region | None:
         """Gives the region a point lies in, or None."""
@@ -158,6 +166,11 @@ class RoomMap:
                     came_from[neighbour] = here
                     queue.append(neighbour)
         return None
+
+
+def _is_same(first_id: str, second_id: str) -> bool:
+    are_regions = {first_id[:1], second_id[:1]} <= set(LETTER.values())
+    return first_id == second_id or (are_regions and first_id[1:] == second_id[1:])
 
 
 def _walk_back(came_from: dict[str, str], goal: str) -> tuple[str, ...]:
