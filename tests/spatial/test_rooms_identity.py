@@ -166,9 +166,9 @@ def test_a_different_building_shares_no_ids() -> None:
 
 
 def test_a_region_that_turns_out_to_be_a_corridor_keeps_its_number() -> None:
-    seen_so_far = np.zeros((34, 104), np.int8)
+    seen_so_far = np.zeros((64, 84), np.int8)
     seen_so_far[:2] = seen_so_far[-2:] = seen_so_far[:, :2] = seen_so_far[:, -2:] = 100
-    whole = np.zeros((34, 404), np.int8)
+    whole = np.zeros((64, 404), np.int8)
     whole[:2] = whole[-2:] = whole[:, :2] = whole[:, -2:] = 100
     before = divide(seen_so_far)
     after = divide(whole, previous=before)

@@ -74,7 +74,7 @@ def _judge(
         return refuse(grid, border, RefusalReason.LOOKED_ALREADY, sentence)
     weighed = [_weigh(distances, border, each) for each in new]
     best = max(weighed, key=lambda each: gain_rate(each.gain_m2, each.distance_m))
-    least_m2 = least_gain_m2(distances.radius_m)
+    least_m2 = _least_gain_m2(grid, distances.radius_m)
     if best.gain_m2 >= least_m2:
         return best
     sentence = f"next to nothing to see: {best.gain_m2:.1f} m2, less than {least_m2:.1f} m2"
@@ -103,9 +103,13 @@ def _weigh(distances: DistanceField, border: Border, lookout: Lookout) -> Fronti
     )
 
 
-def least_gain_m2(radius_m: float) -> float:
-    """Gives the unknown that is worth a drive: a square of two robots' width, at most 1 m2."""
-    return min((4 * radius_m) ** 2, 1.0)
+def _least_gain_m2(grid: OccupancyGrid, radius_m: float) -> float:
+    """Gives the unknown that is worth a drive: the less, the smaller the robot and the known floor.
+
+    That is a square of two robots' width, a hundredth of the floor, or 1 m2.
+    """
+    floor_m2 = int(np.count_nonzero(grid.free)) * grid.resolution_m**2
+    return min((4 * radius_m) ** 2, 0.01 * floor_m2, 1.0)
 
 
 def _facing(grid: OccupancyGrid, lookout: Lookout, prospect: Prospect) -> float:

@@ -11,9 +11,8 @@ from mapspeak.spatial.grid import Mask
 from mapspeak.spatial.rooms.room_map import RoomClass
 from mapspeak.spatial.rooms.segmentation import Segmentation
 
-CORRIDOR_ELONGATION = 3.0
-CORRIDOR_ELONGATION_WITH_DOORS = 2.0
-CORRIDOR_NEIGHBOURS = 4
+CORRIDOR_LADDER = ((3.0, 0), (2.5, 3), (2.0, 4))
+"""Elongation above which a region is a corridor, by the least number of its neighbours."""
 ISLAND_RATIO = 0.1
 """Something that stands free in a region is ignored up to this share of its floor."""
 OPEN_SPACE_WIDTH_M = 8.0
@@ -115,13 +114,13 @@ def _bounding_rectangle(inside: Mask) -> tuple[float, float, float]:
 
 def classify(shape: Shape, *, n_doors: int, n_neighbours: int) -> tuple[RoomClass, str]:
     """Gives what a region is, and the numbers that say so."""
-    long = shape.elongation > CORRIDOR_ELONGATION
-    joining = (
-        shape.elongation > CORRIDOR_ELONGATION_WITH_DOORS and n_neighbours >= CORRIDOR_NEIGHBOURS
+    is_corridor = any(
+        shape.elongation > elongation and n_neighbours >= least
+        for elongation, least in CORRIDOR_LADDER
     )
-    length_m, width_m = walked_size(shape) if long or joining else (shape.length_m, shape.width_m)
+    length_m, width_m = walked_size(shape) if is_corridor else (shape.length_m, shape.width_m)
     size = f"{length_m:.3g} x {width_m:.2g} m, {_count(n_doors, 'door')}"
-    if long or joining:
+    if is_corridor:
         return RoomClass.CORRIDOR, size
     is_wide = 2 * shape.clearance_m >= OPEN_SPACE_WIDTH_M
     if is_wide and shape.floor_area_m2 >= OPEN_SPACE_AREA_M2:
