@@ -14,7 +14,7 @@ SIGHTING = re.compile(
     r"^- (?P<label>[^,]+), bearing (?P<bearing>[+-]?[\d.]+) deg, range (?P<range>[\d.]+) m",
     re.MULTILINE,
 )
-CLEAR_RANGE_M = 4.0
+CLEAR_RANGE_M = 6.0
 """Farther things are left to a waypoint that is nearer to them."""
 
 SAFETY_WORDS = ("extinguisher", "first-aid", "first aid", "exit", "eye", "hose", "fire")

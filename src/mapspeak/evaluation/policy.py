@@ -18,10 +18,12 @@ __all__ = ["PolicyResult", "ScriptedPolicy", "Stage", "Step"]
 
 MOST_GOALS = 80
 WAIT_S = 20.0
+NEAR_M = 4.5
+"""A waypoint that saw its landmark from no farther leads to it, as the paper's do (3 to 4 m)."""
 MOST_VIEWPOINTS = 60
 MARGIN_M = 0.45
 """A viewpoint keeps this clear of walls: as much as the robot needs and a little more."""
-LOOK_AROUND_EVERY_M = 3.0
+LOOK_AROUND_EVERY_M = 4.0
 LOOK_AROUND_DEG = (90.0, 180.0, 270.0)
 FINAL_STATES = ("arrived", "blocked", "cancelled", "preempted", "rejected", "lost")
 
@@ -138,17 +140,29 @@ class ScriptedPolicy:
         return smallest.id
 
     async def go_to_fire_tool(self) -> str | None:
-        """Task 3: the nearest remembered place whose record names a tool for fire."""
-        memory = await self.tools.demand("get_semantic_data")
+        """Task 3: the nearest remembered place that saw an extinguisher from near.
+
+        Nearest by the robot's pose, as the paper's models chose; from near where any did.
+        """
         view = await self._look(Stage.FIRE_TOOL)
-        named = {record["id"] for record in _records(memory) if _speaks_of_fire(record)}
-        places = [row for row in view.rows("Places") if row.id in named]
-        if not places:
+        memory = await self.tools.demand("get_semantic_data")
+        ranges_m = {
+            record["id"]: range_m
+            for record in _records(memory)
+            if (range_m := _range_of_fire_tool(record)) is not None
+        }
+        if not ranges_m:
             return None
-        nearest = min(places, key=lambda row: row.number("path m"))
-        await self._drive(Stage.FIRE_TOOL, nearest.id)
+        enough_m = max(NEAR_M, min(ranges_m.values()))
+        places = [
+            record
+            for record in _records(memory)
+            if ranges_m.get(record["id"], math.inf) <= enough_m
+        ]
+        nearest = min(places, key=lambda record: _point_of(record).distance_to(view.pose.point))
+        await self._drive(Stage.FIRE_TOOL, nearest["id"])
         await self._take_picture(Stage.FIRE_TOOL)
-        return nearest.cells["name"]
+        return str(nearest["name"])
 
     def _next_frontier(self, view: MapReading) -> Row | None:
         untried = (row for row in view.rows("Frontiers") if row.id not in self._blocked)
@@ -216,6 +230,12 @@ def _records(answer: Answer) -> list[dict[str, Any]]:
     return list(answer.report["waypoints"])
 
 
-def _speaks_of_fire(record: dict[str, Any]) -> bool:
+def _point_of(record: dict[str, Any]) -> Point:
+    return Point(record["pose"]["x"], record["pose"]["y"])
+
+
+def _range_of_fire_tool(record: dict[str, Any]) -> float | None:
+    """Gives how far from a waypoint its fire extinguisher is; None where it names none."""
     landmarks = record["safety_landmarks"] + record["functional_landmarks"]
-    return any(re.search(r"\bextinguish", str(landmark["label"])) for landmark in landmarks)
+    ranges = [each["range_m"] for each in landmarks if re.search("extinguish", each["label"])]
+    return min((math.inf if each is None else each for each in ranges), default=None)
