@@ -1,6 +1,6 @@
 """How long it takes to divide a map into rooms, in one thread, and how well it agrees with people.
 
-`python -m benchmarks.bench_rooms MAPS` scores against maps that people have divided. MAPS holds
+`python -m benchmarks.rooms MAPS` scores against maps that people have divided. MAPS holds
 folders of maps; each map is a folder with `map.png` (0 occupied, 205 unknown, 254 free),
 `rooms.png` (16-bit region numbers, 0 for none) and `meta.json` (the resolution; per region its
 number, and its class if known: "room" or "hallway"). Only cells that are free in the map and
