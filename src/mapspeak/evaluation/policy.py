@@ -20,6 +20,7 @@ MOST_GOALS = 80
 WAIT_S = 20.0
 NEAR_M = 4.5
 """A waypoint that saw its landmark from no farther leads to it, as the paper's do (3 to 4 m)."""
+LEAST_ROOM_M2 = 3.0
 MOST_VIEWPOINTS = 60
 MARGIN_M = 0.45
 """A viewpoint keeps this clear of walls: as much as the robot needs and a little more."""
@@ -103,9 +104,20 @@ class ScriptedPolicy:
         )
 
     async def explore(self) -> bool:
-        """Task 1: drives to frontiers and records what is seen, until none is left to reach."""
+        """Task 1: drives to frontiers and records what is seen, until none is left to reach.
+
+        What was blocked is tried once more after the survey: by then more is known of the way.
+        """
         view = await self._look(Stage.EXPLORE)
         await self._record_surroundings(view.pose)
+        view = await self._follow_frontiers(view)
+        await self._survey(view.pose)
+        self._blocked.clear()
+        view = await self._follow_frontiers(await self._look(Stage.EXPLORE))
+        return self._next_frontier(view) is None
+
+    async def _follow_frontiers(self, view: MapReading) -> MapReading:
+        """Drives to the best frontier until there is none that was not tried."""
         while (target := self._next_frontier(view)) is not None and self._n_goals < MOST_GOALS:
             self._n_goals += 1
             state = await self._drive(Stage.EXPLORE, target.id)
@@ -113,8 +125,7 @@ class ScriptedPolicy:
                 self._blocked.add(target.id)
             view = await self._look(Stage.EXPLORE)
             await self._record_surroundings(view.pose)
-        await self._survey(view.pose)
-        return self._next_frontier(view) is None
+        return view
 
     async def _survey(self, pose: Pose) -> None:
         """Looks around wherever floor has not been looked at from near."""
@@ -129,9 +140,9 @@ class ScriptedPolicy:
             self._looked_at.append(point)
 
     async def go_to_smallest_room(self) -> str | None:
-        """Task 2: the first row of the table of rooms that is a room."""
+        """Task 2: the smallest row of the table of rooms that is a room and no nook."""
         view = await self._look(Stage.SMALLEST_ROOM)
-        rooms = [row for row in view.rows("Rooms") if row.cells["kind"] == "room"]
+        rooms = [row for row in view.rows("Rooms") if _is_room(row, view.rows("Doors"))]
         if not rooms:
             return None
         smallest = min(rooms, key=lambda row: row.number("floor m2"))
@@ -228,6 +239,19 @@ def _first(answer: Answer) -> Picture | None:
 
 def _records(answer: Answer) -> list[dict[str, Any]]:
     return list(answer.report["waypoints"])
+
+
+def _is_room(row: Row, doors: tuple[Row, ...]) -> bool:
+    """True for a room; what furniture cuts off is tiny, or open to one neighbour several times."""
+    names = row.cells["doors"].split()
+    ways_in = [
+        door.cells["joins"]
+        for door in doors
+        if door.id in names and door.cells["path m"] != "no way"
+    ]
+    is_nook = len(ways_in) > len(set(ways_in))
+    is_large_enough = row.number("floor m2") >= LEAST_ROOM_M2
+    return row.cells["kind"] == "room" and is_large_enough and not is_nook
 
 
 def _point_of(record: dict[str, Any]) -> Point:

@@ -14,10 +14,15 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.semantic import SemanticMap, Waypoint
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import FrontierReport, find_frontiers, match_frontiers
-from mapspeak.spatial.paths import DistanceField, distances_from
+from mapspeak.spatial.paths import DistanceField, clearance_m, distances_from
+from mapspeak.spatial.paths.clearance import Clearance
 from mapspeak.spatial.rooms import Region, RoomMap, find_rooms
 
 __all__ = ["Atlas", "RememberedPlace", "number_places"]
+
+
+COMFORT_M = 0.15
+"""How much more than its radius a robot should have around it where it is sent to stand."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,6 +108,10 @@ class Atlas:
         earlier = self._earlier_frontiers
         return found if earlier is None else match_frontiers(earlier, found)
 
+    @cached_property
+    def _clearance_m(self) -> Clearance:
+        return clearance_m(self.grid)
+
     @property
     def latest_rooms(self) -> RoomMap | None:
         """The rooms found last, on this map or an earlier one; finds none anew."""
@@ -139,13 +148,19 @@ class Atlas:
 
     def find_standing_point(self, region: Region) -> Point | None:
         """Gives a reachable point of a region, as far from walls as can be, or None."""
-        if self.distances.is_reachable(region.widest):
+        comfortable_m = self.radius_m + COMFORT_M
+        cell = self.grid.cell_at(region.widest)
+        is_roomy = self._clearance_m[cell.row, cell.col] >= comfortable_m
+        if is_roomy and self.distances.is_reachable(region.widest):
             return region.widest
         rows, cols = np.nonzero(self.rooms.labels == region.index)
         distances_m = self.distances.distances_at(rows, cols)
+        clear_m = self._clearance_m[rows, cols]
         reachable = np.flatnonzero(np.isfinite(distances_m))
         if not reachable.size:
             return None
+        enough_m = min(comfortable_m, float(clear_m[reachable].max()))
+        reachable = reachable[clear_m[reachable] >= enough_m]
         points = self.grid.points_at(rows[reachable], cols[reachable])
         away_m = np.hypot(points[:, 0] - region.widest.x, points[:, 1] - region.widest.y)
         best = points[int(np.argmin(away_m))]

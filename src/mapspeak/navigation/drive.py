@@ -20,6 +20,7 @@ __all__ = ["Drive", "DriveBook", "DriveReport"]
 POLL_S = 0.2
 PROGRESS_S = 1.0
 N_KEPT = 200
+N_BLOCKED_KEPT = 8
 FRONTIER = re.compile(r"F\d+")
 
 
@@ -90,13 +91,21 @@ class DriveBook:
 
     @property
     def frontiers_tried(self) -> tuple[Point, ...]:
-        """Where the robot has arrived, or could not get to, when it was sent to a frontier."""
+        """Where the robot has arrived, or lately could not get to, when sent to a frontier.
+
+        One that was blocked is worth another try later, when more is known of the way.
+        """
+        ended = [drive for drive in self._drives.values() if drive.final is not None]
+        lately = {drive.goal_id for drive in ended[-N_BLOCKED_KEPT:]}
         return tuple(
             drive.goal.point
-            for drive in self._drives.values()
+            for drive in ended
             if FRONTIER.fullmatch(drive.place)
             and drive.final is not None
-            and drive.final.state in (GoalState.ARRIVED, GoalState.BLOCKED)
+            and (
+                drive.final.state is GoalState.ARRIVED
+                or (drive.final.state is GoalState.BLOCKED and drive.goal_id in lately)
+            )
         )
 
     @property
