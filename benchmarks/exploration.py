@@ -1,6 +1,6 @@
 """How far a robot drives until it has seen a building, by the rule that picks its frontiers.
 
-`python -m benchmarks.bench_exploration [MAP...]` explores map pictures (0.05 m per cell, dark is
+`python -m benchmarks.exploration [MAP...]` explores map pictures (0.05 m per cell, dark is
 occupied, 205 unknown and taken for solid), the built-in worlds where none are named. The robot is a
 disc that knows its pose and drives exactly; its LiDAR looks around at every step of its way.
 Coverage counts the floor that it could see from anywhere it can get to.
