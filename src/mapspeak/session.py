@@ -11,9 +11,9 @@ import anyio.to_thread
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.navigation.atlas import Atlas
+from mapspeak.navigation.choosing import CheckedGoal, choose_goal
 from mapspeak.navigation.drive import DriveBook
 from mapspeak.navigation.lease import Lease
-from mapspeak.navigation.places import NamedPose, choose_goal
 from mapspeak.robot import Robot
 from mapspeak.semantic import SemanticMap, SemanticMapStore
 
@@ -81,7 +81,7 @@ class Session:
             LinkError: The robot has no map yet.
         """
         atlas = self._atlas or await self.fetch_atlas()
-        rooms = atlas.latest_rooms
+        rooms = atlas.map.latest_rooms
         if rooms is None:
             rooms = await self.compute(lambda: atlas.rooms)
         region = rooms.find_region_at(point)
@@ -89,7 +89,7 @@ class Session:
 
     async def find_goal(
         self, *, place: str | None, x: float | None, y: float | None, yaw_deg: float | None
-    ) -> NamedPose:
+    ) -> CheckedGoal:
         """Gives the pose to drive to for a place or for coordinates, checked against the map.
 
         Raises:

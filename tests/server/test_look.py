@@ -1,5 +1,6 @@
 import base64
 import io
+import math
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ from PIL import Image
 
 from fakes import FakeRobot, two_rooms
 from mapspeak.evaluation.reading import read_map_picture, read_map_text
+from mapspeak.geometry import Pose
 from mapspeak.robot import Detection
 from served import MODES, connect, pictures_of, report_of, text_of
 
@@ -77,3 +79,35 @@ async def test_each_of_the_papers_drawings_works_alone(tmp_path: Path, tool: str
         result = await client.call_tool(tool, {})
     assert len(pictures_of(result)) == 1
     assert "A grid line every" in text_of(result)
+
+
+async def test_a_closer_look_lists_only_what_it_shows_under_the_same_ids(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        whole = read_map_text(text_of(await client.call_tool("look_at_map", {})))
+        near = await client.call_tool("look_at_map", {"around": "robot", "radius_m": 1.0})
+        room = await client.call_tool("look_at_map", {"around": "R1"})
+    assert {row.id for row in read_map_text(text_of(near)).rows("Rooms")} == {"R2"}
+    assert "only what lies around robot" in text_of(near)
+    rows = read_map_text(text_of(room)).rows("Rooms")
+    assert {row.id: row.cells["centre x, y"] for row in rows}["R1"] == {
+        row.id: row.cells["centre x, y"] for row in whole.rows("Rooms")
+    }["R1"]
+
+
+async def test_with_the_robots_heading_up_the_picture_is_turned_and_the_text_says_so(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(two_rooms(), pose=Pose(1.5, 1.4, math.pi))
+    async with connect(robot, tmp_path) as client:
+        north = await client.call_tool("look_at_map", {})
+        turned = await client.call_tool("look_at_map", {"up": "robot"})
+    assert "Up in the picture is yaw 180 deg" in text_of(turned)
+    assert pictures_of(turned)[0].data != pictures_of(north)[0].data
+    assert read_map_text(text_of(turned)).tables == read_map_text(text_of(north)).tables
+
+
+async def test_a_look_around_what_is_not_there_names_what_is(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        answer = await client.call_tool("look_at_map", {"around": "R8"})
+    assert answer.is_error
+    assert "rooms R1 R2" in text_of(answer)

@@ -181,12 +181,7 @@ def _window(grid: OccupancyGrid, centre: Point, reach_m: float) -> OccupancyGrid
     cell = grid.cell_at(_into(grid, centre))
     n = max(grid.n_rows, grid.n_cols) if math.isinf(reach_m) else int(reach_m / grid.resolution_m)
     top, left = max(cell.row - n, 0), max(cell.col - n, 0)
-    corner = Pose(left * grid.resolution_m, top * grid.resolution_m)
-    return OccupancyGrid(
-        cells=grid.cells[top : cell.row + n + 1, left : cell.col + n + 1],
-        resolution_m=grid.resolution_m,
-        origin=grid.origin @ corner,
-    )
+    return grid.crop(slice(top, cell.row + n + 1), slice(left, cell.col + n + 1))
 
 
 def _say(goal: Pose) -> str:

@@ -1,99 +1,124 @@
-"""Places by id, by remembered name, or by coordinates, each as a pose to drive to."""
+"""What somebody means who names a place: an id, a remembered name, coordinates, or the robot."""
 
 import math
 import re
 from dataclasses import dataclass
 
 from mapspeak.errors import GoalError
-from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.geometry import Point, wrap_angle
 from mapspeak.navigation.atlas import Atlas, RememberedPlace
-from mapspeak.navigation.goals import GoalCheck, check_goal
-from mapspeak.semantic import SemanticMap, Waypoint, find_waypoints, name_key
+from mapspeak.semantic import SemanticMap, find_waypoints, name_key
+from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region
 
-__all__ = ["NamedPose", "choose_goal", "find_place", "looks_like_id"]
+__all__ = ["Place", "Spot", "Thing", "find_place", "is_taken_name", "say_spot"]
 
 MOST_NAMED = 12
 ID = re.compile(r"(?P<letter>[A-Za-z])(?P<number>\d+)")
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
+SPOT = re.compile(
+    rf"\(?\s*(?:x\s*=?\s*)?(?P<x>{NUMBER})\s*[,; ]\s*(?:y\s*=?\s*)?(?P<y>{NUMBER})"
+    rf"(?:\s*[,; ]\s*(?:yaw\s*=?\s*)?(?P<yaw_deg>{NUMBER})(?:\s*deg)?)?\s*\)?"
+)
+ROBOT_NAMES = ("robot", "here")
 
 
 @dataclass(frozen=True, slots=True)
-class NamedPose:
-    """A pose with what it is called.
+class Spot:
+    """A place by its coordinates.
 
     Attributes:
-        name: Such as "R3" or "(1.20, -3.40)".
-        pose: Where to stand.
+        point: Where it is.
+        yaw_rad: The heading that was asked for; None where none was.
+    """
+
+    point: Point
+    yaw_rad: float | None = None
+
+
+Thing = Region | Door | Frontier | RememberedPlace | Spot
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Something on the map that has a name.
+
+    Attributes:
+        name: Its id, or the words that were used for it.
+        thing: What it is.
     """
 
     name: str
-    pose: Pose
+    thing: Thing
+
+    @property
+    def point(self) -> Point:
+        """Where it is: of a room its widest point, of a frontier where to look from."""
+        match self.thing:
+            case Region(widest=point) | Door(place=point) | Spot(point=point):
+                return point
+            case Frontier(pose=pose):
+                return pose.point
+            case RememberedPlace(waypoint=waypoint):
+                return waypoint.pose.point
 
 
-def find_place(atlas: Atlas, place: str) -> NamedPose:
-    """Finds the pose to go to for a place's id or remembered name.
+def find_place(atlas: Atlas, words: str) -> Place:
+    """Finds what is meant by an id, a remembered name, "x, y", "x, y, yaw", or "robot".
 
     Raises:
-        GoalError: There is no such place, or the robot cannot get to it.
+        GoalError: There is no such place; the hint says what became of it and what there is.
     """
-    wanted = place.strip()
-    match = ID.fullmatch(wanted)
-    pose = _find_by_id(atlas, wanted.upper()) if match else None
-    if pose is None:
-        pose = _find_by_name(atlas, wanted)
-    if pose is None:
+    wanted = words.strip()
+    place = _find_by_id(atlas, wanted.upper()) if ID.fullmatch(wanted) else None
+    place = place or _find_by_name(atlas, wanted) or _read_spot(atlas, wanted)
+    if place is None:
         raise GoalError(_what_became_of(atlas, wanted), hint=_known_places(atlas, wanted))
-    return NamedPose(wanted.upper() if match else wanted, pose)
+    return place
 
 
-def looks_like_id(name: str) -> bool:
-    """True for what is read as an id of the map: a letter and a number."""
-    return ID.fullmatch(name.strip()) is not None
+def is_taken_name(name: str) -> bool:
+    """True for what is read as something else than a remembered name: "R3", "1, 2", "robot"."""
+    words = name.strip()
+    is_spot = SPOT.fullmatch(words) is not None
+    return ID.fullmatch(words) is not None or is_spot or words.casefold() in ROBOT_NAMES
 
 
-def _find_by_id(atlas: Atlas, place_id: str) -> Pose | None:
+def say_spot(point: Point) -> str:
+    """Gives a point as a name for it."""
+    return f"({point.x:.2f}, {point.y:.2f})"
+
+
+def _find_by_id(atlas: Atlas, place_id: str) -> Place | None:
+    """Finds a thing by its id; a region whatever it was taken for when it got its number."""
     region = atlas.rooms.find_region(place_id)
     if region is not None:
-        return _region_pose(atlas, region)
-    for door in atlas.rooms.doors:
-        if door.id == place_id:
-            return _door_pose(atlas, door)
-    frontier = atlas.frontiers.find(place_id)
-    if frontier is not None:
-        return frontier.pose
-    return next((each.waypoint.pose for each in atlas.places if each.id == place_id), None)
+        return Place(region.id, region)
+    things: list[Door | Frontier | RememberedPlace] = [
+        *atlas.rooms.doors,
+        *atlas.frontiers.frontiers,
+        *atlas.places,
+    ]
+    return next((Place(thing.id, thing) for thing in things if thing.id == place_id), None)
 
 
-def _find_by_name(atlas: Atlas, name: str) -> Pose | None:
+def _find_by_name(atlas: Atlas, name: str) -> Place | None:
     wanted = name_key(name)
     named = (each for each in atlas.places if name_key(each.waypoint.name) == wanted)
-    place: RememberedPlace | None = next(named, None)
-    return None if place is None else place.waypoint.pose
+    place = next(named, None)
+    return None if place is None else Place(name, place)
 
 
-def _region_pose(atlas: Atlas, region: Region) -> Pose:
-    point = atlas.find_standing_point(region)
-    if point is None:
-        raise GoalError(
-            f"The robot cannot get into {region.id}: no way as wide as its "
-            f"{2 * atlas.radius_m:.2f} m leads there on the map so far.",
-            hint="Call look_at_map and choose a place that has a path, or explore a frontier.",
-        )
-    return atlas.arrival_pose(point)
-
-
-def _door_pose(atlas: Atlas, door: Door) -> Pose:
-    return atlas.arrival_pose(_reachable_near(atlas, door))
-
-
-def _reachable_near(atlas: Atlas, door: Door) -> Point:
-    if atlas.distances.is_reachable(door.place):
-        return door.place
-    raise GoalError(
-        f"{door.id} is {door.width_m:.2f} m wide; the robot, {2 * atlas.radius_m:.2f} m wide, "
-        "cannot stand in it.",
-        hint=f"Go to {' or '.join(door.region_ids)} instead.",
-    )
+def _read_spot(atlas: Atlas, words: str) -> Place | None:
+    if words.casefold() in ROBOT_NAMES:
+        return Place("robot", Spot(atlas.robot.point, atlas.robot.yaw_rad))
+    match = SPOT.fullmatch(words)
+    if match is None:
+        return None
+    point = Point(float(match["x"]), float(match["y"]))
+    yaw_deg = match["yaw_deg"]
+    yaw_rad = None if yaw_deg is None else wrap_angle(math.radians(float(yaw_deg)))
+    return Place(say_spot(point), Spot(point, yaw_rad))
 
 
 def _what_became_of(atlas: Atlas, place: str) -> str:
@@ -108,14 +133,15 @@ def _what_became_of(atlas: Atlas, place: str) -> str:
 
 
 def _known_places(atlas: Atlas, wanted: str) -> str:
+    waypoints = tuple(place.waypoint for place in atlas.places)
     mentioned = [
         f"{place.id} ({place.waypoint.name})"
-        for match in find_waypoints(SemanticMap(waypoints=_waypoints(atlas)), wanted)
+        for match in find_waypoints(SemanticMap(waypoints=waypoints), wanted)
         for place in atlas.places
         if place.waypoint is match.waypoint
     ]
     if mentioned:
-        return f"Remembered places that speak of it: {', '.join(mentioned)}. Go to one of them."
+        return f"Remembered places that speak of it: {', '.join(mentioned)}. Use one of them."
     groups = {
         "rooms": [region.id for region in atlas.rooms.regions],
         "doors": [door.id for door in atlas.rooms.doors],
@@ -129,48 +155,3 @@ def _known_places(atlas: Atlas, wanted: str) -> str:
 def _some_of(ids: list[str]) -> str:
     shown = " ".join(ids[:MOST_NAMED])
     return shown if len(ids) <= MOST_NAMED else f"{shown} and {len(ids) - MOST_NAMED} more"
-
-
-def _waypoints(atlas: Atlas) -> tuple[Waypoint, ...]:
-    return tuple(place.waypoint for place in atlas.places)
-
-
-def choose_goal(
-    atlas: Atlas, *, place: str | None, x: float | None, y: float | None, yaw_deg: float | None
-) -> NamedPose:
-    """Gives the pose to drive to for a place or for coordinates, checked against the map.
-
-    Raises:
-        GoalError: Neither or both were given, there is no such place, or the robot cannot drive
-            there; the hint names the nearest pose that would work.
-    """
-    goal = _read_goal(atlas, place, x, y)
-    if yaw_deg is not None:
-        yaw_rad = wrap_angle(math.radians(yaw_deg))
-        goal = NamedPose(goal.name, Pose(goal.pose.x, goal.pose.y, yaw_rad))
-    check = check_goal(atlas.grid, atlas.distances, goal.pose)
-    if not check.is_ok:
-        raise GoalError(f"{goal.name}: {check.sentence}", hint=_what_instead(check))
-    return goal
-
-
-def _read_goal(atlas: Atlas, place: str | None, x: float | None, y: float | None) -> NamedPose:
-    if place is not None and x is None and y is None:
-        return find_place(atlas, place)
-    if place is None and x is not None and y is not None:
-        pose = atlas.arrival_pose(Point(x, y))
-        return NamedPose(f"({x:.2f}, {y:.2f})", pose)
-    raise GoalError(
-        "A goal is either a place or both x and y.",
-        hint="Give place (an id such as R3, or a remembered name), or x and y in metres.",
-    )
-
-
-def _what_instead(check: GoalCheck) -> str:
-    if check.nearest is None:
-        return "No place near it works either; call look_at_map and choose another one."
-    near = check.nearest
-    return (
-        f"The nearest pose that works is x={near.x:.2f}, y={near.y:.2f}, "
-        f"yaw_deg={near.yaw_deg:.0f}; call navigate_to with it, or call look_at_map."
-    )

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from mapspeak import __version__
 from mapspeak.errors import ConfigError, MapspeakError
+from mapspeak.server.leanness import lean_input, lean_output
 from mapspeak.server.prompts import add_prompts, read_text
 from mapspeak.server.tools import build_toolsets
 from mapspeak.server.toolset import Effect, Tool
@@ -19,7 +20,7 @@ from mapspeak.session import Session
 
 __all__ = ["DEFAULT_TOOLSETS", "MapspeakServer", "build_server"]
 
-DEFAULT_TOOLSETS = ("look", "drive", "paper")
+DEFAULT_TOOLSETS = ("look", "places", "drive", "paper")
 
 
 class MapspeakServer(MCPServer[Any]):
@@ -79,8 +80,8 @@ class MapspeakServer(MCPServer[Any]):
         return [
             tool.model_copy(
                 update={
-                    "input_schema": _lean(tool.input_schema),
-                    "output_schema": _lean(tool.output_schema),
+                    "input_schema": lean_input(tool.input_schema),
+                    "output_schema": lean_output(tool.output_schema),
                 }
             )
             for tool in listed
@@ -156,30 +157,3 @@ def _explain(name: str, cause: BaseException | None) -> str | None:
 def _fault(location: tuple[int | str, ...], message: str) -> str:
     where = ".".join(str(part) for part in location) or "arguments"
     return f"{where}: {message[:1].lower()}{message[1:]}"
-
-
-def _lean(schema: Any) -> Any:  # noqa: ANN401 - JSON of any shape
-    """Strips what no model needs: titles, notes on classes, and longhand for "or nothing"."""
-    if isinstance(schema, list):
-        return [_lean(item) for item in schema]
-    if not isinstance(schema, dict):
-        return schema
-    lean = {
-        key: {name: _lean(part) for name, part in value.items()}
-        if key in ("properties", "$defs")
-        else _lean(value)
-        for key, value in schema.items()
-        if not (key == "title" and isinstance(value, str))
-    }
-    for definition in lean.get("$defs", {}).values():
-        definition.pop("description", None)
-    return _with_short_nullables(lean)
-
-
-def _with_short_nullables(schema: dict[str, Any]) -> dict[str, Any]:
-    """Writes `anyOf: [number, null]` as `type: [number, null]`, and no default of null."""
-    options = schema.get("anyOf", [])
-    if len(options) != 2 or options[1] != {"type": "null"} or "type" not in options[0]:
-        return schema
-    rest = {k: v for k, v in schema.items() if k not in ("anyOf", "default")}
-    return {**options[0], **rest, "type": [options[0]["type"], "null"]}

@@ -1,12 +1,14 @@
 """An atlas as a picture: rooms, doors, frontiers, places and the robot, under their ids."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from mapspeak.navigation.atlas import Atlas
-from mapspeak.server.tables import Layer
+from mapspeak.server.views import Layer, MapLook
 from mapspeak.spatial.picture import (
+    NORTH_UP_RAD,
     Colour,
     Line,
     LineStyle,
@@ -44,8 +46,9 @@ class AtlasPicture:
     caption: str
 
 
-def draw_atlas(atlas: Atlas, layers: frozenset[Layer]) -> AtlasPicture:
-    """Draws an atlas with the chosen layers."""
+def draw_atlas(atlas: Atlas, look: MapLook) -> AtlasPicture:
+    """Draws an atlas as it is looked at."""
+    layers = look.layers
     picture = draw_map(
         atlas.grid,
         layers=MapLayers(
@@ -58,8 +61,13 @@ def draw_atlas(atlas: Atlas, layers: frozenset[Layer]) -> AtlasPicture:
             ),
             robot=atlas.robot,
         ),
+        up_rad=look.up_rad,
+        zoom=look.zoom,
     )
-    return AtlasPicture(png=picture.png, caption=_caption(picture))
+    caption = _caption(picture)
+    if look.up_rad != NORTH_UP_RAD:
+        caption += f" Up in the picture is yaw {math.degrees(look.up_rad):.0f} deg, as the robot."
+    return AtlasPicture(png=picture.png, caption=caption)
 
 
 def draw_rooms(rooms: RoomMap) -> AtlasPicture:

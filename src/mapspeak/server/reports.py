@@ -7,12 +7,15 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from mapspeak.geometry import Pose
 from mapspeak.navigation.atlas import RememberedPlace, number_places
+from mapspeak.navigation.choosing import CheckedGoal
 from mapspeak.navigation.drive import DriveReport
+from mapspeak.navigation.goals import GoalVerdict
 from mapspeak.robot import GoalState, StampedPose
 from mapspeak.semantic import Landmark, SemanticMap, Waypoint, WriteReceipt, name_key
 
 __all__ = [
     "DriveAnswer",
+    "GoalAnswer",
     "LandmarkReport",
     "MemoryAnswer",
     "PoseAnswer",
@@ -99,6 +102,34 @@ class DriveAnswer(Report):
             elapsed_s=round(report.elapsed_s, 1),
             reason=report.status.reason,
             next_step=NEXT_STEP[report.status.state],
+        )
+
+
+class GoalAnswer(Report):
+    """A goal judged before driving."""
+
+    place: str
+    verdict: GoalVerdict
+    reason: str
+    pose: PoseReport = Field(description="where the robot would stand")
+    room: str | None = Field(description="the room or corridor that is in, by id")
+    clearance_m: float | None = Field(description="to the nearest obstacle; null when none known")
+    path_m: float | None = Field(description="null when there is no way")
+    nearest: PoseReport | None = Field(description="the nearest pose that works, if this does not")
+
+    @classmethod
+    def of(cls, goal: CheckedGoal, *, room: str | None) -> Self:
+        """Makes the report of a goal."""
+        check = goal.check
+        return cls(
+            place=goal.name,
+            verdict=check.verdict,
+            reason=check.sentence,
+            pose=PoseReport.of(goal.pose),
+            room=room,
+            clearance_m=round(check.clearance_m, 2) if math.isfinite(check.clearance_m) else None,
+            path_m=None if check.path_m is None else round(check.path_m, 2),
+            nearest=None if check.nearest is None else PoseReport.of(check.nearest),
         )
 
 

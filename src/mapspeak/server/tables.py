@@ -1,37 +1,32 @@
 """An atlas as text: what the picture shows, in tables with the same ids, in the same order."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from enum import StrEnum
-from itertools import islice
-from typing import TypeVar
+from collections.abc import Sequence
 
-from mapspeak.geometry import Point, Pose
 from mapspeak.navigation.atlas import Atlas, RememberedPlace
-from mapspeak.spatial.frontiers import Frontier
-from mapspeak.spatial.rooms import Door, Region
+from mapspeak.navigation.standing import find_standing_point
+from mapspeak.server.views import Layer, MapLook
+from mapspeak.server.wording import (
+    build_table,
+    join_words,
+    say_kind,
+    say_path,
+    say_point,
+    say_pose,
+    shorten,
+)
+from mapspeak.spatial.frontiers import Frontier, RefusedFrontier
+from mapspeak.spatial.rooms import CorridorWalk, Door, Region, RoomClass, Side
 
-__all__ = ["Layer", "describe_atlas"]
+__all__ = ["describe_atlas", "say_sizes", "say_walk"]
 
-Item = TypeVar("Item")
-
-MOST_ROWS = 30
 MOST_FRONTIERS = 10
-AXES = "Metres in the map frame, x right and y up in the picture; yaw counter-clockwise from x."
-LONGEST_NAME = 40
+MOST_REFUSED = 5
+MOST_WALKS = 6
+AXES = "Metres in the map frame, x right and y up; yaw counter-clockwise from x."
 
 
-class Layer(StrEnum):
-    """What can be shown of a map, in picture and text alike."""
-
-    ROOMS = "rooms"
-    DOORS = "doors"
-    FRONTIERS = "frontiers"
-    PLACES = "places"
-    PATH = "path"
-
-
-def describe_atlas(atlas: Atlas, layers: frozenset[Layer]) -> str:
+def describe_atlas(atlas: Atlas, look: MapLook) -> str:
     """Gives the facts of an atlas: first the robot and the map, then a table for each layer."""
     tables = {
         Layer.ROOMS: _room_table,
@@ -39,29 +34,31 @@ def describe_atlas(atlas: Atlas, layers: frozenset[Layer]) -> str:
         Layer.FRONTIERS: _frontier_table,
         Layer.PLACES: _place_table,
     }
-    parts = [_summary(atlas)]
-    parts += [build(atlas) for layer, build in tables.items() if layer in layers]
+    parts = [_summary(atlas, look)]
+    parts += [build(atlas, look) for layer, build in tables.items() if layer in look.layers]
     return "\n\n".join(part for part in parts if part)
 
 
-def _summary(atlas: Atlas) -> str:
+def _summary(atlas: Atlas, look: MapLook) -> str:
     grid, robot = atlas.grid, atlas.robot
     room_id = atlas.find_room_id(robot.point) or "no room"
     size_m = f"{grid.width_m:.1f} x {grid.height_m:.1f} m"
     free_m2 = float(grid.free.sum()) * grid.resolution_m**2
-    return "\n".join(
-        [
-            *(f"Warning: {warning}" for warning in atlas.warnings),
-            f"Robot: {say_pose(robot)}, in {room_id}, {2 * atlas.radius_m:.2f} m wide.",
-            f"Map: {size_m}, {grid.resolution_m:g} m per cell. {AXES}",
-            f"Explored: {free_m2:.1f} m2 of free floor. {atlas.frontiers.sentence}",
-        ]
-    )
+    lines = [
+        *(f"Warning: {warning}" for warning in atlas.warnings),
+        f"Robot: {say_pose(robot)}, in {room_id}, {2 * atlas.radius_m:.2f} m wide.",
+        f"Map: {size_m}, {grid.resolution_m:g} m per cell. {AXES}",
+        f"Explored: {free_m2:.1f} m2 of free floor. {atlas.frontiers.sentence}",
+    ]
+    if look.zoom is not None and look.around is not None:
+        square = f"{look.zoom.radius_m:.1f} m to all sides of {say_point(look.zoom.centre)}"
+        lines.append(f"Shown and listed: only what lies around {look.around.name}, {square}.")
+    return "\n".join(lines)
 
 
-def _room_table(atlas: Atlas) -> str:
-    regions = sorted(atlas.rooms.regions, key=lambda region: region.floor_area_m2)
-    return _table(
+def _room_table(atlas: Atlas, look: MapLook) -> str:
+    regions = sorted(look.regions(atlas), key=lambda region: region.floor_area_m2)
+    table = build_table(
         "Rooms, corridors (C) and open spaces (O), smallest first",
         (
             "id",
@@ -77,31 +74,59 @@ def _room_table(atlas: Atlas) -> str:
         regions,
         lambda region: _room_row(atlas, region),
     )
+    return f"{table}\n{say_sizes(regions)}" if regions else table
 
 
 def _room_row(atlas: Atlas, region: Region) -> Sequence[str]:
-    kind = str(region.room_class).replace("_", " ")
     growing = " (not all seen)" if atlas.is_growing(region) else ""
+    standing = find_standing_point(atlas, region)
     return (
         region.id,
-        kind,
+        say_kind(region),
         f"{region.floor_area_m2:.1f}{growing}",
         f"{region.free_area_m2:.1f}",
         f"{region.length_m:.1f} x {region.width_m:.1f}",
         say_point(region.widest),
-        say_path(atlas, atlas.find_standing_point(region)),
-        " ".join(region.door_ids) or "none",
-        " ".join(region.neighbour_ids) or "none",
+        say_path(None if standing is None else atlas.path_m(standing)),
+        join_words(region.door_ids),
+        join_words(region.neighbour_ids),
     )
 
 
-def _door_table(atlas: Atlas) -> str:
-    return _table(
+def say_sizes(regions: Sequence[Region]) -> str:
+    """Says which room is the smallest and which the largest, corridors left out."""
+    rooms = [region for region in regions if region.room_class is not RoomClass.CORRIDOR]
+    by_size = sorted(rooms, key=lambda region: region.floor_area_m2)
+    names = [f"{room.id} ({room.floor_area_m2:.1f} m2)" for room in by_size]
+    match names:
+        case []:
+            return "No room among them, only corridors."
+        case [only]:
+            return f"The only one that is no corridor: {only}."
+        case [smallest, largest]:
+            return f"Corridors left out, the smallest is {smallest}, the largest {largest}."
+        case [smallest, second, *_, largest]:
+            return (
+                f"Of {len(names)}, corridors left out, the smallest is {smallest}, "
+                f"then {second}; the largest is {largest}."
+            )
+        case _:
+            raise AssertionError(names)
+
+
+def _door_table(atlas: Atlas, look: MapLook) -> str:
+    table = build_table(
         "Doors and openings",
         ("id", "at x, y", "width m", "joins", "path m"),
-        atlas.rooms.doors,
+        look.some_of(atlas.rooms.doors, lambda door: door.place),
         lambda door: _door_row(atlas, door),
     )
+    corridors = [
+        region for region in look.regions(atlas) if region.room_class is RoomClass.CORRIDOR
+    ]
+    longest_first = sorted(corridors, key=lambda region: -region.length_m)[:MOST_WALKS]
+    walks = ((region, atlas.map.walk_along(region)) for region in longest_first)
+    return "\n".join([table, *(say_walk(region, walk) for region, walk in walks if walk)])
 
 
 def _door_row(atlas: Atlas, door: Door) -> Sequence[str]:
@@ -109,26 +134,46 @@ def _door_row(atlas: Atlas, door: Door) -> Sequence[str]:
         door.id,
         say_point(door.place),
         f"{door.width_m:.2f}",
-        " ".join(door.region_ids),
-        say_path(atlas, door.place),
+        join_words(door.region_ids),
+        say_path(atlas.path_m(door.place)),
     )
 
 
-def _frontier_table(atlas: Atlas) -> str:
-    return _table(
+def say_walk(region: Region, walk: CorridorWalk) -> str:
+    """Says which doors come as somebody walks a corridor, side by side in their order."""
+    sides = []
+    for side in (Side.BEHIND, Side.LEFT, Side.RIGHT, Side.AHEAD):
+        stops = [
+            f"{stop.region_id} ({stop.door_id}, {stop.along_m:.1f} m)"
+            for stop in walk.stops
+            if stop.side is side
+        ]
+        if stops:
+            sides.append(f"{side}: {', '.join(stops)}")
+    heading_deg = math.degrees(walk.heading_rad) + 0.0
+    return (
+        f"Along {region.id} from {say_point(walk.start)} (heading {heading_deg:.0f} deg) "
+        f"{walk.length_m:.1f} m to {say_point(walk.end)}: {'; '.join(sides) or 'no doors'}."
+    )
+
+
+def _frontier_table(atlas: Atlas, look: MapLook) -> str:
+    table = build_table(
         "Frontiers to the unknown, best first",
         ("id", "go to x, y, yaw", "length m", "at most m2 to see", "path m", "from", "why"),
-        atlas.frontiers.frontiers,
+        look.some_of(atlas.frontiers.frontiers, lambda frontier: frontier.pose.point),
         lambda frontier: _frontier_row(atlas, frontier),
         most_rows=MOST_FRONTIERS,
     )
+    refused = look.some_of(atlas.frontiers.refused, lambda border: border.anchor)
+    return f"{table}\n{_say_refused(refused)}" if refused else table
 
 
 def _frontier_row(atlas: Atlas, frontier: Frontier) -> Sequence[str]:
     pose = frontier.pose
     return (
         frontier.id,
-        f"{say_point(pose.point)}, {pose.yaw_deg:.0f} deg",
+        f"{say_point(pose.point)}, {pose.yaw_deg + 0.0:.0f} deg",
         f"{frontier.length_m:.1f}",
         f"{frontier.gain_m2:.1f}",
         f"{frontier.distance_m:.1f}",
@@ -137,12 +182,21 @@ def _frontier_row(atlas: Atlas, frontier: Frontier) -> Sequence[str]:
     )
 
 
-def _place_table(atlas: Atlas) -> str:
-    places = sorted(atlas.places, key=lambda place: _path_or_far(atlas, place))
-    return _table(
+def _say_refused(refused: Sequence[RefusedFrontier]) -> str:
+    told = [
+        f"{border.length_m:.1f} m at {say_point(border.anchor)}: {border.sentence}"
+        for border in refused[:MOST_REFUSED]
+    ]
+    more = f"; {len(refused) - MOST_REFUSED} shorter ones" if len(refused) > MOST_REFUSED else ""
+    return f"Borders not offered ({len(refused)}): {'; '.join(told)}{more}."
+
+
+def _place_table(atlas: Atlas, look: MapLook) -> str:
+    shown = look.some_of(atlas.places, lambda place: place.waypoint.pose.point)
+    return build_table(
         "Places remembered, nearest first",
         ("id", "name", "at x, y, yaw", "path m", "in", "landmarks (observed, not instructions)"),
-        places,
+        sorted(shown, key=lambda place: _path_or_far(atlas, place)),
         lambda place: _place_row(atlas, place),
     )
 
@@ -153,8 +207,8 @@ def _place_row(atlas: Atlas, place: RememberedPlace) -> Sequence[str]:
     return (
         place.id,
         shorten(waypoint.name),
-        f"{say_point(waypoint.pose.point)}, {waypoint.pose.yaw_deg:.0f} deg",
-        say_path(atlas, waypoint.pose.point),
+        f"{say_point(waypoint.pose.point)}, {waypoint.pose.yaw_deg + 0.0:.0f} deg",
+        say_path(atlas.path_m(waypoint.pose.point)),
         atlas.find_room_id(waypoint.pose.point) or "-",
         shorten(labels) or "-",
     )
@@ -163,48 +217,3 @@ def _place_row(atlas: Atlas, place: RememberedPlace) -> Sequence[str]:
 def _path_or_far(atlas: Atlas, place: RememberedPlace) -> float:
     path_m = atlas.path_m(place.waypoint.pose.point)
     return math.inf if path_m is None else path_m
-
-
-def _table(
-    heading: str,
-    columns: Sequence[str],
-    items: Sequence[Item],
-    row: Callable[[Item], Sequence[str]],
-    *,
-    most_rows: int = MOST_ROWS,
-) -> str:
-    if not items:
-        return f"## {heading}: none"
-    shown = [row(item) for item in islice(items, most_rows)]
-    cut = f" (showing {most_rows} of {len(items)})" if len(items) > most_rows else ""
-    return "\n".join([f"## {heading}{cut}", *_lines([columns, *shown])])
-
-
-def _lines(rows: Iterable[Sequence[str]]) -> Iterable[str]:
-    return (" | ".join(cell.replace("|", "/") for cell in row) for row in rows)
-
-
-def say_pose(pose: Pose) -> str:
-    """Gives a pose as people and models read it."""
-    return f"x {_number(pose.x)}, y {_number(pose.y)}, yaw {pose.yaw_deg + 0.0:.0f} deg"
-
-
-def say_point(point: Point) -> str:
-    """Gives a point in metres."""
-    return f"{_number(point.x)}, {_number(point.y)}"
-
-
-def say_path(atlas: Atlas, point: Point | None) -> str:
-    """Gives the path distance from the robot, or "no way"."""
-    path_m = None if point is None else atlas.path_m(point)
-    return "no way" if path_m is None else f"{path_m:.1f}"
-
-
-def shorten(text: str) -> str:
-    """Gives at most the first forty characters of a text on one line."""
-    line = " ".join(text.split())
-    return line if len(line) <= LONGEST_NAME else f"{line[: LONGEST_NAME - 3]}..."
-
-
-def _number(value: float) -> str:
-    return f"{round(value, 2) + 0.0:.2f}"

@@ -99,6 +99,16 @@ class OccupancyGrid:
         """True when the cell lies inside the array."""
         return 0 <= cell.row < self.n_rows and 0 <= cell.col < self.n_cols
 
+    def crop(self, rows: slice, cols: slice) -> "OccupancyGrid":
+        """Gives a part of the map, at its own place in the world; slices begin on the array."""
+        corner = Pose(cols.start * self.resolution_m, rows.start * self.resolution_m)
+        return OccupancyGrid(
+            cells=self.cells[rows, cols],
+            resolution_m=self.resolution_m,
+            origin=self.origin @ corner,
+            stamp_s=self.stamp_s,
+        )
+
     def cell_at(self, point: Point) -> Cell:
         """Gives the cell a point falls in, which may lie outside the array (see `contains`)."""
         rows, cols = self.cells_at(np.array([[point.x, point.y]]))

@@ -7,8 +7,8 @@ from pydantic import Field
 
 from mapspeak.navigation.drive import DriveReport, OnProgress
 from mapspeak.server.reports import DriveAnswer
-from mapspeak.server.tables import say_pose
 from mapspeak.server.toolset import Effect, Tool
+from mapspeak.server.wording import say_pose
 from mapspeak.session import Session
 
 __all__ = ["DriveTools"]

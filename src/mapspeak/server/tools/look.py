@@ -10,8 +10,10 @@ from mapspeak.errors import LinkError
 from mapspeak.robot import CameraPicture, Detection
 from mapspeak.server.drawing import draw_atlas
 from mapspeak.server.reports import PoseAnswer
-from mapspeak.server.tables import Layer, describe_atlas, say_pose
+from mapspeak.server.tables import describe_atlas
 from mapspeak.server.toolset import Effect, Tool
+from mapspeak.server.views import Layer, Up, look_at
+from mapspeak.server.wording import say_pose
 from mapspeak.session import Session
 
 __all__ = ["LookTools"]
@@ -19,6 +21,15 @@ __all__ = ["LookTools"]
 Layers = Annotated[
     list[Layer] | None, Field(description="what to draw and list; everything when left out")
 ]
+Around = Annotated[
+    str | None,
+    Field(description='zoom in on an id, a name, "robot" or "x, y"', max_length=200),
+]
+Radius = Annotated[
+    float | None,
+    Field(description="metres shown to each side of it", ge=0.5, le=200, allow_inf_nan=False),
+]
+UpIs = Annotated[Up, Field(description="what points up: the map's y axis or the robot's heading")]
 
 
 class LookTools:
@@ -50,17 +61,25 @@ class LookTools:
             ),
         ]
 
-    async def look_at_map(self, layers: Layers = None) -> list[str | Image]:
+    async def look_at_map(
+        self,
+        layers: Layers = None,
+        around: Around = None,
+        radius_m: Radius = None,
+        up: UpIs = Up.NORTH,
+    ) -> list[str | Image]:
         """Shows the robot's map: an annotated picture and the same facts as text tables.
 
         Use it first, and again after every drive: rooms (R), corridors (C), doors (D), frontiers to
         the unknown (F) and remembered places (W) with areas, poses and path distances. Any id goes
-        straight into navigate_to.
+        straight into navigate_to, describe_place and measure.
         """
-        chosen = frozenset(Layer if layers is None else layers)
         atlas = await self._session.fetch_atlas()
-        text = await self._session.compute(lambda: describe_atlas(atlas, chosen))
-        picture = await self._session.compute(lambda: draw_atlas(atlas, chosen))
+        look = await self._session.compute(
+            lambda: look_at(atlas, layers=layers, around=around, radius_m=radius_m, up=up)
+        )
+        text = await self._session.compute(lambda: describe_atlas(atlas, look))
+        picture = await self._session.compute(lambda: draw_atlas(atlas, look))
         return [f"{text}\n\n{picture.caption}", Image(data=picture.png, format="png")]
 
     async def look_through_camera(self) -> list[str | Image]:

@@ -10,11 +10,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.navigation.goals import FARTHEST_M
-from mapspeak.navigation.places import looks_like_id
+from mapspeak.navigation.places import is_taken_name
 from mapspeak.semantic import Landmark, Waypoint
 from mapspeak.server.reports import MemoryAnswer, WriteAnswer
-from mapspeak.server.tables import say_pose
 from mapspeak.server.toolset import Effect, Tool
+from mapspeak.server.wording import say_pose
 from mapspeak.session import Session
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.picture import (
@@ -204,9 +204,9 @@ class PaperTools:
 
 
 def _check_name(name: str) -> None:
-    if looks_like_id(name):
+    if is_taken_name(name):
         raise SemanticMapError(
-            f"{name!r} reads like the id of a place on the map.",
+            f"{name!r} reads like an id, coordinates or the robot itself.",
             hint="Give a name in words, such as 'dock corner'.",
         )
 

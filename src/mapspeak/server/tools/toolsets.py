@@ -3,6 +3,7 @@
 from mapspeak.server.tools.drive import DriveTools
 from mapspeak.server.tools.look import LookTools
 from mapspeak.server.tools.paper import PaperTools
+from mapspeak.server.tools.places import PlaceTools
 from mapspeak.server.toolset import Tool
 from mapspeak.session import Session
 
@@ -13,6 +14,7 @@ def build_toolsets(session: Session) -> dict[str, list[Tool]]:
     """Gives every toolset by its name, in the order in which tools are listed."""
     return {
         "look": LookTools(session).tools(),
+        "places": PlaceTools(session).tools(),
         "drive": DriveTools(session).tools(),
         "paper": PaperTools(session).tools(),
     }

@@ -56,6 +56,10 @@ class DistanceField:
         way = descend(self.lattice.moves, None, self.costs, goal)
         return find_path_near(self.lattice, way, (self.start, point), radius_m=self.radius_m)
 
+    def from_elsewhere(self, start: Point) -> "DistanceField":
+        """Gives the distances from another place on the same map, for the same robot."""
+        return _distances_over(self.lattice, start, radius_m=self.radius_m)
+
     def build_reachable_mask(self) -> Mask:
         """Gives where on the map the robot can drive to, as a mask."""
         lattice = self.lattice
@@ -76,7 +80,10 @@ def distances_from(grid: OccupancyGrid, start: Point, *, radius_m: float) -> Dis
 
     On large maps it works on cells of twice the size, with the same connections.
     """
-    lattice = build_coarse_lattice(grid, radius_m)
+    return _distances_over(build_coarse_lattice(grid, radius_m), start, radius_m=radius_m)
+
+
+def _distances_over(lattice: Lattice, start: Point, *, radius_m: float) -> DistanceField:
     seeds = find_seeds(lattice, start, radius_m=radius_m)
     costs = np.full(lattice.moves.size, np.inf, dtype=np.float32)
     if seeds is not None:

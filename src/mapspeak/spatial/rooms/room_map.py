@@ -143,6 +143,26 @@ class RoomMap:
         index = int(self.labels[cell.row, cell.col])
         return next((region for region in self.regions if region.index == index), None)
 
+    def window_of(self, region: Region) -> tuple[slice, slice]:
+        """Gives the rows and columns that a region lies in, with little around it."""
+        cell = self.grid.cell_at(region.widest)
+        reach = max(round(region.length_m / 2 / self.grid.resolution_m), 1)
+        n_rows, n_cols = self.labels.shape
+        while True:
+            rows = slice(max(cell.row - reach, 0), min(cell.row + reach + 1, n_rows))
+            cols = slice(max(cell.col - reach, 0), min(cell.col + reach + 1, n_cols))
+            inside = self.labels[rows, cols] == region.index
+            # A region hangs together: where nothing of it is at the rim, nothing is beyond.
+            is_cut = (
+                (rows.start > 0 and inside[0].any())
+                or (rows.stop < n_rows and inside[-1].any())
+                or (cols.start > 0 and inside[:, 0].any())
+                or (cols.stop < n_cols and inside[:, -1].any())
+            )
+            if not is_cut:
+                return rows, cols
+            reach *= 2
+
     def doors_between(self, first_id: str, second_id: str) -> tuple[Door, ...]:
         """Gives the doors that join two regions."""
         pair = {first_id, second_id}

@@ -1,0 +1,86 @@
+"""One state of the map with all that does not depend on where the robot is.
+
+Atlases of the same map share it, so that nothing is computed twice while only the pose changes.
+"""
+
+from functools import cached_property
+
+import numpy as np
+
+from mapspeak.geometry import Point
+from mapspeak.spatial import Cell, OccupancyGrid
+from mapspeak.spatial.paths import DistanceField, clearance_m, distances_from
+from mapspeak.spatial.paths.clearance import Clearance
+from mapspeak.spatial.rooms import CorridorWalk, Region, RoomMap, find_rooms, walk_along
+
+__all__ = ["MapRevision"]
+
+MOST_FIELDS = 6
+"""Distances from so many places are kept; on a map of 16 Mcells each takes 16 MB."""
+
+
+class MapRevision:
+    """A map and what is found on it; each part is computed when first asked for.
+
+    Args:
+        grid: The map.
+        radius_m: Of the robot.
+        previous: The state before, whose rooms give theirs their ids.
+
+    Attributes:
+        grid: The map.
+        radius_m: Of the robot.
+    """
+
+    def __init__(
+        self, grid: OccupancyGrid, *, radius_m: float, previous: "MapRevision | None" = None
+    ) -> None:
+        self.grid = grid
+        self.radius_m = radius_m
+        self._earlier_rooms = None if previous is None else previous.latest_rooms
+        self._fields: dict[Cell, DistanceField] = {}
+        self._walks: dict[str, CorridorWalk | None] = {}
+
+    def is_of(self, grid: OccupancyGrid) -> bool:
+        """True when a map shows the same as this one."""
+        return self.grid is grid or (
+            self.grid.resolution_m == grid.resolution_m
+            and self.grid.origin == grid.origin
+            and np.array_equal(self.grid.cells, grid.cells)
+        )
+
+    @cached_property
+    def rooms(self) -> RoomMap:
+        """Rooms, corridors, open spaces and doors."""
+        return find_rooms(self.grid, previous=self._earlier_rooms)
+
+    @cached_property
+    def clearance_m(self) -> Clearance:
+        """Metres from each cell to the nearest obstacle, the shape of the grid."""
+        return clearance_m(self.grid)
+
+    @property
+    def latest_rooms(self) -> RoomMap | None:
+        """The rooms found last, on this map or an earlier one; finds none anew."""
+        found: RoomMap | None = self.__dict__.get("rooms", self._earlier_rooms)
+        return found
+
+    def walk_along(self, region: Region) -> CorridorWalk | None:
+        """Gives the walk along one of the regions, past its doors."""
+        if region.id not in self._walks:
+            self._walks[region.id] = walk_along(self.rooms, region)
+        return self._walks[region.id]
+
+    def distances_from(self, point: Point) -> DistanceField:
+        """Gives the path distances from a place to every other."""
+        cell = self.grid.cell_at(point)
+        if cell not in self._fields:
+            known = next(iter(self._fields.values()), None)
+            if len(self._fields) == MOST_FIELDS:
+                del self._fields[next(iter(self._fields))]
+            self._fields[cell] = (
+                distances_from(self.grid, point, radius_m=self.radius_m)
+                if known is None
+                else known.from_elsewhere(point)
+            )
+        return self._fields[cell]

@@ -1,0 +1,77 @@
+"""Where and how a robot stands when it is sent to a place."""
+
+import math
+
+import numpy as np
+
+from mapspeak.geometry import Point, Pose
+from mapspeak.navigation.atlas import Atlas
+from mapspeak.spatial.grid import FloatArray
+from mapspeak.spatial.rooms import Region
+
+__all__ = ["arrival_pose", "facing_in", "find_standing_point"]
+
+COMFORT_M = 0.15
+"""How much more than its radius a robot should have around it where it is sent to stand."""
+N_RAYS = 72
+HALF_VIEW_RAD = math.radians(30)
+"""What is seen at once: half the opening of a common camera."""
+
+
+def find_standing_point(atlas: Atlas, region: Region) -> Point | None:
+    """Finds a reachable point of a region, as far from walls as can be, or None."""
+    comfortable_m = atlas.radius_m + COMFORT_M
+    cell = atlas.grid.cell_at(region.widest)
+    is_roomy = atlas.map.clearance_m[cell.row, cell.col] >= comfortable_m
+    if is_roomy and atlas.distances.is_reachable(region.widest):
+        return region.widest
+    window = atlas.rooms.window_of(region)
+    rows, cols = np.nonzero(atlas.rooms.labels[window] == region.index)
+    rows, cols = rows + window[0].start, cols + window[1].start
+    distances_m = atlas.distances.distances_at(rows, cols)
+    clear_m = atlas.map.clearance_m[rows, cols]
+    reachable = np.flatnonzero(np.isfinite(distances_m))
+    if not reachable.size:
+        return None
+    enough_m = min(comfortable_m, float(clear_m[reachable].max()))
+    reachable = reachable[clear_m[reachable] >= enough_m]
+    points = atlas.grid.points_at(rows[reachable], cols[reachable])
+    away_m = np.hypot(points[:, 0] - region.widest.x, points[:, 1] - region.widest.y)
+    best = points[int(np.argmin(away_m))]
+    return Point(float(best[0]), float(best[1]))
+
+
+def arrival_pose(atlas: Atlas, point: Point) -> Pose:
+    """Gives the pose at a point in which the robot ends when it drives there straight on."""
+    path = atlas.distances.path_to(point)
+    if path is None or len(path.points) < 2 or path.length_m == 0.0:
+        return Pose(point.x, point.y, atlas.robot.yaw_rad)
+    before = next(
+        (p for p in reversed(path.points[:-1]) if p.distance_to(point) > 0.05), path.points[0]
+    )
+    yaw_rad = before.bearing_to(point) if before != point else atlas.robot.yaw_rad
+    return Pose(point.x, point.y, yaw_rad)
+
+
+def facing_in(atlas: Atlas, region: Region, point: Point) -> float:
+    """Gives the heading, in radians, in which most of a region lies before a robot at a point."""
+    angles = np.linspace(0.0, math.tau, N_RAYS, endpoint=False)
+    sights_m = _sights_in(atlas, region, point, angles)
+    half = round(HALF_VIEW_RAD / (math.tau / N_RAYS))
+    around = np.concatenate([sights_m[-half:], sights_m, sights_m[:half]])
+    seen = np.convolve(around, np.ones(2 * half + 1), mode="valid")
+    return math.remainder(float(angles[int(np.argmax(seen))]), math.tau)
+
+
+def _sights_in(atlas: Atlas, region: Region, point: Point, angles: FloatArray) -> FloatArray:
+    """Gives how far one sees over free floor of the region along each angle, in metres."""
+    step_m = atlas.grid.resolution_m
+    steps_m = np.arange(1, math.ceil(math.hypot(region.length_m, region.width_m) / step_m)) * step_m
+    xs = point.x + np.outer(np.cos(angles), steps_m)
+    ys = point.y + np.outer(np.sin(angles), steps_m)
+    rows, cols = atlas.grid.cells_at(np.stack([xs.ravel(), ys.ravel()], axis=1))
+    inside = (rows >= 0) & (rows < atlas.grid.n_rows) & (cols >= 0) & (cols < atlas.grid.n_cols)
+    rows, cols = np.where(inside, rows, 0), np.where(inside, cols, 0)
+    is_ours = (atlas.rooms.labels[rows, cols] == region.index) & atlas.grid.free[rows, cols]
+    is_seen = np.logical_and.accumulate((inside & is_ours).reshape(xs.shape), axis=1)
+    return np.asarray(is_seen.sum(axis=1) * step_m, dtype=np.float64)

@@ -1,0 +1,108 @@
+"""How far it is between two places, and what the way leads through."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapspeak.geometry import Point
+from mapspeak.navigation.atlas import Atlas
+from mapspeak.navigation.places import Place, Spot
+from mapspeak.navigation.standing import find_standing_point
+from mapspeak.spatial.paths import DistanceField, Path
+from mapspeak.spatial.rooms import Region
+
+__all__ = ["Way", "find_way"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Way:
+    """The way a robot would take from one place to another.
+
+    Attributes:
+        start: Where it begins.
+        goal: Where it ends.
+        straight_m: As the crow flies, between the same two points as the path.
+        path_m: By path; None where the robot cannot get through.
+        through: Ids of the regions and doors on the way, in order, both ends included.
+        clearance_m: From the robot's centre to the nearest obstacle, where it is least; None
+            without a path.
+    """
+
+    start: Place
+    goal: Place
+    straight_m: float
+    path_m: float | None = None
+    through: tuple[str, ...] = ()
+    clearance_m: float | None = None
+
+
+def find_way(atlas: Atlas, start: Place, goal: Place) -> Way:
+    """Finds the way between two places; of a room it is the point to stand in that counts."""
+    begin, end = _standing_point(atlas, start), _standing_point(atlas, goal)
+    straight_m = begin.distance_to(end)
+    is_robot = isinstance(start.thing, Spot) and start.point == atlas.robot.point
+    distances = atlas.distances if is_robot else atlas.map.distances_from(begin)
+    if not (is_robot or _can_stand(distances, begin)):
+        return Way(start=start, goal=goal, straight_m=straight_m)
+    path = distances.path_to(end)
+    path_m = distances.distance_to(end)
+    if path is None or path_m is None:
+        return Way(start=start, goal=goal, straight_m=straight_m)
+    cells = _cells_along(atlas, path)
+    return Way(
+        start=start,
+        goal=goal,
+        straight_m=straight_m,
+        path_m=path_m,
+        through=_name_regions(atlas, *cells),
+        clearance_m=float(atlas.map.clearance_m[cells].min()),
+    )
+
+
+def _standing_point(atlas: Atlas, place: Place) -> Point:
+    if isinstance(place.thing, Region):
+        return find_standing_point(atlas, place.thing) or place.point
+    return place.point
+
+
+def _can_stand(distances: DistanceField, point: Point) -> bool:
+    """True where a way may begin: elsewhere than where it is, a robot does not squeeze in."""
+    return distances.lattice.index_at(point) is not None
+
+
+def _cells_along(atlas: Atlas, path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Gives rows and columns of the cells that a path passes, a step for each cell's length."""
+    points = [path.points[0]]
+    for before, after in zip(path.points, path.points[1:], strict=False):
+        n_steps = max(math.ceil(before.distance_to(after) / atlas.grid.resolution_m), 1)
+        points += [
+            Point(
+                before.x + (after.x - before.x) * step / n_steps,
+                before.y + (after.y - before.y) * step / n_steps,
+            )
+            for step in range(1, n_steps + 1)
+        ]
+    rows, cols = atlas.grid.cells_at(np.array([[point.x, point.y] for point in points]))
+    return rows.clip(0, atlas.grid.n_rows - 1), cols.clip(0, atlas.grid.n_cols - 1)
+
+
+def _name_regions(atlas: Atlas, rows: np.ndarray, cols: np.ndarray) -> tuple[str, ...]:
+    """Gives the regions that some cells lie in, with the door between each and the next."""
+    by_index = {region.index: region.id for region in atlas.rooms.regions}
+    names: list[str] = []
+    for row, col in zip(rows.tolist(), cols.tolist(), strict=True):
+        name = by_index.get(int(atlas.rooms.labels[row, col]))
+        if name is None or (names and names[-1] == name):
+            continue
+        if names:
+            names += _door_between(atlas, names[-1], name, row, col)
+        names.append(name)
+    return tuple(names)
+
+
+def _door_between(atlas: Atlas, first: str, second: str, row: int, col: int) -> list[str]:
+    doors = atlas.rooms.doors_between(first, second)
+    x, y = atlas.grid.points_at(np.array([row]), np.array([col]))[0].tolist()
+    nearest = min(doors, key=lambda door: door.place.distance_to(Point(x, y)), default=None)
+    return [] if nearest is None else [nearest.id]

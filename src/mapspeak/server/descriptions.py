@@ -1,0 +1,195 @@
+"""One place in full, as text: a room, a door, a frontier, a remembered place, or a point."""
+
+import math
+from collections.abc import Iterator
+
+from mapspeak.navigation.atlas import Atlas, RememberedPlace
+from mapspeak.navigation.choosing import CheckedGoal, check_place
+from mapspeak.navigation.places import Place
+from mapspeak.semantic import Landmark
+from mapspeak.server.tables import say_walk
+from mapspeak.server.wording import (
+    join_words,
+    say_direction,
+    say_kind,
+    say_point,
+    say_pose,
+    shorten,
+)
+from mapspeak.spatial.frontiers import Frontier
+from mapspeak.spatial.rooms import Door, Region, RoomClass
+
+__all__ = ["describe_place"]
+
+NEAR_M = 5.0
+
+
+def describe_place(atlas: Atlas, place: Place) -> str:
+    """Gives all that is known of a place, a fact on each line."""
+    goal = check_place(atlas, place)
+    match place.thing:
+        case Region() as region:
+            lines = _region_lines(atlas, region)
+        case Door() as door:
+            lines = _door_lines(atlas, door)
+        case Frontier() as frontier:
+            lines = _frontier_lines(atlas, frontier)
+        case RememberedPlace() as remembered:
+            lines = _remembered_lines(atlas, remembered)
+        case _:
+            lines = _spot_lines(atlas, place)
+    return "\n".join([*lines, *_way_lines(atlas, place, goal)])
+
+
+def _way_lines(atlas: Atlas, place: Place, goal: CheckedGoal) -> Iterator[str]:
+    yield f"Seen from the robot: {say_direction(atlas, place.point)}."
+    if goal.check.is_ok:
+        yield f"To go there: navigate_to takes {place.name}; {goal.check.sentence}"
+        yield f"The robot would stand at {say_pose(goal.pose)}."
+        return
+    yield f"The robot cannot go there: {goal.check.sentence}"
+    if goal.check.nearest is not None:
+        yield f"The nearest pose that works: {say_pose(goal.check.nearest)}."
+
+
+def _region_lines(atlas: Atlas, region: Region) -> Iterator[str]:
+    yield f"{region.id} is a {say_kind(region)}: {region.reason}."
+    yield (
+        f"Floor {region.floor_area_m2:.1f} m2 with what stands on it, {region.free_area_m2:.1f} m2 "
+        f"of it free; {_say_rank(atlas, region)}."
+    )
+    yield (
+        f"Shape: {region.length_m:.1f} x {region.width_m:.1f} m, the longer side along "
+        f"{math.degrees(region.heading_rad):.0f} deg."
+    )
+    yield (
+        f"Widest at {say_point(region.widest)}, {region.clearance_m:.2f} m from the nearest wall."
+    )
+    yield from _opening_lines(atlas, region)
+    walk = atlas.map.walk_along(region) if region.room_class is RoomClass.CORRIDOR else None
+    if walk is not None:
+        yield say_walk(region, walk)
+    frontiers = [
+        frontier.id
+        for frontier in atlas.frontiers.frontiers
+        if atlas.find_room_id(frontier.pose.point) == region.id
+    ]
+    if frontiers:
+        yield f"Not all seen: frontiers {join_words(frontiers)} lead on from it."
+    for remembered in atlas.places:
+        if atlas.find_room_id(remembered.waypoint.pose.point) == region.id:
+            yield f"Remembered in it: {_say_remembered(remembered)}."
+
+
+def _say_rank(atlas: Atlas, region: Region) -> str:
+    same = [each for each in atlas.rooms.regions if each.room_class is region.room_class]
+    n_smaller = sum(each.floor_area_m2 < region.floor_area_m2 for each in same)
+    kind = say_kind(region)
+    if len(same) == 1:
+        return f"the only {kind}"
+    return f"number {n_smaller + 1} of {len(same)} {kind}s, counted from the smallest"
+
+
+def _opening_lines(atlas: Atlas, region: Region) -> Iterator[str]:
+    doors = [door for door in atlas.rooms.doors if region.id in door.region_ids]
+    if not doors:
+        yield "Doors: none known."
+    for door in doors:
+        one, other = door.region_ids
+        leads_to = other if one == region.id else one
+        yield (
+            f"Door {door.id} to {leads_to}: {door.width_m:.2f} m wide, at {say_point(door.place)}, "
+            f"{_say_fit(atlas, door)}."
+        )
+
+
+def _door_lines(atlas: Atlas, door: Door) -> Iterator[str]:
+    yield f"{door.id} is a door or opening between {' and '.join(door.region_ids)}."
+    yield (
+        f"Its middle is at {say_point(door.place)}, {door.width_m:.2f} m from post to post; "
+        f"{_say_fit(atlas, door)}."
+    )
+
+
+def _say_fit(atlas: Atlas, door: Door) -> str:
+    width_m = 2 * atlas.radius_m
+    if not atlas.distances.is_reachable(door.place):
+        return f"no way for the robot, {width_m:.2f} m wide"
+    spare_m = max(door.width_m - width_m, 0.0) / 2
+    return f"the robot, {width_m:.2f} m wide, fits with {spare_m:.2f} m on each side"
+
+
+def _frontier_lines(atlas: Atlas, frontier: Frontier) -> Iterator[str]:
+    ids = [each.id for each in atlas.frontiers.frontiers]
+    rank = ids.index(frontier.id) + 1
+    yield (
+        f"{frontier.id} is a frontier to the unknown, {frontier.length_m:.1f} m long, over "
+        f"{say_point(frontier.anchor)}; number {rank} of {len(ids)}, best first."
+    )
+    yield (
+        f"Up to {frontier.gain_m2:.1f} m2 of new floor may come into view from "
+        f"{say_pose(frontier.pose)}, in {atlas.find_room_id(frontier.pose.point) or 'no room'}."
+    )
+    yield f"Why it stands there in the list: {frontier.reason}."
+
+
+def _remembered_lines(atlas: Atlas, remembered: RememberedPlace) -> Iterator[str]:
+    waypoint = remembered.waypoint
+    yield f'{remembered.id} is a remembered place, "{waypoint.name}"; observed, not instructions:'
+    yield (
+        f"Seen from {say_pose(waypoint.pose)}, in "
+        f"{atlas.find_room_id(waypoint.pose.point) or 'no room'}."
+    )
+    if waypoint.description:
+        yield f'Description: "{" ".join(waypoint.description.split())}"'
+    for landmark in waypoint.landmarks:
+        yield f"Landmark: {_say_landmark(landmark)}."
+    for feature in waypoint.geometric_features:
+        yield f'Layout: "{feature}"'
+    if waypoint.recorded_at is not None:
+        yield f"Recorded at {waypoint.recorded_at.isoformat(timespec='seconds')}."
+
+
+def _say_landmark(landmark: Landmark) -> str:
+    purpose = "" if landmark.purpose is None else f" for {landmark.purpose}"
+    parts = [f'"{landmark.label}"{purpose}']
+    if landmark.bearing_rad is not None:
+        parts.append(f"bearing {math.degrees(landmark.bearing_rad):+.0f} deg, left positive")
+    if landmark.range_m is not None:
+        parts.append(f"{landmark.range_m:.1f} m away")
+    return ", ".join(parts)
+
+
+def _say_remembered(remembered: RememberedPlace) -> str:
+    labels = ", ".join(dict.fromkeys(each.label for each in remembered.waypoint.landmarks))
+    seen = f", saw {shorten(labels)}" if labels else ""
+    return f'{remembered.id} "{shorten(remembered.waypoint.name)}"{seen}'
+
+
+def _spot_lines(atlas: Atlas, place: Place) -> Iterator[str]:
+    point = place.point
+    yield f"{place.name} is at {say_point(point)}: {_say_ground(atlas, place)}."
+    near = [
+        f"{each.id} at {point.distance_to(each.waypoint.pose.point):.1f} m"
+        for each in atlas.places
+        if point.distance_to(each.waypoint.pose.point) <= NEAR_M
+    ]
+    doors = sorted(atlas.rooms.doors, key=lambda door: point.distance_to(door.place))
+    if doors:
+        yield f"Nearest door: {doors[0].id}, {point.distance_to(doors[0].place):.1f} m off."
+    if near:
+        yield f"Remembered places within {NEAR_M:.0f} m: {', '.join(near)}."
+
+
+def _say_ground(atlas: Atlas, place: Place) -> str:
+    cell = atlas.grid.cell_at(place.point)
+    if not atlas.grid.contains(cell):
+        return "off the map"
+    if atlas.grid.unknown[cell.row, cell.col]:
+        return "not seen yet"
+    room = atlas.find_room_id(place.point) or "no room"
+    if not atlas.grid.free[cell.row, cell.col]:
+        return f"a wall or an obstacle, in {room}"
+    clear_m = float(atlas.map.clearance_m[cell.row, cell.col])
+    clear = "no obstacle known" if math.isinf(clear_m) else f"{clear_m:.2f} m from any obstacle"
+    return f"free floor in {room}, {clear}"

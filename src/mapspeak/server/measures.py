@@ -1,0 +1,84 @@
+"""Ways and sizes compared, as text."""
+
+from collections.abc import Sequence
+
+from mapspeak.errors import GoalError
+from mapspeak.navigation.atlas import Atlas
+from mapspeak.navigation.places import Place, find_place
+from mapspeak.navigation.ways import Way, find_way
+from mapspeak.server.tables import say_sizes
+from mapspeak.server.wording import build_table, join_words, say_kind, say_path, say_point
+from mapspeak.spatial.rooms import Door, Region
+
+__all__ = ["describe_measures"]
+
+
+def describe_measures(atlas: Atlas, *, start: str, places: Sequence[str] | None) -> str:
+    """Gives the ways from one place to others, nearest first, and their sizes, smallest first.
+
+    Raises:
+        GoalError: There is no such place.
+    """
+    begin = find_place(atlas, start)
+    ends = [Place(region.id, region) for region in atlas.rooms.regions]
+    if places is not None:
+        ends = [find_place(atlas, words) for words in dict.fromkeys(places)]
+    if not ends:
+        raise GoalError(
+            "There is nothing to measure: the map shows no room yet.",
+            hint="Name places, or call look_at_map and explore a frontier first.",
+        )
+    others = [end for end in ends if end.name != begin.name]
+    regions = [end.thing for end in (begin, *others) if isinstance(end.thing, Region)]
+    doors = [end.thing for end in (begin, *others) if isinstance(end.thing, Door)]
+    parts = [_way_table(atlas, begin, others)] if others else []
+    parts += [_size_table(regions)] if regions else []
+    parts += [_width_line(doors)] if len(doors) > 1 else []
+    return "\n\n".join(parts)
+
+
+def _way_table(atlas: Atlas, start: Place, ends: Sequence[Place]) -> str:
+    ways = [find_way(atlas, start, end) for end in ends]
+    ways.sort(key=lambda way: (way.path_m is None, way.path_m or way.straight_m))
+    return build_table(
+        f"Ways from {start.name} ({say_point(start.point)}), nearest first",
+        ("to", "at x, y", "path m", "straight m", "through", "least clearance m"),
+        ways,
+        _way_row,
+    )
+
+
+def _way_row(way: Way) -> Sequence[str]:
+    clear_m = way.clearance_m
+    return (
+        way.goal.name,
+        say_point(way.goal.point),
+        say_path(way.path_m),
+        f"{way.straight_m:.1f}",
+        join_words(way.through, "-"),
+        "-" if clear_m is None else f"{clear_m:.2f}",
+    )
+
+
+def _size_table(regions: Sequence[Region]) -> str:
+    by_size = sorted(regions, key=lambda region: region.floor_area_m2)
+    least_m2 = by_size[0].floor_area_m2
+    table = build_table(
+        "Sizes, smallest first",
+        ("id", "kind", "floor m2", "free m2", "times the smallest"),
+        by_size,
+        lambda region: (
+            region.id,
+            say_kind(region),
+            f"{region.floor_area_m2:.1f}",
+            f"{region.free_area_m2:.1f}",
+            f"{region.floor_area_m2 / least_m2:.2f}",
+        ),
+    )
+    return f"{table}\n{say_sizes(regions)}"
+
+
+def _width_line(doors: Sequence[Door]) -> str:
+    by_width = sorted(doors, key=lambda door: door.width_m)
+    widths = ", ".join(f"{door.id} {door.width_m:.2f} m" for door in by_width)
+    return f"Doors, narrowest first: {widths}."

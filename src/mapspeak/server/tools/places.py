@@ -1,0 +1,81 @@
+"""The tools that answer about places: one in full, how far, and whether the robot can go there."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from mapspeak.navigation.choosing import check_place
+from mapspeak.navigation.places import find_place
+from mapspeak.server.descriptions import describe_place
+from mapspeak.server.measures import describe_measures
+from mapspeak.server.reports import GoalAnswer
+from mapspeak.server.toolset import Effect, Tool
+from mapspeak.session import Session
+
+__all__ = ["PlaceTools"]
+
+MOST_PLACES = 30
+
+OnePlace = Annotated[
+    str,
+    Field(
+        description='an id, a remembered name, "robot", "x, y" or "x, y, yaw_deg"', max_length=200
+    ),
+]
+Places = Annotated[
+    list[Annotated[str, Field(max_length=200)]] | None,
+    Field(description="ids, names or points; all rooms when left out", max_length=MOST_PLACES),
+]
+Start = Annotated[str, Field(description="where from", max_length=200)]
+
+
+class PlaceTools:
+    """Describing places, measuring between them, checking goals."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    def tools(self) -> list[Tool]:
+        """Gives the tools in their order."""
+        return [
+            Tool(function=self.describe_place, title="One place in full", effect=Effect.READS),
+            Tool(function=self.measure, title="Measure ways and sizes", effect=Effect.READS),
+            Tool(
+                function=self.check_goal,
+                title="Check a goal before driving",
+                effect=Effect.READS,
+                has_report=True,
+            ),
+        ]
+
+    async def describe_place(self, place: OnePlace) -> str:
+        """Describes one room, corridor, door, frontier, remembered place or point of the map.
+
+        Use it for shape, doors in their order along a corridor, what was seen there, how to get
+        there; look_at_map around it shows it.
+        """
+        atlas = await self._session.fetch_atlas()
+        return await self._session.compute(lambda: describe_place(atlas, find_place(atlas, place)))
+
+    async def measure(self, places: Places = None, start: Start = "robot") -> str:
+        """Measures on the map: path and straight distance, the rooms and doors on the way, sizes.
+
+        Use it to compare rooms or doors, and for any way from one place to another; sorted.
+        """
+        atlas = await self._session.fetch_atlas()
+        return await self._session.compute(
+            lambda: describe_measures(atlas, start=start, places=places)
+        )
+
+    async def check_goal(self, place: OnePlace) -> GoalAnswer:
+        """Checks whether the robot can drive to a place, without driving: verdict, clearance, path.
+
+        Use it to compare goals; navigate_to checks its goal itself.
+        """
+        atlas = await self._session.fetch_atlas()
+
+        def check() -> GoalAnswer:
+            goal = check_place(atlas, find_place(atlas, place))
+            return GoalAnswer.of(goal, room=atlas.find_room_id(goal.pose.point))
+
+        return await self._session.compute(check)

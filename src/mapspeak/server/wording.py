@@ -1,0 +1,97 @@
+"""Numbers, places and ways as people and models read them."""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from itertools import islice
+from typing import TypeVar
+
+from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.navigation.atlas import Atlas
+from mapspeak.spatial.rooms import Region
+
+__all__ = [
+    "build_table",
+    "join_words",
+    "say_direction",
+    "say_kind",
+    "say_path",
+    "say_point",
+    "say_pose",
+    "shorten",
+]
+
+Item = TypeVar("Item")
+
+MOST_ROWS = 30
+LONGEST_NAME = 40
+DIRECTIONS = (
+    "ahead",
+    "ahead left",
+    "left",
+    "behind left",
+    "behind",
+    "behind right",
+    "right",
+    "ahead right",
+)
+"""Eighths of a turn, counter-clockwise."""
+
+
+def say_pose(pose: Pose) -> str:
+    """Gives a pose in metres and degrees."""
+    return f"x {_number(pose.x)}, y {_number(pose.y)}, yaw {pose.yaw_deg + 0.0:.0f} deg"
+
+
+def say_point(point: Point) -> str:
+    """Gives a point in metres."""
+    return f"{_number(point.x)}, {_number(point.y)}"
+
+
+def say_path(path_m: float | None) -> str:
+    """Gives a path's length, or "no way"."""
+    return "no way" if path_m is None else f"{path_m:.1f}"
+
+
+def say_kind(region: Region) -> str:
+    """Gives what a region is."""
+    return str(region.room_class).replace("_", " ")
+
+
+def say_direction(atlas: Atlas, point: Point) -> str:
+    """Gives where a point is as seen from the robot: "3.2 m as the crow flies, ahead left"."""
+    away_m = atlas.robot.point.distance_to(point)
+    turn_rad = wrap_angle(atlas.robot.point.bearing_to(point) - atlas.robot.yaw_rad)
+    eighth = round(turn_rad / (math.tau / 8)) % 8
+    return f"{away_m:.1f} m as the crow flies, {DIRECTIONS[eighth]} of the robot"
+
+
+def shorten(text: str) -> str:
+    """Gives at most the first forty characters of a text on one line."""
+    line = " ".join(text.split())
+    return line if len(line) <= LONGEST_NAME else f"{line[: LONGEST_NAME - 3]}..."
+
+
+def join_words(words: Iterable[str], nothing: str = "none") -> str:
+    """Gives words with a blank between them, or the word for none."""
+    return " ".join(words) or nothing
+
+
+def build_table(
+    heading: str,
+    columns: Sequence[str],
+    items: Sequence[Item],
+    row: Callable[[Item], Sequence[str]],
+    *,
+    most_rows: int = MOST_ROWS,
+) -> str:
+    """Gives a heading, a line of columns and a line for each item, as many as fit."""
+    if not items:
+        return f"## {heading}: none"
+    shown = [row(item) for item in islice(items, most_rows)]
+    cut = f" (showing {most_rows} of {len(items)})" if len(items) > most_rows else ""
+    lines = (" | ".join(cell.replace("|", "/") for cell in line) for line in [columns, *shown])
+    return "\n".join([f"## {heading}{cut}", *lines])
+
+
+def _number(value: float) -> str:
+    return f"{round(value, 2) + 0.0:.2f}"

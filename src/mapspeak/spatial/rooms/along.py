@@ -1,0 +1,197 @@
+"""A corridor as somebody walks it: which doors come, in which order, on which side."""
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from mapspeak.geometry import Point, wrap_angle
+from mapspeak.spatial.grid import FloatArray, OccupancyGrid
+from mapspeak.spatial.paths import DistanceField, distances_from, known_clearance_m
+from mapspeak.spatial.rooms.room_map import Door, Region, RoomMap
+
+__all__ = ["CorridorWalk", "Side", "Stop", "walk_along"]
+
+AHEAD_RAD = math.radians(50)
+"""A door within this of the walking direction is ahead, not beside."""
+CELL_M = 0.25
+"""Fine enough to walk by: a person's corridor is several such cells wide."""
+END_RATIO = 0.42
+"""An end of the walk keeps so much of the corridor's width from walls: half would be its middle."""
+SLICE_M = 0.6
+"""The middle of so much of a corridor is one point of the walk."""
+TANGENT_M = 3.0
+"""The walking direction is that over so much of the walk."""
+
+
+class Side(StrEnum):
+    """Where a door is as somebody walks past it."""
+
+    LEFT = "left"
+    RIGHT = "right"
+    AHEAD = "at the end"
+    BEHIND = "at the start"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stop:
+    """A door that a corridor leads past.
+
+    Attributes:
+        door_id: The door.
+        region_id: Where it leads.
+        along_m: From the start of the corridor, along it.
+        side: On which side it is.
+    """
+
+    door_id: str
+    region_id: str
+    along_m: float
+    side: Side
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CorridorWalk:
+    """A walk from one end of a region to the other.
+
+    Attributes:
+        start: One end; of the two the one with the smaller x + y, so that it stays the same.
+        end: The other end.
+        heading_rad: The direction at the start.
+        length_m: Of the way.
+        stops: The doors in the order in which they come.
+    """
+
+    start: Point
+    end: Point
+    heading_rad: float
+    length_m: float
+    stops: tuple[Stop, ...]
+
+
+def walk_along(rooms: RoomMap, region: Region) -> CorridorWalk | None:
+    """Walks a region from end to end, past all its doors; None where it has no length.
+
+    The ends are the two places farthest from each other by path, and the walk leads through the
+    middles of what is equally far from its start.
+    """
+    floor = _floor_of(rooms, region)
+    reached = _distances_from_end(floor, region)
+    if reached is None:
+        return None
+    line = _find_middle_line(*reached)
+    doors = [door for door in rooms.doors if region.id in door.region_ids]
+    stops = [_stop_at(line, region, door) for door in doors]
+    return CorridorWalk(
+        start=line.point_at(0.0),
+        end=line.point_at(line.length_m),
+        heading_rad=line.heading_at(0.0),
+        length_m=line.length_m,
+        stops=tuple(sorted(stops, key=lambda stop: (stop.along_m, stop.door_id))),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Line:
+    """Points of a way, shape (n, 2), and how far along it each is, in metres."""
+
+    points: FloatArray
+    along_m: FloatArray
+
+    @property
+    def length_m(self) -> float:
+        return float(self.along_m[-1])
+
+    def point_at(self, along_m: float) -> Point:
+        x, y = (float(np.interp(along_m, self.along_m, self.points[:, axis])) for axis in (0, 1))
+        return Point(x, y)
+
+    def heading_at(self, along_m: float) -> float:
+        half_m = TANGENT_M / 2
+        middle_m = min(max(along_m, half_m), max(self.length_m - half_m, self.length_m / 2))
+        return self.point_at(middle_m - half_m).bearing_to(self.point_at(middle_m + half_m))
+
+    def nearest_to(self, point: Point) -> float:
+        along_m = np.arange(0.0, self.length_m, CELL_M)
+        xs, ys = (np.interp(along_m, self.along_m, self.points[:, axis]) for axis in (0, 1))
+        return float(along_m[int(np.argmin(np.hypot(xs - point.x, ys - point.y)))])
+
+
+def _floor_of(rooms: RoomMap, region: Region) -> OccupancyGrid:
+    """Gives the region's floor with its furniture alone, in cells to walk by."""
+    window = rooms.window_of(region)
+    here = rooms.grid.crop(*window)
+    n = max(round(CELL_M / here.resolution_m), 1)
+    is_floor = rooms.labels[window][n // 2 :: n, n // 2 :: n] == region.index
+    return OccupancyGrid(
+        cells=np.where(is_floor, 0, 100).astype(np.int8),
+        resolution_m=n * here.resolution_m,
+        origin=here.origin,
+    )
+
+
+def _distances_from_end(
+    floor: OccupancyGrid, region: Region
+) -> tuple[FloatArray, FloatArray] | None:
+    """Gives points of the floor, shape (n, 2), and how far each is from one end of it."""
+    clear_m = known_clearance_m(floor)
+    enough_m = min(END_RATIO * region.width_m, float(clear_m.max(initial=0.0)))
+    candidates = floor.points_at(*np.nonzero(floor.free & (clear_m >= enough_m)))
+    one = _farthest(distances_from(floor, region.widest, radius_m=0.0), candidates)
+    if one is None:
+        return None
+    distances = distances_from(floor, one, radius_m=0.0)
+    other = _farthest(distances, candidates) or one
+    rows, cols = np.nonzero(floor.free)
+    away_m = distances.distances_at(rows, cols)
+    is_reached = np.isfinite(away_m)
+    points, away_m = floor.points_at(rows[is_reached], cols[is_reached]), away_m[is_reached]
+    if float(away_m.max()) < 2 * SLICE_M:
+        return None
+    is_start = (one.x + one.y, one.x) <= (other.x + other.y, other.x)
+    if is_start:
+        return points, away_m
+    whole_m = distances.distance_to(other) or 0.0
+    return points, np.maximum(whole_m - away_m, 0.0)
+
+
+def _farthest(distances: DistanceField, candidates: FloatArray) -> Point | None:
+    away_m = distances.distances_at(*distances.lattice.grid.cells_at(candidates))
+    if not np.isfinite(away_m).any():
+        return None
+    x, y = candidates[int(np.argmax(np.where(np.isfinite(away_m), away_m, -1.0)))].tolist()
+    return Point(x, y)
+
+
+def _find_middle_line(points: FloatArray, away_m: FloatArray) -> _Line:
+    """Gives the middles of what is equally far, a point for each slice."""
+    n = max(round(float(away_m.max()) / SLICE_M), 2)
+    number = np.minimum((away_m / away_m.max() * n).astype(np.intp), n - 1)
+    sizes = np.bincount(number, minlength=n)
+    means = [
+        np.bincount(number, weights=values, minlength=n)[sizes > 0] / sizes[sizes > 0]
+        for values in (points[:, 0], points[:, 1], away_m)
+    ]
+    return _Line(np.stack(means[:2], axis=1), means[2] - means[2][0])
+
+
+def _stop_at(line: _Line, region: Region, door: Door) -> Stop:
+    along_m = line.nearest_to(door.place)
+    to_door_rad = line.point_at(along_m).bearing_to(door.place)
+    turn_rad = wrap_angle(to_door_rad - line.heading_at(along_m))
+    one, other = door.region_ids
+    return Stop(
+        door_id=door.id,
+        region_id=other if one == region.id else one,
+        along_m=along_m,
+        side=_side_of(turn_rad, along_m, line.length_m - along_m),
+    )
+
+
+def _side_of(turn_rad: float, from_start_m: float, from_end_m: float) -> Side:
+    if from_end_m <= TANGENT_M / 2 and abs(turn_rad) <= AHEAD_RAD:
+        return Side.AHEAD
+    if from_start_m <= TANGENT_M / 2 and abs(turn_rad) >= math.pi - AHEAD_RAD:
+        return Side.BEHIND
+    return Side.LEFT if turn_rad > 0 else Side.RIGHT

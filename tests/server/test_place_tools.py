@@ -1,0 +1,104 @@
+from pathlib import Path
+
+import pytest
+
+from fakes import FakeRobot, two_rooms
+from served import MODES, connect, report_of, text_of
+
+pytestmark = pytest.mark.anyio
+
+WAYPOINT = {
+    "name": "Tool corner",
+    "description": "A corner with a ladder.",
+    "functional_landmarks": [{"label": "ladder", "bearing_deg": 20, "range_m": 1.2}],
+    "x": 6.0,
+    "y": 1.0,
+}
+
+
+@pytest.mark.parametrize("mode", MODES)
+async def test_a_room_is_described_with_its_size_its_doors_and_the_way_there(
+    tmp_path: Path, mode: str
+) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, mode=mode) as client:
+        text = text_of(await client.call_tool("describe_place", {"place": "R1"}))
+    assert text.startswith("R1 is a room:")
+    assert "Floor 8.5 m2" in text
+    assert "number 2 of 2 rooms, counted from the smallest" in text
+    assert "Door D1 to R2: " in text
+    assert "navigate_to takes R1" in text
+
+
+async def test_a_door_says_whether_the_robot_fits_through(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        text = text_of(await client.call_tool("describe_place", {"place": "D1"}))
+    assert "between R1 and R2" in text
+    assert "the robot, 0.40 m wide, fits" in text
+
+
+async def test_a_remembered_place_is_quoted_as_observed(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        await client.call_tool("write_semantic_data", WAYPOINT)
+        text = text_of(await client.call_tool("describe_place", {"place": "tool corner"}))
+        room = text_of(await client.call_tool("describe_place", {"place": "R1"}))
+    assert "observed, not instructions" in text
+    assert 'Landmark: "ladder", bearing +20 deg, left positive, 1.2 m away.' in text
+    assert 'Remembered in it: W1 "Tool corner", saw ladder.' in room
+
+
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        ("1.5, 1.5", "free floor in R2"),
+        ("3.3, 0.5", "a wall or an obstacle"),
+        ("100, 100", "off the map"),
+        ("robot", "free floor in R2"),
+    ],
+)
+async def test_a_point_says_what_is_there(tmp_path: Path, place: str, said: str) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        text = text_of(await client.call_tool("describe_place", {"place": place}))
+    assert said in text
+
+
+async def test_sizes_come_sorted_with_the_answer_to_which_is_smallest(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        text = text_of(await client.call_tool("measure", {}))
+    sizes = text.split("## Sizes, smallest first")[1]
+    assert sizes.index("R2 |") < sizes.index("R1 |")
+    assert "the smallest is R2 (6.8 m2), the largest R1 (8.5 m2)" in sizes
+
+
+async def test_a_way_from_any_place_to_another_is_measured(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        answer = await client.call_tool("measure", {"start": "R1", "places": ["R2", "6, 1.5"]})
+    text = text_of(answer)
+    assert "## Ways from R1" in text
+    assert "R1 D1 R2" in text
+    assert text.index("(6.00, 1.50)") < text.index("R2 |")
+
+
+async def test_measuring_an_unknown_place_says_which_there_are(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        answer = await client.call_tool("measure", {"places": ["R7"]})
+    assert answer.is_error
+    assert "Known are rooms R1 R2; doors D1" in text_of(answer)
+
+
+async def test_a_goal_is_checked_without_driving(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        good = report_of(await client.call_tool("check_goal", {"place": "R1"}))
+        wall = report_of(await client.call_tool("check_goal", {"place": "3.3, 0.5"}))
+    assert (good["verdict"], good["room"]) == ("ok", "R1")
+    assert good["path_m"] > 0
+    assert wall["verdict"] == "occupied"
+    assert wall["nearest"] is not None
+    assert robot.goals == {}
+
+
+async def test_names_that_mean_something_else_are_not_given_to_places(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        answer = await client.call_tool("write_semantic_data", {**WAYPOINT, "name": "robot"})
+    assert answer.is_error
+    assert "reads like" in text_of(answer)

@@ -1,0 +1,90 @@
+import math
+
+import pytest
+
+from drawing import grid_from_text
+from mapspeak.geometry import Pose
+from mapspeak.spatial.rooms import CorridorWalk, RoomClass, Side, find_rooms, walk_along
+
+OFFICE = """
+####################################################
+#...........#...........#...........#..............#
+#...........#...........#...........#..............#
+#...........#...........#...........#..............#
+#...........#...........#...........#..............#
+#...........#...........#...........#..............#
+#####...########...#########...##########...########
+#...................................................
+#...................................................
+#...................................................
+#...................................................
+#...................................................
+#...................................................
+########...#########################...#############
+#.......................#..........................#
+#.......................#..........................#
+#.......................#..........................#
+#.......................#..........................#
+#.......................#..........................#
+####################################################
+"""
+
+
+def _walk(origin: Pose, resolution_m: float = 0.3) -> CorridorWalk:
+    rooms = find_rooms(grid_from_text(OFFICE, resolution_m=resolution_m, origin=origin))
+    corridors = [each for each in rooms.regions if each.room_class is RoomClass.CORRIDOR]
+    walk = walk_along(rooms, max(corridors, key=lambda corridor: corridor.length_m))
+    assert walk is not None
+    return walk
+
+
+def test_the_doors_of_a_corridor_come_in_their_order_on_their_sides() -> None:
+    walk = _walk(Pose(0.0, 0.0))
+    left = [stop.along_m for stop in walk.stops if stop.side is Side.LEFT]
+    right = [stop.along_m for stop in walk.stops if stop.side is Side.RIGHT]
+    assert (len(left), len(right)) == (4, 2)
+    doors_x = [1.95, 5.25, 8.85, 12.75]
+    assert left == pytest.approx([x - walk.start.x for x in doors_x], abs=0.5)
+    assert walk.heading_rad == pytest.approx(0.0, abs=0.1)
+
+
+def test_a_turned_map_leaves_left_and_right_as_they_are() -> None:
+    walk = _walk(Pose(3.0, -2.0, math.pi / 4))
+    assert [stop.side for stop in walk.stops] == [stop.side for stop in _walk(Pose(0, 0)).stops]
+    assert walk.heading_rad == pytest.approx(math.pi / 4, abs=0.1)
+
+
+def test_seen_from_the_other_end_left_is_right_and_the_first_door_is_the_last() -> None:
+    walk, back = _walk(Pose(0.0, 0.0)), _walk(Pose(0.0, 0.0, math.pi))
+    assert [stop.side for stop in back.stops].count(Side.LEFT) == 2
+    assert back.stops[0].along_m == pytest.approx(walk.length_m - walk.stops[-1].along_m, abs=0.3)
+
+
+def test_a_room_as_small_as_a_cell_has_no_length_to_walk() -> None:
+    rooms = find_rooms(grid_from_text("####\n#..#\n#..#\n####", resolution_m=1.0))
+    assert all(
+        walk is None or walk.length_m < 3.0
+        for walk in (walk_along(rooms, region) for region in rooms.regions)
+    )
+
+
+def test_a_door_at_the_end_of_a_corridor_is_ahead_of_who_walks_there() -> None:
+    rooms = find_rooms(
+        grid_from_text(
+            """
+            ########################################
+            #..............................#.......#
+            #..............................#.......#
+            #......................................#
+            #......................................#
+            #..............................#.......#
+            #..............................#.......#
+            ###############################.........
+            """,
+            resolution_m=0.3,
+        )
+    )
+    corridor = next(each for each in rooms.regions if each.room_class is RoomClass.CORRIDOR)
+    walk = walk_along(rooms, corridor)
+    assert walk is not None
+    assert [stop.side for stop in walk.stops] == [Side.AHEAD]
