@@ -8,7 +8,7 @@ from typing import TypeVar
 import anyio
 import anyio.to_thread
 
-from mapspeak.errors import SemanticMapError
+from mapspeak.errors import MapError, SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.choosing import CheckedGoal, choose_goal
@@ -59,9 +59,19 @@ class Session:
         return await anyio.to_thread.run_sync(work)
 
     async def fetch_atlas(self) -> Atlas:
-        """Gives the map as it is now, with everything on it under its id."""
+        """Gives the map as it is now, with everything on it under its id.
+
+        Raises:
+            MapError: The robot's map has no cells.
+            LinkError: The robot has no map yet.
+        """
         async with self._surveying:
             grid = await self.robot.fetch_map()
+            if not grid.cells.size:
+                raise MapError(
+                    f"The robot's map has no cells: {grid.n_cols} x {grid.n_rows}.",
+                    hint="Wait until SLAM or the map server has sent one, then look again.",
+                )
             stamped = await self.robot.fetch_pose()
             memory = await self.compute(self._recall)
             self._atlas = Atlas(

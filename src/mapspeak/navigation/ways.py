@@ -12,7 +12,7 @@ from mapspeak.navigation.standing import find_standing_point
 from mapspeak.spatial.paths import DistanceField, Path
 from mapspeak.spatial.rooms import Region
 
-__all__ = ["Way", "find_way"]
+__all__ = ["Way", "find_way", "measure_path"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,16 +37,19 @@ class Way:
     clearance_m: float | None = None
 
 
+def measure_path(atlas: Atlas, start: Place, goal: Place) -> float | None:
+    """Gives the metres by path between two places; None where the robot cannot get through."""
+    distances = _distances_from(atlas, start)
+    return None if distances is None else distances.distance_to(_standing_point(atlas, goal))
+
+
 def find_way(atlas: Atlas, start: Place, goal: Place) -> Way:
     """Finds the way between two places; of a room it is the point to stand in that counts."""
     begin, end = _standing_point(atlas, start), _standing_point(atlas, goal)
     straight_m = begin.distance_to(end)
-    is_robot = isinstance(start.thing, Spot) and start.point == atlas.robot.point
-    distances = atlas.distances if is_robot else atlas.map.distances_from(begin)
-    if not (is_robot or _can_stand(distances, begin)):
-        return Way(start=start, goal=goal, straight_m=straight_m)
-    path = distances.path_to(end)
-    path_m = distances.distance_to(end)
+    distances = _distances_from(atlas, start)
+    path = None if distances is None else distances.path_to(end)
+    path_m = None if distances is None else distances.distance_to(end)
     if path is None or path_m is None:
         return Way(start=start, goal=goal, straight_m=straight_m)
     cells = _cells_along(atlas, path)
@@ -60,15 +63,22 @@ def find_way(atlas: Atlas, start: Place, goal: Place) -> Way:
     )
 
 
+def _distances_from(atlas: Atlas, start: Place) -> DistanceField | None:
+    """Gives the distances from a place; None where no way begins.
+
+    Elsewhere than where it is, a robot cannot squeeze out of a place that is too tight for it.
+    """
+    if isinstance(start.thing, Spot) and start.point == atlas.robot.point:
+        return atlas.distances
+    begin = _standing_point(atlas, start)
+    distances = atlas.map.distances_from(begin)
+    return None if distances.lattice.index_at(begin) is None else distances
+
+
 def _standing_point(atlas: Atlas, place: Place) -> Point:
     if isinstance(place.thing, Region):
         return find_standing_point(atlas, place.thing) or place.point
     return place.point
-
-
-def _can_stand(distances: DistanceField, point: Point) -> bool:
-    """True where a way may begin: elsewhere than where it is, a robot does not squeeze in."""
-    return distances.lattice.index_at(point) is not None
 
 
 def _cells_along(atlas: Atlas, path: Path) -> tuple[np.ndarray, np.ndarray]:

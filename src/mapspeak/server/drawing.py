@@ -7,6 +7,7 @@ import numpy as np
 
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.server.views import Layer, MapLook
+from mapspeak.server.wording import list_some
 from mapspeak.spatial.picture import (
     NORTH_UP_RAD,
     Colour,
@@ -30,6 +31,7 @@ LEGEND = (
     "the best frontier, ring the origin."
 )
 
+MOST_LEFT_OUT = 20
 WITH_PATH = frozenset({Layer.PATH, Layer.FRONTIERS})
 
 
@@ -142,5 +144,6 @@ def _caption(picture: MapPicture) -> str:
     if picture.spacing_m is not None:
         parts.append(f"A grid line every {picture.spacing_m:g} m.")
     if picture.labels_left_out:
-        parts.append(f"No room in the picture for: {', '.join(picture.labels_left_out)}.")
+        left_out = list_some(picture.labels_left_out, most=MOST_LEFT_OUT)
+        parts.append(f"No room in the picture for: {left_out}.")
     return " ".join(parts)

@@ -1,11 +1,12 @@
 """Ways and sizes compared, as text."""
 
+import math
 from collections.abc import Sequence
 
 from mapspeak.errors import GoalError
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.places import Place, find_place
-from mapspeak.navigation.ways import Way, find_way
+from mapspeak.navigation.ways import Way, find_way, measure_path
 from mapspeak.server.tables import say_sizes
 from mapspeak.server.wording import build_table, join_words, say_kind, say_path, say_point
 from mapspeak.spatial.rooms import Door, Region
@@ -38,13 +39,15 @@ def describe_measures(atlas: Atlas, *, start: str, places: Sequence[str] | None)
 
 
 def _way_table(atlas: Atlas, start: Place, ends: Sequence[Place]) -> str:
-    ways = [find_way(atlas, start, end) for end in ends]
-    ways.sort(key=lambda way: (way.path_m is None, way.path_m or way.straight_m))
+    lengths_m = {end.name: measure_path(atlas, start, end) for end in ends}
+    nearest_first = sorted(
+        ends, key=lambda end: math.inf if (m := lengths_m[end.name]) is None else m
+    )
     return build_table(
         f"Ways from {start.name} ({say_point(start.point)}), nearest first",
         ("to", "at x, y", "path m", "straight m", "through", "least clearance m"),
-        ways,
-        _way_row,
+        nearest_first,
+        lambda end: _way_row(find_way(atlas, start, end)),
     )
 
 

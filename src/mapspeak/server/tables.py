@@ -9,6 +9,7 @@ from mapspeak.server.views import Layer, MapLook
 from mapspeak.server.wording import (
     build_table,
     join_words,
+    list_some,
     say_kind,
     say_path,
     say_point,
@@ -23,6 +24,7 @@ __all__ = ["describe_atlas", "say_sizes", "say_walk"]
 MOST_FRONTIERS = 10
 MOST_REFUSED = 5
 MOST_WALKS = 6
+MOST_STOPS = 15
 AXES = "Metres in the map frame, x right and y up; yaw counter-clockwise from x."
 
 
@@ -149,7 +151,7 @@ def say_walk(region: Region, walk: CorridorWalk) -> str:
             if stop.side is side
         ]
         if stops:
-            sides.append(f"{side}: {', '.join(stops)}")
+            sides.append(f"{side}: {list_some(stops, most=MOST_STOPS)}")
     heading_deg = math.degrees(walk.heading_rad) + 0.0
     return (
         f"Along {region.id} from {say_point(walk.start)} (heading {heading_deg:.0f} deg) "

@@ -12,6 +12,7 @@ from mapspeak.spatial.rooms import Region
 __all__ = [
     "build_table",
     "join_words",
+    "list_some",
     "say_direction",
     "say_kind",
     "say_path",
@@ -74,6 +75,12 @@ def shorten(text: str) -> str:
 def join_words(words: Iterable[str], nothing: str = "none") -> str:
     """Gives words with a blank between them, or the word for none."""
     return " ".join(words) or nothing
+
+
+def list_some(words: Sequence[str], *, most: int) -> str:
+    """Gives words with commas between them, and how many were left out."""
+    told = ", ".join(words[:most])
+    return told if len(words) <= most else f"{told} and {len(words) - most} more"
 
 
 def build_table(

@@ -6,7 +6,7 @@ from typing import Annotated
 from mcp.server.mcpserver import Image
 from pydantic import Field
 
-from mapspeak.errors import LinkError
+from mapspeak.errors import LinkError, MapError
 from mapspeak.robot import CameraPicture, Detection
 from mapspeak.server.drawing import draw_atlas
 from mapspeak.server.reports import PoseAnswer
@@ -106,7 +106,7 @@ class LookTools:
         stamped = await robot.fetch_pose()
         try:
             place = await self._session.find_room_id(stamped.pose.point) or "no room"
-        except LinkError:
+        except (LinkError, MapError):
             place = "no map yet"
         return PoseAnswer.of(stamped, place=place, now_s=robot.now_s)
 
