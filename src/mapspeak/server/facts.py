@@ -8,9 +8,10 @@ from pydantic import Field
 from mapspeak.geometry import Point
 from mapspeak.server.reports import PoseReport, Report
 from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.areagraph import AreaGraph, Passage
 from mapspeak.spatial.coverage import measure_known_area
 from mapspeak.spatial.mapfiles import LoadedMap
-from mapspeak.spatial.rooms import Door, Region, RoomMap
+from mapspeak.spatial.rooms import Region
 
 __all__ = ["DoorFacts", "MapFacts", "PointFacts", "RegionFacts"]
 
@@ -69,22 +70,28 @@ class DoorFacts(Report):
 
     id: str
     at: PointFacts
-    width_m: float
+    width_m: float = Field(description="where nothing stands")
+    line: tuple[PointFacts, PointFacts] | None = Field(
+        description="from post to post; none when its regions do not touch on the map"
+    )
     joins: tuple[str, str]
 
     @classmethod
-    def of(cls, door: Door) -> Self:
-        """Makes it from a door."""
+    def of(cls, passage: Passage) -> Self:
+        """Makes it from a passage of the area graph."""
+        door, line = passage.door, passage.line
+        ends = None if line is None else (PointFacts.of(line[0]), PointFacts.of(line[1]))
         return cls(
             id=door.id,
             at=PointFacts.of(door.place),
             width_m=round(door.width_m, 2),
+            line=ends,
             joins=door.region_ids,
         )
 
 
 class MapFacts(Report):
-    """Everything that is said about a map file."""
+    """Everything that is said about a map file; outlines are in the area graph's own files."""
 
     name: str
     n_rows: int
@@ -102,13 +109,14 @@ class MapFacts(Report):
     warnings: list[str]
 
     @classmethod
-    def of(cls, loaded: LoadedMap, rooms: RoomMap) -> Self:
-        """Makes the facts of a map file."""
+    def of(cls, loaded: LoadedMap, graph: AreaGraph) -> Self:
+        """Makes the facts of a map file and the area graph found on it."""
         grid: OccupancyGrid = loaded.grid
         known = measure_known_area(grid)
-        by_size = sorted(rooms.regions, key=lambda region: region.floor_area_m2)
+        regions = [area.region for area in graph.areas]
+        by_size = sorted(regions, key=lambda region: region.floor_area_m2)
         return cls(
-            name=loaded.name,
+            name=graph.name,
             n_rows=grid.n_rows,
             n_cols=grid.n_cols,
             resolution_m=grid.resolution_m,
@@ -120,6 +128,6 @@ class MapFacts(Report):
             unknown_ratio=round(1 - known.known_ratio, 4),
             open_border_m=round(known.open_border_m, 2),
             regions=[RegionFacts.of(region) for region in by_size],
-            doors=[DoorFacts.of(door) for door in rooms.doors],
+            doors=[DoorFacts.of(passage) for passage in graph.passages],
             warnings=[f"{warning.message} {warning.hint}" for warning in loaded.warnings],
         )

@@ -1,0 +1,182 @@
+"""Which maps were asked for, and what each is called among them."""
+
+import hashlib
+import os
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NoReturn
+
+from mapspeak.errors import ConfigError
+
+DESCRIPTION_SUFFIXES = {".yaml", ".yml"}
+PICTURE_SUFFIXES = {".png", ".pgm", ".bmp", ".jpg", ".jpeg"}
+
+_LONGEST_DESCRIPTION = 65536
+_PATTERN_SIGN = re.compile(r"[*?[]")
+_IMAGE_LINE = re.compile(r"""^(?:\{ *)?["']?image["']? *: *["']?([^"'#,}\n]+)""", re.MULTILINE)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MapSelection:
+    """The maps that were asked for.
+
+    Attributes:
+        names: For each map file a name of its own, made from its path below what was asked for.
+        is_one_file: True when one file was asked for, and no folder or pattern.
+    """
+
+    names: Mapping[Path, str]
+    is_one_file: bool
+
+    @property
+    def pictures(self) -> tuple[Path, ...]:
+        """Those that are bare pictures, which do not say how large their pixels are."""
+        return tuple(file for file in self.names if not is_description(file))
+
+
+def find_maps(asked: Iterable[Path]) -> MapSelection:
+    """Gives the map files among files, folders and patterns such as `maps/**/map.yaml`.
+
+    In a folder, .yaml files that name an image and a resolution are maps; so are pictures called
+    map that have no .yaml.
+
+    Raises:
+        ConfigError: One of them does not exist, or holds no map.
+    """
+    asked = tuple(asked)
+    found: dict[str, Path] = {}
+    bases: list[str] = []
+    for path in asked:
+        base, files = _resolve(path)
+        bases.append(_spelled_one_way(base))
+        found |= {_spelled_one_way(file): file for file in files}
+    is_one_file = len(asked) == 1 and tuple(found.values()) == asked
+    names = _names(list(found.values()), os.path.commonpath(bases))
+    return MapSelection(names=names, is_one_file=is_one_file)
+
+
+def _resolve(asked: Path) -> tuple[Path, list[Path]]:
+    """Gives the folder that names are relative to, and the map files."""
+    try:
+        if asked.is_dir():
+            return asked, _maps_in(asked)
+        if asked.exists():
+            return asked.parent, [asked]
+        if _PATTERN_SIGN.search(str(asked)):
+            return _resolve_pattern(asked)
+    except OSError as error:
+        raise ConfigError(
+            f"{error.filename or asked} cannot be looked at: {error.strerror}.",
+            hint="Check who may read it.",
+        ) from error
+    raise ConfigError(f"There is no file {asked}.", hint="Give a map's .yaml or picture.")
+
+
+def _resolve_pattern(asked: Path) -> tuple[Path, list[Path]]:
+    parts = asked.parts
+    first = next(i for i, part in enumerate(parts) if _PATTERN_SIGN.search(part))
+    base = Path(*parts[:first])
+    try:
+        matches = sorted(base.glob(str(Path(*parts[first:]))))
+    except ValueError as error:
+        raise ConfigError(
+            f"{asked} is no pattern: {error}.", hint='A pattern is such as "maps/**/map.yaml".'
+        ) from error
+    found: list[Path] = []
+    for path in matches:
+        if path.is_dir():
+            found += _find_in(path)
+        elif path.suffix.lower() in DESCRIPTION_SUFFIXES | PICTURE_SUFFIXES:
+            found.append(path)
+    if not found:
+        raise ConfigError(f"No map matches {asked}.", hint='A pattern is such as "maps/**/*.yaml".')
+    return base, found
+
+
+def _maps_in(folder: Path) -> list[Path]:
+    found = _find_in(folder)
+    if not found:
+        raise ConfigError(
+            f"The folder {folder} holds no map that can be seen.",
+            hint="Maps are .yaml files that name an image, or pictures called map.png or map.pgm.",
+        )
+    return found
+
+
+def _find_in(folder: Path) -> list[Path]:
+    files = _files_under(folder)
+    described = {
+        file: image
+        for file in files
+        if is_description(file) and (image := find_image(file)) is not None
+    }
+    named = {image.resolve() for image in described.values()}
+    own = {file.with_suffix("") for file in described}
+    return [
+        file
+        for file in files
+        if file in described
+        or (
+            _is_picture_of_a_map(file)
+            and not {file.resolve(), file.with_suffix("")} & (named | own)
+        )
+    ]
+
+
+def _files_under(folder: Path) -> list[Path]:
+    def give_up(error: OSError) -> NoReturn:
+        raise error
+
+    walk = os.walk(folder, onerror=give_up)
+    files = (Path(where) / name for where, _, names in walk for name in names)
+    return sorted(file for file in files if file.is_file())
+
+
+def is_description(file: Path) -> bool:
+    """True for a .yaml; anything else is taken for a bare picture."""
+    return file.suffix.lower() in DESCRIPTION_SUFFIXES
+
+
+def _is_picture_of_a_map(file: Path) -> bool:
+    return file.suffix.lower() in PICTURE_SUFFIXES and file.stem == "map"
+
+
+def find_image(description: Path) -> Path | None:
+    """Gives the picture that a map's .yaml names, or None for a .yaml that is no map's.
+
+    One that cannot be read gives itself: what is wrong with it is told when it is shown.
+    """
+    try:
+        with description.open(encoding="utf-8", errors="replace") as file:
+            text = file.read(_LONGEST_DESCRIPTION)
+    except OSError:
+        return description
+    line = _IMAGE_LINE.search(text)
+    # Files of other programs name an image, too, but no resolution.
+    return description.parent / line[1].strip() if line and "resolution" in text else None
+
+
+def _names(files: list[Path], base: str) -> dict[Path, str]:
+    """Gives each file a name from its path; the same one however many others there are.
+
+    Where paths differ only in ways that such a name does not show, a digest of the path does.
+    """
+    relative = {file: Path(os.path.relpath(file, base)) for file in files}
+    plain = {file: "_".join(path.with_suffix("").parts) for file, path in relative.items()}
+    uses = Counter(name.casefold() for name in plain.values())
+    return {
+        file: name if uses[name.casefold()] == 1 else f"{name}-{_digest(relative[file])}"
+        for file, name in plain.items()
+    }
+
+
+def _spelled_one_way(path: Path) -> str:
+    """Gives the absolute path without following links: two links are two maps."""
+    return os.path.normpath(path.absolute())
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(os.fsencode(path.as_posix())).hexdigest()[:8]

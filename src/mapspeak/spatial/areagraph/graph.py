@@ -1,0 +1,202 @@
+"""What an area graph is: areas with outlines, joined by passages."""
+
+import re
+import unicodedata
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+from mapspeak.errors import MapError
+from mapspeak.geometry import Point
+from mapspeak.spatial.rooms import Door, Region
+
+Ring = tuple[Point, ...]
+"""A closed line: the last point repeats the first."""
+
+Line = tuple[Point, Point]
+
+MICROMETRE_DECIMALS = 6
+"""Outlines and lines are whole micrometres: so they survive the way through degrees and back."""
+
+_ID = re.compile(r"[\w.-]+")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Polygon:
+    """A piece of floor in one part.
+
+    Attributes:
+        outer: Its outline, counter-clockwise.
+        holes: The outlines of what does not belong to it, clockwise.
+    """
+
+    outer: Ring
+    holes: tuple[Ring, ...] = ()
+
+    def __post_init__(self) -> None:
+        for ring in (self.outer, *self.holes):
+            _check_ring(ring)
+        if signed_area_m2(self.outer) <= 0 or any(signed_area_m2(ring) >= 0 for ring in self.holes):
+            raise MapError(
+                "An outline of the area graph turns the wrong way, or encloses nothing.",
+                hint="Outer rings run counter-clockwise, holes clockwise.",
+            )
+
+    @property
+    def rings(self) -> tuple[Ring, ...]:
+        """The outer ring, then the holes."""
+        return (self.outer, *self.holes)
+
+    @property
+    def area_m2(self) -> float:
+        """The area without the holes."""
+        return sum(signed_area_m2(ring) for ring in self.rings)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Area:
+    """A node of the graph: a region with its outline.
+
+    Attributes:
+        region: What is known about it.
+        polygons: Where it lies; several when it is cut into parts, the largest first.
+    """
+
+    region: Region
+    polygons: tuple[Polygon, ...]
+
+    @property
+    def id(self) -> str:
+        """The region's id."""
+        return self.region.id
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Passage:
+    """An edge of the graph: a door with the line that one crosses there.
+
+    Attributes:
+        door: What is known about it.
+        line: From post to post: the ends of the border that its two areas share there, which are
+            corners of both outlines. None when the areas do not touch on the map.
+    """
+
+    door: Door
+    line: Line | None
+
+    @property
+    def id(self) -> str:
+        """The door's id."""
+        return self.door.id
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AreaGraph:
+    """Areas joined by passages, in metres in the map frame.
+
+    Attributes:
+        name: What the map is called.
+        areas: The nodes.
+        passages: The edges.
+
+    Raises:
+        MapError: Ids are not unique, passages lead nowhere, areas name other doors than those that
+            join them, or a text holds control characters.
+    """
+
+    name: str
+    areas: tuple[Area, ...]
+    passages: tuple[Passage, ...]
+
+    def __post_init__(self) -> None:
+        _check_ids([area.id for area in self.areas], "areas")
+        _check_ids([passage.id for passage in self.passages], "passages")
+        _check_texts((self.name, *(area.region.reason for area in self.areas)))
+        _check_ends(self)
+        _check_doors(self)
+
+    def area(self, area_id: str) -> Area:
+        """Gives the area with this id.
+
+        Raises:
+            MapError: There is none.
+        """
+        for area in self.areas:
+            if area.id == area_id:
+                return area
+        raise MapError(
+            f"The area graph has no area {area_id}.",
+            hint=f"Its areas are: {', '.join(area.id for area in self.areas) or 'none'}.",
+        )
+
+    def passages_by_area(self) -> Mapping[str, tuple[Passage, ...]]:
+        """Gives for every area the passages that lead out of it: the graph as adjacency."""
+        found: dict[str, list[Passage]] = {area.id: [] for area in self.areas}
+        for passage in self.passages:
+            for area_id in passage.door.region_ids:
+                found[area_id].append(passage)
+        return {area_id: tuple(passages) for area_id, passages in found.items()}
+
+
+def signed_area_m2(ring: Ring) -> float:
+    """Gives the area inside a closed ring, positive when it runs counter-clockwise."""
+    base = ring[0]
+    return 0.5 * sum(
+        (one.x - base.x) * (other.y - base.y) - (other.x - base.x) * (one.y - base.y)
+        for one, other in pairwise(ring)
+    )
+
+
+def _check_ring(ring: Ring) -> None:
+    if len(ring) < 4 or ring[0] != ring[-1]:
+        raise MapError(
+            f"An outline of the area graph with {len(ring)} points is not closed.",
+            hint="A ring has four points or more, and the last repeats the first.",
+        )
+
+
+def _check_ids(ids: list[str], what: str) -> None:
+    wrong = [name for name in ids if not _ID.fullmatch(name)]
+    if wrong:
+        raise MapError(
+            f"{wrong[0]!a} is no id for {what}.",
+            hint="Ids are letters, digits, dots, hyphens and underscores, such as R3 or D1.",
+        )
+    doubled = {name for name in ids if ids.count(name) > 1} if len(set(ids)) < len(ids) else set()
+    if doubled:
+        raise MapError(f"Two {what} are called {min(doubled)}.", hint="Give each an id of its own.")
+
+
+def _check_texts(texts: Iterable[str]) -> None:
+    for text in texts:
+        if any(
+            unicodedata.category(sign) in {"Cc", "Cs"} or sign in "\ufffe\uffff" for sign in text
+        ):
+            raise MapError(
+                f"The text {text!a} holds control characters, which files cannot carry.",
+                hint="Rename the map, or remove them from the text.",
+            )
+
+
+def _check_ends(graph: AreaGraph) -> None:
+    known = {area.id for area in graph.areas}
+    for passage in graph.passages:
+        first, second = passage.door.region_ids
+        if first == second or not {first, second} <= known:
+            raise MapError(
+                f"Passage {passage.id} joins {first!a} and {second!a}.",
+                hint="A passage joins two areas of the same graph.",
+            )
+
+
+def _check_doors(graph: AreaGraph) -> None:
+    passages = graph.passages_by_area()
+    for area in graph.areas:
+        doors = {passage.id for passage in passages[area.id]}
+        behind = {end for passage in passages[area.id] for end in passage.door.region_ids}
+        region = area.region
+        if set(region.door_ids) != doors or set(region.neighbour_ids) != behind - {area.id}:
+            raise MapError(
+                f"Area {area.id} names other doors or neighbours than the passages that join it.",
+                hint=f"By its passages its doors are: {', '.join(sorted(doors)) or 'none'}.",
+            )
