@@ -17,7 +17,7 @@ from mapspeak.server.tables import describe_atlas
 from mapspeak.server.views import MapLook
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 
-__all__ = ["measure"]
+__all__ = ["draw_building", "measure"]
 
 T = TypeVar("T")
 
@@ -46,7 +46,7 @@ def measure() -> Iterator[Figure]:
 def _measure_size(n_cells: int) -> Iterator[Figure]:
     times_ms: dict[str, list[float]] = {}
     for run in range(N_RUNS):
-        atlas = _look(_grid(n_cells, seed=run), _stand(n_cells), None, times_ms, "")
+        atlas = _look(draw_building(n_cells, seed=run), _stand(n_cells), None, times_ms, "")
         here = atlas.robot
         moved = Pose(here.x + STEP_M, here.y, here.yaw_rad)
         _look(atlas.grid, moved, atlas, times_ms, "only the pose changed, ")
@@ -54,7 +54,7 @@ def _measure_size(n_cells: int) -> Iterator[Figure]:
         yield Figure(
             name=f"{n_cells} x {n_cells}, {what}", value=statistics.median(runs_ms), unit="ms"
         )
-    atlas = _look(_grid(n_cells, seed=0), _stand(n_cells), None, {}, "")
+    atlas = _look(draw_building(n_cells, seed=0), _stand(n_cells), None, {}, "")
     text = describe_atlas(atlas, MapLook())
     picture = draw_atlas(atlas, MapLook())
     yield Figure(name=f"{n_cells} x {n_cells}, text", value=len(text) / 1000, unit="k characters")
@@ -91,7 +91,7 @@ def _note(times_ms: dict[str, list[float]], what: str, started_s: float) -> None
     times_ms.setdefault(what, []).append((time.process_time() - started_s) * 1e3)
 
 
-def _grid(n_cells: int, *, seed: int) -> OccupancyGrid:
+def draw_building(n_cells: int, *, seed: int) -> OccupancyGrid:
     """Gives rooms along corridors with furniture, of which a part has not been seen yet."""
     generator = np.random.default_rng(seed)
     cells = np.zeros((n_cells, n_cells), dtype=np.int8)

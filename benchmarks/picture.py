@@ -1,8 +1,11 @@
-"""How much computing it takes to draw a map as a PNG, in one thread, and how large the PNG is."""
+"""How much computing and memory it takes to draw a map as a PNG, in one thread, and its size."""
 
 import statistics
 import time
+import tracemalloc
 from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
 
 import cv2
 import numpy as np
@@ -11,6 +14,7 @@ from benchmarks.figure import Figure
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.picture import (
+    LegendEntry,
     Line,
     LineStyle,
     MapLayers,
@@ -18,6 +22,9 @@ from mapspeak.spatial.picture import (
     Mark,
     Region,
     RegionLayer,
+    Sample,
+    Shape,
+    Zoom,
     draw_map,
     draw_robot_pose,
 )
@@ -25,18 +32,22 @@ from mapspeak.spatial.picture import (
 __all__ = ["measure"]
 
 N_RUNS = 7
+N_CROWDED_MARKS = 100
+HUGE_CELLS = 10_000
 ROOM_CELLS = 120
 RESOLUTION_M = 0.05
 TURNED = Pose(-3.0, 7.0, 0.4)
 
 
 def measure() -> Iterator[Figure]:
-    """Gives the median CPU time and the size of each kind of picture, for two sizes of map."""
+    """Gives the median CPU time and the size of each kind of picture, and the memory at worst."""
     n_threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:
         for n_cells in (1000, 4000):
             yield from _measure_size(n_cells)
+        yield from _measure_crowd()
+        yield from _measure_huge()
     finally:
         cv2.setNumThreads(n_threads)
 
@@ -50,6 +61,49 @@ def _measure_size(n_cells: int) -> Iterator[Figure]:
     yield from _figures(f"{size}, all layers", lambda: draw_map(grid, layers=layers))
     yield from _figures(f"{size}, turned", lambda: draw_map(turned))
     yield from _figures(f"{size}, paper", lambda: draw_robot_pose(grid, robot))
+
+
+def _measure_crowd() -> Iterator[Figure]:
+    """Measures a map with more labels than find room without being moved, and its legend."""
+    grid = _building(1000, Pose(0.0, 0.0))
+    robot = Pose(grid.width_m / 2, grid.height_m / 2, 0.7)
+    layers = _layers(grid, robot)
+    crowd = replace(
+        layers,
+        marks=_marks(grid, N_CROWDED_MARKS),
+        legend=(
+            LegendEntry(sample=Sample.PLAIN_REGION, text="room"),
+            LegendEntry(sample=Sample.HATCHED_REGION, text="corridor"),
+            LegendEntry(sample=Shape.CIRCLE, text="place"),
+            LegendEntry(sample=LineStyle.DASHED, text="path"),
+            LegendEntry(sample=Sample.ROBOT, text="robot"),
+        ),
+    )
+    zoom = Zoom(centre=robot.point, radius_m=6.0)
+    name = f"1000 x 1000, {N_CROWDED_MARKS} marks and legend"
+    yield from _figures(name, lambda: draw_map(grid, layers=crowd))
+    yield from _figures(
+        "1000 x 1000, closer look, robot up",
+        lambda: draw_map(grid, layers=crowd, zoom=zoom, up_rad=robot.yaw_rad),
+    )
+
+
+def _measure_huge() -> Iterator[Figure]:
+    """Measures time and the memory that drawing takes besides the map and its labels."""
+    part = _building(1000, Pose(0.0, 0.0)).cells
+    n_parts = HUGE_CELLS // 1000
+    for name, origin in (("", Pose(0.0, 0.0)), (", turned", TURNED)):
+        grid = OccupancyGrid(
+            cells=np.tile(part, (n_parts, n_parts)), resolution_m=RESOLUTION_M, origin=origin
+        )
+        layers = _layers(grid, Pose(grid.width_m / 2, grid.height_m / 2))
+        what = f"{HUGE_CELLS} x {HUGE_CELLS}{name}, all layers"
+        yield from _figures(what, partial(draw_map, grid, layers=layers))
+        tracemalloc.start()
+        draw_map(grid, layers=layers)
+        _, peak_bytes = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        yield Figure(name=f"{what}: memory", value=peak_bytes / 1e6, unit="MB")
 
 
 def _figures(name: str, draw: Callable[[], MapPicture]) -> Iterator[Figure]:
@@ -85,18 +139,23 @@ def _layers(grid: OccupancyGrid, robot: Pose) -> MapLayers:
     """Gives up to 64 rooms, 30 marks, a path across the map and the robot."""
     n_across = min(8, grid.n_cols // ROOM_CELLS)
     block = grid.n_cols // n_across
-    rows, cols = np.indices(grid.cells.shape) // block
-    labels = np.where(grid.free, 1 + rows * n_across + cols, 0)
+    block_of = (np.arange(grid.n_cols) // block).astype(np.uint16)
+    labels = block_of[:, np.newaxis] * np.uint16(n_across) + block_of + np.uint16(1)
+    labels[~grid.free] = 0
     regions = tuple(
         Region(
             label=label, text=f"R{label} {block * RESOLUTION_M:.1f} m2", is_hatched=label % 9 == 0
         )
         for label in range(1, n_across**2 + 1)
     )
-    places = np.random.default_rng(3).uniform(0.1, 0.9, (30, 2)) * grid.width_m
-    marks = tuple(
+    marks = _marks(grid, 30)
+    path = Line(points=tuple(mark.point for mark in marks[:8]), style=LineStyle.DASHED)
+    return MapLayers(regions=RegionLayer(labels, regions), lines=(path,), marks=marks, robot=robot)
+
+
+def _marks(grid: OccupancyGrid, n_marks: int) -> tuple[Mark, ...]:
+    places = np.random.default_rng(3).uniform(0.1, 0.9, (n_marks, 2)) * grid.width_m
+    return tuple(
         Mark(point=Point(float(x), float(y)), label=f"W{number}")
         for number, (x, y) in enumerate(places, start=1)
     )
-    path = Line(points=tuple(mark.point for mark in marks[:8]), style=LineStyle.DASHED)
-    return MapLayers(regions=RegionLayer(labels, regions), lines=(path,), marks=marks, robot=robot)

@@ -2,16 +2,20 @@
 
 import io
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
 from mapspeak.geometry import Point
 from mapspeak.spatial.picture import MapPicture
+from mapspeak.spatial.picture.ink import text_patch
 from mapspeak.spatial.picture.palette import (
     FREE,
     GREYS,
+    N_RAMP_LEVELS,
     PALETTE,
+    PAPER,
     RAMPS,
     UNKNOWN_GROUND,
     WALL,
@@ -21,6 +25,7 @@ from mapspeak.spatial.picture.palette import (
 WALL_RGB = tuple(PALETTE[WALL].tolist())
 FREE_RGB = tuple(PALETTE[FREE].tolist())
 UNKNOWN_RGB = tuple(PALETTE[UNKNOWN_GROUND].tolist())
+INK_FROM = 24
 PAPER_OCCUPIED_RGB = tuple(PALETTE[GREYS[-1]].tolist())
 
 
@@ -48,3 +53,17 @@ def is_colour(pixels: NDArray[np.uint8], colour: tuple[int, ...]) -> NDArray[np.
 def full_colour(colour: Colour) -> tuple[int, ...]:
     """Gives the colour of the middle of a mark or line of that name."""
     return tuple(PALETTE[RAMPS[colour][-1]].tolist())
+
+
+def find_text(picture: MapPicture, text: str, size_px: int) -> list[tuple[float, float]]:
+    """Gives the middles (u, v) of all places where a text stands whole and unbroken."""
+    patch = text_patch(text, size_px)
+    inked = np.full(patch.shape, PAPER, dtype=np.uint8)
+    is_ink = patch >= INK_FROM
+    inked[is_ink] = RAMPS[Colour.INK][patch[is_ink].astype(int) * N_RAMP_LEVELS // 256]
+    wanted = PALETTE[inked][..., 0].astype(np.float32)
+    seen = pixels_of(picture)[..., 0].astype(np.float32)
+    apart = cv2.matchTemplate(seen, wanted, cv2.TM_SQDIFF, mask=is_ink.astype(np.float32))
+    rows, cols = np.nonzero(apart < 0.5)
+    height, width = patch.shape
+    return [(col + width / 2, row + height / 2) for row, col in zip(rows, cols, strict=True)]

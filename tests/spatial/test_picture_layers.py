@@ -1,6 +1,5 @@
 import math
 
-import cv2
 import numpy as np
 import pytest
 
@@ -13,7 +12,6 @@ from mapspeak.spatial.picture import (
     Line,
     LineStyle,
     MapLayers,
-    MapPicture,
     Mark,
     Region,
     RegionLayer,
@@ -22,19 +20,23 @@ from mapspeak.spatial.picture import (
     draw_map,
 )
 from mapspeak.spatial.picture.axes import lines_in_view
-from mapspeak.spatial.picture.ink import LABEL_SIZE_PX, NUMBER_SIZE_PX, text_patch
+from mapspeak.spatial.picture.ink import LABEL_SIZE_PX, NUMBER_SIZE_PX
 from mapspeak.spatial.picture.palette import (
     FILLS,
-    N_RAMP_LEVELS,
     PALETTE,
-    PAPER,
-    RAMPS,
     FillPart,
 )
 from mapspeak.spatial.picture.spacing import even_spacing_m
-from seeing import FREE_RGB, WALL_RGB, colour_at, colours_at, full_colour, is_colour, pixels_of
-
-INK = 24
+from seeing import (
+    FREE_RGB,
+    WALL_RGB,
+    colour_at,
+    colours_at,
+    find_text,
+    full_colour,
+    is_colour,
+    pixels_of,
+)
 
 
 def floor(
@@ -54,20 +56,6 @@ def plain(colour: Colour) -> tuple[int, ...]:
 
 def near(one_px: float, other_px: float) -> bool:
     return abs(one_px - other_px) <= 2
-
-
-def find_text(picture: MapPicture, text: str, size_px: int) -> list[tuple[float, float]]:
-    """Gives the middles (u, v) of all places where a text stands whole and unbroken."""
-    patch = text_patch(text, size_px)
-    inked = np.full(patch.shape, PAPER, dtype=np.uint8)
-    is_ink = patch >= INK
-    inked[is_ink] = RAMPS[Colour.INK][patch[is_ink].astype(int) * N_RAMP_LEVELS // 256]
-    wanted = PALETTE[inked][..., 0].astype(np.float32)
-    seen = pixels_of(picture)[..., 0].astype(np.float32)
-    apart = cv2.matchTemplate(seen, wanted, cv2.TM_SQDIFF, mask=is_ink.astype(np.float32))
-    rows, cols = np.nonzero(apart < 0.5)
-    height, width = patch.shape
-    return [(col + width / 2, row + height / 2) for row, col in zip(rows, cols, strict=True)]
 
 
 @pytest.mark.parametrize("longest_m", [0.8, 3.0, 9.0, 22.0, 47.0, 180.0, 1234.0])
@@ -152,7 +140,7 @@ def test_labels_of_crowded_marks_are_all_whole() -> None:
 
 
 def test_a_label_that_finds_no_room_is_named_in_the_result() -> None:
-    marks = tuple(Mark(point=Point(101.0, 201.0), label=f"place {n}") for n in range(90))
+    marks = tuple(Mark(point=Point(101.0, 201.0), label=f"place {n}") for n in range(10, 100))
     picture = draw_map(floor(2.0, 2.0), layers=MapLayers(marks=marks), max_edge_px=320)
     whole = {m.label for m in marks if find_text(picture, m.label, LABEL_SIZE_PX)}
     assert picture.labels_left_out

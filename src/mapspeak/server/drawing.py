@@ -8,15 +8,18 @@ import numpy as np
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.server.views import Layer, MapLook
 from mapspeak.server.wording import list_some
+from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.picture import (
     NORTH_UP_RAD,
     Colour,
+    LegendEntry,
     Line,
     LineStyle,
     MapLayers,
     MapPicture,
     Mark,
     RegionLayer,
+    Sample,
     Shape,
     draw_map,
 )
@@ -26,11 +29,21 @@ from mapspeak.spatial.rooms import Region, RoomClass, RoomMap
 __all__ = ["AtlasPicture", "draw_atlas", "draw_rooms"]
 
 LEGEND = (
-    "White free, grey unknown, black walls; coloured floors are rooms, hatched ones corridors; "
-    "square door, triangle frontier, diamond remembered place, arrow robot, dashed line the way to "
-    "the best frontier, ring the origin."
+    LegendEntry(sample=Sample.PLAIN_REGION, text="room"),
+    LegendEntry(sample=Sample.HATCHED_REGION, text="corridor"),
+    LegendEntry(sample=Sample.DOTTED_REGION, text="open space"),
+    LegendEntry(sample=Shape.SQUARE, text="door"),
+    LegendEntry(sample=Shape.TRIANGLE, text="frontier"),
+    LegendEntry(sample=Shape.DIAMOND, text="remembered place"),
+    LegendEntry(sample=Sample.ROBOT, text="robot"),
+    LegendEntry(sample=LineStyle.DASHED, text="way to the best frontier"),
+    LegendEntry(sample=Sample.ORIGIN, text="origin"),
 )
+GREYS = "White free, grey unknown, black walls; the legend below the map explains the rest."
 
+DETAIL_PX_PER_M = 8.0
+"""From this scale on doors can be told apart, and areas written into rooms."""
+EDGE_PX = 1000
 MOST_LEFT_OUT = 20
 WITH_PATH = frozenset({Layer.PATH, Layer.FRONTIERS})
 
@@ -49,47 +62,74 @@ class AtlasPicture:
 
 
 def draw_atlas(atlas: Atlas, look: MapLook) -> AtlasPicture:
-    """Draws an atlas as it is looked at."""
-    layers = look.layers
+    """Draws an atlas as it is looked at; doors and areas only where they can be told apart."""
+    is_detailed = _scale_px_per_m(atlas.grid, look) >= DETAIL_PX_PER_M
     picture = draw_map(
         atlas.grid,
         layers=MapLayers(
-            regions=_rooms(atlas.rooms) if Layer.ROOMS in layers else None,
-            lines=_path_to_first_frontier(atlas) if layers >= WITH_PATH else (),
+            regions=_rooms(atlas.rooms, has_areas=is_detailed, highlighted=_target_id(look))
+            if Layer.ROOMS in look.layers
+            else None,
+            lines=_path_to_first_frontier(atlas) if look.layers >= WITH_PATH else (),
             marks=(
-                *(_doors(atlas.rooms) if Layer.DOORS in layers else ()),
-                *(_frontiers(atlas) if Layer.FRONTIERS in layers else ()),
-                *(_places(atlas) if Layer.PLACES in layers else ()),
+                *(_doors(atlas.rooms) if Layer.DOORS in look.layers and is_detailed else ()),
+                *(_frontiers(atlas) if Layer.FRONTIERS in look.layers else ()),
+                *(_places(atlas) if Layer.PLACES in look.layers else ()),
             ),
             robot=atlas.robot,
+            legend=LEGEND,
         ),
         up_rad=look.up_rad,
         zoom=look.zoom,
     )
-    caption = _caption(picture)
+    parts = [_caption(picture)]
     if look.up_rad != NORTH_UP_RAD:
-        caption += f" Up in the picture is yaw {math.degrees(look.up_rad):.0f} deg, as the robot."
-    return AtlasPicture(png=picture.png, caption=caption)
+        parts.append(f"Up in the picture is yaw {math.degrees(look.up_rad):.0f} deg, as the robot.")
+    if Layer.DOORS in look.layers and not is_detailed:
+        parts.append("An overview without doors and areas: zoom in with around and radius_m.")
+    return AtlasPicture(png=picture.png, caption=" ".join(parts))
 
 
 def draw_rooms(rooms: RoomMap) -> AtlasPicture:
     """Draws a map with its rooms and doors; no robot needs to be there for it."""
-    layers = MapLayers(regions=_rooms(rooms), marks=_doors(rooms))
+    is_detailed = _scale_px_per_m(rooms.grid, MapLook()) >= DETAIL_PX_PER_M
+    layers = MapLayers(
+        regions=_rooms(rooms, has_areas=is_detailed),
+        marks=_doors(rooms) if is_detailed else (),
+        legend=LEGEND,
+    )
     picture = draw_map(rooms.grid, layers=layers)
     return AtlasPicture(png=picture.png, caption=_caption(picture))
 
 
-def _rooms(rooms: RoomMap) -> RegionLayer:
-    areas = tuple(_area(region) for region in rooms.regions)
-    return RegionLayer(rooms.labels.astype(np.uint16), areas)
+def _scale_px_per_m(grid: OccupancyGrid, look: MapLook) -> float:
+    """Gives about how large a metre will be in the picture."""
+    if look.zoom is not None:
+        return EDGE_PX / (2 * look.zoom.radius_m)
+    known = (np.flatnonzero(grid.cells.max(axis=axis, initial=-1) >= 0) for axis in (0, 1))
+    n_cells = max(int(along[-1] - along[0]) + 1 if along.size else 1 for along in known)
+    return EDGE_PX / (n_cells * grid.resolution_m)
 
 
-def _area(region: Region) -> Area:
-    return Area(
-        label=region.index,
-        text=f"{region.id} {region.floor_area_m2:.1f} m2",
-        is_hatched=region.room_class is RoomClass.CORRIDOR,
+def _target_id(look: MapLook) -> str | None:
+    """Gives the region that is looked at; None where it is something else, or nothing."""
+    is_region = look.around is not None and isinstance(look.around.thing, Region)
+    return look.around.name if look.around is not None and is_region else None
+
+
+def _rooms(rooms: RoomMap, *, has_areas: bool, highlighted: str | None = None) -> RegionLayer:
+    areas = tuple(
+        Area(
+            label=region.index,
+            key=int(region.id[1:]),
+            text=f"{region.id} {region.floor_area_m2:.1f} m2" if has_areas else region.id,
+            is_hatched=region.room_class is RoomClass.CORRIDOR,
+            is_dotted=region.room_class is RoomClass.OPEN_SPACE,
+            is_highlighted=region.id == highlighted,
+        )
+        for region in rooms.regions
     )
+    return RegionLayer(rooms.labels.astype(np.uint16), areas)
 
 
 def _doors(rooms: RoomMap) -> tuple[Mark, ...]:
@@ -139,7 +179,7 @@ def _caption(picture: MapPicture) -> str:
     size = f"{view.width_px} x {view.height_px} px, {view.pixels_per_m:.1f} px per metre"
     parts = [
         f"Picture: {size}, x {low[0]:.1f} to {high[0]:.1f}, y {low[1]:.1f} to {high[1]:.1f}.",
-        LEGEND,
+        GREYS,
     ]
     if picture.spacing_m is not None:
         parts.append(f"A grid line every {picture.spacing_m:g} m.")

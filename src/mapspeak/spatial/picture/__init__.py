@@ -1,7 +1,16 @@
 """The map picture: grey levels, metric grid with numbers, the robot's arrow, marks and areas."""
 
 from mapspeak.spatial.picture.drawing import MapLayers, MapPicture, draw_map
-from mapspeak.spatial.picture.marks import Line, LineStyle, Mark, Region, RegionLayer, Shape
+from mapspeak.spatial.picture.marks import (
+    LegendEntry,
+    Line,
+    LineStyle,
+    Mark,
+    Region,
+    RegionLayer,
+    Sample,
+    Shape,
+)
 from mapspeak.spatial.picture.palette import Colour
 from mapspeak.spatial.picture.paper import (
     draw_map_axis,
@@ -17,6 +26,7 @@ __all__ = [
     "NORTH_UP_RAD",
     "Box",
     "Colour",
+    "LegendEntry",
     "Line",
     "LineStyle",
     "MapLayers",
@@ -25,6 +35,7 @@ __all__ = [
     "Pixel",
     "Region",
     "RegionLayer",
+    "Sample",
     "Shape",
     "View",
     "Zoom",

@@ -1,4 +1,4 @@
-"""The metric grid of a picture: lines under the walls, numbers outside the map, and a legend."""
+"""The metric grid of a picture: lines under the walls, and numbers outside the map."""
 
 import math
 from dataclasses import dataclass
@@ -11,8 +11,6 @@ from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.picture.ink import (
     NUMBER_SIZE_PX,
     clip_segment,
-    draw_polygon,
-    draw_stroke,
     stamp,
     text_patch,
 )
@@ -20,36 +18,31 @@ from mapspeak.spatial.picture.palette import (
     FRAME,
     GRID_OVER,
     IS_BUSY,
-    WALL,
     ZERO_LINE_OVER,
     Canvas,
-    Colour,
 )
 from mapspeak.spatial.picture.plan import Extent, Margins
-from mapspeak.spatial.picture.spacing import decimals_of, round_length_m
-from mapspeak.spatial.picture.view import NORTH_UP_RAD, Box, View
+from mapspeak.spatial.picture.spacing import decimals_of
+from mapspeak.spatial.picture.symbols import draw_zero_ring
+from mapspeak.spatial.picture.view import Box, View, is_north_up
 
 __all__ = [
-    "LegendEntry",
     "MetricLine",
     "draw_frame",
-    "draw_legend",
     "draw_lines_under_walls",
     "draw_numbers",
     "draw_zero",
+    "legend_top",
     "lines_in_view",
     "margins_for",
 ]
 
 
-_ANGLE_SLACK_RAD = 1e-9
 _NUMBER_GAP_PX = 6
-_LEGEND_HEIGHT_PX = 30
-_SCALE_BAR_PX = 80
-_LEGEND_GAP_PX = 18
-_SWATCH_PX = 14
+_CORNER_PX = 1e-6
+_APART_PX = 10
+"""Numbers that far apart along a line of text are not read as one; a space is 4 pixels."""
 _MIN_WIDTH_PX = 300
-_ZERO_RADIUS_PX = 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -67,23 +60,21 @@ class MetricLine:
     ends: FloatArray
 
 
-@dataclass(frozen=True, slots=True)
-class LegendEntry:
-    """A colour of the ground, by its palette number, and what it means."""
-
-    palette_number: int
-    text: str
-
-
-def margins_for(extent: Extent, spacing_m: float, *, up_rad: float) -> Margins:
-    """Gives the room that the numbers along the sides and the legend need."""
+def margins_for(extent: Extent, spacing_m: float, *, up_rad: float, legend_px: int) -> Margins:
+    """Gives the room that the numbers along the sides need, and a legend of that height below."""
     height, width = _widest_number(extent, spacing_m, up_rad).shape
     return Margins(
         side_px=width + 2 * _NUMBER_GAP_PX,
         top_px=height + 2 * _NUMBER_GAP_PX,
-        bottom_px=height + 2 * _NUMBER_GAP_PX + _LEGEND_HEIGHT_PX,
+        bottom_px=height + 2 * _NUMBER_GAP_PX + legend_px,
         min_width_px=_MIN_WIDTH_PX,
     )
+
+
+def legend_top(view: View) -> int:
+    """Gives the first row below the numbers under the map."""
+    height = text_patch("0", NUMBER_SIZE_PX).shape[0]
+    return view.area.bottom + int(height) + 2 * _NUMBER_GAP_PX
 
 
 def lines_in_view(view: View, spacing_m: float) -> tuple[MetricLine, ...]:
@@ -119,21 +110,23 @@ def draw_numbers(
 ) -> None:
     """Writes each line's coordinate outside the map at both of its ends.
 
-    Where the numbers would touch, only every second, fifth or tenth line gets one.
+    Where the numbers would touch, only every second, fifth or tenth line gets one. At a corner
+    the number of one side gives way to that of the other: it is pulled in, or left out.
     """
     patches = {
         line: text_patch(_number(line, spacing_m, view.up_rad), NUMBER_SIZE_PX) for line in lines
     }
     widest_px = max((patch.shape[1] for patch in patches.values()), default=0)
-    stride = _stride(widest_px + _NUMBER_GAP_PX, spacing_m * view.pixels_per_m)
+    stride = _stride(widest_px + _APART_PX, spacing_m * view.pixels_per_m)
     taken: list[Box] = []
     for line in (line for line in lines if line.multiple % stride == 0):
-        boxes = [_box_outside(end, patches[line], view.area) for end in line.ends]
-        if any(box.overlaps(other) for box in boxes for other in taken):
-            continue
-        taken.extend(boxes)
-        for box in boxes:
-            stamp(canvas, patches[line], (box.left, box.top), halo_px=0)
+        for end in line.ends:
+            on_line = _box_outside(line, end, patches[line], view.area)
+            for box in (on_line, _pulled_in(on_line, view.area)):
+                if not any(_is_near(box, other) for other in taken):
+                    taken.append(box)
+                    stamp(canvas, patches[line], (box.left, box.top), halo_px=0)
+                    break
 
 
 def draw_frame(canvas: Canvas, area: Box) -> None:
@@ -145,25 +138,9 @@ def draw_zero(inside: Canvas, view: View) -> None:
     """Marks the map's origin, (0, 0), with a ring under the walls, where the picture shows it."""
     if not view.shows(Point(0.0, 0.0)):
         return
-    centre = view.area_pixels_at(np.zeros((1, 2)))
-    turns = np.linspace(0.0, math.tau, 33)
-    circle = np.stack([np.cos(turns), np.sin(turns)], axis=1)
     before = inside.copy()
-    draw_stroke(inside, centre + _ZERO_RADIUS_PX * circle, Colour.INK, width_px=2)
-    draw_polygon(inside, centre + circle, Colour.INK, halo_px=0)
+    draw_zero_ring(inside, view.area_pixels_at(np.zeros((1, 2)))[0])
     np.copyto(inside, before, where=cv2.LUT(before, IS_BUSY) > 0)
-
-
-def draw_legend(
-    canvas: Canvas, view: View, spacing_m: float, entries: tuple[LegendEntry, ...]
-) -> None:
-    """Draws below the map: a scale bar, what the greys mean, the grid's spacing and direction."""
-    middle = view.height_px - _LEGEND_HEIGHT_PX // 2
-    left = _draw_scale_bar(canvas, view, _LEGEND_GAP_PX, middle)
-    for entry in entries:
-        left = _draw_swatch(canvas, left, middle, entry)
-    for text in (f"grid {spacing_m:g} m", _direction(view.up_rad)):
-        left = _write(canvas, left, middle, text)
 
 
 def _ends_in_area(view: View, index: int, value_m: float) -> FloatArray | None:
@@ -180,24 +157,44 @@ def _ends_in_area(view: View, index: int, value_m: float) -> FloatArray | None:
     return clip_segment(start, end, np.array([view.area.width, view.area.height], dtype=float))
 
 
-def _box_outside(end: FloatArray, patch: Canvas, area: Box) -> Box:
-    """Gives the box for a number beside the point in which its line leaves the map area."""
+def _box_outside(line: MetricLine, end: FloatArray, patch: Canvas, area: Box) -> Box:
+    """Gives the box for a number beside the point in which its line leaves the map area.
+
+    In a corner that is on the side which the line runs towards.
+    """
     height, width = patch.shape
     left, top = end[0] + area.left - width / 2, end[1] + area.top - height / 2
-    if end[1] <= 1e-6:
-        top = area.top - _NUMBER_GAP_PX - height
-    elif end[1] >= area.height - 1e-6:
-        top = area.bottom + _NUMBER_GAP_PX
-    elif end[0] <= 1e-6:
-        left = area.left - _NUMBER_GAP_PX - width
+    away = np.abs(line.ends[1] - line.ends[0])
+    is_at_side = min(end[0], area.width - end[0]) <= _CORNER_PX
+    is_above_or_below = min(end[1], area.height - end[1]) <= _CORNER_PX
+    if is_above_or_below and not (is_at_side and away[0] > away[1]):
+        is_above = end[1] < area.height / 2
+        top = area.top - _NUMBER_GAP_PX - height if is_above else area.bottom + _NUMBER_GAP_PX
     else:
-        left = area.right + _NUMBER_GAP_PX
+        is_left = end[0] < area.width / 2
+        left = area.left - _NUMBER_GAP_PX - width if is_left else area.right + _NUMBER_GAP_PX
     return Box(round(left), round(top), round(left) + width, round(top) + height)
+
+
+def _pulled_in(box: Box, area: Box) -> Box:
+    """Gives a box beside the map area moved along its side until it does not pass the corner."""
+    left, top = box.left, box.top
+    if area.top < box.bottom and box.top < area.bottom:
+        top = min(max(top, area.top), area.bottom - box.height)
+    else:
+        left = min(max(left, area.left), area.right - box.width)
+    return Box(left, top, left + box.width, top + box.height)
+
+
+def _is_near(box: Box, other: Box) -> bool:
+    """True when two numbers could be read as one."""
+    grown = Box(box.left - _APART_PX, box.top - 2, box.right + _APART_PX, box.bottom + 2)
+    return grown.overlaps(other)
 
 
 def _number(line: MetricLine, spacing_m: float, up_rad: float) -> str:
     text = f"{line.multiple * spacing_m:.{decimals_of(spacing_m)}f}"
-    return text if _is_north_up(up_rad) else f"{line.axis}={text}"
+    return text if is_north_up(up_rad) else f"{line.axis}={text}"
 
 
 def _widest_number(extent: Extent, spacing_m: float, up_rad: float) -> Canvas:
@@ -215,44 +212,3 @@ def _stride(needed_px: float, pitch_px: float) -> int:
             if step * ten * pitch_px >= needed_px:
                 return step * ten
         ten *= 10
-
-
-def _is_north_up(up_rad: float) -> bool:
-    return abs(math.remainder(up_rad - NORTH_UP_RAD, math.tau)) < _ANGLE_SLACK_RAD
-
-
-def _direction(up_rad: float) -> str:
-    if _is_north_up(up_rad):
-        return "x right, y up"
-    return f"up is yaw {math.degrees(math.remainder(up_rad, math.tau)):.0f}°"
-
-
-def _draw_scale_bar(canvas: Canvas, view: View, left: int, middle: int) -> int:
-    """Draws the bar and gives where the next thing may begin."""
-    length_m = round_length_m(_SCALE_BAR_PX / view.pixels_per_m)
-    right = left + round(length_m * view.pixels_per_m)
-    cv2.line(canvas, (left, middle), (right, middle), (WALL,), 2)
-    for end in (left, right):
-        cv2.line(canvas, (end, middle - 5), (end, middle + 5), (WALL,), 2)
-    return _write(canvas, right + 8, middle, f"{length_m:g} m")
-
-
-def _draw_swatch(canvas: Canvas, left: int, middle: int, entry: LegendEntry) -> int:
-    patch = text_patch(entry.text, NUMBER_SIZE_PX)
-    right = left + 2 * _SWATCH_PX + patch.shape[1]
-    if right > canvas.shape[1]:
-        return left
-    corners = (left, middle - _SWATCH_PX // 2), (left + _SWATCH_PX, middle + _SWATCH_PX // 2)
-    cv2.rectangle(canvas, *corners, (entry.palette_number,), cv2.FILLED)
-    cv2.rectangle(canvas, *corners, (FRAME,))
-    return _write(canvas, left + _SWATCH_PX + 6, middle, entry.text)
-
-
-def _write(canvas: Canvas, left: int, middle: int, text: str) -> int:
-    """Writes a text if there is room for it, and gives where the next one may begin."""
-    patch = text_patch(text, NUMBER_SIZE_PX)
-    height, width = int(patch.shape[0]), int(patch.shape[1])
-    if left + width > canvas.shape[1]:
-        return left
-    stamp(canvas, patch, (left, middle - height // 2), halo_px=0)
-    return left + width + _LEGEND_GAP_PX

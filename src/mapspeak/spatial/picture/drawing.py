@@ -1,18 +1,35 @@
 """Maps drawn for a reader who sees: to scale, with numbers, marks, areas and the robot."""
 
 import io
+import itertools
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.spatial.grid import OccupancyGrid
+from mapspeak.spatial.grid import FloatArray, OccupancyGrid
 from mapspeak.spatial.picture import axes, ground, plan, symbols
-from mapspeak.spatial.picture.labels import Label, draw_labels, find_poles
-from mapspeak.spatial.picture.marks import Line, Mark, RegionLayer
+from mapspeak.spatial.picture.colouring import colour_regions
+from mapspeak.spatial.picture.labels import (
+    draw_leaders,
+    draw_texts,
+    label_at,
+    labels_of_marks,
+    labels_of_regions,
+    place_labels,
+)
+from mapspeak.spatial.picture.legend import (
+    ROW_PX,
+    GroundEntry,
+    Legend,
+    Scene,
+    grounds_in,
+    n_rows_of,
+)
+from mapspeak.spatial.picture.marks import LegendEntry, Line, Mark, Region, RegionLayer
 from mapspeak.spatial.picture.palette import (
     FREE,
     PALETTE,
@@ -21,17 +38,20 @@ from mapspeak.spatial.picture.palette import (
     WALL,
     Canvas,
 )
+from mapspeak.spatial.picture.poles import find_poles
 from mapspeak.spatial.picture.spacing import even_spacing_m
 from mapspeak.spatial.picture.view import NORTH_UP_RAD, View
 
-__all__ = ["MapLayers", "MapPicture", "draw_axes", "draw_map", "encode", "finish"]
+__all__ = ["MapLayers", "MapPicture", "draw_axes", "draw_map", "encode", "finish", "plan_sheet"]
 
 
-LEGEND = (
-    axes.LegendEntry(FREE, "free"),
-    axes.LegendEntry(UNKNOWN_GROUND, "unknown"),
-    axes.LegendEntry(WALL, "wall"),
+_GROUNDS = (
+    GroundEntry(FREE, "free"),
+    GroundEntry(UNKNOWN_GROUND, "unknown"),
+    GroundEntry(WALL, "wall"),
 )
+_LEGEND_RIM_PX = 5
+_MAX_LEGEND_RATIO = 0.4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,12 +63,15 @@ class MapLayers:
         lines: Paths, doors, borders.
         marks: Places, each with a label.
         robot: Where the robot stands.
+        legend: What symbols and patterns mean; only those that are to be seen are explained, in
+            this order, below the map.
     """
 
     regions: RegionLayer | None = None
     lines: tuple[Line, ...] = ()
     marks: tuple[Mark, ...] = ()
     robot: Pose | None = None
+    legend: tuple[LegendEntry, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,6 +84,7 @@ class MapPicture:
         spacing_m: Between the lines of the metric grid; None where none is drawn.
         labels_left_out: Texts of things in the picture whose label found no room.
         marks_outside: Labels of marks that lie outside the part of the map shown.
+        regions_outside: Texts of regions of which no part is shown.
         has_robot: The robot's arrow is in the picture.
     """
 
@@ -69,6 +93,7 @@ class MapPicture:
     spacing_m: float | None = None
     labels_left_out: tuple[str, ...] = ()
     marks_outside: tuple[str, ...] = ()
+    regions_outside: tuple[str, ...] = ()
     has_robot: bool = False
 
     @property
@@ -105,34 +130,59 @@ def draw_map(
     """
     extent = _extent(grid, up_rad, zoom, layers.robot)
     spacing_m = even_spacing_m(max(extent.width_m, extent.height_m))
-    margins = axes.margins_for(extent, spacing_m, up_rad=up_rad)
-    view = plan.plan_view(
-        grid,
-        extent,
-        up_rad=up_rad,
-        margins=margins,
-        max_edge_px=max_edge_px,
-        steps_per_pixel=2,
+    legend = Legend(spacing_m=spacing_m, grounds=_GROUNDS, entries=layers.legend)
+    everything = legend.limited_to(_everything(layers))
+    view = plan_sheet(
+        grid, extent, everything, up_rad=up_rad, max_edge_px=max_edge_px, steps_per_pixel=2
     )
     canvas = np.full((view.height_px, view.width_px), PAPER, dtype=np.uint8)
     inside = view.area_of(canvas)
     inside[:] = ground.paint_ground(grid, view)
     regions = _paint_regions(inside, grid, view, layers.regions)
-    draw_axes(canvas, view, spacing_m, LEGEND)
-    return finish(canvas, view, layers, spacing_m=spacing_m, regions=regions)
+    legend = replace(legend, grounds=grounds_in(inside, _GROUNDS))
+    draw_axes(canvas, view, spacing_m)
+    return finish(canvas, view, layers, legend=legend, regions=regions)
 
 
-def draw_axes(
-    canvas: Canvas, view: View, spacing_m: float, legend: tuple[axes.LegendEntry, ...]
-) -> None:
-    """Draws the metric grid under the walls, and the frame, numbers and legend around the map."""
+def plan_sheet(
+    grid: OccupancyGrid,
+    extent: plan.Extent,
+    legend: Legend,
+    *,
+    up_rad: float,
+    max_edge_px: int,
+    steps_per_pixel: int = 1,
+) -> View:
+    """Gives the view with room for numbers and legend; see `plan.plan_view`.
+
+    The more rows the legend gets, the smaller the map, and the more rows the legend needs.
+    """
+    most_rows = int(_MAX_LEGEND_RATIO * max_edge_px / ROW_PX)
+    n_rows = 1
+    while True:
+        legend_px = n_rows * ROW_PX + _LEGEND_RIM_PX
+        view = plan.plan_view(
+            grid,
+            extent,
+            up_rad=up_rad,
+            margins=axes.margins_for(extent, legend.spacing_m, up_rad=up_rad, legend_px=legend_px),
+            max_edge_px=max_edge_px,
+            steps_per_pixel=steps_per_pixel,
+        )
+        n_needed = min(n_rows_of(legend, view), most_rows)
+        if n_needed <= n_rows:
+            return view
+        n_rows = n_needed
+
+
+def draw_axes(canvas: Canvas, view: View, spacing_m: float) -> None:
+    """Draws the metric grid under the walls, and the frame and numbers around the map."""
     lines = axes.lines_in_view(view, spacing_m)
     inside = view.area_of(canvas)
     axes.draw_lines_under_walls(inside, lines)
     axes.draw_zero(inside, view)
     axes.draw_frame(canvas, view.area)
     axes.draw_numbers(canvas, view, lines, spacing_m)
-    axes.draw_legend(canvas, view, spacing_m, legend)
 
 
 def finish(
@@ -140,18 +190,32 @@ def finish(
     view: View,
     layers: MapLayers,
     *,
-    spacing_m: float,
+    legend: Legend,
     regions: NDArray[np.uint16] | None,
 ) -> MapPicture:
-    """Draws lines, symbols, the robot and all labels over the ground and gives the picture."""
-    left_out = _draw_layers(view.area_of(canvas), view, layers, regions)
+    """Draws lines, symbols, the robot, all labels and the legend, and gives the picture."""
+    sight = _look(view, layers, regions)
+    left_out = _draw_scene(view.area_of(canvas), view, sight, regions)
+    bottom = legend.limited_to(sight.scene).draw(canvas, view, axes.legend_top(view))
+    height_px = min(view.height_px, bottom + _LEGEND_RIM_PX)
     return MapPicture(
-        png=encode(canvas),
-        view=view,
-        spacing_m=spacing_m,
+        png=encode(canvas[:height_px]),
+        view=replace(view, height_px=height_px),
+        spacing_m=legend.spacing_m,
         labels_left_out=left_out,
-        marks_outside=tuple(mark.label for mark in layers.marks if not view.shows(mark.point)),
-        has_robot=layers.robot is not None and view.shows(layers.robot.point),
+        marks_outside=tuple(
+            mark.label
+            for mark, is_shown in zip(
+                layers.marks, view.shows_each(_points_of(layers.marks)), strict=True
+            )
+            if mark.label and not is_shown
+        ),
+        regions_outside=tuple(
+            region.text
+            for region in _regions_of(layers)
+            if region.text and region.label not in sight.poles
+        ),
+        has_robot=sight.scene.robot is not None,
     )
 
 
@@ -162,6 +226,14 @@ def encode(canvas: Canvas) -> bytes:
     file = io.BytesIO()
     picture.save(file, "PNG", compress_level=1, compress_type=zlib.Z_RLE)
     return file.getvalue()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Sight:
+    """What a picture shows, and where in it the labels of regions stand best."""
+
+    scene: Scene
+    poles: dict[int, tuple[float, float]]
 
 
 def _robot_label(robot: Pose) -> str:
@@ -178,6 +250,36 @@ def _extent(
     return plan.extent_of_zoom(grid, up_rad, zoom)
 
 
+def _regions_of(layers: MapLayers) -> tuple[Region, ...]:
+    return () if layers.regions is None else layers.regions.regions
+
+
+def _everything(layers: MapLayers) -> Scene:
+    """Gives all that a picture of the whole map would show."""
+    return Scene(
+        regions=_regions_of(layers),
+        lines=layers.lines,
+        marks=layers.marks,
+        robot=layers.robot,
+        has_origin=True,
+    )
+
+
+def _look(view: View, layers: MapLayers, regions: NDArray[np.uint16] | None) -> _Sight:
+    """Gives the part of all that which lies in the view."""
+    named = _regions_of(layers)
+    poles = {} if regions is None else find_poles(regions, tuple(r.label for r in named))
+    robot = layers.robot
+    scene = Scene(
+        regions=tuple(region for region in named if region.label in poles),
+        lines=tuple(line for line in layers.lines if symbols.is_in_view(view, line)),
+        marks=tuple(itertools.compress(layers.marks, view.shows_each(_points_of(layers.marks)))),
+        robot=robot if robot is not None and view.shows(robot.point) else None,
+        has_origin=view.shows(Point(0.0, 0.0)),
+    )
+    return _Sight(scene=scene, poles=poles)
+
+
 def _paint_regions(
     inside: Canvas, grid: OccupancyGrid, view: View, layer: RegionLayer | None
 ) -> NDArray[np.uint16] | None:
@@ -186,58 +288,43 @@ def _paint_regions(
         return None
     ground.check_layer(layer, grid)
     regions = ground.sample(layer.labels, grid, view)
-    ground.paint_regions(inside, regions, ground.colour_regions(regions, layer.regions))
+    ground.paint_regions(inside, regions, layer.regions, colour_regions(layer, grid))
     return regions
 
 
-def _draw_layers(
-    inside: Canvas, view: View, layers: MapLayers, regions: NDArray[np.uint16] | None
+def _draw_scene(
+    inside: Canvas, view: View, sight: _Sight, regions: NDArray[np.uint16] | None
 ) -> tuple[str, ...]:
-    """Draws lines, symbols, the robot and then all labels; gives the labels left out."""
-    shown = [mark for mark in layers.marks if view.shows(mark.point)]
-    robot = layers.robot if layers.robot and view.shows(layers.robot.point) else None
-    for line in layers.lines:
+    """Draws lines, symbols, the robot and all labels; gives the names left out."""
+    scene = sight.scene
+    for line in scene.lines:
         symbols.draw_line(inside, view, line)
-    for mark in shown:
-        symbols.draw_symbol(inside, view, mark)
+    places = view.area_pixels_at(_points_of(scene.marks))
     obstacles = [
-        symbols.symbol_box(view, mark.point, symbols.SYMBOL_REACH_PX)
-        for mark in shown
+        symbols.symbol_box(place, symbols.SYMBOL_REACH_PX)
+        for mark, place in zip(scene.marks, places, strict=True)
         if mark.shape is not None
     ]
-    labels = [_label_of_mark(view, mark) for mark in shown if mark.label]
-    if robot is not None:
-        symbols.draw_robot(inside, view, robot)
-        obstacles.append(symbols.symbol_box(view, robot.point, symbols.ARROW_REACH_PX))
-        labels.insert(0, _label_at(view, robot.point, _robot_label(robot), symbols.ARROW_REACH_PX))
-    labels.extend(_labels_of_regions(layers.regions, regions))
-    return draw_labels(inside, tuple(labels), obstacles=tuple(obstacles), regions=regions)
+    labels = labels_of_regions(scene.regions, sight.poles) + labels_of_marks(scene.marks, places)
+    if scene.robot is not None:
+        at, reach_px = _place_of(scene.robot, view), symbols.ARROW_REACH_PX
+        obstacles.append(symbols.symbol_box(at, reach_px))
+        labels.insert(0, label_at(at, _robot_label(scene.robot), clearance_px=reach_px))
+    placed, left_out = place_labels(inside, labels, obstacles=obstacles, regions=regions)
+    draw_leaders(inside, placed)
+    for mark, place in zip(scene.marks, places, strict=True):
+        if mark.shape is not None:
+            symbols.draw_shape(inside, place, mark.shape, mark.colour)
+    if scene.robot is not None:
+        heading_rad = view.heading_at(scene.robot.yaw_rad)
+        symbols.draw_arrow(inside, _place_of(scene.robot, view), heading_rad)
+    draw_texts(inside, placed)
+    return left_out
 
 
-def _label_of_mark(view: View, mark: Mark) -> Label:
-    clearance_px = symbols.SYMBOL_REACH_PX if mark.shape is not None else 0.0
-    return _label_at(view, mark.point, mark.label, clearance_px)
+def _place_of(robot: Pose, view: View) -> FloatArray:
+    return np.asarray(view.area_pixels_at(np.array([[robot.x, robot.y]]))[0])
 
 
-def _label_at(view: View, point: Point, text: str, clearance_px: float) -> Label:
-    u, v = view.area_pixels_at(np.array([[point.x, point.y]]))[0]
-    return Label(text=text, u=float(u), v=float(v), clearance_px=clearance_px)
-
-
-def _labels_of_regions(
-    layer: RegionLayer | None, regions: NDArray[np.uint16] | None
-) -> list[Label]:
-    """Gives the labels of the regions in sight, each at the place with the most room."""
-    if layer is None or regions is None:
-        return []
-    poles = find_poles(regions)
-    return [
-        Label(
-            text=region.text,
-            u=poles[region.label][0],
-            v=poles[region.label][1],
-            region=region.label,
-        )
-        for region in layer.regions
-        if region.text and region.label in poles
-    ]
+def _points_of(marks: tuple[Mark, ...]) -> FloatArray:
+    return np.array([[mark.point.x, mark.point.y] for mark in marks]).reshape(-1, 2)

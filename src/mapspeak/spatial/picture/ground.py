@@ -19,6 +19,7 @@ from mapspeak.spatial.picture.palette import (
     FILLS,
     FREE,
     GREYS,
+    RAMPS,
     UNKNOWN_GROUND,
     WALL,
     Canvas,
@@ -29,7 +30,6 @@ from mapspeak.spatial.picture.view import View
 
 __all__ = [
     "check_layer",
-    "colour_regions",
     "is_aligned",
     "paint_ground",
     "paint_paper_ground",
@@ -45,15 +45,10 @@ _MAX_SAMPLE_STEP_CELLS = 0.7
 
 _OUTLINE_PX = 2
 _HATCH_STEP_PX = 9
-_NEIGHBOUR_PX = 12
-_AUTOMATIC_COLOURS = (
-    Colour.SKY,
-    Colour.ORANGE,
-    Colour.GREEN,
-    Colour.PURPLE,
-    Colour.YELLOW,
-    Colour.VERMILION,
-)
+_DOT_STEP_PX = 10
+_DOT_PX = 2
+_HIGHLIGHT_PX = 5
+_HIGHLIGHT = int(RAMPS[Colour.VERMILION][-1])
 
 
 def is_aligned(grid: OccupancyGrid, up_rad: float) -> bool:
@@ -87,40 +82,35 @@ def paint_paper_ground(grid: OccupancyGrid, view: View) -> Canvas:
     return painted
 
 
-def paint_regions(ground: Canvas, labels: NDArray[np.uint16], regions: tuple[Region, ...]) -> None:
-    """Fills the free pixels of each region, hatches and outlines it, on the ground given.
+def paint_regions(
+    ground: Canvas,
+    labels: NDArray[np.uint16],
+    regions: tuple[Region, ...],
+    colours: dict[int, Colour],
+) -> None:
+    """Fills the free pixels of each region, with its pattern and outline, on the ground given.
 
     Args:
         ground: Palette numbers of the map area; changed in place.
         labels: The region of each pixel, from `sample`.
-        regions: With their colours chosen, see `colour_regions`.
+        regions: What is to be seen of them.
+        colours: Of each region's label.
     """
-    is_free = ground == FREE
-    fill = np.take(_fill_by_label(regions, FillPart.PLAIN), labels)
-    is_filled = is_free & (fill > 0)
+    fill = np.take(_fill_by_label(regions, colours, FillPart.PLAIN), labels)
+    is_filled = (ground == FREE) & (fill > 0)
     np.copyto(ground, fill, where=is_filled)
-    _hatch(ground, labels, is_filled, tuple(region for region in regions if region.is_hatched))
+    for places, wanted in (
+        (_hatch_pixels, tuple(region for region in regions if region.is_hatched)),
+        (_dot_pixels, tuple(region for region in regions if region.is_dotted)),
+    ):
+        if wanted:
+            hatch = _fill_by_label(wanted, colours, FillPart.HATCH)
+            _paint_pattern(ground, labels, is_filled, places(ground.shape), hatch)
     edge = _is_edge(labels) & is_filled
-    ground[edge] = _fill_by_label(regions, FillPart.OUTLINE)[labels[edge]]
-
-
-def colour_regions(labels: NDArray[np.uint16], regions: tuple[Region, ...]) -> tuple[Region, ...]:
-    """Gives the regions with a colour each, different from that of the regions near by."""
-    neighbours = _find_neighbours(labels)
-    chosen = {region.label: region.colour for region in regions if region.colour is not None}
+    ground[edge] = _fill_by_label(regions, colours, FillPart.OUTLINE)[labels[edge]]
     for region in regions:
-        if region.colour is None:
-            taken = {chosen[label] for label in neighbours.get(region.label, ()) if label in chosen}
-            chosen[region.label] = _pick_colour(region.label, taken)
-    return tuple(
-        Region(
-            label=region.label,
-            text=region.text,
-            colour=chosen[region.label],
-            is_hatched=region.is_hatched,
-        )
-        for region in regions
-    )
+        if region.is_highlighted:
+            _highlight(ground, labels == region.label)
 
 
 def check_layer(layer: RegionLayer, grid: OccupancyGrid) -> None:
@@ -140,13 +130,18 @@ def _turn_in_view(grid: OccupancyGrid, up_rad: float) -> float:
 def _sample_aligned(values: NDArray[Number], grid: OccupancyGrid, view: View) -> NDArray[Number]:
     cells_per_pixel = 1.0 / (view.pixels_per_m * grid.resolution_m)
     corner = grid.fractional_cells_at(np.array([[view.corner.x, view.corner.y]]))[0]
-    n_above = grid.n_rows - round(corner[0])
-    rows = n_above + _first_cells(view.area.height + 1, cells_per_pixel)
-    cols = round(corner[1]) + _first_cells(view.area.width + 1, cells_per_pixel)
-    from_top = values[::-1]
+    top = round(corner[0]) - 1
+    down = _spans(_first_cells(view.area.height + 1, cells_per_pixel))
+    right = _spans(_first_cells(view.area.width + 1, cells_per_pixel))
+    rows = (top - down[1], top - down[0])
+    cols = (round(corner[1]) + right[0], round(corner[1]) + right[1])
     if cells_per_pixel < 1:
-        return _pool(_pool(from_top, cols, axis=1), rows, axis=0)
-    return _pool(_pool(from_top, rows, axis=0), cols, axis=1)
+        # Cells become larger: taken from few rows, repeated last.
+        first = min(max(0, int(rows[0].min())), grid.n_rows - 1)
+        window = values[first : max(first, int(rows[1].max())) + 1]
+        wide = _pool(window, *cols, axis=1)
+        return _pool(wide, rows[0] - first, rows[1] - first, axis=0)
+    return _pool(_pool(values, *rows, axis=0), *cols, axis=1)
 
 
 def _first_cells(n_pixels: int, cells_per_pixel: float) -> IntArray:
@@ -159,10 +154,16 @@ def _first_cells(n_pixels: int, cells_per_pixel: float) -> IntArray:
     return first
 
 
-def _pool(values: NDArray[Number], starts: IntArray, *, axis: int) -> NDArray[Number]:
-    """Gives the highest value between each start and the next along an axis."""
+def _spans(starts: IntArray) -> tuple[IntArray, IntArray]:
+    """Gives the first and the last cell from each start to before the next; one at the least."""
+    return starts[:-1], np.maximum(starts[1:] - 1, starts[:-1])
+
+
+def _pool(
+    values: NDArray[Number], firsts: IntArray, lasts: IntArray, *, axis: int
+) -> NDArray[Number]:
+    """Gives the highest value from each first to its last place along an axis."""
     n_cells = values.shape[axis]
-    firsts, lasts = starts[:-1], np.maximum(starts[1:] - 1, starts[:-1])
     pooled = np.take(values, np.clip(firsts, 0, n_cells - 1), axis=axis)
     for offset in range(1, int((lasts - firsts).max(initial=0)) + 1):
         index = np.clip(np.minimum(firsts + offset, lasts), 0, n_cells - 1)
@@ -210,7 +211,7 @@ def _coarsen(values: NDArray[Number], n_pooled: int) -> NDArray[Number]:
     """Gives the highest value of each block of n x n; blocks at the far sides may be smaller."""
     for axis in (0, 1):
         n_blocks = -(-values.shape[axis] // n_pooled)
-        values = _pool(values, np.arange(n_blocks + 1) * n_pooled, axis=axis)
+        values = _pool(values, *_spans(np.arange(n_blocks + 1) * n_pooled), axis=axis)
     return values
 
 
@@ -233,28 +234,56 @@ def _coarse_from_fine(
     return np.stack([x_y[1] - x_y[0], x_y[2] - x_y[0], x_y[0]], axis=1)
 
 
-def _fill_by_label(regions: tuple[Region, ...], part: FillPart) -> Canvas:
+def _fill_by_label(
+    regions: tuple[Region, ...], colours: dict[int, Colour], part: FillPart
+) -> Canvas:
     """Gives the palette number of each label's fill; 0 for labels without a region."""
     fills = np.zeros(np.iinfo(np.uint16).max + 1, dtype=np.uint8)
     for region in regions:
-        if region.colour is not None:
-            fills[region.label] = FILLS[region.colour, part]
+        fills[region.label] = FILLS[colours[region.label], part]
     return fills
 
 
-def _hatch(
-    ground: Canvas, labels: NDArray[np.uint16], is_filled: Mask, regions: tuple[Region, ...]
+def _paint_pattern(
+    ground: Canvas,
+    labels: NDArray[np.uint16],
+    is_filled: Mask,
+    places: tuple[IntArray, IntArray],
+    fills: Canvas,
 ) -> None:
-    """Draws diagonal lines over the filled pixels of some regions."""
-    if not regions:
-        return
-    n_rows, n_cols = ground.shape
-    row = np.arange(n_rows)[:, np.newaxis]
-    col = -row % _HATCH_STEP_PX + np.arange(0, n_cols, _HATCH_STEP_PX)
-    row, col = np.broadcast_to(row, col.shape)[col < n_cols], col[col < n_cols]
-    hatch = _fill_by_label(regions, FillPart.HATCH)[labels[row, col]]
-    is_hatched = is_filled[row, col] & (hatch > 0)
-    ground[row[is_hatched], col[is_hatched]] = hatch[is_hatched]
+    """Paints those of the rows and columns given that lie in a filled region with a pattern."""
+    row, col = places
+    numbers = fills[labels[row, col]]
+    is_painted = is_filled[row, col] & (numbers > 0)
+    ground[row[is_painted], col[is_painted]] = numbers[is_painted]
+
+
+def _hatch_pixels(shape: tuple[int, ...]) -> tuple[IntArray, IntArray]:
+    """Gives rows and columns on diagonal lines."""
+    row = np.arange(shape[0])[:, np.newaxis]
+    col = -row % _HATCH_STEP_PX + np.arange(0, shape[1], _HATCH_STEP_PX)
+    return np.broadcast_to(row, col.shape)[col < shape[1]], col[col < shape[1]]
+
+
+def _dot_pixels(shape: tuple[int, ...]) -> tuple[IntArray, IntArray]:
+    """Gives rows and columns of small square dots."""
+    row, col = (np.flatnonzero(np.arange(length) % _DOT_STEP_PX < _DOT_PX) for length in shape)
+    return np.repeat(row, col.size), np.tile(col, row.size)
+
+
+def _highlight(ground: Canvas, is_region: Mask) -> None:
+    """Draws a bold line inside a region along its outer border, beside its walls.
+
+    Where the picture cuts the region off there is no border.
+    """
+    rim_px = 2 * _HIGHLIGHT_PX
+    mask = np.pad(is_region.astype(np.uint8), rim_px, mode="edge")
+    borders, _ = cv2.findContours(
+        mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE, offset=(-rim_px, -rim_px)
+    )
+    bold = np.zeros(ground.shape, dtype=np.uint8)
+    cv2.drawContours(bold, borders, -1, (1,), 2 * _HIGHLIGHT_PX - 1)
+    ground[(bold > 0) & is_region & (ground != WALL)] = _HIGHLIGHT
 
 
 def _is_edge(labels: NDArray[np.uint16]) -> Mask:
@@ -262,27 +291,3 @@ def _is_edge(labels: NDArray[np.uint16]) -> Mask:
     kernel = np.ones((2 * _OUTLINE_PX + 1, 2 * _OUTLINE_PX + 1), dtype=np.uint8)
     is_edge: Mask = cv2.dilate(labels, kernel) != cv2.erode(labels, kernel)
     return is_edge
-
-
-def _find_neighbours(labels: NDArray[np.uint16]) -> dict[int, set[int]]:
-    """Gives, for each label, those that come near it along a row or a column of pixels."""
-    found: dict[int, set[int]] = {}
-    for distance in (2, _NEIGHBOUR_PX):
-        pairs = (
-            (labels[:-distance:2, ::2], labels[distance::2, ::2]),
-            (labels[::2, :-distance:2], labels[::2, distance::2]),
-        )
-        for one, other in pairs:
-            differ = (one != other) & (one > 0) & (other > 0)
-            joint = np.unique(one[differ].astype(np.uint32) << 16 | other[differ])
-            for a, b in zip((joint >> 16).tolist(), (joint & 0xFFFF).tolist(), strict=True):
-                found.setdefault(a, set()).add(b)
-                found.setdefault(b, set()).add(a)
-    return found
-
-
-def _pick_colour(label: int, taken: set[Colour]) -> Colour:
-    """Gives the first colour not taken, beginning at one that depends on the label alone."""
-    start = label % len(_AUTOMATIC_COLOURS)
-    turned = _AUTOMATIC_COLOURS[start:] + _AUTOMATIC_COLOURS[:start]
-    return next((colour for colour in turned if colour not in taken), turned[0])

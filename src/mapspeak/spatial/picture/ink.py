@@ -34,6 +34,7 @@ _SHIFT = 4
 _HALO_FROM = 96
 _INK_FROM = 24
 _TALL_AND_DEEP = "Hg|"
+_GAP_RATIO = 0.4
 
 
 def draw_polygon(canvas: Canvas, corners: FloatArray, colour: Colour, *, halo_px: int = 2) -> None:
@@ -77,13 +78,18 @@ def clip_segment(start: FloatArray, end: FloatArray, size: FloatArray) -> FloatA
     return np.stack([start + first * step, start + last * step]) if first < last else None
 
 
+@functools.lru_cache(maxsize=2048)
 def text_patch(text: str, size_px: int) -> Canvas:
-    """Gives lines of text as a patch, centred; all single lines of one size are equally high."""
-    rows = [_line_patch(line, size_px) for line in text.split("\n")]
-    if len(rows) == 1:
-        return rows[0]
+    """Gives lines of text as a patch, centred; all single lines of one size are equally high.
+
+    A tab sets words apart that do not belong together. Patches are kept, and locked, because the
+    same numbers and ids are written again and again.
+    """
+    rows = [_row_of_words(line.split("\t"), size_px) for line in text.split("\n")]
     width = max(row.shape[1] for row in rows)
-    return np.concatenate([_centred(row, width) for row in rows])
+    patch = np.concatenate([_centred(row, width) for row in rows])
+    patch.setflags(write=False)
+    return patch
 
 
 def stamp(
@@ -115,12 +121,20 @@ def stamp(
     coverage = padded[cut_top : cut_top + target.shape[0], cut_left : cut_left + target.shape[1]]
     if coverage.size == 0:
         return
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * halo_px + 1, 2 * halo_px + 1))
-    halo = cv2.dilate(padded, kernel)[cut_top:, cut_left:][: target.shape[0], : target.shape[1]]
+    halo = cv2.dilate(padded, _disc(halo_px))[cut_top:, cut_left:][
+        : target.shape[0], : target.shape[1]
+    ]
     target[halo >= _HALO_FROM] = PAPER
     is_inked = coverage >= _INK_FROM
     levels = coverage[is_inked].astype(np.intp) * N_RAMP_LEVELS // 256
     target[is_inked] = RAMPS[colour][levels]
+
+
+@functools.cache
+def _disc(radius_px: int) -> Canvas:
+    side_px = 2 * radius_px + 1
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side_px, side_px))
+    return disc.astype(np.uint8, copy=False)
 
 
 def _patch_around(points: FloatArray, rim_px: int) -> tuple[Canvas, tuple[int, int]]:
@@ -136,18 +150,21 @@ def _in_subpixels(points: FloatArray, top_left: tuple[int, int]) -> NDArray[np.i
     return np.asarray(np.rint(local * (1 << _SHIFT)), dtype=np.int32)
 
 
-@functools.lru_cache(maxsize=2048)
-def _line_patch(text: str, size_px: int) -> Canvas:
-    """Gives one line; kept, because the same numbers and ids are written again and again."""
+def _row_of_words(words: list[str], size_px: int) -> Canvas:
+    """Gives patches side by side, as far apart as words that do not belong together."""
+    first, *others = (_word_patch(word, size_px) for word in words)
+    gap = np.zeros((first.shape[0], round(_GAP_RATIO * size_px)), dtype=np.uint8)
+    return np.hstack([first, *(part for other in others for part in (gap, other))])
+
+
+def _word_patch(text: str, size_px: int) -> Canvas:
     font, ascent_px, height_px = _font(size_px)
     written = _printable(text)
     picture = Image.new("L", ((len(written) + 2) * size_px, height_px))
     ImageDraw.Draw(picture).text((size_px, ascent_px), written, fill=255, font=font, anchor="ls")
     pixels = np.asarray(picture)
     used = np.flatnonzero(pixels.any(axis=0))
-    patch = pixels[:, used[0] : used[-1] + 1].copy() if used.size else pixels[:, :size_px].copy()
-    patch.setflags(write=False)
-    return patch
+    return pixels[:, used[0] : used[-1] + 1] if used.size else pixels[:, :size_px]
 
 
 @functools.cache

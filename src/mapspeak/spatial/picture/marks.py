@@ -1,4 +1,4 @@
-"""What can be drawn on a map: marks, lines and areas, with no knowledge of what they stand for."""
+"""What can be drawn on a map: marks, lines, areas and a legend, whatever they stand for."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -10,7 +10,7 @@ from mapspeak.errors import MapError
 from mapspeak.geometry import Point
 from mapspeak.spatial.picture.palette import Colour
 
-__all__ = ["Line", "LineStyle", "Mark", "Region", "RegionLayer", "Shape"]
+__all__ = ["LegendEntry", "Line", "LineStyle", "Mark", "Region", "RegionLayer", "Sample", "Shape"]
 
 _MAX_LABEL = np.iinfo(np.uint16).max
 
@@ -30,6 +30,17 @@ class LineStyle(StrEnum):
 
     SOLID = "solid"
     DASHED = "dashed"
+
+
+class Sample(StrEnum):
+    """What a legend can explain besides the shapes of marks and the styles of lines."""
+
+    PLAIN_REGION = "plain region"
+    HATCHED_REGION = "hatched region"
+    DOTTED_REGION = "dotted region"
+    HIGHLIGHTED_REGION = "highlighted region"
+    ROBOT = "robot"
+    ORIGIN = "origin"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,13 +85,20 @@ class Region:
         label: The number its cells carry in the layer's array.
         text: What is written in it; empty for none.
         colour: Of its pale fill; None for one that differs from the neighbours'.
-        is_hatched: It is hatched too.
+        is_hatched: Its fill has diagonal lines.
+        is_dotted: Its fill has dots.
+        is_highlighted: It has a bold outline, for the one region that a picture is about.
+        key: What stays the same from picture to picture, such as the number in its id; it decides
+            on an automatic colour. None where the label itself stays the same.
     """
 
     label: int
     text: str
     colour: Colour | None = None
     is_hatched: bool = False
+    is_dotted: bool = False
+    is_highlighted: bool = False
+    key: int | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,3 +127,18 @@ class RegionLayer:
         locked = np.array(labels, dtype=np.uint16, order="C")
         locked.setflags(write=False)
         object.__setattr__(self, "labels", locked)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LegendEntry:
+    """One symbol of a picture and what it stands for.
+
+    Attributes:
+        sample: What is explained.
+        text: Its meaning in a word or two.
+        colour: Only for marks and lines of this colour; None for those of any.
+    """
+
+    sample: Shape | LineStyle | Sample
+    text: str
+    colour: Colour | None = None

@@ -10,18 +10,26 @@ from numpy.typing import NDArray
 
 from mapspeak.geometry import Pose
 from mapspeak.spatial.grid import OccupancyGrid
-from mapspeak.spatial.picture import axes, ground, plan
-from mapspeak.spatial.picture.drawing import MapLayers, MapPicture, draw_axes, encode, finish
+from mapspeak.spatial.picture import ground, plan
+from mapspeak.spatial.picture.drawing import (
+    MapLayers,
+    MapPicture,
+    draw_axes,
+    encode,
+    finish,
+    plan_sheet,
+)
+from mapspeak.spatial.picture.legend import GroundEntry, Legend
 from mapspeak.spatial.picture.palette import GREYS, PALETTE, PAPER
 from mapspeak.spatial.picture.spacing import paper_spacing_m
 from mapspeak.spatial.picture.view import NORTH_UP_RAD
 
 __all__ = ["draw_map_axis", "draw_map_plain", "draw_robot_pose", "grey_levels"]
 
-_LEGEND = (
-    axes.LegendEntry(int(GREYS[1]), "free"),
-    axes.LegendEntry(int(GREYS[0]), "unknown"),
-    axes.LegendEntry(int(GREYS[-1]), "occupied"),
+_GROUNDS = (
+    GroundEntry(int(GREYS[1]), "free"),
+    GroundEntry(int(GREYS[0]), "unknown"),
+    GroundEntry(int(GREYS[-1]), "occupied"),
 )
 
 
@@ -54,12 +62,10 @@ def draw_robot_pose(grid: OccupancyGrid, robot: Pose, *, max_edge_px: int = 1000
 def _draw_with_axes(grid: OccupancyGrid, layers: MapLayers, max_edge_px: int) -> MapPicture:
     extent = plan.extent_of_map(grid, NORTH_UP_RAD)
     spacing_m = paper_spacing_m(extent.width_m, extent.height_m, grid.resolution_m)
-    margins = axes.margins_for(extent, spacing_m, up_rad=NORTH_UP_RAD)
-    view = plan.plan_view(
-        grid, extent, up_rad=NORTH_UP_RAD, margins=margins, max_edge_px=max_edge_px
-    )
+    legend = Legend(spacing_m=spacing_m, grounds=_GROUNDS)
+    view = plan_sheet(grid, extent, legend, up_rad=NORTH_UP_RAD, max_edge_px=max_edge_px)
     canvas = np.full((view.height_px, view.width_px), PAPER, dtype=np.uint8)
     inside = view.area_of(canvas)
     inside[:] = ground.paint_paper_ground(grid, view)
-    draw_axes(canvas, view, spacing_m, _LEGEND)
-    return finish(canvas, view, layers, spacing_m=spacing_m, regions=None)
+    draw_axes(canvas, view, spacing_m)
+    return finish(canvas, view, layers, legend=legend, regions=None)

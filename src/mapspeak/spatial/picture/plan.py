@@ -28,6 +28,8 @@ MAX_EDGE_PX = 1072
 MIN_EDGE_PX = 320
 _RIM_M = 1.0
 _MIN_RIM_LIMIT_CELLS = 10
+_BLOCK_ROWS = 512
+"""Large maps are read in blocks, so that drawing them takes little memory."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -249,9 +251,12 @@ def _extent_of_points(points: FloatArray, up_rad: float) -> Extent:
 
 def _extent_of_known_turned(grid: OccupancyGrid, up_rad: float, rows: IntArray) -> Extent:
     """Gives the extent of the known cells from the first and the last one of each row."""
-    known = grid.cells[rows] >= 0
-    first = known.argmax(axis=1)
-    last = grid.n_cols - known[:, ::-1].argmax(axis=1)
+    first, last = np.empty_like(rows), np.empty_like(rows)
+    for start in range(0, rows.size, _BLOCK_ROWS):
+        block = slice(start, start + _BLOCK_ROWS)
+        known = grid.cells[rows[block]] >= 0
+        first[block] = known.argmax(axis=1)
+        last[block] = grid.n_cols - known[:, ::-1].argmax(axis=1)
     corners = [
         _corner_points(grid, rows + above, cols) for above in (0, 1) for cols in (first, last)
     ]

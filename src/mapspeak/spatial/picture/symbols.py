@@ -5,10 +5,9 @@ import math
 
 import numpy as np
 
-from mapspeak.geometry import Point, Pose
 from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.picture.ink import clip_segment, draw_polygon, draw_stroke
-from mapspeak.spatial.picture.marks import Line, LineStyle, Mark, Shape
+from mapspeak.spatial.picture.marks import Line, LineStyle, Shape
 from mapspeak.spatial.picture.palette import Canvas, Colour
 from mapspeak.spatial.picture.view import Box, View
 
@@ -16,9 +15,13 @@ __all__ = [
     "ARROW_REACH_PX",
     "SYMBOL_REACH_PX",
     "arrow_pixels",
+    "draw_arrow",
     "draw_line",
-    "draw_robot",
-    "draw_symbol",
+    "draw_run",
+    "draw_shape",
+    "draw_zero_ring",
+    "is_in_view",
+    "symbol_box",
 ]
 
 
@@ -29,6 +32,7 @@ _ARROW_PX = np.array([[17.0, 0.0], [-9.0, 9.0], [-4.0, 0.0], [-9.0, -9.0]])
 """The arrow in the robot's own frame, x forward and y left, around the robot's position."""
 
 _DASH_PX, _GAP_PX = 11.0, 7.0
+_ZERO_RADIUS_PX = 6
 _CORNER_TURNS = {
     Shape.SQUARE: np.arange(4) * math.tau / 4 + math.tau / 8,
     Shape.DIAMOND: np.arange(4) * math.tau / 4,
@@ -37,8 +41,8 @@ _CORNER_TURNS = {
 }
 _CROSS_PX = np.array(
     [
-        [-2, -2], [-2, -7], [2, -7], [2, -2], [7, -2], [7, 2],
-        [2, 2], [2, 7], [-2, 7], [-2, 2], [-7, 2], [-7, -2],
+        [0, -3], [5, -8], [8, -5], [3, 0], [8, 5], [5, 8],
+        [0, 3], [-5, 8], [-8, 5], [-3, 0], [-8, -5], [-5, -8],
     ],
     dtype=np.float64,
 )  # fmt: skip
@@ -57,9 +61,9 @@ def arrow_pixels(arrow: FloatArray, heading_rad: float) -> FloatArray:
     return np.stack([right, down], axis=1)
 
 
-def symbol_box(view: View, point: Point, reach_px: float) -> Box:
-    """Gives the box of the map area that a symbol at a point takes."""
-    u, v = view.area_pixels_at(np.array([[point.x, point.y]]))[0]
+def symbol_box(place: FloatArray, reach_px: float) -> Box:
+    """Gives the box of the map area that a symbol at (u, v) takes."""
+    u, v = place
     return Box(
         math.floor(u - reach_px),
         math.floor(v - reach_px),
@@ -68,32 +72,50 @@ def symbol_box(view: View, point: Point, reach_px: float) -> Box:
     )
 
 
-def draw_robot(inside: Canvas, view: View, robot: Pose) -> None:
-    """Draws the robot as an arrow along its heading, with a white edge."""
-    place = view.area_pixels_at(np.array([[robot.x, robot.y]]))
-    arrow = arrow_pixels(_ARROW_PX, view.heading_at(robot.yaw_rad))
-    draw_polygon(inside, place + arrow, Colour.VERMILION, halo_px=3)
+def draw_arrow(canvas: Canvas, place: FloatArray, heading_rad: float, *, scale: float = 1) -> None:
+    """Draws the robot's arrow, with a white edge, at (u, v); see `arrow_pixels` for the heading."""
+    arrow = arrow_pixels(scale * _ARROW_PX, heading_rad)
+    draw_polygon(canvas, place + arrow, Colour.VERMILION, halo_px=3)
 
 
-def draw_symbol(inside: Canvas, view: View, mark: Mark) -> None:
-    """Draws a mark's symbol, if it has one."""
-    place = view.area_pixels_at(np.array([[mark.point.x, mark.point.y]]))
-    if mark.shape is Shape.CROSS:
-        draw_polygon(inside, place + _CROSS_PX, mark.colour)
-    elif mark.shape is not None:
-        turns = _CORNER_TURNS[mark.shape]
-        reach = 6.0 if mark.shape is Shape.CIRCLE else 8.0
-        corners = place + reach * np.stack([np.cos(turns), np.sin(turns)], axis=1)
-        draw_polygon(inside, corners, mark.colour)
+def draw_shape(canvas: Canvas, place: FloatArray, shape: Shape, colour: Colour) -> None:
+    """Draws a shape around a place (u, v)."""
+    if shape is Shape.CROSS:
+        draw_polygon(canvas, place + _CROSS_PX, colour)
+        return
+    turns = _CORNER_TURNS[shape]
+    reach = 6.0 if shape is Shape.CIRCLE else 8.0
+    corners = place + reach * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    draw_polygon(canvas, corners, colour)
+
+
+def draw_zero_ring(canvas: Canvas, place: FloatArray) -> None:
+    """Draws the ring that marks the map's origin, around (u, v)."""
+    turns = np.linspace(0.0, math.tau, 33)
+    circle = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    draw_stroke(canvas, place + _ZERO_RADIUS_PX * circle, Colour.INK, width_px=2)
+    draw_polygon(canvas, place + circle, Colour.INK, halo_px=0)
+
+
+def is_in_view(view: View, line: Line) -> bool:
+    """True when some of a line lies in the map area."""
+    points = view.area_pixels_at(np.array([[point.x, point.y] for point in line.points]))
+    return bool(_runs_inside(points, view.area))
 
 
 def draw_line(inside: Canvas, view: View, line: Line) -> None:
     """Draws the part of a line that lies in the map area."""
     points = view.area_pixels_at(np.array([[point.x, point.y] for point in line.points]))
     for run in _runs_inside(points, view.area):
-        pieces = [run] if line.style is LineStyle.SOLID else _dashes(run)
-        for piece in pieces:
-            draw_stroke(inside, piece, line.colour, width_px=line.width_px)
+        draw_run(inside, run, line.style, line.colour, width_px=line.width_px)
+
+
+def draw_run(
+    canvas: Canvas, run: FloatArray, style: LineStyle, colour: Colour, *, width_px: int
+) -> None:
+    """Draws an unbroken line through points (u, v) of shape (n, 2), solid or in dashes."""
+    for piece in [run] if style is LineStyle.SOLID else _dashes(run):
+        draw_stroke(canvas, piece, colour, width_px=width_px)
 
 
 def _runs_inside(points: FloatArray, area: Box) -> list[FloatArray]:

@@ -9,14 +9,20 @@ from numpy.typing import NDArray
 from mapspeak.geometry import Point
 from mapspeak.spatial.grid import FloatArray
 
-__all__ = ["NORTH_UP_RAD", "Box", "Pixel", "View"]
+__all__ = ["NORTH_UP_RAD", "Box", "Pixel", "View", "is_north_up"]
 
 
 NORTH_UP_RAD = math.pi / 2
 """The view in which the map's y axis points up and its x axis to the right."""
 
+_ANGLE_SLACK_RAD = 1e-9
 _BORDER_SLACK_PX = 1e-6
 """Rounding in the last digits must not push a cell's corner into the pixel before it."""
+
+
+def is_north_up(up_rad: float) -> bool:
+    """True for the view with the map's y axis up."""
+    return abs(math.remainder(up_rad - NORTH_UP_RAD, math.tau)) < _ANGLE_SLACK_RAD
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +110,12 @@ class View:
         u = self.area.left + self.pixels_per_m * (sin * dx - cos * dy)
         v = self.area.top - self.pixels_per_m * (cos * dx + sin * dy)
         return np.stack([u, v], axis=1)
+
+    def shows_each(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Gives `shows` for points of shape (n, 2)."""
+        pixels = np.floor(self.fractional_pixels_at(points) + _BORDER_SLACK_PX)
+        first, end = (self.area.left, self.area.top), (self.area.right, self.area.bottom)
+        return np.asarray(((pixels >= first) & (pixels < end)).all(axis=1))
 
     def area_pixels_at(self, points: FloatArray) -> FloatArray:
         """Gives (u, v) as real numbers, counted from the top left corner of the map area."""

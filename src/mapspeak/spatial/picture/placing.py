@@ -1,0 +1,250 @@
+"""The search for a place for each label: near what it names, on nothing that should be seen.
+
+Every label tries positions around its place, from near to far, and takes the one that covers the
+fewest walls and drawn things; a label with no free position gets none.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from mapspeak.spatial.grid import FloatArray, IntArray, Mask
+from mapspeak.spatial.picture.field import (
+    FAR_RINGS,
+    HALO_PX,
+    NEAR_RINGS,
+    Field,
+    Label,
+    Placed,
+    Positions,
+)
+from mapspeak.spatial.picture.view import Box
+
+__all__ = ["find_places", "leader_of"]
+
+
+_COST_OF_CROSSING = 12.0
+_COST_OF_HINDERING = 1.2
+_FAIR_COST = 1.5
+_N_LEADER_POINTS = 9
+_LEADER_STEP_PX = 8.0
+_N_CHECKED = 16
+_BLOCK = 24
+_CORNER_REACH = 1.5
+"""A symbol's box reaches this much farther at its corners than the symbol itself."""
+
+
+def find_places(
+    labels: tuple[Label, ...], field: Field, obstacles: tuple[Box, ...]
+) -> tuple[list[Placed], list[Label]]:
+    """Gives the labels that found a place, and those that did not.
+
+    Regions too small for their labels choose first, because these need the free ground around;
+    then points, which have many good places, but spare the best one of a region's label; last
+    regions. Where points took all places in a region after all, those in its best place move.
+
+    Args:
+        labels: In the order in which they may choose among their kind.
+        field: What is on the map.
+        obstacles: Boxes that no label may touch, such as symbols.
+    """
+    search = _Search(labels, field, obstacles)
+    points = [label for label in labels if label.region is None]
+    regions = [label for label in labels if label.region is not None]
+    for label in regions:
+        if label not in search.wishes:
+            search.place(label)
+    for label in points:
+        search.place(label)
+    for label in regions:
+        if label in search.wishes and not search.place_inside(label):
+            search.make_room(label)
+    return list(search.placed.values()), [label for label in labels if label not in search.placed]
+
+
+def leader_of(label: Label, box: Box) -> FloatArray:
+    """Gives the line from what a label names to the nearest point of its box, shape (2, 2)."""
+    start = np.array([label.u, label.v])
+    end = np.clip(start, (box.left, box.top), (box.right, box.bottom)).astype(np.float64)
+    away = (end - start) / max(1e-9, float(np.hypot(*(end - start))))
+    return np.stack([start + label.clearance_px * away, end])
+
+
+class _Search:
+    """The state of the search.
+
+    Attributes:
+        placed: Labels with their places.
+        wishes: Where each region's label would stand inside it if there were no other labels.
+    """
+
+    def __init__(self, labels: tuple[Label, ...], field: Field, obstacles: tuple[Box, ...]) -> None:
+        self.placed: dict[Label, Placed] = {}
+        self._field = field
+        self._near = dict(zip(labels, field.positions(labels, NEAR_RINGS), strict=True))
+        self._far: dict[Label, Positions] = {}
+        self._taken = _Taken(obstacles)
+        self._spared = np.zeros((0, 4), dtype=np.intp)
+        self.wishes = {label: spot for label in labels if (spot := self._find_inside(label))}
+        wished = [_corners(spot.box) for spot in self.wishes.values()]
+        self._spared = np.array(wished, dtype=np.intp).reshape(-1, 4)
+
+    def place(self, label: Label) -> bool:
+        """Places a label anywhere; gives False where there is no room."""
+        spot = self._find(label, lambda positions: np.ones(len(positions.boxes), dtype=bool))
+        return self._add(label, spot)
+
+    def place_inside(self, label: Label) -> bool:
+        """Places a region's label inside it; gives False where there is no room."""
+        return self._add(label, self._find_inside(label))
+
+    def make_room(self, label: Label) -> None:
+        """Places a region's label where it wished to be, and moves those of points from there."""
+        wish = self.wishes[label]
+        in_its_way = [self.placed[other] for other in self._taken.owners_at(wish.box)]
+        if any(spot.label.region is not None for spot in in_its_way):
+            self.place(label)
+            return
+        for spot in in_its_way:
+            self._taken.remove(spot.label)
+            del self.placed[spot.label]
+        self._add(label, wish)
+        for spot in in_its_way:
+            self.place(spot.label)
+
+    def _add(self, label: Label, spot: Placed | None) -> bool:
+        if spot is not None:
+            self.placed[label] = spot
+            self._taken.add(spot)
+        return spot is not None
+
+    def _find_inside(self, label: Label) -> Placed | None:
+        if label.region is None:
+            return None
+        return self._find(
+            label,
+            lambda positions: (
+                ~(positions.needs_leader | positions.is_astray) & (positions.cost < _FAIR_COST)
+            ),
+        )
+
+    def _find(self, label: Label, is_possible: Callable[[Positions], Mask]) -> Placed | None:
+        """Gives the cheapest possible place; far ones are tried where no near one is good."""
+        best: Placed | None = None
+        best_cost = math.inf
+        for positions in self._near_and_far(label):
+            taken = self._taken.near(positions.boxes)
+            free = _cheapest_free(positions, np.flatnonzero(is_possible(positions)), taken)
+            if free.size:
+                cost, cheapest = self._judge(positions, free, taken)
+                if cost < best_cost:
+                    best, best_cost = positions.placed(cheapest), cost
+            if best_cost < _FAIR_COST:
+                break
+        return best
+
+    def _near_and_far(self, label: Label) -> Iterator[Positions]:
+        yield self._near[label]
+        if label not in self._far:
+            self._far[label] = self._field.positions((label,), FAR_RINGS)[0]
+        yield self._far[label]
+
+    def _judge(self, positions: Positions, index: IntArray, taken: IntArray) -> tuple[float, int]:
+        """Gives the lowest cost among positions, the other labels counted, and where it is."""
+        label, boxes = positions.label, positions.boxes[index]
+        cost, needs_leader = positions.cost[index], positions.needs_leader[index]
+        if label.region is None:
+            cost += _COST_OF_HINDERING * _overlaps(boxes, self._spared).any(axis=1)
+        if needs_leader.any():
+            crossed_ratio = _crossed_ratio(_leaders(label, boxes), taken)
+            cost += _COST_OF_CROSSING * crossed_ratio * needs_leader
+        best = int(np.argmin(cost))
+        return float(cost[best]), int(index[best])
+
+
+class _Taken:
+    """Boxes that no label may touch; grows as labels find their places."""
+
+    def __init__(self, obstacles: tuple[Box, ...]) -> None:
+        self._boxes = np.array([_corners(box) for box in obstacles], dtype=np.intp).reshape(-1, 4)
+        self._owners: list[Label | None] = [None] * len(obstacles)
+
+    def add(self, spot: Placed) -> None:
+        """Takes a label's box, and a rim around it and its leader."""
+        rim = np.array([-HALO_PX, -HALO_PX, HALO_PX, HALO_PX])
+        boxes = np.array([_corners(spot.box)])
+        if spot.has_leader:
+            leader = leader_of(spot.label, spot.box)
+            length_px = float(np.hypot(*(leader[1] - leader[0])))
+            shares = np.linspace(0.0, 1.0, 2 + int(length_px / _LEADER_STEP_PX))[:, np.newaxis]
+            points = np.rint(leader[0] + (leader[1] - leader[0]) * shares).astype(np.intp)
+            boxes = np.vstack([boxes, np.hstack([points, points])])
+        self._boxes = np.vstack([self._boxes, boxes + rim])
+        self._owners += [spot.label] * len(boxes)
+
+    def remove(self, label: Label) -> None:
+        """Gives a label's boxes free."""
+        is_kept = [owner is not label for owner in self._owners]
+        self._boxes = self._boxes[is_kept]
+        self._owners = [owner for owner in self._owners if owner is not label]
+
+    def owners_at(self, box: Box) -> tuple[Label, ...]:
+        """Gives the labels that have taken some of a box, each once."""
+        found = np.flatnonzero(_overlaps(np.array([_corners(box)]), self._boxes)[0])
+        owners = [self._owners[index] for index in found]
+        return tuple(dict.fromkeys(owner for owner in owners if owner is not None))
+
+    def near(self, boxes: IntArray) -> IntArray:
+        """Gives those boxes that other boxes, or lines between these, may touch."""
+        if not len(boxes):
+            return self._boxes[:0]
+        first, last = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
+        is_near = (self._boxes[:, :2] < last).all(axis=1) & (self._boxes[:, 2:] > first).all(axis=1)
+        return np.asarray(self._boxes[is_near])
+
+
+def _cheapest_free(positions: Positions, index: IntArray, taken: IntArray) -> IntArray:
+    """Gives the cheapest of some positions that touch nothing taken, in order of cost.
+
+    They are looked at in blocks, because the first few often do.
+    """
+    index = index[np.argsort(positions.cost[index], kind="stable")]
+    free = index[:0]
+    for start in range(0, index.size, _BLOCK):
+        block = index[start : start + _BLOCK]
+        free = np.append(free, block[~_overlaps(positions.boxes[block], taken).any(axis=1)])
+        if free.size >= _N_CHECKED:
+            break
+    return np.asarray(free[:_N_CHECKED])
+
+
+def _crossed_ratio(points: FloatArray, taken: IntArray) -> FloatArray:
+    """Gives the share of the points of each line that lie in a box taken."""
+    u, v = points[..., 0, np.newaxis], points[..., 1, np.newaxis]
+    is_in = (u >= taken[:, 0]) & (u < taken[:, 2]) & (v >= taken[:, 1]) & (v < taken[:, 3])
+    return np.asarray(is_in.any(axis=2).mean(axis=1), dtype=np.float64)
+
+
+def _overlaps(boxes: IntArray, taken: IntArray) -> Mask:
+    """Gives True where a box, by row, shares a pixel with a taken one, by column."""
+    left, top, right, bottom = (boxes[:, index, np.newaxis] for index in range(4))
+    overlaps = (left < taken[:, 2]) & (taken[:, 0] < right)
+    overlaps &= (top < taken[:, 3]) & (taken[:, 1] < bottom)
+    return np.asarray(overlaps)
+
+
+def _leaders(label: Label, boxes: IntArray) -> FloatArray:
+    """Gives points (u, v) along the line from a place to each box, shape (boxes, points, 2)."""
+    place = np.array([label.u, label.v])
+    ends = np.clip(place, boxes[:, :2], boxes[:, 2:])
+    way = ends - place
+    length = np.maximum(1e-9, np.hypot(way[:, 0], way[:, 1]))[:, np.newaxis]
+    starts = place + way * np.minimum(1.0, _CORNER_REACH * label.clearance_px / length)
+    shares = np.linspace(0.0, 1.0, _N_LEADER_POINTS)[:, np.newaxis]
+    points: FloatArray = starts[:, np.newaxis] + (ends - starts)[:, np.newaxis] * shares
+    return points
+
+
+def _corners(box: Box) -> tuple[int, int, int, int]:
+    return box.left, box.top, box.right, box.bottom
