@@ -14,7 +14,7 @@ from mapspeak.semantic import SemanticMap, Waypoint
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import FrontierReport, find_frontiers, match_frontiers
 from mapspeak.spatial.paths import DistanceField
-from mapspeak.spatial.rooms import Region, RoomMap
+from mapspeak.spatial.rooms import RoomMap
 
 __all__ = ["Atlas", "RememberedPlace", "number_places"]
 
@@ -121,12 +121,11 @@ class Atlas:
         region = self.rooms.find_region_at(point)
         return None if region is None else region.id
 
-    def is_growing(self, region: Region) -> bool:
-        """True when a frontier leads out of the region: its area is not final."""
-        return any(
-            self.find_room_id(frontier.pose.point) == region.id
-            for frontier in self.frontiers.frontiers
-        )
+    @cached_property
+    def growing_ids(self) -> frozenset[str]:
+        """The regions out of which a frontier leads: their areas are not final."""
+        poses = (frontier.pose for frontier in self.frontiers.frontiers)
+        return frozenset(filter(None, (self.find_room_id(pose.point) for pose in poses)))
 
 
 def number_places(waypoints: Sequence[Waypoint]) -> tuple[RememberedPlace, ...]:

@@ -80,7 +80,7 @@ def _room_table(atlas: Atlas, look: MapLook) -> str:
 
 
 def _room_row(atlas: Atlas, region: Region) -> Sequence[str]:
-    growing = " (not all seen)" if atlas.is_growing(region) else ""
+    growing = " (not all seen)" if region.id in atlas.growing_ids else ""
     standing = find_standing_point(atlas, region)
     return (
         region.id,

@@ -144,24 +144,28 @@ class RoomMap:
         return next((region for region in self.regions if region.index == index), None)
 
     def window_of(self, region: Region) -> tuple[slice, slice]:
-        """Gives the rows and columns that a region lies in, with little around it."""
+        """Gives the rows and columns that a region lies in."""
         cell = self.grid.cell_at(region.widest)
         reach = max(round(region.length_m / 2 / self.grid.resolution_m), 1)
-        n_rows, n_cols = self.labels.shape
         while True:
-            rows = slice(max(cell.row - reach, 0), min(cell.row + reach + 1, n_rows))
-            cols = slice(max(cell.col - reach, 0), min(cell.col + reach + 1, n_cols))
+            rows = slice(max(cell.row - reach, 0), cell.row + reach + 1)
+            cols = slice(max(cell.col - reach, 0), cell.col + reach + 1)
             inside = self.labels[rows, cols] == region.index
-            # A region hangs together: where nothing of it is at the rim, nothing is beyond.
-            is_cut = (
-                (rows.start > 0 and inside[0].any())
-                or (rows.stop < n_rows and inside[-1].any())
-                or (cols.start > 0 and inside[:, 0].any())
-                or (cols.stop < n_cols and inside[:, -1].any())
+            along, across = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
+            window = (
+                slice(rows.start + int(along[0]), rows.start + int(along[-1]) + 1),
+                slice(cols.start + int(across[0]), cols.start + int(across[-1]) + 1),
             )
-            if not is_cut:
-                return rows, cols
+            if not self._is_cut(window, (rows, cols)):
+                return window
             reach *= 2
+
+    def _is_cut(self, window: tuple[slice, slice], seen: tuple[slice, slice]) -> bool:
+        """True when a region, which hangs together, may go on beyond the part that was seen."""
+        return any(
+            (inner.start == outer.start > 0) or (inner.stop == outer.stop < size)
+            for inner, outer, size in zip(window, seen, self.labels.shape, strict=True)
+        )
 
     def doors_between(self, first_id: str, second_id: str) -> tuple[Door, ...]:
         """Gives the doors that join two regions."""
