@@ -33,7 +33,7 @@ def measure_by_brute_force(edges: NDArray[np.float64], pose: Pose) -> NDArray[np
     beam_x, beam_y = np.cos(angles), np.sin(angles)
     start_x, start_y = edges[:, 0] - pose.x, edges[:, 1] - pose.y
     edge_x, edge_y = edges[:, 2] - edges[:, 0], edges[:, 3] - edges[:, 1]
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         across = beam_x * edge_y - beam_y * edge_x
         distance = (start_x * edge_y - start_y * edge_x) / across
         share = (start_x * beam_y - start_y * beam_x) / across

@@ -9,12 +9,12 @@ from mapspeak.simulator import (
     TICK_S,
     DriveState,
     DriveStatus,
-    RoomClass,
     Simulation,
     Velocity,
     World,
     load_world,
 )
+from mapspeak.spatial.rooms import RoomClass
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,8 @@ import pytest
 
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Point
-from mapspeak.simulator import RoomClass, Wall, load_world, world_names
+from mapspeak.simulator import Wall, load_world, world_names
+from mapspeak.spatial.rooms import RoomClass
 
 WORKSHOP = """\
 title: A workshop with a store.

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from mapspeak.geometry import Pose
-from mapspeak.simulator import RoomClass, TrueFloor, World, load_world, world_names
+from mapspeak.simulator import TrueFloor, World, load_world, world_names
+from mapspeak.spatial.rooms import RoomClass
 
 PAPER_NEEDS = {"loaded_shelf": 4, "forklift": 2, "fire_extinguisher": 3, "first_aid_box": 1}
 OFFICE_NEEDS = {"fire_extinguisher": 3, "first_aid_box": 1, "fridge": 1, "toilet": 1, "printer": 1}

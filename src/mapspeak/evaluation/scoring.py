@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from mapspeak.geometry import Point, Pose
 from mapspeak.simulator import (
     MeasuredRoom,
-    RoomClass,
     StateRecord,
     TrueFloor,
     World,
@@ -15,6 +14,7 @@ from mapspeak.simulator import (
 )
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.coverage import Coverage, measure_coverage
+from mapspeak.spatial.rooms import RoomClass
 
 __all__ = ["FireToolScore", "RoomScore", "Scorer"]
 

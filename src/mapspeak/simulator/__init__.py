@@ -8,7 +8,7 @@ from mapspeak.simulator.sight import is_in_sight
 from mapspeak.simulator.simulation import TICK_S, CameraShot, Simulation
 from mapspeak.simulator.statelog import StateLog, StateRecord, read_state_log
 from mapspeak.simulator.truth import MeasuredRoom, TrueFloor, Truth
-from mapspeak.simulator.world import Door, RoomClass, TrueRoom, Wall, World, WorldObject
+from mapspeak.simulator.world import Door, TrueRoom, Wall, World, WorldObject
 from mapspeak.simulator.worldfiles import load_world, world_names
 
 __all__ = [
@@ -24,7 +24,6 @@ __all__ = [
     "DriveStatus",
     "LidarScan",
     "MeasuredRoom",
-    "RoomClass",
     "SimulatedDetection",
     "Simulation",
     "StateLog",

@@ -1,19 +1,11 @@
 """A world as it truly is: walls, doors, objects, rooms. `worldfiles` reads it from a file."""
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 from mapspeak.geometry import Point, Pose
+from mapspeak.spatial.rooms import RoomClass
 
-__all__ = ["Door", "RoomClass", "TrueRoom", "Wall", "World", "WorldObject"]
-
-
-class RoomClass(StrEnum):
-    """What a person would call a region of the floor."""
-
-    ROOM = "room"
-    CORRIDOR = "corridor"
-    OPEN_SPACE = "open_space"
+__all__ = ["Door", "TrueRoom", "Wall", "World", "WorldObject"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -36,7 +36,8 @@ from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.simulator.models import KINDS
 from mapspeak.simulator.motion import BODY_BAND_M, BODY_RADIUS_M
 from mapspeak.simulator.slices import slice_world
-from mapspeak.simulator.world import Door, RoomClass, TrueRoom, Wall, World, WorldObject
+from mapspeak.simulator.world import Door, TrueRoom, Wall, World, WorldObject
+from mapspeak.spatial.rooms import RoomClass
 
 __all__ = ["load_world", "world_names"]
 

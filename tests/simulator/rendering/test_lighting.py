@@ -4,7 +4,8 @@ import numpy as np
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.simulator.rendering.lighting import Light, find_light
-from mapspeak.simulator.world import RoomClass, TrueRoom
+from mapspeak.simulator.world import TrueRoom
+from mapspeak.spatial.rooms import RoomClass
 from staging import ROOM_WIDTH_M, make_room, make_wall
 
 
