@@ -2,6 +2,8 @@ import json
 from pathlib import Path
 
 import pytest
+from mcp.shared.exceptions import MCPError
+from mcp_types import INVALID_PARAMS
 
 from fakes import FakeRobot, two_rooms
 from mapspeak.errors import ConfigError
@@ -86,3 +88,13 @@ async def test_the_papers_prompts_are_offered(tmp_path: Path) -> None:
     text = prompt.messages[0].content.model_dump()["text"]
     assert "Select ONE waypoint >= 5 m away toward the largest unexplored area." in text
     assert "safety landmarks" in text
+
+
+@pytest.mark.parametrize("mode", MODES)
+async def test_an_unknown_prompt_is_answered_with_those_there_are(
+    tmp_path: Path, mode: str
+) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, mode=mode) as client:
+        with pytest.raises(MCPError, match="there are: exploration, semantic_policy") as raised:
+            await client.get_prompt("explore")
+    assert raised.value.error.code == INVALID_PARAMS

@@ -80,7 +80,10 @@ async def test_a_drive_ends_when_its_client_is_gone(tmp_path: Path) -> None:
     [
         ([], 401),
         ([(b"authorization", b"Bearer wrong")], 401),
+        ([(b"authorization", b"Basic right")], 401),
+        ([(b"authorization", b"right")], 401),
         ([(b"authorization", b"Bearer right")], 200),
+        ([(b"authorization", b"bearer right")], 200),
     ],
 )
 async def test_only_who_has_the_token_is_let_in(

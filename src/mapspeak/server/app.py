@@ -6,7 +6,8 @@ from typing import Any
 from mcp.server import MCPServer
 from mcp.server.mcpserver import Context
 from mcp.server.mcpserver.exceptions import ToolError
-from mcp_types import CallToolResult, InputRequiredResult
+from mcp.shared.exceptions import MCPError
+from mcp_types import INVALID_PARAMS, CallToolResult, GetPromptResult, InputRequiredResult
 from mcp_types import Tool as ListedTool
 from pydantic import ValidationError
 
@@ -62,6 +63,19 @@ class MapspeakServer(MCPServer[Any]):
             meta=tool.meta,
             structured_output=tool.has_report,
         )
+
+    async def get_prompt(
+        self,
+        name: str,
+        arguments: dict[str, Any] | None = None,
+        context: Context[Any, Any] | None = None,
+    ) -> GetPromptResult | InputRequiredResult:
+        """Gives a prompt; an unknown name is the caller's mistake and not the server's."""
+        known = sorted(prompt.name for prompt in await self.list_prompts())
+        if name not in known:
+            message = f"There is no prompt named {name!r}; there are: {', '.join(known)}."
+            raise MCPError(INVALID_PARAMS, message)
+        return await super().get_prompt(name, arguments, context)
 
     def _check_arguments(self, name: str, given: dict[str, Any]) -> None:
         """Refuses arguments that would be dropped without a word, such as yaw for yaw_deg."""

@@ -86,7 +86,7 @@ class TokenGuard:
 
     def __init__(self, app: ASGIApp, token: str) -> None:
         self._app = app
-        self._expected = f"Bearer {token}".encode()
+        self._token = token.encode()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Passes the request on, or answers 401."""
@@ -99,8 +99,11 @@ class TokenGuard:
         await self._app(scope, receive, send)
 
     def _is_welcome(self, scope: Scope) -> bool:
-        given = dict(scope["headers"]).get(b"authorization", b"")
-        return scope["path"] == "/health" or secrets.compare_digest(given, self._expected)
+        # The scheme's name is written in any case (RFC 9110, section 11.1).
+        scheme, _, given = dict(scope["headers"]).get(b"authorization", b"").partition(b" ")
+        is_bearer = scheme.lower() == b"bearer"
+        is_right = secrets.compare_digest(given.strip(), self._token)
+        return scope["path"] == "/health" or (is_bearer and is_right)
 
 
 async def _say_ok(_request: object) -> PlainTextResponse:
