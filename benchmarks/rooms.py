@@ -1,13 +1,18 @@
 """How long it takes to divide a map into rooms, in one thread, and how well it agrees with people.
 
-`python -m benchmarks.rooms MAPS` scores against maps that people have divided. MAPS holds
-folders of maps; each map is a folder with `map.png` (0 occupied, 205 unknown, 254 free),
-`rooms.png` (16-bit region numbers, 0 for none) and `meta.json` (the resolution; per region its
-number, and its class if known: "room" or "hallway"). Only cells that are free in the map and
+The agreement is measured on maps that people have divided: those of the folder that the
+environment variable MAPSPEAK_LABELLED_MAPS names, else of `../shared/maps` beside the checkout.
+Where there is neither, the times are all there is. `python -m benchmarks.rooms MAPS` shows the
+scores as a table, beside those of published methods.
+
+MAPS holds folders of maps; each map is a folder with `map.png` (0 occupied, 205 unknown, 254
+free), `rooms.png` (16-bit region numbers, 0 for none) and `meta.json` (the resolution; per region
+its number, and its class if known: "room" or "hallway"). Only cells that are free in the map and
 numbered by people are counted.
 """
 
 import json
+import os
 import statistics
 import time
 from collections.abc import Iterable, Iterator, Sequence
@@ -27,25 +32,78 @@ from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import load_picture
 from mapspeak.spatial.rooms import RoomClass, RoomMap, find_rooms
 
-__all__ = ["main", "measure"]
+__all__ = ["find_labelled_maps", "list_labelled_maps", "main", "measure"]
 
 N_RUNS = 3
 ROOM_CELLS = 120
 RESOLUTION_M = 0.05
 RANKS = {"smallest": 0, "second": 1, "largest": -1}
 
+PUBLISHED = {
+    "bormann_plain": {
+        "MAORIS": 0.908,
+        "distance": 0.796,
+        "morphological": 0.797,
+        "DuDe": 0.782,
+        "ROSE2": 0.768,
+        "Voronoi": 0.759,
+    },
+    "bormann_furnished": {"DuDe": 0.777, "ROSE2": 0.771, "Voronoi": 0.693},
+    "rose2_full": {"ROSE2": 0.736},
+    "rose2_partial_fr79": {"ROSE2": 0.862},
+}
+"""F1 at 0.5 of published methods on the same maps with the same score; none takes part here.
+
+The figures are those of the table in the maps' own README.md. Distance, morphological and Voronoi
+are the segmentations of Bormann et al. (ICRA 2016).
+"""
+
 Numbers = NDArray[np.intp]
 Ratios = NDArray[np.float64]
 
 
 def measure() -> Iterator[Figure]:
-    """Gives the median CPU time for drawn buildings of three sizes."""
+    """Gives the median CPU time for drawn buildings of three sizes, and the scores if it can."""
     cv2.setNumThreads(1)
     for n_cells in (1000, 2000, 4000):
         grid = _building(n_cells)
         times_ms = [_timed(grid)[1] for _ in range(N_RUNS)]
         name = f"{n_cells} x {n_cells}, {len(find_rooms(grid).regions)} rooms"
         yield Figure(name=name, value=statistics.median(times_ms), unit="ms")
+    maps = find_labelled_maps()
+    if maps is not None:
+        yield from _score_figures([score_map(folder) for folder in list_labelled_maps(maps)])
+
+
+def find_labelled_maps() -> Path | None:
+    """Gives the folder of maps that people have divided, or None where there is none."""
+    named = os.environ.get("MAPSPEAK_LABELLED_MAPS")
+    folder = Path(named) if named else Path(__file__).parents[2] / "shared" / "maps"
+    return folder if folder.is_dir() else None
+
+
+def list_labelled_maps(maps: Path) -> list[Path]:
+    """Gives the folders of the maps in it, in alphabetical order."""
+    return [found.parent for found in sorted(maps.glob("*/*/rooms.png"))]
+
+
+def _score_figures(scores: Sequence["Score"]) -> Iterator[Figure]:
+    for group, own in _by_group(scores).items():
+        f1_50 = statistics.mean(score.f1_50 for score in own)
+        f1_75 = statistics.mean(score.f1_75 for score in own)
+        yield Figure(name=f"{group}, {len(own)} maps, F1 at IoU 0.5", value=f1_50, unit="")
+        yield Figure(name=f"{group}, {len(own)} maps, F1 at IoU 0.75", value=f1_75, unit="")
+    ranks = [score.ranks_right for score in scores if score.ranks_right]
+    for name in RANKS if ranks else ():
+        n_right = sum(rank[name] for rank in ranks)
+        yield Figure(name=f"{name} room right, of {len(ranks)}", value=n_right, unit="maps")
+
+
+def _by_group(scores: Sequence["Score"]) -> dict[str, list["Score"]]:
+    groups: dict[str, list[Score]] = {}
+    for score in scores:
+        groups.setdefault(score.group, []).append(score)
+    return groups
 
 
 def _building(n_cells: int) -> OccupancyGrid:
@@ -187,7 +245,7 @@ def _ranks_right(
 def main(maps: Path, *, as_json: bool) -> None:
     """Scores the division of every map in MAPS that people have divided."""
     cv2.setNumThreads(1)
-    scores = [score_map(found.parent) for found in sorted(maps.glob("*/*/rooms.png"))]
+    scores = [score_map(folder) for folder in list_labelled_maps(maps)]
     if as_json:
         click.echo(json.dumps([asdict(score) for score in scores], indent=2))
         return
@@ -197,9 +255,10 @@ def main(maps: Path, *, as_json: bool) -> None:
 def _show(scores: Sequence[Score]) -> None:
     columns = ("maps", "n", "F1@.5", "F1@.75", "class", "hallway F1", *RANKS, "ms", "ms, most")
     table = Table(*columns)
-    groups = sorted({score.group for score in scores})
-    for group in groups:
-        table.add_row(group, *_row([score for score in scores if score.group == group]))
+    for group, own in _by_group(scores).items():
+        table.add_row(group, *_row(own))
+        for method, f1_50 in PUBLISHED.get(group, {}).items():
+            table.add_row(f"  {method}", "", f"{f1_50:.3f}")
     table.add_row("all", *_row(scores))
     Console(width=120).print(table)
 

@@ -291,3 +291,80 @@ def test_a_partition_that_stands_free_makes_no_corridor_of_a_room() -> None:
 
     assert region.room_class is RoomClass.ROOM
     assert region.reason == "8.6 x 8.6 m, 0 doors"
+
+
+CORRIDOR_WITH_OFFICES = np.full((140, 400), 100, np.int8)
+CORRIDOR_WITH_OFFICES[4:96, 4:-4] = CORRIDOR_WITH_OFFICES[100:136, 4:-4] = 0
+CORRIDOR_WITH_OFFICES[4:96, 130:134] = CORRIDOR_WITH_OFFICES[4:96, 264:268] = 100
+CORRIDOR_WITH_OFFICES[96:100, 40:60] = CORRIDOR_WITH_OFFICES[96:100, 190:210] = 0
+CORRIDOR_WITH_OFFICES[96:100, 330:350] = 0
+
+
+def test_a_corridor_goes_on_past_a_pillar() -> None:
+    cells = CORRIDOR_WITH_OFFICES.copy()
+    cells[132:136, 130:134] = cells[100:104, 130:134] = 100
+
+    rooms = find_rooms(OccupancyGrid(cells=cells, resolution_m=0.05))
+
+    assert [region.id for region in rooms.regions] == ["C1", "R2", "R3", "R4"]
+
+
+def test_a_plant_in_line_with_a_wall_divides_no_corridor() -> None:
+    cells = CORRIDOR_WITH_OFFICES.copy()
+    cells[100:108, 128:136] = 100
+
+    rooms = find_rooms(OccupancyGrid(cells=cells, resolution_m=0.05))
+
+    assert [region.id for region in rooms.regions] == ["C1", "R2", "R3", "R4"]
+
+
+def test_a_crack_in_a_wall_is_no_door() -> None:
+    cells = CORRIDOR_WITH_OFFICES.copy()
+    cells[50:53, 130:134] = 0
+
+    rooms = find_rooms(OccupancyGrid(cells=cells, resolution_m=0.05))
+
+    assert len(rooms.doors) == 3
+    assert all(door.width_m > 0.8 for door in rooms.doors)
+
+
+def test_a_wall_seen_only_in_pieces_is_wall_all_along() -> None:
+    cells = np.full((134, 204), 100, np.int8)
+    cells[4:-4, 4:-4] = 0
+    cells[4:30, 100:103] = cells[104:130, 100:103] = 100
+    for row in range(38, 96, 16):
+        cells[row : row + 8, 100:103] = 100
+
+    rooms = find_rooms(OccupancyGrid(cells=cells, resolution_m=0.05))
+
+    assert [region.id for region in rooms.regions] == ["R1", "R2"]
+    assert max(door.width_m for door in rooms.doors) < 0.5
+
+
+@pytest.mark.slow
+def test_a_map_of_ten_thousand_cells_a_side_is_divided() -> None:
+    grid = OccupancyGrid(cells=np.zeros((10_000, 10_000), np.int8), resolution_m=0.05)
+
+    (region,) = find_rooms(grid).regions
+
+    assert region.free_area_m2 == pytest.approx(250_000)
+
+
+@pytest.mark.slow
+def test_a_map_of_too_many_cells_is_refused_with_what_to_do() -> None:
+    grid = OccupancyGrid(cells=np.full((11_000, 11_000), -1, np.int8), resolution_m=0.05)
+
+    with pytest.raises(MapError, match="121000000 cells, more than 120000000") as error:
+        find_rooms(grid)
+    assert error.value.hint == "Ask for a part of it, or for a map at a coarser resolution."
+
+
+@pytest.mark.slow
+def test_of_more_rooms_than_labels_can_tell_apart_the_rest_is_left_out() -> None:
+    cells = np.zeros((6000, 6000), np.int8)
+    cells[::31] = cells[:, ::31] = 100
+
+    rooms = find_rooms(OccupancyGrid(cells=cells, resolution_m=0.05))
+
+    assert len(rooms.regions) == 32_767
+    assert rooms.labels.min() == 0

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.spatial.rooms.raster import Picture
+from mapspeak.spatial.rooms.raster import Picture, find_cells
 
 Heights = NDArray[np.float32]
 BasinLabels = NDArray[np.int32]
@@ -34,16 +34,13 @@ class Saddle:
 
 def build_basins(height: Heights, floor: Picture) -> BasinLabels:
     """Gives each floor cell the number of its basin, from 1; 0 elsewhere."""
-    cells = np.flatnonzero(floor).astype(np.int32)
     step = _steepest_steps(height).ravel()
     peaks = floor & (step == 0).reshape(floor.shape)
     _, peak_label = cv2.connectedComponents(peaks, connectivity=8)
-    number = np.full(floor.size, -1, np.int32)
-    number[cells] = np.arange(cells.size, dtype=np.int32)
-    summit = _follow(number[cells + step[cells]])
-    basins = np.zeros(floor.size, np.int32)
-    basins[cells] = peak_label.ravel()[cells][summit]
-    return basins.reshape(floor.shape)
+    summit = _follow(np.arange(floor.size, dtype=np.int32) + step)
+    basins = np.asarray(peak_label, np.int32).ravel()[summit].reshape(floor.shape)
+    basins[floor == 0] = 0
+    return basins
 
 
 def _steepest_steps(height: Heights) -> NDArray[np.int32]:
@@ -80,7 +77,7 @@ def find_saddles(basins: BasinLabels, height: Heights) -> list[Saddle]:
     parts = []
     for here, there in ((np.s_[:-1, :], np.s_[1:, :]), (np.s_[:, :-1], np.s_[:, 1:])):
         one, other = basins[here], basins[there]
-        rows, cols = np.nonzero((one != other) & (one > 0) & (other > 0))
+        rows, cols = find_cells((one != other) & (one > 0) & (other > 0))
         a, b = one[rows, cols], other[rows, cols]
         level = np.minimum(height[here][rows, cols], height[there][rows, cols])
         parts.append((level, np.minimum(a, b), np.maximum(a, b), rows, cols))

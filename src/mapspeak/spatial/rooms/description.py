@@ -8,6 +8,7 @@ import numpy as np
 
 from mapspeak.geometry import Point
 from mapspeak.spatial.grid import Mask
+from mapspeak.spatial.rooms.raster import find_cells
 from mapspeak.spatial.rooms.room_map import RoomClass
 from mapspeak.spatial.rooms.segmentation import Segmentation
 
@@ -55,12 +56,14 @@ def _find_windows(segmentation: Segmentation) -> list[tuple[slice, slice]]:
     n = int(labels.max(initial=0))
     if n == 0:
         return []
+    framed = np.pad(labels, ((0, 0), (1, 1)))
+    rows, cols = find_cells(framed[:, 1:] != framed[:, :-1])
     low = np.full((2, n + 1), max(labels.shape), np.intp)
     high = np.zeros((2, n + 1), np.intp)
-    for axis, places in enumerate(np.nonzero(labels)):
-        number = labels[labels > 0]
-        np.minimum.at(low[axis], number, places)
-        np.maximum.at(high[axis], number, places + 1)
+    for number in (framed[rows, cols], framed[rows, cols + 1]):
+        for axis, (first, last) in enumerate(((rows, rows + 1), (cols, cols))):
+            np.minimum.at(low[axis], number, first)
+            np.maximum.at(high[axis], number, last)
     return [
         (slice(int(low[0, i]), int(high[0, i])), slice(int(low[1, i]), int(high[1, i])))
         for i in range(1, n + 1)

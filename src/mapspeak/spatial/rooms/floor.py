@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.spatial.rooms.raster import Picture, Raster
+from mapspeak.spatial.rooms.raster import Picture, Raster, find_cells
 from mapspeak.spatial.rooms.settings import RoomSettings
 from mapspeak.spatial.rooms.walls import find_wall_directions, find_walls
 
@@ -68,7 +68,7 @@ def _find_pockets(floor: Picture, wall: Picture, largest: float) -> Picture:
     border = np.zeros(n)
     at_wall = np.zeros(n)
     for here, there in _NEIGHBOURS:
-        rows, cols = np.nonzero((unseen[here] > 0) & (unseen[there] == 0))
+        rows, cols = find_cells((unseen[here] > 0) & (unseen[there] == 0))
         pocket = label[here][rows, cols]
         border += np.bincount(pocket, minlength=n)
         at_wall += np.bincount(pocket, weights=wall[there][rows, cols], minlength=n)

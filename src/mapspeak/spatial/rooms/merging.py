@@ -91,8 +91,8 @@ def _join_open_borders(
         narrow, wide = forest.sides(saddle)
         if narrow == wide:
             continue
-        clearance_m = forest.clearance_m[narrow]
-        if _is_narrow(clearance_m, saddle, settings):
+        clearance_m, wide_m = forest.clearance_m[narrow], forest.clearance_m[wide]
+        if _is_narrow(clearance_m, wide_m, saddle, settings):
             wall_m = frames.measure(saddle.row, saddle.col, saddle.height)
             if saddle.height <= _door_ratio(wall_m, settings) * clearance_m:
                 borders.append(_Border(saddle=saddle, wall_m=wall_m))
@@ -104,9 +104,14 @@ def _join_open_borders(
     return borders
 
 
-def _is_narrow(clearance_m: float, saddle: Saddle, settings: RoomSettings) -> bool:
-    """True where a door could be, if there is enough wall in line with it."""
-    is_door_wide = 2 * saddle.height <= settings.door_width_m
+def _is_narrow(clearance_m: float, wide_m: float, saddle: Saddle, settings: RoomSettings) -> bool:
+    """True where a door could be, if there is enough wall in line with it.
+
+    A place that is hardly narrower than both sides, such as a corridor beside a pillar, is none.
+    """
+    width_m = 2 * saddle.height
+    is_leaf = width_m <= settings.leaf_width_m or saddle.height <= settings.wide_ratio * wide_m
+    is_door_wide = is_leaf and width_m <= settings.door_width_m
     return is_door_wide and saddle.height <= settings.door_ratio * clearance_m
 
 

@@ -52,6 +52,13 @@ class Raster:
         return Point(float(xy[0, 0]), float(xy[0, 1]))
 
 
+def find_cells(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Gives the rows and columns of the cells that are set, row by row; nonzero is far slower."""
+    places = np.flatnonzero(mask)
+    rows, cols = np.divmod(places, mask.shape[1]) if places.size else (places, places)
+    return rows, cols
+
+
 def build_raster(grid: OccupancyGrid, *, cell_size_m: float) -> Raster:
     """Gives the known part of a map in cells of about the wanted size.
 

@@ -13,6 +13,7 @@ class RoomSettings:
         oblique_length_m: The same for any other direction.
         wall_reach_m: Shorter runs in line with a wall belong to it, up to this far from its ends.
         wall_piece_m: The shortest run that can be such a piece.
+        wall_thickness_m: Where an obstacle is this thick, it is no such piece.
         island_size_m: An obstacle that can be walked around is wall only if it is larger.
         direction_ratio: A main direction has at least this share of the strongest one's edges.
         pocket_area_m2: Unseen areas up to this size inside a room count as floor.
@@ -22,6 +23,9 @@ class RoomSettings:
         door_ratio: A narrow place in a wall divides if its half width is at most this share of
             the clearance of the narrower side.
         gap_ratio: The same for a narrow place with no wall in line with it.
+        leaf_width_m: Doors up to this width divide however wide the places behind them are.
+        wide_ratio: A wider one divides if its half width is also at most this share of the
+            clearance of the wider side.
         frame_m: The length of wall in line with a narrow place that makes it fully a door.
         mouth_width_m: The widest end of a corridor that opens straight into a wider place.
         mouth_ratio: Clearance of such a corridor over that of the wider place, at most.
@@ -34,17 +38,20 @@ class RoomSettings:
     cell_size_m: float = 0.05
     wall_length_m: float = 1.2
     oblique_length_m: float = 2.4
-    wall_reach_m: float = 1.2
+    wall_reach_m: float = 2.0
     wall_piece_m: float = 0.2
+    wall_thickness_m: float = 0.5
     island_size_m: float = 2.0
-    direction_ratio: float = 0.1
+    direction_ratio: float = 0.2
     pocket_area_m2: float = 2.0
     smoothing_m: float = 0.1
     same_width_ratio: float = 0.8
     door_width_m: float = 2.4
     door_ratio: float = 0.8
     gap_ratio: float = 0.5
-    frame_m: float = 2.0
+    leaf_width_m: float = 1.0
+    wide_ratio: float = 0.6
+    frame_m: float = 2.5
     mouth_width_m: float = 3.0
     mouth_ratio: float = 0.5
     mouth_elongation: float = 3.0

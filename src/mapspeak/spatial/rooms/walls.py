@@ -15,22 +15,26 @@ SLENDER_RATIO = 0.37
 """Area over the square of the diagonal: 0.5 for a square, 0.39 for a disc, 0.3 for 3 to 1."""
 _EDGE_BLUR_CELLS = 1.5
 _BELL_DEG = 2.0
+_APART_DEG = 6
+"""Main directions differ by more than this."""
 
 
 def find_walls(raster: Raster, directions_deg: list[float], settings: RoomSettings) -> Picture:
     """Gives 1 where an obstacle is wall: a long run in a main direction, or in line with one.
 
-    A run of twice that length is wall in any direction, and so are long curved walls.
+    A run of twice that length is wall in any direction, and so are long curved walls. What is
+    thicker than a wall, such as a cupboard, is no piece of one that it stands in line with.
     """
     cells = _Lengths(raster, settings)
     occupied = raster.occupied
     thick = cv2.dilate(occupied, np.ones((3, 3), np.uint8))
     large, slender = _sort_obstacles(raster.free, cells.island)
+    can_be_piece = (large | slender) & (1 - _thick(occupied, cells.thickness))
     wall = np.zeros_like(occupied)
     for angle_deg in directions_deg:
         for turned_deg in (angle_deg, angle_deg + 90):
             long_run = _open(thick, cells.wall, turned_deg) & occupied & large
-            piece = _open(thick, cells.piece, turned_deg) & occupied & (large | slender)
+            piece = _open(thick, cells.piece, turned_deg) & occupied & can_be_piece
             in_line = _dilate(long_run, 2 * cells.reach, turned_deg)
             wall |= long_run | (piece & in_line)
     for turned_deg in np.arange(0.0, 180.0, OBLIQUE_STEP_DEG).tolist():
@@ -46,12 +50,20 @@ class _Lengths:
         self.oblique = settings.oblique_length_m / raster.cell_size_m
         self.reach = settings.wall_reach_m / raster.cell_size_m
         self.piece = settings.wall_piece_m / raster.cell_size_m
+        self.thickness = settings.wall_thickness_m / raster.cell_size_m
         self.island = settings.island_size_m / raster.cell_size_m
 
 
 def _open(picture: cv2.typing.MatLike, length: float, angle_deg: float) -> Picture:
     kernel = _line(length, angle_deg)
     return np.asarray(cv2.morphologyEx(picture, cv2.MORPH_OPEN, kernel), np.uint8)
+
+
+def _thick(occupied: Picture, least: float) -> Picture:
+    """Gives 1 where a disc of this diameter in cells fits into an obstacle."""
+    side = max(round(least), 1)
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    return np.asarray(cv2.morphologyEx(occupied, cv2.MORPH_OPEN, disc), np.uint8)
 
 
 def _dilate(picture: Picture, length: float, angle_deg: float) -> Picture:
@@ -88,16 +100,22 @@ def find_wall_directions(occupied: Picture, *, least_ratio: float) -> list[float
     """Gives the main directions of walls in degrees from 0 to 90, the strongest first.
 
     They are the peaks of the histogram of gradient angles modulo 90 degrees, each with at least
-    `least_ratio` of the highest.
+    `least_ratio` of the highest; and last, halfway between the strongest and its right angle, the
+    direction of cut corners, which would else be found or not as the raster happens to lie.
     """
     histogram = _angle_histogram(occupied)
     highest = float(histogram.max())
     if highest <= 0:
         return []
-    around = np.stack([np.roll(histogram, shift) for shift in range(-6, 7)]).max(axis=0)
+    around = np.stack(
+        [np.roll(histogram, shift) for shift in range(-_APART_DEG, _APART_DEG + 1)]
+    ).max(axis=0)
     peaks = np.flatnonzero((histogram >= around) & (histogram >= least_ratio * highest))
     strongest = sorted(peaks.tolist(), key=lambda peak: (-histogram[peak], peak))
-    return [peak + 0.5 for peak in strongest[:MAX_DIRECTIONS]]
+    directions = [peak + 0.5 for peak in strongest[:MAX_DIRECTIONS]]
+    halfway = (directions[0] + 45.0) % 90.0
+    is_new = all(abs((halfway - other + 45.0) % 90.0 - 45.0) > _APART_DEG for other in directions)
+    return [*directions, halfway] if is_new else directions
 
 
 def _angle_histogram(occupied: Picture) -> NDArray[np.float64]:
