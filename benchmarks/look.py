@@ -14,7 +14,7 @@ from mapspeak.navigation.atlas import Atlas
 from mapspeak.semantic import SemanticMap
 from mapspeak.server.drawing import draw_atlas
 from mapspeak.server.tables import describe_atlas
-from mapspeak.server.views import MapLook
+from mapspeak.server.views import MapLook, view_of
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 
 __all__ = ["draw_building", "measure"]
@@ -55,8 +55,8 @@ def _measure_size(n_cells: int) -> Iterator[Figure]:
             name=f"{n_cells} x {n_cells}, {what}", value=statistics.median(runs_ms), unit="ms"
         )
     atlas = _look(draw_building(n_cells, seed=0), _stand(n_cells), None, {}, "")
-    text = describe_atlas(atlas, MapLook())
-    picture = draw_atlas(atlas, MapLook())
+    text = describe_atlas(view_of(atlas, MapLook()))
+    picture = draw_atlas(view_of(atlas, MapLook()))
     yield Figure(name=f"{n_cells} x {n_cells}, text", value=len(text) / 1000, unit="k characters")
     yield Figure(name=f"{n_cells} x {n_cells}, PNG", value=len(picture.png) / 1000, unit="kB")
 
@@ -76,8 +76,8 @@ def _look(
         "rooms": lambda: atlas.rooms,
         "distances": lambda: atlas.distances,
         "frontiers": lambda: atlas.frontiers,
-        "tables": lambda: describe_atlas(atlas, MapLook()),
-        "picture": lambda: draw_atlas(atlas, MapLook()),
+        "tables": lambda: describe_atlas(view_of(atlas, MapLook())),
+        "picture": lambda: draw_atlas(view_of(atlas, MapLook())),
     }
     for name, compute in parts.items():
         part_started_s = time.process_time()

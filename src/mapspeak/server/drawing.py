@@ -1,12 +1,13 @@
 """An atlas as a picture: rooms, doors, frontiers, places and the robot, under their ids."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mapspeak.navigation.atlas import Atlas
-from mapspeak.server.views import Layer, MapLook
+from mapspeak.server.views import Layer, MapLook, MapView
 from mapspeak.server.wording import list_some
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.picture import (
@@ -24,7 +25,7 @@ from mapspeak.spatial.picture import (
     draw_map,
 )
 from mapspeak.spatial.picture import Region as Area
-from mapspeak.spatial.rooms import Region, RoomClass, RoomMap
+from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap
 
 __all__ = ["AtlasPicture", "draw_atlas", "draw_rooms"]
 
@@ -61,20 +62,20 @@ class AtlasPicture:
     caption: str
 
 
-def draw_atlas(atlas: Atlas, look: MapLook) -> AtlasPicture:
-    """Draws an atlas as it is looked at; doors and areas only where they can be told apart."""
+def draw_atlas(view: MapView) -> AtlasPicture:
+    """Draws what is to be seen of an atlas; doors and areas only where they can be told apart."""
+    atlas, look = view.atlas, view.look
     is_detailed = _scale_px_per_m(atlas.grid, look) >= DETAIL_PX_PER_M
+    doors = view.doors.items if Layer.DOORS in look.layers and is_detailed else ()
     picture = draw_map(
         atlas.grid,
         layers=MapLayers(
-            regions=_rooms(atlas.rooms, has_areas=is_detailed, highlighted=_target_id(look))
-            if Layer.ROOMS in look.layers
-            else None,
+            regions=_rooms_in(view, has_areas=is_detailed) if Layer.ROOMS in look.layers else None,
             lines=_path_to_first_frontier(atlas) if look.layers >= WITH_PATH else (),
             marks=(
-                *(_doors(atlas.rooms) if Layer.DOORS in look.layers and is_detailed else ()),
-                *(_frontiers(atlas) if Layer.FRONTIERS in look.layers else ()),
-                *(_places(atlas) if Layer.PLACES in look.layers else ()),
+                *(_door_mark(door) for door in doors),
+                *(_frontiers(view) if Layer.FRONTIERS in look.layers else ()),
+                *(_places(view) if Layer.PLACES in look.layers else ()),
             ),
             robot=atlas.robot,
             legend=LEGEND,
@@ -94,8 +95,8 @@ def draw_rooms(rooms: RoomMap) -> AtlasPicture:
     """Draws a map with its rooms and doors; no robot needs to be there for it."""
     is_detailed = _scale_px_per_m(rooms.grid, MapLook()) >= DETAIL_PX_PER_M
     layers = MapLayers(
-        regions=_rooms(rooms, has_areas=is_detailed),
-        marks=_doors(rooms) if is_detailed else (),
+        regions=_layer(rooms, [_area(region, has_area=is_detailed) for region in rooms.regions]),
+        marks=tuple(_door_mark(door) for door in rooms.doors) if is_detailed else (),
         legend=LEGEND,
     )
     picture = draw_map(rooms.grid, layers=layers)
@@ -111,35 +112,43 @@ def _scale_px_per_m(grid: OccupancyGrid, look: MapLook) -> float:
     return EDGE_PX / (n_cells * grid.resolution_m)
 
 
-def _target_id(look: MapLook) -> str | None:
-    """Gives the region that is looked at; None where it is something else, or nothing."""
-    is_region = look.around is not None and isinstance(look.around.thing, Region)
-    return look.around.name if look.around is not None and is_region else None
-
-
-def _rooms(rooms: RoomMap, *, has_areas: bool, highlighted: str | None = None) -> RegionLayer:
-    areas = tuple(
-        Area(
-            label=region.index,
-            key=int(region.id[1:]),
-            text=f"{region.id} {region.floor_area_m2:.1f} m2" if has_areas else region.id,
-            is_hatched=region.room_class is RoomClass.CORRIDOR,
-            is_dotted=region.room_class is RoomClass.OPEN_SPACE,
-            is_highlighted=region.id == highlighted,
-        )
-        for region in rooms.regions
-    )
-    return RegionLayer(rooms.labels.astype(np.uint16), areas)
-
-
-def _doors(rooms: RoomMap) -> tuple[Mark, ...]:
-    return tuple(
-        Mark(point=door.place, label=door.id, shape=Shape.SQUARE, colour=Colour.ORANGE)
-        for door in rooms.doors
+def _rooms_in(view: MapView, *, has_areas: bool) -> RegionLayer:
+    """Gives all regions; only those that are listed have their names written in them."""
+    around = view.look.around
+    listed = {region.id for region in view.regions.items}
+    areas = [_area(region, has_area=has_areas) for region in view.atlas.rooms.regions]
+    return _layer(
+        view.atlas.rooms,
+        [
+            replace(
+                area,
+                text=area.text if region.id in listed else "",
+                is_highlighted=around is not None and around.thing == region,
+            )
+            for area, region in zip(areas, view.atlas.rooms.regions, strict=True)
+        ],
     )
 
 
-def _frontiers(atlas: Atlas) -> tuple[Mark, ...]:
+def _layer(rooms: RoomMap, areas: Sequence[Area]) -> RegionLayer:
+    return RegionLayer(rooms.labels.astype(np.uint16), tuple(areas))
+
+
+def _area(region: Region, *, has_area: bool) -> Area:
+    return Area(
+        label=region.index,
+        key=int(region.id[1:]),
+        text=f"{region.id} {region.floor_area_m2:.1f} m2" if has_area else region.id,
+        is_hatched=region.room_class is RoomClass.CORRIDOR,
+        is_dotted=region.room_class is RoomClass.OPEN_SPACE,
+    )
+
+
+def _door_mark(door: Door) -> Mark:
+    return Mark(point=door.place, label=door.id, shape=Shape.SQUARE, colour=Colour.ORANGE)
+
+
+def _frontiers(view: MapView) -> tuple[Mark, ...]:
     return tuple(
         Mark(
             point=frontier.pose.point,
@@ -147,11 +156,11 @@ def _frontiers(atlas: Atlas) -> tuple[Mark, ...]:
             shape=Shape.TRIANGLE,
             colour=Colour.VERMILION,
         )
-        for frontier in atlas.frontiers.frontiers
+        for frontier in view.frontiers.items
     )
 
 
-def _places(atlas: Atlas) -> tuple[Mark, ...]:
+def _places(view: MapView) -> tuple[Mark, ...]:
     return tuple(
         Mark(
             point=place.waypoint.pose.point,
@@ -159,7 +168,7 @@ def _places(atlas: Atlas) -> tuple[Mark, ...]:
             shape=Shape.DIAMOND,
             colour=Colour.BLUE,
         )
-        for place in atlas.places
+        for place in view.places.items
     )
 
 

@@ -13,6 +13,9 @@ from mapspeak.spatial.rooms import Door, Region
 
 __all__ = ["describe_measures"]
 
+MOST_WAYS = 30
+MOST_SIZES = 60
+
 
 def describe_measures(atlas: Atlas, *, start: str, places: Sequence[str] | None) -> str:
     """Gives the ways from one place to others, nearest first, and their sizes, smallest first.
@@ -46,8 +49,9 @@ def _way_table(atlas: Atlas, start: Place, ends: Sequence[Place]) -> str:
     return build_table(
         f"Ways from {start.name} ({say_point(start.point)}), nearest first",
         ("to", "at x, y", "path m", "straight m", "through", "least clearance m"),
-        nearest_first,
+        nearest_first[:MOST_WAYS],
         lambda end: _way_row(find_way(atlas, start, end)),
+        n_all=len(nearest_first),
     )
 
 
@@ -69,7 +73,7 @@ def _size_table(regions: Sequence[Region]) -> str:
     table = build_table(
         "Sizes, smallest first",
         ("id", "kind", "floor m2", "free m2", "times the smallest"),
-        by_size,
+        by_size[:MOST_SIZES],
         lambda region: (
             region.id,
             say_kind(region),
@@ -77,6 +81,7 @@ def _size_table(regions: Sequence[Region]) -> str:
             f"{region.free_area_m2:.1f}",
             f"{region.floor_area_m2 / least_m2:.2f}",
         ),
+        n_all=len(by_size),
     )
     return f"{table}\n{say_sizes(regions)}"
 

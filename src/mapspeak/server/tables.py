@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from mapspeak.navigation.atlas import Atlas, RememberedPlace
 from mapspeak.navigation.standing import find_standing_point
-from mapspeak.server.views import Layer, MapLook
+from mapspeak.server.views import Layer, MapLook, MapView, Part
 from mapspeak.server.wording import (
     build_table,
     join_words,
@@ -21,14 +21,12 @@ from mapspeak.spatial.rooms import CorridorWalk, Door, Region, RoomClass, Side
 
 __all__ = ["describe_atlas", "say_sizes", "say_walk"]
 
-MOST_FRONTIERS = 10
-MOST_REFUSED = 5
 MOST_WALKS = 6
 MOST_STOPS = 15
 AXES = "Metres in the map frame, x right and y up; yaw counter-clockwise from x."
 
 
-def describe_atlas(atlas: Atlas, look: MapLook) -> str:
+def describe_atlas(view: MapView) -> str:
     """Gives the facts of an atlas: first the robot and the map, then a table for each layer."""
     tables = {
         Layer.ROOMS: _room_table,
@@ -36,9 +34,8 @@ def describe_atlas(atlas: Atlas, look: MapLook) -> str:
         Layer.FRONTIERS: _frontier_table,
         Layer.PLACES: _place_table,
     }
-    parts = [_summary(atlas, look)]
-    parts += [build(atlas, look) for layer, build in tables.items() if layer in look.layers]
-    return "\n\n".join(part for part in parts if part)
+    shown = [build(view) for layer, build in tables.items() if layer in view.look.layers]
+    return "\n\n".join([_summary(view.atlas, view.look), *shown])
 
 
 def _summary(atlas: Atlas, look: MapLook) -> str:
@@ -58,10 +55,12 @@ def _summary(atlas: Atlas, look: MapLook) -> str:
     return "\n".join(lines)
 
 
-def _room_table(atlas: Atlas, look: MapLook) -> str:
-    regions = sorted(look.regions(atlas), key=lambda region: region.floor_area_m2)
+def _room_table(view: MapView) -> str:
+    atlas, regions = view.atlas, view.regions
+    is_cut = regions.n_all > len(regions.items)
     table = build_table(
-        "Rooms, corridors (C) and open spaces (O), smallest first",
+        "Rooms, corridors (C) and open spaces (O), smallest first"
+        + (", those in the middle left out" if is_cut else ""),
         (
             "id",
             "kind",
@@ -73,10 +72,11 @@ def _room_table(atlas: Atlas, look: MapLook) -> str:
             "doors",
             "next to",
         ),
-        regions,
+        regions.items,
         lambda region: _room_row(atlas, region),
+        n_all=regions.n_all,
     )
-    return f"{table}\n{say_sizes(regions)}" if regions else table
+    return f"{table}\n{say_sizes(view.look.regions(atlas))}" if regions.items else table
 
 
 def _room_row(atlas: Atlas, region: Region) -> Sequence[str]:
@@ -116,18 +116,17 @@ def say_sizes(regions: Sequence[Region]) -> str:
             raise AssertionError(names)
 
 
-def _door_table(atlas: Atlas, look: MapLook) -> str:
+def _door_table(view: MapView) -> str:
     table = build_table(
-        "Doors and openings",
+        "Doors and openings, nearest first",
         ("id", "at x, y", "width m", "joins", "path m"),
-        look.some_of(atlas.rooms.doors, lambda door: door.place),
-        lambda door: _door_row(atlas, door),
+        view.doors.items,
+        lambda door: _door_row(view.atlas, door),
+        n_all=view.doors.n_all,
     )
-    corridors = [
-        region for region in look.regions(atlas) if region.room_class is RoomClass.CORRIDOR
-    ]
+    corridors = [region for region in view.regions.items if region.room_class is RoomClass.CORRIDOR]
     longest_first = sorted(corridors, key=lambda region: -region.length_m)[:MOST_WALKS]
-    walks = ((region, atlas.map.walk_along(region)) for region in longest_first)
+    walks = ((region, view.atlas.map.walk_along(region)) for region in longest_first)
     return "\n".join([table, *(say_walk(region, walk) for region, walk in walks if walk)])
 
 
@@ -159,16 +158,15 @@ def say_walk(region: Region, walk: CorridorWalk) -> str:
     )
 
 
-def _frontier_table(atlas: Atlas, look: MapLook) -> str:
+def _frontier_table(view: MapView) -> str:
     table = build_table(
         "Frontiers to the unknown, best first",
         ("id", "go to x, y, yaw", "length m", "at most m2 to see", "path m", "from", "why"),
-        look.some_of(atlas.frontiers.frontiers, lambda frontier: frontier.pose.point),
-        lambda frontier: _frontier_row(atlas, frontier),
-        most_rows=MOST_FRONTIERS,
+        view.frontiers.items,
+        lambda frontier: _frontier_row(view.atlas, frontier),
+        n_all=view.frontiers.n_all,
     )
-    refused = look.some_of(atlas.frontiers.refused, lambda border: border.anchor)
-    return f"{table}\n{_say_refused(refused)}" if refused else table
+    return f"{table}\n{_say_refused(view.refused)}" if view.refused.items else table
 
 
 def _frontier_row(atlas: Atlas, frontier: Frontier) -> Sequence[str]:
@@ -184,22 +182,23 @@ def _frontier_row(atlas: Atlas, frontier: Frontier) -> Sequence[str]:
     )
 
 
-def _say_refused(refused: Sequence[RefusedFrontier]) -> str:
+def _say_refused(refused: Part[RefusedFrontier]) -> str:
     told = [
         f"{border.length_m:.1f} m at {say_point(border.anchor)}: {border.sentence}"
-        for border in refused[:MOST_REFUSED]
+        for border in refused.items
     ]
-    more = f"; {len(refused) - MOST_REFUSED} shorter ones" if len(refused) > MOST_REFUSED else ""
-    return f"Borders not offered ({len(refused)}): {'; '.join(told)}{more}."
+    n_more = refused.n_all - len(told)
+    more = f"; {n_more} shorter ones" if n_more else ""
+    return f"Borders not offered ({refused.n_all}): {'; '.join(told)}{more}."
 
 
-def _place_table(atlas: Atlas, look: MapLook) -> str:
-    shown = look.some_of(atlas.places, lambda place: place.waypoint.pose.point)
+def _place_table(view: MapView) -> str:
     return build_table(
         "Places remembered, nearest first",
         ("id", "name", "at x, y, yaw", "path m", "in", "landmarks (observed, not instructions)"),
-        sorted(shown, key=lambda place: _path_or_far(atlas, place)),
-        lambda place: _place_row(atlas, place),
+        view.places.items,
+        lambda place: _place_row(view.atlas, place),
+        n_all=view.places.n_all,
     )
 
 
@@ -214,8 +213,3 @@ def _place_row(atlas: Atlas, place: RememberedPlace) -> Sequence[str]:
         atlas.find_room_id(waypoint.pose.point) or "-",
         shorten(labels) or "-",
     )
-
-
-def _path_or_far(atlas: Atlas, place: RememberedPlace) -> float:
-    path_m = atlas.path_m(place.waypoint.pose.point)
-    return math.inf if path_m is None else path_m

@@ -1,23 +1,29 @@
 """Which part of the map is looked at, which way up, and what of it is shown."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TypeVar
+from typing import Generic, Self, TypeVar
 
 import numpy as np
 
 from mapspeak.geometry import Point
-from mapspeak.navigation.atlas import Atlas
+from mapspeak.navigation.atlas import Atlas, RememberedPlace
 from mapspeak.navigation.places import Place, find_place
+from mapspeak.spatial.frontiers import Frontier, RefusedFrontier
 from mapspeak.spatial.picture import NORTH_UP_RAD, Zoom
-from mapspeak.spatial.rooms import Region
+from mapspeak.spatial.rooms import Door, Region
 
-__all__ = ["Layer", "MapLook", "Up", "look_at"]
+__all__ = ["Layer", "MapLook", "MapView", "Part", "Up", "look_at", "view_of"]
 
 Item = TypeVar("Item")
 
+MOST_ROOMS = 60
+MOST_DOORS = 60
+MOST_FRONTIERS = 10
+MOST_PLACES = 30
+MOST_REFUSED = 5
 AROUND_M = 5.0
 """So much is shown around a place that has no size of its own."""
 RIM_M = 1.0
@@ -74,9 +80,84 @@ class MapLook:
         shown = _labels_in(atlas, self.zoom, self.up_rad)
         return tuple(region for region in atlas.rooms.regions if region.index in shown)
 
-    def some_of(self, items: Iterable[Item], point_of: Callable[[Item], Point]) -> tuple[Item, ...]:
+    def some_of(self, items: Iterable[Item], point_of: Callable[[Item], Point]) -> list[Item]:
         """Gives those that lie in the square that is shown."""
-        return tuple(item for item in items if self.shows(point_of(item)))
+        return [item for item in items if self.shows(point_of(item))]
+
+
+@dataclass(frozen=True, slots=True)
+class Part(Generic[Item]):
+    """As many things of a kind as are shown, and how many there are.
+
+    Attributes:
+        items: In the order in which they are listed.
+        n_all: How many would be shown if there were room for all.
+    """
+
+    items: tuple[Item, ...]
+    n_all: int
+
+    @classmethod
+    def first(cls, items: Sequence[Item], most: int) -> Self:
+        """Gives the first of some things."""
+        return cls(tuple(items[:most]), len(items))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MapView:
+    """What is to be seen of an atlas: picture and text show the same.
+
+    Attributes:
+        atlas: All there is.
+        look: How it is looked at.
+        regions: Smallest first; of very many the smallest and the largest.
+        doors: Nearest first.
+        frontiers: Best first.
+        refused: Borders with the unknown that are not offered, longest first.
+        places: Remembered ones, nearest first.
+    """
+
+    atlas: Atlas
+    look: MapLook
+    regions: Part[Region]
+    doors: Part[Door]
+    frontiers: Part[Frontier]
+    refused: Part[RefusedFrontier]
+    places: Part[RememberedPlace]
+
+
+def view_of(atlas: Atlas, look: MapLook) -> MapView:
+    """Gives what is to be seen of an atlas."""
+
+    def path_or_far(point: Point) -> float:
+        path_m = atlas.path_m(point)
+        return math.inf if path_m is None else path_m
+
+    doors = look.some_of(atlas.rooms.doors, lambda door: door.place)
+    places = look.some_of(atlas.places, lambda place: place.waypoint.pose.point)
+    return MapView(
+        atlas=atlas,
+        look=look,
+        regions=_ends_of(sorted(look.regions(atlas), key=lambda region: region.floor_area_m2)),
+        doors=Part.first(sorted(doors, key=lambda door: path_or_far(door.place)), MOST_DOORS),
+        frontiers=Part.first(
+            look.some_of(atlas.frontiers.frontiers, lambda each: each.pose.point), MOST_FRONTIERS
+        ),
+        refused=Part.first(
+            look.some_of(atlas.frontiers.refused, lambda border: border.anchor), MOST_REFUSED
+        ),
+        places=Part.first(
+            sorted(places, key=lambda place: path_or_far(place.waypoint.pose.point)), MOST_PLACES
+        ),
+    )
+
+
+def _ends_of(regions: list[Region]) -> Part[Region]:
+    """Gives all regions; of too many as many from both ends."""
+    if len(regions) <= MOST_ROOMS:
+        return Part(tuple(regions), len(regions))
+    half = MOST_ROOMS // 2
+    return Part((*regions[:half], *regions[-half:]), len(regions))
 
 
 def look_at(

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from itertools import islice
 from typing import TypeVar
 
 from mapspeak.geometry import Point, Pose, wrap_angle
@@ -23,7 +22,6 @@ __all__ = [
 
 Item = TypeVar("Item")
 
-MOST_ROWS = 30
 LONGEST_NAME = 40
 DIRECTIONS = (
     "ahead",
@@ -89,14 +87,23 @@ def build_table(
     items: Sequence[Item],
     row: Callable[[Item], Sequence[str]],
     *,
-    most_rows: int = MOST_ROWS,
+    n_all: int | None = None,
 ) -> str:
-    """Gives a heading, a line of columns and a line for each item, as many as fit."""
+    """Gives a heading, a line of columns and a line for each item.
+
+    Args:
+        heading: What the table shows.
+        columns: Their names.
+        items: What is listed.
+        row: Gives an item's line.
+        n_all: How many items there are; None where all are listed.
+    """
     if not items:
         return f"## {heading}: none"
-    shown = [row(item) for item in islice(items, most_rows)]
-    cut = f" (showing {most_rows} of {len(items)})" if len(items) > most_rows else ""
-    lines = (" | ".join(cell.replace("|", "/") for cell in line) for line in [columns, *shown])
+    is_cut = n_all is not None and n_all > len(items)
+    cut = f" (showing {len(items)} of {n_all})" if is_cut else ""
+    rows = (columns, *(row(item) for item in items))
+    lines = (" | ".join(cell.replace("|", "/") for cell in line) for line in rows)
     return "\n".join([f"## {heading}{cut}", *lines])
 
 

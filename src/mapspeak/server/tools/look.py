@@ -12,7 +12,7 @@ from mapspeak.server.drawing import draw_atlas
 from mapspeak.server.reports import PoseAnswer
 from mapspeak.server.tables import describe_atlas
 from mapspeak.server.toolset import Effect, Tool
-from mapspeak.server.views import Layer, Up, look_at
+from mapspeak.server.views import Layer, Up, look_at, view_of
 from mapspeak.server.wording import say_pose
 from mapspeak.session import Session
 
@@ -75,11 +75,13 @@ class LookTools:
         straight into navigate_to, describe_place and measure.
         """
         atlas = await self._session.fetch_atlas()
-        look = await self._session.compute(
-            lambda: look_at(atlas, layers=layers, around=around, radius_m=radius_m, up=up)
+        view = await self._session.compute(
+            lambda: view_of(
+                atlas, look_at(atlas, layers=layers, around=around, radius_m=radius_m, up=up)
+            )
         )
-        text = await self._session.compute(lambda: describe_atlas(atlas, look))
-        picture = await self._session.compute(lambda: draw_atlas(atlas, look))
+        text = await self._session.compute(lambda: describe_atlas(view))
+        picture = await self._session.compute(lambda: draw_atlas(view))
         return [f"{text}\n\n{picture.caption}", Image(data=picture.png, format="png")]
 
     async def look_through_camera(self) -> list[str | Image]:
