@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from drawing import grid_from_text
 from mapspeak.geometry import Point
 from mapspeak.spatial import Cell, OccupancyGrid
-from mapspeak.spatial.paths import distances_from
+from mapspeak.spatial.paths import clearance_m, distances_from
+from mapspeak.spatial.paths.lattice import moves_within
 from mapspeak.spatial.paths.wavefront import Seeds, spread
 
 NEIGHBOURS = [step for step in itertools.product((-1, 0, 1), repeat=2) if step != (0, 0)]
@@ -110,6 +111,23 @@ def test_the_path_to_a_place_is_about_as_long_as_its_distance() -> None:
     assert (path.points[0], path.points[-1]) == (Point(0.4, 0.4), goal)
 
 
+def test_a_wave_with_goals_stops_when_it_has_reached_them_all() -> None:
+    moves = moves_within(np.ones((1, 50), np.bool_))
+    seeds = Seeds(np.array([0]), np.zeros(1, dtype=np.float32))
+    costs = spread(moves, None, seeds, goals=np.array([3, 9]))
+    assert costs[[3, 9]].tolist() == [3.0, 9.0]
+    assert np.isinf(costs[20:]).all()
+
+
+def test_a_large_map_keeps_the_clearance_of_each_of_its_cells() -> None:
+    cells = np.where(np.random.default_rng(4).random((711, 711)) < 0.05, 100, 0).astype(np.int8)
+    grid = OccupancyGrid(cells=cells, resolution_m=0.05)
+    lattice = distances_from(grid, Point(0.5, 0.5), radius_m=0.1).lattice
+    assert lattice.factor == 2
+    assert (lattice.fine_clearance_m == clearance_m(grid)).all()
+    assert lattice.clearance_m[3, 5] == lattice.fine_clearance_m[6:8, 10:12].max()
+
+
 def test_a_large_map_keeps_the_connections_of_its_cells() -> None:
     cells = np.where(np.random.default_rng(4).random((710, 711)) < 0.05, 100, 0).astype(np.int8)
     cells[:4, :4] = 0
@@ -138,3 +156,22 @@ def test_distances_cannot_be_changed() -> None:
     field = distances_from(grid_from_text(".."), Point(0.5, 0.5), radius_m=0.0)
     with pytest.raises(ValueError, match="read-only"):
         field.costs[0] = 3
+
+
+def test_a_way_to_draw_leads_over_free_floor_and_is_as_long_as_the_distance_says() -> None:
+    grid = grid_from_text(
+        """
+        ..........
+        .########.
+        ........#.
+        ........#.
+        """
+    )
+    distances = distances_from(grid, Point(0.5, 0.5), radius_m=0.3)
+    way = distances.way_to(Point(9.5, 0.5))
+    assert way is not None
+    assert (way[0], way[-1]) == (Point(0.5, 0.5), Point(9.5, 0.5))
+    assert all(grid.free[cell.row, cell.col] for cell in map(grid.cell_at, way))
+    length_m = sum(one.distance_to(other) for one, other in itertools.pairwise(way))
+    assert length_m == pytest.approx(distances.distance_to(Point(9.5, 0.5)), abs=0.01)
+    assert distances.way_to(Point(4.5, 2.5)) is None

@@ -57,7 +57,8 @@ class MapRevision:
     @cached_property
     def clearance_m(self) -> Clearance:
         """Metres from each cell to the nearest obstacle, the shape of the grid."""
-        return clearance_m(self.grid)
+        known = next(iter(self._fields.values()), None)
+        return clearance_m(self.grid) if known is None else known.lattice.fine_clearance_m
 
     @property
     def latest_rooms(self) -> RoomMap | None:

@@ -127,7 +127,7 @@ def _frontier_lines(atlas: Atlas, frontier: Frontier) -> Iterator[str]:
         f"{say_point(frontier.anchor)}; number {rank} of {len(ids)}, best first."
     )
     yield (
-        f"Up to {frontier.gain_m2:.1f} m2 of new floor may come into view from "
+        f"About {frontier.gain_m2:.1f} m2 of new floor may come into view from "
         f"{say_pose(frontier.pose)}, in {atlas.find_room_id(frontier.pose.point) or 'no room'}."
     )
     yield f"Why it stands there in the list: {frontier.reason}."

@@ -71,7 +71,7 @@ def draw_atlas(view: MapView) -> AtlasPicture:
         atlas.grid,
         layers=MapLayers(
             regions=_rooms_in(view, has_areas=is_detailed) if Layer.ROOMS in look.layers else None,
-            lines=_path_to_first_frontier(atlas) if look.layers >= WITH_PATH else (),
+            lines=_way_to_first_frontier(atlas) if look.layers >= WITH_PATH else (),
             marks=(
                 *(_door_mark(door) for door in doors),
                 *(_frontiers(view) if Layer.FRONTIERS in look.layers else ()),
@@ -172,13 +172,11 @@ def _places(view: MapView) -> tuple[Mark, ...]:
     )
 
 
-def _path_to_first_frontier(atlas: Atlas) -> tuple[Line, ...]:
+def _way_to_first_frontier(atlas: Atlas) -> tuple[Line, ...]:
     if not atlas.frontiers.frontiers:
         return ()
-    path = atlas.distances.path_to(atlas.frontiers.frontiers[0].pose.point)
-    if path is None or len(path.points) < 2:
-        return ()
-    return (Line(points=path.points, style=LineStyle.DASHED),)
+    way = atlas.distances.way_to(atlas.frontiers.frontiers[0].pose.point)
+    return () if way is None or len(way) < 2 else (Line(points=way, style=LineStyle.DASHED),)
 
 
 def _caption(picture: MapPicture) -> str:

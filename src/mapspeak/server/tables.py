@@ -161,7 +161,7 @@ def say_walk(region: Region, walk: CorridorWalk) -> str:
 def _frontier_table(view: MapView) -> str:
     table = build_table(
         "Frontiers to the unknown, best first",
-        ("id", "go to x, y, yaw", "length m", "at most m2 to see", "path m", "from", "why"),
+        ("id", "go to x, y, yaw", "length m", "new m2, about", "path m", "from", "why"),
         view.frontiers.items,
         lambda frontier: _frontier_row(view.atlas, frontier),
         n_all=view.frontiers.n_all,

@@ -19,8 +19,8 @@ __all__ = ["Layer", "MapLook", "MapView", "Part", "Up", "look_at", "view_of"]
 
 Item = TypeVar("Item")
 
-MOST_ROOMS = 60
-MOST_DOORS = 60
+MOST_ROOMS = 50
+MOST_DOORS = 40
 MOST_FRONTIERS = 10
 MOST_PLACES = 30
 MOST_REFUSED = 5

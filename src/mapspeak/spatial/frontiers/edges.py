@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.spatial.grid import IntArray, Mask, OccupancyGrid
+from mapspeak.spatial.grid import IntArray, OccupancyGrid
 
-__all__ = ["Border", "find_borders"]
+__all__ = ["Border", "Borders", "Labels", "find_borders", "find_middle"]
 
 THINNEST_UNKNOWN_M = 0.15
 """Thinner unknown is what lies between two beams of a LiDAR, or along a wall: nothing to see."""
@@ -16,7 +16,10 @@ THINNEST_UNKNOWN_M = 0.15
 JOIN_M = 0.6
 """Pieces of border that are no further apart on the floor are one."""
 
+PLUS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], dtype=np.uint8)
+
 Labels = NDArray[np.int32]
+Picture = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -34,49 +37,91 @@ class Border:
     length_m: float
 
 
-def find_borders(grid: OccupancyGrid) -> list[Border]:
+@dataclass(frozen=True, slots=True, eq=False)
+class Borders:
+    """All borders of a map.
+
+    Attributes:
+        kept: Those long enough to be worth a look.
+        n_specks: How many others there are.
+    """
+
+    kept: tuple[Border, ...]
+    n_specks: int
+
+
+def find_borders(grid: OccupancyGrid, *, least_length_m: float) -> Borders:
     """Finds all borders of the known floor with unknown that is worth a look.
 
     Only cells that touch by a side count as neighbours, so that nothing is seen between walls
     that touch at a corner. Outside the array everything is unknown.
     """
-    edge = _edge(grid)
-    labels, n_labels = _labelled(edge, grid.free, reach=_cells(JOIN_M, grid))
-    rows, cols = np.nonzero(edge)
-    of_cell = labels[rows, cols]
+    free = grid.free.view(np.uint8)
+    edge = _edge(grid.unknown.view(np.uint8), free, side=max(_cells(THINNEST_UNKNOWN_M, grid), 1))
+    labels = _labelled(edge, free, reach=_cells(JOIN_M, grid))
+    cells = np.flatnonzero(edge)
+    of_cell = labels.ravel()[cells]
     order = np.argsort(of_cell, kind="stable")
-    starts = np.searchsorted(of_cell[order], np.arange(1, n_labels + 1))
-    groups = np.split(order, starts[1:]) if n_labels > 1 else [order]
-    return [_border(grid, rows[group], cols[group]) for group in groups if group.size]
+    starts = np.flatnonzero(np.diff(of_cell[order], prepend=0))
+    if not starts.size:
+        return Borders((), 0)
+    rows, cols = np.divmod(cells[order], grid.n_cols)
+    lengths_m = _lengths(rows, cols, starts) * grid.resolution_m
+    kept = np.flatnonzero(lengths_m >= least_length_m)
+    ends = np.append(starts[1:], rows.size)
+    borders = (
+        Border(
+            rows=rows[starts[index] : ends[index]],
+            cols=cols[starts[index] : ends[index]],
+            length_m=float(lengths_m[index]),
+        )
+        for index in kept
+    )
+    return Borders(tuple(borders), starts.size - kept.size)
 
 
-def _edge(grid: OccupancyGrid) -> Mask:
+def find_middle(rows: IntArray, cols: IntArray) -> int:
+    """Gives which of some cells is nearest to their mean."""
+    off_rows, off_cols = rows - rows.sum() / rows.size, cols - cols.sum() / cols.size
+    return int((off_rows * off_rows + off_cols * off_cols).argmin())
+
+
+def _edge(unknown: Picture, free: Picture, *, side: int) -> Picture:
     """True in free cells that have unknown at a side, and not just a sliver of it."""
-    side = max(_cells(THINNEST_UNKNOWN_M, grid), 1)
-    unknown = np.pad(grid.unknown, side, constant_values=True).view(np.uint8)
     square = np.ones((side, side), dtype=np.uint8)
-    thick = cv2.dilate(cv2.erode(unknown, square, anchor=(0, 0)), square, anchor=(side - 1,) * 2)
-    near_thick = cv2.dilate(thick, np.ones((2 * side + 1, 2 * side + 1), dtype=np.uint8)) > 0
-    plus = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
-    beside = cv2.dilate(unknown, plus) > 0
-    inner = slice(side, -side)
-    return np.asarray(grid.free & (beside & near_thick)[inner, inner], dtype=np.bool_)
+    thick = np.asarray(cv2.erode(unknown, square, anchor=(0, 0)), dtype=np.uint8)
+    # One dilation gives the squares of unknown back and looks as far around them again.
+    near_thick = _dilate(thick, np.ones((3 * side, 3 * side), np.uint8), (2 * side - 1,) * 2)
+    beside = _dilate(unknown, PLUS, (1, 1))
+    beside &= near_thick
+    beside &= free
+    return beside
 
 
-def _labelled(edge: Mask, free: Mask, *, reach: int) -> tuple[Labels, int]:
-    """Numbers the borders; pieces near each other on the floor share a number."""
-    plus = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+def _dilate(picture: Picture, kernel: Picture, anchor: tuple[int, int]) -> Picture:
+    """Dilates a picture that is set everywhere outside the array."""
+    dilated = cv2.dilate(
+        picture, kernel, anchor=anchor, borderType=cv2.BORDER_CONSTANT, borderValue=1
+    )
+    return np.asarray(dilated, dtype=np.uint8)
+
+
+def _labelled(edge: Picture, free: Picture, *, reach: int) -> Labels:
+    """Numbers the borders from 1; pieces near each other on the floor share a number."""
     grown = edge
     for _ in range(max(reach // 2, 1)):
-        grown = (cv2.dilate(grown.view(np.uint8), plus) > 0) & free
-    n_labels, labels = cv2.connectedComponents(grown.view(np.uint8), connectivity=4)
-    return np.asarray(labels, dtype=np.int32), n_labels - 1
+        grown = np.asarray(cv2.bitwise_and(cv2.dilate(grown, PLUS), free), dtype=np.uint8)
+    _, labels = cv2.connectedComponents(grown, connectivity=4)
+    return np.asarray(labels, dtype=np.int32)
 
 
-def _border(grid: OccupancyGrid, rows: IntArray, cols: IntArray) -> Border:
-    across = np.hypot(np.ptp(rows) + 1, np.ptp(cols) + 1) if rows.size > 1 else 1.0
-    length = max(float(rows.size), float(across))
-    return Border(rows=rows, cols=cols, length_m=length * grid.resolution_m)
+def _lengths(rows: IntArray, cols: IntArray, starts: IntArray) -> NDArray[np.float64]:
+    """Gives the lengths in cells of borders whose cells follow each other from each start on."""
+    n_cells = np.diff(starts, append=rows.size)
+    high = np.maximum.reduceat(rows, starts) - np.minimum.reduceat(rows, starts) + 1
+    wide = np.maximum.reduceat(cols, starts) - np.minimum.reduceat(cols, starts) + 1
+    across = np.where(n_cells > 1, np.hypot(high, wide), 1.0)
+    return np.asarray(np.maximum(n_cells, across), dtype=np.float64)
 
 
 def _cells(length_m: float, grid: OccupancyGrid) -> int:

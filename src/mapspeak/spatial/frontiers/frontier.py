@@ -20,8 +20,9 @@ class Frontier:
         points: The centres of its cells in metres, shape (n, 2).
         anchor: The one of them that the pose looks over.
         length_m: Along the border.
-        gain_m2: Unknown floor that may come into view at the pose, if nothing hides it.
+        gain_m2: Unknown floor that is to be expected to come into view at the pose.
         distance_m: From the robot to the pose, by path.
+        openness_m: What that was reckoned with: how far one sees on this map, on average.
         pose: Where to go: a place the robot can reach and stand in, facing the unknown.
         reason: Why it stands where it stands in the ranking, in words with numbers.
     """
@@ -32,6 +33,7 @@ class Frontier:
     length_m: float
     gain_m2: float
     distance_m: float
+    openness_m: float
     pose: Pose
     reason: str
 
@@ -44,7 +46,6 @@ class Frontier:
 class RefusalReason(StrEnum):
     """Why a border with the unknown is no place to go."""
 
-    SPECKLE = "speckle"
     NO_WAY = "no_way"
     TOO_NARROW = "too_narrow"
     NOTHING_TO_SEE = "nothing_to_see"
@@ -84,6 +85,7 @@ class FrontierReport:
     Attributes:
         frontiers: Where to go, best first.
         refused: Where not to go, longest first.
+        n_specks: Borders so short that they are nothing but noise, which are not listed.
         verdict: Whether anything is left.
         sentence: The verdict in words with numbers.
         n_named: The highest number given to a frontier so far; the next new one gets one more.
@@ -91,6 +93,7 @@ class FrontierReport:
 
     frontiers: tuple[Frontier, ...]
     refused: tuple[RefusedFrontier, ...]
+    n_specks: int
     verdict: FrontierVerdict
     sentence: str
     n_named: int

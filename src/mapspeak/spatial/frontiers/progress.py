@@ -1,7 +1,7 @@
 """How much of what a frontier promised is still to be seen, on a later map."""
 
 from mapspeak.spatial.frontiers.frontier import Frontier
-from mapspeak.spatial.frontiers.view import find_prospect
+from mapspeak.spatial.frontiers.view import find_area_m2
 from mapspeak.spatial.grid import OccupancyGrid
 
 __all__ = ["remaining_ratio"]
@@ -13,4 +13,5 @@ def remaining_ratio(grid: OccupancyGrid, frontier: Frontier) -> float:
     A robot under way to a frontier can turn to the next one when this falls: it has seen from afar
     what it was sent to see. The map may have grown and moved its origin since.
     """
-    return find_prospect(grid, grid.cell_at(frontier.pose.point)).area_m2 / frontier.gain_m2
+    place = grid.cell_at(frontier.pose.point)
+    return find_area_m2(grid, place, openness_m=frontier.openness_m) / frontier.gain_m2

@@ -1,19 +1,18 @@
 """Which frontier first: much to see soon, without having to come back for the rest."""
 
-import dataclasses
-
 import numpy as np
 
 from mapspeak.spatial.frontiers.frontier import Frontier
+from mapspeak.spatial.frontiers.reasons import with_reasons
 from mapspeak.spatial.frontiers.rounds import find_shortest_rounds, find_ways_between
-from mapspeak.spatial.paths.distances import DistanceField
+from mapspeak.spatial.frontiers.terrain import Terrain
 
 __all__ = ["gain_rate", "rank"]
 
 N_WEIGHED = 9
 """The round is reckoned through so many frontiers, the most promising ones; others come after."""
-DETOUR_WORTH_M2 = 1.0
-"""A metre that has to be driven later, to come back, is worth this much unknown now."""
+DETOUR_WORTH_M2 = 0.5
+"""A metre that has to be driven later, to come back, is worth this much new floor now."""
 STOP_M = 0.5
 """What a stop costs beside the way to it."""
 
@@ -23,7 +22,7 @@ def gain_rate(gain_m2: float, distance_m: float) -> float:
     return gain_m2 / (distance_m + STOP_M)
 
 
-def rank(distances: DistanceField, frontiers: list[Frontier]) -> list[Frontier]:
+def rank(terrain: Terrain, frontiers: list[Frontier]) -> list[Frontier]:
     """Gives frontiers in the order in which to think of them, each with its reason.
 
     Gain per metre of way is what shows most of a building soon. It leaves corners behind, though,
@@ -31,31 +30,29 @@ def rank(distances: DistanceField, frontiers: list[Frontier]) -> list[Frontier]:
     """
     by_rate = sorted(frontiers, key=lambda each: -gain_rate(each.gain_m2, each.distance_m))
     weighed, others = by_rate[:N_WEIGHED], by_rate[N_WEIGHED:]
-    detours_m = _detours_m(distances, weighed)
-    scores = [
-        gain_rate(each.gain_m2 - DETOUR_WORTH_M2 * detour_m, each.distance_m)
-        for each, detour_m in zip(weighed, detours_m, strict=True)
-    ]
+    detours_m = _detours_m(terrain, weighed)
+    scores = [_score(each, detour_m) for each, detour_m in zip(weighed, detours_m, strict=True)]
     order = np.argsort(-np.array(scores), kind="stable")
-    return [
-        *(_with_reason(weighed[index], detours_m[index]) for index in order),
-        *(_with_reason(each, 0.0) for each in others),
-    ]
+    ranked = [*(weighed[index] for index in order), *others]
+    return with_reasons(
+        ranked,
+        [*(detours_m[index] for index in order), *([None] * len(others))],
+        [gain_rate(each.gain_m2, each.distance_m) for each in ranked],
+    )
 
 
-def _detours_m(distances: DistanceField, frontiers: list[Frontier]) -> list[float]:
+def _score(frontier: Frontier, detour_m: float) -> float:
+    """Gives what is left of the gain after the detour: per metre of way, where anything is left."""
+    left_m2 = frontier.gain_m2 - DETOUR_WORTH_M2 * detour_m
+    return gain_rate(left_m2, frontier.distance_m) if left_m2 > 0 else left_m2
+
+
+def _detours_m(terrain: Terrain, frontiers: list[Frontier]) -> list[float]:
     """Gives how much longer than the shortest round the one is that begins with each."""
     if len(frontiers) < 2:
         return [0.0] * len(frontiers)
     from_robot_m = np.array([each.distance_m for each in frontiers])
-    between_m = find_ways_between(distances, [each.pose.point for each in frontiers])
+    between_m = find_ways_between(terrain, [each.pose.point for each in frontiers])
     through_robot_m = from_robot_m[:, None] + from_robot_m
     rounds_m = find_shortest_rounds(from_robot_m, np.minimum(between_m, through_robot_m))
     return [float(round_m - rounds_m.min()) for round_m in rounds_m]
-
-
-def _with_reason(frontier: Frontier, detour_m: float) -> Frontier:
-    reason = f"{frontier.gain_m2:.0f} m2 may come into view after {frontier.distance_m:.1f} m"
-    if detour_m >= 1.0:
-        reason += f"; beginning here makes the round of all frontiers {detour_m:.0f} m longer"
-    return dataclasses.replace(frontier, reason=reason)

@@ -10,12 +10,11 @@ from mapspeak.spatial.frontiers.frontier import (
     RefusalReason,
     RefusedFrontier,
 )
-from mapspeak.spatial.grid import OccupancyGrid
+from mapspeak.spatial.frontiers.terrain import Terrain
 
 __all__ = ["build_report"]
 
 IN_WORDS = {
-    RefusalReason.SPECKLE: "too short to be more than noise",
     RefusalReason.NO_WAY: "behind walls",
     RefusalReason.TOO_NARROW: "too narrow for the robot",
     RefusalReason.NOTHING_TO_SEE: "with next to nothing to see",
@@ -24,10 +23,14 @@ IN_WORDS = {
 
 
 def build_report(
-    grid: OccupancyGrid, ranked: list[Frontier], refused: list[RefusedFrontier]
+    terrain: Terrain,
+    ranked: list[Frontier],
+    refused: list[RefusedFrontier],
+    *,
+    n_specks: int,
 ) -> FrontierReport:
     """Gives the report of frontiers in their order, named from F1 on."""
-    verdict = _verdict(grid, ranked, refused)
+    verdict = _verdict(terrain, ranked, is_refused=bool(refused or n_specks))
     named = (
         dataclasses.replace(frontier, id=f"F{number}")
         for number, frontier in enumerate(ranked, start=1)
@@ -35,31 +38,36 @@ def build_report(
     return FrontierReport(
         frontiers=tuple(named),
         refused=tuple(sorted(refused, key=lambda each: -each.length_m)),
+        n_specks=n_specks,
         verdict=verdict,
-        sentence=_sentence(verdict, ranked, refused),
+        sentence=_sentence(terrain, verdict, ranked, refused),
         n_named=len(ranked),
     )
 
 
-def _verdict(
-    grid: OccupancyGrid, ranked: list[Frontier], refused: list[RefusedFrontier]
-) -> FrontierVerdict:
+def _verdict(terrain: Terrain, ranked: list[Frontier], *, is_refused: bool) -> FrontierVerdict:
     if ranked:
         return FrontierVerdict.SOME_LEFT
-    if refused:
+    if is_refused:
         return FrontierVerdict.ALL_REFUSED
-    return FrontierVerdict.NONE_LEFT if grid.free.any() else FrontierVerdict.NOTHING_KNOWN
+    return FrontierVerdict.NONE_LEFT if terrain.free.any() else FrontierVerdict.NOTHING_KNOWN
 
 
 def _sentence(
-    verdict: FrontierVerdict, ranked: list[Frontier], refused: list[RefusedFrontier]
+    terrain: Terrain,
+    verdict: FrontierVerdict,
+    ranked: list[Frontier],
+    refused: list[RefusedFrontier],
 ) -> str:
     if verdict is FrontierVerdict.NOTHING_KNOWN:
         return "No free floor is known yet."
     if verdict is FrontierVerdict.NONE_LEFT:
         return "No frontier is left: all known floor ends at walls."
+    if not terrain.reachable.any():
+        return "No frontier can be reached: no free floor with room for the robot is near it."
     if verdict is FrontierVerdict.ALL_REFUSED:
-        return f"No frontier is left to go to; refused are {_refusals(refused)}."
+        others = _refusals(refused) or "specks too short to be more than noise"
+        return f"No frontier is left to go to; refused are {others}."
     others = f"; refused are {_refusals(refused)}" if refused else ""
     return f"{len(ranked)} frontier{'s' if len(ranked) > 1 else ''} to go to{others}."
 

@@ -5,29 +5,63 @@ import math
 import numpy as np
 
 from mapspeak.geometry import Point
+from mapspeak.spatial.frontiers.terrain import Terrain
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
-from mapspeak.spatial.paths.distances import DistanceField
 from mapspeak.spatial.paths.lattice import moves_within
 from mapspeak.spatial.paths.wavefront import Seeds, spread
 
 __all__ = ["find_shortest_rounds", "find_ways_between"]
 
+MOST_CELLS = 4_000_000
+"""So many cells are held in memory for waves that spread together."""
 
-def find_ways_between(distances: DistanceField, stops: list[Point]) -> FloatArray:
+
+def find_ways_between(terrain: Terrain, stops: list[Point]) -> FloatArray:
     """Gives the lengths of ways between reachable places, shape (n, n), in metres.
 
     They are estimates: the floor is looked at in cells so coarse that walls, which keep the robot's
     radius on both sides, just do not vanish.
     """
-    grid = distances.lattice.grid
-    factor = max(int(distances.radius_m / math.sqrt(2) / grid.resolution_m), 1)
-    floor = _coarser(distances.build_reachable_mask(), factor)
-    moves = moves_within(floor)
+    grid = terrain.grid
+    factor = max(int(terrain.radius_m / math.sqrt(2) / grid.resolution_m), 1)
     rows, cols = grid.cells_at(np.array([[stop.x, stop.y] for stop in stops]))
-    cells: IntArray = (rows // factor) * floor.shape[1] + cols // factor
-    start = np.zeros(1, dtype=np.float32)
-    ways = [spread(moves, None, Seeds(cell[None], start))[cells] for cell in cells]
-    return np.array(ways, dtype=np.float64) * factor * grid.resolution_m
+    window = _window(terrain, rows, cols)
+    floor = _coarser(terrain.reachable[window], factor)
+    cells: IntArray = np.ravel_multi_index(
+        ((rows - window[0].start) // factor, (cols - window[1].start) // factor), floor.shape
+    )
+    at_once = max(MOST_CELLS // floor.size, 1)
+    ways = [
+        _spread_together(floor, cells[start : start + at_once], cells)
+        for start in range(0, cells.size, at_once)
+    ]
+    return np.concatenate(ways) * factor * grid.resolution_m
+
+
+def _window(terrain: Terrain, rows: IntArray, cols: IntArray) -> tuple[slice, slice]:
+    """Gives the part of the map that shortest ways between some cells cannot leave.
+
+    By way of the robot's own place there is a way between any two of them.
+    """
+    from_robot_m = terrain.distances.distances_at(rows, cols)
+    reach = math.ceil(float(from_robot_m.max()) / terrain.grid.resolution_m) + 1
+    top, left = max(int(rows.min()) - reach, 0), max(int(cols.min()) - reach, 0)
+    return slice(top, int(rows.max()) + reach + 1), slice(left, int(cols.max()) + reach + 1)
+
+
+def _spread_together(floor: Mask, starts: IntArray, goals: IntArray) -> FloatArray:
+    """Gives the ways in cells from each start to all goals, shape (starts, goals).
+
+    Each wave has a copy of the floor of its own, one above the other, as it is the number of steps
+    that takes the time.
+    """
+    n_copies = len(starts)
+    moves = np.tile(moves_within(floor), (n_copies, 1))
+    first = np.arange(n_copies) * floor.size
+    seeds = Seeds(first + starts, np.zeros(n_copies, dtype=np.float32))
+    ends = first[:, None] + goals
+    costs = spread(moves, None, seeds, goals=ends.ravel())
+    return np.asarray(costs[ends], dtype=np.float64)
 
 
 def find_shortest_rounds(from_start_m: FloatArray, between_m: FloatArray) -> FloatArray:

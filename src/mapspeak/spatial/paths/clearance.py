@@ -36,5 +36,7 @@ def _distance_to(blocked: Mask, resolution_m: float) -> Clearance:
     if not blocked.any():
         return np.full(blocked.shape, np.inf, dtype=np.float32)
     source = np.logical_not(blocked).view(np.uint8)
-    distance = cv2.distanceTransform(source, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    return np.asarray(distance, dtype=np.float32) * np.float32(resolution_m)
+    transformed = cv2.distanceTransform(source, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    distance = np.asarray(transformed, dtype=np.float32)
+    distance *= np.float32(resolution_m)
+    return distance

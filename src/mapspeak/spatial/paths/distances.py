@@ -56,6 +56,17 @@ class DistanceField:
         way = descend(self.lattice.moves, None, self.costs, goal)
         return find_path_near(self.lattice, way, (self.start, point), radius_m=self.radius_m)
 
+    def way_to(self, point: Point) -> tuple[Point, ...] | None:
+        """Gives the shortest way from cell to cell, good enough to draw; `path_to` is to drive."""
+        goal = self.lattice.index_at(point)
+        if goal is None or not math.isfinite(self.costs[goal]):
+            return None
+        way = descend(self.lattice.moves, None, self.costs, goal)
+        rows, cols = np.divmod(way, self.lattice.n_cols)
+        n = self.lattice.factor
+        points = self.lattice.grid.points_at(rows * n + n // 2, cols * n + n // 2)
+        return (*(Point(x, y) for x, y in points.tolist()), point)
+
     def from_elsewhere(self, start: Point) -> "DistanceField":
         """Gives the distances from another place on the same map, for the same robot."""
         return _distances_over(self.lattice, start, radius_m=self.radius_m)

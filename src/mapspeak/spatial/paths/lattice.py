@@ -5,6 +5,7 @@ have one, so that nothing opens or closes by looking coarser.
 """
 
 import dataclasses
+import functools
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -36,6 +37,7 @@ class Lattice:
         moves: The directions in which each lattice cell may be left, as bits.
         is_open: True where a lattice cell can be entered.
         clearance_m: The largest within each lattice cell.
+        fine_clearance_m: Of each of the map's cells.
     """
 
     grid: OccupancyGrid
@@ -44,6 +46,7 @@ class Lattice:
     moves: Moves
     is_open: Mask
     clearance_m: Clearance
+    fine_clearance_m: Clearance
 
     @property
     def cell_size_m(self) -> float:
@@ -79,13 +82,16 @@ def build_fine_lattice(grid: OccupancyGrid, radius_m: float) -> Lattice:
         moves=moves_within(passable),
         is_open=passable,
         clearance_m=clearance,
+        fine_clearance_m=clearance,
     )
 
 
 def build_coarse_lattice(grid: OccupancyGrid, radius_m: float) -> Lattice:
     """Gives the lattice that suits the map's size: of two by two cells where it is large."""
-    fine = build_fine_lattice(grid, radius_m)
-    return fine if grid.cells.size < LARGE_MAP else _halve(fine)
+    if grid.cells.size < LARGE_MAP:
+        return build_fine_lattice(grid, radius_m)
+    clearance = clearance_m(grid)
+    return _halve(grid, clearance, grid.free & (clearance >= radius_m))
 
 
 def restrict(lattice: Lattice, mask: Mask) -> Lattice:
@@ -99,28 +105,29 @@ def moves_within(mask: Mask) -> Moves:
     return _moves(mask[:, :-1] & mask[:, 1:], mask[:-1] & mask[1:])
 
 
-def _halve(fine: Lattice) -> Lattice:
-    n_rows, n_cols = fine.passable.shape
-    padding = ((0, n_rows % 2), (0, n_cols % 2))
-    low_left, low_right, high_left, high_right = _quarters(np.pad(fine.passable, padding))
+def _halve(grid: OccupancyGrid, clearance: Clearance, passable: Mask) -> Lattice:
+    low_left, low_right, high_left, high_right = _quarters(passable)
     is_open = _hang_together(low_left, low_right, high_left, high_right)
     to_east = (low_right[:, :-1] & low_left[:, 1:]) | (high_right[:, :-1] & high_left[:, 1:])
     to_north = (high_left[:-1] & low_left[1:]) | (high_right[:-1] & low_right[1:])
-    clearances = _quarters(np.pad(fine.clearance_m, padding))
     return Lattice(
-        grid=fine.grid,
-        passable=fine.passable,
+        grid=grid,
+        passable=passable,
         factor=2,
         moves=_moves(
             to_east & is_open[:, :-1] & is_open[:, 1:], to_north & is_open[:-1] & is_open[1:]
         ),
         is_open=is_open,
-        clearance_m=np.maximum.reduce(clearances),
+        clearance_m=functools.reduce(np.maximum, _quarters(clearance)),
+        fine_clearance_m=clearance,
     )
 
 
 def _quarters(values: NDArray[Number]) -> tuple[NDArray[Number], ...]:
     """Gives the low left, low right, high left and high right cell of each two by two cells."""
+    n_rows, n_cols = values.shape
+    if n_rows % 2 or n_cols % 2:
+        values = np.pad(values, ((0, n_rows % 2), (0, n_cols % 2)))
     return values[0::2, 0::2], values[0::2, 1::2], values[1::2, 0::2], values[1::2, 1::2]
 
 

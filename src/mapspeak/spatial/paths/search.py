@@ -63,7 +63,7 @@ def _find_way(
     seeds = find_seeds(lattice, ends[0], radius_m=radius_m)
     if goal is None or seeds is None:
         return None
-    costs = spread(lattice.moves, weights, seeds, goal=goal)
+    costs = spread(lattice.moves, weights, seeds, goals=np.array([goal]))
     return descend(lattice.moves, weights, costs, goal) if np.isfinite(costs[goal]) else None
 
 

@@ -47,7 +47,9 @@ def offsets(n_cols: int) -> IntArray:
     return np.array(straight + diagonal, dtype=np.intp)
 
 
-def spread(moves: Moves, weights: Costs | None, seeds: Seeds, *, goal: int | None = None) -> Costs:
+def spread(
+    moves: Moves, weights: Costs | None, seeds: Seeds, *, goals: IntArray | None = None
+) -> Costs:
     """Gives the least cost to every cell, flat; infinite where the wave does not come.
 
     Args:
@@ -56,11 +58,11 @@ def spread(moves: Moves, weights: Costs | None, seeds: Seeds, *, goal: int | Non
         weights: What a unit of way costs in each cell, at least 1; a move costs its length times
             the mean of both ends. None where all cells cost 1.
         seeds: Where to start.
-        goal: Stop once this cell is settled.
+        goals: Stop once all these cells are settled.
     """
     front = _Front(moves, None if weights is None else weights.ravel(), seeds)
     while (ring := front.next_ring()) is not None:
-        if goal is not None and front.is_settled[goal]:
+        if goals is not None and front.is_settled[goals].all():
             break
         front.advance(ring)
     return front.costs
