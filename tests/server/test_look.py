@@ -1,11 +1,13 @@
 import base64
 import io
 import math
+import re
 from pathlib import Path
 
 import pytest
 from PIL import Image
 
+from drawing import grid_from_text
 from fakes import FakeRobot, two_rooms
 from mapspeak.evaluation.reading import read_map_picture, read_map_text
 from mapspeak.geometry import Pose
@@ -111,3 +113,53 @@ async def test_a_look_around_what_is_not_there_names_what_is(tmp_path: Path) -> 
         answer = await client.call_tool("look_at_map", {"around": "R8"})
     assert answer.is_error
     assert "rooms R1 R2" in text_of(answer)
+
+
+async def test_a_room_that_nobody_can_get_to_is_not_offered_as_the_smallest_to_go_to(
+    tmp_path: Path,
+) -> None:
+    grid = grid_from_text(
+        """
+        ########################
+        #......#.........#.....#
+        #......#.........#.....#
+        #......#.........#.....#
+        #................#.....#
+        #................#.....#
+        #......#.........#.....#
+        #......#.........#.....#
+        ########################
+        """,
+        resolution_m=0.4,
+    )
+    async with connect(FakeRobot(grid, pose=Pose(1.5, 1.5)), tmp_path) as client:
+        text = text_of(await client.call_tool("look_at_map", {}))
+    rows = {row.id: row for row in read_map_text(text).rows("Rooms")}
+    closed = next(id_ for id_, row in rows.items() if row.cells["path m"] == "no way")
+    assert f"the smallest is {closed} " in text
+    (told,) = re.findall(r"Of those with a way for the robot the smallest is (R\d+)", text)
+    assert told != closed
+    assert rows[told].number("floor m2") < max(row.number("floor m2") for row in rows.values())
+
+
+async def test_a_room_that_borders_on_the_unknown_is_said_to_be_not_all_seen(
+    tmp_path: Path,
+) -> None:
+    grid = grid_from_text(
+        """
+        ########################
+        #......#...............?
+        #......#...............?
+        #......#...............?
+        #......................?
+        #......................?
+        #......#...............?
+        #......#...............?
+        ########################
+        """,
+        resolution_m=0.4,
+    )
+    async with connect(FakeRobot(grid, pose=Pose(1.5, 1.5)), tmp_path) as client:
+        text = text_of(await client.call_tool("look_at_map", {}))
+    sizes = {row.id: row.cells["floor m2"] for row in read_map_text(text).rows("Rooms")}
+    assert [size.endswith("(not all seen)") for size in sizes.values()] == [False, True]

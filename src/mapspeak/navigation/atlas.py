@@ -123,9 +123,14 @@ class Atlas:
 
     @cached_property
     def growing_ids(self) -> frozenset[str]:
-        """The regions out of which a frontier leads: their areas are not final."""
-        poses = (frontier.pose for frontier in self.frontiers.frontiers)
-        return frozenset(filter(None, (self.find_room_id(pose.point) for pose in poses)))
+        """The regions that border on the unknown: their areas are not final."""
+        frontiers = self.frontiers
+        borders = (
+            *(frontier.pose.point for frontier in frontiers.frontiers),
+            *(frontier.anchor for frontier in frontiers.frontiers),
+            *(refused.anchor for refused in frontiers.refused),
+        )
+        return frozenset(filter(None, map(self.find_room_id, borders)))
 
 
 def number_places(waypoints: Sequence[Waypoint]) -> tuple[RememberedPlace, ...]:

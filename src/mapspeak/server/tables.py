@@ -56,7 +56,7 @@ def _summary(atlas: Atlas, look: MapLook) -> str:
 
 
 def _room_table(view: MapView) -> str:
-    atlas, regions = view.atlas, view.regions
+    atlas, regions, shown = view.atlas, view.regions, view.look.regions(view.atlas)
     is_cut = regions.n_all > len(regions.items)
     table = build_table(
         "Rooms, corridors (C) and open spaces (O), smallest first"
@@ -76,7 +76,22 @@ def _room_table(view: MapView) -> str:
         lambda region: _room_row(atlas, region),
         n_all=regions.n_all,
     )
-    return f"{table}\n{say_sizes(view.look.regions(atlas))}" if regions.items else table
+    if not regions.items:
+        return table
+    return "\n".join([table, say_sizes(shown), *_say_reachable(atlas, shown)])
+
+
+def _say_reachable(atlas: Atlas, regions: Sequence[Region]) -> Sequence[str]:
+    """Says which room is the smallest that the robot can get to, where that is another one."""
+    rooms = [region for region in regions if region.room_class is not RoomClass.CORRIDOR]
+    by_size = sorted(rooms, key=lambda region: region.floor_area_m2)
+    reachable = next((room for room in by_size if find_standing_point(atlas, room)), None)
+    if reachable is None or reachable is by_size[0]:
+        return ()
+    size_m2 = reachable.floor_area_m2
+    return (
+        f"Of those with a way for the robot the smallest is {reachable.id} ({size_m2:.1f} m2).",
+    )
 
 
 def _room_row(atlas: Atlas, region: Region) -> Sequence[str]:
