@@ -91,8 +91,8 @@ async def test_a_closer_look_lists_only_what_it_shows_under_the_same_ids(tmp_pat
     assert {row.id for row in read_map_text(text_of(near)).rows("Rooms")} == {"R2"}
     assert "only what lies around robot" in text_of(near)
     rows = read_map_text(text_of(room)).rows("Rooms")
-    assert {row.id: row.cells["centre x, y"] for row in rows}["R1"] == {
-        row.id: row.cells["centre x, y"] for row in whole.rows("Rooms")
+    assert {row.id: row.cells["stand at x, y"] for row in rows}["R1"] == {
+        row.id: row.cells["stand at x, y"] for row in whole.rows("Rooms")
     }["R1"]
 
 

@@ -108,6 +108,7 @@ async def test_the_text_about_a_building_of_hundreds_of_rooms_stays_short(tmp_pa
     async with connect(FakeRobot(grid, pose=Pose(3.0, 3.0)), tmp_path) as client:
         text = text_of(await client.call_tool("look_at_map", {}))
         measured = text_of(await client.call_tool("measure", {}))
-    assert "showing 50 of" in text
+    assert "## Rooms, smallest first (showing 40 of" in text
+    assert "more, in between, left out" in text
     assert len(text) <= MOST_CHARACTERS
     assert len(measured) <= MOST_CHARACTERS

@@ -66,7 +66,7 @@ async def test_sizes_come_sorted_with_the_answer_to_which_is_smallest(tmp_path: 
         text = text_of(await client.call_tool("measure", {}))
     sizes = text.split("## Sizes, smallest first")[1]
     assert sizes.index("R2 |") < sizes.index("R1 |")
-    assert "the smallest is R2 (6.8 m2), the largest R1 (8.5 m2)" in sizes
+    assert "The smaller room is R2 (6.8 m2), the larger R1 (8.5 m2)" in sizes
 
 
 async def test_a_way_from_any_place_to_another_is_measured(tmp_path: Path) -> None:

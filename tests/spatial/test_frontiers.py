@@ -322,4 +322,4 @@ def test_a_corner_on_the_way_comes_before_what_would_mean_to_come_back() -> None
     assert (corner.anchor.x, hall.anchor.x) == pytest.approx((10.5, 26.0), abs=0.5)
     assert hall.gain_m2 / hall.distance_m > corner.gain_m2 / corner.distance_m
     assert corner.reason == "best, nearest, on the way"
-    assert hall.reason == "most to see per metre, makes the round of all 15 m longer"
+    assert hall.reason == "most to see per metre, going first costs 15 m more in all"

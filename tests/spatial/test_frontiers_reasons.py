@@ -33,8 +33,8 @@ def test_reasons_say_what_sets_each_frontier_apart() -> None:
     ]
     assert reasons == [
         "best, most to see per metre, on the way",
-        "most to see, makes the round of all 12 m longer",
-        "nearest, makes the round of all 2 m longer",
+        "most to see, going first costs 12 m more in all",
+        "nearest, going first costs 2 m more in all",
         "on the way",
         "little to see per metre",
     ]
@@ -45,7 +45,7 @@ def test_a_reason_is_short_however_much_there_is_to_say() -> None:
     best, _ = with_reasons(ranked, [1234.0, 0.0], [3.0, 0.3])
     assert len(best.reason) < 60
     assert best.reason.startswith("best")
-    assert best.reason.endswith("1234 m longer")
+    assert best.reason.endswith("1234 m more in all")
 
 
 def test_one_frontier_alone_needs_no_comparison() -> None:

@@ -243,11 +243,11 @@ def _records(answer: Answer) -> list[dict[str, Any]]:
 
 def _is_room(row: Row, doors: tuple[Row, ...]) -> bool:
     """True for a room; what furniture cuts off is tiny, or open to one neighbour several times."""
-    names = row.cells["doors"].split()
+    names = re.findall(r"D\d+", row.cells["doors"])
     ways_in = [
         door.cells["joins"]
         for door in doors
-        if door.id in names and door.cells["path m"] != "no way"
+        if door.id in names and not door.cells["path m"].startswith("no way")
     ]
     is_nook = len(ways_in) > len(set(ways_in))
     is_large_enough = row.number("floor m2") >= LEAST_ROOM_M2

@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from mapspeak.geometry import Point, Pose
+from mapspeak.navigation.doorways import find_crossing
 from mapspeak.navigation.revision import MapRevision
 from mapspeak.semantic import SemanticMap, Waypoint
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import FrontierReport, find_frontiers, match_frontiers
 from mapspeak.spatial.paths import DistanceField
-from mapspeak.spatial.rooms import RoomMap
+from mapspeak.spatial.rooms import Door, RoomMap
 
 __all__ = ["Atlas", "RememberedPlace", "number_places"]
 
@@ -72,6 +73,7 @@ class Atlas:
         self.warnings = memory.warnings
         self._looked_from = tuple(looked_from)
         self._earlier_frontiers = None if previous is None else previous.latest_frontiers
+        self._crossings: dict[str, Point | None] = {}
 
     @property
     def grid(self) -> OccupancyGrid:
@@ -120,6 +122,12 @@ class Atlas:
         """Gives the id of the room or corridor a point lies in."""
         region = self.rooms.find_region_at(point)
         return None if region is None else region.id
+
+    def find_crossing(self, door: Door) -> Point | None:
+        """Finds where the robot passes a door; None where it does not get through."""
+        if door.id not in self._crossings:
+            self._crossings[door.id] = find_crossing(self.rooms, self.distances, door)
+        return self._crossings[door.id]
 
     @cached_property
     def growing_ids(self) -> frozenset[str]:

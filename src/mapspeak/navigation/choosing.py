@@ -76,8 +76,8 @@ def stand_at(atlas: Atlas, place: Place) -> Pose:
         case Region() as region:
             point = find_standing_point(atlas, region) or region.widest
             return Pose(point.x, point.y, facing_in(atlas, region, point))
-        case Door(place=point):
-            return arrival_pose(atlas, point)
+        case Door() as door:
+            return arrival_pose(atlas, atlas.find_crossing(door) or door.place)
         case Frontier(pose=pose):
             return pose
         case RememberedPlace(waypoint=waypoint):

@@ -195,10 +195,5 @@ def _say_clearance(clear_m: float) -> str:
 
 
 def _bounds(grid: OccupancyGrid) -> str:
-    corners = [
-        grid.origin.transform(Point(x, y))
-        for x in (0.0, grid.width_m)
-        for y in (0.0, grid.height_m)
-    ]
-    xs, ys = [corner.x for corner in corners], [corner.y for corner in corners]
-    return f"which spans x {min(xs):.1f} to {max(xs):.1f}, y {min(ys):.1f} to {max(ys):.1f}"
+    low, high = grid.bounds()
+    return f"which spans x {low.x:.1f} to {high.x:.1f}, y {low.y:.1f} to {high.y:.1f}"

@@ -7,7 +7,7 @@ import numpy as np
 from mapspeak.geometry import Point, Pose
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.spatial.grid import FloatArray
-from mapspeak.spatial.rooms import Region
+from mapspeak.spatial.rooms import Region, RoomClass
 
 __all__ = ["arrival_pose", "facing_in", "find_standing_point"]
 
@@ -19,12 +19,13 @@ HALF_VIEW_RAD = math.radians(30)
 
 
 def find_standing_point(atlas: Atlas, region: Region) -> Point | None:
-    """Finds a reachable point of a region, as far from walls as can be, or None."""
+    """Finds a reachable point of a region with room around it, near its middle, or None."""
+    middle = _middle_of(atlas, region)
     comfortable_m = atlas.radius_m + COMFORT_M
-    cell = atlas.grid.cell_at(region.widest)
+    cell = atlas.grid.cell_at(middle)
     is_roomy = atlas.map.clearance_m[cell.row, cell.col] >= comfortable_m
-    if is_roomy and atlas.distances.is_reachable(region.widest):
-        return region.widest
+    if is_roomy and atlas.distances.is_reachable(middle):
+        return middle
     window = atlas.rooms.window_of(region)
     rows, cols = np.nonzero(atlas.rooms.labels[window] == region.index)
     rows, cols = rows + window[0].start, cols + window[1].start
@@ -36,9 +37,16 @@ def find_standing_point(atlas: Atlas, region: Region) -> Point | None:
     enough_m = min(comfortable_m, float(clear_m[reachable].max()))
     reachable = reachable[clear_m[reachable] >= enough_m]
     points = atlas.grid.points_at(rows[reachable], cols[reachable])
-    away_m = np.hypot(points[:, 0] - region.widest.x, points[:, 1] - region.widest.y)
+    away_m = np.hypot(points[:, 0] - middle.x, points[:, 1] - middle.y)
     best = points[int(np.argmin(away_m))]
     return Point(float(best[0]), float(best[1]))
+
+
+def _middle_of(atlas: Atlas, region: Region) -> Point:
+    """Gives the widest point of a room, and the middle of the walk along a corridor."""
+    is_corridor = region.room_class is RoomClass.CORRIDOR
+    walk = atlas.map.walk_along(region) if is_corridor else None
+    return region.widest if walk is None else walk.middle
 
 
 def arrival_pose(atlas: Atlas, point: Point) -> Pose:

@@ -7,11 +7,12 @@ from mapspeak.navigation.atlas import Atlas, RememberedPlace
 from mapspeak.navigation.choosing import CheckedGoal, check_place
 from mapspeak.navigation.places import Place
 from mapspeak.semantic import Landmark
-from mapspeak.server.tables import say_walk
+from mapspeak.server.roomtables import say_walk
 from mapspeak.server.wording import (
     join_words,
     say_direction,
     say_kind,
+    say_obstruction,
     say_point,
     say_pose,
     shorten,
@@ -91,7 +92,7 @@ def _say_rank(atlas: Atlas, region: Region) -> str:
 
 
 def _opening_lines(atlas: Atlas, region: Region) -> Iterator[str]:
-    doors = [door for door in atlas.rooms.doors if region.id in door.region_ids]
+    doors = atlas.rooms.doors_of(region)
     if not doors:
         yield "Doors: none known."
     for door in doors:
@@ -113,8 +114,8 @@ def _door_lines(atlas: Atlas, door: Door) -> Iterator[str]:
 
 def _say_fit(atlas: Atlas, door: Door) -> str:
     width_m = 2 * atlas.radius_m
-    if not atlas.distances.is_reachable(door.place):
-        return f"no way for the robot, {width_m:.2f} m wide"
+    if atlas.find_crossing(door) is None:
+        return f"{say_obstruction(atlas, door)}: no way for the robot, {width_m:.2f} m wide"
     spare_m = max(door.width_m - width_m, 0.0) / 2
     return f"the robot, {width_m:.2f} m wide, fits with {spare_m:.2f} m on each side"
 

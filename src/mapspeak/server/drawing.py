@@ -34,6 +34,7 @@ LEGEND = (
     LegendEntry(sample=Sample.HATCHED_REGION, text="corridor"),
     LegendEntry(sample=Sample.DOTTED_REGION, text="open space"),
     LegendEntry(sample=Shape.SQUARE, text="door"),
+    LegendEntry(sample=Shape.CROSS, text="door, no way for the robot"),
     LegendEntry(sample=Shape.TRIANGLE, text="frontier"),
     LegendEntry(sample=Shape.DIAMOND, text="remembered place"),
     LegendEntry(sample=Sample.ROBOT, text="robot"),
@@ -73,7 +74,7 @@ def draw_atlas(view: MapView) -> AtlasPicture:
             regions=_rooms_in(view, has_areas=is_detailed) if Layer.ROOMS in look.layers else None,
             lines=_way_to_first_frontier(atlas) if look.layers >= WITH_PATH else (),
             marks=(
-                *(_door_mark(door) for door in doors),
+                *(_door_mark(door, is_way=bool(atlas.find_crossing(door))) for door in doors),
                 *(_frontiers(view) if Layer.FRONTIERS in look.layers else ()),
                 *(_places(view) if Layer.PLACES in look.layers else ()),
             ),
@@ -115,7 +116,7 @@ def _scale_px_per_m(grid: OccupancyGrid, look: MapLook) -> float:
 def _rooms_in(view: MapView, *, has_areas: bool) -> RegionLayer:
     """Gives all regions; only those that are listed have their names written in them."""
     around = view.look.around
-    listed = {region.id for region in view.regions.items}
+    listed = {region.id for region in (*view.rooms.items, *view.corridors.items)}
     areas = [_area(region, has_area=has_areas) for region in view.atlas.rooms.regions]
     return _layer(
         view.atlas.rooms,
@@ -144,8 +145,9 @@ def _area(region: Region, *, has_area: bool) -> Area:
     )
 
 
-def _door_mark(door: Door) -> Mark:
-    return Mark(point=door.place, label=door.id, shape=Shape.SQUARE, colour=Colour.ORANGE)
+def _door_mark(door: Door, *, is_way: bool = True) -> Mark:
+    shape = Shape.SQUARE if is_way else Shape.CROSS
+    return Mark(point=door.place, label=door.id, shape=shape, colour=Colour.ORANGE)
 
 
 def _frontiers(view: MapView) -> tuple[Mark, ...]:

@@ -7,7 +7,7 @@ from mapspeak.errors import GoalError
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.places import Place, find_place
 from mapspeak.navigation.ways import Way, find_way, measure_path
-from mapspeak.server.tables import say_sizes
+from mapspeak.server.roomtables import say_sizes
 from mapspeak.server.wording import build_table, join_words, say_kind, say_path, say_point
 from mapspeak.spatial.rooms import Door, Region
 
@@ -36,7 +36,7 @@ def describe_measures(atlas: Atlas, *, start: str, places: Sequence[str] | None)
     regions = [end.thing for end in (begin, *others) if isinstance(end.thing, Region)]
     doors = [end.thing for end in (begin, *others) if isinstance(end.thing, Door)]
     parts = [_way_table(atlas, begin, others)] if others else []
-    parts += [_size_table(regions)] if regions else []
+    parts += [_size_table(atlas, regions)] if regions else []
     parts += [_width_line(doors)] if len(doors) > 1 else []
     return "\n\n".join(parts)
 
@@ -67,7 +67,7 @@ def _way_row(way: Way) -> Sequence[str]:
     )
 
 
-def _size_table(regions: Sequence[Region]) -> str:
+def _size_table(atlas: Atlas, regions: Sequence[Region]) -> str:
     by_size = sorted(regions, key=lambda region: region.floor_area_m2)
     least_m2 = by_size[0].floor_area_m2
     table = build_table(
@@ -83,7 +83,7 @@ def _size_table(regions: Sequence[Region]) -> str:
         ),
         n_all=len(by_size),
     )
-    return f"{table}\n{say_sizes(regions)}"
+    return f"{table}\n{say_sizes(atlas, regions)}"
 
 
 def _width_line(doors: Sequence[Door]) -> str:

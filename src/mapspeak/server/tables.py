@@ -1,35 +1,37 @@
 """An atlas as text: what the picture shows, in tables with the same ids, in the same order."""
 
-import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import groupby
 
 from mapspeak.navigation.atlas import Atlas, RememberedPlace
-from mapspeak.navigation.standing import find_standing_point
-from mapspeak.server.views import Layer, MapLook, MapView, Part
+from mapspeak.server.roomtables import room_tables, say_walk
+from mapspeak.server.views import Layer, MapLook, MapView
 from mapspeak.server.wording import (
     build_table,
     join_words,
-    list_some,
-    say_kind,
+    say_obstruction,
     say_path,
     say_point,
     say_pose,
     shorten,
 )
-from mapspeak.spatial.frontiers import Frontier, RefusedFrontier
-from mapspeak.spatial.rooms import CorridorWalk, Door, Region, RoomClass, Side
+from mapspeak.spatial.frontiers import Frontier
+from mapspeak.spatial.rooms import Door
 
-__all__ = ["describe_atlas", "say_sizes", "say_walk"]
+__all__ = ["describe_atlas"]
 
 MOST_WALKS = 6
-MOST_STOPS = 15
 AXES = "Metres in the map frame, x right and y up; yaw counter-clockwise from x."
+MEANINGS = (
+    "Floor counts what stands on it, free does not; path m is the robot's way to where it would "
+    "stand; of a corridor, size is along x across."
+)
 
 
 def describe_atlas(view: MapView) -> str:
     """Gives the facts of an atlas: first the robot and the map, then a table for each layer."""
     tables = {
-        Layer.ROOMS: _room_table,
+        Layer.ROOMS: room_tables,
         Layer.DOORS: _door_table,
         Layer.FRONTIERS: _frontier_table,
         Layer.PLACES: _place_table,
@@ -41,94 +43,19 @@ def describe_atlas(view: MapView) -> str:
 def _summary(atlas: Atlas, look: MapLook) -> str:
     grid, robot = atlas.grid, atlas.robot
     room_id = atlas.find_room_id(robot.point) or "no room"
-    size_m = f"{grid.width_m:.1f} x {grid.height_m:.1f} m"
     free_m2 = float(grid.free.sum()) * grid.resolution_m**2
+    low, high = grid.bounds()
+    extent = f"x {low.x:.1f} to {high.x:.1f}, y {low.y:.1f} to {high.y:.1f}"
     lines = [
         *(f"Warning: {warning}" for warning in atlas.warnings),
         f"Robot: {say_pose(robot)}, in {room_id}, {2 * atlas.radius_m:.2f} m wide.",
-        f"Map: {size_m}, {grid.resolution_m:g} m per cell. {AXES}",
+        f"Map: {extent}, {grid.resolution_m:g} m per cell. {AXES} {MEANINGS}",
         f"Explored: {free_m2:.1f} m2 of free floor. {atlas.frontiers.sentence}",
     ]
     if look.zoom is not None and look.around is not None:
         square = f"{look.zoom.radius_m:.1f} m to all sides of {say_point(look.zoom.centre)}"
         lines.append(f"Shown and listed: only what lies around {look.around.name}, {square}.")
     return "\n".join(lines)
-
-
-def _room_table(view: MapView) -> str:
-    atlas, regions, shown = view.atlas, view.regions, view.look.regions(view.atlas)
-    is_cut = regions.n_all > len(regions.items)
-    table = build_table(
-        "Rooms, corridors (C) and open spaces (O), smallest first"
-        + (", those in the middle left out" if is_cut else ""),
-        (
-            "id",
-            "kind",
-            "floor m2",
-            "free m2",
-            "size m",
-            "centre x, y",
-            "path m",
-            "doors",
-            "next to",
-        ),
-        regions.items,
-        lambda region: _room_row(atlas, region),
-        n_all=regions.n_all,
-    )
-    if not regions.items:
-        return table
-    return "\n".join([table, say_sizes(shown), *_say_reachable(atlas, shown)])
-
-
-def _say_reachable(atlas: Atlas, regions: Sequence[Region]) -> Sequence[str]:
-    """Says which room is the smallest that the robot can get to, where that is another one."""
-    rooms = [region for region in regions if region.room_class is not RoomClass.CORRIDOR]
-    by_size = sorted(rooms, key=lambda region: region.floor_area_m2)
-    reachable = next((room for room in by_size if find_standing_point(atlas, room)), None)
-    if reachable is None or reachable is by_size[0]:
-        return ()
-    size_m2 = reachable.floor_area_m2
-    return (
-        f"Of those with a way for the robot the smallest is {reachable.id} ({size_m2:.1f} m2).",
-    )
-
-
-def _room_row(atlas: Atlas, region: Region) -> Sequence[str]:
-    growing = " (not all seen)" if region.id in atlas.growing_ids else ""
-    standing = find_standing_point(atlas, region)
-    return (
-        region.id,
-        say_kind(region),
-        f"{region.floor_area_m2:.1f}{growing}",
-        f"{region.free_area_m2:.1f}",
-        f"{region.length_m:.1f} x {region.width_m:.1f}",
-        say_point(region.widest),
-        say_path(None if standing is None else atlas.path_m(standing)),
-        join_words(region.door_ids),
-        join_words(region.neighbour_ids),
-    )
-
-
-def say_sizes(regions: Sequence[Region]) -> str:
-    """Says which room is the smallest and which the largest, corridors left out."""
-    rooms = [region for region in regions if region.room_class is not RoomClass.CORRIDOR]
-    by_size = sorted(rooms, key=lambda region: region.floor_area_m2)
-    names = [f"{room.id} ({room.floor_area_m2:.1f} m2)" for room in by_size]
-    match names:
-        case []:
-            return "No room among them, only corridors."
-        case [only]:
-            return f"The only one that is no corridor: {only}."
-        case [smallest, largest]:
-            return f"Corridors left out, the smallest is {smallest}, the largest {largest}."
-        case [smallest, second, *_, largest]:
-            return (
-                f"Of {len(names)}, corridors left out, the smallest is {smallest}, "
-                f"then {second}; the largest is {largest}."
-            )
-        case _:
-            raise AssertionError(names)
 
 
 def _door_table(view: MapView) -> str:
@@ -139,37 +66,21 @@ def _door_table(view: MapView) -> str:
         lambda door: _door_row(view.atlas, door),
         n_all=view.doors.n_all,
     )
-    corridors = [region for region in view.regions.items if region.room_class is RoomClass.CORRIDOR]
-    longest_first = sorted(corridors, key=lambda region: -region.length_m)[:MOST_WALKS]
-    walks = ((region, view.atlas.map.walk_along(region)) for region in longest_first)
+    longest_first = sorted(view.corridors.items, key=lambda region: -region.length_m)
+    walks = ((region, view.atlas.map.walk_along(region)) for region in longest_first[:MOST_WALKS])
     return "\n".join([table, *(say_walk(region, walk) for region, walk in walks if walk)])
 
 
 def _door_row(atlas: Atlas, door: Door) -> Sequence[str]:
+    crossing = atlas.find_crossing(door)
     return (
         door.id,
         say_point(door.place),
         f"{door.width_m:.2f}",
         join_words(door.region_ids),
-        say_path(atlas.path_m(door.place)),
-    )
-
-
-def say_walk(region: Region, walk: CorridorWalk) -> str:
-    """Says which doors come as somebody walks a corridor, side by side in their order."""
-    sides = []
-    for side in (Side.BEHIND, Side.LEFT, Side.RIGHT, Side.AHEAD):
-        stops = [
-            f"{stop.region_id} ({stop.door_id}, {stop.along_m:.1f} m)"
-            for stop in walk.stops
-            if stop.side is side
-        ]
-        if stops:
-            sides.append(f"{side}: {list_some(stops, most=MOST_STOPS)}")
-    heading_deg = math.degrees(walk.heading_rad) + 0.0
-    return (
-        f"Along {region.id} from {say_point(walk.start)} (heading {heading_deg:.0f} deg) "
-        f"{walk.length_m:.1f} m to {say_point(walk.end)}: {'; '.join(sides) or 'no doors'}."
+        f"no way ({say_obstruction(atlas, door)})"
+        if crossing is None
+        else say_path(atlas.path_m(crossing)),
     )
 
 
@@ -181,7 +92,20 @@ def _frontier_table(view: MapView) -> str:
         lambda frontier: _frontier_row(view.atlas, frontier),
         n_all=view.frontiers.n_all,
     )
-    return f"{table}\n{_say_refused(view.refused)}" if view.refused.items else table
+    return "\n".join([table, *_say_extremes(view), *_say_refused(view)])
+
+
+def _say_extremes(view: MapView) -> Iterator[str]:
+    """Says which frontier is the nearest and which shows most, of all and not only those listed."""
+    frontiers = view.atlas.frontiers.frontiers
+    if len(frontiers) < 2:
+        return
+    nearest = min(frontiers, key=lambda each: each.distance_m)
+    widest = max(frontiers, key=lambda each: each.gain_m2)
+    yield (
+        f"Of all {len(frontiers)}: the nearest is {nearest.id} ({nearest.distance_m:.1f} m), most "
+        f"to see is from {widest.id} (about {widest.gain_m2:.1f} m2)."
+    )
 
 
 def _frontier_row(atlas: Atlas, frontier: Frontier) -> Sequence[str]:
@@ -197,14 +121,20 @@ def _frontier_row(atlas: Atlas, frontier: Frontier) -> Sequence[str]:
     )
 
 
-def _say_refused(refused: Part[RefusedFrontier]) -> str:
+def _say_refused(view: MapView) -> Iterator[str]:
+    """Says where the map ends without being offered, grouped by why, longest first."""
+    refused = view.refused
+    if not refused.items:
+        return
+    by_reason = sorted(refused.items, key=lambda border: border.sentence)
     told = [
-        f"{border.length_m:.1f} m at {say_point(border.anchor)}: {border.sentence}"
-        for border in refused.items
+        f"{sentence}: "
+        + ", ".join(f"{border.length_m:.1f} m at {say_point(border.anchor)}" for border in group)
+        for sentence, group in groupby(by_reason, key=lambda border: border.sentence)
     ]
-    n_more = refused.n_all - len(told)
+    n_more = refused.n_all - len(refused.items)
     more = f"; {n_more} shorter ones" if n_more else ""
-    return f"Borders not offered ({refused.n_all}): {'; '.join(told)}{more}."
+    yield f"Borders not offered ({refused.n_all}): {'; '.join(told)}{more}."
 
 
 def _place_table(view: MapView) -> str:

@@ -13,17 +13,19 @@ from mapspeak.navigation.atlas import Atlas, RememberedPlace
 from mapspeak.navigation.places import Place, find_place
 from mapspeak.spatial.frontiers import Frontier, RefusedFrontier
 from mapspeak.spatial.picture import NORTH_UP_RAD, Zoom
-from mapspeak.spatial.rooms import Door, Region
+from mapspeak.spatial.rooms import Door, Region, RoomClass
 
 __all__ = ["Layer", "MapLook", "MapView", "Part", "Up", "look_at", "view_of"]
 
 Item = TypeVar("Item")
 
-MOST_ROOMS = 50
+MOST_ROOMS = 40
+MOST_CORRIDORS = 12
 MOST_DOORS = 40
 MOST_FRONTIERS = 10
 MOST_PLACES = 30
 MOST_REFUSED = 5
+SLACK = 1.25
 AROUND_M = 5.0
 """So much is shown around a place that has no size of its own."""
 RIM_M = 1.0
@@ -92,15 +94,26 @@ class Part(Generic[Item]):
     Attributes:
         items: In the order in which they are listed.
         n_all: How many would be shown if there were room for all.
+        gap_after: After so many of them those that are left out belong; None for at the end.
     """
 
     items: tuple[Item, ...]
     n_all: int
+    gap_after: int | None = None
 
     @classmethod
     def first(cls, items: Sequence[Item], most: int) -> Self:
-        """Gives the first of some things."""
-        return cls(tuple(items[:most]), len(items))
+        """Gives the first of some things; leaving out a few is not worth the words."""
+        n = len(items) if len(items) <= SLACK * most else most
+        return cls(tuple(items[:n]), len(items))
+
+    @classmethod
+    def ends(cls, items: Sequence[Item], most: int) -> Self:
+        """Gives things from both ends of a list that is too long."""
+        if len(items) <= SLACK * most:
+            return cls(tuple(items), len(items))
+        half = most // 2
+        return cls((*items[:half], *items[-half:]), len(items), gap_after=half)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,7 +123,8 @@ class MapView:
     Attributes:
         atlas: All there is.
         look: How it is looked at.
-        regions: Smallest first; of very many the smallest and the largest.
+        rooms: With open spaces, smallest first; of very many the smallest and the largest.
+        corridors: In the same way.
         doors: Nearest first.
         frontiers: Best first.
         refused: Borders with the unknown that are not offered, longest first.
@@ -119,7 +133,8 @@ class MapView:
 
     atlas: Atlas
     look: MapLook
-    regions: Part[Region]
+    rooms: Part[Region]
+    corridors: Part[Region]
     doors: Part[Door]
     frontiers: Part[Frontier]
     refused: Part[RefusedFrontier]
@@ -129,17 +144,23 @@ class MapView:
 def view_of(atlas: Atlas, look: MapLook) -> MapView:
     """Gives what is to be seen of an atlas."""
 
-    def path_or_far(point: Point) -> float:
-        path_m = atlas.path_m(point)
+    def path_or_far(point: Point | None) -> float:
+        path_m = None if point is None else atlas.path_m(point)
         return math.inf if path_m is None else path_m
 
+    by_size = sorted(look.regions(atlas), key=lambda region: region.floor_area_m2)
+    corridors = [region for region in by_size if region.room_class is RoomClass.CORRIDOR]
+    rooms = [region for region in by_size if region.room_class is not RoomClass.CORRIDOR]
     doors = look.some_of(atlas.rooms.doors, lambda door: door.place)
     places = look.some_of(atlas.places, lambda place: place.waypoint.pose.point)
     return MapView(
         atlas=atlas,
         look=look,
-        regions=_ends_of(sorted(look.regions(atlas), key=lambda region: region.floor_area_m2)),
-        doors=Part.first(sorted(doors, key=lambda door: path_or_far(door.place)), MOST_DOORS),
+        rooms=Part.ends(rooms, MOST_ROOMS),
+        corridors=Part.ends(corridors, MOST_CORRIDORS),
+        doors=Part.first(
+            sorted(doors, key=lambda door: path_or_far(atlas.find_crossing(door))), MOST_DOORS
+        ),
         frontiers=Part.first(
             look.some_of(atlas.frontiers.frontiers, lambda each: each.pose.point), MOST_FRONTIERS
         ),
@@ -150,14 +171,6 @@ def view_of(atlas: Atlas, look: MapLook) -> MapView:
             sorted(places, key=lambda place: path_or_far(place.waypoint.pose.point)), MOST_PLACES
         ),
     )
-
-
-def _ends_of(regions: list[Region]) -> Part[Region]:
-    """Gives all regions; of too many as many from both ends."""
-    if len(regions) <= MOST_ROOMS:
-        return Part(tuple(regions), len(regions))
-    half = MOST_ROOMS // 2
-    return Part((*regions[:half], *regions[-half:]), len(regions))
 
 
 def look_at(

@@ -6,14 +6,17 @@ from typing import TypeVar
 
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.navigation.atlas import Atlas
-from mapspeak.spatial.rooms import Region
+from mapspeak.navigation.standing import find_standing_point
+from mapspeak.spatial.rooms import Door, Region
 
 __all__ = [
     "build_table",
     "join_words",
     "list_some",
+    "say_compass",
     "say_direction",
     "say_kind",
+    "say_obstruction",
     "say_path",
     "say_point",
     "say_pose",
@@ -36,6 +39,19 @@ DIRECTIONS = (
 """Eighths of a turn, counter-clockwise."""
 
 
+COMPASS = (
+    "east",
+    "north-east",
+    "north",
+    "north-west",
+    "west",
+    "south-west",
+    "south",
+    "south-east",
+)
+"""The same from the map's x axis on."""
+
+
 def say_pose(pose: Pose) -> str:
     """Gives a pose in metres and degrees."""
     return f"x {_number(pose.x)}, y {_number(pose.y)}, yaw {pose.yaw_deg + 0.0:.0f} deg"
@@ -49,6 +65,20 @@ def say_point(point: Point) -> str:
 def say_path(path_m: float | None) -> str:
     """Gives a path's length, or "no way"."""
     return "no way" if path_m is None else f"{path_m:.1f}"
+
+
+def say_compass(heading_rad: float) -> str:
+    """Gives a direction on the map, y being north: "north-east"."""
+    return COMPASS[round(heading_rad / (math.tau / 8)) % 8]
+
+
+def say_obstruction(atlas: Atlas, door: Door) -> str:
+    """Gives why the robot does not get through a door, in a word or two."""
+    if door.width_m < 2 * atlas.radius_m:
+        return "too narrow"
+    sides = (atlas.rooms.region(region_id) for region_id in door.region_ids)
+    is_any_reached = any(find_standing_point(atlas, region) for region in sides)
+    return "blocked" if is_any_reached else "out of reach"
 
 
 def say_kind(region: Region) -> str:
@@ -88,6 +118,7 @@ def build_table(
     row: Callable[[Item], Sequence[str]],
     *,
     n_all: int | None = None,
+    gap_after: int | None = None,
 ) -> str:
     """Gives a heading, a line of columns and a line for each item.
 
@@ -97,14 +128,16 @@ def build_table(
         items: What is listed.
         row: Gives an item's line.
         n_all: How many items there are; None where all are listed.
+        gap_after: After so many lines those that are left out would stand; None for at the end.
     """
     if not items:
         return f"## {heading}: none"
-    is_cut = n_all is not None and n_all > len(items)
-    cut = f" (showing {len(items)} of {n_all})" if is_cut else ""
-    rows = (columns, *(row(item) for item in items))
-    lines = (" | ".join(cell.replace("|", "/") for cell in line) for line in rows)
-    return "\n".join([f"## {heading}{cut}", *lines])
+    n_left_out = 0 if n_all is None else n_all - len(items)
+    cut = f" (showing {len(items)} of {n_all})" if n_left_out else ""
+    lines = [" | ".join(cell.replace("|", "/") for cell in row(item)) for item in items]
+    if n_left_out and gap_after is not None:
+        lines.insert(gap_after, f"... {n_left_out} more, in between, left out")
+    return "\n".join([f"## {heading}{cut}", " | ".join(columns), *lines])
 
 
 def _number(value: float) -> str:

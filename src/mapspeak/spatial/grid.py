@@ -95,6 +95,16 @@ class OccupancyGrid:
         """True where nothing has been seen yet."""
         return self.cells < 0
 
+    def bounds(self) -> tuple[Point, Point]:
+        """Gives the least and the greatest x and y of the map, as two points."""
+        corners = [
+            self.origin.transform(Point(x, y))
+            for x in (0.0, self.width_m)
+            for y in (0.0, self.height_m)
+        ]
+        xs, ys = [corner.x for corner in corners], [corner.y for corner in corners]
+        return Point(min(xs), min(ys)), Point(max(xs), max(ys))
+
     def contains(self, cell: Cell) -> bool:
         """True when the cell lies inside the array."""
         return 0 <= cell.row < self.n_rows and 0 <= cell.col < self.n_cols

@@ -45,7 +45,7 @@ def _on_round(detour_m: float | None) -> str:
         return "little to see per metre"
     if detour_m < LEAST_DETOUR_M:
         return "on the way"
-    return f"makes the round of all {detour_m:.0f} m longer"
+    return f"going first costs {detour_m:.0f} m more in all"
 
 
 def _joined(clauses: Sequence[str]) -> str:

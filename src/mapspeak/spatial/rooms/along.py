@@ -19,6 +19,7 @@ CELL_M = 0.25
 """Fine enough to walk by: a person's corridor is several such cells wide."""
 END_RATIO = 0.42
 """An end of the walk keeps so much of the corridor's width from walls: half would be its middle."""
+STEP_M = 0.05
 SLICE_M = 0.6
 """The middle of so much of a corridor is one point of the walk."""
 TANGENT_M = 3.0
@@ -58,14 +59,18 @@ class CorridorWalk:
     Attributes:
         start: One end; of the two the one with the smaller x + y, so that it stays the same.
         end: The other end.
+        middle: Half of the way along.
         heading_rad: The direction at the start.
+        end_heading_rad: The direction at the end.
         length_m: Of the way.
         stops: The doors in the order in which they come.
     """
 
     start: Point
     end: Point
+    middle: Point
     heading_rad: float
+    end_heading_rad: float
     length_m: float
     stops: tuple[Stop, ...]
 
@@ -86,7 +91,9 @@ def walk_along(rooms: RoomMap, region: Region) -> CorridorWalk | None:
     return CorridorWalk(
         start=line.point_at(0.0),
         end=line.point_at(line.length_m),
+        middle=line.point_at(line.length_m / 2),
         heading_rad=line.heading_at(0.0),
+        end_heading_rad=line.heading_at(line.length_m),
         length_m=line.length_m,
         stops=tuple(sorted(stops, key=lambda stop: (stop.along_m, stop.door_id))),
     )
@@ -113,7 +120,7 @@ class _Line:
         return self.point_at(middle_m - half_m).bearing_to(self.point_at(middle_m + half_m))
 
     def nearest_to(self, point: Point) -> float:
-        along_m = np.arange(0.0, self.length_m, CELL_M)
+        along_m = np.arange(0.0, self.length_m + STEP_M, STEP_M)
         xs, ys = (np.interp(along_m, self.along_m, self.points[:, axis]) for axis in (0, 1))
         return float(along_m[int(np.argmin(np.hypot(xs - point.x, ys - point.y)))])
 
@@ -173,7 +180,11 @@ def _find_middle_line(points: FloatArray, away_m: FloatArray) -> _Line:
         np.bincount(number, weights=values, minlength=n)[sizes > 0] / sizes[sizes > 0]
         for values in (points[:, 0], points[:, 1], away_m)
     ]
-    return _Line(np.stack(means[:2], axis=1), means[2] - means[2][0])
+    along_m = means[2] - means[2][0]
+    straight_m = math.hypot(means[0][-1] - means[0][0], means[1][-1] - means[1][0])
+    # Means of slices shorten the way at its ends; no way is shorter than the straight line.
+    stretch = max(1.0, straight_m / max(float(along_m[-1]), SLICE_M))
+    return _Line(np.stack(means[:2], axis=1), along_m * stretch)
 
 
 def _stop_at(line: _Line, region: Region, door: Door) -> Stop:

@@ -167,6 +167,10 @@ class RoomMap:
             for inner, outer, size in zip(window, seen, self.labels.shape, strict=True)
         )
 
+    def doors_of(self, region: Region) -> tuple[Door, ...]:
+        """Gives the doors that lead out of a region."""
+        return tuple(door for door in self.doors if region.id in door.region_ids)
+
     def doors_between(self, first_id: str, second_id: str) -> tuple[Door, ...]:
         """Gives the doors that join two regions."""
         pair = {first_id, second_id}
