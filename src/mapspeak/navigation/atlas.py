@@ -5,7 +5,7 @@ stays R3 while the map grows.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from mapspeak.geometry import Point, Pose
@@ -13,7 +13,12 @@ from mapspeak.navigation.doorways import find_crossing
 from mapspeak.navigation.revision import MapRevision
 from mapspeak.semantic import SemanticMap, Waypoint
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.spatial.frontiers import FrontierReport, find_frontiers, match_frontiers
+from mapspeak.spatial.frontiers import (
+    FrontierReport,
+    find_frontiers,
+    match_frontiers,
+    rerank_frontiers,
+)
 from mapspeak.spatial.paths import DistanceField
 from mapspeak.spatial.rooms import Door, RoomMap
 
@@ -31,6 +36,23 @@ class RememberedPlace:
 
     id: str
     waypoint: Waypoint
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reach:
+    """What was found for all places from which a robot can get to the same floor of one map.
+
+    Attributes:
+        start: One of these places.
+        crossings: Where it passes each door, by the door's id; None where it does not.
+        standing: Where it would stand in each region, by the region's id.
+        frontiers: By the places from which it has looked already.
+    """
+
+    start: Point
+    crossings: dict[str, Point | None] = field(default_factory=dict)
+    standing: dict[str, Point | None] = field(default_factory=dict)
+    frontiers: dict[tuple[Point, ...], FrontierReport] = field(default_factory=dict)
 
 
 class Atlas:
@@ -72,8 +94,9 @@ class Atlas:
         self.places = number_places(memory.waypoints)
         self.warnings = memory.warnings
         self._looked_from = tuple(looked_from)
-        self._earlier_frontiers = None if previous is None else previous.latest_frontiers
-        self._crossings: dict[str, Point | None] = {}
+        self._previous_frontiers = None if previous is None else previous.latest_frontiers
+        has_only_moved = previous is not None and previous.map is self.map
+        self._earlier_reach = previous.latest_reach if previous and has_only_moved else None
 
     @property
     def grid(self) -> OccupancyGrid:
@@ -96,8 +119,20 @@ class Atlas:
         return self.map.distances_from(self.robot.point)
 
     @cached_property
+    def reach(self) -> Reach:
+        """What depends on where the robot can get to, and not on where it is."""
+        earlier = self._earlier_reach
+        if earlier is not None and self.distances.is_reachable(earlier.start):
+            return earlier
+        return Reach(self.robot.point)
+
+    @cached_property
     def frontiers(self) -> FrontierReport:
-        """Where the known meets the unknown, best first."""
+        """Where the known meets the unknown, best first; poses stay while the map does."""
+        known = self.reach.frontiers.get(self._looked_from)
+        moved = None if known is None else rerank_frontiers(known, self.distances)
+        if moved is not None:
+            return moved
         found = find_frontiers(
             self.grid,
             self.robot.point,
@@ -105,13 +140,21 @@ class Atlas:
             distances=self.distances,
             looked_from=self._looked_from,
         )
-        earlier = self._earlier_frontiers
-        return found if earlier is None else match_frontiers(earlier, found)
+        earlier = self._previous_frontiers
+        named = found if earlier is None else match_frontiers(earlier, found)
+        self.reach.frontiers[self._looked_from] = named
+        return named
 
     @property
     def latest_frontiers(self) -> FrontierReport | None:
         """The frontiers found last; finds none anew."""
-        found: FrontierReport | None = self.__dict__.get("frontiers", self._earlier_frontiers)
+        found: FrontierReport | None = self.__dict__.get("frontiers", self._previous_frontiers)
+        return found
+
+    @property
+    def latest_reach(self) -> Reach | None:
+        """The reach of this atlas, or of one before it on the same map."""
+        found: Reach | None = self.__dict__.get("reach", self._earlier_reach)
         return found
 
     def path_m(self, point: Point) -> float | None:
@@ -125,9 +168,10 @@ class Atlas:
 
     def find_crossing(self, door: Door) -> Point | None:
         """Finds where the robot passes a door; None where it does not get through."""
-        if door.id not in self._crossings:
-            self._crossings[door.id] = find_crossing(self.rooms, self.distances, door)
-        return self._crossings[door.id]
+        crossings = self.reach.crossings
+        if door.id not in crossings:
+            crossings[door.id] = find_crossing(self.rooms, self.distances, door)
+        return crossings[door.id]
 
     @cached_property
     def growing_ids(self) -> frozenset[str]:

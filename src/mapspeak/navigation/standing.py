@@ -20,6 +20,13 @@ HALF_VIEW_RAD = math.radians(30)
 
 def find_standing_point(atlas: Atlas, region: Region) -> Point | None:
     """Finds a reachable point of a region with room around it, near its middle, or None."""
+    known = atlas.reach.standing
+    if region.id not in known:
+        known[region.id] = _search_standing_point(atlas, region)
+    return known[region.id]
+
+
+def _search_standing_point(atlas: Atlas, region: Region) -> Point | None:
     middle = _middle_of(atlas, region)
     comfortable_m = atlas.radius_m + COMFORT_M
     cell = atlas.grid.cell_at(middle)

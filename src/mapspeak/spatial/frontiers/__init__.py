@@ -1,6 +1,6 @@
 """Where known floor meets the unknown, and where to go to look beyond."""
 
-from mapspeak.spatial.frontiers.find import find_frontiers
+from mapspeak.spatial.frontiers.find import find_frontiers, rerank_frontiers
 from mapspeak.spatial.frontiers.frontier import (
     Frontier,
     FrontierReport,
@@ -20,4 +20,5 @@ __all__ = [
     "find_frontiers",
     "match_frontiers",
     "remaining_ratio",
+    "rerank_frontiers",
 ]

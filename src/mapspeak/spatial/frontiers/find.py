@@ -1,5 +1,6 @@
 """Frontiers of a map: found, judged, ranked."""
 
+import dataclasses
 from collections.abc import Sequence
 
 from mapspeak.geometry import Point
@@ -12,7 +13,7 @@ from mapspeak.spatial.frontiers.terrain import build_terrain
 from mapspeak.spatial.grid import OccupancyGrid
 from mapspeak.spatial.paths.distances import DistanceField, distances_from
 
-__all__ = ["find_frontiers"]
+__all__ = ["find_frontiers", "rerank_frontiers"]
 
 
 def find_frontiers(
@@ -38,9 +39,33 @@ def find_frontiers(
     borders = find_borders(grid, least_length_m=radius_m)
     terrain = build_terrain(distances)
     judgement = judge(terrain, borders.kept, looked_from=looked_from)
+    ranked, ways = rank(terrain, judgement.frontiers)
     return build_report(
         terrain,
-        rank(terrain, judgement.frontiers),
+        ranked,
         judgement.refused,
+        ways=ways,
         n_specks=borders.n_specks + judgement.n_specks,
     )
+
+
+def rerank_frontiers(report: FrontierReport, distances: DistanceField) -> FrontierReport | None:
+    """Gives the same frontiers as seen from another place on the same map; ids and poses stay.
+
+    Args:
+        report: Of the map that the distances belong to.
+        distances: From where the robot is now.
+
+    Returns:
+        The report in its new order; None where a frontier cannot be reached from there.
+    """
+    lengths_m = [distances.distance_to(each.pose.point) for each in report.frontiers]
+    moved = [
+        dataclasses.replace(frontier, distance_m=length_m)
+        for frontier, length_m in zip(report.frontiers, lengths_m, strict=True)
+        if length_m is not None
+    ]
+    if len(moved) < len(lengths_m):
+        return None
+    ranked, ways = rank(build_terrain(distances), moved, report.ways)
+    return dataclasses.replace(report, frontiers=tuple(ranked), ways=ways)

@@ -8,7 +8,14 @@ import numpy as np
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial.grid import FloatArray
 
-__all__ = ["Frontier", "FrontierReport", "FrontierVerdict", "RefusalReason", "RefusedFrontier"]
+__all__ = [
+    "Frontier",
+    "FrontierReport",
+    "FrontierVerdict",
+    "RefusalReason",
+    "RefusedFrontier",
+    "WaysBetween",
+]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -78,6 +85,19 @@ class FrontierVerdict(StrEnum):
     NOTHING_KNOWN = "nothing_known"
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class WaysBetween:
+    """How far it is from frontier to frontier.
+
+    Attributes:
+        stops: Their poses' places.
+        metres: By path, shape (n, n).
+    """
+
+    stops: tuple[Point, ...]
+    metres: FloatArray = field(repr=False)
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class FrontierReport:
     """All frontiers of a map as seen from one place.
@@ -88,6 +108,7 @@ class FrontierReport:
         n_specks: Borders so short that they are nothing but noise, which are not listed.
         verdict: Whether anything is left.
         sentence: The verdict in words with numbers.
+        ways: Between those that were weighed against each other; they hold while the map does.
         n_named: The highest number given to a frontier so far; the next new one gets one more.
     """
 
@@ -97,6 +118,7 @@ class FrontierReport:
     verdict: FrontierVerdict
     sentence: str
     n_named: int
+    ways: WaysBetween | None = None
 
     def find(self, frontier_id: str) -> Frontier | None:
         """Finds a frontier by its id; None where it is gone or was never there."""

@@ -9,6 +9,7 @@ from mapspeak.spatial.frontiers.frontier import (
     FrontierVerdict,
     RefusalReason,
     RefusedFrontier,
+    WaysBetween,
 )
 from mapspeak.spatial.frontiers.terrain import Terrain
 
@@ -27,6 +28,7 @@ def build_report(
     ranked: list[Frontier],
     refused: list[RefusedFrontier],
     *,
+    ways: WaysBetween,
     n_specks: int,
 ) -> FrontierReport:
     """Gives the report of frontiers in their order, named from F1 on."""
@@ -42,6 +44,7 @@ def build_report(
         verdict=verdict,
         sentence=_sentence(terrain, verdict, ranked, refused),
         n_named=len(ranked),
+        ways=ways,
     )
 
 
