@@ -153,3 +153,49 @@ def test_the_pose_that_is_offered_instead_is_accepted(x: float, y: float) -> Non
     found = check(Pose(x, y))
     if found.nearest is not None:
         assert check(found.nearest).is_ok
+
+
+def test_a_goal_on_the_border_of_two_cells_is_as_clear_as_the_cell_it_is_taken_for() -> None:
+    cells = np.zeros((60, 60), dtype=np.int8)
+    cells[:, 0] = 100
+    grid = OccupancyGrid(cells=cells, resolution_m=0.05, origin=Pose(8.7, -10.0))
+    distances = distances_from(grid, Point(10.5, -8.5), radius_m=0.28)
+    for number in range(1, 30):
+        x = 8.7 + 0.05 * number
+        check = check_goal(grid, distances, Pose(round(x, 2), -8.5))
+        assert check.is_ok == (check.clearance_m >= 0.28), check
+
+
+@pytest.mark.parametrize("goal", [Pose(2.5, 2.5), Pose(-0.02, 1.0), Pose(9.0, 9.0)])
+def test_a_goal_inside_a_thing_or_beside_the_map_has_a_nearest_pose_that_works(
+    goal: Pose,
+) -> None:
+    grid = grid_from_text(
+        """
+        ##########
+        #........#
+        #........#
+        #..####..#
+        #..#??#..#
+        #..#??#..#
+        #..####..#
+        #........#
+        #........#
+        ##########
+        """,
+        resolution_m=0.5,
+    )
+    distances = distances_from(grid, Point(1.0, 1.0), radius_m=0.2)
+    check = check_goal(grid, distances, goal)
+    assert not check.is_ok
+    assert check.nearest is not None
+    assert distances.is_reachable(check.nearest.point)
+
+
+def test_a_number_with_hundreds_of_digits_is_not_repeated() -> None:
+    grid = grid_from_text("....", resolution_m=0.5)
+    distances = distances_from(grid, Point(0.5, 0.2), radius_m=0.0)
+    for far in (1e300, -1e308, 1e7):
+        check = check_goal(grid, distances, Pose(far, 0.0))
+        assert check.verdict is GoalVerdict.NOT_FINITE
+        assert len(check.sentence) < 100

@@ -54,7 +54,7 @@ def test_a_remembered_name_wins_over_coordinates_that_it_looks_like() -> None:
 
 @pytest.mark.parametrize("words", ["R9", "the moon", "", "1.5", "F3", "nan, 2", "1,2,3,4"])
 def test_a_place_that_is_not_there_is_answered_with_those_that_are(words: str) -> None:
-    with pytest.raises(GoalError, match="rooms R1 R2; doors D1"):
+    with pytest.raises(GoalError, match="rooms and corridors R1 R2; doors D1"):
         find_place(_atlas(), words)
 
 

@@ -112,7 +112,7 @@ async def test_a_look_around_what_is_not_there_names_what_is(tmp_path: Path) -> 
     async with connect(FakeRobot(two_rooms()), tmp_path) as client:
         answer = await client.call_tool("look_at_map", {"around": "R8"})
     assert answer.is_error
-    assert "rooms R1 R2" in text_of(answer)
+    assert "rooms and corridors R1 R2" in text_of(answer)
 
 
 async def test_a_room_that_nobody_can_get_to_is_not_offered_as_the_smallest_to_go_to(

@@ -109,3 +109,16 @@ async def test_what_a_note_orders_stays_quoted_in_its_cell(tmp_path: Path) -> No
     line = next(line for line in text.splitlines() if line.startswith("W1 |"))
     assert line.count(" | ") == 5
     assert "observed, not instructions" in text
+
+
+async def test_a_place_that_is_not_remembered_is_answered_with_those_that_are(
+    tmp_path: Path,
+) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        empty = await client.call_tool("get_semantic_data", {"name": "W1"})
+        await client.call_tool("write_semantic_data", {"name": "dock", "description": "A dock."})
+        other = await client.call_tool("get_semantic_data", {"name": "kitchen"})
+    assert empty.is_error
+    assert "no places yet" in text_of(empty)
+    assert other.is_error
+    assert "W1 'dock'" in text_of(other)

@@ -1,3 +1,4 @@
+import math
 from pathlib import Path
 
 import pytest
@@ -82,7 +83,7 @@ async def test_measuring_an_unknown_place_says_which_there_are(tmp_path: Path) -
     async with connect(FakeRobot(two_rooms()), tmp_path) as client:
         answer = await client.call_tool("measure", {"places": ["R7"]})
     assert answer.is_error
-    assert "Known are rooms R1 R2; doors D1" in text_of(answer)
+    assert "Known are rooms and corridors R1 R2; doors D1" in text_of(answer)
 
 
 async def test_a_goal_is_checked_without_driving(tmp_path: Path) -> None:
@@ -102,3 +103,47 @@ async def test_names_that_mean_something_else_are_not_given_to_places(tmp_path: 
         answer = await client.call_tool("write_semantic_data", {**WAYPOINT, "name": "robot"})
     assert answer.is_error
     assert "reads like" in text_of(answer)
+
+
+@pytest.mark.parametrize(
+    "arguments", [{"places": ["D1"], "start": "D1"}, {"places": ["robot"]}, {"places": []}]
+)
+async def test_measuring_from_a_place_to_itself_says_what_to_name(
+    tmp_path: Path, arguments: dict[str, object]
+) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        answer = await client.call_tool("measure", arguments)
+    assert answer.is_error
+    assert "Name other places" in text_of(answer)
+
+
+async def test_a_place_without_a_way_says_why_there_is_none(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        to_wall = text_of(await client.call_tool("measure", {"places": ["3.3, 0.5", "50, 50"]}))
+        in_wall = text_of(
+            await client.call_tool("measure", {"places": ["R1"], "start": "3.3, 0.5"})
+        )
+    assert "no way (occupied)" in to_wall
+    assert "no way (off map)" in to_wall
+    assert "No way begins there: (3.30, 0.50) lies in a wall" in in_wall
+
+
+async def test_a_distance_is_measured_to_the_point_that_is_printed(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        text = text_of(await client.call_tool("measure", {}))
+        pose = report_of(await client.call_tool("get_robot_pose", {}))["pose"]
+    rows = [line.split(" | ") for line in text.splitlines() if line.startswith("R")]
+    for _, at, path_m, straight_m, *_ in rows[:2]:
+        x, y = (float(part) for part in at.split(", "))
+        straight = math.hypot(x - pose["x"], y - pose["y"])
+        assert float(straight_m) == pytest.approx(straight, abs=0.06)
+        assert float(path_m) >= straight - 0.06
+
+
+async def test_a_stop_says_which_drive_it_ended(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        idle = text_of(await client.call_tool("stop_robot", {}))
+        await client.call_tool("navigate_to", {"place": "R1", "wait_s": 0})
+        driving = text_of(await client.call_tool("stop_robot", {}))
+    assert "no drive was under way" in idle
+    assert "G1 was ended" in driving

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.spatial.rooms import RoomMap, Vanished, find_rooms, match_rooms
+from mapspeak.spatial.rooms import RoomMap, find_rooms, match_rooms
 
 Cells = NDArray[np.int8]
 
@@ -46,6 +46,11 @@ def id_at(rooms: RoomMap, x: float, y: float = 2.0) -> str:
     region = rooms.find_region_at(Point(x, y))
     assert region is not None
     return region.id
+
+
+def heirs_of(rooms: RoomMap, lost_id: str) -> tuple[str, ...]:
+    (gone,) = (each for each in rooms.vanished if each.id == lost_id)
+    return gone.became
 
 
 def test_the_same_map_again_has_the_same_ids() -> None:
@@ -117,20 +122,43 @@ def test_two_rooms_that_turn_out_to_be_one_are_remembered_as_merged() -> None:
     kept = id_at(after, 2.0)
     lost = second if kept == first else first
     assert id_at(after, 6.0) == kept
-    assert Vanished(id=lost, became=(kept,)) in after.vanished
+    assert heirs_of(after, lost) == (kept,)
     assert after.region(lost).id == kept
 
 
-def test_an_id_that_was_given_up_is_not_given_out_again() -> None:
+def test_rooms_and_doors_that_are_found_again_have_their_ids_again() -> None:
     first = divide(row_of_rooms(3))
     merged = divide(row_of_rooms(3, open_wall=1), previous=first)
 
     again = divide(row_of_rooms(3), previous=merged)
 
-    lost = {gone.id for gone in merged.vanished if gone.id.startswith("R")}
-    assert len(again.regions) == 3
-    assert lost.isdisjoint(region.id for region in again.regions)
-    assert "R4" in {region.id for region in again.regions}
+    for region in first.regions:
+        assert id_at(again, region.widest.x) == region.id
+    assert {door.id for door in again.doors} == {door.id for door in first.doors}
+    assert again.vanished == ()
+
+
+def test_an_id_that_was_given_up_is_not_given_to_anything_else() -> None:
+    first = divide(row_of_rooms(3))
+    merged = divide(row_of_rooms(3, open_wall=1), previous=first)
+    lost = {gone.id for gone in merged.vanished}
+
+    longer = divide(row_of_rooms(5, open_wall=1), previous=merged)
+
+    names = {region.id for region in longer.regions} | {door.id for door in longer.doors}
+    assert lost.isdisjoint(names)
+
+
+def test_the_floor_of_a_vanished_room_is_followed_to_what_covers_it_now() -> None:
+    first = divide(row_of_rooms(3))
+    merged = divide(row_of_rooms(3, open_wall=1), previous=first)
+    (lost,) = (gone for gone in merged.vanished if gone.floor_area_m2 is not None)
+
+    other = row_of_rooms(3, open_wall=1)
+    other[4:-4, 2 * ROOM_CELLS : 2 * ROOM_CELLS + 4] = 0
+    joined = divide(other, previous=merged)
+
+    assert heirs_of(joined, lost.id) == (id_at(joined, lost.place.x),)
 
 
 def test_a_region_that_merged_twice_points_to_the_last_one() -> None:
@@ -153,7 +181,7 @@ def test_a_door_that_was_closed_is_remembered() -> None:
     after = divide(row_of_rooms(3, closed=(1,)), previous=before)
 
     assert door.id not in {kept.id for kept in after.doors}
-    assert Vanished(id=door.id, became=()) in after.vanished
+    assert heirs_of(after, door.id) == ()
 
 
 def test_a_different_building_shares_no_ids() -> None:

@@ -221,7 +221,7 @@ class DriveBook:
                 "The robot has not been sent anywhere yet.", hint="Call navigate_to first."
             )
         raise GoalError(
-            f"There is no goal {goal_id!r}.",
+            f"There is no goal {str(goal_id)[:40]!r}.",
             hint=f"Known goals are {', '.join(list(self._drives)[-5:])}.",
         )
 

@@ -113,8 +113,10 @@ def _judge(
 def _find_nearest(grid: OccupancyGrid, distances: DistanceField, goal: Pose) -> Pose | None:
     """Finds the reachable cell nearest to the goal by ways that pass through no wall.
 
-    What nobody has seen may be floor, so such ways may lead through it.
+    What nobody has seen may be floor, so such ways may lead through it. A goal that is walled in,
+    such as the inside of a cupboard, gets the nearest cell as the crow flies.
     """
+    straight: Pose | None = None
     for reach_m in (SEARCH_M, math.inf):
         window = _window(grid, goal.point, reach_m)
         points = _reachable_points(window, distances)
@@ -124,7 +126,16 @@ def _find_nearest(grid: OccupancyGrid, distances: DistanceField, goal: Pose) -> 
         best = int(np.argmin(ways_m))
         if np.isfinite(ways_m[best]):
             return Pose(float(points[best, 0]), float(points[best, 1]), goal.yaw_rad)
-    return None
+        if straight is None and not _is_free(grid, goal.point):
+            off_m = np.hypot(points[:, 0] - goal.x, points[:, 1] - goal.y)
+            x, y = points[int(np.argmin(off_m))].tolist()
+            straight = Pose(x, y, goal.yaw_rad)
+    return straight
+
+
+def _is_free(grid: OccupancyGrid, point: Point) -> bool:
+    cell = grid.cell_at(point)
+    return grid.contains(cell) and bool(grid.free[cell.row, cell.col])
 
 
 def _reachable_points(window: OccupancyGrid, distances: DistanceField) -> FloatArray:
@@ -171,9 +182,10 @@ def _clearance_at(grid: OccupancyGrid, point: Point) -> float:
     cell = grid.cell_at(point)
     if not grid.contains(cell) or not grid.free[cell.row, cell.col]:
         return 0.0
-    window = _window(grid, point, SEARCH_M)
-    cell = window.cell_at(point)
-    return float(clearance_m(window)[cell.row, cell.col])
+    reach = int(SEARCH_M / grid.resolution_m)
+    top, left = max(cell.row - reach, 0), max(cell.col - reach, 0)
+    window = grid.crop(slice(top, cell.row + reach + 1), slice(left, cell.col + reach + 1))
+    return float(clearance_m(window)[cell.row - top, cell.col - left])
 
 
 def _window(grid: OccupancyGrid, centre: Point, reach_m: float) -> OccupancyGrid:

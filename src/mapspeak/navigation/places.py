@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.navigation.atlas import Atlas, RememberedPlace
+from mapspeak.navigation.goals import FARTHEST_M
 from mapspeak.semantic import SemanticMap, find_waypoints, name_key
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region
@@ -86,7 +87,8 @@ def is_taken_name(name: str) -> bool:
 
 def say_spot(point: Point) -> str:
     """Gives a point as a name for it."""
-    return f"({point.x:.2f}, {point.y:.2f})"
+    is_on_earth = max(abs(point.x), abs(point.y)) < FARTHEST_M
+    return f"({point.x:.2f}, {point.y:.2f})" if is_on_earth else f"({point.x:g}, {point.y:g})"
 
 
 def _find_by_id(atlas: Atlas, place_id: str) -> Place | None:
@@ -143,7 +145,7 @@ def _known_places(atlas: Atlas, wanted: str) -> str:
     if mentioned:
         return f"Remembered places that speak of it: {', '.join(mentioned)}. Use one of them."
     groups = {
-        "rooms": [region.id for region in atlas.rooms.regions],
+        "rooms and corridors": [region.id for region in atlas.rooms.regions],
         "doors": [door.id for door in atlas.rooms.doors],
         "frontiers": [frontier.id for frontier in atlas.frontiers.frontiers],
         "remembered": [place.id for place in atlas.places],

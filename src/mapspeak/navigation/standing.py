@@ -6,6 +6,7 @@ import numpy as np
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.navigation.atlas import Atlas
+from mapspeak.navigation.goals import FARTHEST_M
 from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.rooms import Region, RoomClass
 
@@ -58,7 +59,8 @@ def _middle_of(atlas: Atlas, region: Region) -> Point:
 
 def arrival_pose(atlas: Atlas, point: Point) -> Pose:
     """Gives the pose at a point in which the robot ends when it drives there straight on."""
-    path = atlas.distances.path_to(point)
+    is_near = max(abs(point.x), abs(point.y)) < FARTHEST_M
+    path = atlas.distances.path_to(point) if is_near else None
     if path is None or len(path.points) < 2 or path.length_m == 0.0:
         return Pose(point.x, point.y, atlas.robot.yaw_rad)
     before = next(

@@ -10,9 +10,9 @@ from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.places import Place, Spot
 from mapspeak.navigation.standing import find_standing_point
 from mapspeak.spatial.paths import DistanceField, Path
-from mapspeak.spatial.rooms import Region
+from mapspeak.spatial.rooms import Door, Region
 
-__all__ = ["Way", "find_way", "measure_path"]
+__all__ = ["Way", "find_way", "measure_path", "standing_point"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,6 +22,7 @@ class Way:
     Attributes:
         start: Where it begins.
         goal: Where it ends.
+        end: The point it ends at: in a room, where the robot would stand.
         straight_m: As the crow flies, between the same two points as the path.
         path_m: By path; None where the robot cannot get through.
         through: Ids of the regions and doors on the way, in order, both ends included.
@@ -31,6 +32,7 @@ class Way:
 
     start: Place
     goal: Place
+    end: Point
     straight_m: float
     path_m: float | None = None
     through: tuple[str, ...] = ()
@@ -40,22 +42,23 @@ class Way:
 def measure_path(atlas: Atlas, start: Place, goal: Place) -> float | None:
     """Gives the metres by path between two places; None where the robot cannot get through."""
     distances = _distances_from(atlas, start)
-    return None if distances is None else distances.distance_to(_standing_point(atlas, goal))
+    return None if distances is None else distances.distance_to(standing_point(atlas, goal))
 
 
 def find_way(atlas: Atlas, start: Place, goal: Place) -> Way:
     """Finds the way between two places; of a room it is the point to stand in that counts."""
-    begin, end = _standing_point(atlas, start), _standing_point(atlas, goal)
+    begin, end = standing_point(atlas, start), standing_point(atlas, goal)
     straight_m = begin.distance_to(end)
     distances = _distances_from(atlas, start)
     path = None if distances is None else distances.path_to(end)
     path_m = None if distances is None else distances.distance_to(end)
     if path is None or path_m is None:
-        return Way(start=start, goal=goal, straight_m=straight_m)
+        return Way(start=start, goal=goal, end=end, straight_m=straight_m)
     cells = _cells_along(atlas, path)
     return Way(
         start=start,
         goal=goal,
+        end=end,
         straight_m=straight_m,
         path_m=path_m,
         through=_name_regions(atlas, *cells),
@@ -70,15 +73,20 @@ def _distances_from(atlas: Atlas, start: Place) -> DistanceField | None:
     """
     if isinstance(start.thing, Spot) and start.point == atlas.robot.point:
         return atlas.distances
-    begin = _standing_point(atlas, start)
+    begin = standing_point(atlas, start)
     distances = atlas.map.distances_from(begin)
     return None if distances.lattice.index_at(begin) is None else distances
 
 
-def _standing_point(atlas: Atlas, place: Place) -> Point:
-    if isinstance(place.thing, Region):
-        return find_standing_point(atlas, place.thing) or place.point
-    return place.point
+def standing_point(atlas: Atlas, place: Place) -> Point:
+    """Gives the point from which and to which ways to a place are measured."""
+    match place.thing:
+        case Region() as region:
+            return find_standing_point(atlas, region) or place.point
+        case Door() as door:
+            return atlas.find_crossing(door) or place.point
+        case _:
+            return place.point
 
 
 def _cells_along(atlas: Atlas, path: Path) -> tuple[np.ndarray, np.ndarray]:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from mapspeak.navigation.atlas import Atlas, RememberedPlace
 from mapspeak.navigation.choosing import CheckedGoal, check_place
 from mapspeak.navigation.places import Place
+from mapspeak.navigation.ways import standing_point
 from mapspeak.semantic import Landmark
 from mapspeak.server.roomtables import say_walk
 from mapspeak.server.wording import (
@@ -43,7 +44,7 @@ def describe_place(atlas: Atlas, place: Place) -> str:
 
 
 def _way_lines(atlas: Atlas, place: Place, goal: CheckedGoal) -> Iterator[str]:
-    yield f"Seen from the robot: {say_direction(atlas, place.point)}."
+    yield f"From the robot: {say_direction(atlas, standing_point(atlas, place))}."
     if goal.check.is_ok:
         yield f"To go there: navigate_to takes {place.name}; {goal.check.sentence}"
         yield f"The robot would stand at {say_pose(goal.pose)}."
@@ -59,10 +60,11 @@ def _region_lines(atlas: Atlas, region: Region) -> Iterator[str]:
         f"Floor {region.floor_area_m2:.1f} m2 with what stands on it, {region.free_area_m2:.1f} m2 "
         f"of it free; {_say_rank(atlas, region)}."
     )
-    yield (
-        f"Shape: {region.length_m:.1f} x {region.width_m:.1f} m, the longer side along "
-        f"{math.degrees(region.heading_rad):.0f} deg."
-    )
+    if region.room_class is not RoomClass.CORRIDOR:
+        yield (
+            f"Shape: {region.length_m:.1f} x {region.width_m:.1f} m, the longer side along "
+            f"{math.degrees(region.heading_rad):.0f} deg."
+        )
     yield (
         f"Widest at {say_point(region.widest)}, {region.clearance_m:.2f} m from the nearest wall."
     )

@@ -106,11 +106,12 @@ def draw_rooms(rooms: RoomMap) -> AtlasPicture:
 
 def _scale_px_per_m(grid: OccupancyGrid, look: MapLook) -> float:
     """Gives about how large a metre will be in the picture."""
-    if look.zoom is not None:
-        return EDGE_PX / (2 * look.zoom.radius_m)
     known = (np.flatnonzero(grid.cells.max(axis=axis, initial=-1) >= 0) for axis in (0, 1))
     n_cells = max(int(along[-1] - along[0]) + 1 if along.size else 1 for along in known)
-    return EDGE_PX / (n_cells * grid.resolution_m)
+    shown_m = n_cells * grid.resolution_m
+    if look.zoom is not None:
+        shown_m = min(shown_m, 2 * look.zoom.radius_m)
+    return EDGE_PX / shown_m
 
 
 def _rooms_in(view: MapView, *, has_areas: bool) -> RegionLayer:

@@ -5,8 +5,10 @@ from collections.abc import Sequence
 
 from mapspeak.errors import GoalError
 from mapspeak.navigation.atlas import Atlas
-from mapspeak.navigation.places import Place, find_place
-from mapspeak.navigation.ways import Way, find_way, measure_path
+from mapspeak.navigation.choosing import check_place
+from mapspeak.navigation.goals import GoalVerdict
+from mapspeak.navigation.places import Place, Spot, find_place
+from mapspeak.navigation.ways import Way, find_way, measure_path, standing_point
 from mapspeak.server.roomtables import say_sizes
 from mapspeak.server.wording import build_table, join_words, say_kind, say_path, say_point
 from mapspeak.spatial.rooms import Door, Region
@@ -21,24 +23,30 @@ def describe_measures(atlas: Atlas, *, start: str, places: Sequence[str] | None)
     """Gives the ways from one place to others, nearest first, and their sizes, smallest first.
 
     Raises:
-        GoalError: There is no such place.
+        GoalError: There is no such place, or nothing to measure.
     """
     begin = find_place(atlas, start)
-    ends = [Place(region.id, region) for region in atlas.rooms.regions]
-    if places is not None:
-        ends = [find_place(atlas, words) for words in dict.fromkeys(places)]
-    if not ends:
-        raise GoalError(
-            "There is nothing to measure: the map shows no room yet.",
-            hint="Name places, or call look_at_map and explore a frontier first.",
-        )
-    others = [end for end in ends if end.name != begin.name]
+    others = _find_others(atlas, begin, places)
     regions = [end.thing for end in (begin, *others) if isinstance(end.thing, Region)]
     doors = [end.thing for end in (begin, *others) if isinstance(end.thing, Door)]
-    parts = [_way_table(atlas, begin, others)] if others else []
+    parts = [_way_table(atlas, begin, others)]
     parts += [_size_table(atlas, regions)] if regions else []
     parts += [_width_line(doors)] if len(doors) > 1 else []
     return "\n\n".join(parts)
+
+
+def _find_others(atlas: Atlas, begin: Place, places: Sequence[str] | None) -> list[Place]:
+    """Gives each place once, without the one to measure from."""
+    ends = [Place(region.id, region) for region in atlas.rooms.regions]
+    if places is not None:
+        ends = [find_place(atlas, words) for words in places]
+    by_name = {end.name: end for end in ends if end.name != begin.name}
+    if by_name:
+        return list(by_name.values())
+    raise GoalError(
+        f"There is nothing to measure from {begin.name} to.",
+        hint="Name other places than the start, or explore: call look_at_map.",
+    )
 
 
 def _way_table(atlas: Atlas, start: Place, ends: Sequence[Place]) -> str:
@@ -46,25 +54,34 @@ def _way_table(atlas: Atlas, start: Place, ends: Sequence[Place]) -> str:
     nearest_first = sorted(
         ends, key=lambda end: math.inf if (m := lengths_m[end.name]) is None else m
     )
-    return build_table(
-        f"Ways from {start.name} ({say_point(start.point)}), nearest first",
+    begin = check_place(atlas, Place(start.name, Spot(standing_point(atlas, start))))
+    table = build_table(
+        f"Ways from {start.name} ({say_point(begin.pose.point)}), nearest first",
         ("to", "at x, y", "path m", "straight m", "through", "least clearance m"),
         nearest_first[:MOST_WAYS],
-        lambda end: _way_row(find_way(atlas, start, end)),
+        lambda end: _way_row(atlas, find_way(atlas, start, end)),
         n_all=len(nearest_first),
     )
+    is_there = begin.check.is_ok or start.point == atlas.robot.point
+    return table if is_there else f"{table}\nNo way begins there: {begin.check.sentence}"
 
 
-def _way_row(way: Way) -> Sequence[str]:
+def _way_row(atlas: Atlas, way: Way) -> Sequence[str]:
     clear_m = way.clearance_m
     return (
         way.goal.name,
-        say_point(way.goal.point),
-        say_path(way.path_m),
+        say_point(way.end),
+        _say_no_way(atlas, way.goal) if way.path_m is None else say_path(way.path_m),
         f"{way.straight_m:.1f}",
         join_words(way.through, "-"),
         "-" if clear_m is None else f"{clear_m:.2f}",
     )
+
+
+def _say_no_way(atlas: Atlas, goal: Place) -> str:
+    """Says that there is no way, with the reason where it lies in the goal."""
+    verdict = check_place(atlas, goal).check.verdict
+    return "no way" if verdict is GoalVerdict.OK else f"no way ({verdict.replace('_', ' ')})"
 
 
 def _size_table(atlas: Atlas, regions: Sequence[Region]) -> str:

@@ -5,6 +5,7 @@ from typing import Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.navigation.atlas import RememberedPlace, number_places
 from mapspeak.navigation.choosing import CheckedGoal
@@ -23,6 +24,9 @@ __all__ = [
     "WaypointReport",
     "WriteAnswer",
 ]
+
+
+MOST_NAMED = 12
 
 
 class Report(BaseModel):
@@ -191,9 +195,21 @@ class MemoryAnswer(Report):
 
     @classmethod
     def of(cls, memory: SemanticMap, name: str | None) -> Self:
-        """Makes the report of all places, or of the one of that name or id."""
+        """Makes the report of all places, or of the one of that name or id.
+
+        Raises:
+            SemanticMapError: There is no such place.
+        """
         places = number_places(memory.waypoints)
         shown = [place for place in places if name is None or _is_called(place, name)]
+        if name is not None and not shown:
+            known = ", ".join(
+                f"{place.id} {place.waypoint.name!r}" for place in places[:MOST_NAMED]
+            )
+            raise SemanticMapError(
+                f"No place called {name[:80]!r} is remembered.",
+                hint=f"Remembered are {known or 'no places yet'}; without a name all are given.",
+            )
         return cls(
             map=memory.map_id,
             n_places=len(places),

@@ -98,11 +98,20 @@ def _region_row(atlas: Atlas, region: Region) -> Sequence[str]:
         say_kind(region),
         f"{region.floor_area_m2:.1f}{_say_growing(atlas, region)}",
         f"{region.free_area_m2:.1f}",
-        f"{region.length_m:.1f} x {region.width_m:.1f}",
+        _say_shape(atlas, region),
         say_point(standing or region.widest),
         say_path(None if standing is None else atlas.path_m(standing)),
         list_some(doors, most=MOST_STOPS) or "none",
     )
+
+
+def _say_shape(atlas: Atlas, region: Region) -> str:
+    """Gives length and width; of a corridor, those of the walk along it."""
+    is_corridor = region.room_class is RoomClass.CORRIDOR
+    walk = atlas.map.walk_along(region) if is_corridor else None
+    if walk is None:
+        return f"{region.length_m:.1f} x {region.width_m:.1f}"
+    return f"{walk.length_m:.1f} x {region.floor_area_m2 / max(walk.length_m, 0.1):.1f}"
 
 
 def _say_door(atlas: Atlas, region: Region, door: Door) -> str:

@@ -24,7 +24,7 @@ MOST_WALKS = 6
 AXES = "Metres in the map frame, x right and y up; yaw counter-clockwise from x."
 MEANINGS = (
     "Floor counts what stands on it, free does not; path m is the robot's way to where it would "
-    "stand; of a corridor, size is along x across."
+    "stand; a corridor's size is the walk along it by the mean width."
 )
 
 

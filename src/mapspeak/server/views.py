@@ -190,7 +190,7 @@ def look_at(
     up_rad = atlas.robot.yaw_rad if up is Up.ROBOT else NORTH_UP_RAD
     if around is None and radius_m is None:
         return MapLook(layers=chosen, up_rad=up_rad)
-    place = find_place(atlas, around or "robot")
+    place = find_place(atlas, "robot" if around is None else around)
     zoom = _zoom_on(atlas, place)
     if radius_m is not None:
         zoom = Zoom(centre=zoom.centre, radius_m=radius_m)

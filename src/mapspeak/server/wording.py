@@ -27,17 +27,17 @@ Item = TypeVar("Item")
 
 LONGEST_NAME = 40
 DIRECTIONS = (
-    "ahead",
-    "ahead left",
-    "left",
-    "behind left",
-    "behind",
-    "behind right",
-    "right",
-    "ahead right",
+    "ahead of it",
+    "ahead and to its left",
+    "to its left",
+    "behind and to its left",
+    "behind it",
+    "behind and to its right",
+    "to its right",
+    "ahead and to its right",
 )
-"""Eighths of a turn, counter-clockwise."""
-
+"""Eighths of a turn from the robot's heading, counter-clockwise."""
+HERE_M = 0.1
 
 COMPASS = (
     "east",
@@ -87,11 +87,13 @@ def say_kind(region: Region) -> str:
 
 
 def say_direction(atlas: Atlas, point: Point) -> str:
-    """Gives where a point is as seen from the robot: "3.2 m as the crow flies, ahead left"."""
+    """Gives where a point is as seen from the robot: "3.2 m straight, to its left"."""
     away_m = atlas.robot.point.distance_to(point)
+    if away_m < HERE_M:
+        return "it stands there"
     turn_rad = wrap_angle(atlas.robot.point.bearing_to(point) - atlas.robot.yaw_rad)
     eighth = round(turn_rad / (math.tau / 8)) % 8
-    return f"{away_m:.1f} m as the crow flies, {DIRECTIONS[eighth]} of the robot"
+    return f"{away_m:.1f} m straight, {DIRECTIONS[eighth]}"
 
 
 def shorten(text: str) -> str:

@@ -113,8 +113,10 @@ class DriveTools:
 
         Use it whenever going on could do harm; it works during any other call.
         """
+        ended = self._session.drives.under_way
         await self._session.drives.stop()
-        return "The robot was told to stop; no drive is under way."
+        told = "no drive was under way" if ended is None else f"{ended.goal_id} was ended"
+        return f"The robot was told to stop; {told}."
 
     async def _wait(self, context: Context, goal_id: str | None, wait_s: float) -> DriveAnswer:
         report = await self._session.drives.wait(

@@ -11,6 +11,8 @@ __all__ = ["match_frontiers"]
 
 TOUCH_M = 0.3
 """Points of one frontier on two maps are no further apart."""
+SAME_PLACE_M = 2.0
+"""Who goes to a frontier by its id comes no farther off than this from where it was."""
 SAME_RATIO = 0.25
 """Two frontiers are one when this share of the shorter lies on the other."""
 
@@ -42,7 +44,17 @@ def _inherited(previous: tuple[Frontier, ...], current: tuple[Frontier, ...]) ->
     for ratio, index, old_id in sorted(overlaps, key=lambda each: (-each[0], each[1], each[2])):
         if ratio >= SAME_RATIO and index not in ids and old_id not in ids.values():
             ids[index] = old_id
-    return ids
+    return {
+        index: old_id for index, old_id in ids.items() if _is_near(previous, current, index, old_id)
+    }
+
+
+def _is_near(
+    previous: tuple[Frontier, ...], current: tuple[Frontier, ...], index: int, old_id: str
+) -> bool:
+    """True when the pose has hardly moved: an id that leads somewhere else would mislead."""
+    old = next(frontier for frontier in previous if frontier.id == old_id)
+    return old.pose.point.distance_to(current[index].pose.point) <= SAME_PLACE_M
 
 
 def _overlap_ratio(first: FloatArray, second: FloatArray) -> float:

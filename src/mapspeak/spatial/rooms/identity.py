@@ -13,6 +13,8 @@ from mapspeak.spatial.rooms.room_map import Door, Region, RoomMap, Vanished
 
 _SAMPLES = 200_000
 _SAME_DOOR_M = 0.6
+_SAME_SIZE_RATIO = 1.5
+"""A region that is back has at most this many times the floor it had, or at least one over that."""
 _REMAINS_RATIO = 0.25
 """A vanished region became every region that covers at least this share of what is still seen."""
 
@@ -22,7 +24,8 @@ def match_rooms(previous: RoomMap, current: RoomMap) -> RoomMap:
 
     Regions are matched one to one by overlap in world coordinates, the largest overlap first;
     doors by place. A region keeps its number; its letter says what it is taken for now. New ones
-    get numbers never used before; lost ones are remembered.
+    get numbers never used before; lost ones are remembered, and get their numbers back when they
+    are found again in their place.
     """
     overlap = _count_overlap(previous, current)
     ids = _match_regions(previous, current, overlap)
@@ -36,9 +39,10 @@ def match_rooms(previous: RoomMap, current: RoomMap) -> RoomMap:
         regions=tuple(_rename(region, final, door_ids) for region in current.regions),
         doors=tuple(_rename_door(door, final, door_ids) for door in current.doors),
         vanished=tuple(
-            Vanished(id=gone.id, became=tuple(now.get(name, name) for name in gone.became))
+            replace(gone, became=tuple(now.get(name, name) for name in gone.became))
             for gone in vanished
         ),
+        former_ids=_former_ids(previous, now),
     )
 
 
@@ -73,7 +77,33 @@ def _match_regions(
     for before, now in pairs:
         if before in old and now in new:
             ids[new.pop(now)] = old.pop(before)
-    return ids | _fresh(new.values(), _used(previous))
+    ids |= _revive_regions(previous, [region for region in current.regions if region.index in new])
+    missing = [name for name in new.values() if name not in ids]
+    return ids | _fresh(missing, _used(previous))
+
+
+def _revive_regions(previous: RoomMap, regions: list[Region]) -> dict[str, str]:
+    """Gives the ids of vanished regions that are back: about as large, and in their place."""
+    back = [
+        (gone.place.distance_to(region.widest), gone.id, region.id)
+        for gone in previous.vanished
+        for region in regions
+        if gone.floor_area_m2 is not None
+        and gone.place.distance_to(region.widest) <= region.clearance_m
+        and 1 / _SAME_SIZE_RATIO <= region.floor_area_m2 / gone.floor_area_m2 <= _SAME_SIZE_RATIO
+    ]
+    ids: dict[str, str] = {}
+    for _, gone_id, region_id in sorted(back):
+        if region_id not in ids and gone_id not in ids.values():
+            ids[region_id] = gone_id
+    return ids
+
+
+def _former_ids(previous: RoomMap, now: dict[str, str]) -> dict[str, str]:
+    """Gives what regions were called before, by the names they keep and those they have now."""
+    renamed = {kept: name for kept, name in now.items() if kept != name}
+    earlier = {old: now[name] for old, name in previous.former_ids.items() if name in now}
+    return {old: name for old, name in (earlier | renamed).items() if old != name}
 
 
 def _used(previous: RoomMap) -> set[str]:
@@ -102,6 +132,13 @@ def _match_doors(previous: RoomMap, current: RoomMap, ids: dict[str, str]) -> di
         for before, now in _neighbours(previous.doors, current.doors)
         if before.place.distance_to(now.place)
         <= _SAME_DOOR_M * (2 if _joins_same(before, now, ids) else 1)
+    ]
+    # Doors that were there a while ago come after those that were there just now.
+    near += [
+        (_SAME_DOOR_M * 2 + gone.place.distance_to(door.place), gone.id, door.id)
+        for gone in previous.vanished
+        for door in current.doors
+        if gone.floor_area_m2 is None and gone.place.distance_to(door.place) <= _SAME_DOOR_M
     ]
     matched: dict[str, str] = {}
     taken: set[str] = set()
@@ -163,13 +200,27 @@ def _remember(
     """Gives everything that is no longer there, with what became of it by now."""
     kept = set(ids.values()) | set(door_ids.values())
     final = {region.index: ids[region.id] for region in current.regions}
-    became = {region.id: _heirs(overlap[region.index], final) for region in previous.regions}
-    lost = {name: heirs for name, heirs in became.items() if name not in kept}
-    lost |= {door.id: () for door in previous.doors if door.id not in kept}
-    for gone in previous.vanished:
-        heirs = {heir for name in gone.became for heir in became.get(name, ())}
-        lost[gone.id] = tuple(sorted(heirs, key=_order))
-    return tuple(Vanished(id=name, became=lost[name]) for name in sorted(lost, key=_order))
+    lost = [
+        Vanished(
+            id=region.id,
+            place=region.widest,
+            floor_area_m2=region.floor_area_m2,
+            became=_heirs(overlap[region.index], final),
+        )
+        for region in previous.regions
+    ]
+    lost += [
+        Vanished(id=door.id, place=door.place, floor_area_m2=None, became=())
+        for door in previous.doors
+    ]
+    lost += [replace(gone, became=_regions_at(current, gone, ids)) for gone in previous.vanished]
+    return tuple(sorted((gone for gone in lost if gone.id not in kept), key=lambda g: _order(g.id)))
+
+
+def _regions_at(current: RoomMap, gone: Vanished, ids: dict[str, str]) -> tuple[str, ...]:
+    """Gives the region that now covers the place of what vanished earlier."""
+    region = None if gone.floor_area_m2 is None else current.find_region_at(gone.place)
+    return () if region is None else (ids[region.id],)
 
 
 def _heirs(shared: NDArray[np.float64], final: dict[int, str]) -> tuple[str, ...]:

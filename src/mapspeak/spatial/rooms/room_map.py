@@ -1,7 +1,8 @@
 """What a map looks like once it is divided: regions, the doors between them, and how they join."""
 
 from collections import deque
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
@@ -84,10 +85,14 @@ class Vanished:
 
     Attributes:
         id: What it was called.
+        place: Where it was: of a region its widest point.
+        floor_area_m2: Of a region; None for a door.
         became: The regions that now cover its place; empty when nothing does.
     """
 
     id: str
+    place: Point
+    floor_area_m2: float | None
     became: tuple[str, ...]
 
 
@@ -101,7 +106,10 @@ class RoomMap:
             to the region it stands in.
         regions: Ordered by index, largest first when nothing came before.
         doors: All of them.
-        vanished: Ids of earlier maps that are no longer used, never given out again.
+        vanished: Ids of earlier maps that are no longer used; given out again only when the same
+            thing is back in its place.
+        former_ids: What regions were called when they were taken for something else, and what
+            they are called now: {"R3": "C3"}.
     """
 
     grid: OccupancyGrid
@@ -109,6 +117,7 @@ class RoomMap:
     regions: tuple[Region, ...]
     doors: tuple[Door, ...]
     vanished: tuple[Vanished, ...] = ()
+    former_ids: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         labels = np.array(self.labels, dtype=np.int16, order="C")
@@ -124,7 +133,7 @@ class RoomMap:
         found = self.find_region(region_id)
         if found is not None:
             return found
-        became = [gone.became for gone in self.vanished if _is_same(gone.id, region_id)]
+        became = [gone.became for gone in self.vanished if gone.id == region_id]
         known = {region.id for region in self.regions}
         if became and len(became[0]) == 1 and became[0][0] in known:
             return self.region(became[0][0])
@@ -132,8 +141,9 @@ class RoomMap:
         raise MapError(f"This map has no region {region_id}.", hint=f"Its regions are: {names}.")
 
     def find_region(self, region_id: str) -> Region | None:
-        """Gives the region with this number, whatever it was taken for when it got its id."""
-        return next((each for each in self.regions if _is_same(each.id, region_id)), None)
+        """Gives the region with this id, also one that was called so and is something else now."""
+        now = self.former_ids.get(region_id, region_id)
+        return next((each for each in self.regions if each.id in (region_id, now)), None)
 
     def find_region_at(self, point: Point) -> Region | None:
         """Gives the region a point lies in, or None."""
@@ -194,11 +204,6 @@ class RoomMap:
                     came_from[neighbour] = here
                     queue.append(neighbour)
         return None
-
-
-def _is_same(first_id: str, second_id: str) -> bool:
-    are_regions = {first_id[:1], second_id[:1]} <= set(LETTER.values())
-    return first_id == second_id or (are_regions and first_id[1:] == second_id[1:])
 
 
 def _walk_back(came_from: dict[str, str], goal: str) -> tuple[str, ...]:
