@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import pytest
@@ -28,12 +29,19 @@ def run_main(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
     ("arguments", "says"),
     [
         (["serve", "--robot", "rover"], "sim:WORLD"),
+        (["serve", "--robot", "ws://127.0.0.1:1"], "rosbridge"),
+        (["serve", "--robot", "ws://127.0.0.1:1", "--detector"], "--robot sim"),
+        (["serve", "--robot-file", "robot.yaml"], "--robot ws://"),
+        (["doctor", "--robot", "ws://127.0.0.1:1"], "ros2 launch"),
         (["serve", "--robot", "sim:atlantis"], "atlantis"),
         (["serve", "--http", "0.0.0.0:8766"], "MAPSPEAK_HTTP_TOKEN"),
         (["serve", "--http", "nonsense"], "HOST:PORT"),
         (["serve", "--toolsets", "looks"], "'looks'"),
         (["map", "missing.yaml"], "missing.yaml"),
         (["demo", "--quiet", "--out", "/proc/demo"], "--out"),
+        (["simulate", "--rosbridge", "here"], "PORT"),
+        (["simulate", "--rosbridge", "192.0.2.1:9090"], "another port"),
+        (["simulate", "--world", "atlantis"], "atlantis"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_one_line(
@@ -66,3 +74,10 @@ def test_a_bare_picture_needs_a_resolution(
     assert "--resolution" in capsys.readouterr().err
     result = CliRunner().invoke(cli, ["map", str(written), "--resolution", "0.5"])
     assert "9 x 6 cells of 0.5 m" in result.output
+
+
+def test_a_check_up_of_the_simulated_robot_finds_nothing_missing() -> None:
+    result = CliRunner().invoke(cli, ["doctor", "--robot", "sim:office", "--json"])
+    assert result.exit_code == 0, result.output
+    findings = {each["what"]: each["health"] for each in json.loads(result.output)}
+    assert findings == {"map": "fine", "pose": "fine", "place": "fine", "picture": "fine"}

@@ -14,8 +14,10 @@ from mapspeak.spatial import OccupancyGrid
 __all__ = [
     "CameraPicture",
     "Detection",
+    "Finding",
     "GoalState",
     "GoalStatus",
+    "Health",
     "Robot",
     "RobotDescription",
     "StampedPose",
@@ -127,6 +129,31 @@ class GoalStatus:
     distance_left_m: float | None = None
     n_recoveries: int = 0
     reason: str = ""
+
+
+class Health(StrEnum):
+    """How it stands with one thing that a robot should offer."""
+
+    FINE = "fine"
+    DOUBTFUL = "doubtful"
+    MISSING = "missing"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """One line of a check-up.
+
+    Attributes:
+        what: The thing: map, pose, camera, ...
+        health: How it stands with it.
+        said: What was found, with numbers and units.
+        hint: What to start or to change; empty where all is well.
+    """
+
+    what: str
+    health: Health
+    said: str
+    hint: str = ""
 
 
 class Robot(Protocol):

@@ -10,6 +10,9 @@ from PIL import Image
 from fakes import FakeRobot, two_rooms
 from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Pose
+from mapspeak.links.rosbridge import open_rosbridge_robot
+from mapspeak.links.rosbridge.messages import Dialect
+from mapspeak.links.rosbridge.server import open_rosbridge_server
 from mapspeak.links.simulated import Clock, open_simulated_robot
 from mapspeak.robot import GoalState, GoalStatus, Robot
 from mapspeak.simulator import Simulation, load_world
@@ -31,7 +34,28 @@ async def open_simulated() -> AsyncGenerator[Robot]:
         yield robot
 
 
-@pytest.fixture(params=[open_fake, open_simulated], ids=["fake", "simulated"])
+@asynccontextmanager
+async def open_over_rosbridge(dialect: Dialect) -> AsyncGenerator[Robot]:
+    async with (
+        open_simulated() as simulated,
+        open_rosbridge_server(simulated, dialect=dialect) as server,
+        open_rosbridge_robot(server.url) as robot,
+    ):
+        yield robot
+
+
+def open_ros1() -> AbstractAsyncContextManager[Robot]:
+    return open_over_rosbridge(Dialect.ROS1)
+
+
+def open_ros2() -> AbstractAsyncContextManager[Robot]:
+    return open_over_rosbridge(Dialect.ROS2)
+
+
+@pytest.fixture(
+    params=[open_fake, open_simulated, open_ros1, open_ros2],
+    ids=["fake", "simulated", "rosbridge-ros1", "rosbridge-ros2"],
+)
 def open_robot(request: pytest.FixtureRequest) -> OpenRobot:
     chosen: OpenRobot = request.param
     return chosen

@@ -1,0 +1,48 @@
+"""All commands, and what becomes of errors."""
+
+import sys
+
+import click
+
+from mapspeak import __version__
+from mapspeak.cli.demonstrating import demo
+from mapspeak.cli.examining import doctor
+from mapspeak.cli.mapping import map_command
+from mapspeak.cli.serving import serve
+from mapspeak.cli.simulating import simulate
+from mapspeak.errors import MapspeakError
+
+__all__ = ["cli", "main"]
+
+
+@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="mapspeak")
+@click.pass_context
+def cli(context: click.Context) -> None:
+    """A robot's map, eyes and memory of places for any language model, over MCP.
+
+    Without a command it serves the simulated robot over stdio, as an MCP client expects.
+    """
+    if context.invoked_subcommand is None:
+        context.invoke(serve)
+
+
+for command in (serve, demo, doctor, simulate, map_command):
+    cli.add_command(command)
+
+
+def main() -> None:
+    """Runs the command line; what went wrong on purpose is said in one line, without a trace."""
+    try:
+        cli()
+    except* MapspeakError as group:
+        for error in _leaves(group):
+            click.echo(f"mapspeak: {error}", err=True)
+        sys.exit(2)
+
+
+def _leaves(group: BaseExceptionGroup[MapspeakError]) -> list[MapspeakError]:
+    leaves: list[MapspeakError] = []
+    for error in group.exceptions:
+        leaves += _leaves(error) if isinstance(error, BaseExceptionGroup) else [error]
+    return leaves

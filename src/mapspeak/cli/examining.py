@@ -1,0 +1,67 @@
+"""`mapspeak doctor`: what a robot offers, and what to start before it can be used."""
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import anyio
+import click
+
+from mapspeak.cli.options import ROBOT_OPTIONS, add_options
+from mapspeak.cli.robots import RobotChoice, open_robot
+
+if TYPE_CHECKING:
+    from mapspeak.robot import Finding
+
+__all__ = ["doctor"]
+
+SIGNS = {"fine": "ok", "doubtful": "??", "missing": "--"}
+
+
+@click.command()
+@add_options(ROBOT_OPTIONS)
+@click.option("--json", "as_json", is_flag=True, help="The findings as JSON.")
+def doctor(
+    robot: str,
+    robot_file: Path | None,
+    ca_file: Path | None,
+    seed: int,
+    as_json: bool,  # noqa: FBT001 - a flag
+) -> None:
+    """Checks a robot: what was found, how fresh it is, what is missing and how to start it.
+
+    Ends with 0 when all is well, with 1 when something is missing, with 2 when it cannot be
+    reached.
+    """
+    choice = RobotChoice(robot=robot, robot_file=robot_file, ca_file=ca_file, seed=seed)
+    findings = anyio.run(_examine, choice)
+    if as_json:
+        click.echo(json.dumps([asdict(finding) for finding in findings], indent=2))
+    else:
+        _show(findings)
+    sys.exit(1 if any(finding.health == "missing" for finding in findings) else 0)
+
+
+async def _examine(choice: RobotChoice) -> "list[Finding]":
+    from mapspeak.links.rosbridge import (  # noqa: PLC0415 - heavy; help must be quick
+        RosbridgeRobot,
+        describe_profile,
+    )
+    from mapspeak.navigation.checkup import examine  # noqa: PLC0415
+
+    async with open_robot(choice) as robot:
+        lines = describe_profile(robot.profile) if isinstance(robot, RosbridgeRobot) else ()
+        return [*lines, *await examine(robot)]
+
+
+def _show(findings: "Sequence[Finding]") -> None:
+    for finding in findings:
+        click.echo(f"{SIGNS[finding.health]}  {finding.what}: {finding.said}")
+        if finding.hint:
+            click.echo(f"      {finding.hint}")
+    n_missing = sum(finding.health == "missing" for finding in findings)
+    n_doubtful = sum(finding.health == "doubtful" for finding in findings)
+    click.echo(f"{n_missing} missing, {n_doubtful} doubtful, {len(findings)} looked at.")

@@ -1,0 +1,51 @@
+"""Options that several commands have."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+__all__ = ["DEFAULT_WORLD", "FILE", "ROBOT_OPTIONS", "SEED_OPTION", "WORLD_OPTION", "add_options"]
+
+Command = Callable[..., Any]
+Decorator = Callable[[Command], Command]
+
+DEFAULT_WORLD = "warehouse"
+
+FILE = click.Path(path_type=Path)
+SEED_OPTION = click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Of the simulated robot's noise.",
+)
+WORLD_OPTION = click.option(
+    "--world", default=DEFAULT_WORLD, show_default=True, help="A world or world file."
+)
+ROBOT_OPTIONS = (
+    click.option(
+        "--robot",
+        default=f"sim:{DEFAULT_WORLD}",
+        show_default=True,
+        help="sim[:WORLD], where WORLD is a shipped world or a world file; or the address of a "
+        "robot's rosbridge, such as ws://192.168.1.20:9090.",
+    ),
+    click.option(
+        "--robot-file", type=FILE, help="robot.yaml: what is not to be found by asking the robot."
+    ),
+    click.option("--ca-file", type=FILE, help="Whose certificates a wss robot may show, as PEM."),
+    SEED_OPTION,
+)
+
+
+def add_options(options: Sequence[Decorator]) -> Decorator:
+    """Gives a decorator that adds several options, in their order."""
+
+    def add(function: Command) -> Command:
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return add

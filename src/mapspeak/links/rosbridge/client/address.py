@@ -1,0 +1,93 @@
+"""Where a robot's rosbridge is, and what it wants to see before it talks."""
+
+import ssl
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from websockets.exceptions import InvalidURI
+from websockets.uri import WebSocketURI, parse_uri
+
+from mapspeak.errors import ConfigError
+
+DEFAULT_PORT = 9090
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotAddress:
+    """A rosbridge server.
+
+    Attributes:
+        url: ws://host:9090 or wss://host:9090; without a port, 9090 is meant.
+        headers: Sent with the first request, such as {"Authorization": "Bearer ..."}.
+        token: Given in rosbridge's own `auth` operation, for servers that want it.
+        ca_file: Whose certificates a wss server may show; None trusts the system's.
+
+    Raises:
+        ConfigError: The URL is none, or there is no such file.
+    """
+
+    url: str
+    headers: dict[str, str] = field(default_factory=dict, repr=False)
+    token: str | None = field(default=None, repr=False)
+    ca_file: Path | None = None
+
+    def __post_init__(self) -> None:
+        uri = _parse(self.url)
+        object.__setattr__(self, "url", _with_port(self.url, uri))
+        if self.ca_file is not None and not uri.secure:
+            raise ConfigError(
+                f"{self.shown} is not encrypted, so that a CA file says nothing.",
+                hint="Write wss:// for a server with a certificate, or leave the CA file away.",
+            )
+
+    @property
+    def uri(self) -> WebSocketURI:
+        """The URL in parts."""
+        return _parse(self.url)
+
+    @property
+    def shown(self) -> str:
+        """The URL as people may see it: without user and password."""
+        uri = self.uri
+        host = f"[{uri.host}]" if ":" in uri.host else uri.host
+        return f"{'wss' if uri.secure else 'ws'}://{host}:{uri.port}"
+
+    def build_ssl_context(self) -> ssl.SSLContext | None:
+        """Gives what decides whether a wss server is the right one; None for ws.
+
+        Raises:
+            ConfigError: The CA file cannot be read.
+        """
+        if not self.uri.secure:
+            return None
+        try:
+            return ssl.create_default_context(cafile=self.ca_file)
+        except (OSError, ssl.SSLError) as error:
+            raise ConfigError(
+                f"The CA file {self.ca_file} cannot be used: {error}.",
+                hint="Give a PEM file with the certificate that signed the robot's.",
+            ) from error
+
+
+def _parse(url: str) -> WebSocketURI:
+    try:
+        return parse_uri(url)
+    except (InvalidURI, ValueError) as error:
+        raise ConfigError(
+            f"{_without_password(url)!r} is not the address of a rosbridge server.",
+            hint="It looks like ws://192.168.1.20:9090, ws://[fe80::1]:9090 or wss://robot:9090.",
+        ) from error
+
+
+def _with_port(url: str, uri: WebSocketURI) -> str:
+    authority = url.split("://", 1)[1].split("/", 1)[0].split("?", 1)[0]
+    has_port = authority.rsplit("@", 1)[-1].rsplit("]", 1)[-1].rpartition(":")[1] == ":"
+    if has_port:
+        return url
+    scheme = "wss" if uri.secure else "ws"
+    return url.replace(f"{scheme}://{authority}", f"{scheme}://{authority}:{DEFAULT_PORT}", 1)
+
+
+def _without_password(url: str) -> str:
+    scheme, separator, rest = url[:200].partition("://")
+    return f"{scheme}{separator}{rest.rsplit('@', 1)[-1]}"

@@ -1,0 +1,348 @@
+"""The client of one robot: what it subscribes to, publishes, calls and pursues."""
+
+from collections import deque
+from collections.abc import AsyncGenerator, Callable, Coroutine, Iterator, Mapping
+from contextlib import asynccontextmanager, contextmanager
+from typing import Any
+
+import anyio
+from anyio.abc import TaskGroup
+
+from mapspeak.errors import LinkError
+from mapspeak.links.rosbridge import protocol
+from mapspeak.links.rosbridge.client.address import RobotAddress
+from mapspeak.links.rosbridge.client.channel import Channel
+from mapspeak.links.rosbridge.client.goal import ActionGoal
+from mapspeak.links.rosbridge.client.subscription import Subscription
+from mapspeak.links.rosbridge.client.timing import Timing
+from mapspeak.links.rosbridge.messages import Message
+from mapspeak.links.rosbridge.protocol import (
+    Encoding,
+    Event,
+    FrameRefused,
+    GoalEnded,
+    GoalFedBack,
+    Published,
+    StatusNoted,
+)
+
+N_REMARKS_KEPT = 50
+USUAL_TIMING = Timing()
+
+
+class RosbridgeClient:
+    """One robot over two sockets: topics and goals on one, calls and what is urgent on the other.
+
+    Some versions of rosbridge handle what comes over one socket one after another, so that a stop
+    sent behind a goal would act when the goal has ended. Hence a goal takes the socket that carries
+    none, and what is urgent takes the other; a goal that replaces another frees that one's socket.
+
+    Args:
+        address: Where the robot is.
+        timing: All time limits.
+    """
+
+    def __init__(self, address: RobotAddress, *, timing: Timing = USUAL_TIMING) -> None:
+        self.address = address
+        self.timing = timing
+        self._control = self._channel()
+        self._urgent = self._channel()
+        self._subscriptions: dict[str, Subscription] = {}
+        self._channel_of: dict[str, Channel] = {}
+        self._advertised: dict[str, str] = {}
+        self._goals: dict[str, tuple[ActionGoal, Channel]] = {}
+        self._tasks: TaskGroup | None = None
+        self._published_s = float("-inf")
+        self.n_frames_refused = 0
+        """Frames that could not be understood and were left away."""
+        self.remarks: deque[str] = deque(maxlen=N_REMARKS_KEPT)
+        """What the server remarked, and why frames were refused; the newest last."""
+
+    @property
+    def is_connected(self) -> bool:
+        """True when both sockets are open."""
+        return self._control.is_up and self._urgent.is_up
+
+    @property
+    def has_open_socket(self) -> bool:
+        """True when something can be sent at once."""
+        return self._control.is_up or self._urgent.is_up
+
+    @property
+    def n_connections(self) -> int:
+        """How often the socket that carries topics and goals has been connected."""
+        return self._control.n_connections
+
+    @property
+    def connected_for_s(self) -> float | None:
+        """Since when the socket that carries topics and goals has been open; None while it is not.
+
+        In wall time.
+        """
+        return self._control.up_for_s
+
+    def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        """Runs something in the background until the client is closed."""
+        if self._tasks is not None:
+            self._tasks.start_soon(work)
+
+    async def wait_until_connected(self) -> None:
+        """Returns at once, or when both sockets are open again.
+
+        Raises:
+            LinkError: They are not within the usual time for an answer.
+        """
+        await self._control.wait_until_up(self.timing.answer_s)
+        await self._urgent.wait_until_up(self.timing.answer_s)
+
+    async def start(self, tasks: TaskGroup) -> None:
+        """Connects, and keeps connected in the background.
+
+        Raises:
+            LinkError: The robot cannot be reached.
+        """
+        self._tasks = tasks
+        await self._control.start(tasks)
+        await self._urgent.start(tasks)
+
+    async def aclose(self) -> None:
+        """Closes both sockets, once what was published last has had time to arrive."""
+        # rosbridge forgets a message when the socket that brought it closes at once.
+        await anyio.sleep_until(self._published_s + self.timing.linger_s)
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(self._control.say_goodbye)
+            tasks.start_soon(self._urgent.say_goodbye)
+
+    def subscribe(
+        self,
+        topic: str,
+        *,
+        type_name: str | None = None,
+        encoding: Encoding = Encoding.JSON,
+        throttle_ms: int = 0,
+    ) -> Subscription:
+        """Gives the subscription to a topic, which is begun where there is none yet.
+
+        Args:
+            topic: Its full name.
+            type_name: None leaves it to the server.
+            encoding: How messages are written; the first subscriber decides.
+            throttle_ms: The least time between two messages; likewise.
+        """
+        subscription = self._subscriptions.get(topic)
+        if subscription is None:
+            subscription = Subscription(
+                topic,
+                type_name=type_name,
+                encoding=encoding,
+                throttle_ms=throttle_ms,
+                operation_id=protocol.new_id(),
+            )
+            self._begin(subscription)
+            self._subscriptions[topic] = subscription
+        subscription.n_users += 1
+        return subscription
+
+    def unsubscribe(self, subscription: Subscription) -> None:
+        """Ends one use of a subscription; the last one ends it at the server too."""
+        subscription.n_users -= 1
+        if subscription.n_users == 0:
+            del self._subscriptions[subscription.topic]
+            self._end(subscription)
+
+    def renew(self, subscription: Subscription, *, encoding: Encoding) -> None:
+        """Subscribes again: a latched message may have been missed, or cannot be written so."""
+        self._end(subscription)
+        subscription.encoding = encoding
+        subscription.operation_id = protocol.new_id()
+        self._begin(subscription)
+
+    def advertise(self, topic: str, *, type_name: str) -> None:
+        """Says that we will publish; the robot needs a moment until it listens.
+
+        Raises:
+            LinkError: The topic was advertised with another type, or its name is none.
+        """
+        known = self._advertised.setdefault(topic, type_name)
+        if known != type_name:
+            raise LinkError(
+                f"{topic} was advertised as {known}, not as {type_name}.",
+                hint="A topic has one type: look it up on the robot.",
+            )
+        for channel in (self._control, self._urgent):
+            text = protocol.advertise(topic, operation_id=f"advertise:{topic}", type_name=type_name)
+            channel.keep_standing(f"advertise:{topic}", text)
+
+    async def publish(self, topic: str, message: Message) -> None:
+        """Publishes on an advertised topic.
+
+        Raises:
+            LinkError: There is no connection, or the message cannot be sent.
+        """
+        text = protocol.publish(topic, message)
+        await self._free_for_topics().send(text, timeout_s=self.timing.answer_s)
+        self._published_s = anyio.current_time()
+
+    def publish_everywhere(self, topic: str, message: Message) -> int:
+        """Publishes over every open socket, and gives over how many: for a stop."""
+        text = protocol.publish(topic, message)
+        open_channels = [channel for channel in (self._urgent, self._control) if channel.is_up]
+        for channel in open_channels:
+            channel.send_if_up(text)
+        self._published_s = anyio.current_time()
+        return len(open_channels)
+
+    async def call_service(
+        self,
+        service: str,
+        arguments: Mapping[str, Any] | None = None,
+        *,
+        type_name: str | None = None,
+        timeout_s: float | None = None,
+    ) -> dict[str, Any]:
+        """Gives what a service answers. The wait ends, the connection stays.
+
+        Args:
+            service: Its full name.
+            arguments: The fields of the request; None for none.
+            type_name: None leaves it to the server.
+            timeout_s: In wall time; None takes the client's usual limit.
+
+        Raises:
+            LinkError: No answer, a refusal, or no connection.
+        """
+        call_id = protocol.new_id()
+        text = protocol.call_service(
+            service, arguments or {}, operation_id=call_id, type_name=type_name
+        )
+        limit_s = self.timing.answer_s if timeout_s is None else timeout_s
+        channel = self._free_for_calls()
+        values = await channel.call(text, call_id=call_id, what=service, timeout_s=limit_s)
+        return values if isinstance(values, dict) else {}
+
+    async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
+        """Sends a goal to an action of ROS 2 and gives what becomes of it, as it becomes.
+
+        Raises:
+            LinkError: There is no connection, or the goal cannot be sent.
+        """
+        goal = ActionGoal(goal_id=protocol.new_id(), action=action)
+        text = protocol.send_action_goal(
+            action, arguments, operation_id=goal.goal_id, type_name=type_name
+        )
+        channel = self._free_for_topics()
+        self._goals[goal.goal_id] = (goal, channel)
+        try:
+            await channel.send(text, timeout_s=self.timing.answer_s)
+        except LinkError:
+            del self._goals[goal.goal_id]
+            raise
+        return goal
+
+    def cancel_goal(self, goal: ActionGoal) -> None:
+        """Cancels a goal over the socket it does not block; its end tells whether that worked."""
+        text = protocol.cancel_action_goal(goal.action, operation_id=goal.goal_id)
+        self._free_for_calls().send_if_up(text)
+
+    def give_up_goal(self, goal: ActionGoal) -> None:
+        """Waits no longer for a goal that shows no sign of life; it may block its socket."""
+        known = self._goals.pop(goal.goal_id, None)
+        if known is not None:
+            _, channel = known
+            channel.replace()
+
+    def clear_the_way(self) -> None:
+        """Makes a socket anew where goals or calls are under way on both: for a stop."""
+        if self._carries_goal(self._free_for_calls()) or self._free_for_calls().is_waiting:
+            self._free_for_calls().replace()
+
+    def _channel(self) -> Channel:
+        return Channel(
+            self.address, on_event=self._take, on_loss=self._lose_goals, timing=self.timing
+        )
+
+    def _carries_goal(self, channel: Channel) -> bool:
+        return any(carrier is channel for _, carrier in self._goals.values())
+
+    def _free_for_topics(self) -> Channel:
+        is_free = self._carries_goal(self._urgent) or not self._carries_goal(self._control)
+        return self._control if is_free else self._urgent
+
+    def _free_for_calls(self) -> Channel:
+        is_free = self._carries_goal(self._control) or not self._carries_goal(self._urgent)
+        return self._urgent if is_free else self._control
+
+    def _begin(self, subscription: Subscription) -> None:
+        text = protocol.subscribe(
+            subscription.topic,
+            operation_id=subscription.operation_id,
+            type_name=subscription.type_name,
+            encoding=subscription.encoding,
+            throttle_ms=subscription.throttle_ms,
+        )
+        channel = self._channel_of[subscription.operation_id] = self._free_for_topics()
+        channel.keep_standing(subscription.operation_id, text)
+
+    def _end(self, subscription: Subscription) -> None:
+        text = protocol.unsubscribe(subscription.topic, operation_id=subscription.operation_id)
+        channel = self._channel_of.pop(subscription.operation_id)
+        channel.end_standing(subscription.operation_id, text)
+
+    def _take(self, event: Event) -> None:
+        match event:
+            case Published():
+                subscription = self._subscriptions.get(event.topic)
+                if subscription is not None:
+                    subscription.take(event.message)
+            case GoalFedBack():
+                known = self._goals.get(event.goal_id)
+                if known is not None:
+                    known[0].take_feedback(event.values)
+            case GoalEnded():
+                known = self._goals.pop(event.goal_id, None)
+                if known is not None:
+                    known[0].take_end(event)
+            case StatusNoted():
+                self.remarks.append(f"{event.level}: {event.text}")
+            case FrameRefused():
+                self.n_frames_refused += 1
+                self.remarks.append(f"refused: {event.reason}")
+
+    def _lose_goals(self, channel: Channel) -> None:
+        lost = [goal for goal, carrier in self._goals.values() if carrier is channel]
+        for goal in lost:
+            del self._goals[goal.goal_id]
+            goal.take_loss()
+
+
+@asynccontextmanager
+async def open_client(
+    address: RobotAddress, *, timing: Timing = USUAL_TIMING
+) -> AsyncGenerator[RosbridgeClient]:
+    """Keeps a robot connected while the context lasts.
+
+    Raises:
+        LinkError: It cannot be reached.
+    """
+    client = RosbridgeClient(address, timing=timing)
+    with _plain_errors():
+        async with anyio.create_task_group() as tasks:
+            await client.start(tasks)
+            try:
+                yield client
+            finally:
+                with anyio.CancelScope(shield=True):
+                    await client.aclose()
+                tasks.cancel_scope.cancel()
+
+
+@contextmanager
+def _plain_errors() -> Iterator[None]:
+    """Lets an error pass as it was raised, out of the group that a task group makes of it."""
+    try:
+        yield
+    except BaseExceptionGroup as group:
+        error: BaseException = group
+        while isinstance(error, BaseExceptionGroup) and len(error.exceptions) == 1:
+            error = error.exceptions[0]
+        raise error from error.__cause__

@@ -1,0 +1,53 @@
+"""The rosbridge protocol without I/O: frames in, events out; operations as text."""
+
+from mapspeak.links.rosbridge.protocol.conversation import Conversation
+from mapspeak.links.rosbridge.protocol.decoding import MAX_FRAME_BYTES
+from mapspeak.links.rosbridge.protocol.events import (
+    Event,
+    FrameRefused,
+    GoalEnded,
+    GoalFedBack,
+    Published,
+    ServiceAnswered,
+    StatusNoted,
+)
+from mapspeak.links.rosbridge.protocol.operations import (
+    NAME,
+    TYPE,
+    Encoding,
+    advertise,
+    authenticate,
+    call_service,
+    cancel_action_goal,
+    new_id,
+    publish,
+    send_action_goal,
+    subscribe,
+    unadvertise,
+    unsubscribe,
+)
+
+__all__ = [
+    "MAX_FRAME_BYTES",
+    "NAME",
+    "TYPE",
+    "Conversation",
+    "Encoding",
+    "Event",
+    "FrameRefused",
+    "GoalEnded",
+    "GoalFedBack",
+    "Published",
+    "ServiceAnswered",
+    "StatusNoted",
+    "advertise",
+    "authenticate",
+    "call_service",
+    "cancel_action_goal",
+    "new_id",
+    "publish",
+    "send_action_goal",
+    "subscribe",
+    "unadvertise",
+    "unsubscribe",
+]

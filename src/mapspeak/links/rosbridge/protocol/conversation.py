@@ -1,0 +1,139 @@
+"""One connection's talk, as far as it has a memory: frames in, events out, never an exception."""
+
+from typing import Any
+
+from mapspeak.links.rosbridge.protocol.decoding import (
+    MAX_FRAME_BYTES,
+    FrameError,
+    decode_cbor,
+    decode_json,
+    decode_png,
+)
+from mapspeak.links.rosbridge.protocol.events import (
+    Event,
+    FrameRefused,
+    GoalEnded,
+    GoalFedBack,
+    Published,
+    ServiceAnswered,
+    StatusNoted,
+)
+from mapspeak.links.rosbridge.protocol.fragments import FragmentStore
+
+MAX_WRAPPINGS = 3
+"""A fragmented png is two layers of wrapping; nothing needs more."""
+MAX_REASON_LENGTH = 200
+
+
+class Conversation:
+    """Understands what a rosbridge server sends over one connection.
+
+    Args:
+        max_bytes: The largest message that is taken, whole or in pieces.
+    """
+
+    def __init__(self, *, max_bytes: int = MAX_FRAME_BYTES) -> None:
+        self._max_bytes = max_bytes
+        self._fragments = FragmentStore(max_bytes=max_bytes)
+
+    @property
+    def n_characters_held(self) -> int:
+        """Of messages that have come in part."""
+        return self._fragments.n_characters
+
+    def receive_text(self, frame: bytes) -> Event | None:
+        """Gives what a text frame (JSON, UTF-8) says; None while the message is incomplete."""
+        try:
+            return self._understand(self._checked(frame, decode_json), n_wrappings=0)
+        except FrameError as error:
+            return FrameRefused(str(error)[:MAX_REASON_LENGTH])
+
+    def receive_binary(self, frame: bytes) -> Event | None:
+        """Gives what a binary frame (CBOR) says; None while the message is incomplete."""
+        try:
+            return self._understand(self._checked(frame, decode_cbor), n_wrappings=0)
+        except FrameError as error:
+            return FrameRefused(str(error)[:MAX_REASON_LENGTH])
+
+    def _checked(self, frame: bytes, decode: Any) -> Any:  # noqa: ANN401 - ROS data enters here
+        if len(frame) > self._max_bytes:
+            raise FrameError(f"a frame of {len(frame)} bytes, the limit is {self._max_bytes}")
+        return decode(frame)
+
+    def _understand(self, operation: Any, *, n_wrappings: int) -> Event | None:  # noqa: ANN401
+        if not isinstance(operation, dict):
+            raise FrameError(f"no rosbridge operation: {type(operation).__name__}")
+        match operation.get("op"):
+            case "publish":
+                return _published(operation)
+            case "service_response":
+                return _service_answered(operation)
+            case "action_feedback":
+                return _goal_fed_back(operation)
+            case "action_result":
+                return _goal_ended(operation)
+            case "status":
+                return _status_noted(operation)
+            case "fragment" | "png" if n_wrappings < MAX_WRAPPINGS:
+                return self._unwrap(operation, n_wrappings=n_wrappings + 1)
+            case other:
+                raise FrameError(f"an operation {str(other)[:40]!r} that is not known")
+
+    def _unwrap(self, operation: dict[str, Any], *, n_wrappings: int) -> Event | None:
+        if operation["op"] == "fragment":
+            text = self._fragments.add(operation)
+            if text is None:
+                return None
+            frame = text.encode("utf-8", "surrogatepass")
+        else:
+            frame = decode_png(_text(operation, "data"))
+        return self._understand(self._checked(frame, decode_json), n_wrappings=n_wrappings)
+
+
+def _published(operation: dict[str, Any]) -> Published:
+    message = operation.get("msg")
+    if not isinstance(message, dict):
+        raise FrameError("a publication without a message")
+    return Published(topic=_text(operation, "topic"), message=message)
+
+
+def _service_answered(operation: dict[str, Any]) -> ServiceAnswered:
+    return ServiceAnswered(
+        call_id=_text(operation, "id"),
+        # Old servers do not say; they answered only what succeeded.
+        is_success=operation.get("result", True) is True,
+        values=operation.get("values", {}),
+    )
+
+
+def _goal_fed_back(operation: dict[str, Any]) -> GoalFedBack:
+    values = operation.get("values")
+    if not isinstance(values, dict):
+        raise FrameError("feedback without values")
+    return GoalFedBack(goal_id=_text(operation, "id"), values=values)
+
+
+def _goal_ended(operation: dict[str, Any]) -> GoalEnded:
+    status = operation.get("status")
+    return GoalEnded(
+        goal_id=_text(operation, "id"),
+        status=status if isinstance(status, int) and not isinstance(status, bool) else None,
+        is_result=operation.get("result", True) is True,
+        values=operation.get("values", {}),
+    )
+
+
+def _status_noted(operation: dict[str, Any]) -> StatusNoted:
+    operation_id = operation.get("id")
+    return StatusNoted(
+        level=str(operation.get("level"))[:40],
+        text=str(operation.get("msg"))[:MAX_REASON_LENGTH],
+        operation_id=operation_id if isinstance(operation_id, str) else None,
+    )
+
+
+def _text(operation: dict[str, Any], key: str) -> str:
+    value = operation.get(key)
+    if not isinstance(value, str):
+        raise FrameError(f"a {operation['op']} without {key}")
+    return value

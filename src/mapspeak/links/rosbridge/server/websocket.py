@@ -1,0 +1,136 @@
+"""One client's websocket, on a byte stream: the library speaks the protocol, this moves bytes."""
+
+import anyio
+from anyio.abc import ByteStream
+from websockets.exceptions import ProtocolError
+from websockets.extensions.permessage_deflate import ServerPerMessageDeflateFactory
+from websockets.frames import CloseCode, Frame, Opcode
+from websockets.http11 import Request
+from websockets.protocol import State
+from websockets.server import ServerProtocol
+
+__all__ = ["WebSocket"]
+
+LONGEST_MESSAGE = 10_000_000
+"""What rosbridge takes in at most, unless told otherwise."""
+FRAME_LENGTH = 1 << 18
+"""A long message leaves in frames of this length: compressing one must not hold up the others."""
+HANDSHAKE_TIMEOUT_S = 10.0
+CLOSING_TIMEOUT_S = 1.0
+
+
+class WebSocket:
+    """The server's end of one connection."""
+
+    def __init__(self, stream: ByteStream) -> None:
+        self._stream = stream
+        compression = ServerPerMessageDeflateFactory(compress_settings={"level": 1})
+        self._protocol = ServerProtocol(extensions=[compression], max_size=LONGEST_MESSAGE)
+        self._flushing = anyio.Lock()
+        self._sending = anyio.Lock()
+        self._frames: list[Frame] = []
+
+    async def accept(self) -> bool:
+        """Shakes hands; False when the other end is no websocket client."""
+        with anyio.move_on_after(HANDSHAKE_TIMEOUT_S):
+            while self._protocol.state is State.CONNECTING and await self._read():
+                for event in self._protocol.events_received():
+                    if isinstance(event, Request):
+                        self._protocol.send_response(self._protocol.accept(event))
+                await self._flush()
+                if self._protocol.handshake_exc is not None:
+                    break
+        return self._protocol.state is State.OPEN
+
+    async def receive(self) -> str | bytes | None:
+        """Gives the next message; None when there will be no more."""
+        parts: list[Frame] = []
+        while (frame := await self._next_frame()) is not None:
+            if frame.opcode in (Opcode.TEXT, Opcode.BINARY, Opcode.CONT):
+                parts.append(frame)
+            if parts and parts[-1].fin:
+                data = b"".join(part.data for part in parts)
+                if parts[0].opcode is Opcode.BINARY:
+                    return data
+                text = _decode(data)
+                if text is not None:
+                    return text
+                self._protocol.fail(CloseCode.INVALID_DATA)
+                await self._flush()
+                return None
+        return None
+
+    async def send(self, message: bytes, *, is_text: bool) -> None:
+        """Sends one message; returns when the network has taken it.
+
+        Raises:
+            anyio.BrokenResourceError: The connection is gone.
+        """
+        async with self._sending:
+            for start in range(0, max(len(message), 1), FRAME_LENGTH):
+                part = message[start : start + FRAME_LENGTH]
+                self._send_frame(
+                    part,
+                    is_text=is_text,
+                    is_first=start == 0,
+                    is_last=start + FRAME_LENGTH >= len(message),
+                )
+                await self._flush()
+
+    async def close(self) -> None:
+        """Says goodbye, and hangs up without waiting long for an answer."""
+        with anyio.move_on_after(CLOSING_TIMEOUT_S, shield=True):
+            try:
+                if self._protocol.state is State.OPEN:
+                    self._protocol.send_close(CloseCode.GOING_AWAY)
+                await self._flush()
+            except (anyio.BrokenResourceError, anyio.ClosedResourceError):
+                pass
+            await self._stream.aclose()
+
+    def _send_frame(self, part: bytes, *, is_text: bool, is_first: bool, is_last: bool) -> None:
+        if self._protocol.state is not State.OPEN:
+            raise anyio.BrokenResourceError
+        if not is_first:
+            self._protocol.send_continuation(part, is_last)
+        elif is_text:
+            self._protocol.send_text(part, is_last)
+        else:
+            self._protocol.send_binary(part, is_last)
+
+    async def _next_frame(self) -> Frame | None:
+        while not self._frames:
+            if not await self._read():
+                return None
+            events = self._protocol.events_received()
+            self._frames = [event for event in events if isinstance(event, Frame)]
+            await self._flush()
+        return self._frames.pop(0)
+
+    async def _read(self) -> bool:
+        """Takes in what has arrived; False when the other end has hung up."""
+        try:
+            data = await self._stream.receive()
+        except (anyio.EndOfStream, anyio.BrokenResourceError, anyio.ClosedResourceError):
+            self._protocol.receive_eof()
+            return False
+        try:
+            self._protocol.receive_data(data)
+        except ProtocolError:
+            return False
+        return True
+
+    async def _flush(self) -> None:
+        async with self._flushing:
+            for data in self._protocol.data_to_send():
+                if data:
+                    await self._stream.send(data)
+                else:
+                    await self._stream.send_eof()
+
+
+def _decode(data: bytes) -> str | None:
+    try:
+        return data.decode()
+    except UnicodeDecodeError:
+        return None

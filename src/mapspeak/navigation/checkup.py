@@ -1,0 +1,98 @@
+"""What a robot really gives when it is asked, and what is missing before it can be used."""
+
+import math
+from collections.abc import Awaitable, Callable
+
+from mapspeak.errors import LinkError, MapError
+from mapspeak.robot import Finding, Health, Robot
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.paths import clearance_m
+
+__all__ = ["examine"]
+
+OLD_POSE_S = 5.0
+"""A pose older than this is no answer to where a driving robot is."""
+
+
+async def examine(robot: Robot) -> tuple[Finding, ...]:
+    """Asks a robot for its map, its pose and a picture, and judges what comes."""
+    found = [await _ask("map", lambda: _look_at_map(robot))]
+    found.append(await _ask("pose", lambda: _look_at_pose(robot)))
+    if found[0].health is not Health.MISSING and found[1].health is not Health.MISSING:
+        found.append(await _ask("place", lambda: _look_at_place(robot)))
+    if robot.description.has_camera:
+        found.append(await _ask("picture", lambda: _look_at_picture(robot)))
+    return tuple(found)
+
+
+async def _ask(what: str, look: Callable[[], Awaitable[Finding]]) -> Finding:
+    try:
+        return await look()
+    except (LinkError, MapError) as error:
+        return Finding(what=what, health=Health.MISSING, said=error.message, hint=error.hint)
+
+
+async def _look_at_map(robot: Robot) -> Finding:
+    grid = await robot.fetch_map()
+    free_m2 = float(grid.free.sum()) * grid.resolution_m**2
+    size = f"{grid.width_m:.1f} x {grid.height_m:.1f} m in cells of {grid.resolution_m:g} m"
+    said = f"{size}, {free_m2:.1f} m2 of free floor"
+    if free_m2 > 0:
+        return Finding(what="map", health=Health.FINE, said=said)
+    return Finding(
+        what="map",
+        health=Health.DOUBTFUL,
+        said=said,
+        hint="Let SLAM see something: check that the laser publishes.",
+    )
+
+
+async def _look_at_pose(robot: Robot) -> Finding:
+    stamped = await robot.fetch_pose()
+    pose, age_s = stamped.pose, max(robot.now_s - stamped.stamp_s, 0.0)
+    said = f"x {pose.x:.2f}, y {pose.y:.2f}, yaw {pose.yaw_deg:.0f} deg, {age_s:.1f} s old"
+    if age_s <= OLD_POSE_S:
+        return Finding(what="pose", health=Health.FINE, said=said)
+    return Finding(
+        what="pose",
+        health=Health.DOUBTFUL,
+        said=said,
+        hint="Check that SLAM or AMCL runs, and that the clocks agree (use_sim_time, NTP).",
+    )
+
+
+async def _look_at_place(robot: Robot) -> Finding:
+    grid = await robot.fetch_map()
+    cell = grid.cell_at((await robot.fetch_pose()).pose.point)
+    if not grid.contains(cell):
+        return _misplaced("the robot stands off its map")
+    if grid.occupied[cell.row, cell.col]:
+        return _misplaced("the robot stands in a wall of its map")
+    clear_m, radius_m = _clearance_at(grid, cell.row, cell.col), robot.description.radius_m
+    if clear_m < radius_m:
+        return _misplaced(
+            f"the robot stands {clear_m:.2f} m from an obstacle, its radius is {radius_m:.2f} m"
+        )
+    room = "no obstacle known" if math.isinf(clear_m) else f"{clear_m:.2f} m to any obstacle"
+    return Finding(what="place", health=Health.FINE, said=f"on its map, {room}")
+
+
+def _clearance_at(grid: OccupancyGrid, row: int, col: int) -> float:
+    return float(clearance_m(grid)[row, col])
+
+
+def _misplaced(said: str) -> Finding:
+    return Finding(
+        what="place",
+        health=Health.DOUBTFUL,
+        said=said,
+        hint="Set the initial pose, or the robot's radius_m in robot.yaml.",
+    )
+
+
+async def _look_at_picture(robot: Robot) -> Finding:
+    picture = await robot.fetch_picture()
+    size = f"{picture.width_px} x {picture.height_px} px, {len(picture.data) / 1000:.0f} kB"
+    fov_rad = picture.horizontal_fov_rad
+    wide = ", angle unknown" if fov_rad is None else f", {math.degrees(fov_rad):.0f} deg wide"
+    return Finding(what="picture", health=Health.FINE, said=f"{picture.media_type}, {size}{wide}")

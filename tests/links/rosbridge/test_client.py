@@ -1,0 +1,375 @@
+"""The rosbridge client: one robot, two sockets, whatever the network does."""
+
+from collections.abc import AsyncGenerator
+from contextlib import asynccontextmanager
+
+import anyio
+import orjson
+import pytest
+
+from mapspeak.errors import ConfigError, LinkError
+from mapspeak.links.rosbridge.client import RobotAddress, RosbridgeClient, Timing, open_client
+from rosbridge_script import (
+    PATIENCE_S,
+    Operation,
+    ScriptedServer,
+    Visitor,
+    answering_with,
+    running,
+)
+
+pytestmark = pytest.mark.anyio
+
+QUICK = Timing(first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0)
+TWIST = "geometry_msgs/msg/Twist"
+
+
+@asynccontextmanager
+async def connected(
+    server: ScriptedServer, timing: Timing = QUICK
+) -> AsyncGenerator[RosbridgeClient]:
+    with anyio.fail_after(PATIENCE_S):
+        async with (
+            running(server),
+            open_client(RobotAddress(url=server.url), timing=timing) as client,
+        ):
+            yield client
+
+
+async def echo(visitor: Visitor, call: Operation) -> None:
+    await visitor.answer(call, call["args"])
+
+
+async def refuse(visitor: Visitor, call: Operation) -> None:
+    await visitor.answer(call, "service does not exist", is_success=False)
+
+
+def is_whole(server: ScriptedServer) -> bool:
+    """True when both sockets are there, and one has subscribed."""
+    present = server.present
+    return len(present) == 2 and any(each.asked("subscribe") for each in present)
+
+
+async def fails_with(address: RobotAddress) -> LinkError:
+    with pytest.raises(LinkError) as raised:
+        async with open_client(address, timing=QUICK):
+            pass
+    return raised.value
+
+
+async def test_a_call_is_answered() -> None:
+    async with connected(ScriptedServer({"call_service": echo})) as client:
+        assert await client.call_service("/add", {"a": 1}) == {"a": 1}
+
+
+async def test_a_robot_is_reached_over_two_sockets_however_much_is_asked() -> None:
+    server = ScriptedServer({"call_service": echo})
+    async with connected(server) as client:
+        for number in range(50):
+            client.subscribe(f"/topic_{number}")
+            await client.call_service("/add", {"a": number})
+    assert len(server.visitors) == 2
+
+
+async def test_answers_find_their_calls_in_whatever_order_they_come() -> None:
+    waiting: list[tuple[Visitor, Operation]] = []
+
+    async def answer_the_last_first(visitor: Visitor, call: Operation) -> None:
+        waiting.append((visitor, call))
+        if len(waiting) == 20:
+            for each, its_call in reversed(waiting):
+                await echo(each, its_call)
+
+    async with connected(ScriptedServer({"call_service": answer_the_last_first})) as client:
+        values: dict[int, dict[str, object]] = {}
+
+        async def ask(number: int) -> None:
+            values[number] = await client.call_service("/add", {"a": number})
+
+        async with anyio.create_task_group() as tasks:
+            for number in range(20):
+                tasks.start_soon(ask, number)
+    assert values == {number: {"a": number} for number in range(20)}
+
+
+async def test_a_refused_call_says_why() -> None:
+    async with connected(ScriptedServer({"call_service": refuse})) as client:
+        with pytest.raises(LinkError, match="/add failed: service does not exist"):
+            await client.call_service("/add")
+
+
+async def test_a_silent_service_ends_the_wait_and_not_the_connection() -> None:
+    server = ScriptedServer()
+    async with connected(server) as client:
+        heard = client.subscribe("/slow")
+        with pytest.raises(LinkError, match="did not answer within"):
+            await client.call_service("/never", timeout_s=0.01)
+        await server.publish("/slow", {"data": 1})
+        assert await heard.wait_for_more_than(0, timeout_s=PATIENCE_S) == {"data": 1}
+        assert client.n_connections == 1
+
+
+async def test_behind_a_call_that_is_stuck_the_next_is_answered_over_a_fresh_socket() -> None:
+    async def answer_unless_stuck(visitor: Visitor, call: Operation) -> None:
+        is_stuck = any(each["service"] == "/never" for each in visitor.asked("call_service"))
+        if not is_stuck:
+            await echo(visitor, call)
+
+    async with connected(ScriptedServer({"call_service": answer_unless_stuck})) as client:
+        with pytest.raises(LinkError):
+            await client.call_service("/never", timeout_s=0.01)
+        assert await client.call_service("/add", {"a": 1}) == {"a": 1}
+
+
+async def test_a_topic_much_slower_than_the_wait_is_read_over_one_subscription() -> None:
+    # Fault 1 of the field: a receive limit closed the socket, and the subscription with it.
+    server = ScriptedServer()
+    async with connected(server) as client:
+        slow = client.subscribe("/slow")
+        for _ in range(3):
+            with pytest.raises(LinkError, match="No message came on /slow"):
+                await slow.wait_for_more_than(0, timeout_s=0.01)
+        await server.publish("/slow", {"data": "at last"})
+        assert await slow.wait_for_more_than(0, timeout_s=PATIENCE_S) == {"data": "at last"}
+    assert len(server.asked("subscribe")) == 1
+    assert len(server.visitors) == 2
+
+
+async def test_the_latest_message_wins() -> None:
+    server = ScriptedServer()
+    async with connected(server) as client:
+        heard = client.subscribe("/pose")
+        await server.until(lambda: server.asked("subscribe"))
+        for number in range(100):
+            await server.publish("/pose", {"data": number})
+        latest = await heard.wait_for_more_than(99, timeout_s=PATIENCE_S)
+    assert latest == {"data": 99}
+
+
+async def test_two_users_of_a_topic_share_one_subscription() -> None:
+    server = ScriptedServer()
+    async with connected(server) as client:
+        first, second = client.subscribe("/map"), client.subscribe("/map")
+        client.unsubscribe(first)
+        await server.until(lambda: server.asked("subscribe"))
+        await server.publish("/map", {"data": 1})
+        await second.wait_for_more_than(0, timeout_s=PATIENCE_S)
+        client.unsubscribe(second)
+        await server.until(lambda: server.asked("unsubscribe"))
+    assert len(server.asked("subscribe")) == len(server.asked("unsubscribe")) == 1
+
+
+async def test_after_a_loss_everything_is_as_it_was() -> None:
+    server = ScriptedServer({"call_service": echo})
+    async with connected(server) as client:
+        heard = client.subscribe("/pose")
+        client.advertise("/cmd_vel", type_name=TWIST)
+        await server.until(lambda: server.asked("subscribe"))
+        await server.drop_all()
+        await server.until(lambda: len(server.asked("subscribe")) == 2)
+        await server.publish("/pose", {"data": 2})
+        assert await heard.wait_for_more_than(0, timeout_s=PATIENCE_S) == {"data": 2}
+        assert await client.call_service("/add", {"a": 1}) == {"a": 1}
+        await client.publish("/cmd_vel", {"linear": {"x": 0.1}})
+        await server.until(lambda: server.asked("publish"))
+        publisher = next(each for each in server.visitors if each.asked("publish"))
+        assert publisher.asked("advertise")
+        assert publisher.number >= 2
+
+
+async def test_what_was_ended_is_not_begun_again_after_a_loss() -> None:
+    server = ScriptedServer({"call_service": echo})
+    async with connected(server) as client:
+        client.unsubscribe(client.subscribe("/camera"))
+        client.subscribe("/pose")
+        await server.until(lambda: len(server.asked("subscribe")) == 2)
+        await server.drop_all()
+        await server.until(lambda: len(server.asked("subscribe")) == 3)
+    assert server.asked("subscribe")[-1]["topic"] == "/pose"
+
+
+async def test_a_call_under_way_when_the_connection_goes_is_an_error_at_once() -> None:
+    async def vanish(visitor: Visitor, _call: Operation) -> None:
+        await visitor.drop()
+
+    async with connected(ScriptedServer({"call_service": vanish})) as client:
+        with pytest.raises(LinkError, match="was lost while /add was asked"):
+            await client.call_service("/add", timeout_s=PATIENCE_S)
+
+
+async def test_a_server_that_comes_back_later_is_found_again() -> None:
+    server = ScriptedServer({"call_service": echo})
+    async with connected(server) as client:
+        server.hangs_up = True
+        await server.drop_all()
+        with pytest.raises(LinkError, match="was lost"):
+            await client.call_service("/add", timeout_s=0.05)
+        server.hangs_up = False
+        assert await client.call_service("/add", {"a": 2}, timeout_s=PATIENCE_S) == {"a": 2}
+
+
+async def test_a_hundred_losses_leave_no_socket_behind() -> None:
+    server = ScriptedServer({"call_service": echo})
+    async with connected(server) as client:
+        client.subscribe("/pose")
+        for _ in range(100):
+            await server.until(lambda: is_whole(server))
+            await server.drop_all()
+        await server.until(lambda: is_whole(server))
+        assert await client.call_service("/add", {"a": 1}, timeout_s=PATIENCE_S) == {"a": 1}
+        assert len(server.visitors) == 202
+
+
+async def test_a_socket_without_a_sign_of_life_is_replaced() -> None:
+    server = ScriptedServer(answers_pings=True)
+    timing = Timing(
+        connect_s=0.2,
+        ping_s=0.01,
+        silence_s=0.05,
+        first_pause_s=0.001,
+        linger_s=0.0,
+        goodbye_s=0.01,
+    )
+    async with connected(server, timing) as client:
+        client.subscribe("/pose")
+        await server.until(lambda: server.asked("subscribe"))
+        server.answers_pings = False
+        await server.until(lambda: len(server.visitors) >= 3)
+        server.answers_pings = True
+        await server.until(lambda: len(server.asked("subscribe")) >= 2)
+
+
+async def test_garbage_is_counted_and_the_talk_goes_on() -> None:
+    server = ScriptedServer()
+    async with connected(server) as client:
+        heard = client.subscribe("/pose")
+        await server.until(lambda: server.asked("subscribe"))
+        for visitor in server.present:
+            await visitor.send_text(b"{no json")
+            await visitor.send_binary(b"\xff\x00")
+            await visitor.send_text(b"[]")
+            await visitor.send({"op": "publish", "topic": "/nobody/asked", "msg": {}})
+        await server.publish("/pose", {"data": 1})
+        assert await heard.wait_for_more_than(0, timeout_s=PATIENCE_S) == {"data": 1}
+        assert client.n_frames_refused >= 3
+        assert client.n_connections == 1
+
+
+async def test_bytes_that_are_no_websocket_frames_cost_the_socket_and_nothing_else() -> None:
+    server = ScriptedServer({"call_service": echo})
+    async with connected(server) as client:
+        heard = client.subscribe("/pose")
+        await server.until(lambda: server.asked("subscribe"))
+        for visitor in server.present:
+            await visitor.send_raw(b"\xff" * 20)
+        await server.until(lambda: len(server.asked("subscribe")) == 2)
+        await server.publish("/pose", {"data": 1})
+        assert await heard.wait_for_more_than(0, timeout_s=PATIENCE_S) == {"data": 1}
+
+
+async def test_a_frame_cut_off_by_a_loss_is_not_taken_for_a_message() -> None:
+    server = ScriptedServer()
+    async with connected(server) as client:
+        heard = client.subscribe("/pose")
+        await server.until(lambda: server.asked("subscribe"))
+        text = orjson.dumps({"op": "publish", "topic": "/pose", "msg": {"data": 1}})
+        for visitor in server.present:
+            await visitor.send_raw(bytes([0x81, len(text)]) + text[:-5])
+            await visitor.drop()
+        await server.until(lambda: len(server.asked("subscribe")) == 2)
+        assert heard.n_received == 0
+        await server.publish("/pose", {"data": 2})
+        assert await heard.wait_for_more_than(0, timeout_s=PATIENCE_S) == {"data": 2}
+
+
+async def test_the_last_publication_arrives_before_the_connection_closes() -> None:
+    server = ScriptedServer()
+    async with connected(server) as client:
+        client.advertise("/cmd_vel", type_name=TWIST)
+        await client.publish("/cmd_vel", {"linear": {"x": 0.0}})
+    assert server.asked("publish") == [
+        {"op": "publish", "topic": "/cmd_vel", "msg": {"linear": {"x": 0.0}}}
+    ]
+
+
+async def test_an_error_of_the_user_comes_out_as_it_was_raised() -> None:
+    async with running(ScriptedServer()) as server:
+        with pytest.raises(LinkError, match="mine"):
+            async with open_client(RobotAddress(url=server.url), timing=QUICK):
+                raise LinkError("mine", hint="")
+
+
+async def test_nobody_at_the_port_is_said_with_how_to_start_rosbridge() -> None:
+    server = ScriptedServer()
+    async with running(server):
+        pass
+    error = await fails_with(RobotAddress(url=server.url))
+    assert "Nothing listens at ws://127.0.0.1:" in error.message
+    assert "rosbridge_websocket_launch.xml" in error.hint
+
+
+async def test_a_name_that_nobody_knows_is_said() -> None:
+    error = await fails_with(RobotAddress(url="ws://no-such-robot.invalid"))
+    assert "'no-such-robot.invalid'" in error.message
+
+
+@pytest.mark.parametrize(
+    ("data", "told"),
+    [
+        (b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\nhi", "HTTP status 200"),
+        (b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n", "HTTP status 404"),
+        (b"SSH-2.0-OpenSSH_9.6\r\n", "something else than a websocket"),
+        (b"", "hung up"),
+    ],
+)
+async def test_something_else_at_the_port_is_said(data: bytes, told: str) -> None:
+    async with answering_with(data) as url:
+        error = await fails_with(RobotAddress(url=url))
+    assert "is not a rosbridge server" in error.message
+    assert told in error.message
+    assert "9090" in error.hint
+
+
+async def test_a_server_that_wants_a_token_is_said() -> None:
+    async with answering_with(b"HTTP/1.1 401 Unauthorized\r\nContent-Length: 0\r\n\r\n") as url:
+        error = await fails_with(RobotAddress(url=url))
+    assert "does not let us in" in error.message
+    assert "token" in error.hint
+
+
+async def test_a_token_goes_into_the_header_or_ahead_of_everything_else() -> None:
+    server = ScriptedServer({"call_service": echo})
+    async with running(server):
+        address = RobotAddress(
+            url=server.url,
+            headers={"Authorization": "Bearer secret"},
+            token="open sesame",  # noqa: S106 - a fairy tale
+        )
+        async with open_client(address, timing=QUICK) as client:
+            await client.call_service("/add")
+    for visitor in server.visitors:
+        assert visitor.request is not None
+        assert visitor.request.headers["Authorization"] == "Bearer secret"
+        assert visitor.operations[0] == {"op": "auth", "token": "open sesame"}
+    assert "secret" not in repr(address)
+    assert "sesame" not in repr(address)
+
+
+@pytest.mark.parametrize(
+    ("url", "shown"),
+    [
+        ("ws://robot", "ws://robot:9090"),
+        ("ws://robot:8080/path", "ws://robot:8080"),
+        ("wss://user:secret@robot", "wss://robot:9090"),
+        ("ws://[fe80::1]", "ws://[fe80::1]:9090"),
+        ("ws://[fe80::1]:80", "ws://[fe80::1]:80"),
+    ],
+)
+def test_an_address_has_the_usual_port_and_shows_no_password(url: str, shown: str) -> None:
+    assert RobotAddress(url=url).shown == shown
+
+
+@pytest.mark.parametrize("url", ["", "robot:9090", "http://robot", "ws://", "ws://robot:port"])
+def test_what_is_no_address_is_refused(url: str) -> None:
+    with pytest.raises(ConfigError, match="not the address"):
+        RobotAddress(url=url)

@@ -1,0 +1,351 @@
+"""The rosbridge protocol: frames in, events out, whatever is sent."""
+
+import base64
+import io
+import json
+import math
+from typing import Any
+
+import cbor2
+import numpy as np
+import orjson
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from mapspeak.errors import LinkError
+from mapspeak.links.rosbridge import protocol
+from mapspeak.links.rosbridge.protocol import (
+    Conversation,
+    Encoding,
+    Event,
+    FrameRefused,
+    GoalEnded,
+    GoalFedBack,
+    Published,
+    ServiceAnswered,
+    StatusNoted,
+)
+
+
+def frame(operation: dict[str, Any]) -> bytes:
+    return orjson.dumps(operation)
+
+
+def published(event: Event | None) -> Published:
+    assert isinstance(event, Published)
+    return event
+
+
+def refused(event: Event | None) -> str:
+    assert isinstance(event, FrameRefused)
+    return event.reason
+
+
+def pieces_of(text: str, n_pieces: int, *, total: float | None = None) -> list[bytes]:
+    size = math.ceil(len(text) / n_pieces)
+    return [
+        frame(
+            {
+                "op": "fragment",
+                "id": 0,
+                "data": text[index * size : (index + 1) * size],
+                "num": index,
+                "total": n_pieces if total is None else total,
+            }
+        )
+        for index in range(n_pieces)
+    ]
+
+
+def as_png(text: bytes) -> str:
+    side = math.ceil(math.sqrt(len(text) / 3))
+    filled = text.ljust(side * side * 3, b"\n")
+    encoded = io.BytesIO()
+    Image.frombytes("RGB", (side, side), filled).save(encoded, format="PNG")
+    return base64.b64encode(encoded.getvalue()).decode()
+
+
+HELLO = {"op": "publish", "topic": "/greeting", "msg": {"data": "hello"}}
+
+
+def test_a_publication_says_its_topic_and_its_message() -> None:
+    event = published(Conversation().receive_text(frame(HELLO)))
+    assert event.topic == "/greeting"
+    assert event.message == {"data": "hello"}
+
+
+def test_slashes_may_be_escaped() -> None:
+    text = rb'{"op": "publish", "topic": "\/map", "msg": {}}'
+    assert published(Conversation().receive_text(text)).topic == "/map"
+
+
+def test_answers_carry_the_id_of_their_call() -> None:
+    conversation = Conversation()
+    good = {"op": "service_response", "id": "b", "values": {"sum": 3}, "result": True}
+    bad = {"op": "service_response", "id": "a", "values": "no such service", "result": False}
+    assert conversation.receive_text(frame(good)) == ServiceAnswered(
+        call_id="b", is_success=True, values={"sum": 3}
+    )
+    assert conversation.receive_text(frame(bad)) == ServiceAnswered(
+        call_id="a", is_success=False, values="no such service"
+    )
+
+
+def test_only_the_status_of_an_action_says_how_it_ended() -> None:
+    aborted = {
+        "op": "action_result",
+        "id": "goal",
+        "status": 6,
+        "result": True,
+        "values": {"error_code": 0},
+    }
+    assert Conversation().receive_text(frame(aborted)) == GoalEnded(
+        goal_id="goal", status=6, is_result=True, values={"error_code": 0}
+    )
+
+
+def test_feedback_and_remarks_are_told_apart() -> None:
+    conversation = Conversation()
+    feedback = {"op": "action_feedback", "id": "g", "values": {"distance_remaining": 1.5}}
+    remark = {"op": "status", "level": "error", "msg": "no", "id": "x"}
+    assert conversation.receive_text(frame(feedback)) == GoalFedBack(
+        goal_id="g", values={"distance_remaining": 1.5}
+    )
+    assert conversation.receive_text(frame(remark)) == StatusNoted(
+        level="error", text="no", operation_id="x"
+    )
+
+
+@pytest.mark.parametrize("spelling", ["NaN", "nan", "-nan"])
+def test_not_a_number_is_read_however_it_is_spelled(spelling: str) -> None:
+    text = f'{{"op": "publish", "topic": "/scan", "msg": {{"r": [1.0, {spelling}]}}}}'
+    ranges = published(Conversation().receive_text(text.encode())).message["r"]
+    assert ranges[0] == 1.0
+    assert math.isnan(ranges[1])
+
+
+@pytest.mark.parametrize("spelling", ["Infinity", "inf", "-Infinity", "-inf", "Inf", "+inf"])
+def test_infinity_is_read_however_it_is_spelled(spelling: str) -> None:
+    text = f'{{"op": "publish", "topic": "/scan", "msg": {{"r": {spelling}, "w": "inf, NaN"}}}}'
+    message = published(Conversation().receive_text(text.encode())).message
+    assert message == {"r": float(spelling), "w": "inf, NaN"}
+
+
+@pytest.mark.parametrize(
+    ("tag", "dtype"), [(69, "<u2"), (72, "i1"), (78, "<i4"), (81, ">f4"), (85, "<f4")]
+)
+def test_cbor_typed_arrays_become_numpy_arrays(tag: int, dtype: str) -> None:
+    numbers = np.array([0, 1, 100], dtype=dtype)
+    message = {"data": cbor2.CBORTag(tag, numbers.tobytes())}
+    event = Conversation().receive_binary(
+        cbor2.dumps({"op": "publish", "topic": "/map", "msg": message})
+    )
+    data = published(event).message["data"]
+    assert data.dtype == np.dtype(dtype)
+    assert data.tolist() == [0, 1, 100]
+
+
+def test_a_cbor_array_of_bytes_becomes_bytes() -> None:
+    message = {"data": cbor2.CBORTag(64, b"jpeg")}
+    event = Conversation().receive_binary(
+        cbor2.dumps({"op": "publish", "topic": "/camera", "msg": message})
+    )
+    assert published(event).message == {"data": b"jpeg"}
+
+
+@pytest.mark.parametrize("tag", [2, 28, 35, 258])
+def test_cbor_tags_that_no_message_needs_are_refused(tag: int) -> None:
+    hostile = cbor2.dumps({"op": "publish", "topic": "/x", "msg": cbor2.CBORTag(tag, b"1")})
+    assert "CBOR" in refused(Conversation().receive_binary(hostile))
+
+
+def test_a_long_list_of_whole_numbers_arrives_as_an_array() -> None:
+    cells = [-1, 0, 100] * 20_000
+    message = {"info": {"width": 3}, "data": cells}
+    text = frame({"op": "publish", "topic": "/map", "msg": message})
+    event = published(Conversation().receive_text(text))
+    assert isinstance(event.message["data"], np.ndarray)
+    assert event.message["data"].tolist() == cells
+    assert event.message["info"] == {"width": 3}
+
+
+@pytest.mark.parametrize("spoilt", ["1,,2", "1 2", "--1", "1,", "-", "-,1"])
+def test_a_long_list_with_a_fault_in_it_is_no_message(spoilt: str) -> None:
+    numbers = "0," * 20_000 + spoilt
+    text = f'{{"op": "publish", "topic": "/map", "msg": {{"data": [{numbers}]}}}}'
+    assert "JSON" in refused(Conversation().receive_text(text.encode()))
+
+
+def test_a_long_list_that_belongs_to_another_message_within_is_left_there() -> None:
+    inner = {"data": [1] * 30_000}
+    text = frame({"op": "publish", "topic": "/maps", "msg": {"first": inner, "data": [2]}})
+    assert published(Conversation().receive_text(text)).message == {"first": inner, "data": [2]}
+
+
+def test_pieces_are_put_together_in_any_order_with_a_fraction_for_a_total() -> None:
+    conversation = Conversation()
+    # Measured: 60,058,350 characters in pieces of 10,000,000 come as 7 pieces "of 7.005835".
+    pieces = pieces_of(json.dumps(HELLO), 5, total=5.4027)
+    events = [conversation.receive_text(piece) for piece in [*reversed(pieces[1:]), pieces[0]]]
+    assert events[:-1] == [None] * 4
+    assert published(events[-1]).message == {"data": "hello"}
+    assert conversation.n_characters_held == 0
+
+
+def test_a_piece_that_comes_twice_changes_nothing() -> None:
+    conversation = Conversation()
+    first, second = pieces_of(json.dumps(HELLO), 2)
+    assert conversation.receive_text(first) is None
+    assert conversation.receive_text(first) is None
+    assert published(conversation.receive_text(second)).topic == "/greeting"
+
+
+def test_a_message_cut_short_does_not_spoil_the_next_with_the_same_id() -> None:
+    conversation = Conversation()
+    conversation.receive_text(pieces_of("x" * len(json.dumps(HELLO)), 2)[0])
+    events = [conversation.receive_text(piece) for piece in pieces_of(json.dumps(HELLO), 2)]
+    assert published(events[-1]).topic == "/greeting"
+
+
+def test_pieces_that_are_never_complete_do_not_fill_the_memory() -> None:
+    conversation = Conversation(max_bytes=10_000)
+    for number in range(1_000):
+        piece = {"op": "fragment", "id": number, "num": 0, "total": 2, "data": "x" * 1_000}
+        assert conversation.receive_text(frame(piece)) is None
+        assert conversation.n_characters_held <= 10_000
+
+
+@pytest.mark.parametrize("total", [0, 0.9, -1, 1e300, "3", None, True])
+def test_a_piece_of_an_impossible_whole_is_refused(total: object) -> None:
+    piece = {"op": "fragment", "id": 0, "num": 0, "total": total, "data": "x"}
+    assert "fragment" in refused(Conversation().receive_text(frame(piece)))
+
+
+def test_a_message_in_a_picture_is_read() -> None:
+    wrapped = {"op": "png", "data": as_png(frame(HELLO))}
+    assert published(Conversation().receive_text(frame(wrapped))).message == {"data": "hello"}
+
+
+def test_a_picture_within_a_picture_without_end_is_refused() -> None:
+    wrapped = frame(HELLO)
+    for _ in range(5):
+        wrapped = frame({"op": "png", "data": as_png(wrapped)})
+    assert "png" in refused(Conversation().receive_text(wrapped))
+
+
+def test_a_frame_beyond_the_limit_is_refused_unread() -> None:
+    text = frame(HELLO)
+    assert "limit" in refused(Conversation(max_bytes=len(text) - 1).receive_text(text))
+
+
+def test_deep_nesting_is_refused() -> None:
+    deep = b'{"op": "publish", "topic": "/x", "msg": {"a": ' + b"[" * 100_000 + b"nan"
+    assert "JSON" in refused(Conversation().receive_text(deep))
+    assert "CBOR" in refused(Conversation().receive_binary(b"\x81" * 100_000))
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
+def test_a_velocity_that_is_no_number_never_reaches_the_robot(number: float) -> None:
+    with pytest.raises(LinkError, match="finite"):
+        protocol.publish("/cmd_vel", {"linear": {"x": number}})
+    with pytest.raises(LinkError, match="NaN"):
+        protocol.publish("/scan", {"ranges": np.array([number])})
+
+
+@pytest.mark.parametrize("name", ["", "/", "no spaces", "/a//b", "/1", "/a;b", "\x00"])
+def test_a_name_that_ros_does_not_take_is_refused_before_it_is_sent(name: str) -> None:
+    with pytest.raises(LinkError, match="not the name"):
+        protocol.publish(name, {})
+
+
+def test_a_subscription_says_what_the_server_needs_and_no_fragment_size() -> None:
+    text = protocol.subscribe(
+        "/map",
+        operation_id="one",
+        type_name="nav_msgs/msg/OccupancyGrid",
+        encoding=Encoding.CBOR,
+        throttle_ms=0,
+    )
+    assert orjson.loads(text) == {
+        "op": "subscribe",
+        "id": "one",
+        "topic": "/map",
+        "type": "nav_msgs/msg/OccupancyGrid",
+        "compression": "cbor",
+    }
+
+
+def test_ids_are_never_the_same() -> None:
+    assert len({protocol.new_id() for _ in range(1_000)}) == 1_000
+
+
+OPERATIONS = st.sampled_from(
+    ["publish", "service_response", "action_feedback", "action_result", "status", "fragment", "png"]
+)
+LEAVES = st.none() | st.booleans() | st.integers(-(2**70), 2**70) | st.floats() | st.text()
+VALUES = st.recursive(
+    LEAVES, lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner), max_leaves=8
+)
+FRAMES = st.fixed_dictionaries(
+    {},
+    optional={
+        "op": OPERATIONS | VALUES,
+        "id": VALUES,
+        "topic": VALUES,
+        "msg": VALUES,
+        "values": VALUES,
+        "status": VALUES,
+        "result": VALUES,
+        "num": VALUES | st.integers(0, 3),
+        "total": VALUES | st.integers(1, 4),
+        "data": VALUES,
+        "level": VALUES,
+    },
+)
+
+
+def check_that_it_is_an_event(event: Event | None) -> None:
+    assert event is None or isinstance(event, Event)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(FRAMES, max_size=6))
+def test_any_operation_gives_an_event_and_never_an_exception(
+    operations: list[dict[str, Any]],
+) -> None:
+    conversation = Conversation(max_bytes=10_000)
+    for operation in operations:
+        check_that_it_is_an_event(conversation.receive_text(json.dumps(operation).encode()))
+        check_that_it_is_an_event(conversation.receive_binary(cbor2.dumps(operation)))
+        assert conversation.n_characters_held <= 10_000
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.binary(max_size=60), max_size=60))
+def test_any_bytes_give_an_event_and_never_an_exception(frames: list[bytes]) -> None:
+    conversation = Conversation(max_bytes=10_000)
+    for each in frames:
+        check_that_it_is_an_event(conversation.receive_text(each))
+        check_that_it_is_an_event(conversation.receive_binary(each))
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(0, 10**6), st.lists(st.integers(0, 255), min_size=1, max_size=4))
+def test_a_damaged_frame_gives_an_event_and_never_an_exception(
+    place: int, damage: list[int]
+) -> None:
+    conversation = Conversation()
+    map_message = {"op": "publish", "topic": "/map", "msg": {"data": cbor2.CBORTag(72, b"abc")}}
+    png = frame({"op": "png", "data": as_png(frame(HELLO))})
+    for whole, receive in (
+        (frame(HELLO), conversation.receive_text),
+        (png, conversation.receive_text),
+        (pieces_of(json.dumps(HELLO), 2)[0], conversation.receive_text),
+        (cbor2.dumps(map_message), conversation.receive_binary),
+    ):
+        start = place % len(whole)
+        spoilt = whole[:start] + bytes(damage) + whole[start + len(damage) :]
+        check_that_it_is_an_event(receive(spoilt))
+        check_that_it_is_an_event(receive(whole[:start]))

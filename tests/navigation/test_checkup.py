@@ -1,0 +1,54 @@
+import pytest
+
+from fakes import FakeRobot, two_rooms
+from mapspeak.geometry import Pose
+from mapspeak.navigation.checkup import examine
+from mapspeak.robot import Finding, Health
+
+pytestmark = pytest.mark.anyio
+
+
+async def _examine(robot: FakeRobot) -> dict[str, Finding]:
+    return {finding.what: finding for finding in await examine(robot)}
+
+
+async def test_a_robot_that_gives_everything_is_fine() -> None:
+    found = await _examine(FakeRobot(two_rooms()))
+    assert {each.health for each in found.values()} == {Health.FINE}
+    assert found.keys() == {"map", "pose", "place", "picture"}
+
+
+async def test_a_robot_without_a_map_is_told_what_to_start() -> None:
+    found = await _examine(FakeRobot(None))
+    assert found["map"].health is Health.MISSING
+    assert "SLAM" in found["map"].hint
+    assert "place" not in found
+
+
+async def test_a_robot_without_a_camera_is_not_asked_for_a_picture() -> None:
+    assert "picture" not in await _examine(FakeRobot(two_rooms(), has_camera=False))
+
+
+@pytest.mark.parametrize(
+    ("pose", "said"),
+    [
+        (Pose(3.3, 0.3), "in a wall"),
+        (Pose(90.0, 0.0), "off its map"),
+    ],
+)
+async def test_a_robot_that_cannot_be_where_it_believes_is_doubted(pose: Pose, said: str) -> None:
+    found = await _examine(FakeRobot(two_rooms(), pose=pose))
+    assert found["place"].health is Health.DOUBTFUL
+    assert said in found["place"].said
+    assert "initial pose" in found["place"].hint
+
+
+async def test_a_pose_that_is_old_is_doubted() -> None:
+    class LateRobot(FakeRobot):
+        @property
+        def now_s(self) -> float:
+            return super().now_s + 60.0
+
+    found = await _examine(LateRobot(two_rooms()))
+    assert found["pose"].health is Health.DOUBTFUL
+    assert "60.0 s old" in found["pose"].said
