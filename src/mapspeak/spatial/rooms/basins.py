@@ -23,6 +23,7 @@ class Saddle:
         second: The basin with the higher number.
         row: Where the pass lies.
         col: Where the pass lies.
+        is_doorway: True between two wall ends, where the height map has been cut.
     """
 
     height: float
@@ -30,6 +31,7 @@ class Saddle:
     second: int
     row: int
     col: int
+    is_doorway: bool = False
 
 
 def build_basins(height: Heights, floor: Picture) -> BasinLabels:

@@ -12,7 +12,7 @@ from mapspeak.spatial.rooms.raster import find_cells
 from mapspeak.spatial.rooms.room_map import RoomClass
 from mapspeak.spatial.rooms.segmentation import Segmentation
 
-CORRIDOR_LADDER = ((3.0, 0), (2.5, 3), (2.0, 4))
+CORRIDOR_LADDER = ((3.0, 0), (2.5, 3), (2.0, 4), (1.5, 6))
 """Elongation above which a region is a corridor, by the least number of its neighbours."""
 ISLAND_RATIO = 0.1
 """Something that stands free in a region is ignored up to this share of its floor."""

@@ -1,6 +1,6 @@
 """The floor that rooms are cut from: what a robot could drive on if the furniture were gone."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -18,12 +18,14 @@ class Floor:
     Attributes:
         floor: 1 on floor, furniture and small unseen pockets, else 0.
         wall: 1 on wall, else 0.
+        obstacle: 1 on what stands and cannot be walked around, wall or not, else 0.
         directions_deg: The main directions of the walls, from 0 to 90 degrees.
         clearance_m: How far each floor cell is from what is not floor.
     """
 
     floor: Picture
     wall: Picture
+    obstacle: Picture
     directions_deg: list[float]
     clearance_m: NDArray[np.float32]
 
@@ -31,16 +33,23 @@ class Floor:
 def build_floor(raster: Raster, settings: RoomSettings) -> Floor:
     """Gives the floor with its furniture cleared away."""
     directions = find_wall_directions(raster.occupied, least_ratio=settings.direction_ratio)
-    wall = find_walls(raster, directions, settings)
+    wall, obstacle = find_walls(raster, directions, settings)
     floor = raster.free | (raster.occupied & (1 - wall))
     floor |= _find_pockets(floor, wall, settings.pocket_area_m2 / raster.cell_area_m2)
     floor = _drop_crumbs(floor, settings.room_area_m2 / raster.cell_area_m2)
     return Floor(
         floor=floor,
         wall=wall,
+        obstacle=obstacle,
         directions_deg=directions,
         clearance_m=_clearance(floor, raster.cell_size_m),
     )
+
+
+def cut_away(floor: Floor, cut: Picture, cell_size_m: float) -> Floor:
+    """Gives the floor without the cells that are set, and its clearances; the walls stay."""
+    rest = floor.floor & (1 - cut)
+    return replace(floor, floor=rest, clearance_m=_clearance(rest, cell_size_m))
 
 
 def _drop_crumbs(floor: Picture, smallest: float) -> Picture:

@@ -77,6 +77,8 @@ def _join_equal_widths(forest: _Forest, saddles: list[Saddle], same_ratio: float
     for saddle in saddles:
         narrow, wide = forest.sides(saddle)
         clearance_m = forest.clearance_m[narrow]
+        if saddle.is_doorway:
+            continue
         is_open = saddle.height >= same_ratio * clearance_m
         if narrow != wide and is_open and clearance_m >= same_ratio * forest.clearance_m[wide]:
             forest.join(narrow, wide)
@@ -90,6 +92,9 @@ def _join_open_borders(
     for saddle in saddles:
         narrow, wide = forest.sides(saddle)
         if narrow == wide:
+            continue
+        if saddle.is_doorway:
+            borders.append(_Border(saddle=saddle, wall_m=settings.frame_m))
             continue
         clearance_m, wide_m = forest.clearance_m[narrow], forest.clearance_m[wide]
         if _is_narrow(clearance_m, wide_m, saddle, settings):

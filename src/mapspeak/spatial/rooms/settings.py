@@ -26,6 +26,9 @@ class RoomSettings:
         leaf_width_m: Doors up to this width divide however wide the places behind them are.
         wide_ratio: A wider one divides if its half width is also at most this share of the
             clearance of the wider side.
+        stub_m: The shortest piece of wall that makes an opening wider than a leaf, in line with
+            it, a door whatever the clearances.
+        tip_m: The thickest such piece.
         frame_m: The length of wall in line with a narrow place that makes it fully a door.
         mouth_width_m: The widest end of a corridor that opens straight into a wider place.
         mouth_ratio: Clearance of such a corridor over that of the wider place, at most.
@@ -51,6 +54,8 @@ class RoomSettings:
     gap_ratio: float = 0.5
     leaf_width_m: float = 1.0
     wide_ratio: float = 0.6
+    stub_m: float = 0.3
+    tip_m: float = 0.25
     frame_m: float = 2.5
     mouth_width_m: float = 3.0
     mouth_ratio: float = 0.5

@@ -19,8 +19,12 @@ _APART_DEG = 6
 """Main directions differ by more than this."""
 
 
-def find_walls(raster: Raster, directions_deg: list[float], settings: RoomSettings) -> Picture:
-    """Gives 1 where an obstacle is wall: a long run in a main direction, or in line with one.
+def find_walls(
+    raster: Raster, directions_deg: list[float], settings: RoomSettings
+) -> tuple[Picture, Picture]:
+    """Gives 1 where an obstacle is wall, and 1 where it is no island that furniture could be.
+
+    Wall is a long run in a main direction, or in line with one.
 
     A run of twice that length is wall in any direction, and so are long curved walls. What is
     thicker than a wall, such as a cupboard, is no piece of one that it stands in line with.
@@ -39,7 +43,7 @@ def find_walls(raster: Raster, directions_deg: list[float], settings: RoomSettin
             wall |= long_run | (piece & in_line)
     for turned_deg in np.arange(0.0, 180.0, OBLIQUE_STEP_DEG).tolist():
         wall |= _open(thick, cells.oblique, turned_deg) & occupied & large
-    return wall
+    return wall, occupied & large
 
 
 class _Lengths:
