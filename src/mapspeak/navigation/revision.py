@@ -67,7 +67,9 @@ class MapRevision:
         return found
 
     def walk_along(self, region: Region) -> CorridorWalk | None:
-        """Gives the walk along one of the regions, past its doors."""
+        """Gives the walk along one of the regions, past its doors; None where it has none."""
+        if not region.door_ids:
+            return None
         if region.id not in self._walks:
             self._walks[region.id] = walk_along(self.rooms, region)
         return self._walks[region.id]

@@ -52,8 +52,7 @@ def _search_standing_point(atlas: Atlas, region: Region) -> Point | None:
 
 def _middle_of(atlas: Atlas, region: Region) -> Point:
     """Gives the widest point of a room, and the middle of the walk along a corridor."""
-    is_corridor = region.room_class is RoomClass.CORRIDOR
-    walk = atlas.map.walk_along(region) if is_corridor else None
+    walk = atlas.map.walk_along(region) if region.room_class is RoomClass.CORRIDOR else None
     return region.widest if walk is None else walk.middle
 
 
