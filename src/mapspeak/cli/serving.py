@@ -125,10 +125,10 @@ async def _serve(options: ServeOptions) -> None:
 
     async with open_robot(options.robot) as robot, anyio.create_task_group() as tasks:
         map_name = robot.description.map_name
-        path = options.semantic_map or _usual_semantic_map(map_name)
+        path = options.semantic_map or _usual_semantic_map(map_name or options.robot.robot)
         # A client on stdio cannot vanish unnoticed: its end of the pipe closes.
         lease_s = math.inf if options.http is None else options.lease_s
-        session = Session(robot, SemanticMapStore(path, map_id=map_name), lease_s=lease_s)
+        session = Session(robot, SemanticMapStore(path, map_id=map_name or None), lease_s=lease_s)
         server = build_server(
             session,
             toolsets=options.toolsets,
