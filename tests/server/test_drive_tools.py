@@ -168,3 +168,14 @@ async def test_a_goal_id_that_nobody_gave_is_an_error(tmp_path: Path) -> None:
     assert "navigate_to" in text_of(nothing_yet)
     assert unknown.is_error
     assert "G1" in text_of(unknown)
+
+
+async def test_true_is_no_number_of_metres(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        drive = await client.call_tool("navigate_to", {"x": True, "y": 1.0})
+        look = await client.call_tool("look_at_map", {"radius_m": True})
+    assert drive.is_error
+    assert "wants a number for x" in text_of(drive)
+    assert look.is_error
+    assert robot.goals == {}

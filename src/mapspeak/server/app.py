@@ -37,6 +37,7 @@ class MapspeakServer(MCPServer[Any]):
         )
         self._session = session
         self._arguments: dict[str, frozenset[str]] = {}
+        self._numbers: dict[str, frozenset[str]] = {}
 
     async def call_tool(
         self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None = None
@@ -55,6 +56,7 @@ class MapspeakServer(MCPServer[Any]):
     def offer(self, tool: Tool) -> None:
         """Adds a tool to those that can be called."""
         self._arguments[tool.name] = tool.arguments
+        self._numbers[tool.name] = tool.numbers
         self.add_tool(
             tool.function,
             title=tool.title,
@@ -78,11 +80,14 @@ class MapspeakServer(MCPServer[Any]):
         return await super().get_prompt(name, arguments, context)
 
     def _check_arguments(self, name: str, given: dict[str, Any]) -> None:
-        """Refuses arguments that would be dropped without a word, such as yaw for yaw_deg."""
+        """Refuses what would be dropped without a word, such as yaw, or taken for 1, as true is."""
         strangers = sorted(set(given) - self._arguments.get(name, frozenset(given)))
         if strangers:
             known = ", ".join(sorted(self._arguments[name])) or "none"
             raise ToolError(f"{name} has no argument {', '.join(strangers)}; it has: {known}.")
+        flags = {key for key, value in given.items() if isinstance(value, bool)}
+        if wrong := sorted(flags & self._numbers.get(name, frozenset())):
+            raise ToolError(f"{name} wants a number for {', '.join(wrong)}, not true or false.")
 
     async def note_hang_up(self, client: str) -> None:
         """Stops a drive that nobody is there for any more."""

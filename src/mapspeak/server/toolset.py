@@ -4,7 +4,7 @@ import inspect
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 from mcp_types import ToolAnnotations
 
@@ -47,6 +47,14 @@ class Tool:
     def arguments(self) -> frozenset[str]:
         """The names of what it takes."""
         return frozenset(inspect.signature(self.function).parameters) - {"context"}
+
+    @property
+    def numbers(self) -> frozenset[str]:
+        """The names of the arguments that are numbers."""
+        hints = get_type_hints(self.function)
+        return frozenset(
+            name for name in self.arguments if float in (hints[name], *get_args(hints[name]))
+        )
 
     @property
     def description(self) -> str:
