@@ -94,10 +94,12 @@ def _open_clearance(inside: Mask) -> float:
     outside = cv2.copyMakeBorder(
         (~inside).astype(np.uint8), 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=1
     )
-    n, label, stats, _ = cv2.connectedComponentsWithStats(outside, connectivity=4)
-    is_island = stats[:, cv2.CC_STAT_AREA] <= ISLAND_RATIO * int(inside.sum())
+    n, label = cv2.connectedComponents(outside, connectivity=4)
+    if n <= 2:
+        return 0.0
+    is_island = np.bincount(label.ravel(), minlength=n) <= ISLAND_RATIO * int(inside.sum())
     is_island[0] = is_island[label[0, 0]] = False
-    if n <= 2 or not is_island.any():
+    if not is_island.any():
         return 0.0
     whole = ((outside == 0) | is_island[label]).astype(np.uint8)
     return float(cv2.distanceTransform(whole, cv2.DIST_L2, cv2.DIST_MASK_PRECISE).max()) - 0.5
