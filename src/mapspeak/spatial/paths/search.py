@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from mapspeak.geometry import Point, Pose
+from mapspeak.geometry import Point
 from mapspeak.spatial.grid import IntArray, OccupancyGrid
 from mapspeak.spatial.paths.lattice import (
     Lattice,
@@ -89,16 +89,7 @@ def _build_corridor(lattice: Lattice, way: IntArray, radius_m: float) -> Lattice
     side = 2 * int(np.ceil(CORRIDOR_M / lattice.cell_size_m)) + 1
     near = cv2.dilate(drawn, np.ones((side, side), dtype=np.uint8)) > 0
     near = near.repeat(lattice.factor, axis=0).repeat(lattice.factor, axis=1)
-    crop = _crop(lattice.grid, top * lattice.factor, left * lattice.factor, near.shape)
+    top, left = top * lattice.factor, left * lattice.factor
+    crop = lattice.grid.crop(slice(top, top + near.shape[0]), slice(left, left + near.shape[1]))
     n_rows, n_cols = crop.cells.shape
     return restrict(build_fine_lattice(crop, radius_m), near[:n_rows, :n_cols])
-
-
-def _crop(grid: OccupancyGrid, top: int, left: int, shape: tuple[int, ...]) -> OccupancyGrid:
-    corner = Pose(left * grid.resolution_m, top * grid.resolution_m)
-    return OccupancyGrid(
-        cells=grid.cells[top : top + shape[0], left : left + shape[1]],
-        resolution_m=grid.resolution_m,
-        origin=grid.origin @ corner,
-        stamp_s=grid.stamp_s,
-    )

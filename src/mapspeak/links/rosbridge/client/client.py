@@ -59,11 +59,6 @@ class RosbridgeClient:
         """What the server remarked, and why frames were refused; the newest last."""
 
     @property
-    def is_connected(self) -> bool:
-        """True when both sockets are open."""
-        return self._control.is_up and self._urgent.is_up
-
-    @property
     def has_open_socket(self) -> bool:
         """True when something can be sent at once."""
         return self._control.is_up or self._urgent.is_up

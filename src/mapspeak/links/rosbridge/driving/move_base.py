@@ -6,7 +6,7 @@ from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge.client import RosbridgeClient
 from mapspeak.links.rosbridge.driving.driver import LATEST_S, DrivingPatience
-from mapspeak.links.rosbridge.driving.record import GoalRecord
+from mapspeak.links.rosbridge.driving.record import GoalRecord, wait_for_ends
 from mapspeak.links.rosbridge.messages import (
     Dialect,
     FramedPose,
@@ -85,9 +85,7 @@ class MoveBaseDriver:
         for each in before:
             each.is_replaced = True
         try:
-            with anyio.move_on_after(self._patience.acceptance_s):
-                while not (record.is_accepted or record.is_over):
-                    await record.wait_for_news()
+            await record.wait_for_acceptance(within_s=self._patience.acceptance_s)
         except anyio.get_cancelled_exc_class():
             # Nobody has the id of this goal: nobody else could end it.
             self._cancel_everywhere(record.goal_id)
@@ -150,10 +148,7 @@ class MoveBaseDriver:
         }
 
     async def _wait_for_end(self, records: list[GoalRecord]) -> None:
-        with anyio.move_on_after(self._patience.end_s):
-            for record in records:
-                while not record.is_over:
-                    await record.wait_for_news()
+        await wait_for_ends(records, within_s=self._patience.end_s)
 
     def _take_statuses(self, message: Message) -> None:
         entries = message.get("status_list")

@@ -12,7 +12,7 @@ from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge.client import ActionGoal, RosbridgeClient
 from mapspeak.links.rosbridge.driving.driver import LATEST_S, DrivingPatience
-from mapspeak.links.rosbridge.driving.record import GoalRecord
+from mapspeak.links.rosbridge.driving.record import GoalRecord, wait_for_ends
 from mapspeak.links.rosbridge.messages import Dialect, FramedPose, Message, write_pose_stamped
 from mapspeak.robot import GoalState
 
@@ -144,9 +144,7 @@ class Nav2Driver:
     async def _wait_for_acceptance(self, pursuit: _Pursuit) -> None:
         record = pursuit.record
         try:
-            with anyio.move_on_after(self._patience.acceptance_s):
-                while not (record.is_accepted or record.is_over):
-                    await record.wait_for_news()
+            await record.wait_for_acceptance(within_s=self._patience.acceptance_s)
         except anyio.get_cancelled_exc_class():
             # Nobody has the id of this goal: nobody else could end it.
             self._client.cancel_goal(pursuit.action)
@@ -162,10 +160,7 @@ class Nav2Driver:
             )
 
     async def _wait_for_end(self, records: list[GoalRecord]) -> None:
-        with anyio.move_on_after(self._patience.end_s):
-            for record in records:
-                while not record.is_over:
-                    await record.wait_for_news()
+        await wait_for_ends(records, within_s=self._patience.end_s)
 
     def _take_statuses(self, message: Message) -> None:
         self._statuses = dict(_read_statuses(message))

@@ -1,5 +1,7 @@
 """What is known of one drive; kept after its end, so that it can be asked for later."""
 
+from collections.abc import Iterable
+
 import anyio
 
 from mapspeak.geometry import Pose
@@ -75,6 +77,20 @@ class GoalRecord:
         news, self._news = self._news, anyio.Event()
         news.set()
 
+    async def wait_for_acceptance(self, *, within_s: float) -> None:
+        """Returns when the robot has taken the goal, when it is over, or after so long."""
+        with anyio.move_on_after(within_s):
+            while not (self.is_accepted or self.is_over):
+                await self.wait_for_news()
+
     async def wait_for_news(self) -> None:
         """Returns after the next change, or the next sign that there may be one."""
         await self._news.wait()
+
+
+async def wait_for_ends(records: Iterable[GoalRecord], *, within_s: float) -> None:
+    """Returns when all of some goals are over, or after so long."""
+    with anyio.move_on_after(within_s):
+        for record in records:
+            while not record.is_over:
+                await record.wait_for_news()
