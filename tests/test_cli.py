@@ -6,6 +6,7 @@ from click.testing import CliRunner
 
 from drawing import grid_from_text
 from mapspeak.cli import cli, main
+from mapspeak.cli.serving import usual_semantic_map
 from mapspeak.spatial.mapfiles import write_map
 
 ROOM = """
@@ -81,3 +82,10 @@ def test_a_check_up_of_the_simulated_robot_finds_nothing_missing() -> None:
     assert result.exit_code == 0, result.output
     findings = {each["what"]: each["health"] for each in json.loads(result.output)}
     assert findings == {"map": "fine", "pose": "fine", "place": "fine", "picture": "fine"}
+
+
+def test_robots_that_do_not_name_their_map_remember_in_files_of_their_own() -> None:
+    one, other = (usual_semantic_map("", f"ws://10.0.0.{n}:9090") for n in (1, 2))
+    assert one != other
+    assert not one.name.startswith(".")
+    assert usual_semantic_map("hall 3", "ws://10.0.0.1:9090").name == "hall_3.yaml"

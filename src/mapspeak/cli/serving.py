@@ -17,7 +17,7 @@ from mapspeak.cli.robots import RobotChoice, open_robot
 if TYPE_CHECKING:
     from mapspeak.session import Session
 
-__all__ = ["serve"]
+__all__ = ["serve", "usual_semantic_map"]
 
 TOKEN_VARIABLE = "MAPSPEAK_HTTP_TOKEN"  # noqa: S105 - the variable's name, not a token
 DEFAULT_HTTP = "127.0.0.1:8766"
@@ -125,7 +125,7 @@ async def _serve(options: ServeOptions) -> None:
 
     async with open_robot(options.robot) as robot, anyio.create_task_group() as tasks:
         map_name = robot.description.map_name
-        path = options.semantic_map or _usual_semantic_map(map_name or options.robot.robot)
+        path = options.semantic_map or usual_semantic_map(map_name, options.robot.robot)
         # A client on stdio cannot vanish unnoticed: its end of the pipe closes.
         lease_s = math.inf if options.http is None else options.lease_s
         session = Session(robot, SemanticMapStore(path, map_id=map_name or None), lease_s=lease_s)
@@ -155,7 +155,13 @@ async def _end_on_signal(session: "Session") -> None:
             os._exit(128 + number)
 
 
-def _usual_semantic_map(map_name: str) -> Path:
-    """Gives a file that stays when an MCP client starts the server in another folder."""
+def usual_semantic_map(map_name: str, robot: str) -> Path:
+    """Gives a file that stays when an MCP client starts the server in another folder.
+
+    Args:
+        map_name: Of the robot's map; empty where it does not say.
+        robot: The robot's address, whose file it is then.
+    """
+    name = map_name or robot
     folder = Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share") / "mapspeak"
-    return folder / f"{re.sub(r'[^A-Za-z0-9_.-]+', '_', map_name)}.yaml"
+    return folder / f"{re.sub(r'[^A-Za-z0-9_.-]+', '_', name)}.yaml"

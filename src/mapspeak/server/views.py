@@ -70,8 +70,8 @@ class MapLook:
         """True when a point lies in the square that is shown."""
         if self.zoom is None:
             return True
-        away_m, bearing_rad = _polar(self.zoom.centre, point)
-        turned_rad = bearing_rad - self.up_rad
+        away_m = self.zoom.centre.distance_to(point)
+        turned_rad = self.zoom.centre.bearing_to(point) - self.up_rad
         farthest_m = away_m * max(abs(math.cos(turned_rad)), abs(math.sin(turned_rad)))
         return farthest_m <= self.zoom.radius_m
 
@@ -222,7 +222,3 @@ def _labels_in(atlas: Atlas, zoom: Zoom, up_rad: float) -> frozenset[int]:
     labels = atlas.rooms.labels
     inside = (rows >= 0) & (rows < labels.shape[0]) & (cols >= 0) & (cols < labels.shape[1])
     return frozenset(np.unique(labels[rows[inside], cols[inside]]).tolist())
-
-
-def _polar(centre: Point, point: Point) -> tuple[float, float]:
-    return centre.distance_to(point), centre.bearing_to(point)
