@@ -15,11 +15,13 @@ import orjson
 
 from benchmarks.figure import Figure
 from mapspeak.geometry import Pose
-from mapspeak.links.rosbridge import RosbridgeRobot, open_rosbridge_robot
-from mapspeak.links.rosbridge.messages import Dialect, read_grid, to_cbor, to_json, write_grid
+from mapspeak.links.ros import RosRobot
+from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.links.rosbridge.protocol import Conversation, Published
+from mapspeak.links.rosbridge.protocol.encoding import to_cbor, to_json
 from mapspeak.links.rosbridge.server import open_rosbridge_server
 from mapspeak.links.simulated import Clock, open_simulated_robot
+from mapspeak.ros.messages import Dialect, read_grid, write_grid
 from mapspeak.simulator import Simulation, load_world
 from mapspeak.spatial import OccupancyGrid
 
@@ -98,7 +100,7 @@ async def _drive(dialect: Dialect) -> dict[str, list[float]]:
             await _note(times_ms, "pose", robot.fetch_pose)
             await _note(times_ms, "map again", robot.fetch_map)
             await _note(times_ms, "state of the drive", lambda: robot.fetch_goal_status(goal_id))
-            await _note(times_ms, "topics", lambda: robot.client.call_service("/rosapi/topics"))
+            await _note(times_ms, "topics", lambda: robot.connection.call_service("/rosapi/topics"))
             await anyio.sleep(PAUSE_S)
         for _ in range(N_STOPS):
             await robot.send_goal(AHEAD)
@@ -108,7 +110,7 @@ async def _drive(dialect: Dialect) -> dict[str, list[float]]:
     return times_ms
 
 
-async def _look_all_the_while(robot: RosbridgeRobot) -> None:
+async def _look_all_the_while(robot: RosRobot) -> None:
     while True:
         await robot.fetch_picture()
 

@@ -6,10 +6,10 @@ from typing import Any
 import anyio
 
 from mapspeak.geometry import Pose
-from mapspeak.links.rosbridge.messages import (
+from mapspeak.links.rosbridge.protocol.encoding import to_cbor
+from mapspeak.ros.messages import (
     Dialect,
     FrameTransform,
-    to_cbor,
     write_grid,
     write_transforms,
 )

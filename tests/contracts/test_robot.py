@@ -11,10 +11,10 @@ from fakes import FakeRobot, two_rooms
 from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import open_rosbridge_robot
-from mapspeak.links.rosbridge.messages import Dialect
 from mapspeak.links.rosbridge.server import open_rosbridge_server
 from mapspeak.links.simulated import Clock, open_simulated_robot
 from mapspeak.robot import GoalState, GoalStatus, Robot
+from mapspeak.ros.messages import Dialect
 from mapspeak.simulator import Simulation, load_world
 
 pytestmark = pytest.mark.anyio

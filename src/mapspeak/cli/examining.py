@@ -46,14 +46,14 @@ def doctor(
 
 
 async def _examine(choice: RobotChoice) -> "list[Finding]":
-    from mapspeak.links.rosbridge import (  # noqa: PLC0415 - heavy; help must be quick
-        RosbridgeRobot,
+    from mapspeak.links.ros import (  # noqa: PLC0415 - heavy; help must be quick
+        RosRobot,
         describe_profile,
     )
     from mapspeak.navigation.checkup import examine  # noqa: PLC0415
 
     async with open_robot(choice) as robot:
-        lines = describe_profile(robot.profile) if isinstance(robot, RosbridgeRobot) else ()
+        lines = describe_profile(robot.profile) if isinstance(robot, RosRobot) else ()
         return [*lines, *await examine(robot)]
 
 

@@ -66,12 +66,8 @@ async def open_robot(choice: RobotChoice) -> AsyncGenerator["Robot"]:
 
 @asynccontextmanager
 async def _open_rosbridge(choice: RobotChoice) -> AsyncGenerator["Robot"]:
-    from mapspeak.links.rosbridge import (  # noqa: PLC0415 - heavy; help must be quick
-        RobotAddress,
-        RobotOverrides,
-        load_robot_file,
-        open_rosbridge_robot,
-    )
+    from mapspeak.links.ros import RobotOverrides, load_robot_file  # noqa: PLC0415 - heavy
+    from mapspeak.links.rosbridge import RobotAddress, open_rosbridge_robot  # noqa: PLC0415
 
     if choice.clock == "virtual" or choice.has_detector or choice.state_log is not None:
         raise ConfigError(

@@ -9,16 +9,17 @@ import pytest
 
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
-from mapspeak.links.rosbridge import RosbridgeRobot, open_rosbridge_robot
+from mapspeak.links.ros import RosRobot
+from mapspeak.links.ros.driving import DrivingPatience
+from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.links.rosbridge.client import Timing
-from mapspeak.links.rosbridge.driving import DrivingPatience
-from mapspeak.links.rosbridge.messages import (
+from mapspeak.robot import GoalState, GoalStatus
+from mapspeak.ros.messages import (
     Dialect,
     FramedPose,
     write_pose_stamped,
     write_stamp,
 )
-from mapspeak.robot import GoalState, GoalStatus
 from rosbridge_robot import ScriptedRobot, eventually
 from rosbridge_script import PATIENCE_S, Operation, running
 
@@ -40,7 +41,7 @@ GOAL = Pose(4.0, 2.0)
 @asynccontextmanager
 async def connected(
     scripted: ScriptedRobot, *, patience: DrivingPatience = LONG
-) -> AsyncGenerator[RosbridgeRobot]:
+) -> AsyncGenerator[RosRobot]:
     with anyio.fail_after(PATIENCE_S):
         async with (
             running(scripted.server) as server,
@@ -62,7 +63,7 @@ async def tell(scripted: ScriptedRobot, *statuses: dict[str, Any]) -> None:
     await scripted.publish("/move_base/status", {"status_list": list(statuses)})
 
 
-async def send(scripted: ScriptedRobot, robot: RosbridgeRobot, goal: Pose = GOAL) -> str:
+async def send(scripted: ScriptedRobot, robot: RosRobot, goal: Pose = GOAL) -> str:
     """Sends a goal that move_base takes; gives its id."""
     sent: list[str] = []
 
@@ -81,7 +82,7 @@ def ids_of(scripted: ScriptedRobot) -> list[str]:
     return [each["msg"]["goal_id"]["id"] for each in published(scripted, "/move_base/goal")]
 
 
-async def until_state(robot: RosbridgeRobot, goal_id: str, state: GoalState) -> GoalStatus:
+async def until_state(robot: RosRobot, goal_id: str, state: GoalState) -> GoalStatus:
     async def is_so() -> bool:
         return (await robot.fetch_goal_status(goal_id)).state is state
 
@@ -222,7 +223,7 @@ def clock(second: int) -> dict[str, Any]:
     return {"clock": {"sec": second, "nanosec": 0}}
 
 
-async def be_at(scripted: ScriptedRobot, robot: RosbridgeRobot, pose: Pose, second: int) -> None:
+async def be_at(scripted: ScriptedRobot, robot: RosRobot, pose: Pose, second: int) -> None:
     """Puts the robot somewhere at some time, as far as it says."""
     await scripted.publish("/tf", scripted.transforms(pose))
     await scripted.publish("/clock", clock(second))

@@ -15,15 +15,15 @@ from PIL import Image
 from drawing import grid_from_text, text_from_grid
 from mapspeak.errors import GoalError, LinkError, MapError
 from mapspeak.geometry import Pose
-from mapspeak.links.rosbridge import RobotOverrides, RosbridgeRobot, open_rosbridge_robot
-from mapspeak.links.rosbridge.client import Timing
-from mapspeak.links.rosbridge.discovery import PoseSource
-from mapspeak.links.rosbridge.driving import DrivingPatience
-from mapspeak.links.rosbridge.maps import Attempt, MapKeeper
-from mapspeak.links.rosbridge.messages import Dialect, write_header, write_pose
-from mapspeak.links.rosbridge.poses import PoseKeeper
-from mapspeak.links.rosbridge.protocol import Encoding
+from mapspeak.links.ros import RobotOverrides, RosRobot
+from mapspeak.links.ros.discovery import PoseSource
+from mapspeak.links.ros.driving import DrivingPatience
+from mapspeak.links.ros.maps import MapKeeper
+from mapspeak.links.ros.poses import PoseKeeper
+from mapspeak.links.rosbridge import open_rosbridge_robot
+from mapspeak.links.rosbridge.client import RosbridgeClient, Timing
 from mapspeak.robot import GoalState, GoalStatus
+from mapspeak.ros.messages import Dialect, write_header, write_pose
 from rosbridge_robot import (
     ABORTED,
     CANCEL_SERVICE,
@@ -58,7 +58,7 @@ async def connected(
     patience: DrivingPatience = LONG,
     overrides: RobotOverrides | None = None,
     timing: Timing = QUICK,
-) -> AsyncGenerator[RosbridgeRobot]:
+) -> AsyncGenerator[RosRobot]:
     with anyio.fail_after(PATIENCE_S):
         async with (
             running(scripted.server) as server,
@@ -72,15 +72,11 @@ async def connected(
             yield robot
 
 
-def attempts_after(n_silent: int) -> tuple[Attempt, ...]:
-    encodings = (Encoding.CBOR, Encoding.CBOR, Encoding.JSON)[: n_silent + 1]
-    return tuple(
-        Attempt(encoding, 0.02 if number < n_silent else PATIENCE_S)
-        for number, encoding in enumerate(encodings)
-    )
+def waits_after(n_silent: int) -> tuple[float, ...]:
+    return (*(0.02 for _ in range(n_silent)), PATIENCE_S)
 
 
-async def until_state(robot: RosbridgeRobot, goal_id: str, state: GoalState) -> GoalStatus:
+async def until_state(robot: RosRobot, goal_id: str, state: GoalState) -> GoalStatus:
     async def is_so() -> bool:
         return (await robot.fetch_goal_status(goal_id)).state is state
 
@@ -108,7 +104,7 @@ async def test_a_map_that_does_not_come_is_asked_for_again_and_at_last_as_json(
     scripted.latched["/map"] = scripted.map_message(grid_from_text(ROOM))
     scripted.n_silent["/map"] = n_silent
     async with connected(scripted) as robot:
-        maps = MapKeeper(robot.client, robot.profile, attempts=attempts_after(n_silent))
+        maps = MapKeeper(robot.connection, robot.profile, waits_s=waits_after(n_silent))
         assert (await maps.fetch()).n_cols == 4
     encodings = [each["compression"] for each in subscriptions(scripted, "/map")]
     assert encodings == ["cbor", "cbor", "none"][: n_silent + 1]
@@ -117,7 +113,7 @@ async def test_a_map_that_does_not_come_is_asked_for_again_and_at_last_as_json(
 async def test_a_map_that_never_comes_is_said_and_may_come_later() -> None:
     scripted = ScriptedRobot()
     async with connected(scripted) as robot:
-        maps = MapKeeper(robot.client, robot.profile, attempts=(Attempt(Encoding.CBOR, 0.01),))
+        maps = MapKeeper(robot.connection, robot.profile, waits_s=(0.01,))
         with pytest.raises(LinkError, match="No map has come on /map yet"):
             await maps.fetch()
         await scripted.publish("/map", scripted.map_message(grid_from_text(ROOM)))
@@ -134,13 +130,12 @@ async def test_a_map_that_never_comes_is_said_and_may_come_later() -> None:
 async def test_asking_again_for_a_map_that_takes_long_does_not_begin_it_anew() -> None:
     scripted = ScriptedRobot()
     async with connected(scripted) as robot:
-        attempts = tuple(replace(each, timeout_s=0.01) for each in attempts_after(2))
-        maps = MapKeeper(robot.client, robot.profile, attempts=attempts)
+        maps = MapKeeper(robot.connection, robot.profile, waits_s=(0.01, 0.01, 0.01))
         for _ in range(3):
             with pytest.raises(LinkError, match="ask again"):
                 await maps.fetch()
         await scripted.until(lambda: len(subscriptions(scripted, "/map")) == 3)
-        await robot.client.call_service("/rosapi/get_time")
+        await robot.connection.call_service("/rosapi/get_time")
     assert [each["compression"] for each in subscriptions(scripted, "/map")][-1] == "none"
     assert len(subscriptions(scripted, "/map")) == 3
 
@@ -239,7 +234,7 @@ async def test_a_pose_of_frames_that_have_fallen_silent_is_not_told_as_the_prese
     scripted = ScriptedRobot()
     async with connected(scripted) as robot:
         await robot.fetch_pose()
-        poses = PoseKeeper(robot.client, robot.profile, robot._frames, silence_s=0.0)
+        poses = PoseKeeper(robot.connection, robot.profile, robot._frames, silence_s=0.0)
         with pytest.raises(LinkError, match="pose is old") as raised:
             await poses.fetch(timeout_s=0.01)
     assert "localisation" in raised.value.hint
@@ -564,8 +559,8 @@ async def test_a_stop_gets_past_a_service_that_is_stuck() -> None:
     assert len(stops) == 1
 
 
-async def ask_in_vain(robot: RosbridgeRobot) -> None:
-    await robot.client.call_service("/slow", timeout_s=PATIENCE_S)
+async def ask_in_vain(robot: RosRobot) -> None:
+    await robot.connection.call_service("/slow", timeout_s=PATIENCE_S)
 
 
 async def test_a_stop_that_navigation_refuses_is_an_error() -> None:
@@ -681,7 +676,7 @@ async def test_a_robot_that_has_gone_is_not_reported_from_memory() -> None:
                 await until_it_fails(robot)
 
 
-async def until_it_fails(robot: RosbridgeRobot) -> None:
+async def until_it_fails(robot: RosRobot) -> None:
     while True:
         await robot.fetch_pose()
         await anyio.lowlevel.checkpoint()
@@ -719,7 +714,8 @@ async def test_odd_messages_on_every_topic_cost_nothing_but_themselves(
         await scripted.end_goal(SUCCEEDED)
         await until_state(robot, goal_id, GoalState.ARRIVED)
         assert (await robot.fetch_map()).n_cols == 4
-        assert robot.client.n_connections == 1
+        assert isinstance(robot.connection, RosbridgeClient)
+        assert robot.connection.n_connections == 1
     assert [each for each in caplog.records if each.levelname == "ERROR"] == []
 
 

@@ -27,6 +27,7 @@ from mapspeak.links.rosbridge.protocol import (
     ServiceAnswered,
     StatusNoted,
 )
+from mapspeak.ros import new_id
 
 
 def frame(operation: dict[str, Any]) -> bytes:
@@ -278,7 +279,7 @@ def test_a_subscription_says_what_the_server_needs_and_no_fragment_size() -> Non
 
 
 def test_ids_are_never_the_same() -> None:
-    assert len({protocol.new_id() for _ in range(1_000)}) == 1_000
+    assert len({new_id() for _ in range(1_000)}) == 1_000
 
 
 OPERATIONS = st.sampled_from(

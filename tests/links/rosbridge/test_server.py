@@ -12,7 +12,9 @@ from bridging import SteppedRobot, bridge
 from fakes import two_rooms
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Pose
-from mapspeak.links.rosbridge.messages import (
+from mapspeak.links.rosbridge.protocol.decoding import decode_png
+from mapspeak.links.rosbridge.server import open_rosbridge_server
+from mapspeak.ros.messages import (
     Dialect,
     read_compressed_image,
     read_grid,
@@ -20,8 +22,6 @@ from mapspeak.links.rosbridge.messages import (
     read_transforms,
     read_twist,
 )
-from mapspeak.links.rosbridge.protocol.decoding import decode_png
-from mapspeak.links.rosbridge.server import open_rosbridge_server
 from mapspeak.spatial import OccupancyGrid
 
 pytestmark = pytest.mark.anyio

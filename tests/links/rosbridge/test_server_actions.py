@@ -8,13 +8,13 @@ from bridging import RawClient, SteppedRobot, bridge
 from fakes import two_rooms
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose
-from mapspeak.links.rosbridge.messages import (
+from mapspeak.robot import GoalState
+from mapspeak.ros.messages import (
     Dialect,
     FramedPose,
     read_pose_stamped,
     write_pose_stamped,
 )
-from mapspeak.robot import GoalState
 
 pytestmark = pytest.mark.anyio
 

@@ -9,7 +9,7 @@ import pytest
 from bridging import SteppedRobot, bridge
 from fakes import two_rooms
 from mapspeak.geometry import Pose
-from mapspeak.links.rosbridge.messages import Dialect, FramedPose, write_pose_stamped
+from mapspeak.ros.messages import Dialect, FramedPose, write_pose_stamped
 
 pytestmark = pytest.mark.anyio
 

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from bridging import bridge
-from mapspeak.links.rosbridge.messages import Dialect, read_grid
+from mapspeak.ros.messages import Dialect, read_grid
 
 pytestmark = pytest.mark.anyio
 both = pytest.mark.parametrize("dialect", Dialect)

@@ -10,9 +10,9 @@ from pathlib import Path
 import anyio
 import pytest
 
-from mapspeak.links.rosbridge.messages import Dialect
 from mapspeak.links.rosbridge.server import open_rosbridge_server
 from mapspeak.links.simulated import Clock, open_simulated_robot
+from mapspeak.ros.messages import Dialect
 from mapspeak.simulator import Simulation, load_world
 
 PROGRAM = Path(__file__).parents[2] / "talking_roslibpy.py"

@@ -9,7 +9,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 from bridging import SteppedRobot, bridge
-from mapspeak.links.rosbridge.messages import Dialect, read_grid
+from mapspeak.ros.messages import Dialect, read_grid
 from mapspeak.spatial import OccupancyGrid
 
 pytestmark = pytest.mark.anyio

@@ -2,15 +2,11 @@
 
 from mapspeak.links.rosbridge.client.address import RobotAddress
 from mapspeak.links.rosbridge.client.client import RosbridgeClient, open_client
-from mapspeak.links.rosbridge.client.goal import ActionGoal
-from mapspeak.links.rosbridge.client.subscription import Subscription
 from mapspeak.links.rosbridge.client.timing import Timing
 
 __all__ = [
-    "ActionGoal",
     "RobotAddress",
     "RosbridgeClient",
-    "Subscription",
     "Timing",
     "open_client",
 ]

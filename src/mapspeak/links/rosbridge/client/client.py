@@ -3,19 +3,19 @@
 from collections import deque
 from collections.abc import AsyncGenerator, Callable, Coroutine, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import anyio
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError
+from mapspeak.links.ros import PursuedGoal, TopicSubscription
 from mapspeak.links.rosbridge import protocol
 from mapspeak.links.rosbridge.client.address import RobotAddress
 from mapspeak.links.rosbridge.client.channel import Channel
-from mapspeak.links.rosbridge.client.goal import ActionGoal
-from mapspeak.links.rosbridge.client.subscription import Subscription
+from mapspeak.links.rosbridge.client.rosapi import Rosapi
 from mapspeak.links.rosbridge.client.timing import Timing
-from mapspeak.links.rosbridge.messages import Message
 from mapspeak.links.rosbridge.protocol import (
     Encoding,
     Event,
@@ -25,12 +25,47 @@ from mapspeak.links.rosbridge.protocol import (
     Published,
     StatusNoted,
 )
+from mapspeak.ros import ActionEnd, ActionGoal, Subscription, new_id
+from mapspeak.ros.messages import Message
 
 N_REMARKS_KEPT = 50
 USUAL_TIMING = Timing()
+ENCODINGS = (Encoding.CBOR, Encoding.CBOR, Encoding.JSON)
+"""Of bulky messages: asked for so first, and again, and again.
+
+Where CBOR is beyond the server's size limit it is dropped in silence, while JSON comes in pieces.
+"""
 
 
-class RosbridgeClient:
+@dataclass(slots=True, eq=False)
+class _Request:
+    """How a topic was asked for.
+
+    Attributes:
+        subscription: Of the topic.
+        is_bulky: See `ENCODINGS`.
+        throttle_ms: The least time between two messages.
+        n_renewals: How often it was asked for anew.
+        operation_id: Under which the server knows it.
+        channel: Over which it was asked for.
+    """
+
+    subscription: TopicSubscription
+    is_bulky: bool
+    throttle_ms: int
+    n_renewals: int = 0
+    operation_id: str = ""
+    channel: Channel | None = None
+
+    @property
+    def encoding(self) -> Encoding:
+        """How the server is to write the messages."""
+        if not self.is_bulky:
+            return Encoding.JSON
+        return ENCODINGS[min(self.n_renewals, len(ENCODINGS) - 1)]
+
+
+class RosbridgeClient(Rosapi):
     """One robot over two sockets: topics and goals on one, calls and what is urgent on the other.
 
     Some versions of rosbridge handle what comes over one socket one after another, so that a stop
@@ -43,14 +78,14 @@ class RosbridgeClient:
     """
 
     def __init__(self, address: RobotAddress, *, timing: Timing = USUAL_TIMING) -> None:
+        super().__init__()
         self.address = address
         self.timing = timing
         self._control = self._channel()
         self._urgent = self._channel()
-        self._subscriptions: dict[str, Subscription] = {}
-        self._channel_of: dict[str, Channel] = {}
+        self._requests: dict[str, _Request] = {}
         self._advertised: dict[str, str] = {}
-        self._goals: dict[str, tuple[ActionGoal, Channel]] = {}
+        self._goals: dict[str, tuple[PursuedGoal, Channel]] = {}
         self._tasks: TaskGroup | None = None
         self._published_s = float("-inf")
         self.n_frames_refused = 0
@@ -59,7 +94,7 @@ class RosbridgeClient:
         """What the server remarked, and why frames were refused; the newest last."""
 
     @property
-    def has_open_socket(self) -> bool:
+    def is_open(self) -> bool:
         """True when something can be sent at once."""
         return self._control.is_up or self._urgent.is_up
 
@@ -113,44 +148,39 @@ class RosbridgeClient:
         topic: str,
         *,
         type_name: str | None = None,
-        encoding: Encoding = Encoding.JSON,
+        is_bulky: bool = False,
         throttle_ms: int = 0,
-    ) -> Subscription:
+    ) -> TopicSubscription:
         """Gives the subscription to a topic, which is begun where there is none yet.
 
-        Args:
-            topic: Its full name.
-            type_name: None leaves it to the server.
-            encoding: How messages are written; the first subscriber decides.
-            throttle_ms: The least time between two messages; likewise.
+        The first subscriber decides how messages are written, and how often they come.
         """
-        subscription = self._subscriptions.get(topic)
-        if subscription is None:
-            subscription = Subscription(
-                topic,
-                type_name=type_name,
-                encoding=encoding,
-                throttle_ms=throttle_ms,
-                operation_id=protocol.new_id(),
-            )
-            self._begin(subscription)
-            self._subscriptions[topic] = subscription
-        subscription.n_users += 1
-        return subscription
+        request = self._requests.get(topic)
+        if request is None:
+            subscription = TopicSubscription(topic, type_name=type_name)
+            request = _Request(subscription, is_bulky, throttle_ms)
+            self._begin(request)
+            self._requests[topic] = request
+        request.subscription.n_users += 1
+        return request.subscription
 
     def unsubscribe(self, subscription: Subscription) -> None:
         """Ends one use of a subscription; the last one ends it at the server too."""
-        subscription.n_users -= 1
-        if subscription.n_users == 0:
-            del self._subscriptions[subscription.topic]
-            self._end(subscription)
+        request = self._requests.get(subscription.topic)
+        if request is None or request.subscription is not subscription:
+            return
+        request.subscription.n_users -= 1
+        if request.subscription.n_users == 0:
+            del self._requests[subscription.topic]
+            self._end(request)
 
-    def renew(self, subscription: Subscription, *, encoding: Encoding) -> None:
+    def renew(self, subscription: Subscription) -> None:
         """Subscribes again: a latched message may have been missed, or cannot be written so."""
-        self._end(subscription)
-        subscription.encoding = encoding
-        subscription.operation_id = protocol.new_id()
-        self._begin(subscription)
+        request = self._requests.get(subscription.topic)
+        if request is not None:
+            self._end(request)
+            request.n_renewals += 1
+            self._begin(request)
 
     def advertise(self, topic: str, *, type_name: str) -> None:
         """Says that we will publish; the robot needs a moment until it listens.
@@ -167,6 +197,13 @@ class RosbridgeClient:
         for channel in (self._control, self._urgent):
             text = protocol.advertise(topic, operation_id=f"advertise:{topic}", type_name=type_name)
             channel.keep_standing(f"advertise:{topic}", text)
+
+    def unadvertise(self, topic: str) -> None:
+        """Takes back what `advertise` said."""
+        if self._advertised.pop(topic, None) is not None:
+            text = protocol.unadvertise(topic, operation_id=f"advertise:{topic}")
+            for channel in (self._control, self._urgent):
+                channel.end_standing(f"advertise:{topic}", text)
 
     async def publish(self, topic: str, message: Message) -> None:
         """Publishes on an advertised topic.
@@ -206,7 +243,7 @@ class RosbridgeClient:
         Raises:
             LinkError: No answer, a refusal, or no connection.
         """
-        call_id = protocol.new_id()
+        call_id = new_id()
         text = protocol.call_service(
             service, arguments or {}, operation_id=call_id, type_name=type_name
         )
@@ -215,13 +252,13 @@ class RosbridgeClient:
         values = await channel.call(text, call_id=call_id, what=service, timeout_s=limit_s)
         return values if isinstance(values, dict) else {}
 
-    async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
+    async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> PursuedGoal:
         """Sends a goal to an action of ROS 2 and gives what becomes of it, as it becomes.
 
         Raises:
             LinkError: There is no connection, or the goal cannot be sent.
         """
-        goal = ActionGoal(goal_id=protocol.new_id(), action=action)
+        goal = PursuedGoal(goal_id=new_id(), action=action)
         text = protocol.send_action_goal(
             action, arguments, operation_id=goal.goal_id, type_name=type_name
         )
@@ -267,28 +304,30 @@ class RosbridgeClient:
         is_free = self._carries_goal(self._control) or not self._carries_goal(self._urgent)
         return self._urgent if is_free else self._control
 
-    def _begin(self, subscription: Subscription) -> None:
+    def _begin(self, request: _Request) -> None:
+        subscription = request.subscription
+        request.operation_id = new_id()
         text = protocol.subscribe(
             subscription.topic,
-            operation_id=subscription.operation_id,
+            operation_id=request.operation_id,
             type_name=subscription.type_name,
-            encoding=subscription.encoding,
-            throttle_ms=subscription.throttle_ms,
+            encoding=request.encoding,
+            throttle_ms=request.throttle_ms,
         )
-        channel = self._channel_of[subscription.operation_id] = self._free_for_topics()
-        channel.keep_standing(subscription.operation_id, text)
+        request.channel = self._free_for_topics()
+        request.channel.keep_standing(request.operation_id, text)
 
-    def _end(self, subscription: Subscription) -> None:
-        text = protocol.unsubscribe(subscription.topic, operation_id=subscription.operation_id)
-        channel = self._channel_of.pop(subscription.operation_id)
-        channel.end_standing(subscription.operation_id, text)
+    def _end(self, request: _Request) -> None:
+        text = protocol.unsubscribe(request.subscription.topic, operation_id=request.operation_id)
+        if request.channel is not None:
+            request.channel.end_standing(request.operation_id, text)
 
     def _take(self, event: Event) -> None:
         match event:
             case Published():
-                subscription = self._subscriptions.get(event.topic)
-                if subscription is not None:
-                    subscription.take(event.message)
+                request = self._requests.get(event.topic)
+                if request is not None:
+                    request.subscription.take(event.message)
             case GoalFedBack():
                 known = self._goals.get(event.goal_id)
                 if known is not None:
@@ -296,7 +335,11 @@ class RosbridgeClient:
             case GoalEnded():
                 known = self._goals.pop(event.goal_id, None)
                 if known is not None:
-                    known[0].take_end(event)
+                    known[0].take_end(
+                        ActionEnd(
+                            status=event.status, is_result=event.is_result, values=event.values
+                        )
+                    )
             case StatusNoted():
                 self.remarks.append(f"{event.level}: {event.text}")
             case FrameRefused():

@@ -12,14 +12,11 @@ from mapspeak.links.rosbridge.protocol.events import (
     StatusNoted,
 )
 from mapspeak.links.rosbridge.protocol.operations import (
-    NAME,
-    TYPE,
     Encoding,
     advertise,
     authenticate,
     call_service,
     cancel_action_goal,
-    new_id,
     publish,
     send_action_goal,
     subscribe,
@@ -29,8 +26,6 @@ from mapspeak.links.rosbridge.protocol.operations import (
 
 __all__ = [
     "MAX_FRAME_BYTES",
-    "NAME",
-    "TYPE",
     "Conversation",
     "Encoding",
     "Event",
@@ -44,7 +39,6 @@ __all__ = [
     "authenticate",
     "call_service",
     "cancel_action_goal",
-    "new_id",
     "publish",
     "send_action_goal",
     "subscribe",

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from mapspeak.links.rosbridge.messages import Message
+from mapspeak.ros.messages import Message
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -4,8 +4,6 @@ rosbridge is silent about almost every mistake, so that all is checked here befo
 """
 
 import math
-import re
-import uuid
 from collections.abc import Mapping
 from enum import StrEnum
 from typing import Any
@@ -14,9 +12,8 @@ import numpy as np
 import orjson
 
 from mapspeak.errors import LinkError
+from mapspeak.ros import NAME, TYPE
 
-NAME = re.compile(r"[~/]?[A-Za-z_][A-Za-z0-9_]*(?:/[A-Za-z_][A-Za-z0-9_]*)*")
-TYPE = re.compile(r"[A-Za-z]\w*(?:/(?:msg|srv|action))?/[A-Za-z]\w*")
 MAX_DEPTH = 32
 
 
@@ -26,11 +23,6 @@ class Encoding(StrEnum):
     JSON = "none"
     CBOR = "cbor"
     PNG = "png"
-
-
-def new_id() -> str:
-    """Gives an id that no other client of the same server uses."""
-    return uuid.uuid4().hex
 
 
 def subscribe(

@@ -7,7 +7,6 @@ import anyio
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError, MapspeakError
-from mapspeak.links.rosbridge.messages import bare_type
 from mapspeak.links.rosbridge.server.drives import Drive
 from mapspeak.links.rosbridge.server.nav2 import (
     ABORTED,
@@ -21,6 +20,7 @@ from mapspeak.links.rosbridge.server.nav2 import (
 from mapspeak.links.rosbridge.server.outbox import Outbox
 from mapspeak.links.rosbridge.server.publication import answer_frame
 from mapspeak.links.rosbridge.server.stack import RosStack, refusal
+from mapspeak.ros.messages import bare_type
 
 __all__ = ["GoalOperations"]
 

@@ -8,7 +8,6 @@ from typing import Any
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError, MapspeakError
-from mapspeak.links.rosbridge.messages import Dialect, bare_type
 from mapspeak.links.rosbridge.protocol.decoding import FrameError, decode_json
 from mapspeak.links.rosbridge.server.actions import GoalOperations
 from mapspeak.links.rosbridge.server.outbox import Outbox
@@ -19,6 +18,7 @@ from mapspeak.links.rosbridge.server.publication import (
     answer_frame,
 )
 from mapspeak.links.rosbridge.server.stack import RosStack, refusal
+from mapspeak.ros.messages import Dialect, bare_type
 
 __all__ = ["Conversation"]
 

@@ -8,9 +8,9 @@ import anyio
 
 from mapspeak.errors import GoalError, MapspeakError
 from mapspeak.geometry import Pose
-from mapspeak.links.rosbridge.messages import FramedPose
 from mapspeak.links.rosbridge.server.graph import BASE_FRAME
 from mapspeak.robot import GoalState, GoalStatus, Robot
+from mapspeak.ros.messages import FramedPose
 
 __all__ = ["Drive", "Drives"]
 

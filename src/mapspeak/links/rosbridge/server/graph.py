@@ -1,7 +1,7 @@
 """The nodes and topics of a robot, as its ROS would show them."""
 
-from mapspeak.links.rosbridge.messages import Dialect
 from mapspeak.links.rosbridge.server.hub import ROSBRIDGE_NODE, Topic
+from mapspeak.ros.messages import Dialect
 
 __all__ = ["BASE_FRAME", "BASE_NODE", "ROSAPI_NODE", "SLAM_NODES", "navigator_of", "topics_of"]
 

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from mapspeak.links.rosbridge.messages import Message, bare_type
 from mapspeak.links.rosbridge.server.publication import Publication
+from mapspeak.ros.messages import Message, bare_type
 
 __all__ = ["ROSBRIDGE_NODE", "Hub", "Topic"]
 

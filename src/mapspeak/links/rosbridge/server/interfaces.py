@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from mapspeak.errors import LinkError
-from mapspeak.links.rosbridge.messages import Dialect, bare_type
 from mapspeak.links.rosbridge.server.definitions import MESSAGES, SERVICES
+from mapspeak.ros.messages import Dialect, bare_type
 
 __all__ = ["Interfaces"]
 

@@ -4,7 +4,11 @@ from typing import Any
 
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.geometry import Pose
-from mapspeak.links.rosbridge.messages import (
+from mapspeak.links.rosbridge.server.drives import Drive, Drives
+from mapspeak.links.rosbridge.server.hub import Hub
+from mapspeak.links.rosbridge.server.publication import Publication
+from mapspeak.robot import GoalState, Robot
+from mapspeak.ros.messages import (
     Dialect,
     FramedPose,
     Message,
@@ -14,10 +18,6 @@ from mapspeak.links.rosbridge.messages import (
     write_pose_stamped,
     write_stamp,
 )
-from mapspeak.links.rosbridge.server.drives import Drive, Drives
-from mapspeak.links.rosbridge.server.hub import Hub
-from mapspeak.links.rosbridge.server.publication import Publication
-from mapspeak.robot import GoalState, Robot
 
 __all__ = ["MoveBase"]
 

@@ -7,17 +7,17 @@ from typing import Any
 
 from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Pose
-from mapspeak.links.rosbridge.messages import (
+from mapspeak.links.rosbridge.server.drives import Drive, Drives
+from mapspeak.links.rosbridge.server.hub import Hub
+from mapspeak.links.rosbridge.server.publication import Publication
+from mapspeak.robot import GoalState, Robot
+from mapspeak.ros.messages import (
     Dialect,
     FramedPose,
     read_pose_stamped,
     write_pose_stamped,
     write_stamp,
 )
-from mapspeak.links.rosbridge.server.drives import Drive, Drives
-from mapspeak.links.rosbridge.server.hub import Hub
-from mapspeak.links.rosbridge.server.publication import Publication
-from mapspeak.robot import GoalState, Robot
 
 __all__ = ["ACTION", "ACTION_TYPE", "Nav2"]
 

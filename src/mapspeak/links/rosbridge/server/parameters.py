@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from mapspeak.errors import LinkError
-from mapspeak.links.rosbridge.messages import Dialect
 from mapspeak.links.rosbridge.server.graph import BASE_FRAME, BASE_NODE, SLAM_NODES, navigator_of
 from mapspeak.links.rosbridge.server.interfaces import Interfaces
 from mapspeak.links.rosbridge.server.services import Service, Services
+from mapspeak.ros.messages import Dialect
 
 __all__ = ["Parameters", "add_parameter_services"]
 

@@ -10,7 +10,8 @@ from functools import cached_property
 
 from PIL import Image
 
-from mapspeak.links.rosbridge.messages import Message, to_cbor, to_json
+from mapspeak.links.rosbridge.protocol.encoding import to_cbor, to_json
+from mapspeak.ros.messages import Message
 
 __all__ = ["Compression", "Frame", "Publication", "answer_frame", "fragments_of"]
 

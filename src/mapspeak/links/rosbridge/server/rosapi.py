@@ -7,13 +7,13 @@ from functools import partial
 from typing import Any
 
 from mapspeak.errors import LinkError
-from mapspeak.links.rosbridge.messages import Dialect, bare_type, write_stamp
 from mapspeak.links.rosbridge.server.graph import ROSAPI_NODE
 from mapspeak.links.rosbridge.server.hub import ROSBRIDGE_NODE, Hub, Topic
 from mapspeak.links.rosbridge.server.interfaces import Interfaces
 from mapspeak.links.rosbridge.server.parameters import Parameters
 from mapspeak.links.rosbridge.server.services import Service, Services
 from mapspeak.robot import Robot
+from mapspeak.ros.messages import Dialect, bare_type, write_stamp
 
 __all__ = ["add_rosapi"]
 

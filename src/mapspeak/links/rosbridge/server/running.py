@@ -6,9 +6,9 @@ from collections.abc import Callable
 import anyio
 
 from mapspeak.errors import ConfigError
-from mapspeak.links.rosbridge.messages import Dialect
 from mapspeak.links.rosbridge.server.serving import open_rosbridge_server
 from mapspeak.robot import Robot
+from mapspeak.ros.messages import Dialect
 
 __all__ = ["run_rosbridge_server"]
 

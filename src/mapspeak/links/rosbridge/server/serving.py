@@ -10,13 +10,13 @@ from anyio.abc import ByteStream, SocketAttribute
 from anyio.streams.memory import MemoryObjectReceiveStream
 
 from mapspeak.errors import ConfigError
-from mapspeak.links.rosbridge.messages import Dialect
 from mapspeak.links.rosbridge.server.conversation import Conversation
 from mapspeak.links.rosbridge.server.outbox import Outbox
 from mapspeak.links.rosbridge.server.publication import Frame, fragments_of
 from mapspeak.links.rosbridge.server.stack import RosStack
 from mapspeak.links.rosbridge.server.websocket import WebSocket
 from mapspeak.robot import Robot
+from mapspeak.ros.messages import Dialect
 
 __all__ = ["RosbridgeServer", "open_rosbridge_server"]
 

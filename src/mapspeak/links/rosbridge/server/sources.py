@@ -8,7 +8,10 @@ from anyio.abc import TaskGroup
 
 from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Pose
-from mapspeak.links.rosbridge.messages import (
+from mapspeak.links.rosbridge.server.graph import BASE_FRAME
+from mapspeak.links.rosbridge.server.hub import Hub
+from mapspeak.robot import Robot, StampedPose
+from mapspeak.ros.messages import (
     CameraInfo,
     Dialect,
     EncodedPicture,
@@ -23,9 +26,6 @@ from mapspeak.links.rosbridge.messages import (
     write_stamp,
     write_transforms,
 )
-from mapspeak.links.rosbridge.server.graph import BASE_FRAME
-from mapspeak.links.rosbridge.server.hub import Hub
-from mapspeak.robot import Robot, StampedPose
 from mapspeak.spatial import OccupancyGrid
 
 __all__ = ["TICK_S", "Sources"]

@@ -8,7 +8,6 @@ import anyio.lowlevel
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError, MapspeakError
-from mapspeak.links.rosbridge.messages import Dialect, read_twist, write_grid
 from mapspeak.links.rosbridge.server.drives import Drives
 from mapspeak.links.rosbridge.server.graph import SLAM_NODES, navigator_of, topics_of
 from mapspeak.links.rosbridge.server.hub import Hub
@@ -21,6 +20,7 @@ from mapspeak.links.rosbridge.server.rosapi import add_rosapi
 from mapspeak.links.rosbridge.server.services import Service, Services
 from mapspeak.links.rosbridge.server.sources import TICK_S, Sources
 from mapspeak.robot import Robot
+from mapspeak.ros.messages import Dialect, read_twist, write_grid
 
 __all__ = ["RosStack"]
 

@@ -1,0 +1,28 @@
+"""Any robot that speaks ROS, over any connection: what it offers, its map, its goals."""
+
+from mapspeak.links.ros.discovery import (
+    RobotOverrides,
+    RobotProfile,
+    describe_profile,
+    load_robot_file,
+)
+from mapspeak.links.ros.driving import DrivingPatience
+from mapspeak.links.ros.goal import PursuedGoal
+from mapspeak.links.ros.parameters import NodeParameters
+from mapspeak.links.ros.poses import describe_pose_source
+from mapspeak.links.ros.robot import RosRobot, build_ros_robot
+from mapspeak.links.ros.subscription import TopicSubscription
+
+__all__ = [
+    "DrivingPatience",
+    "NodeParameters",
+    "PursuedGoal",
+    "RobotOverrides",
+    "RobotProfile",
+    "RosRobot",
+    "TopicSubscription",
+    "build_ros_robot",
+    "describe_pose_source",
+    "describe_profile",
+    "load_robot_file",
+]

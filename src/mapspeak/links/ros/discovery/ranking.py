@@ -1,0 +1,142 @@
+"""Which of several topics of the right type is the one meant, judged by its name."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from mapspeak.ros import RosGraph
+
+MAP = "nav_msgs/OccupancyGrid"
+MAP_UPDATE = "map_msgs/OccupancyGridUpdate"
+MOVE_BASE_GOAL = "move_base_msgs/MoveBaseActionGoal"
+NO_MAPS = ("costmap", "cost_map")
+
+
+@dataclass(frozen=True, slots=True)
+class Nearness:
+    """Prefers topics of one robot among several.
+
+    Attributes:
+        namespace: Such as /robot1; empty or None for none.
+    """
+
+    namespace: str | None
+
+    def first(self, names: Iterable[str]) -> str | None:
+        """Gives the first of the names that lies in the namespace, else the first."""
+        listed = list(names)
+        return next((name for name in listed if self._is_near(name)), next(iter(listed), None))
+
+    def sort(self, names: list[str]) -> list[str]:
+        """Puts names within the namespace first, and changes nothing else."""
+        return sorted(names, key=lambda name: not self._is_near(name))
+
+    def _is_near(self, name: str) -> bool:
+        prefix = (self.namespace or "").strip("/")
+        return bool(prefix) and name.strip("/").startswith(f"{prefix}/")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wanted:
+    """What a topic must be, and how it is usually called.
+
+    Attributes:
+        types: As "package/Type"; an earlier one is preferred where names are equally good.
+        endings: How such topics' names end, the usual one first.
+        never: Parts of names that mean something else.
+        takes_others: Takes a topic of the type, however it is called.
+    """
+
+    types: tuple[str, ...]
+    endings: tuple[str, ...]
+    never: tuple[str, ...] = ()
+    takes_others: bool = False
+
+
+SCANS = Wanted(
+    types=("sensor_msgs/LaserScan",),
+    endings=("/scan", "/base_scan", "scan"),
+    takes_others=True,
+)
+POSES = Wanted(
+    types=("geometry_msgs/PoseWithCovarianceStamped", "geometry_msgs/PoseStamped"),
+    endings=("/amcl_pose", "/pose", "/tracked_pose", "/robot_pose", "/localization_pose"),
+    never=("initial", "goal", "target", "truth"),
+)
+ODOMETRY = Wanted(
+    types=("nav_msgs/Odometry",),
+    endings=("/odometry/filtered", "/odom", "odom", "odometry"),
+    never=("truth",),
+    takes_others=True,
+)
+CAMERAS = Wanted(
+    types=("sensor_msgs/CompressedImage", "sensor_msgs/Image"),
+    endings=(
+        "/color/image_raw/compressed", "/rgb/image_raw/compressed", "/image_raw/compressed",
+        "/image_rect_color/compressed", "/image_color/compressed", "/image/compressed",
+        "/compressed", "/color/image_raw", "/rgb/image_raw", "/image_raw", "/image_rect_color",
+        "/image_color", "/rgb", "/image", "image_raw", "image",
+    ),
+    never=("depth", "disparity", "mask", "debug", "infra", "/ir/", "label", "segment", "costmap"),
+    takes_others=True,
+)  # fmt: skip
+GOALS = Wanted(
+    types=("geometry_msgs/PoseStamped",),
+    endings=("/goal_pose", "/move_base_simple/goal", "/goal"),
+    never=("current_goal", "/move_base/goal"),
+)
+VELOCITIES = Wanted(
+    types=("geometry_msgs/Twist", "geometry_msgs/TwistStamped"),
+    endings=("/cmd_vel", "/mobile_base/commands/velocity", "/velocity", "/cmd_vel_unstamped"),
+)
+
+
+def best(graph: RosGraph, wanted: Wanted, near: Nearness) -> str | None:
+    """Gives the topic that fits best; None where none fits."""
+    ranked = sorted(
+        (topic for topic in graph.topics_of(*wanted.types) if _may_be(topic, wanted)),
+        key=lambda topic: (
+            _place_of(topic, wanted),
+            wanted.types.index(graph.types[topic]),
+            topic.count("/"),
+            topic,
+        ),
+    )
+    return near.first(ranked)
+
+
+def rank_maps(graph: RosGraph, near: Nearness) -> list[str]:
+    """Gives the topics that may be the map, the best first; costmaps are none."""
+    maps = [
+        topic
+        for topic in graph.topics_of(MAP)
+        if not any(part in topic.lower() for part in NO_MAPS)
+    ]
+    maps.sort(
+        key=lambda topic: (
+            not topic.endswith("/map"),
+            "map" not in topic.rpartition("/")[2],
+            topic.count("/"),
+            topic,
+        )
+    )
+    return near.sort(maps)
+
+
+def best_move_base(graph: RosGraph, near: Nearness) -> str | None:
+    """Gives the name of the ROS 1 action that drives to a pose, such as /move_base."""
+    goals = graph.topics_of(MOVE_BASE_GOAL)
+    names = [topic.removesuffix("/goal") for topic in goals if topic.endswith("/goal")]
+    return near.first(sorted(names, key=lambda name: (name.count("/"), name)))
+
+
+def _may_be(topic: str, wanted: Wanted) -> bool:
+    lowered = topic.lower()
+    if any(part in lowered for part in wanted.never):
+        return False
+    return wanted.takes_others or any(lowered.endswith(ending) for ending in wanted.endings)
+
+
+def _place_of(topic: str, wanted: Wanted) -> int:
+    lowered = topic.lower()
+    places = (place for place, ending in enumerate(wanted.endings) if lowered.endswith(ending))
+    return next(places, len(wanted.endings))

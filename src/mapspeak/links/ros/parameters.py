@@ -1,0 +1,123 @@
+"""The parameters of a ROS 2 node, by the services that every node offers for them."""
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from mapspeak.errors import LinkError
+
+FIELD_OF_KIND = {
+    1: "bool_value",
+    2: "integer_value",
+    3: "double_value",
+    4: "string_value",
+    5: "byte_array_value",
+    6: "bool_array_value",
+    7: "integer_array_value",
+    8: "double_array_value",
+    9: "string_array_value",
+}
+"""By rcl_interfaces/ParameterType, the field of ParameterValue that holds the value; 0 is unset."""
+KIND_OF: dict[type, int] = {bool: 1, int: 2, float: 3, str: 4}
+DOUBLE, DOUBLE_ARRAY, ARRAY_SHIFT = 3, 8, 5
+
+
+class _Caller(Protocol):
+    async def call_service(
+        self,
+        service: str,
+        arguments: Mapping[str, Any] | None = None,
+        *,
+        type_name: str | None = None,
+        timeout_s: float | None = None,
+    ) -> dict[str, Any]: ...
+
+
+class NodeParameters:
+    """Lists, reads and sets parameters over whatever can call services.
+
+    Args:
+        caller: Connected to the robot.
+    """
+
+    def __init__(self, caller: _Caller) -> None:
+        self._caller = caller
+
+    async def fetch_names(self, node: str) -> tuple[str, ...]:
+        """Gives the names of a node's parameters, in their order.
+
+        Raises:
+            LinkError: The node does not answer.
+        """
+        answer = await self._call(node, "list_parameters", "ListParameters", {"depth": 0})
+        names = _part(answer.get("result"), "names", node)
+        return tuple(sorted(str(name) for name in names))
+
+    async def fetch(self, node: str, name: str) -> Any:  # noqa: ANN401 - any value ROS has
+        """Gives the value of a parameter; None where it is not set.
+
+        Raises:
+            LinkError: The node does not answer.
+        """
+        answer = await self._call(node, "get_parameters", "GetParameters", {"names": [name]})
+        values = _part(answer, "values", node)
+        value = values[0] if len(values) else {}
+        field = FIELD_OF_KIND.get(value.get("type", 0)) if isinstance(value, dict) else None
+        return None if field is None else value.get(field)
+
+    async def put(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401 - likewise
+        """Sets a parameter; a whole number becomes a double where the node keeps doubles.
+
+        Raises:
+            LinkError: The node does not answer, or refuses, and says why.
+        """
+        types = await self._call(
+            node, "get_parameter_types", "GetParameterTypes", {"names": [name]}
+        )
+        known = [int(kind) for kind in _part(types, "types", node)]
+        parameter = {"name": name, "value": _write(value, wanted=known[0] if known else 0)}
+        answer = await self._call(
+            node, "set_parameters", "SetParameters", {"parameters": [parameter]}
+        )
+        for result in _part(answer, "results", node):
+            if isinstance(result, dict) and not result.get("successful", False):
+                raise LinkError(
+                    f"{node} refuses {name} = {str(value)[:80]}: {result.get('reason')}",
+                    hint="Read the parameter and its type first; give a value of that type.",
+                )
+
+    async def _call(
+        self, node: str, service: str, type_name: str, arguments: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        return await self._caller.call_service(
+            f"{node}/{service}", arguments, type_name=f"rcl_interfaces/srv/{type_name}"
+        )
+
+
+def _part(answer: Any, key: str, node: str) -> Any:  # noqa: ANN401 - ROS JSON enters here
+    part = answer.get(key) if isinstance(answer, Mapping) else None
+    if part is None or isinstance(part, str) or not hasattr(part, "__len__"):
+        raise LinkError(
+            f"{node} answers without {key}.", hint="Ask for the list of nodes: it may have ended."
+        )
+    return part
+
+
+def _write(value: Any, *, wanted: int) -> dict[str, Any]:  # noqa: ANN401 - any value ROS has
+    """Gives a rcl_interfaces/ParameterValue."""
+    kind = _kind_of(value)
+    if (kind, wanted) == (KIND_OF[int], DOUBLE):
+        kind, value = DOUBLE, float(value)
+    if (kind, wanted) == (KIND_OF[int] + ARRAY_SHIFT, DOUBLE_ARRAY):
+        kind, value = DOUBLE_ARRAY, [float(part) for part in value]
+    return {"type": kind, FIELD_OF_KIND[kind]: value}
+
+
+def _kind_of(value: Any) -> int:  # noqa: ANN401 - any value ROS has
+    if type(value) in KIND_OF:
+        return KIND_OF[type(value)]
+    if isinstance(value, list) and value and len({type(part) for part in value}) == 1:
+        return _kind_of(value[0]) + ARRAY_SHIFT
+    raise LinkError(
+        f"{str(value)[:80]!r} is no value of a parameter.",
+        hint="Give true or false, a number, a text, or a list of one of these kinds.",
+    )

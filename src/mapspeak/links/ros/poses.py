@@ -1,0 +1,128 @@
+"""Where the robot believes it is."""
+
+import anyio
+
+from mapspeak.errors import LinkError
+from mapspeak.links.ros.discovery import PoseSource, RobotProfile
+from mapspeak.links.ros.discovery.profile import POSE_STAMPED, POSE_WITH_COVARIANCE
+from mapspeak.links.ros.frames import FrameListener
+from mapspeak.robot import StampedPose
+from mapspeak.ros import RosConnection, Subscription
+from mapspeak.ros.messages import (
+    FramedPose,
+    Message,
+    read_pose_stamped,
+    read_pose_with_covariance,
+)
+
+PATIENCE_S = 3.0
+SILENCE_S = 10.0
+
+
+class PoseKeeper:
+    """Tells the pose from the tree of frames, or from a topic where the tree does not reach.
+
+    Args:
+        connection: Connected to the robot.
+        profile: Says where the pose comes from.
+        frames: Listens to the tree.
+        silence_s: Without any moving transform, in wall time, after which the pose is too old.
+    """
+
+    def __init__(
+        self,
+        connection: RosConnection,
+        profile: RobotProfile,
+        frames: FrameListener,
+        *,
+        silence_s: float = SILENCE_S,
+    ) -> None:
+        self._silence_s = silence_s
+        self._profile = profile
+        self._frames = frames
+        self._topic: Subscription | None = None
+        if profile.pose_topic is not None:
+            type_name = profile.dialect.type_name(profile.pose_type or POSE_WITH_COVARIANCE)
+            self._topic = connection.subscribe(profile.pose_topic, type_name=type_name)
+
+    async def fetch(self, *, timeout_s: float = PATIENCE_S) -> StampedPose:
+        """Gives the latest pose in the map frame; waits for the first.
+
+        Raises:
+            LinkError: The robot does not say where it is.
+        """
+        with anyio.move_on_after(timeout_s):
+            while True:
+                try:
+                    return self.latest
+                except LinkError:
+                    await self._wait_for_news()
+        return self.latest
+
+    @property
+    def latest(self) -> StampedPose:
+        """The latest pose in the map frame.
+
+        Raises:
+            LinkError: The robot has not said where it is.
+        """
+        if self._topic is None:
+            return self._from_frames(self._profile.base_frame)
+        if self._topic.latest is None:
+            raise LinkError(
+                f"No pose has come on {self._topic.topic}.",
+                hint="Start localisation (AMCL, slam_toolbox), or name another pose_topic in "
+                "robot.yaml.",
+            )
+        return self._from_topic(self._topic.latest)
+
+    def _from_frames(self, frame: str) -> StampedPose:
+        found = self._frames.tree.find(outer=self._profile.map_frame, inner=frame)
+        self._check_that_frames_move()
+        return StampedPose(found.outer_from_inner, found.stamp_s)
+
+    def _check_that_frames_move(self) -> None:
+        if self._frames.arrived_s is None:
+            return
+        silent_s = anyio.current_time() - self._frames.arrived_s
+        if silent_s > self._silence_s:
+            raise LinkError(
+                f"The robot's pose is old: no transform has come for {silent_s:.0f} s.",
+                hint="Check that SLAM or localisation and the robot's drivers still run, and that "
+                "a simulation is not paused.",
+            )
+
+    def _from_topic(self, message: Message) -> StampedPose:
+        framed = self._read(message)
+        outer = self._profile.map_frame
+        if framed.frame_id in ("", outer) or not self._frames.has_way(
+            outer=outer, inner=framed.frame_id
+        ):
+            # Odometry without a map has no other frame: it is taken for the map's.
+            return StampedPose(framed.pose, framed.stamp_s)
+        map_from_frame = self._from_frames(framed.frame_id).pose
+        return StampedPose(map_from_frame @ framed.pose, framed.stamp_s)
+
+    def _read(self, message: Message) -> FramedPose:
+        if self._profile.pose_type == POSE_STAMPED:
+            return read_pose_stamped(message)
+        return read_pose_with_covariance(message)
+
+    async def _wait_for_news(self) -> None:
+        if self._topic is None:
+            await self._frames.wait_for_news()
+        else:
+            await self._topic.wait_for_more_than(self._topic.n_received, timeout_s=PATIENCE_S)
+
+
+def describe_pose_source(profile: RobotProfile) -> str:
+    """Says in a sentence where the pose comes from."""
+    match profile.pose_source:
+        case PoseSource.TF:
+            return f"The pose is that of {profile.base_frame} in {profile.map_frame} by TF."
+        case PoseSource.POSE_TOPIC:
+            return f"The pose comes from {profile.pose_topic}."
+        case PoseSource.ODOMETRY:
+            return f"The pose is odometry from {profile.pose_topic}: it drifts away from the map."
+        case PoseSource.NONE:
+            return "The robot does not say where it is."

@@ -1,0 +1,279 @@
+"""The port implemented over any connection to ROS 1 or ROS 2."""
+
+from collections import OrderedDict
+from contextlib import suppress
+
+import anyio
+
+from mapspeak.errors import GoalError, LinkError
+from mapspeak.geometry import Pose
+from mapspeak.links.ros.camera import Camera
+from mapspeak.links.ros.clock import RobotClock
+from mapspeak.links.ros.discovery import (
+    FRAMES_S,
+    NavigationKind,
+    PoseSource,
+    RobotOverrides,
+    RobotProfile,
+    discover_robot,
+    look_at_robot,
+)
+from mapspeak.links.ros.driving import (
+    Driver,
+    DrivingPatience,
+    GoalRecord,
+    GoalTopicDriver,
+    MoveBaseDriver,
+    Nav2Driver,
+)
+from mapspeak.links.ros.frames import FrameListener
+from mapspeak.links.ros.maps import MapKeeper
+from mapspeak.links.ros.poses import PoseKeeper
+from mapspeak.links.ros.velocity import Brake
+from mapspeak.robot import (
+    CameraPicture,
+    Detection,
+    GoalStatus,
+    RobotDescription,
+    StampedPose,
+)
+from mapspeak.ros import RosConnection
+from mapspeak.spatial import OccupancyGrid
+
+MOST_GOALS_KEPT = 1_000
+LOOK_AGAIN_S = 5.0
+"""Between two looks for a better source of the pose while no new frames appear, in wall time."""
+USUAL_PATIENCE = DrivingPatience()
+NOTHING_SAID = RobotOverrides()
+
+
+class RosRobot:
+    """A `Robot` that speaks ROS.
+
+    Args:
+        connection: Connected to the robot.
+        profile: What the robot offers.
+        frames: Listens to its coordinate frames.
+        clock: Tells its time.
+        overrides: What robot.yaml says, for what is found only later.
+        patience: How long to wait for its navigation.
+    """
+
+    def __init__(
+        self,
+        connection: RosConnection,
+        profile: RobotProfile,
+        *,
+        frames: FrameListener,
+        clock: RobotClock,
+        overrides: RobotOverrides = NOTHING_SAID,
+        patience: DrivingPatience = USUAL_PATIENCE,
+    ) -> None:
+        self.profile = profile
+        self.connection = connection
+        self._frames = frames
+        self._clock = clock
+        self._overrides = overrides
+        self._patience = patience
+        self._looked_s = float("-inf")
+        self._frames_looked_at = frames.tree.frames
+        self._goals: OrderedDict[str, GoalRecord] = OrderedDict()
+        self._maps = MapKeeper(connection, profile)
+        self._camera = self._build_camera()
+        self._poses = PoseKeeper(connection, profile, frames)
+        self._brake = Brake(connection, profile)
+        self._driver = self._build_driver()
+
+    @property
+    def description(self) -> RobotDescription:
+        """What is fixed about this robot."""
+        return RobotDescription(
+            name=self.profile.name,
+            radius_m=self.profile.radius_m,
+            map_name=self.profile.map_name,
+            has_camera=self.profile.camera_topic is not None,
+            detector=None,
+        )
+
+    @property
+    def now_s(self) -> float:
+        """Robot time: that of /clock in a simulation, else of the robot's own clock."""
+        return self._clock.now_s
+
+    async def sleep(self, duration_s: float) -> None:
+        """Returns when that much robot time has passed."""
+        await self._clock.sleep(duration_s)
+
+    async def fetch_map(self) -> OccupancyGrid:
+        """Gives the latest map; the same value as long as it has not changed."""
+        await self.connection.wait_until_connected()
+        if self.profile.map_topic is None:
+            await self._look_again()
+        return await self._maps.fetch()
+
+    async def fetch_pose(self) -> StampedPose:
+        """Gives where the robot believes it is; see the profile for how it is known."""
+        await self.connection.wait_until_connected()
+        if self.profile.pose_source in (PoseSource.ODOMETRY, PoseSource.NONE):
+            await self._look_for_better_pose()
+        return await self._poses.fetch()
+
+    async def fetch_picture(self) -> CameraPicture:
+        """Takes a picture with the front camera."""
+        await self.connection.wait_until_connected()
+        if self.profile.camera_topic is None:
+            await self._look_again()
+        picture = await self._camera.fetch()
+        return CameraPicture(
+            data=picture.data,
+            media_type=picture.media_type,
+            width_px=picture.width_px,
+            height_px=picture.height_px,
+            horizontal_fov_rad=await self._camera.fetch_fov_rad(),
+            pose=(await self._poses.fetch()).pose,
+            stamp_s=picture.stamp_s,
+        )
+
+    async def fetch_detections(self) -> tuple[Detection, ...]:
+        """Gives nothing: no message for detections is common to robots."""
+        return ()
+
+    async def send_goal(self, goal: Pose) -> str:
+        """Starts a drive; returns when navigation has taken or refused it."""
+        await self.connection.wait_until_connected()
+        if self._driver is None:
+            await self._look_again()
+        record = await self._wanted_driver().send(goal)
+        self._goals[record.goal_id] = record
+        while len(self._goals) > MOST_GOALS_KEPT:
+            self._goals.popitem(last=False)
+        return record.goal_id
+
+    async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
+        """Gives how a drive stands, also long after its end and after a reconnection."""
+        record = self._record(robot_goal_id)
+        if not record.is_over:
+            await self.connection.wait_until_connected()
+            await self._wanted_driver().look_at(record)
+        return record.status
+
+    async def cancel_goal(self, robot_goal_id: str) -> None:
+        """Asks navigation to end a drive, and waits a moment until it has."""
+        record = self._record(robot_goal_id)
+        if not record.is_over:
+            await self.connection.wait_until_connected()
+            await self._wanted_driver().cancel(record)
+
+    async def stop(self) -> None:
+        """Ends every drive, those of other clients too, and commands zero velocity."""
+        if not self.connection.is_open:
+            await self.connection.wait_until_connected()
+        self._brake.pull()
+        if self._driver is not None:
+            await self._driver.cancel_all()
+
+    async def _look_again(self) -> None:
+        """Takes in what has been started since: people start rosbridge first and SLAM later."""
+        before = self.profile
+        self.profile = await look_at_robot(self.connection, self._frames, self._overrides)
+        if self.profile == before:
+            return
+        if before.map_topic is None:
+            self._maps = MapKeeper(self.connection, self.profile)
+        if before.camera_topic is None:
+            self._camera = self._build_camera()
+        if before.velocity_topic is None:
+            self._brake = Brake(self.connection, self.profile)
+        if self._driver is None:
+            self._driver = self._build_driver()
+        if before.pose_source is not self.profile.pose_source:
+            self._poses = PoseKeeper(self.connection, self.profile, self._frames)
+
+    async def _look_for_better_pose(self) -> None:
+        frames, now_s = self._frames.tree.frames, anyio.current_time()
+        if frames != self._frames_looked_at or now_s - self._looked_s > LOOK_AGAIN_S:
+            self._frames_looked_at, self._looked_s = frames, now_s
+            # What is there goes on being used where nothing better can be found.
+            with suppress(LinkError):
+                await self._look_again()
+
+    def _build_camera(self) -> Camera:
+        camera = Camera(self.connection, self.profile)
+        self.connection.start_soon(camera.close_when_idle)
+        return camera
+
+    def _build_driver(self) -> Driver | None:
+        profile, name = self.profile, self.profile.navigation_name
+        if name is None:
+            return None
+        match profile.navigation:
+            case NavigationKind.NAV2:
+                return Nav2Driver(
+                    self.connection,
+                    name,
+                    map_frame=profile.map_frame,
+                    patience=self._patience,
+                )
+            case NavigationKind.MOVE_BASE:
+                return MoveBaseDriver(
+                    self.connection,
+                    name,
+                    map_frame=profile.map_frame,
+                    patience=self._patience,
+                )
+            case NavigationKind.GOAL_TOPIC:
+                return GoalTopicDriver(
+                    self.connection,
+                    name,
+                    dialect=profile.dialect,
+                    map_frame=profile.map_frame,
+                    fetch_pose=self.fetch_pose,
+                    now_s=lambda: self.now_s,
+                )
+            case NavigationKind.NONE:
+                return None
+
+    def _wanted_driver(self) -> Driver:
+        if self._driver is None:
+            raise LinkError(
+                "The robot offers no navigation.",
+                hint="Start Nav2 (ROS 1: move_base) on the robot, or name `navigation` and "
+                "`navigation_name` in robot.yaml.",
+            )
+        return self._driver
+
+    def _record(self, robot_goal_id: str) -> GoalRecord:
+        record = self._goals.get(robot_goal_id)
+        if record is None:
+            raise GoalError(
+                f"No goal with the id {robot_goal_id[:80]!r} was sent over this link.",
+                hint="Use the id that sending the goal gave.",
+            )
+        return record
+
+
+async def build_ros_robot(
+    connection: RosConnection,
+    *,
+    overrides: RobotOverrides = NOTHING_SAID,
+    patience: DrivingPatience = USUAL_PATIENCE,
+    frames_s: float = FRAMES_S,
+) -> RosRobot:
+    """Gives the robot at the other end of a connection, once it has said what it offers.
+
+    Args:
+        connection: To the robot; stays open as long as the robot is used.
+        overrides: What robot.yaml says.
+        patience: Time limits of navigation.
+        frames_s: How long to wait for its frames, in wall time.
+
+    Raises:
+        LinkError: The robot does not say what it offers.
+    """
+    frames = FrameListener(connection)
+    clock = RobotClock(connection)
+    profile = await discover_robot(connection, frames, overrides, frames_s=frames_s)
+    await clock.start(profile.clock_topic)
+    return RosRobot(
+        connection, profile, frames=frames, clock=clock, overrides=overrides, patience=patience
+    )

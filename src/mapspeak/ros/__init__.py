@@ -1,0 +1,24 @@
+"""THE SECOND PORT: what a ROS system can be asked, over whatever connects us to it.
+
+`RosConnection` is to a whole ROS graph what `Robot` is to one robot: links implement it, and what
+works with any ROS robot is written against it. Messages are mappings as rosbridge writes them.
+"""
+
+from mapspeak.ros.definitions import split_definition
+from mapspeak.ros.graph import NodeLinks, RosGraph
+from mapspeak.ros.names import NAME, TYPE, new_id
+from mapspeak.ros.port import ActionEnd, ActionGoal, Listener, RosConnection, Subscription
+
+__all__ = [
+    "NAME",
+    "TYPE",
+    "ActionEnd",
+    "ActionGoal",
+    "Listener",
+    "NodeLinks",
+    "RosConnection",
+    "RosGraph",
+    "Subscription",
+    "new_id",
+    "split_definition",
+]

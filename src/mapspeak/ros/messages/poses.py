@@ -1,0 +1,209 @@
+"""Poses, transforms and velocities of ROS messages; everything is taken as lying in the plane."""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from mapspeak.errors import LinkError
+from mapspeak.geometry import Pose
+from mapspeak.ros.messages.dialect import Dialect, read_header, write_header
+from mapspeak.ros.messages.fields import Message, number_of, part_of, parts_of, text_of
+
+NORM_TOLERANCE = 0.01
+"""How far a quaternion's squared length may be from 1; tf2 draws the line there too."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FramedPose:
+    """A pose with the frame it is given in.
+
+    Attributes:
+        pose: In the frame `frame_id`.
+        frame_id: Such as "map".
+        stamp_s: Robot time of the estimate.
+    """
+
+    pose: Pose
+    frame_id: str
+    stamp_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrameTransform:
+    """Where one frame lies in another.
+
+    Attributes:
+        parent_from_child: The pose of the child frame in the parent frame.
+        parent: The outer frame, such as "map".
+        child: The inner frame, such as "odom".
+        stamp_s: Robot time of the transform.
+    """
+
+    parent_from_child: Pose
+    parent: str
+    child: str
+    stamp_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Twist:
+    """A velocity in the robot's own frame.
+
+    Attributes:
+        forward_mps: Along its heading.
+        left_mps: Across it.
+        turn_radps: Counter-clockwise.
+    """
+
+    forward_mps: float
+    left_mps: float
+    turn_radps: float
+
+    @property
+    def is_standing(self) -> bool:
+        """True when it commands a stand."""
+        return self == Twist(forward_mps=0.0, left_mps=0.0, turn_radps=0.0)
+
+
+def read_yaw(quaternion: Message) -> float:
+    """Reads the heading of a quaternion, in radians.
+
+    Raises:
+        LinkError: It is zero, not of length 1, or not made of numbers.
+    """
+    x, y, z, w = (number_of(quaternion, name) for name in "xyzw")
+    norm = math.hypot(x, y, z, w)
+    if abs(norm * norm - 1.0) > NORM_TOLERANCE:
+        raise LinkError(
+            f"A ROS message's quaternion ({x:g}, {y:g}, {z:g}, {w:g}) has the length {norm:g}, "
+            "not 1.",
+            hint="The node that sends it left it unset or unnormalised; "
+            "no rotation is x=0, y=0, z=0, w=1.",
+        )
+    x, y, z, w = x / norm, y / norm, z / norm, w / norm
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def write_yaw(yaw_rad: float) -> dict[str, float]:
+    """Writes a heading as a quaternion."""
+    return {"x": 0.0, "y": 0.0, "z": math.sin(yaw_rad / 2), "w": math.cos(yaw_rad / 2)}
+
+
+def read_pose(message: Message) -> Pose:
+    """Reads geometry_msgs/Pose; height and tilt are left away.
+
+    Raises:
+        LinkError: It is no pose.
+    """
+    place = part_of(message, "position")
+    yaw_rad = read_yaw(part_of(message, "orientation"))
+    return Pose(number_of(place, "x"), number_of(place, "y"), yaw_rad)
+
+
+def write_pose(pose: Pose) -> dict[str, Any]:
+    """Writes geometry_msgs/Pose, on the floor."""
+    position = {"x": float(pose.x), "y": float(pose.y), "z": 0.0}
+    return {"position": position, "orientation": write_yaw(pose.yaw_rad)}
+
+
+def read_pose_stamped(message: Message) -> FramedPose:
+    """Reads geometry_msgs/PoseStamped.
+
+    Raises:
+        LinkError: It is none.
+    """
+    frame_id, stamp_s = read_header(message)
+    return FramedPose(pose=read_pose(part_of(message, "pose")), frame_id=frame_id, stamp_s=stamp_s)
+
+
+def write_pose_stamped(framed: FramedPose, *, dialect: Dialect) -> dict[str, Any]:
+    """Writes geometry_msgs/PoseStamped."""
+    header = write_header(framed.frame_id, framed.stamp_s, dialect=dialect)
+    return {"header": header, "pose": write_pose(framed.pose)}
+
+
+def read_pose_with_covariance(message: Message) -> FramedPose:
+    """Reads geometry_msgs/PoseWithCovarianceStamped, or the pose of nav_msgs/Odometry.
+
+    Raises:
+        LinkError: It is neither.
+    """
+    frame_id, stamp_s = read_header(message)
+    pose = read_pose(part_of(part_of(message, "pose"), "pose"))
+    return FramedPose(pose=pose, frame_id=frame_id, stamp_s=stamp_s)
+
+
+def write_pose_with_covariance(framed: FramedPose, *, dialect: Dialect) -> dict[str, Any]:
+    """Writes geometry_msgs/PoseWithCovarianceStamped; the covariance is left at zero, unknown."""
+    header = write_header(framed.frame_id, framed.stamp_s, dialect=dialect)
+    return {"header": header, "pose": {"pose": write_pose(framed.pose), "covariance": [0.0] * 36}}
+
+
+def write_odometry(
+    framed: FramedPose, twist: Twist, *, child: str, dialect: Dialect
+) -> dict[str, Any]:
+    """Writes nav_msgs/Odometry: a pose, and the velocity in the frame `child`."""
+    velocity = {"twist": write_twist(twist), "covariance": [0.0] * 36}
+    posed = write_pose_with_covariance(framed, dialect=dialect)
+    return {**posed, "child_frame_id": child, "twist": velocity}
+
+
+def read_transforms(message: Message) -> tuple[FrameTransform, ...]:
+    """Reads tf2_msgs/TFMessage; height and tilt are left away.
+
+    Raises:
+        LinkError: It is none.
+    """
+    return tuple(_read_transform(each) for each in parts_of(message, "transforms"))
+
+
+def write_transforms(transforms: Iterable[FrameTransform], *, dialect: Dialect) -> dict[str, Any]:
+    """Writes tf2_msgs/TFMessage."""
+    return {"transforms": [_write_transform(each, dialect=dialect) for each in transforms]}
+
+
+def read_twist(message: object) -> Twist:
+    """Reads geometry_msgs/Twist, or the one within geometry_msgs/TwistStamped.
+
+    Raises:
+        LinkError: It is neither.
+    """
+    is_stamped = isinstance(message, Mapping) and "twist" in message
+    twist = part_of(message, "twist") if is_stamped else message
+    linear, angular = part_of(twist, "linear"), part_of(twist, "angular")
+    return Twist(
+        forward_mps=number_of(linear, "x"),
+        left_mps=number_of(linear, "y"),
+        turn_radps=number_of(angular, "z"),
+    )
+
+
+def write_twist(twist: Twist) -> dict[str, Any]:
+    """Writes geometry_msgs/Twist."""
+    return {
+        "linear": {"x": twist.forward_mps, "y": twist.left_mps, "z": 0.0},
+        "angular": {"x": 0.0, "y": 0.0, "z": twist.turn_radps},
+    }
+
+
+def _read_transform(message: Any) -> FrameTransform:  # noqa: ANN401 - ROS JSON enters here
+    parent, stamp_s = read_header(message)
+    transform = part_of(message, "transform")
+    place = part_of(transform, "translation")
+    yaw_rad = read_yaw(part_of(transform, "rotation"))
+    return FrameTransform(
+        parent_from_child=Pose(number_of(place, "x"), number_of(place, "y"), yaw_rad),
+        parent=parent,
+        child=text_of(message, "child_frame_id").lstrip("/"),
+        stamp_s=stamp_s,
+    )
+
+
+def _write_transform(transform: FrameTransform, *, dialect: Dialect) -> dict[str, Any]:
+    pose = write_pose(transform.parent_from_child)
+    return {
+        "header": write_header(transform.parent, transform.stamp_s, dialect=dialect),
+        "child_frame_id": transform.child,
+        "transform": {"translation": pose["position"], "rotation": pose["orientation"]},
+    }

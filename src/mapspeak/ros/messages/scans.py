@@ -1,0 +1,166 @@
+"""Laser scans and camera descriptions of ROS messages."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.ros.messages.dialect import Dialect, read_header, write_header
+from mapspeak.ros.messages.fields import (
+    Message,
+    floats_of,
+    misfit,
+    number_of,
+    whole_of,
+)
+
+LARGEST_SIDE_PX = 65535
+MOST_BEAMS = 1_000_000
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class LaserScan:
+    """One turn of a LiDAR; compared by identity.
+
+    Attributes:
+        ranges_m: One distance per beam; NaN where the beam met nothing or was not valid.
+        first_angle_rad: Of the first beam, counter-clockwise from the sensor's x axis.
+        angle_step_rad: From one beam to the next.
+        least_range_m: Nearer things are not measured.
+        largest_range_m: Farther things are not measured.
+        frame_id: The sensor's frame.
+        stamp_s: Robot time of the first beam.
+    """
+
+    ranges_m: NDArray[np.float64]
+    first_angle_rad: float
+    angle_step_rad: float
+    least_range_m: float
+    largest_range_m: float
+    frame_id: str
+    stamp_s: float
+
+    def __post_init__(self) -> None:
+        ranges_m = np.array(self.ranges_m, dtype=np.float64)
+        ranges_m.setflags(write=False)
+        object.__setattr__(self, "ranges_m", ranges_m)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraInfo:
+    """What a camera says of itself.
+
+    Attributes:
+        width_px: Columns.
+        height_px: Rows.
+        horizontal_fov_rad: From the left edge to the right one; None where it is not calibrated.
+        frame_id: The camera's frame.
+        stamp_s: Robot time of the picture it belongs to.
+    """
+
+    width_px: int
+    height_px: int
+    horizontal_fov_rad: float | None
+    frame_id: str
+    stamp_s: float
+
+
+def read_scan(message: Message) -> LaserScan:
+    """Reads sensor_msgs/LaserScan; ranges outside its own limits become NaN.
+
+    Raises:
+        LinkError: It is none.
+    """
+    frame_id, stamp_s = read_header(message)
+    ranges_m = floats_of(message, "ranges")
+    if ranges_m.size > MOST_BEAMS:
+        raise misfit("ranges", f"{ranges_m.size} long", f"at most {MOST_BEAMS} beams")
+    least_m, largest_m = number_of(message, "range_min"), number_of(message, "range_max")
+    is_valid = (ranges_m >= least_m) & (ranges_m <= largest_m)
+    return LaserScan(
+        ranges_m=np.where(is_valid, ranges_m, np.nan),
+        first_angle_rad=number_of(message, "angle_min"),
+        angle_step_rad=number_of(message, "angle_increment"),
+        least_range_m=least_m,
+        largest_range_m=largest_m,
+        frame_id=frame_id,
+        stamp_s=stamp_s,
+    )
+
+
+def write_scan(scan: LaserScan, *, dialect: Dialect) -> dict[str, Any]:
+    """Writes sensor_msgs/LaserScan; a beam without a range becomes infinite (REP 117)."""
+    ranges_m = np.where(np.isnan(scan.ranges_m), np.inf, scan.ranges_m)
+    last_rad = scan.first_angle_rad + scan.angle_step_rad * max(len(ranges_m) - 1, 0)
+    return {
+        "header": write_header(scan.frame_id, scan.stamp_s, dialect=dialect),
+        "angle_min": scan.first_angle_rad,
+        "angle_max": last_rad,
+        "angle_increment": scan.angle_step_rad,
+        "time_increment": 0.0,
+        "scan_time": 0.0,
+        "range_min": scan.least_range_m,
+        "range_max": scan.largest_range_m,
+        "ranges": ranges_m.astype(np.float32),
+        "intensities": np.zeros(0, dtype=np.float32),
+    }
+
+
+def read_camera_info(message: Message) -> CameraInfo:
+    """Reads sensor_msgs/CameraInfo.
+
+    Raises:
+        LinkError: It is none.
+    """
+    frame_id, stamp_s = read_header(message)
+    width_px = whole_of(message, "width", low=0, high=LARGEST_SIDE_PX)
+    height_px = whole_of(message, "height", low=0, high=LARGEST_SIDE_PX)
+    # ROS 1 writes the intrinsic matrix with a capital letter.
+    matrix = floats_of(message, "K" if "K" in message else "k")
+    if matrix.size != 9:
+        raise misfit("k", f"{matrix.size} long", "a matrix of 9 numbers")
+    return CameraInfo(
+        width_px=width_px,
+        height_px=height_px,
+        horizontal_fov_rad=_fov(width_px, focal_px=float(matrix[0]), centre_px=float(matrix[2])),
+        frame_id=frame_id,
+        stamp_s=stamp_s,
+    )
+
+
+def write_camera_info(info: CameraInfo, *, dialect: Dialect) -> dict[str, Any]:
+    """Writes sensor_msgs/CameraInfo of a camera without distortion, with square pixels."""
+    focal_px = 0.0
+    if info.horizontal_fov_rad is not None:
+        focal_px = info.width_px / (2.0 * math.tan(info.horizontal_fov_rad / 2.0))
+    u, v = info.width_px / 2.0, info.height_px / 2.0
+    intrinsic = [focal_px, 0.0, u, 0.0, focal_px, v, 0.0, 0.0, 1.0]
+    projection = [focal_px, 0.0, u, 0.0, 0.0, focal_px, v, 0.0, 0.0, 0.0, 1.0, 0.0]
+    matrices = {
+        "D": [0.0] * 5,
+        "K": intrinsic,
+        "R": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        "P": projection,
+    }
+    is_ros1 = dialect is Dialect.ROS1
+    roi = {"x_offset": 0, "y_offset": 0, "height": 0, "width": 0, "do_rectify": False}
+    return {
+        "header": write_header(info.frame_id, info.stamp_s, dialect=dialect),
+        "height": info.height_px,
+        "width": info.width_px,
+        "distortion_model": "plumb_bob",
+        **{name if is_ros1 else name.lower(): values for name, values in matrices.items()},
+        "binning_x": 0,
+        "binning_y": 0,
+        "roi": roi,
+    }
+
+
+def _fov(width_px: int, *, focal_px: float, centre_px: float) -> float | None:
+    """Gives the angle between the edges; drivers leave the matrix at zero until calibrated."""
+    if not (focal_px > 0.0 and 0.0 <= centre_px <= width_px and width_px > 0):
+        return None
+    fov_rad = math.atan(centre_px / focal_px) + math.atan((width_px - centre_px) / focal_px)
+    return fov_rad if 0.0 < fov_rad < math.pi else None

@@ -1,0 +1,272 @@
+"""What a connection to a ROS system can do."""
+
+from collections.abc import Callable, Coroutine, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from mapspeak.ros.graph import NodeLinks, RosGraph
+from mapspeak.ros.messages import Message
+
+Listener = Callable[[Message], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ActionEnd:
+    """The end of a goal.
+
+    Attributes:
+        status: As in action_msgs/GoalStatus: 4 succeeded, 5 cancelled, 6 aborted; None if unsaid.
+        is_result: False when the goal was refused; says nothing about success.
+        values: The result message; a text with the reason where it was refused.
+    """
+
+    status: int | None
+    is_result: bool
+    values: Any
+
+
+class Subscription(Protocol):
+    """A topic as we last heard it: the latest message wins."""
+
+    @property
+    def topic(self) -> str:
+        """Its full name."""
+        ...
+
+    @property
+    def latest(self) -> Message | None:
+        """The newest message; None as long as none has come."""
+        ...
+
+    @property
+    def n_received(self) -> int:
+        """Since the subscription began, over all connections."""
+        ...
+
+    @property
+    def arrived_s(self) -> float:
+        """When the newest came, by the event loop's clock."""
+        ...
+
+    def listen(self, listener: Listener) -> None:
+        """Calls a function with every message that comes from now on; it must not raise."""
+        ...
+
+    async def wait_for_more_than(self, n_received: int, *, timeout_s: float) -> Message:
+        """Gives the latest message once more than so many have come; waits in wall time.
+
+        Raises:
+            LinkError: None came in time. The subscription goes on.
+        """
+        ...
+
+
+class ActionGoal(Protocol):
+    """What is known of one goal of a ROS 2 action. It is kept after its end."""
+
+    @property
+    def goal_id(self) -> str:
+        """The id it was sent with."""
+        ...
+
+    @property
+    def action(self) -> str:
+        """The action's full name."""
+        ...
+
+    @property
+    def ros_id(self) -> str | None:
+        """The UUID under which the action server knows it, 32 hex digits; None where unknown."""
+        ...
+
+    @property
+    def is_accepted(self) -> bool:
+        """True when the server is known to have taken it; rosbridge does not tell."""
+        ...
+
+    @property
+    def feedback(self) -> Message | None:
+        """The latest; None before the first."""
+        ...
+
+    @property
+    def end(self) -> ActionEnd | None:
+        """How it ended; None before."""
+        ...
+
+    @property
+    def is_lost(self) -> bool:
+        """True when what would have brought its end is gone; the robot may still drive."""
+        ...
+
+    def listen(self, listener: Callable[[], None]) -> None:
+        """Calls a function whenever something is said about the goal; it must not raise."""
+        ...
+
+
+class RosConnection(Protocol):
+    """One ROS system, kept connected. Waiting is limited in wall time; a limit closes nothing.
+
+    Methods raise `LinkError` when the system cannot be reached or does not answer, and when a
+    message, a name or a type is none.
+    """
+
+    @property
+    def is_open(self) -> bool:
+        """True when something can be sent at once."""
+        ...
+
+    @property
+    def connected_for_s(self) -> float | None:
+        """Since when topics and goals have been connected, in wall time; None while not."""
+        ...
+
+    def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        """Runs something in the background until the connection is closed."""
+        ...
+
+    async def wait_until_connected(self) -> None:
+        """Returns at once, or when the connection is open again."""
+        ...
+
+    def subscribe(
+        self,
+        topic: str,
+        *,
+        type_name: str | None = None,
+        is_bulky: bool = False,
+        throttle_ms: int = 0,
+    ) -> Subscription:
+        """Gives the subscription to a topic, which is begun where there is none yet.
+
+        Args:
+            topic: Its full name.
+            type_name: As this ROS writes it; None looks it up.
+            is_bulky: Messages hold large arrays: maps, scans, pictures.
+            throttle_ms: The least time between two messages.
+        """
+        ...
+
+    def unsubscribe(self, subscription: Subscription) -> None:
+        """Ends one use of a subscription; the last one ends it at the robot too."""
+        ...
+
+    def renew(self, subscription: Subscription) -> None:
+        """Subscribes again, perhaps in another way: a latched message may have been missed."""
+        ...
+
+    def advertise(self, topic: str, *, type_name: str) -> None:
+        """Says that we will publish; the robot needs a moment until it listens."""
+        ...
+
+    def unadvertise(self, topic: str) -> None:
+        """Takes back what `advertise` said; does nothing for what was not advertised."""
+        ...
+
+    async def publish(self, topic: str, message: Message) -> None:
+        """Publishes on an advertised topic."""
+        ...
+
+    def publish_everywhere(self, topic: str, message: Message) -> int:
+        """Publishes at once by every way that is open, and gives how many: for a stop."""
+        ...
+
+    async def call_service(
+        self,
+        service: str,
+        arguments: Mapping[str, Any] | None = None,
+        *,
+        type_name: str | None = None,
+        timeout_s: float | None = None,
+    ) -> dict[str, Any]:
+        """Gives what a service answers.
+
+        Args:
+            service: Its full name.
+            arguments: The fields of the request; None for none.
+            type_name: None looks it up.
+            timeout_s: None takes the usual limit.
+        """
+        ...
+
+    async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
+        """Sends a goal to an action of ROS 2 and gives what becomes of it, as it becomes."""
+        ...
+
+    def cancel_goal(self, goal: ActionGoal) -> None:
+        """Asks for the end of a goal; its `end` tells whether that worked."""
+        ...
+
+    def give_up_goal(self, goal: ActionGoal) -> None:
+        """Waits no longer for a goal that shows no sign of life."""
+        ...
+
+    def clear_the_way(self) -> None:
+        """Makes sure that what is sent next is not held up by what was sent before: for a stop."""
+        ...
+
+    async def fetch_graph(self) -> RosGraph:
+        """Gives the topics and actions there are."""
+        ...
+
+    async def fetch_time_s(self) -> float | None:
+        """Gives robot time; None where the robot does not say."""
+        ...
+
+    async def fetch_nodes(self) -> tuple[str, ...]:
+        """Gives the full names of all nodes, in their order."""
+        ...
+
+    async def fetch_node(self, node: str) -> NodeLinks:
+        """Gives what a node publishes, subscribes to and serves."""
+        ...
+
+    async def fetch_publishers(self, topic: str) -> tuple[str, ...]:
+        """Gives the nodes that publish on a topic."""
+        ...
+
+    async def fetch_subscribers(self, topic: str) -> tuple[str, ...]:
+        """Gives the nodes that listen to a topic."""
+        ...
+
+    async def fetch_services(self) -> tuple[str, ...]:
+        """Gives the full names of all services, in their order."""
+        ...
+
+    async def fetch_service_type(self, service: str) -> str:
+        """Gives a service's type, as "package/Type"."""
+        ...
+
+    async def fetch_action_type(self, action: str) -> str:
+        """Gives an action's type, as "package/Type"."""
+        ...
+
+    async def fetch_definitions(self, type_name: str) -> Mapping[str, str]:
+        """Gives the .msg texts of a type and of every type within it.
+
+        Args:
+            type_name: Of a message, a service or an action, such as "nav_msgs/srv/GetMap" or
+                "std_msgs/String".
+
+        Returns:
+            By name as "package/Type", the type itself first. A service has the two names
+            "package/Type_Request" and "package/Type_Response", an action "package/Type_Goal",
+            "package/Type_Result" and "package/Type_Feedback". Empty where nobody knows the type.
+        """
+        ...
+
+    async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
+        """Gives the names of a node's parameters; ROS 1 keeps them below the node's name."""
+        ...
+
+    async def fetch_parameter(self, node: str, name: str) -> Any:  # noqa: ANN401 - any YAML value
+        """Gives the value of a node's parameter; None where it is not set."""
+        ...
+
+    async def set_parameter(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401
+        """Sets a node's parameter.
+
+        Raises:
+            LinkError: The node refuses it, and says why.
+        """
+        ...
