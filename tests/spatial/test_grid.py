@@ -84,3 +84,17 @@ def test_values_that_are_no_occupancy_are_refused(value: int) -> None:
 def test_an_array_that_is_not_flat_is_refused() -> None:
     with pytest.raises(MapError, match="3"):
         OccupancyGrid(cells=np.zeros((1, 1, 1), dtype=np.int8), resolution_m=1.0)
+
+
+def test_a_map_that_lies_in_bytes_is_not_copied_and_any_other_is() -> None:
+    message = bytes([0, 100, 255, 0])
+    heard = np.frombuffer(message, dtype=np.int8).reshape(2, 2)
+    assert np.shares_memory(OccupancyGrid(cells=heard, resolution_m=0.05).cells, heard)
+    own = np.zeros((2, 2), dtype=np.int8)
+    locked = own.view()
+    locked.setflags(write=False)
+    assert not np.shares_memory(OccupancyGrid(cells=locked, resolution_m=0.05).cells, own)
+    changeable = np.frombuffer(bytearray(message), dtype=np.int8).reshape(2, 2)
+    assert not np.shares_memory(
+        OccupancyGrid(cells=changeable, resolution_m=0.05).cells, changeable
+    )

@@ -56,9 +56,10 @@ class OccupancyGrid:
 
     def __post_init__(self) -> None:
         _check(np.asarray(self.cells), self.resolution_m, self.origin)
-        cells = np.array(self.cells, dtype=np.int8, order="C")
-        cells.setflags(write=False)
-        object.__setattr__(self, "cells", cells)
+        if not _nobody_can_write(self.cells):
+            cells = np.array(self.cells, dtype=np.int8, order="C")
+            cells.setflags(write=False)
+            object.__setattr__(self, "cells", cells)
 
     @property
     def n_rows(self) -> int:
@@ -152,6 +153,18 @@ class OccupancyGrid:
         x = self.origin.x + cos * along_x - sin * along_y
         y = self.origin.y + sin * along_x + cos * along_y
         return np.stack([x, y], axis=1)
+
+
+def _nobody_can_write(cells: NDArray[np.integer[Any]]) -> bool:
+    """True for what lies in a `bytes`, as a map does that came over a wire: no copy is needed."""
+    if not isinstance(cells, np.ndarray) or cells.dtype != np.int8 or not cells.flags.c_contiguous:
+        return False
+    owner: object = cells
+    while isinstance(owner, np.ndarray):
+        if owner.flags.writeable:
+            return False
+        owner = owner.base
+    return isinstance(owner, bytes)
 
 
 def _check(cells: NDArray[np.integer[Any]], resolution_m: float, origin: Pose) -> None:
