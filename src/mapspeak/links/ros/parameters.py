@@ -1,5 +1,6 @@
 """The parameters of a ROS 2 node, by the services that every node offers for them."""
 
+import base64
 from collections.abc import Mapping
 from typing import Any, Protocol
 
@@ -73,8 +74,7 @@ class NodeParameters:
         types = await self._call(
             node, "get_parameter_types", "GetParameterTypes", {"names": [name]}
         )
-        known = [int(kind) for kind in _part(types, "types", node)]
-        parameter = {"name": name, "value": _write(value, wanted=known[0] if known else 0)}
+        parameter = {"name": name, "value": _write(value, wanted=_first_of(types.get("types")))}
         answer = await self._call(
             node, "set_parameters", "SetParameters", {"parameters": [parameter]}
         )
@@ -91,6 +91,12 @@ class NodeParameters:
         return await self._caller.call_service(
             f"{node}/{service}", arguments, type_name=f"rcl_interfaces/srv/{type_name}"
         )
+
+
+def _first_of(numbers: Any) -> int:  # noqa: ANN401 - uint8[]: base64, bytes or a list
+    if isinstance(numbers, str):
+        numbers = base64.b64decode(numbers)
+    return int(numbers[0]) if numbers is not None and len(numbers) else 0
 
 
 def _part(answer: Any, key: str, node: str) -> Any:  # noqa: ANN401 - ROS JSON enters here

@@ -175,7 +175,9 @@ class RosRobot:
     async def _look_again(self) -> None:
         """Takes in what has been started since: people start rosbridge first and SLAM later."""
         before = self.profile
-        self.profile = await look_at_robot(self.connection, self._frames, self._overrides)
+        self.profile = await look_at_robot(
+            self.connection, self._frames, self._overrides, before=before
+        )
         if self.profile == before:
             return
         if before.map_topic is None:

@@ -9,6 +9,7 @@ START_CAMERA = (
     "Start the camera driver, or name camera_topic in robot.yaml; all else works without."
 )
 START_NAVIGATION = "Start Nav2 (ROS 1: move_base) on the robot, or name navigation in robot.yaml."
+START_RADIUS = "Name radius_m in robot.yaml: the navigation does not tell it (robot_radius)."
 START_VELOCITY = "Name velocity_topic in robot.yaml, so that a stop can command zero velocity."
 
 
@@ -22,7 +23,7 @@ def describe_profile(profile: RobotProfile) -> tuple[Finding, ...]:
         _found("camera topic", profile.camera_topic, START_CAMERA, Health.DOUBTFUL),
         _describe_navigation(profile),
         _found("velocity topic", profile.velocity_topic, START_VELOCITY, Health.DOUBTFUL),
-        Finding(what="radius", health=Health.FINE, said=f"{profile.radius_m:.2f} m"),
+        _describe_radius(profile),
     )
 
 
@@ -48,6 +49,13 @@ def _describe_pose(profile: RobotProfile) -> Finding:
             )
         case PoseSource.NONE:
             return _found("pose source", None, START_POSE)
+
+
+def _describe_radius(profile: RobotProfile) -> Finding:
+    said = f"{profile.radius_m:.2f} m, {profile.radius_source or 'assumed'}"
+    if profile.radius_source:
+        return Finding(what="radius", health=Health.FINE, said=said)
+    return Finding(what="radius", health=Health.DOUBTFUL, said=said, hint=START_RADIUS)
 
 
 def _describe_navigation(profile: RobotProfile) -> Finding:

@@ -46,6 +46,7 @@ class RobotProfile:
         dialect: Which ROS.
         distro: Such as "jazzy"; empty where unknown.
         radius_m: Of the smallest circle around it.
+        radius_source: Who said so: a parameter, or robot.yaml; empty where it is assumed.
         map_name: Which map or building it drives in.
         map_topic: Of nav_msgs/OccupancyGrid.
         map_updates_topic: Of map_msgs/OccupancyGridUpdate.
@@ -71,6 +72,7 @@ class RobotProfile:
     dialect: Dialect
     distro: str = ""
     radius_m: float = USUAL_RADIUS_M
+    radius_source: str = ""
     map_name: str = ""
     map_topic: str | None = None
     map_updates_topic: str | None = None
@@ -114,6 +116,7 @@ def choose_profile(
         dialect=graph.dialect,
         distro=graph.distro,
         radius_m=overrides.radius_m or USUAL_RADIUS_M,
+        radius_source="robot.yaml" if overrides.radius_m else "",
         map_name=overrides.map_name or "",
         map_topic=map_topic,
         map_updates_topic=overrides.map_updates_topic or _updates_of(graph, map_topic),

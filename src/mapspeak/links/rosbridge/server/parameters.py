@@ -14,6 +14,10 @@ __all__ = ["Parameters", "add_parameter_services"]
 Values = dict[str, Any]
 ROS1_DISTRIBUTION = "noetic\n"
 NOT_SET = 0
+COSTMAP_OF = {
+    Dialect.ROS1: ("/move_base", "global_costmap/"),
+    Dialect.ROS2: ("/global_costmap/global_costmap", ""),
+}
 KINDS: dict[type, tuple[int, str]] = {
     bool: (1, "bool_value"),
     int: (2, "integer_value"),
@@ -39,6 +43,8 @@ class Parameters:
             navigator_of(dialect): {"global_frame": "map", "robot_base_frame": BASE_FRAME},
             BASE_NODE: {"robot_radius": radius_m},
         }
+        costmap, prefix = COSTMAP_OF[dialect]
+        by_node.setdefault(costmap, {})[f"{prefix}robot_radius"] = radius_m
         self._values: Values = {}
         for node, values in by_node.items():
             for name, value in values.items():
