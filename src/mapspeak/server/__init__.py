@@ -1,6 +1,14 @@
 """The MCP surface."""
 
 from mapspeak.server.app import DEFAULT_TOOLSETS, MapspeakServer, build_server
+from mapspeak.server.fleet import FleetServer
 from mapspeak.server.transport import serve_http, serve_stdio
 
-__all__ = ["DEFAULT_TOOLSETS", "MapspeakServer", "build_server", "serve_http", "serve_stdio"]
+__all__ = [
+    "DEFAULT_TOOLSETS",
+    "FleetServer",
+    "MapspeakServer",
+    "build_server",
+    "serve_http",
+    "serve_stdio",
+]

@@ -12,16 +12,17 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mapspeak.errors import ConfigError
 from mapspeak.server.app import MapspeakServer
+from mapspeak.server.fleet import FleetServer
 
 __all__ = ["serve_http", "serve_stdio"]
 
 
-async def serve_stdio(server: MapspeakServer) -> None:
+async def serve_stdio(server: MapspeakServer | FleetServer) -> None:
     """Serves one client over standard input and output until it hangs up."""
     await server.run_stdio_async()
 
 
-async def serve_http(server: MapspeakServer, address: str, *, token: str | None = None) -> None:
+async def serve_http(server: MapspeakServer | FleetServer, address: str, *, token: str | None = None) -> None:
     """Serves clients over streaming HTTP at `/mcp`; `/health` answers "ok".
 
     Foreign Host and Origin headers are refused. Outside this machine a bearer token is demanded.
