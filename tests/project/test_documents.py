@@ -75,7 +75,7 @@ def commands_in_prose() -> Iterator[tuple[str, list[str]]]:
 def commands_of_run() -> set[str]:
     """Lists the commands that ./run keeps for itself, from its own help."""
     script = (CHECKOUT / "run").read_text()
-    return {"help", *re.findall(r"^  \./run (\w+)", script, re.MULTILINE)} - set(cli.commands)
+    return {"help", *re.findall(r"^  \./run ([\w-]+)", script, re.MULTILINE)} - set(cli.commands)
 
 
 def why_not(arguments: list[str]) -> str | None:

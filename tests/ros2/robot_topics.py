@@ -1,0 +1,170 @@
+"""What the robot of the ROS 2 tests publishes and hears."""
+
+import array
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import Pose as PoseMessage
+from geometry_msgs.msg import PoseStamped, Transform, TransformStamped, Twist
+from map_msgs.msg import OccupancyGridUpdate
+from nav_msgs.msg import OccupancyGrid as GridMessage
+from nav_msgs.msg import Odometry
+from numpy.typing import NDArray
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import CameraInfo, Image, LaserScan
+from std_srvs.srv import SetBool
+from tf2_msgs.msg import TFMessage
+
+from mapspeak.geometry import Pose
+from mapspeak.spatial import OccupancyGrid
+from ros2.robot_motion import Motion
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+MAP_FROM_ODOM = Pose(1.0, -0.5, 0.3)
+CAMERA_EVERY = 4
+N_BEAMS = 72
+SCAN_RANGE_M = 10.0
+WIDTH, HEIGHT, FOCAL_LENGTH_PX = 64, 48, 32.0
+PADDING_BYTES = 8
+
+Message = Any  # rclpy has no types
+
+
+class Topics:
+    """Publishers and subscriptions of one node."""
+
+    def __init__(self, node: Any, *, on_velocity: Callable[[Message], None]) -> None:  # noqa: ANN401
+        self._node = node
+        self._n_steps = 0
+        self._map = node.create_publisher(GridMessage, "map", LATCHED)
+        self._map_updates = node.create_publisher(OccupancyGridUpdate, "map_updates", 10)
+        self._tf = node.create_publisher(TFMessage, "/tf", 100)
+        self._tf_static = node.create_publisher(TFMessage, "/tf_static", LATCHED)
+        self._odometry = node.create_publisher(Odometry, "odom", 10)
+        self._scan = node.create_publisher(LaserScan, "scan", 10)
+        self._image = node.create_publisher(Image, "camera/image_raw", 10)
+        self._camera_info = node.create_publisher(CameraInfo, "camera/camera_info", 10)
+        node.create_subscription(Twist, "cmd_vel", on_velocity, 10)
+        self._publish_static_frames()
+
+    def offer_motor_switch(self, answer: Callable[[Message, Message], Message]) -> None:
+        self._node.create_service(SetBool, "switch_motors", answer)
+
+    # --- the map
+
+    def publish_map(self, grid: OccupancyGrid) -> None:
+        message = GridMessage()
+        message.header.frame_id = "map"
+        message.header.stamp = self._now()
+        message.info.resolution = grid.resolution_m
+        message.info.width, message.info.height = grid.n_cols, grid.n_rows
+        message.info.origin = message_from_pose(grid.origin)
+        message.data = packed(grid.cells)
+        self._map.publish(message)
+
+    def publish_map_update(self, cells: NDArray[np.int8], *, row: int, col: int) -> None:
+        message = OccupancyGridUpdate()
+        message.header.frame_id = "map"
+        message.header.stamp = self._now()
+        message.x, message.y = col, row
+        message.height, message.width = cells.shape
+        message.data = packed(cells)
+        self._map_updates.publish(message)
+
+    # --- where the robot is and what it sees
+
+    def publish_state(self, motion: Motion) -> None:
+        odom_from_base = MAP_FROM_ODOM.inverse() @ motion.pose
+        for parent, child, pose in (
+            ("map", "odom", MAP_FROM_ODOM),
+            ("odom", "base_footprint", odom_from_base),
+        ):
+            self._tf.publish(TFMessage(transforms=[self._frame(parent, child, pose)]))
+        self._publish_odometry(odom_from_base)
+        if self._n_steps % CAMERA_EVERY == 0:
+            self._publish_scan(motion)
+            self._publish_picture()
+        self._n_steps += 1
+
+    def _publish_odometry(self, odom_from_base: Pose) -> None:
+        message = Odometry()
+        message.header.stamp = self._now()
+        message.header.frame_id, message.child_frame_id = "odom", "base_footprint"
+        message.pose.pose = message_from_pose(odom_from_base)
+        self._odometry.publish(message)
+
+    def _publish_scan(self, motion: Motion) -> None:
+        message = LaserScan()
+        message.header.stamp = self._now()
+        message.header.frame_id = "base_footprint"
+        message.angle_min = -math.pi
+        message.angle_increment = 2.0 * math.pi / N_BEAMS
+        message.angle_max = math.pi - message.angle_increment
+        message.range_max = SCAN_RANGE_M
+        message.ranges = motion.scan(n_beams=N_BEAMS, range_m=SCAN_RANGE_M)
+        self._scan.publish(message)
+
+    def _publish_picture(self) -> None:
+        """A picture with its left half red and its right half blue; its rows are padded."""
+        row = b"\xff\x00\x00" * (WIDTH // 2) + b"\x00\x00\xff" * (WIDTH // 2) + bytes(PADDING_BYTES)
+        image, info = Image(), CameraInfo()
+        for message in (image, info):
+            message.header.stamp = self._now()
+            message.header.frame_id = "camera_optical"
+            message.width, message.height = WIDTH, HEIGHT
+        image.encoding, image.step, image.data = "rgb8", len(row), array.array("B", row * HEIGHT)
+        focal, cx, cy = FOCAL_LENGTH_PX, WIDTH / 2.0, HEIGHT / 2.0
+        info.distortion_model = "plumb_bob"
+        info.k = [focal, 0.0, cx, 0.0, focal, cy, 0.0, 0.0, 1.0]
+        info.p = [focal, 0.0, cx, 0.0, 0.0, focal, cy, 0.0, 0.0, 0.0, 1.0, 0.0]
+        self._image.publish(image)
+        self._camera_info.publish(info)
+
+    # --- frames
+
+    def _publish_static_frames(self) -> None:
+        camera = self._frame("base_link", "camera_optical", Pose(0.1, 0.0, 0.0))
+        camera.transform.translation.z = 0.3
+        rotation = camera.transform.rotation
+        rotation.x, rotation.y, rotation.z, rotation.w = -0.5, 0.5, -0.5, 0.5
+        base = self._frame("base_footprint", "base_link", Pose(0.0, 0.0, 0.0))
+        self._tf_static.publish(TFMessage(transforms=[base, camera]))
+
+    def _frame(self, parent: str, child: str, pose: Pose) -> Message:
+        frame = TransformStamped()
+        frame.header.stamp = self._now()
+        frame.header.frame_id, frame.child_frame_id = parent, child
+        place = message_from_pose(pose)
+        frame.transform = Transform(rotation=place.orientation)
+        frame.transform.translation.x = pose.x
+        frame.transform.translation.y = pose.y
+        return frame
+
+    def stamped(self, pose: Pose) -> Message:
+        message = PoseStamped(pose=message_from_pose(pose))
+        message.header.frame_id = "map"
+        message.header.stamp = self._now()
+        return message
+
+    def _now(self) -> Message:
+        return self._node.get_clock().now().to_msg()
+
+
+def packed(cells: NDArray[np.int8]) -> "array.array[int]":
+    """The cells as rclpy takes them fastest."""
+    return array.array("b", np.ascontiguousarray(cells).tobytes())
+
+
+def message_from_pose(pose: Pose) -> Message:
+    message = PoseMessage()
+    message.position.x, message.position.y = pose.x, pose.y
+    message.orientation.z = math.sin(pose.yaw_rad / 2.0)
+    message.orientation.w = math.cos(pose.yaw_rad / 2.0)
+    return message
+
+
+def pose_from_message(message: Message) -> Pose:
+    yaw_rad = 2.0 * math.atan2(message.orientation.z, message.orientation.w)
+    return Pose(message.position.x, message.position.y, yaw_rad)
