@@ -22,7 +22,9 @@ async def serve_stdio(server: MapspeakServer | FleetServer) -> None:
     await server.run_stdio_async()
 
 
-async def serve_http(server: MapspeakServer | FleetServer, address: str, *, token: str | None = None) -> None:
+async def serve_http(
+    server: MapspeakServer | FleetServer, address: str, *, token: str | None = None
+) -> None:
     """Serves clients over streaming HTTP at `/mcp`; `/health` answers "ok".
 
     Foreign Host and Origin headers are refused. Outside this machine a bearer token is demanded.

@@ -157,9 +157,9 @@ class OccupancyGrid:
 
 def _nobody_can_write(cells: NDArray[np.integer[Any]]) -> bool:
     """True for what lies in a `bytes`, as a map does that came over a wire: no copy is needed."""
-    if not isinstance(cells, np.ndarray) or cells.dtype != np.int8 or not cells.flags.c_contiguous:
-        return False
     owner: object = cells
+    if not (isinstance(owner, np.ndarray) and owner.dtype == np.int8 and owner.flags.c_contiguous):
+        return False
     while isinstance(owner, np.ndarray):
         if owner.flags.writeable:
             return False
