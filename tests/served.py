@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from mcp.client import Client
+from mcp.client.session import ElicitationFnT
 from mcp_types import CallToolResult, ImageContent, TextContent
 
-from fakes import FakeRobot
+from mapspeak.navigation.safety import Guard
+from mapspeak.robot import Robot
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server import DEFAULT_TOOLSETS, build_server
 from mapspeak.session import Session
@@ -18,19 +20,21 @@ MODES = ("auto", "legacy")
 
 @asynccontextmanager
 async def connect(
-    robot: FakeRobot,
+    robot: Robot,
     folder: Path,
     *,
     mode: str = "auto",
     toolsets: tuple[str, ...] = DEFAULT_TOOLSETS,
     tools: tuple[str, ...] = (),
     is_read_only: bool = False,
+    guard: Guard | None = None,
+    on_question: ElicitationFnT | None = None,
 ) -> AsyncGenerator[Client]:
     """Gives a client of a server over that robot, with its memory in that folder."""
     memory = SemanticMapStore(folder / "semantic_map.yaml", map_id=robot.description.map_name)
-    session = Session(robot, memory, lease_s=60.0)
+    session = Session(robot, memory, lease_s=60.0, guard=guard)
     server = build_server(session, toolsets=toolsets, tools=tools, is_read_only=is_read_only)
-    async with Client(server, mode=mode) as client:
+    async with Client(server, mode=mode, elicitation_callback=on_question) as client:
         yield client
 
 

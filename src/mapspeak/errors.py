@@ -5,6 +5,7 @@ MapspeakError           everything below; carries what is wrong and what to do n
 |- LinkError            the robot cannot be reached, or does not offer what was asked
 |- MapError             a map, or a map file, that cannot be what it claims
 |- GoalError            a goal that cannot be driven to, or a goal id nobody knows
+|- PolicyError          what the policy, a hold or a person does not allow
 `- SemanticMapError     the semantic map file or a record in it is wrong
 """
 
@@ -40,6 +41,10 @@ class MapError(MapspeakError):
 
 class GoalError(MapspeakError):
     """A goal cannot be driven to, or its id is not known."""
+
+
+class PolicyError(MapspeakError):
+    """The policy, a hold or a person does not allow what was asked."""
 
 
 class SemanticMapError(MapspeakError):

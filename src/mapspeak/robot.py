@@ -97,8 +97,9 @@ class Detection:
 
 
 class GoalState(StrEnum):
-    """How a drive stands, as the robot's navigation reports it."""
+    """How a drive stands; planned ones wait their turn, timed-out ones came no nearer."""
 
+    PLANNED = "planned"
     ACCEPTED = "accepted"
     DRIVING = "driving"
     ARRIVED = "arrived"
@@ -106,12 +107,13 @@ class GoalState(StrEnum):
     CANCELLED = "cancelled"
     PREEMPTED = "preempted"
     REJECTED = "rejected"
+    TIMED_OUT = "timed_out"
     LOST = "lost"
 
     @property
     def is_final(self) -> bool:
         """True when nothing more will happen."""
-        return self not in (GoalState.ACCEPTED, GoalState.DRIVING)
+        return self not in (GoalState.PLANNED, GoalState.ACCEPTED, GoalState.DRIVING)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,25 +1,33 @@
 """The one stateful object: a robot, its latest atlas, its memory, its drives, its clients."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from typing import TypeVar
 
 import anyio
 import anyio.to_thread
 
-from mapspeak.errors import MapError, SemanticMapError
+from mapspeak.errors import MapError, MapspeakError, SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.choosing import CheckedGoal, choose_goal
 from mapspeak.navigation.drive import DriveBook
 from mapspeak.navigation.lease import Lease
+from mapspeak.navigation.revision import MapRevision
+from mapspeak.navigation.safety import Guard, GuardedConnection, GuardedRobot, Surveyor, WhenBusy
 from mapspeak.robot import Robot
+from mapspeak.ros import RosConnection
 from mapspeak.semantic import SemanticMap, SemanticMapStore
+from mapspeak.spatial import OccupancyGrid
 
 __all__ = ["Session"]
 
+LOOK_S = 0.05
+"""Wall time between two looks for a hold, and at where a drive leads."""
 WATCH_S = 0.5
+"""Wall time between two looks at the clients and at how a drive stands."""
 
 T = TypeVar("T")
 
@@ -29,16 +37,44 @@ logger = logging.getLogger(__name__)
 class Session:
     """Holds what tools share. It holds; it does not compute.
 
+    Args:
+        robot: The robot itself; tools never see it where there is a guard.
+        memory: The semantic map's file.
+        lease_s: Without a client for so long, a driving robot is stopped.
+        guard: What commands are held to; without one, as in tests, to nothing.
+        ros: The connection of a robot that speaks ROS.
+
     Attributes:
-        robot: The port to the robot.
+        robot: The port to the robot, behind the guard.
         memory: The semantic map's file.
         drives: Every drive of the robot.
+        guard: What commands are held to.
+        ros: The connection of a robot that speaks ROS; None for any other.
     """
 
-    def __init__(self, robot: Robot, memory: SemanticMapStore, *, lease_s: float) -> None:
-        self.robot = robot
+    def __init__(
+        self,
+        robot: Robot,
+        memory: SemanticMapStore,
+        *,
+        lease_s: float,
+        guard: Guard | None = None,
+        ros: RosConnection | None = None,
+    ) -> None:
+        self.guard = guard
+        self._surveyor: Surveyor | None = None
+        self._guarded: GuardedRobot | None = None
+        when_busy = WhenBusy.REPLACE
+        if guard is not None:
+            self._surveyor = Surveyor(guard.policy.areas, wall_clock=guard.wall_clock)
+            self._guarded = GuardedRobot(robot, guard=guard, surveyor=self._surveyor)
+            when_busy = guard.policy.when_busy
+            if ros is not None:
+                ros = GuardedConnection(ros, guard=guard, now_s=lambda: robot.now_s)
+        self.ros = ros
+        self.robot: Robot = self._guarded or robot
         self.memory = memory
-        self.drives = DriveBook(robot)
+        self.drives = DriveBook(self.robot, when_busy=when_busy)
         self._lease = Lease(lease_s)
         self._atlas: Atlas | None = None
         self._surveying = anyio.Lock()
@@ -74,13 +110,15 @@ class Session:
                 )
             stamped = await self.robot.fetch_pose()
             memory = await self.compute(self._recall)
+            revision, warnings = await self._survey(grid)
             self._atlas = Atlas(
                 grid,
                 stamped.pose,
-                memory,
+                replace(memory, warnings=(*memory.warnings, *warnings)),
                 radius_m=self.robot.description.radius_m,
                 looked_from=self.drives.frontiers_tried,
                 previous=self._atlas,
+                revision=revision,
             )
             return self._atlas
 
@@ -111,6 +149,14 @@ class Session:
             lambda: choose_goal(atlas, place=place, x=x, y=y, yaw_deg=yaw_deg)
         )
 
+    async def _survey(self, grid: OccupancyGrid) -> tuple[MapRevision | None, tuple[str, ...]]:
+        """Gives the map with what is closed on it now, and what is to be said of that."""
+        surveyor = self._surveyor
+        if surveyor is None:
+            return None, ()
+        revision = await surveyor.survey(grid, radius_m=self.robot.description.radius_m)
+        return revision, await self.compute(lambda: surveyor.describe(revision))
+
     def _recall(self) -> SemanticMap:
         """Gives what is remembered; a broken file costs the memory, not the map."""
         try:
@@ -119,15 +165,32 @@ class Session:
             return SemanticMap(warnings=(str(error),))
 
     async def keep_watch(self) -> None:
-        """Stops a driving robot when no client has been heard for too long; until cancelled."""
+        """Stops a driving robot for a hold, a closed area, or want of clients; until cancelled."""
+        async with anyio.create_task_group() as tasks:
+            if self._guarded is not None:
+                # Apart from each other: a robot that is slow to tell its map is stopped at once.
+                tasks.start_soon(self._again_and_again, self._guarded.obey_hold, LOOK_S)
+                tasks.start_soon(self._again_and_again, self._guarded.watch, LOOK_S)
+            tasks.start_soon(self._again_and_again, self._watch, WATCH_S)
+
+    async def _again_and_again(self, look: Callable[[], Awaitable[None]], every_s: float) -> None:
         while True:
-            await anyio.sleep(WATCH_S)
-            if self._lease.is_over and self.drives.is_busy:
-                logger.warning("No client for %.0f s: stopping the robot.", self._lease.duration_s)
-                await self.drives.stop(f"No client was heard for {self._lease.duration_s:.0f} s.")
+            await anyio.sleep(every_s)
+            try:
+                await look()
+            except MapspeakError as error:
+                logger.warning("While watching the robot: %s", error)
+
+    async def _watch(self) -> None:
+        if self._lease.is_over and self.drives.is_busy:
+            logger.warning("No client for %.0f s: stopping the robot.", self._lease.duration_s)
+            await self.drives.stop(f"No client was heard for {self._lease.duration_s:.0f} s.")
+        await self.drives.watch()
 
     async def close(self) -> None:
         """Leaves the robot standing."""
+        if self.guard is not None:
+            self.guard.approvals.close()
         with anyio.CancelScope(shield=True):
             if self.drives.is_busy:
                 await self.drives.stop("The server ended.")

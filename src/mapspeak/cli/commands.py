@@ -5,11 +5,14 @@ import sys
 import click
 
 from mapspeak import __version__
+from mapspeak.cli.approving import approve
 from mapspeak.cli.demonstrating import demo
 from mapspeak.cli.examining import doctor
 from mapspeak.cli.mapping import map_command
+from mapspeak.cli.replaying import replay
 from mapspeak.cli.serving import serve
 from mapspeak.cli.simulating import simulate
+from mapspeak.cli.stopping import release, stop
 from mapspeak.errors import MapspeakError
 
 __all__ = ["cli", "main"]
@@ -27,7 +30,7 @@ def cli(context: click.Context) -> None:
         context.invoke(serve)
 
 
-for command in (serve, demo, doctor, simulate, map_command):
+for command in (serve, demo, doctor, simulate, map_command, stop, release, approve, replay):
     cli.add_command(command)
 
 

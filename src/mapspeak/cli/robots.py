@@ -12,8 +12,9 @@ from mapspeak.errors import ConfigError
 
 if TYPE_CHECKING:
     from mapspeak.robot import Robot
+    from mapspeak.ros import RosConnection
 
-__all__ = ["RobotChoice", "open_robot"]
+__all__ = ["RobotChoice", "find_connection", "open_robot"]
 
 ROBOT_TOKEN_VARIABLE = "MAPSPEAK_ROBOT_TOKEN"  # noqa: S105 - the variable's name, not a token
 ROSBRIDGE_SCHEMES = ("ws://", "wss://")
@@ -108,3 +109,12 @@ async def _open_simulated(choice: RobotChoice, world: str) -> AsyncGenerator["Ro
     finally:
         if log is not None:
             log.close()
+
+
+def find_connection(robot: "Robot", choice: RobotChoice) -> "RosConnection | None":
+    """Gives the connection of a robot that speaks ROS; None for the simulated one."""
+    if choice.robot.partition(":")[0] == "sim":
+        return None
+    from mapspeak.links.ros import RosRobot  # noqa: PLC0415 - heavy
+
+    return robot.connection if isinstance(robot, RosRobot) else None

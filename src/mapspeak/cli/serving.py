@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 import anyio
 import click
 
+from mapspeak.cli.guarding import GUARD_OPTIONS, GuardChoice, build_guard, data_folder
 from mapspeak.cli.options import FILE, ROBOT_OPTIONS, add_options
-from mapspeak.cli.robots import RobotChoice, open_robot
+from mapspeak.cli.robots import RobotChoice, find_connection, open_robot
 
 if TYPE_CHECKING:
     from mapspeak.session import Session
@@ -34,6 +35,7 @@ class ServeOptions:
     is_read_only: bool
     semantic_map: Path | None
     lease_s: float
+    guard: GuardChoice
 
 
 def _split_names(
@@ -80,6 +82,7 @@ def _split_names(
     show_default=True,
     help="Over HTTP, a driving robot is stopped when no client was heard for so long.",
 )
+@add_options(GUARD_OPTIONS)
 def serve(
     robot: str,
     robot_file: Path | None,
@@ -94,6 +97,9 @@ def serve(
     semantic_map: Path | None,
     state_log: Path | None,
     lease_s: float,
+    policy: Path | None,
+    audit: Path | None,
+    control: Path | None,
 ) -> None:
     """Serves a robot to MCP clients, over stdio or streaming HTTP."""
     from mapspeak.server import DEFAULT_TOOLSETS  # noqa: PLC0415 - heavy; help must be quick
@@ -114,6 +120,7 @@ def serve(
         is_read_only=is_read_only,
         semantic_map=semantic_map,
         lease_s=lease_s,
+        guard=GuardChoice(policy=policy, audit=audit, control=control),
     )
     anyio.run(_serve, options)
 
@@ -121,14 +128,19 @@ def serve(
 async def _serve(options: ServeOptions) -> None:
     from mapspeak.semantic import SemanticMapStore  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.server import build_server, serve_http, serve_stdio  # noqa: PLC0415
+    from mapspeak.server.tools import require_ros  # noqa: PLC0415
     from mapspeak.session import Session  # noqa: PLC0415
 
+    guard = build_guard(options.guard, robot=options.robot.robot)
     async with open_robot(options.robot) as robot, anyio.create_task_group() as tasks:
         map_name = robot.description.map_name
         path = options.semantic_map or usual_semantic_map(map_name, options.robot.robot)
         # A client on stdio cannot vanish unnoticed: its end of the pipe closes.
         lease_s = math.inf if options.http is None else options.lease_s
-        session = Session(robot, SemanticMapStore(path, map_id=map_name or None), lease_s=lease_s)
+        memory = SemanticMapStore(path, map_id=map_name or None)
+        ros = find_connection(robot, options.robot)
+        session = Session(robot, memory, lease_s=lease_s, guard=guard, ros=ros)
+        require_ros(session, toolsets=options.toolsets, tools=options.tools)
         server = build_server(
             session,
             toolsets=options.toolsets,
@@ -163,5 +175,4 @@ def usual_semantic_map(map_name: str, robot: str) -> Path:
         robot: The robot's address, whose file it is then.
     """
     name = map_name or robot
-    folder = Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share") / "mapspeak"
-    return folder / f"{re.sub(r'[^A-Za-z0-9_.-]+', '_', name)}.yaml"
+    return data_folder() / f"{re.sub(r'[^A-Za-z0-9_.-]+', '_', name)}.yaml"

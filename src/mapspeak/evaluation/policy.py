@@ -87,7 +87,6 @@ class ScriptedPolicy:
     on_step: OnStep
     _n_goals: int = 0
     _n_records: int = 0
-    _blocked: set[str] = field(default_factory=set)
     _looked_at: list[Point] = field(default_factory=list)
     _grid: OccupancyGrid = field(init=False)
 
@@ -106,26 +105,31 @@ class ScriptedPolicy:
     async def explore(self) -> bool:
         """Task 1: drives to frontiers and records what is seen, until none is left to reach.
 
-        What was blocked is tried once more after the survey: by then more is known of the way.
+        It explores once more after the survey: by then more is known.
         """
         view = await self._look(Stage.EXPLORE)
         await self._record_surroundings(view.pose)
         view = await self._follow_frontiers(view)
         await self._survey(view.pose)
-        self._blocked.clear()
         view = await self._follow_frontiers(await self._look(Stage.EXPLORE))
-        return self._next_frontier(view) is None
+        return not view.rows("Frontiers")
 
     async def _follow_frontiers(self, view: MapReading) -> MapReading:
-        """Drives to the best frontier until there is none that was not tried."""
-        while (target := self._next_frontier(view)) is not None and self._n_goals < MOST_GOALS:
-            self._n_goals += 1
-            state = await self._drive(Stage.EXPLORE, target.id)
-            if state != "arrived":
-                self._blocked.add(target.id)
+        """Lets the robot explore, one frontier at a time, until none is left that it can reach."""
+        while self._n_goals < MOST_GOALS and (n_goals := await self._explore_one()):
+            self._n_goals += n_goals
             view = await self._look(Stage.EXPLORE)
             await self._record_surroundings(view.pose)
         return view
+
+    async def _explore_one(self) -> int:
+        """Gives how many frontiers the robot set out to, none where nothing is left."""
+        state = "driving"
+        while state == "driving":
+            report = (await self.tools.demand("explore", n_goals=1, wait_s=WAIT_S)).report
+            state = str(report["state"])
+        await self.on_step(Step(stage=Stage.EXPLORE, caption=f"{state}: {report['reason']}"))
+        return int(report["n_goals"])
 
     async def _survey(self, pose: Pose) -> None:
         """Looks around wherever floor has not been looked at from near."""
@@ -174,10 +178,6 @@ class ScriptedPolicy:
         await self._drive(Stage.FIRE_TOOL, nearest["id"])
         await self._take_picture(Stage.FIRE_TOOL)
         return str(nearest["name"])
-
-    def _next_frontier(self, view: MapReading) -> Row | None:
-        untried = (row for row in view.rows("Frontiers") if row.id not in self._blocked)
-        return next(untried, None)
 
     async def _look(self, stage: Stage) -> MapReading:
         plain = await self.tools.demand("subscribe_map_as_image")

@@ -65,6 +65,7 @@ class Atlas:
         radius_m: Of the robot.
         looked_from: Places of former frontiers that the robot has been to.
         previous: The atlas before, whose ids are kept and whose parts are used where they hold.
+        revision: The state of the map, where somebody has made it already.
 
     Attributes:
         map: The state of the map.
@@ -82,10 +83,11 @@ class Atlas:
         radius_m: float,
         looked_from: Sequence[Point] = (),
         previous: "Atlas | None" = None,
+        revision: MapRevision | None = None,
     ) -> None:
         before = None if previous is None else previous.map
         is_unchanged = before is not None and before.is_of(grid)
-        self.map: MapRevision = (
+        self.map: MapRevision = revision or (
             before
             if before is not None and is_unchanged
             else MapRevision(grid, radius_m=radius_m, previous=before)

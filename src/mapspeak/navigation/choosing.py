@@ -7,7 +7,7 @@ from mapspeak.errors import GoalError
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.navigation.atlas import Atlas, RememberedPlace
 from mapspeak.navigation.goals import GoalCheck, check_goal
-from mapspeak.navigation.places import Place, Spot, find_place, say_spot
+from mapspeak.navigation.places import Place, Spot, find_place, is_taken_name, say_spot
 from mapspeak.navigation.standing import arrival_pose, facing_in, find_standing_point
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region
@@ -23,11 +23,24 @@ class CheckedGoal:
         name: Such as "R3" or "(1.20, -3.40)".
         pose: Where to stand.
         check: What is to be said of it.
+        reason: Why there, where words had to be read for it; else empty.
     """
 
     name: str
     pose: Pose
     check: GoalCheck
+    reason: str = ""
+
+    @property
+    def title(self) -> str:
+        """What the drive there is called: the id of what has one, else the name with its reason."""
+        is_told = self.reason and not is_taken_name(self.name)
+        return f"{self.name}: {self.reason}" if is_told else self.name
+
+    @property
+    def sentence(self) -> str:
+        """Why there, and what is to be said of it."""
+        return "; ".join(filter(None, (self.reason, self.check.sentence)))
 
 
 def choose_goal(
@@ -67,7 +80,8 @@ def check_place(atlas: Atlas, place: Place, *, yaw_deg: float | None = None) -> 
     pose = stand_at(atlas, place)
     if yaw_deg is not None:
         pose = Pose(pose.x, pose.y, wrap_angle(math.radians(yaw_deg)))
-    return CheckedGoal(place.name, pose, check_goal(atlas.grid, atlas.distances, pose))
+    check = check_goal(atlas.grid, atlas.distances, pose)
+    return CheckedGoal(place.name, pose, check, place.reason)
 
 
 def stand_at(atlas: Atlas, place: Place) -> Pose:

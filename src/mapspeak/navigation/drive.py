@@ -1,7 +1,8 @@
 """Drives as jobs: sent, asked about later by their id, waited for, cancelled; one at a time.
 
 A drive's state is the robot's own account of it, fetched when somebody asks; nothing runs in the
-background, so a simulated robot's time stands still between two questions.
+background, so a simulated robot's time stands still between two questions. `watch` asks where
+nobody else does, so that a drive ends also when the robot falls silent, jumps or does not move.
 """
 
 import re
@@ -11,9 +12,11 @@ from dataclasses import dataclass, replace
 
 import anyio
 
-from mapspeak.errors import GoalError
+from mapspeak.errors import GoalError, LinkError, MapspeakError
 from mapspeak.geometry import Point, Pose
-from mapspeak.robot import GoalState, GoalStatus, Robot
+from mapspeak.navigation.safety import WhenBusy
+from mapspeak.navigation.vigil import Vigil
+from mapspeak.robot import GoalState, GoalStatus, Robot, StampedPose
 
 __all__ = ["Drive", "DriveBook", "DriveReport"]
 
@@ -32,7 +35,7 @@ class Drive:
         goal_id: The name it goes by: G1, G2, ...
         goal: Where to.
         place: What the goal was called when it was asked for.
-        robot_goal_id: What the robot's navigation calls it.
+        robot_goal_id: What the robot's navigation calls it; None before it was sent there.
         started_s: Robot time at which it was sent.
         client: Who asked for it; empty where there can be only one.
         final: How it ended, once it has.
@@ -41,7 +44,7 @@ class Drive:
     goal_id: str
     goal: Pose
     place: str
-    robot_goal_id: str
+    robot_goal_id: str | None
     started_s: float
     client: str = ""
     final: GoalStatus | None = None
@@ -54,7 +57,7 @@ class DriveReport:
     Attributes:
         drive: The drive.
         status: How it stands.
-        pose: Where the robot is now.
+        pose: Where the robot is now, or was last seen.
         elapsed_s: Robot time since the drive was sent.
     """
 
@@ -68,10 +71,25 @@ OnProgress = Callable[[DriveReport], Awaitable[None]]
 
 
 class DriveBook:
-    """Every drive of one robot, the latest last."""
+    """Every drive of one robot, the latest last.
 
-    def __init__(self, robot: Robot) -> None:
+    Args:
+        robot: The robot.
+        when_busy: What becomes of a drive while one of another client is under way.
+        patience_s: Robot time without any movement after which a drive has timed out.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        when_busy: WhenBusy = WhenBusy.REPLACE,
+        patience_s: float = 60.0,
+    ) -> None:
         self._robot = robot
+        self._when_busy = when_busy
+        self._vigil = Vigil(patience_s=patience_s)
+        self._last_seen: StampedPose | None = None
         self._drives: dict[str, Drive] = {}
         self._n_started = 0
         self._n_stops = 0
@@ -86,8 +104,7 @@ class DriveBook:
     @property
     def under_way(self) -> Drive | None:
         """The drive that has not ended yet, as far as anyone has asked."""
-        latest = self.latest
-        return latest if latest is not None and latest.final is None else None
+        return next((each for each in self._open() if each.robot_goal_id is not None), None)
 
     @property
     def frontiers_tried(self) -> tuple[Point, ...]:
@@ -110,8 +127,8 @@ class DriveBook:
 
     @property
     def is_busy(self) -> bool:
-        """True while a drive is under way or being prepared."""
-        return self.under_way is not None or self._n_preparing > 0
+        """True while a drive is under way, waits its turn or is being prepared."""
+        return bool(self._open()) or self._n_preparing > 0
 
     @contextmanager
     def preparing(self) -> Generator[int]:
@@ -122,45 +139,74 @@ class DriveBook:
         finally:
             self._n_preparing -= 1
 
-    async def start(self, goal: Pose, *, place: str, ticket: int, client: str = "") -> Drive:
-        """Sends a goal to the robot; a drive that was under way ends as preempted.
+    async def start(
+        self,
+        goal: Pose,
+        *,
+        place: str,
+        ticket: int,
+        client: str = "",
+        when_busy: WhenBusy | None = None,
+    ) -> Drive:
+        """Sends a goal to the robot, or lets it wait its turn.
+
+        Args:
+            goal: Where to.
+            place: What it was called.
+            ticket: From `preparing`.
+            client: Who asks.
+            when_busy: What becomes of it while another drive is under way; by default a newer
+                drive of the same client replaces the older one.
 
         Raises:
-            GoalError: The robot was stopped after the ticket was given.
+            GoalError: The robot was stopped after the ticket was given, or another drive is under
+                way that must not be replaced.
+            PolicyError: The robot must not drive there.
         """
         async with self._starting:
-            await self._preempt()
-            if ticket != self._n_stops:
-                raise GoalError(
-                    "The robot was stopped while this goal was being checked.",
-                    hint="Call navigate_to again when it may drive.",
-                )
-            robot_goal_id = await self._robot.send_goal(goal)
-            self._n_started += 1
-            drive = Drive(
-                goal_id=f"G{self._n_started}",
-                goal=goal,
-                place=place,
-                robot_goal_id=robot_goal_id,
-                started_s=self._robot.now_s,
-                client=client,
+            busy = await self._find_busy()
+            self._check_ticket(ticket)
+            if busy is None or self._choose(busy, client, when_busy) is WhenBusy.REPLACE:
+                drive = self._note(goal, place, client, await self._robot.send_goal(goal))
+                self._vigil.begin(drive.goal_id, now_s=self._robot.now_s)
+                self._end_all("A newer goal took its place.", but=drive)
+                return drive
+            if self._choose(busy, client, when_busy) is WhenBusy.WAIT:
+                return self._note(goal, place, client, None)
+            raise GoalError(
+                f"{busy.goal_id} to {busy.place} is under way.",
+                hint="Wait for its end with wait_for_goal, or end it with cancel_goal.",
             )
-            self._drives[drive.goal_id] = drive
-            self._forget_old()
-            return drive
 
     async def report(self, goal_id: str | None = None) -> DriveReport:
         """Gives how a drive stands; the latest one when no id is given.
 
         Raises:
             GoalError: No drive has that id.
+            LinkError: The robot does not answer.
         """
         drive = self._find(goal_id)
-        status = drive.final or await self._robot.fetch_goal_status(drive.robot_goal_id)
+        status = drive.final or await self._fetch_status(drive)
         drive = self._note_end(drive, status)
-        stamped = await self._robot.fetch_pose()
+        stamped = await self._fetch_pose(is_over=status.state.is_final)
+        if drive.final is None and drive.robot_goal_id is not None:
+            fault = self._vigil.judge(status, stamped.pose, now_s=self._robot.now_s)
+            if fault is not None:
+                return await self._give_up(drive, fault)
         elapsed_s = self._robot.now_s - drive.started_s
         return DriveReport(drive=drive, status=status, pose=stamped.pose, elapsed_s=elapsed_s)
+
+    async def watch(self) -> None:
+        """Looks after the drive under way, and starts the next one; to be called now and then."""
+        drive = self.under_way
+        if drive is not None:
+            try:
+                await self.report(drive.goal_id)
+            except LinkError as error:
+                fault = self._vigil.note_silence(error)
+                if fault is not None:
+                    self._note_end(drive, fault)
+        await self._start_next()
 
     async def wait(
         self, goal_id: str | None, *, wait_s: float, on_progress: OnProgress
@@ -185,6 +231,7 @@ class DriveBook:
         while not report.status.state.is_final and self._robot.now_s < deadline_s:
             left_s = deadline_s - self._robot.now_s
             await self._robot.sleep(min(POLL_S, max(left_s, 0.01)))
+            await self._start_next()
             report = await self.report(report.drive.goal_id)
             if self._robot.now_s >= next_progress_s:
                 next_progress_s += PROGRESS_S
@@ -196,8 +243,12 @@ class DriveBook:
         report = await self.report(goal_id)
         if report.status.state.is_final:
             return report
-        with anyio.CancelScope(shield=True):
-            await self._robot.cancel_goal(report.drive.robot_goal_id)
+        if report.drive.robot_goal_id is None:
+            status = GoalStatus(state=GoalState.CANCELLED, reason="It was cancelled.")
+            self._note_end(report.drive, status)
+        else:
+            with anyio.CancelScope(shield=True):
+                await self._robot.cancel_goal(report.drive.robot_goal_id)
         return await self.report(report.drive.goal_id)
 
     async def stop(self, reason: str = "The robot was stopped.") -> None:
@@ -206,11 +257,107 @@ class DriveBook:
         with anyio.CancelScope(shield=True):
             await self._robot.stop()
             drive = self.under_way
+            self._dismiss(reason)
             if drive is not None:
                 report = await self.report(drive.goal_id)
                 if report.status.state is GoalState.CANCELLED:
                     ended = replace(report.drive, final=replace(report.status, reason=reason))
                     self._drives[drive.goal_id] = ended
+
+    # --- inside ---
+
+    def _open(self) -> list[Drive]:
+        """Gives the drives that have not ended, in their order."""
+        return [each for each in self._drives.values() if each.final is None]
+
+    def _waiting(self) -> list[Drive]:
+        """Gives the drives that wait their turn, in their order."""
+        return [each for each in self._open() if each.robot_goal_id is None]
+
+    def _dismiss(self, reason: str) -> None:
+        """Ends the drives that wait."""
+        for drive in self._waiting():
+            self._note_end(drive, GoalStatus(state=GoalState.CANCELLED, reason=reason))
+
+    async def _find_busy(self) -> Drive | None:
+        """Finds the drive that is under way, after asking the robot whether it has ended."""
+        drive = self.under_way
+        if drive is not None:
+            await self.report(drive.goal_id)
+        return self.under_way
+
+    def _check_ticket(self, ticket: int) -> None:
+        if ticket != self._n_stops:
+            raise GoalError(
+                "The robot was stopped while this goal was being checked.",
+                hint="Call navigate_to again when it may drive.",
+            )
+
+    def _choose(self, busy: Drive, client: str, when_busy: WhenBusy | None) -> WhenBusy:
+        if when_busy is not None:
+            return when_busy
+        return WhenBusy.REPLACE if busy.client == client else self._when_busy
+
+    def _note(self, goal: Pose, place: str, client: str, robot_goal_id: str | None) -> Drive:
+        self._n_started += 1
+        drive = Drive(
+            goal_id=f"G{self._n_started}",
+            goal=goal,
+            place=place,
+            robot_goal_id=robot_goal_id,
+            started_s=self._robot.now_s,
+            client=client,
+        )
+        self._drives[drive.goal_id] = drive
+        self._forget_old()
+        return drive
+
+    def _end_all(self, reason: str, *, but: Drive) -> None:
+        """Notes that all drives but one are over: the robot has one goal."""
+        status = GoalStatus(state=GoalState.PREEMPTED, reason=reason)
+        for drive in self._open():
+            if drive.goal_id != but.goal_id:
+                self._note_end(drive, status)
+
+    async def _start_next(self) -> None:
+        """Sends the next drive that waits, once the one before it has ended."""
+        if not self._waiting():
+            return
+        async with self._starting:
+            if await self._find_busy() is not None or not self._waiting():
+                return
+            drive = self._waiting()[0]
+            try:
+                robot_goal_id = await self._robot.send_goal(drive.goal)
+            except MapspeakError as error:
+                self._note_end(drive, GoalStatus(state=GoalState.REJECTED, reason=str(error)))
+                return
+            now_s = self._robot.now_s
+            sent = replace(drive, robot_goal_id=robot_goal_id, started_s=now_s)
+            self._drives[drive.goal_id] = sent
+            self._vigil.begin(drive.goal_id, now_s=now_s)
+
+    async def _fetch_status(self, drive: Drive) -> GoalStatus:
+        if drive.robot_goal_id is None:
+            return GoalStatus(state=GoalState.PLANNED, reason="It waits for the drive before it.")
+        return await self._robot.fetch_goal_status(drive.robot_goal_id)
+
+    async def _fetch_pose(self, *, is_over: bool) -> StampedPose:
+        """Gives where the robot is; of a drive that is over, where it was seen last will do."""
+        try:
+            self._last_seen = await self._robot.fetch_pose()
+        except LinkError:
+            if not is_over or self._last_seen is None:
+                raise
+        return self._last_seen
+
+    async def _give_up(self, drive: Drive, fault: GoalStatus) -> DriveReport:
+        """Ends a drive that must not go on; the robot comes to a stand."""
+        self._note_end(drive, fault)
+        self._dismiss(f"The drive before it has ended: {fault.reason}")
+        with anyio.CancelScope(shield=True):
+            await self._robot.stop()
+        return await self.report(drive.goal_id)
 
     def _find(self, goal_id: str | None) -> Drive:
         drive = self.latest if goal_id is None else self._drives.get(goal_id.strip().upper())
@@ -230,15 +377,6 @@ class DriveBook:
             drive = replace(drive, final=status)
             self._drives[drive.goal_id] = drive
         return drive
-
-    async def _preempt(self) -> None:
-        drive = self.under_way
-        if drive is None:
-            return
-        report = await self.report(drive.goal_id)
-        if not report.status.state.is_final:
-            reason = "A newer goal took its place."
-            self._note_end(drive, GoalStatus(state=GoalState.PREEMPTED, reason=reason))
 
     def _forget_old(self) -> None:
         while len(self._drives) > N_KEPT:

@@ -7,6 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
+from mapspeak.navigation.closures import ClosedFloor
 from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, Mask
 from mapspeak.spatial.paths import DistanceField, clearance_m, distances_from
@@ -23,6 +24,7 @@ class GoalVerdict(StrEnum):
     UNKNOWN = "unknown"
     OCCUPIED = "occupied"
     TOO_TIGHT = "too_tight"
+    CLOSED = "closed"
     UNREACHABLE = "unreachable"
 
 
@@ -65,7 +67,7 @@ def check_goal(grid: OccupancyGrid, distances: DistanceField, goal: Pose) -> Goa
 
     Args:
         grid: The map.
-        distances: From the robot, on that map.
+        distances: From the robot, on that map or on its floor without closed areas.
         goal: Where to stand.
     """
     if not goal.is_finite() or max(abs(goal.x), abs(goal.y)) > FARTHEST_M:
@@ -73,7 +75,8 @@ def check_goal(grid: OccupancyGrid, distances: DistanceField, goal: Pose) -> Goa
         return GoalCheck(verdict=GoalVerdict.NOT_FINITE, sentence=sentence, clearance_m=0.0)
     clear_m = _clearance_at(grid, goal.point)
     path_m = distances.distance_to(goal.point)
-    verdict, sentence = _judge(grid, distances, goal, clear_m, path_m)
+    closed = _say_closed(distances, goal, is_reachable=path_m is not None)
+    verdict, sentence = closed or _judge(grid, distances, goal, clear_m, path_m)
     return GoalCheck(
         verdict=verdict,
         sentence=sentence,
@@ -108,6 +111,28 @@ def _judge(
         return GoalVerdict.TOO_TIGHT, sentence
     sentence = f"no known way as wide as the robot, {2 * radius_m:.2f} m, leads to {_say(goal)}."
     return GoalVerdict.UNREACHABLE, sentence
+
+
+def _say_closed(
+    distances: DistanceField, goal: Pose, *, is_reachable: bool
+) -> tuple[GoalVerdict, str] | None:
+    """Gives the verdict on a goal at which the robot would be over a closed area."""
+    floor = distances.lattice.grid
+    if not isinstance(floor, ClosedFloor):
+        return None
+    # Borders of areas and of cells differ: what is reachable decides between the two.
+    cell_m = floor.resolution_m
+    reach_m = distances.radius_m - cell_m if is_reachable else distances.radius_m + 2 * cell_m
+    area = floor.find_area(goal.point, within_m=reach_m)
+    if area is not None:
+        off_m = area.distance_to(goal.point)
+        where = f"{off_m:.2f} m from" if off_m else "in"
+        return GoalVerdict.CLOSED, f"{_say(goal)} lies {where} the {area.title}."
+    around = None if is_reachable else floor.find_area(distances.start, within_m=0.0)
+    if around is None:
+        return None
+    sentence = f"the robot itself stands in the {around.title}; a person has to lead it out."
+    return GoalVerdict.CLOSED, sentence
 
 
 def _find_nearest(grid: OccupancyGrid, distances: DistanceField, goal: Pose) -> Pose | None:

@@ -3,11 +3,13 @@
 Atlases of the same map share it, so that nothing is computed twice while only the pose changes.
 """
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 
 from mapspeak.geometry import Point
+from mapspeak.navigation.closures import ClosedArea, close_floor
 from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.paths import DistanceField, clearance_m, distances_from
 from mapspeak.spatial.paths.clearance import Clearance
@@ -26,17 +28,26 @@ class MapRevision:
         grid: The map.
         radius_m: Of the robot.
         previous: The state before, whose rooms give theirs their ids.
+        areas: What is closed of the floor: no way leads over it.
 
     Attributes:
         grid: The map.
         radius_m: Of the robot.
+        areas: What is closed of the floor.
     """
 
     def __init__(
-        self, grid: OccupancyGrid, *, radius_m: float, previous: "MapRevision | None" = None
+        self,
+        grid: OccupancyGrid,
+        *,
+        radius_m: float,
+        previous: "MapRevision | None" = None,
+        areas: Sequence[ClosedArea] = (),
     ) -> None:
         self.grid = grid
         self.radius_m = radius_m
+        self.areas = tuple(areas)
+        self._open: MapRevision | None = None
         self._earlier_rooms = None if previous is None else previous.latest_rooms
         self._fields: dict[Cell, DistanceField] = {}
         self._walks: dict[str, CorridorWalk | None] = {}
@@ -49,6 +60,28 @@ class MapRevision:
             and np.array_equal(self.grid.cells, grid.cells)
         )
 
+    def with_areas(self, areas: Sequence[ClosedArea]) -> "MapRevision":
+        """Gives the same map with other areas closed; its rooms are the same ones."""
+        other = MapRevision(self.grid, radius_m=self.radius_m, previous=self, areas=areas)
+        other._open = self.open
+        if "rooms" in self.__dict__:
+            other.__dict__["rooms"] = self.rooms
+        return other
+
+    @property
+    def open(self) -> "MapRevision":
+        """The same map with nothing closed, as a robot sees it that knows of no areas."""
+        if not self.areas:
+            return self
+        if self._open is None:
+            self._open = MapRevision(self.grid, radius_m=self.radius_m, previous=self)
+        return self._open
+
+    @cached_property
+    def floor(self) -> OccupancyGrid:
+        """The map without the floor that is closed."""
+        return close_floor(self.grid, self.areas)
+
     @cached_property
     def rooms(self) -> RoomMap:
         """Rooms, corridors, open spaces and doors."""
@@ -56,9 +89,9 @@ class MapRevision:
 
     @cached_property
     def clearance_m(self) -> Clearance:
-        """Metres from each cell to the nearest obstacle, the shape of the grid."""
+        """Metres from each cell to the nearest obstacle or closed area, the shape of the grid."""
         known = next(iter(self._fields.values()), None)
-        return clearance_m(self.grid) if known is None else known.lattice.fine_clearance_m
+        return clearance_m(self.floor) if known is None else known.lattice.fine_clearance_m
 
     @property
     def latest_rooms(self) -> RoomMap | None:
@@ -79,11 +112,13 @@ class MapRevision:
         cell = self.grid.cell_at(point)
         if cell not in self._fields:
             known = next(iter(self._fields.values()), None)
-            if len(self._fields) == MOST_FIELDS:
-                del self._fields[next(iter(self._fields))]
-            self._fields[cell] = (
-                distances_from(self.grid, point, radius_m=self.radius_m)
+            field = (
+                distances_from(self.floor, point, radius_m=self.radius_m)
                 if known is None
                 else known.from_elsewhere(point)
             )
+            # A new dictionary each time: several threads may ask at once.
+            kept = list(self._fields.items())[1 - MOST_FIELDS :]
+            self._fields = {**dict(kept), cell: field}
+            return field
         return self._fields[cell]

@@ -7,7 +7,7 @@ import numpy as np
 
 from mapspeak.geometry import Point
 from mapspeak.navigation.atlas import Atlas
-from mapspeak.navigation.places import Place, Spot
+from mapspeak.navigation.naming import Place, Spot
 from mapspeak.navigation.standing import find_standing_point
 from mapspeak.spatial.paths import DistanceField, Path
 from mapspeak.spatial.rooms import Door, Region

@@ -6,7 +6,7 @@ works with any ROS robot is written against it. Messages are mappings as rosbrid
 
 from mapspeak.ros.definitions import split_definition
 from mapspeak.ros.graph import NodeLinks, RosGraph
-from mapspeak.ros.names import NAME, TYPE, new_id
+from mapspeak.ros.names import NAME, TYPE, find_nearest, new_id
 from mapspeak.ros.port import ActionEnd, ActionGoal, Listener, RosConnection, Subscription
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "RosConnection",
     "RosGraph",
     "Subscription",
+    "find_nearest",
     "new_id",
     "split_definition",
 ]

@@ -13,6 +13,8 @@ from pydantic import ValidationError
 
 from mapspeak import __version__
 from mapspeak.errors import ConfigError, MapspeakError
+from mapspeak.navigation.safety import ApprovalNeededError, Caller, calling
+from mapspeak.server.asking import Asking
 from mapspeak.server.leanness import lean_input, lean_output
 from mapspeak.server.prompts import add_prompts, read_text
 from mapspeak.server.tools import build_toolsets
@@ -38,25 +40,61 @@ class MapspeakServer(MCPServer[Any]):
         self._session = session
         self._arguments: dict[str, frozenset[str]] = {}
         self._numbers: dict[str, frozenset[str]] = {}
+        self._remembering: set[str] = set()
 
     async def call_tool(
         self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None = None
     ) -> CallToolResult | InputRequiredResult:
         """Calls a tool; what went wrong on purpose reaches the model with its hint."""
-        with self._session.client_is_heard():
+        caller = Caller(client=name_client(context), tool=name)
+        with self._session.client_is_heard(), calling(caller):
             self._check_arguments(name, arguments)
             try:
-                return await super().call_tool(name, arguments, context)
+                answer = await self._call_with_approval(name, arguments, context)
             except ToolError as error:
                 readable = _explain(name, error.__cause__)
                 if readable is None:
                     raise
                 raise ToolError(readable) from error.__cause__
+            self._note_memory(name, arguments)
+            return answer
+
+    def _note_memory(self, name: str, arguments: dict[str, Any]) -> None:
+        """Notes in the audit log that a tool has changed what is remembered."""
+        guard = self._session.guard
+        if guard is not None and name in self._remembering:
+            said = f"remembered {str(arguments.get('name', ''))[:120]!r}"
+            guard.note_event("memory", said, robot_s=self._session.robot.now_s)
+
+    async def _call_with_approval(
+        self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None
+    ) -> CallToolResult | InputRequiredResult:
+        """Calls a tool, and once more when a person has agreed to what it needs their word for."""
+        guard, asking = self._session.guard, Asking(context)
+        if guard is None:
+            return await super().call_tool(name, arguments, context)
+        if not asking.take_answers(guard.approvals):
+            raise _disagreed()
+        try:
+            return await super().call_tool(name, arguments, context)
+        except ToolError as error:
+            needed = error.__cause__
+            if not isinstance(needed, ApprovalNeededError) or not asking.can_ask:
+                raise
+            question = asking.ask_by_answer(needed)
+            if question is not None:
+                return question
+            if not await asking.ask_at_once(needed):
+                raise _disagreed() from error
+            guard.approvals.grant(needed.wish_id)
+        return await super().call_tool(name, arguments, context)
 
     def offer(self, tool: Tool) -> None:
         """Adds a tool to those that can be called."""
         self._arguments[tool.name] = tool.arguments
         self._numbers[tool.name] = tool.numbers
+        if tool.effect is Effect.REMEMBERS:
+            self._remembering.add(tool.name)
         self.add_tool(
             tool.function,
             title=tool.title,
@@ -107,6 +145,16 @@ class MapspeakServer(MCPServer[Any]):
         ]
 
 
+def name_client(context: Context[Any, Any] | None) -> str:
+    """Gives who calls, for the audit log: the client's own name and its HTTP session."""
+    if context is None:
+        return "unknown"
+    about = context.session.client_params
+    name = "client" if about is None else about.client_info.name
+    session_id = (context.headers or {}).get("mcp-session-id", "")
+    return f"{name[:60]} {session_id[:8]}".strip()
+
+
 def build_server(
     session: Session,
     *,
@@ -126,6 +174,7 @@ def build_server(
         ConfigError: There is no such toolset or tool.
     """
     server = MapspeakServer(session)
+    is_read_only = is_read_only or (session.guard is not None and session.guard.policy.is_read_only)
     for tool in choose_tools(session, toolsets=toolsets, tools=tools, is_read_only=is_read_only):
         server.offer(tool)
     add_prompts(server)
@@ -160,6 +209,12 @@ def _check_names(what: str, asked: set[str], known: set[str]) -> None:
             f"There is no {what} named {', '.join(map(repr, strangers))}.",
             hint=f"Choose from {', '.join(sorted(known))}.",
         )
+
+
+def _disagreed() -> ToolError:
+    return ToolError(
+        "The person who was asked did not agree. Do not ask again; tell them what you need it for."
+    )
 
 
 def _explain(name: str, cause: BaseException | None) -> str | None:

@@ -40,7 +40,8 @@ def describe_place(atlas: Atlas, place: Place) -> str:
             lines = _remembered_lines(atlas, remembered)
         case _:
             lines = _spot_lines(atlas, place)
-    return "\n".join([*lines, *_way_lines(atlas, place, goal)])
+    why = [f"{place.name} is {place.reason}."] if place.reason else []
+    return "\n".join([*why, *lines, *_way_lines(atlas, place, goal)])
 
 
 def _way_lines(atlas: Atlas, place: Place, goal: CheckedGoal) -> Iterator[str]:

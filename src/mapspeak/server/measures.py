@@ -30,6 +30,7 @@ def describe_measures(atlas: Atlas, *, start: str, places: Sequence[str] | None)
     regions = [end.thing for end in (begin, *others) if isinstance(end.thing, Region)]
     doors = [end.thing for end in (begin, *others) if isinstance(end.thing, Door)]
     parts = [_way_table(atlas, begin, others)]
+    parts += [f"{end.name} is {end.reason}." for end in (begin, *others) if end.reason]
     parts += [_size_table(atlas, regions)] if regions else []
     parts += [_width_line(doors)] if len(doors) > 1 else []
     return "\n\n".join(parts)

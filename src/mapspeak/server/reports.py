@@ -67,6 +67,7 @@ class PoseAnswer(Report):
 
 
 NEXT_STEP = {
+    GoalState.PLANNED: "Call wait_for_goal; it starts when the drive before it has ended.",
     GoalState.ACCEPTED: "Call wait_for_goal; stop_robot or cancel_goal end it.",
     GoalState.DRIVING: "Call wait_for_goal; stop_robot or cancel_goal end it.",
     GoalState.ARRIVED: "The robot stands at the goal.",
@@ -74,6 +75,7 @@ NEXT_STEP = {
     GoalState.CANCELLED: "The robot stands still; send a new goal when ready.",
     GoalState.PREEMPTED: "A newer goal is under way; ask for that one.",
     GoalState.REJECTED: "Call look_at_map and choose a place inside known free space.",
+    GoalState.TIMED_OUT: "Check the robot's navigation; stop_robot, then send a new goal.",
     GoalState.LOST: "The robot no longer answers for this goal; check it, then send a new one.",
 }
 
@@ -84,7 +86,9 @@ class DriveAnswer(Report):
     goal_id: str
     place: str
     goal: PoseReport
-    state: GoalState = Field(description="accepted and driving go on, all others are final")
+    state: GoalState = Field(
+        description="planned, accepted and driving go on, all others are final"
+    )
     robot: PoseReport = Field(description="where it is now")
     distance_left_m: float | None = Field(description="by path")
     elapsed_s: float
@@ -128,7 +132,7 @@ class GoalAnswer(Report):
         return cls(
             place=goal.name,
             verdict=check.verdict,
-            reason=check.sentence,
+            reason=goal.sentence,
             pose=PoseReport.of(goal.pose),
             room=room,
             clearance_m=round(check.clearance_m, 2) if math.isfinite(check.clearance_m) else None,

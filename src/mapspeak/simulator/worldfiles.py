@@ -33,10 +33,12 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.simulator.mapworld import build_map_world
 from mapspeak.simulator.models import KINDS
 from mapspeak.simulator.motion import BODY_BAND_M, BODY_RADIUS_M
 from mapspeak.simulator.slices import slice_world
 from mapspeak.simulator.world import Door, TrueRoom, Wall, World, WorldObject
+from mapspeak.spatial.mapfiles import load_map
 from mapspeak.spatial.rooms import RoomClass
 
 __all__ = ["load_world", "world_names"]
@@ -63,14 +65,19 @@ def world_names() -> tuple[str, ...]:
 
 
 def load_world(name_or_path: str | Path) -> World:
-    """Reads a shipped world by its name, or a world file of the user's by its path.
+    """Reads a shipped world by its name, or a world file or a map's .yaml by its path.
+
+    A map that map_server loads becomes a building without objects.
 
     Raises:
         ConfigError: There is no such world, or its file has a fault; the message names the file,
             the line and the fault.
+        MapError: A map is damaged, or the robot fits nowhere on it.
     """
     label, stem, text = _read_text(name_or_path)
     tree = _parse_yaml(text, label)
+    if "image" in tree:
+        return build_map_world(load_map(Path(name_or_path)).grid, name=stem)
     try:
         written = _WorldFile.model_validate(tree)
         world = _build_world(written, stem)

@@ -32,8 +32,8 @@ QUICK = Timing(
     goodbye_s=1.0,
     frames_s=PATIENCE_S,
 )
-BRIEF = DrivingPatience(acceptance_s=0.1, end_s=0.05, return_s=0.1)
-LONG = DrivingPatience(acceptance_s=PATIENCE_S, end_s=0.05)
+BRIEF = DrivingPatience(acceptance_s=0.1, end_s=0.05, return_s=0.1, settling_s=0.0)
+LONG = DrivingPatience(acceptance_s=PATIENCE_S, end_s=0.05, settling_s=0.0)
 PENDING, ACTIVE, PREEMPTED, SUCCEEDED, ABORTED, REJECTED = 0, 1, 2, 3, 4, 5
 GOAL = Pose(4.0, 2.0)
 

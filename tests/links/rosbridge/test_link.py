@@ -40,8 +40,8 @@ pytestmark = pytest.mark.anyio
 QUICK = Timing(
     first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0, frames_s=PATIENCE_S
 )
-BRIEF = DrivingPatience(acceptance_s=0.4, end_s=0.05, result_s=0.0, return_s=0.1)
-LONG = DrivingPatience(acceptance_s=PATIENCE_S, end_s=0.05)
+BRIEF = DrivingPatience(acceptance_s=0.4, end_s=0.05, result_s=0.0, return_s=0.1, settling_s=0.0)
+LONG = DrivingPatience(acceptance_s=PATIENCE_S, end_s=0.05, settling_s=0.0)
 GOAL = Pose(3.0, 4.0, 1.0)
 OURS, OTHERS = bytes(range(16)), bytes(range(16, 32))
 ROOM = """

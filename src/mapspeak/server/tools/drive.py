@@ -5,7 +5,7 @@ from typing import Annotated
 from mcp.server.mcpserver import Context
 from pydantic import Field
 
-from mapspeak.navigation.drive import DriveReport, OnProgress
+from mapspeak.server.callers import client_of, tell_progress
 from mapspeak.server.reports import DriveAnswer
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.server.wording import say_pose
@@ -17,7 +17,10 @@ LONGEST_WAIT_S = 25.0
 
 Place = Annotated[
     str | None,
-    Field(description="an id from look_at_map (R3, C1, D1, F2, W5) or a remembered name"),
+    Field(
+        description="an id from look_at_map (R3, C1, D1, F2, W5), a remembered name, or a phrase: "
+        "left of W3, between D1 and D2, corner of R2"
+    ),
 ]
 Metres = Annotated[float | None, Field(description="metres, map frame", allow_inf_nan=False)]
 Degrees = Annotated[
@@ -84,7 +87,7 @@ class DriveTools:
         with drives.preparing() as ticket:
             goal = await self._session.find_goal(place=place, x=x, y=y, yaw_deg=yaw_deg)
             drive = await drives.start(
-                goal.pose, place=goal.name, ticket=ticket, client=_client_of(context)
+                goal.pose, place=goal.title, ticket=ticket, client=client_of(context)
             )
         return await self._wait(context, drive.goal_id, wait_s)
 
@@ -120,22 +123,6 @@ class DriveTools:
 
     async def _wait(self, context: Context, goal_id: str | None, wait_s: float) -> DriveAnswer:
         report = await self._session.drives.wait(
-            goal_id, wait_s=wait_s, on_progress=_tell_progress(context)
+            goal_id, wait_s=wait_s, on_progress=tell_progress(context)
         )
         return DriveAnswer.of(report)
-
-
-def _client_of(context: Context) -> str:
-    """Gives the HTTP session that calls; empty on stdio and for clients without one."""
-    return (context.headers or {}).get("mcp-session-id", "")
-
-
-def _tell_progress(context: Context) -> OnProgress:
-    async def tell(report: DriveReport) -> None:
-        left_m = report.status.distance_left_m
-        left = "" if left_m is None else f", {left_m:.1f} m left"
-        await context.report_progress(
-            report.elapsed_s, message=f"{report.drive.goal_id} {report.status.state}{left}"
-        )
-
-    return tell

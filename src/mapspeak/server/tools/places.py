@@ -19,7 +19,8 @@ MOST_PLACES = 30
 OnePlace = Annotated[
     str,
     Field(
-        description='an id, a remembered name, "robot", "x, y" or "x, y, yaw_deg"', max_length=200
+        description='an id, a remembered name, "robot", "x, y" or "x, y, yaw_deg", "left of W3"',
+        max_length=200,
     ),
 ]
 Places = Annotated[

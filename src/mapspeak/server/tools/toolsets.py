@@ -1,9 +1,12 @@
 """Every toolset by its name."""
 
 from mapspeak.server.tools.drive import DriveTools
+from mapspeak.server.tools.explore import ExploreTools
 from mapspeak.server.tools.look import LookTools
 from mapspeak.server.tools.paper import PaperTools
 from mapspeak.server.tools.places import PlaceTools
+from mapspeak.server.tools.ros import RosTools
+from mapspeak.server.tools.routes import RouteTools
 from mapspeak.server.toolset import Tool
 from mapspeak.session import Session
 
@@ -16,5 +19,8 @@ def build_toolsets(session: Session) -> dict[str, list[Tool]]:
         "look": LookTools(session).tools(),
         "places": PlaceTools(session).tools(),
         "drive": DriveTools(session).tools(),
+        "explore": ExploreTools(session).tools(),
+        "routes": RouteTools(session).tools(),
         "paper": PaperTools(session).tools(),
+        "ros": RosTools(session).tools(),
     }

@@ -7,7 +7,8 @@ from typing import Any
 
 from mapspeak.errors import LinkError
 from mapspeak.links.ros import NodeParameters
-from mapspeak.ros import NodeLinks, RosGraph, split_definition
+from mapspeak.links.rosbridge.client.definitions import DefinitionKeeper
+from mapspeak.ros import NodeLinks, RosGraph
 from mapspeak.ros.messages import Dialect, bare_type, read_stamp
 
 ROSAPI_HINT = (
@@ -25,7 +26,8 @@ class Rosapi(ABC):
     """
 
     def __init__(self) -> None:
-        self._dialect: Dialect | None = None
+        self._version: tuple[Dialect, str] | None = None
+        self._definitions = DefinitionKeeper(self.call_service)
         self._parameters = NodeParameters(self)
 
     @abstractmethod
@@ -113,18 +115,13 @@ class Rosapi(ABC):
         if await self._fetch_dialect() is Dialect.ROS1:
             answer = await self.call_service("/rosapi/topic_type", {"topic": f"{action}/goal"})
             return _type_of(answer, action).removesuffix("ActionGoal")
+        # Only versions after 2.1 have that service.
         answer = await self.call_service("/rosapi/action_type", {"action": action})
         return _type_of(answer, action)
 
     async def fetch_definitions(self, type_name: str) -> Mapping[str, str]:
-        """Gives the .msg texts of a type and of all within it, as far as a topic of it is there."""
-        answer = await self.call_service("/rosapi/topics_and_raw_types")
-        types = [bare_type(name) for name in _texts(answer, "types")]
-        texts = _texts(answer, "typedefs_full_text")
-        for known, text in zip(types, texts, strict=False):
-            if known == bare_type(type_name):
-                return split_definition(known, text)
-        return {}
+        """Gives the .msg texts of a type and of all within it: the robot's, else our own."""
+        return await self._definitions.fetch(type_name, dialect=await self._fetch_dialect())
 
     async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
         """Gives the names of a node's parameters."""
@@ -157,11 +154,20 @@ class Rosapi(ABC):
         await self.call_service("/rosapi/set_param", {"name": full, "value": json.dumps(value)})
 
     async def _fetch_dialect(self) -> Dialect:
-        if self._dialect is None:
-            self._dialect = (await self.fetch_graph()).dialect
-        return self._dialect
+        if self._version is None:
+            return (await self.fetch_graph()).dialect
+        return self._version[0]
 
     async def _fetch_version(self, types: list[str]) -> tuple[Dialect, str]:
+        """Gives which ROS it is; that is asked once, for it does not change."""
+        if self._version is None:
+            version = await self._ask_version(types)
+            if not types:
+                return version
+            self._version = version
+        return self._version
+
+    async def _ask_version(self, types: list[str]) -> tuple[Dialect, str]:
         try:
             answer = await self.call_service("/rosapi/get_ros_version")
         except LinkError:

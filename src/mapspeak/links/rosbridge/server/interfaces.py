@@ -1,31 +1,25 @@
 """Message types as one ROS knows them: described, filled in, and what does not fit refused."""
 
-import re
 from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from mapspeak.errors import LinkError
-from mapspeak.links.rosbridge.server.definitions import MESSAGES, SERVICES
+from mapspeak.ros.definitions import (
+    FLOATS,
+    GENERATED,
+    TIMES,
+    WHOLES,
+    Field,
+    TypeBook,
+    known_definitions,
+    write_definition,
+)
 from mapspeak.ros.messages import Dialect, bare_type
 
 __all__ = ["Interfaces"]
 
-FIELD = re.compile(r"(?P<type>[\w/]+)(?P<array>\[\d*\])? (?P<name>\w+)(?: (?P<default>\S+))?")
-CONSTANT = re.compile(r"[\w/]+ (?P<name>\w+)=(?P<value>\S+)")
-FLOATS = ("float32", "float64")
-WHOLES = {
-    "byte": (-128, 255), "char": (0, 255), "int8": (-(2**7), 2**7 - 1), "uint8": (0, 2**8 - 1),
-    "int16": (-(2**15), 2**15 - 1), "uint16": (0, 2**16 - 1), "int32": (-(2**31), 2**31 - 1),
-    "uint32": (0, 2**32 - 1), "int64": (-(2**63), 2**63 - 1), "uint64": (0, 2**64 - 1),
-}  # fmt: skip
-TIMES = {"builtin_interfaces/Time": "time", "builtin_interfaces/Duration": "duration"}
-PLAIN_DEFAULTS = {"string": "", "bool": False}
-RULER = "=" * 80
-GENERATED = re.compile(r"_(Request|Response|Goal|Result|FeedbackMessage|Feedback)$")
-"""What ROS 2 makes of services and actions; no message of a person has an underscore."""
 KIND_OF_GENERATED = {
     **dict.fromkeys(("Request", "Response"), "srv"),
     **dict.fromkeys(("Goal", "Result", "Feedback", "FeedbackMessage"), "action"),
@@ -34,39 +28,18 @@ KIND_OF_GENERATED = {
 Answer = Callable[[dict[str, Any]], Awaitable[dict[str, Any]]]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FieldType:
-    """One field of a message.
-
-    Attributes:
-        name: Of the field.
-        type: Of the value, or of one in a list.
-        length: Of a list: 0 where it is not fixed; None where it is no list.
-        default: What it holds unless said otherwise, as the definition says it.
-    """
-
-    name: str
-    type: str
-    length: int | None
-    default: str
-
-
 class Interfaces:
     """The message types of one dialect."""
 
     def __init__(self, dialect: Dialect) -> None:
         self._dialect = dialect
-        self._texts = {name: self._translate(name, text) for name, text in MESSAGES.items()}
-        for name, (request, response) in SERVICES.items():
-            self._texts[f"{name}_Request"] = self._translate(name, request)
-            self._texts[f"{name}_Response"] = self._translate(name, response)
-        self._fields = {name: _parse(text) for name, text in self._texts.items()}
-        self._with_fixed_array = {name for name in self._texts if self._finds_fixed_array(name)}
+        self._book = TypeBook(known_definitions(dialect))
+        self._fixed_arrays: dict[str, bool] = {}
 
     @property
     def names(self) -> list[str]:
         """All messages, services and actions, as this ROS writes their names."""
-        return sorted({GENERATED.sub("", self.said(name)) for name in self._texts})
+        return sorted({GENERATED.sub("", self.said(name)) for name in self._book.texts})
 
     def said(self, name: str) -> str:
         """Gives a type's name as this ROS writes it; one that is no message keeps its name."""
@@ -79,26 +52,26 @@ class Interfaces:
 
     def knows(self, name: str) -> bool:
         """True for a type that is described here, however its name is written."""
-        return bare_type(name) in self._texts
-
-    def fields_of(self, name: str) -> list[FieldType]:
-        """Gives a type's fields in their order."""
-        return self._fields[bare_type(name)]
+        return self._book.knows(name)
 
     def has_fixed_array(self, name: str) -> bool:
         """True when a list of fixed length is somewhere within."""
-        return bare_type(name) in self._with_fixed_array
+        bare = bare_type(name)
+        if bare not in self._fixed_arrays:
+            self._fixed_arrays[bare] = any(
+                field.length
+                for each in self._book.within(bare)
+                for field in self._book[each].fields
+            )
+        return self._fixed_arrays[bare]
 
     def full_text(self, name: str) -> str:
         """Gives a type's definition and those of all types within, as `gendeps --cat` does."""
-        first, *others = self._within(bare_type(name))
-        parts = [self._texts[first]]
-        parts += [f"{RULER}\nMSG: {each}\n{self._texts[each]}" for each in others]
-        return "\n".join(parts)
+        return write_definition(self._book.texts, self._book.within(name))
 
     def details(self, name: str) -> list[dict[str, object]]:
         """Gives what rosapi's message_details says of a type and of all types within."""
-        return [self._detail(each) for each in self._within(bare_type(name))]
+        return [self._detail(each) for each in self._book.within(name)]
 
     def fill(self, name: str, message: object) -> dict[str, Any]:
         """Gives a client's message with all fields; those left out hold their defaults.
@@ -108,7 +81,7 @@ class Interfaces:
         """
         if not isinstance(message, Mapping):
             raise _misfit(name, "message", message)
-        fields = {each.name: each for each in self.fields_of(name)}
+        fields = {each.name: each for each in self._book[name].fields}
         for given in message:
             if given not in fields:
                 raise LinkError(
@@ -117,7 +90,7 @@ class Interfaces:
         return {
             each.name: self._fill_field(each, message[each.name])
             if each.name in message
-            else self._default(each)
+            else self._book.default(each)
             for each in fields.values()
         }
 
@@ -129,7 +102,7 @@ class Interfaces:
 
         return reply
 
-    def _fill_field(self, field: FieldType, value: object) -> Any:  # noqa: ANN401 - ROS JSON
+    def _fill_field(self, field: Field, value: object) -> Any:  # noqa: ANN401 - ROS JSON
         if field.length is None:
             return self._fill_value(field, value)
         if field.type == "uint8" and isinstance(value, str | bytes):
@@ -141,7 +114,7 @@ class Interfaces:
             return value
         return [self._fill_value(field, each) for each in value]  # type: ignore[attr-defined]
 
-    def _fill_value(self, field: FieldType, value: object) -> Any:  # noqa: ANN401 - ROS JSON
+    def _fill_value(self, field: Field, value: object) -> Any:  # noqa: ANN401 - ROS JSON
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         match field.type:
             case "string" if isinstance(value, str) and _is_unicode(value):
@@ -154,67 +127,27 @@ class Interfaces:
                 low, high = WHOLES[kind]
                 if low <= value <= high:
                     return value
-            case "time" | "duration" if isinstance(value, Mapping):
+            case kind if kind in TIMES and isinstance(value, Mapping):
                 # A stamp in the words of ROS 2 is silently replaced.
                 is_known = {"secs", "nsecs"} <= set(value)
                 return dict(value) if is_known else {"secs": 0, "nsecs": 0}
-            case kind if kind in self._texts:
+            case kind if self._book.knows(kind):
                 return self.fill(kind, value)
         raise _misfit(field.type, field.name, value)
 
-    def _default(self, field: FieldType) -> Any:  # noqa: ANN401 - ROS JSON
-        if field.length is not None:
-            one = FieldType(name=field.name, type=field.type, length=None, default="")
-            return [self._default(one) for _ in range(field.length)]
-        if field.type in FLOATS:
-            return float(field.default or 0.0)
-        if field.type in WHOLES:
-            return 0
-        if field.type in PLAIN_DEFAULTS:
-            return PLAIN_DEFAULTS[field.type]
-        return (
-            {"secs": 0, "nsecs": 0} if field.type in TIMES.values() else self.fill(field.type, {})
-        )
-
-    def _finds_fixed_array(self, name: str) -> bool:
-        return any(
-            bool(each.length) or (each.type in self._texts and self._finds_fixed_array(each.type))
-            for each in self._fields[name]
-        )
-
-    def _within(self, name: str) -> list[str]:
-        found = [name]
-        for each in found:
-            inner = [field.type for field in self.fields_of(each) if field.type in self._texts]
-            found += [kind for kind in dict.fromkeys(inner) if kind not in found]
-        return found
-
     def _detail(self, name: str) -> dict[str, object]:
-        fields = self.fields_of(name)
-        constants = [CONSTANT.fullmatch(line) for line in self._texts[name].splitlines()]
-        known = [each for each in constants if each is not None]
+        message = self._book[name]
         return {
             "type": self.said(name),
-            "fieldnames": [each.name for each in fields],
-            "fieldtypes": [self.said(each.type) for each in fields],
-            "fieldarraylen": [-1 if each.length is None else each.length for each in fields],
-            "examples": [_example(each) for each in fields],
-            "constnames": [each["name"] for each in known],
-            "constvalues": [each["value"] for each in known],
+            "fieldnames": [each.name for each in message.fields],
+            "fieldtypes": [self.said(each.type) for each in message.fields],
+            "fieldarraylen": [
+                -1 if each.length is None else each.length for each in message.fields
+            ],
+            "examples": [_example(each) for each in message.fields],
+            "constnames": [each.name for each in message.constants],
+            "constvalues": [each.value for each in message.constants],
         }
-
-    def _translate(self, name: str, text: str) -> str:
-        if self._dialect is Dialect.ROS2:
-            return text
-        for ros2, ros1 in TIMES.items():
-            text = text.replace(ros2, ros1)
-        if name == "std_msgs/Header":
-            text = f"uint32 seq\n{text}"
-        if name == "geometry_msgs/Quaternion":
-            text = re.sub(r" \d$", "", text, flags=re.MULTILINE)
-        if name == "sensor_msgs/CameraInfo":
-            text = re.sub(r"\b([dkrp])$", lambda match: match[1].upper(), text, flags=re.MULTILINE)
-        return text
 
 
 def _is_unicode(text: str) -> bool:
@@ -222,21 +155,7 @@ def _is_unicode(text: str) -> bool:
     return not any("\ud800" <= sign <= "\udfff" for sign in text)
 
 
-def _parse(text: str) -> list[FieldType]:
-    found = (FIELD.fullmatch(line) for line in text.splitlines())
-    return [
-        FieldType(
-            name=each["name"],
-            type=each["type"],
-            length=int(each["array"][1:-1] or 0) if each["array"] else None,
-            default=each["default"] or "",
-        )
-        for each in found
-        if each is not None
-    ]
-
-
-def _example(field: FieldType) -> str:
+def _example(field: Field) -> str:
     if field.length is not None:
         return "[]"
     if field.type in FLOATS:

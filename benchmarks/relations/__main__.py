@@ -1,0 +1,5 @@
+"""Lists the goals that were not answered rightly."""
+
+from benchmarks.relations.measuring import main
+
+main()

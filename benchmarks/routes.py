@@ -1,0 +1,146 @@
+"""How many routes are as short as they can be, of those on which the nearest choice is wrong.
+
+Things of a few kinds are remembered all over a map, and routes name kinds in order. The truth is
+brute force: every choice of places, measured with path lengths of the benchmark's own. Only routes
+count on which taking the nearest place each time costs at least a metre more.
+"""
+
+import itertools
+import math
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from benchmarks.figure import Figure
+from benchmarks.relations.sites import Site, build_sites
+from benchmarks.relations.truth import Truth, away
+from mapspeak.geometry import Point, Pose
+from mapspeak.navigation.atlas import Atlas
+from mapspeak.navigation.routes import RoutePlan, plan_route
+from mapspeak.semantic import Landmark, SemanticMap, Waypoint
+
+__all__ = ["measure"]
+
+KINDS = ("extinguisher", "printer", "bench", "socket")
+N_PLACES = 12
+N_ROUTES = 50
+N_STOPS = (3, 5)
+LEAST_DETOUR_M = 1.0
+SAME_RATIO, SAME_M = 0.01, 0.1
+"""Two computations of one path differ by no more than this."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """A route and what is true of it.
+
+    Attributes:
+        stops: The words.
+        best_m: Of all choices, the shortest.
+        greedy_m: Taking the nearest place each time.
+    """
+
+    stops: tuple[str, ...]
+    best_m: float
+    greedy_m: float
+
+
+class Ways:
+    """The path lengths between the robot, number 0, and the places of a site."""
+
+    def __init__(self, truth: Truth, points: Sequence[Point]) -> None:
+        at = [int(np.argmin(away(point, truth.places))) for point in points]
+        self._metres = np.array([truth.paths_m(point)[at] for point in points])
+
+    def length_m(self, numbers: Sequence[int]) -> float:
+        """Gives the whole way past some places, from the robot on."""
+        legs = itertools.pairwise((0, *numbers))
+        return math.fsum(float(self._metres[leg]) for leg in legs)
+
+    def nearest(self, here: int, numbers: Sequence[int]) -> int:
+        """Gives the nearest of some places."""
+        return min(numbers, key=lambda number: float(self._metres[here, number]))
+
+
+def measure() -> Iterator[Figure]:
+    """Gives how many of the routes came out as short as brute force finds."""
+    cv2.setNumThreads(1)
+    n_right, n_all, saved_m, took_ms = 0, 0, 0.0, []
+    sites = list(build_sites())
+    for number, site in enumerate(sites):
+        n_wanted = N_ROUTES * (number + 1) // len(sites) - N_ROUTES * number // len(sites)
+        for is_right, case, took in _judge_site(site, seed=number, n_wanted=n_wanted):
+            n_right, n_all = n_right + is_right, n_all + 1
+            saved_m += case.greedy_m - case.best_m
+            took_ms.append(1e3 * took)
+    yield Figure(name="routes on which greedy choice fails", value=n_all, unit="")
+    yield Figure(name="as short as brute force", value=n_right, unit="routes")
+    yield Figure(name="saved against greedy choice, mean", value=saved_m / n_all, unit="m")
+    yield Figure(name="one plan, median", value=sorted(took_ms)[len(took_ms) // 2], unit="ms")
+
+
+def _judge_site(site: Site, *, seed: int, n_wanted: int) -> Iterator[tuple[bool, Case, float]]:
+    generator = np.random.default_rng(seed)
+    truth = Truth(site)
+    poses, kinds = _spread(truth, generator)
+    site = replace(site, memory=_remember(poses, kinds))
+    ways = Ways(truth, [site.robot.point, *(pose.point for pose in poses)])
+    atlas = Atlas(site.grid, site.robot, site.memory, radius_m=site.radius_m)
+    for case in itertools.islice(_find_cases(ways, kinds, generator), n_wanted):
+        started_s = time.process_time()
+        plan = plan_route(atlas, case.stops)
+        took_s = time.process_time() - started_s
+        yield _is_right(ways, plan, case), case, took_s
+
+
+def _spread(truth: Truth, generator: np.random.Generator) -> tuple[list[Pose], list[str]]:
+    clear = truth.clear_m[truth.standable] >= truth.site.radius_m + 0.1
+    chosen = generator.choice(np.flatnonzero(clear), size=N_PLACES, replace=False)
+    poses = [Pose(float(x), float(y)) for x, y in truth.places[chosen]]
+    return poses, [KINDS[number % len(KINDS)] for number in range(N_PLACES)]
+
+
+def _remember(poses: Sequence[Pose], kinds: Sequence[str]) -> SemanticMap:
+    return SemanticMap(
+        waypoints=tuple(
+            Waypoint(name=f"place {number}", pose=pose, safety_landmarks=(Landmark(label=kind),))
+            for number, (pose, kind) in enumerate(zip(poses, kinds, strict=True))
+        )
+    )
+
+
+def _find_cases(ways: Ways, kinds: Sequence[str], generator: np.random.Generator) -> Iterator[Case]:
+    """Draws routes until greedy choice fails; without end, as such routes are common."""
+    numbers = {kind: [n + 1 for n, each in enumerate(kinds) if each == kind] for kind in KINDS}
+    seen: set[tuple[str, ...]] = set()
+    for _ in range(2000):
+        n_stops = int(generator.integers(N_STOPS[0], N_STOPS[1] + 1))
+        stops = [str(kind) for kind in generator.choice(KINDS, size=n_stops)]
+        if generator.random() < 0.5:
+            stops[-1] = f"W{generator.integers(1, N_PLACES + 1)}"
+        if any(one == other for one, other in itertools.pairwise(stops)):
+            continue
+        choices = [numbers.get(stop, [int(stop[1:])] if stop[0] == "W" else []) for stop in stops]
+        best_m = min(map(ways.length_m, itertools.product(*choices)))
+        greedy_m = ways.length_m(_choose_greedily(ways, choices))
+        if greedy_m >= best_m + LEAST_DETOUR_M and tuple(stops) not in seen:
+            seen.add(tuple(stops))
+            yield Case(stops=tuple(stops), best_m=best_m, greedy_m=greedy_m)
+
+
+def _choose_greedily(ways: Ways, choices: Sequence[Sequence[int]]) -> list[int]:
+    chosen = [0]
+    for numbers in choices:
+        chosen.append(ways.nearest(chosen[-1], numbers))
+    return chosen[1:]
+
+
+def _is_right(ways: Ways, plan: RoutePlan, case: Case) -> bool:
+    """True where the route chosen is as short as can be, by the benchmark's own measure."""
+    length_m = ways.length_m([int(each.name[1:]) for each in plan.chosen])
+    is_shortest = length_m <= case.best_m * (1 + SAME_RATIO) + SAME_M
+    is_told = abs(plan.total_m - length_m) <= length_m * SAME_RATIO * 2 + 2 * SAME_M
+    return is_shortest and is_told

@@ -1,0 +1,65 @@
+"""`mapspeak stop` and `mapspeak release`: the operator's word, past any client and any model."""
+
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from mapspeak.cli.guarding import CONTROL_OPTION, control_folder, wall_clock
+
+if TYPE_CHECKING:
+    from mapspeak.navigation.safety import Hold
+
+__all__ = ["release", "stop"]
+
+POLL_S = 0.01
+OTHERS_S = 0.3
+"""Once one server has answered, so long is waited for others."""
+
+
+@click.command()
+@CONTROL_OPTION
+@click.option("--reason", default="mapspeak stop", show_default=True, help="For the log.")
+@click.option(
+    "--wait-s", default=2.0, show_default=True, help="How long to wait for servers to answer."
+)
+def stop(control: Path | None, reason: str, wait_s: float) -> None:
+    """Stops every robot that is served from here, and holds it until `mapspeak release`.
+
+    Ends with 1 when no server has answered; the hold is there all the same.
+    """
+    from mapspeak.navigation.safety import Hold  # noqa: PLC0415 - heavy; help must be quick
+
+    hold = Hold(control_folder(control))
+    hold.put(" ".join(reason.split()), at=wall_clock())
+    robots = _wait_for_answers(hold, wait_s=wait_s)
+    if robots:
+        click.echo(f"Stopped and held: {', '.join(robots)}. `mapspeak release` lets them go on.")
+        return
+    click.echo(
+        f"Held, but no server has answered within {wait_s:g} s. If a robot moves, press its own "
+        "stop button.",
+        err=True,
+    )
+    sys.exit(1)
+
+
+@click.command()
+@CONTROL_OPTION
+def release(control: Path | None) -> None:
+    """Lets robots that were held by `mapspeak stop`, or by a client's stop, drive again."""
+    from mapspeak.navigation.safety import Hold  # noqa: PLC0415 - heavy; help must be quick
+
+    was_held = Hold(control_folder(control)).lift()
+    click.echo("Released." if was_held else "Nothing was held.")
+
+
+def _wait_for_answers(hold: "Hold", *, wait_s: float) -> tuple[str, ...]:
+    deadline_s = time.monotonic() + wait_s
+    while not hold.answers() and time.monotonic() < deadline_s:
+        time.sleep(POLL_S)
+    if hold.answers():
+        time.sleep(min(OTHERS_S, max(deadline_s - time.monotonic(), 0.0)))
+    return hold.answers()

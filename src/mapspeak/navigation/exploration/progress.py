@@ -1,0 +1,132 @@
+"""How an exploration stands, as a value."""
+
+from collections import Counter
+from dataclasses import dataclass
+from enum import StrEnum
+
+from mapspeak.geometry import Pose
+from mapspeak.navigation.atlas import Atlas
+from mapspeak.navigation.exploration.blocked import BlockedPlace
+from mapspeak.navigation.exploration.trips import Trip
+from mapspeak.spatial.frontiers import (
+    Frontier,
+    FrontierReport,
+    FrontierVerdict,
+    RefusalReason,
+    RefusedFrontier,
+)
+
+__all__ = ["ExplorationState", "Progress", "find_unreachable", "judge_end", "known_ratio"]
+
+OUT_OF_REACH = frozenset({RefusalReason.NO_WAY, RefusalReason.TOO_NARROW})
+
+
+class ExplorationState(StrEnum):
+    """How an exploration stands; all but the first two are an end, though not of the map."""
+
+    DRIVING = "driving"
+    AT_GOAL = "at_goal"
+    BOUND_REACHED = "bound_reached"
+    NOTHING_LEFT = "nothing_left"
+    REST_UNREACHABLE = "rest_unreachable"
+    NOTHING_KNOWN = "nothing_known"
+    INTERRUPTED = "interrupted"
+
+    @property
+    def is_end(self) -> bool:
+        """True when calling again begins anew instead of going on."""
+        return self not in (ExplorationState.DRIVING, ExplorationState.AT_GOAL)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Progress:
+    """How an exploration stands.
+
+    Attributes:
+        state: See `ExplorationState`.
+        sentence: The same in words with numbers.
+        n_goals: Frontiers the robot was sent to since the exploration began.
+        n_arrived: How many of them it has come to; others were seen from afar or blocked.
+        driven_m: How far it has driven meanwhile, by its own poses.
+        elapsed_s: Robot time of all calls.
+        known_area_m2: Free floor on the map.
+        known_ratio: Of the free floor that is to be expected in all.
+        frontiers: Where one could still go, best first.
+        trip: The drive under way.
+        pose: Where the robot is.
+        unreachable: Borders with the unknown that the robot cannot get to.
+        blocked: Places that it was sent to in vain.
+    """
+
+    state: ExplorationState
+    sentence: str
+    n_goals: int
+    n_arrived: int
+    driven_m: float
+    elapsed_s: float
+    known_area_m2: float
+    known_ratio: float
+    frontiers: tuple[Frontier, ...]
+    trip: Trip | None
+    pose: Pose
+    unreachable: tuple[RefusedFrontier, ...]
+    blocked: tuple[BlockedPlace, ...]
+
+
+def known_ratio(atlas: Atlas) -> float:
+    """Gives the known share of the floor that is to be expected: what frontiers promise is not."""
+    known_m2 = known_area_m2(atlas)
+    promised_m2 = sum(frontier.gain_m2 for frontier in atlas.frontiers.frontiers)
+    return known_m2 / (known_m2 + promised_m2) if known_m2 else 0.0
+
+
+def known_area_m2(atlas: Atlas) -> float:
+    """Gives the free floor on the map."""
+    return int(atlas.grid.free.sum()) * atlas.grid.resolution_m**2
+
+
+def find_unreachable(atlas: Atlas) -> tuple[RefusedFrontier, ...]:
+    """Gives the borders with the unknown that the robot cannot get to."""
+    return tuple(each for each in atlas.frontiers.refused if each.reason in OUT_OF_REACH)
+
+
+def judge_end(atlas: Atlas, blocked: tuple[BlockedPlace, ...]) -> tuple[ExplorationState, str]:
+    """Says what it means that there is no frontier to go to: all seen, or the rest out of reach."""
+    report = atlas.frontiers
+    if report.verdict is FrontierVerdict.NOTHING_KNOWN:
+        return ExplorationState.NOTHING_KNOWN, report.sentence
+    unreachable = find_unreachable(atlas)
+    if not unreachable and not blocked:
+        return ExplorationState.NOTHING_LEFT, f"Nothing is left to explore{_say_dull(report)}."
+    parts = [f"{n} {words}" for n, words in _count(unreachable, blocked) if n]
+    left_m = sum(each.length_m for each in unreachable)
+    sentence = (
+        f"What is left cannot be reached: {', '.join(parts)}; "
+        f"{left_m:.1f} m of border with the unknown."
+    )
+    return ExplorationState.REST_UNREACHABLE, sentence
+
+
+def _say_dull(report: FrontierReport) -> str:
+    """Gives what is not worth a drive, in words."""
+    dull = [each for each in report.refused if _is_dull(each)]
+    if not dull:
+        return ": all was seen"
+    left_m = sum(each.length_m for each in dull)
+    places = "places" if len(dull) > 1 else "place"
+    return f" that is worth a drive; {left_m:.1f} m of border in {len(dull)} {places} stay"
+
+
+def _is_dull(border: RefusedFrontier) -> bool:
+    return border.reason is RefusalReason.NOTHING_TO_SEE
+
+
+def _count(
+    unreachable: tuple[RefusedFrontier, ...], blocked: tuple[BlockedPlace, ...]
+) -> tuple[tuple[int, str], ...]:
+    reasons = Counter(each.reason for each in unreachable)
+    return (
+        (reasons[RefusalReason.TOO_NARROW], "behind gaps too narrow for the robot"),
+        (reasons[RefusalReason.NO_WAY], "behind walls"),
+        (len(blocked), "where driving there failed"),
+    )

@@ -1,0 +1,101 @@
+"""The poses that the words for one stop of a route may mean."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from mapspeak.errors import GoalError
+from mapspeak.geometry import Pose
+from mapspeak.navigation.atlas import Atlas
+from mapspeak.navigation.choosing import CheckedGoal, check_place
+from mapspeak.navigation.naming import AmbiguousPlaceError, Place
+from mapspeak.navigation.places import find_place
+from mapspeak.navigation.relations import Nearest, find_all_near, parse_relation
+from mapspeak.semantic import SemanticMap, find_waypoints
+
+__all__ = ["MOST_CANDIDATES", "Candidate", "find_candidates"]
+
+MOST_CANDIDATES = 12
+LEAST_SCORE_RATIO = 0.75
+"""Of words that are no name, so much must be found in what was remembered of a place."""
+SAME_SCORE_RATIO = 0.9
+"""Places that fit so nearly as well as the best one may be meant too."""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """One thing that a stop may mean, where the robot can stand.
+
+    Attributes:
+        name: Such as "W3".
+        pose: Where to stand.
+        title: The name with the reason, where words had to be read for it.
+    """
+
+    name: str
+    pose: Pose
+    title: str
+
+
+def find_candidates(atlas: Atlas, words: str) -> tuple[Candidate, ...]:
+    """Finds all that words may mean and the robot can get to.
+
+    Raises:
+        GoalError: They mean nothing, or nothing that can be reached.
+    """
+    goals = [check_place(atlas, place) for place in _find_places(atlas, words)]
+    good = [goal for goal in goals if goal.check.is_ok]
+    if not good:
+        raise GoalError(
+            f"{goals[0].name}: {goals[0].check.sentence}",
+            hint="Leave this stop out, or call check_goal to find a pose near it that works.",
+        )
+    unique = {(goal.pose.x, goal.pose.y): _candidate_of(goal) for goal in reversed(good)}
+    return tuple(reversed(unique.values()))[:MOST_CANDIDATES]
+
+
+def _candidate_of(goal: CheckedGoal) -> Candidate:
+    return Candidate(goal.name, goal.pose, goal.title)
+
+
+def _find_places(atlas: Atlas, words: str) -> list[Place]:
+    """Finds what words mean; "the nearest door" is nearest on the route, so any door may be it."""
+    relation = parse_relation(words)
+    if isinstance(relation, Nearest) and relation.to is None:
+        near = find_all_near(atlas, relation.kind)
+        if near:
+            return list(near)
+    try:
+        return [find_place(atlas, words)]
+    except AmbiguousPlaceError as error:
+        found = list(_find_meanings(atlas, words, error))
+        if found:
+            return found
+        raise
+    except GoalError:
+        remembered = list(_find_remembered(atlas, words))
+        if remembered:
+            return remembered
+        raise
+
+
+def _find_meanings(atlas: Atlas, words: str, error: AmbiguousPlaceError) -> Iterator[Place]:
+    """Gives the places for each meaning of the part of the words that has several."""
+    at = words.casefold().find(error.words.casefold())
+    for meaning in error.meanings:
+        said = words[:at] + meaning + words[at + len(error.words) :] if at >= 0 else meaning
+        try:
+            yield find_place(atlas, said)
+        except GoalError:
+            continue
+
+
+def _find_remembered(atlas: Atlas, words: str) -> Iterator[Place]:
+    """Gives the remembered places that speak of what the words say, all that fit as well."""
+    waypoints = tuple(place.waypoint for place in atlas.places)
+    matches = find_waypoints(SemanticMap(waypoints=waypoints), words, limit=MOST_CANDIDATES)
+    if not matches or matches[0].score_ratio < LEAST_SCORE_RATIO:
+        return
+    for match in matches:
+        if match.score_ratio >= SAME_SCORE_RATIO * matches[0].score_ratio:
+            place = next(each for each in atlas.places if each.waypoint is match.waypoint)
+            yield Place(place.id, place)

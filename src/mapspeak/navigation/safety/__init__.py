@@ -1,0 +1,81 @@
+"""Limits that are on: a policy, a guard in front of the robot, a hold, an audit log."""
+
+from mapspeak.navigation.safety.approvals import Approvals, WaitingRoom
+from mapspeak.navigation.safety.audit import AuditLine, AuditLog, read_audit
+from mapspeak.navigation.safety.caller import NOBODY, Caller, calling, current_caller
+from mapspeak.navigation.safety.commands import (
+    Act,
+    Call,
+    Command,
+    Drive,
+    Kind,
+    Publish,
+    SetParameter,
+    say_command,
+)
+from mapspeak.navigation.safety.connection import GuardedConnection
+from mapspeak.navigation.safety.deciding import (
+    Allowed,
+    Decision,
+    NeedsApproval,
+    Refused,
+    Situation,
+    decide,
+)
+from mapspeak.navigation.safety.guard import ApprovalNeededError, Clearance, Guard
+from mapspeak.navigation.safety.hold import Hold
+from mapspeak.navigation.safety.policy import (
+    Approval,
+    AreaRule,
+    Hours,
+    Otherwise,
+    Patterns,
+    Policy,
+    Speeds,
+    WhenBusy,
+)
+from mapspeak.navigation.safety.policyfile import load_policy
+from mapspeak.navigation.safety.robot import GuardedRobot
+from mapspeak.navigation.safety.surveying import Surveyor
+
+__all__ = [
+    "NOBODY",
+    "Act",
+    "Allowed",
+    "Approval",
+    "ApprovalNeededError",
+    "Approvals",
+    "AreaRule",
+    "AuditLine",
+    "AuditLog",
+    "Call",
+    "Caller",
+    "Clearance",
+    "Command",
+    "Decision",
+    "Drive",
+    "Guard",
+    "GuardedConnection",
+    "GuardedRobot",
+    "Hold",
+    "Hours",
+    "Kind",
+    "NeedsApproval",
+    "Otherwise",
+    "Patterns",
+    "Policy",
+    "Publish",
+    "Refused",
+    "SetParameter",
+    "Situation",
+    "Speeds",
+    "Surveyor",
+    "WaitingRoom",
+    "WhenBusy",
+    "calling",
+    "current_caller",
+    "decide",
+    "load_policy",
+    "read_audit",
+    "say_command",
+]

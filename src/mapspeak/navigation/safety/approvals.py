@@ -1,0 +1,164 @@
+"""Commands that wait for a person's word, and those that got it."""
+
+import json
+import secrets
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mapspeak.errors import ConfigError
+from mapspeak.navigation.safety.commands import Command, is_same, say_command
+
+__all__ = ["Approvals", "WaitingRoom"]
+
+VALID_S = 600.0
+"""A word that was given is good for so long, and for one command."""
+MOST_WAITING = 50
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Wish:
+    """A command that somebody asked for.
+
+    Attributes:
+        id: What an operator calls it.
+        command: The command.
+        client: Who asked.
+        asked_s: When, by the same clock as all times here.
+    """
+
+    id: str
+    command: Command
+    client: str
+    asked_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class WaitingRoom:
+    """A folder in which a server writes what waits, and an operator what is approved.
+
+    Attributes:
+        folder: Shared by servers and operators.
+    """
+
+    folder: Path
+
+    def add(self, wish_id: str, said: str) -> None:
+        """Writes a command that waits."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self._file(wish_id, "waiting").write_text(json.dumps({"what": said}), encoding="utf-8")
+
+    def list_waiting(self) -> dict[str, str]:
+        """Gives what waits, by its id."""
+        waiting = {}
+        for path in sorted(self.folder.glob("*.waiting")):
+            try:
+                waiting[path.stem] = str(json.loads(path.read_text(encoding="utf-8"))["what"])
+            except (OSError, ValueError, KeyError, TypeError):
+                continue
+        return waiting
+
+    def approve(self, wish_id: str) -> str:
+        """Approves a waiting command and gives it in words.
+
+        Raises:
+            ConfigError: Nothing waits under that id.
+        """
+        waiting = self.list_waiting()
+        if wish_id not in waiting:
+            raise ConfigError(
+                f"Nothing waits for approval under {wish_id!r}.",
+                hint=f"There waits: {', '.join(waiting) or 'nothing'}.",
+            )
+        self._file(wish_id, "waiting").rename(self._file(wish_id, "approved"))
+        return waiting[wish_id]
+
+    def take_approved(self, wish_id: str) -> bool:
+        """Gives whether a command was approved; once."""
+        try:
+            self._file(wish_id, "approved").unlink()
+        except OSError:
+            return False
+        return True
+
+    def remove(self, wish_id: str) -> None:
+        """Forgets a command."""
+        for state in ("waiting", "approved"):
+            self._file(wish_id, state).unlink(missing_ok=True)
+
+    def _file(self, wish_id: str, state: str) -> Path:
+        return self.folder / f"{wish_id}.{state}"
+
+
+@dataclass(slots=True)
+class Approvals:
+    """What waits for a person's word in one server.
+
+    Attributes:
+        room: Where it waits for `mapspeak approve`.
+        now_s: Seconds that only grow.
+    """
+
+    room: WaitingRoom
+    now_s: Callable[[], float]
+    _wishes: dict[str, _Wish] = field(default_factory=dict)
+    _granted: set[str] = field(default_factory=set)
+    _n_wishes: int = 0
+    _prefix: str = field(default_factory=lambda: secrets.token_hex(2))
+
+    def ask(self, command: Command, *, client: str) -> str:
+        """Notes a wish and gives its id; the same one for the same wish."""
+        self._forget_old()
+        for known in self._wishes.values():
+            if _is_of(known, command, client):
+                return known.id
+        self._n_wishes += 1
+        wish_id = f"{self._prefix}-{self._n_wishes}"
+        self._wishes[wish_id] = _Wish(
+            id=wish_id, command=command, client=client, asked_s=self.now_s()
+        )
+        return wish_id
+
+    def queue(self, wish_id: str) -> None:
+        """Lets a wish wait for `mapspeak approve`."""
+        wish = self._wishes[wish_id]
+        who = f", asked by {wish.client}" if wish.client else ""
+        self.room.add(wish_id, f"{say_command(wish.command)}{who}")
+
+    def grant(self, wish_id: str) -> bool:
+        """Notes a person's word for a wish, and gives whether there is such a wish."""
+        if wish_id in self._wishes:
+            self._granted.add(wish_id)
+        return wish_id in self._wishes
+
+    def is_granted(self, command: Command, *, client: str) -> bool:
+        """True once for each word that a person gave for this command of this client."""
+        self._forget_old()
+        for wish in list(self._wishes.values()):
+            if not _is_of(wish, command, client):
+                continue
+            if wish.id in self._granted or self.room.take_approved(wish.id):
+                self._forget(wish.id)
+                return True
+        return False
+
+    def close(self) -> None:
+        """Forgets everything: what waits here can no longer be done."""
+        for wish_id in list(self._wishes):
+            self._forget(wish_id)
+
+    def _forget_old(self) -> None:
+        oldest_s = self.now_s() - VALID_S
+        old = [each.id for each in self._wishes.values() if each.asked_s < oldest_s]
+        surplus = list(self._wishes)[: max(len(self._wishes) - MOST_WAITING, 0)]
+        for wish_id in {*old, *surplus}:
+            self._forget(wish_id)
+
+    def _forget(self, wish_id: str) -> None:
+        del self._wishes[wish_id]
+        self._granted.discard(wish_id)
+        self.room.remove(wish_id)
+
+
+def _is_of(wish: _Wish, command: Command, client: str) -> bool:
+    return wish.client == client and is_same(wish.command, command)

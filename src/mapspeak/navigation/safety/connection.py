@@ -1,0 +1,254 @@
+"""A ROS system behind the guard: reading passes, what changes something is decided on first."""
+
+import re
+from collections.abc import Callable, Coroutine, Mapping
+from typing import Any, TypeVar
+
+from mapspeak.navigation.safety.commands import Act, Call, Command, Publish, SetParameter
+from mapspeak.navigation.safety.deciding import find_speeds
+from mapspeak.navigation.safety.guard import Guard
+from mapspeak.ros import ActionGoal, NodeLinks, RosConnection, RosGraph, Subscription
+from mapspeak.ros.messages import Message
+
+__all__ = ["GuardedConnection"]
+
+T = TypeVar("T")
+
+VELOCITY_TYPE = re.compile(
+    r"geometry_msgs/(?:msg/)?Twist(?:Stamped)?|ackermann_msgs/(?:msg/)?AckermannDrive(?:Stamped)?"
+)
+CANCEL_TYPE = re.compile(r"actionlib_msgs/(?:msg/)?GoalID")
+
+
+class GuardedConnection:
+    """A `RosConnection` that changes only what its policy lets it; stopping always passes.
+
+    Args:
+        connection: The connection itself.
+        guard: Decides and notes.
+        now_s: Robot time.
+    """
+
+    def __init__(
+        self, connection: RosConnection, *, guard: Guard, now_s: Callable[[], float]
+    ) -> None:
+        self._connection = connection
+        self._guard = guard
+        self._now_s = now_s
+        self._types: dict[str, str] = {}
+
+    # --- what changes something ---
+
+    async def publish(self, topic: str, message: Message) -> None:
+        """Publishes on an advertised topic what the policy allows.
+
+        Raises:
+            PolicyError: It does not.
+        """
+        command = Publish(topic=topic, type=self._types.get(topic, ""), message=message)
+        if _is_stop(command):
+            await self._connection.publish(topic, message)
+            self._note_stop(command)
+            return
+        done = self._connection.publish(topic, message)
+        await self._guarded(command, done)
+
+    def publish_everywhere(self, topic: str, message: Message) -> int:
+        """Publishes at once by every way that is open, and gives how many: for a stop.
+
+        Raises:
+            PolicyError: It is no stop, and the policy does not allow it.
+        """
+        command = Publish(topic=topic, type=self._types.get(topic, ""), message=message)
+        if _is_stop(command):
+            n_ways = self._connection.publish_everywhere(topic, message)
+            self._note_stop(command)
+            return n_ways
+        cleared = self._guard.clear(command, robot_s=self._now_s())
+        n_ways = self._connection.publish_everywhere(topic, message)
+        self._guard.note_result(cleared, f"by {n_ways} ways", robot_s=self._now_s())
+        return n_ways
+
+    async def call_service(
+        self,
+        service: str,
+        arguments: Mapping[str, Any] | None = None,
+        *,
+        type_name: str | None = None,
+        timeout_s: float | None = None,
+    ) -> dict[str, Any]:
+        """Gives what a service answers that the policy allows to be called.
+
+        Raises:
+            PolicyError: It does not.
+        """
+        command = Call(service=service, type=type_name or "", arguments=arguments or {})
+        return await self._guarded(
+            command,
+            self._connection.call_service(
+                service, arguments, type_name=type_name, timeout_s=timeout_s
+            ),
+        )
+
+    async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
+        """Sends a goal to an action of ROS 2 that the policy allows.
+
+        Raises:
+            PolicyError: It does not.
+        """
+        command = Act(action=action, type=type_name, goal=arguments)
+        return await self._guarded(
+            command, self._connection.send_goal(action, arguments, type_name=type_name)
+        )
+
+    async def set_parameter(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401
+        """Sets a node's parameter that the policy allows to be set.
+
+        Raises:
+            PolicyError: It does not.
+        """
+        command = SetParameter(node=node, name=name, value=value)
+        await self._guarded(command, self._connection.set_parameter(node, name, value))
+
+    async def _guarded(self, command: Command, work: Coroutine[Any, Any, T]) -> T:
+        """Does what was decided to be allowed, and notes how it ended."""
+        try:
+            cleared = self._guard.clear(command, robot_s=self._now_s())
+        except BaseException:
+            work.close()
+            raise
+        said = "given up"
+        try:
+            result = await work
+            said = "done"
+        finally:
+            self._guard.note_result(cleared, said, robot_s=self._now_s())
+        return result
+
+    def _note_stop(self, command: Publish) -> None:
+        said = f"a stand, or the end of a goal, on {command.topic}"
+        self._guard.note_event("stop", said, robot_s=self._now_s())
+
+    # --- what ends something: never refused ---
+
+    def cancel_goal(self, goal: ActionGoal) -> None:
+        """Asks for the end of a goal; its `end` tells whether that worked."""
+        self._connection.cancel_goal(goal)
+        self._guard.note_event("stop", f"cancelled {goal.goal_id}", robot_s=self._now_s())
+
+    def give_up_goal(self, goal: ActionGoal) -> None:
+        """Waits no longer for a goal that shows no sign of life."""
+        self._connection.give_up_goal(goal)
+
+    def clear_the_way(self) -> None:
+        """Makes sure that what is sent next is not held up by what was sent before."""
+        self._connection.clear_the_way()
+
+    # --- what reads ---
+
+    @property
+    def is_open(self) -> bool:
+        """True when something can be sent at once."""
+        return self._connection.is_open
+
+    @property
+    def connected_for_s(self) -> float | None:
+        """Since when topics and goals have been connected, in wall time; None while not."""
+        return self._connection.connected_for_s
+
+    def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        """Runs something in the background until the connection is closed."""
+        self._connection.start_soon(work)
+
+    async def wait_until_connected(self) -> None:
+        """Returns at once, or when the connection is open again."""
+        await self._connection.wait_until_connected()
+
+    def subscribe(
+        self,
+        topic: str,
+        *,
+        type_name: str | None = None,
+        is_bulky: bool = False,
+        throttle_ms: int = 0,
+    ) -> Subscription:
+        """Gives the subscription to a topic, which is begun where there is none yet."""
+        return self._connection.subscribe(
+            topic, type_name=type_name, is_bulky=is_bulky, throttle_ms=throttle_ms
+        )
+
+    def unsubscribe(self, subscription: Subscription) -> None:
+        """Ends one use of a subscription; the last one ends it at the robot too."""
+        self._connection.unsubscribe(subscription)
+
+    def renew(self, subscription: Subscription) -> None:
+        """Subscribes again, perhaps in another way: a latched message may have been missed."""
+        self._connection.renew(subscription)
+
+    def advertise(self, topic: str, *, type_name: str) -> None:
+        """Says that we will publish; the robot needs a moment until it listens."""
+        self._types[topic] = type_name
+        self._connection.advertise(topic, type_name=type_name)
+
+    def unadvertise(self, topic: str) -> None:
+        """Takes back what `advertise` said; does nothing for what was not advertised."""
+        self._connection.unadvertise(topic)
+
+    async def fetch_graph(self) -> RosGraph:
+        """Gives the topics and actions there are."""
+        return await self._connection.fetch_graph()
+
+    async def fetch_time_s(self) -> float | None:
+        """Gives robot time; None where the robot does not say."""
+        return await self._connection.fetch_time_s()
+
+    async def fetch_nodes(self) -> tuple[str, ...]:
+        """Gives the full names of all nodes, in their order."""
+        return await self._connection.fetch_nodes()
+
+    async def fetch_node(self, node: str) -> NodeLinks:
+        """Gives what a node publishes, subscribes to and serves."""
+        return await self._connection.fetch_node(node)
+
+    async def fetch_publishers(self, topic: str) -> tuple[str, ...]:
+        """Gives the nodes that publish on a topic."""
+        return await self._connection.fetch_publishers(topic)
+
+    async def fetch_subscribers(self, topic: str) -> tuple[str, ...]:
+        """Gives the nodes that listen to a topic."""
+        return await self._connection.fetch_subscribers(topic)
+
+    async def fetch_services(self) -> tuple[str, ...]:
+        """Gives the full names of all services, in their order."""
+        return await self._connection.fetch_services()
+
+    async def fetch_service_type(self, service: str) -> str:
+        """Gives a service's type, as "package/Type"."""
+        return await self._connection.fetch_service_type(service)
+
+    async def fetch_action_type(self, action: str) -> str:
+        """Gives an action's type, as "package/Type"."""
+        return await self._connection.fetch_action_type(action)
+
+    async def fetch_definitions(self, type_name: str) -> Mapping[str, str]:
+        """Gives the .msg texts of a type and of every type within it."""
+        return await self._connection.fetch_definitions(type_name)
+
+    async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
+        """Gives the names of a node's parameters; ROS 1 keeps them below the node's name."""
+        return await self._connection.fetch_parameter_names(node)
+
+    async def fetch_parameter(self, node: str, name: str) -> Any:  # noqa: ANN401 - any YAML value
+        """Gives the value of a node's parameter; None where it is not set."""
+        return await self._connection.fetch_parameter(node, name)
+
+
+def _is_stop(command: Publish) -> bool:
+    """True for a velocity of zero, and for the message by which ROS 1 cancels a goal."""
+    if CANCEL_TYPE.fullmatch(command.type) and command.topic.endswith("/cancel"):
+        return True
+    # Only types that hold nothing else: an odometry with a speed of zero is no stop.
+    if not VELOCITY_TYPE.fullmatch(command.type):
+        return False
+    speeds = [speed for _, speed in find_speeds(command.message)]
+    return bool(speeds) and all(speed == 0.0 for speed in speeds)

@@ -1,0 +1,178 @@
+"""The one door that every command passes on its way to a robot: decided, noted, counted."""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import datetime
+
+from mapspeak.errors import GoalError, PolicyError
+from mapspeak.navigation.safety.approvals import Approvals
+from mapspeak.navigation.safety.audit import AuditLog
+from mapspeak.navigation.safety.caller import Caller, current_caller
+from mapspeak.navigation.safety.commands import Command
+from mapspeak.navigation.safety.deciding import (
+    Allowed,
+    Decision,
+    NeedsApproval,
+    Refused,
+    Situation,
+    decide,
+)
+from mapspeak.navigation.safety.hold import Hold
+from mapspeak.navigation.safety.policy import Otherwise, Policy
+from mapspeak.navigation.safety.rates import RateLog
+
+__all__ = ["ApprovalNeededError", "Clearance", "Guard"]
+
+logger = logging.getLogger(__name__)
+
+
+class ApprovalNeededError(PolicyError):
+    """A person has to agree first.
+
+    Attributes:
+        question: What to ask.
+        wish_id: What to grant when the person agrees.
+    """
+
+    def __init__(self, question: str, *, wish_id: str, hint: str) -> None:
+        super().__init__(f"A person must agree first. {question}", hint=hint)
+        self.question = question
+        self.wish_id = wish_id
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Clearance:
+    """A command that was allowed.
+
+    Attributes:
+        number: Of the command in the audit log.
+        command: The command.
+        caller: Who gave it.
+    """
+
+    number: int
+    command: Command
+    caller: Caller
+
+
+@dataclass(slots=True, kw_only=True)
+class Guard:
+    """Holds commands to a policy; every wrapper of a port asks the same one.
+
+    Attributes:
+        policy: What commands are held to.
+        audit: Where all of them are noted.
+        hold: What keeps the robot standing.
+        approvals: What waits for a person's word.
+        wall_clock: The operator's.
+    """
+
+    policy: Policy
+    audit: AuditLog
+    hold: Hold
+    approvals: Approvals
+    wall_clock: Callable[[], datetime]
+    _rates: RateLog = field(default_factory=RateLog)
+
+    def clear(self, command: Command, *, robot_s: float) -> Clearance:
+        """Allows a command, and notes that; between this and the command nothing may wait.
+
+        Raises:
+            ApprovalNeededError: A person has to agree first.
+            GoalError: The robot must not drive there; another goal may do.
+            PolicyError: It is not allowed, or could not be noted.
+        """
+        caller = current_caller()
+        cleared = Clearance(number=self.audit.next_number(), command=command, caller=caller)
+        decision = self._decide(command, caller, robot_s)
+        verdict, said = _say_decision(decision)
+        self._note("decision", cleared, robot_s=robot_s, verdict=verdict, said=said)
+        match decision:
+            case Refused(reason=reason, hint=hint):
+                kind_of_error = GoalError if decision.is_of_the_goal else PolicyError
+                raise kind_of_error(reason, hint=hint)
+            case NeedsApproval(question=question):
+                raise self._ask(command, question, caller)
+            case Allowed():
+                self._rates.note(command.kind, robot_s)
+        return cleared
+
+    def note_result(self, cleared: Clearance, said: str, *, robot_s: float) -> None:
+        """Notes what the robot answered to a command that was allowed."""
+        self._note_after("result", cleared, robot_s=robot_s, said=said)
+
+    def note_end(self, cleared: Clearance, said: str, *, robot_s: float) -> None:
+        """Notes how something that took a while has ended."""
+        self._note_after("ended", cleared, robot_s=robot_s, said=said)
+
+    def note_leg(self, cleared: Clearance, said: str, *, robot_s: float) -> None:
+        """Notes that the robot is sent on within a drive that was allowed.
+
+        Raises:
+            PolicyError: The line could not be written.
+        """
+        self._note("leg", cleared, robot_s=robot_s, said=said)
+
+    def note_event(self, event: str, said: str, *, robot_s: float) -> None:
+        """Notes what is no command: a stop, a hold. It never fails: stopping goes first."""
+        try:
+            self.audit.write(
+                event,
+                number=self.audit.next_number(),
+                caller=current_caller(),
+                robot_s=robot_s,
+                said=said,
+            )
+        except PolicyError as error:
+            logger.error("%s", error)  # noqa: TRY400 - it says all there is to say
+
+    def _decide(self, command: Command, caller: Caller, robot_s: float) -> Decision:
+        situation = self._situation(command, robot_s)
+        decision = decide(command, policy=self.policy, situation=situation)
+        is_asked_for = isinstance(decision, NeedsApproval)
+        if is_asked_for and self.approvals.is_granted(command, client=caller.client):
+            return Allowed()
+        return decision
+
+    def _situation(self, command: Command, robot_s: float) -> Situation:
+        n_lately = self._rates.count(command.kind, robot_s)
+        return Situation(held_by=self.hold.read(), n_in_last_minute=n_lately)
+
+    def _ask(self, command: Command, question: str, caller: Caller) -> ApprovalNeededError:
+        wish_id = self.approvals.ask(command, client=caller.client)
+        hint = "The client cannot ask anybody: tell the person that the policy wants their word."
+        if self.policy.approval.otherwise is Otherwise.QUEUE:
+            self.approvals.queue(wish_id)
+            hint = f"Call again once a person has typed `mapspeak approve {wish_id}`."
+        return ApprovalNeededError(question, wish_id=wish_id, hint=hint)
+
+    def _note(
+        self, event: str, cleared: Clearance, *, robot_s: float, verdict: str = "", said: str
+    ) -> None:
+        self.audit.write(
+            event,
+            number=cleared.number,
+            caller=cleared.caller,
+            robot_s=robot_s,
+            command=cleared.command,
+            verdict=verdict,
+            said=said,
+        )
+
+    def _note_after(self, event: str, cleared: Clearance, *, robot_s: float, said: str) -> None:
+        """Notes what has happened already: an error here could only hide it."""
+        try:
+            self._note(event, cleared, robot_s=robot_s, said=said)
+        except PolicyError as error:
+            logger.error("%s", error)  # noqa: TRY400 - it says all there is to say
+
+
+def _say_decision(decision: Decision) -> tuple[str, str]:
+    match decision:
+        case Refused(rule=rule, reason=reason):
+            return "refused", f"{rule}: {reason}"
+        case NeedsApproval(question=question):
+            return "needs approval", question
+        case Allowed():
+            return "allowed", ""

@@ -1,0 +1,263 @@
+"""policy.yaml, read into a `Policy`; a mistake in it is named with its line and key."""
+
+import difflib
+from datetime import time
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+from mapspeak.errors import ConfigError
+from mapspeak.geometry import Point
+from mapspeak.navigation.safety.commands import Kind
+from mapspeak.navigation.safety.policy import (
+    DAYS,
+    USUAL_DENIALS,
+    USUAL_RATES,
+    Approval,
+    AreaRule,
+    Hours,
+    Otherwise,
+    Patterns,
+    Policy,
+    Speeds,
+    WhenBusy,
+)
+
+__all__ = ["load_policy"]
+
+MAX_FILE_BYTES = 1_000_000
+
+_Name = Annotated[str, Field(min_length=1, max_length=80)]
+_Pattern = Annotated[str, Field(min_length=1, max_length=200)]
+_Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+_Corner = Annotated[list[_Coordinate], Field(min_length=2, max_length=2)]
+_Outline = Annotated[list[_Corner], Field(min_length=3)]
+_Region = Annotated[str, Field(pattern=r"^[A-Z]\d+$")]
+_TimeOfDay = Annotated[str, Field(pattern=r"^(?:[01]\d|2[0-3]):[0-5]\d$|^24:00$")]
+_Day = Literal["mon", "tue", "wed", "thu", "fri", "sat", "sun"]
+_PerMinute = Annotated[int, Field(ge=0)]
+
+
+class _Written(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+class _WrittenSpeeds(_Written):
+    linear_mps: Annotated[float, Field(ge=0, le=20)] = Speeds().linear_mps
+    angular_radps: Annotated[float, Field(ge=0, le=20)] = Speeds().angular_radps
+
+
+class _WrittenGoals(_Written):
+    known_way: bool = True
+    clearance_m: Annotated[float, Field(ge=0, le=5)] = 0.0
+    farthest_m: Annotated[float, Field(gt=0)] = 500.0
+
+
+class _WrittenArea(_Written):
+    name: _Name
+    outline: _Outline | None = None
+    region: _Region | None = None
+
+    @model_validator(mode="after")
+    def _is_somewhere(self) -> Self:
+        if (self.outline is None) == (self.region is None):
+            message = f"{self.name!r} needs either an outline or a region"
+            raise ValueError(message)
+        return self
+
+    def rule(self, hours: Hours | None = None) -> AreaRule:
+        corners = tuple(Point(x, y) for x, y in self.outline or ())
+        return AreaRule(name=self.name, outline=corners, region_id=self.region or "", hours=hours)
+
+
+class _WrittenClosure(_WrittenArea):
+    begins: Annotated[_TimeOfDay, Field(alias="from")] = "00:00"
+    ends: Annotated[_TimeOfDay, Field(alias="until")] = "24:00"
+    days: Annotated[list[_Day], Field(min_length=1)] = [
+        "mon",
+        "tue",
+        "wed",
+        "thu",
+        "fri",
+        "sat",
+        "sun",
+    ]
+
+    def hours(self) -> Hours:
+        days = frozenset(DAYS.index(day) for day in self.days)
+        return Hours(begins=_read_time(self.begins), ends=_read_time(self.ends), days=days)
+
+
+class _WrittenPatterns(_Written):
+    allow: list[_Pattern] = ["*"]
+    deny: list[_Pattern] = []
+    usual_denials: bool = True
+
+    def patterns(self, kind: Kind) -> Patterns:
+        usual = USUAL_DENIALS[kind] if self.usual_denials else ()
+        return Patterns(allow=tuple(self.allow), deny=(*self.deny, *usual))
+
+
+class _WrittenApproval(_Written):
+    drives: bool = False
+    publishes: bool = False
+    calls: bool = False
+    actions: bool = False
+    parameters: bool = False
+    otherwise: Literal["refuse", "queue"] = "refuse"
+
+    def approval(self) -> Approval:
+        asked = {
+            Kind.DRIVE: self.drives,
+            Kind.PUBLISH: self.publishes,
+            Kind.CALL: self.calls,
+            Kind.ACT: self.actions,
+            Kind.SET_PARAMETER: self.parameters,
+        }
+        kinds = frozenset(kind for kind, is_asked in asked.items() if is_asked)
+        return Approval(kinds=kinds, otherwise=Otherwise(self.otherwise))
+
+
+class _WrittenRates(_Written):
+    drives_per_minute: _PerMinute = USUAL_RATES[Kind.DRIVE]
+    publishes_per_minute: _PerMinute = USUAL_RATES[Kind.PUBLISH]
+    calls_per_minute: _PerMinute = USUAL_RATES[Kind.CALL]
+    actions_per_minute: _PerMinute = USUAL_RATES[Kind.ACT]
+    parameters_per_minute: _PerMinute = USUAL_RATES[Kind.SET_PARAMETER]
+
+    def rates(self) -> dict[Kind, int]:
+        return {
+            Kind.DRIVE: self.drives_per_minute,
+            Kind.PUBLISH: self.publishes_per_minute,
+            Kind.CALL: self.calls_per_minute,
+            Kind.ACT: self.actions_per_minute,
+            Kind.SET_PARAMETER: self.parameters_per_minute,
+        }
+
+
+class _PolicyFile(_Written):
+    read_only: bool = False
+    latch_on_stop: bool = False
+    when_busy: Literal["replace", "wait", "refuse"] = "replace"
+    speed: _WrittenSpeeds = _WrittenSpeeds()
+    goals: _WrittenGoals = _WrittenGoals()
+    keep_out: list[_WrittenArea] = []
+    closed: list[_WrittenClosure] = []
+    publish: _WrittenPatterns = _WrittenPatterns()
+    call: _WrittenPatterns = _WrittenPatterns()
+    act: _WrittenPatterns = _WrittenPatterns()
+    set_parameter: _WrittenPatterns = _WrittenPatterns()
+    approval: _WrittenApproval = _WrittenApproval()
+    rates: _WrittenRates = _WrittenRates()
+
+    def policy(self) -> Policy:
+        return Policy(
+            is_read_only=self.read_only,
+            latches_on_stop=self.latch_on_stop,
+            when_busy=WhenBusy(self.when_busy),
+            speeds=Speeds(linear_mps=self.speed.linear_mps, angular_radps=self.speed.angular_radps),
+            needs_known_way=self.goals.known_way,
+            clearance_m=self.goals.clearance_m,
+            farthest_m=self.goals.farthest_m,
+            areas=(
+                *(area.rule() for area in self.keep_out),
+                *(area.rule(area.hours()) for area in self.closed),
+            ),
+            patterns={
+                Kind.PUBLISH: self.publish.patterns(Kind.PUBLISH),
+                Kind.CALL: self.call.patterns(Kind.CALL),
+                Kind.ACT: self.act.patterns(Kind.ACT),
+                Kind.SET_PARAMETER: self.set_parameter.patterns(Kind.SET_PARAMETER),
+            },
+            approval=self.approval.approval(),
+            rates=self.rates.rates(),
+        )
+
+
+def load_policy(path: Path) -> Policy:
+    """Reads policy.yaml; what is left away keeps its default.
+
+    Raises:
+        ConfigError: The file cannot be read, or has a mistake; says the line and the key.
+    """
+    tree = _load_yaml(path)
+    if tree is None:
+        return Policy()
+    if not isinstance(tree, CommentedMap):
+        raise ConfigError(
+            f"{path}, line 1: this is not a list of keys and values.",
+            hint="Write lines like `read_only: true`.",
+        )
+    try:
+        return _PolicyFile.model_validate(tree).policy()
+    except ValidationError as error:
+        raise _fault_in(path, tree, error) from error
+
+
+def _load_yaml(path: Path) -> Any:  # noqa: ANN401 - whatever a person wrote
+    try:
+        if path.stat().st_size > MAX_FILE_BYTES:
+            raise ConfigError(
+                f"{path} is larger than {MAX_FILE_BYTES:,} bytes.", hint="Give a policy.yaml."
+            )
+        return YAML(typ="rt").load(path.read_text(encoding="utf-8"))
+    except MarkedYAMLError as error:
+        mark = error.problem_mark
+        line = f", line {mark.line + 1}" if mark is not None else ""
+        raise ConfigError(
+            f"{path}{line} is no YAML: {error.problem}.", hint="Write `key: value` on each line."
+        ) from error
+    except (OSError, UnicodeDecodeError, YAMLError, RecursionError, ValueError) as error:
+        raise ConfigError(
+            f"{path} cannot be read: {error}.", hint="Check the path, and that it is a text file."
+        ) from error
+
+
+def _fault_in(path: Path, tree: CommentedMap, error: ValidationError) -> ConfigError:
+    first, *others = error.errors()
+    location = first["loc"]
+    key = ".".join(str(part) for part in location)
+    more = f" {len(others)} more mistakes follow." if others else ""
+    if first["type"] == "extra_forbidden":
+        known = _keys_beside(location)
+        near = difflib.get_close_matches(str(location[-1]), known, n=1)
+        what = f"there is no key {key!r}."
+        hint = f"Did you mean `{near[0]}`?" if near else f"Here belong: {', '.join(known)}."
+    else:
+        what = f"{key or 'the file'} cannot be {str(first['input'])[:80]!r}: {first['msg']}."
+        hint = "docs/howto/limits.md explains every key."
+    return ConfigError(f"{path}, line {_line_of(tree, location)}: {what}{more}", hint=hint)
+
+
+def _keys_beside(location: tuple[int | str, ...]) -> list[str]:
+    """Gives the keys that a place of the file may have."""
+    model: Any = _PolicyFile
+    for part in location[:-1]:
+        if isinstance(part, int):
+            continue
+        annotation: Any = model.model_fields[part].annotation
+        model = getattr(annotation, "__args__", (annotation,))[0]
+    return [each.alias or name for name, each in model.model_fields.items()]
+
+
+def _line_of(tree: CommentedMap, location: tuple[int | str, ...]) -> int:
+    """Gives the line of the innermost part of a place that the file has."""
+    node: Any = tree
+    line = 0
+    for part in location:
+        places = node.lc.data if isinstance(node, CommentedMap | CommentedSeq) else None
+        if not places or (part not in places):
+            break
+        line = int(places[part][0])
+        node = node[part]
+    return line + 1
+
+
+def _read_time(text: str) -> time:
+    """Reads a time of day; the end of a day is the midnight that follows."""
+    hour, minute = (int(part) for part in text.split(":"))
+    return time(hour % 24, minute)

@@ -1,0 +1,48 @@
+"""What ROS types look like: definitions read, known ones, messages shown, checked and built."""
+
+from mapspeak.ros.definitions.book import TypeBook
+from mapspeak.ros.definitions.checking import check_message
+from mapspeak.ros.definitions.describing import describe_type, say_fields
+from mapspeak.ros.definitions.known import known_definitions
+from mapspeak.ros.definitions.parsing import (
+    FLOATS,
+    TIMES,
+    WHOLES,
+    Constant,
+    Field,
+    MessageType,
+    parse_definition,
+)
+from mapspeak.ros.definitions.parts import (
+    ACTION_PARTS,
+    GENERATED,
+    SERVICE_PARTS,
+    find_actions_of_ros1,
+    name_parts,
+    split_definition,
+    split_parts,
+    write_definition,
+)
+
+__all__ = [
+    "ACTION_PARTS",
+    "FLOATS",
+    "GENERATED",
+    "SERVICE_PARTS",
+    "TIMES",
+    "WHOLES",
+    "Constant",
+    "Field",
+    "MessageType",
+    "TypeBook",
+    "check_message",
+    "describe_type",
+    "find_actions_of_ros1",
+    "known_definitions",
+    "name_parts",
+    "parse_definition",
+    "say_fields",
+    "split_definition",
+    "split_parts",
+    "write_definition",
+]

@@ -1,0 +1,145 @@
+"""Messages that are about to be sent, held against what their type says."""
+
+import base64
+import binascii
+import difflib
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from mapspeak.errors import LinkError
+from mapspeak.ros.definitions.book import MOST_NESTED, TypeBook
+from mapspeak.ros.definitions.describing import say_fields
+from mapspeak.ros.definitions.parsing import FLOATS, TEXTS, TIMES, WHOLES, Field, MessageType
+
+__all__ = ["check_message"]
+
+LARGEST_FLOAT32 = 3.4028234663852886e38
+BYTES = ("uint8", "char", "byte")
+MOST_SHOWN = 40
+
+
+def check_message(book: TypeBook, type_name: str, message: object) -> dict[str, Any]:
+    """Gives a message as it may be sent: fields left out stay out, whole numbers become floats.
+
+    Raises:
+        LinkError: It does not fit; says the field's path and what its type wants.
+    """
+    return _check(book, type_name, message, path="", depth=0)
+
+
+def _check(
+    book: TypeBook, type_name: str, message: object, *, path: str, depth: int
+) -> dict[str, Any]:
+    if type_name not in TIMES and not book.knows(type_name):
+        raise LinkError(
+            f"{path or 'The message'} is a {type_name}, which nobody has described.",
+            hint="Give its definition to ros_type first.",
+        )
+    message_type = book[type_name]
+    if not isinstance(message, Mapping) or depth > MOST_NESTED:
+        raise _misfit(path or "message", f"an object of type {type_name}", message, message_type)
+    fields = {field.name: field for field in message_type.fields}
+    strangers = [str(name) for name in message if name not in fields]
+    if strangers:
+        raise _stranger(strangers[0], message_type, path)
+    return {
+        name: _check_field(book, fields[name], value, path=_join(path, name), depth=depth)
+        for name, value in message.items()
+    }
+
+
+def _check_field(book: TypeBook, field: Field, value: object, *, path: str, depth: int) -> Any:  # noqa: ANN401 - ROS JSON
+    if field.length is None:
+        return _check_value(book, field, value, path=path, depth=depth)
+    if isinstance(value, str) and field.type in BYTES and _n_bytes(value) is not None:
+        _check_length(field, _n_bytes(value) or 0, path)
+        return value
+    if not isinstance(value, list):
+        raise _misfit(path, f"a list ({field.shown_type})", value)
+    _check_length(field, len(value), path)
+    return [
+        _check_value(book, field, each, path=f"{path}[{number}]", depth=depth)
+        for number, each in enumerate(value)
+    ]
+
+
+def _check_length(field: Field, length: int, path: str) -> None:
+    is_wrong = bool(field.length) and length != field.length
+    if is_wrong or (field.most is not None and length > field.most):
+        raise LinkError(
+            f"{path} has {length} values; its type is {field.shown_type}.",
+            hint=f"Give {field.length or f'at most {field.most}'} values.",
+        )
+
+
+def _check_value(book: TypeBook, field: Field, value: object, *, path: str, depth: int) -> Any:  # noqa: ANN401 - ROS JSON
+    kind = field.type
+    if kind in FLOATS:
+        return _check_float(kind, value, path)
+    if kind in WHOLES:
+        low, high = WHOLES[kind]
+        is_whole = isinstance(value, int) and not isinstance(value, bool)
+        if not is_whole or not low <= value <= high:  # type: ignore[operator]
+            raise _misfit(path, f"a whole number from {low} to {high} ({kind})", value)
+        return value
+    if kind == "bool":
+        if not isinstance(value, bool):
+            raise _misfit(path, "true or false (bool)", value)
+        return value
+    if kind in TEXTS:
+        return _check_text(field, value, path)
+    return _check(book, kind, value, path=path, depth=depth + 1)
+
+
+def _check_float(kind: str, value: object, path: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise _misfit(path, f"a number ({kind})", value)
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number) or (kind == "float32" and abs(number) > LARGEST_FLOAT32):
+        raise _misfit(path, f"a finite number ({kind})", value)
+    return number
+
+
+def _check_text(field: Field, value: object, path: str) -> str:
+    # Half a surrogate pair can be said in JSON, and no wire can carry it.
+    if not isinstance(value, str) or any("\ud800" <= sign <= "\udfff" for sign in value):
+        raise _misfit(path, f"a text ({field.shown_type})", value)
+    if field.most_letters is not None and len(value) > field.most_letters:
+        raise LinkError(
+            f"{path} has {len(value)} letters; its type is {field.shown_type}.",
+            hint=f"Give at most {field.most_letters} letters.",
+        )
+    return value
+
+
+def _n_bytes(text: str) -> int | None:
+    try:
+        return len(base64.b64decode(text, validate=True))
+    except binascii.Error:
+        return None
+
+
+def _stranger(name: str, message: MessageType, path: str) -> LinkError:
+    known = [field.name for field in message.fields]
+    near = difflib.get_close_matches(name, known, n=1)
+    meant = f" Did you mean {_join(path, near[0])}?" if near else ""
+    return LinkError(
+        f"{message.name} has no field {_join(path, name)[:MOST_SHOWN]!r}.{meant}",
+        hint=f"Its fields are {say_fields(message)}.",
+    )
+
+
+def _misfit(path: str, wanted: str, value: object, kind: MessageType | None = None) -> LinkError:
+    shown = repr(value)
+    if len(shown) > MOST_SHOWN:
+        shown = f"{shown[: MOST_SHOWN - 3]}..."
+    hint = f"Its fields are {say_fields(kind)}." if kind else "Correct that field and send again."
+    return LinkError(f"{path} wants {wanted}, not {shown}.", hint=hint)
+
+
+def _join(path: str, name: str) -> str:
+    return f"{path}.{name}" if path else name

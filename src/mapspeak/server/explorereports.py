@@ -1,0 +1,148 @@
+"""What the model reads while the robot explores or searches by itself."""
+
+from typing import Self
+
+from pydantic import Field
+
+from mapspeak.navigation.exploration import BlockedPlace, ExplorationState, Progress
+from mapspeak.navigation.search import Candidate, SearchState, Standing
+from mapspeak.server.reports import PoseReport, Report
+from mapspeak.server.wording import say_point
+from mapspeak.spatial.frontiers import RefusedFrontier
+
+__all__ = ["ExploreAnswer", "SearchAnswer"]
+
+MOST_NAMED = 8
+
+NEXT_STEP = {
+    ExplorationState.DRIVING: "Call explore again to go on; stop_robot ends it.",
+    ExplorationState.AT_GOAL: "Look at the picture, record what matters, call explore to go on.",
+    ExplorationState.BOUND_REACHED: "Call explore again for more.",
+    ExplorationState.NOTHING_LEFT: "The map is complete; call look_at_map.",
+    ExplorationState.REST_UNREACHABLE: (
+        "All that can be reached is known. Open what is in the way, then call explore again."
+    ),
+    ExplorationState.NOTHING_KNOWN: "Start SLAM, or wait until the first map has floor on it.",
+    ExplorationState.INTERRUPTED: "The robot was stopped or sent elsewhere. Call explore to go on.",
+}
+
+
+class ExploreAnswer(Report):
+    """How an exploration stands."""
+
+    state: ExplorationState = Field(description="driving and at_goal go on with the next call")
+    reason: str
+    n_goals: int = Field(description="frontiers it set out to")
+    n_arrived: int = Field(description="the others were seen from afar, or blocked")
+    driven_m: float
+    elapsed_s: float = Field(description="robot time of all calls of this exploration")
+    known_area_m2: float = Field(description="free floor on the map")
+    known_percent: float = Field(description="of the floor that is to be expected")
+    frontiers: list[str] = Field(description="ids, best first")
+    n_frontiers: int
+    next: str = Field(description="the frontier under way, and why it was chosen")
+    goal_id: str | None
+    robot: PoseReport
+    cannot_reach: list[str] = Field(description="what is left, where, and why")
+    next_step: str
+
+    @classmethod
+    def of(cls, progress: Progress) -> Self:
+        """Makes the report of an exploration."""
+        trip = progress.trip
+        return cls(
+            state=progress.state,
+            reason=progress.sentence,
+            n_goals=progress.n_goals,
+            n_arrived=progress.n_arrived,
+            driven_m=round(progress.driven_m, 1),
+            elapsed_s=round(progress.elapsed_s, 1),
+            known_area_m2=round(progress.known_area_m2, 1),
+            known_percent=round(100 * progress.known_ratio, 1),
+            frontiers=[frontier.id for frontier in progress.frontiers[:MOST_NAMED]],
+            n_frontiers=len(progress.frontiers),
+            next=_say_next(progress),
+            goal_id=None if trip is None else trip.goal_id,
+            robot=PoseReport.of(progress.pose),
+            cannot_reach=_say_rest(progress),
+            next_step=NEXT_STEP[progress.state],
+        )
+
+
+def _say_next(progress: Progress) -> str:
+    if progress.trip is not None:
+        return f"{progress.trip.target.id}: {progress.trip.target.reason}"
+    best = next(iter(progress.frontiers), None)
+    return "" if best is None else f"{best.id}: {best.reason}"
+
+
+def _say_rest(progress: Progress) -> list[str]:
+    told = [
+        *(_say_blocked(place) for place in progress.blocked),
+        *(_say_refused(border) for border in progress.unreachable),
+    ]
+    left_out = len(told) - MOST_NAMED
+    return told if left_out <= 0 else [*told[:MOST_NAMED], f"and {left_out} more"]
+
+
+def _say_blocked(place: BlockedPlace) -> str:
+    times = f"{place.n_tries} times" if place.n_tries > 1 else "once"
+    return f"{place.id} at {say_point(place.pose.point)}, tried {times}: {place.reason}"
+
+
+def _say_refused(border: RefusedFrontier) -> str:
+    return f"{border.length_m:.1f} m of border at {say_point(border.anchor)}: {border.sentence}"
+
+
+SEARCH_STEP = {
+    SearchState.DRIVING: "Call search_for again to go on; stop_robot ends it.",
+    SearchState.LOOK: "Judge the picture, then call search_for with seen and, if not, likely.",
+    SearchState.REPORTED: "Judge the picture, then call search_for with seen.",
+    SearchState.FOUND: "Remember the place with write_semantic_data.",
+    SearchState.NOT_FOUND: "It is in none of the places seen, as far as pictures showed them.",
+    SearchState.BUDGET_SPENT: "Call search_for again for a new search, or look elsewhere.",
+    SearchState.INTERRUPTED: "The robot was stopped or sent elsewhere. Call search_for to go on.",
+}
+
+
+class SearchAnswer(Report):
+    """How a search stands."""
+
+    state: SearchState = Field(description="driving, look and reported go on with the next call")
+    reason: str
+    thing: str
+    n_looks: int = Field(description="pictures shown so far, this one included")
+    driven_m: float
+    looks_at: str = Field(description="where the robot looks or is on its way to, and why there")
+    goal_id: str | None
+    next: list[str] = Field(description="where it could look next, best first; F ids take scores")
+    seen_percent: float = Field(description="of the known floor, by the camera from near")
+    places_seen: list[str] = Field(description="in the end: how much of each room was seen")
+    cannot_reach: list[str]
+    robot: PoseReport
+    next_step: str
+
+    @classmethod
+    def of(cls, standing: Standing) -> Self:
+        """Makes the report of a search."""
+        return cls(
+            state=standing.state,
+            reason=standing.sentence,
+            thing=standing.thing,
+            n_looks=standing.n_looks,
+            driven_m=round(standing.driven_m, 1),
+            looks_at="" if standing.here is None else _say_candidate(standing.here),
+            goal_id=standing.goal_id,
+            next=[_say_candidate(candidate) for candidate in standing.next],
+            seen_percent=round(100 * standing.seen_ratio, 1),
+            places_seen=[
+                f"{region.id} {100 * region.seen_ratio:.0f} %" for region in standing.regions
+            ],
+            cannot_reach=[_say_blocked(place) for place in standing.blocked][:MOST_NAMED],
+            robot=PoseReport.of(standing.pose),
+            next_step=SEARCH_STEP[standing.state],
+        )
+
+
+def _say_candidate(candidate: Candidate) -> str:
+    return f"{candidate.id}: {candidate.reason}"

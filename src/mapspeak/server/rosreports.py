@@ -1,0 +1,146 @@
+"""ROS messages as a model reads them: short, whatever they hold."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["LONGEST_ANSWER", "cut", "show_message", "show_value"]
+
+LONGEST_ANSWER = 20_000
+"""No answer has more letters; most have a tenth of that."""
+LONGEST_LINE = 90
+LONGEST_TEXT = 200
+LONGEST_MESSAGE = 3_000
+MOST_NUMBERS = 9
+MOST_ITEMS = 3
+MOST_WORDS = 20
+MOST_NESTED = 10
+INDENT = "  "
+TIMES = ({"sec", "nanosec"}, {"secs", "nsecs"})
+NUMBERS = int | float | np.integer | np.floating
+
+
+def show_message(message: Mapping[str, Any]) -> str:
+    """Gives a message's fields, one to a line; large lists by their size, range and beginning."""
+    if not message:
+        return "(a message without fields)"
+    lines: list[str] = []
+    for name, value in message.items():
+        lines += _lines(str(name), value, 0)
+    return cut("\n".join(lines), most=LONGEST_MESSAGE)
+
+
+def show_value(value: object) -> str:
+    """Gives a value on one line."""
+    return cut(_inline(value, 0), most=LONGEST_MESSAGE)
+
+
+def cut(text: str, *, most: int = LONGEST_ANSWER) -> str:
+    """Gives at most so many letters of a text, and says how many there were."""
+    if len(text) <= most:
+        return text
+    return f"{text[: most - 60]}\n... cut: {len(text):,} letters in all."
+
+
+def _lines(name: str, value: object, depth: int) -> list[str]:
+    short = f"{INDENT * depth}{name}: {_inline(value, depth)}"
+    if len(short) <= LONGEST_LINE or depth > MOST_NESTED:
+        return [short]
+    if isinstance(value, Mapping):
+        inner = [line for key, each in value.items() for line in _lines(str(key), each, depth + 1)]
+        return [f"{INDENT * depth}{name}:", *inner]
+    if isinstance(value, list | tuple) and any(isinstance(each, Mapping) for each in value):
+        lines = [f"{INDENT * depth}{name}: {len(value)} in a list"]
+        for number, each in enumerate(value[:MOST_ITEMS]):
+            lines += _lines(f"[{number}]", each, depth + 1)
+        return lines
+    return [short]
+
+
+def _inline(value: object, depth: int) -> str:
+    if isinstance(value, Mapping):
+        return _inline_mapping(value, depth)
+    if isinstance(value, list | tuple):
+        return _inline_list(value, depth)
+    return _show_plain(value)
+
+
+def _show_plain(value: object) -> str:
+    match value:
+        case np.ndarray():
+            shown = _show_array(value)
+        case bytes() | bytearray() | memoryview():
+            shown = f"[{len(value):,} bytes]"
+        case str():
+            shown = _show_text(value)
+        case bool() | np.bool_():
+            shown = str(bool(value)).lower()
+        case int() | float() | np.integer() | np.floating():
+            shown = _show_number(value)
+        case _:
+            shown = "null" if value is None else f"({type(value).__name__})"
+    return shown
+
+
+def _inline_mapping(value: Mapping[Any, Any], depth: int) -> str:
+    if set(value) in TIMES:
+        whole, rest = value.values()
+        if isinstance(whole, int) and isinstance(rest, int) and abs(whole) < 1e12:
+            return f"{whole + rest / 1e9:.3f} s"
+    if depth > MOST_NESTED:
+        return "{...}"
+    return f"{{{', '.join(f'{key}: {_inline(each, depth + 1)}' for key, each in value.items())}}}"
+
+
+def _inline_list(value: Sequence[Any], depth: int) -> str:
+    if value and all(isinstance(each, NUMBERS | None) for each in value):
+        return _show_numbers(value)
+    most = MOST_WORDS if all(isinstance(each, str) for each in value) else MOST_ITEMS
+    shown = [_inline(each, depth + 1) for each in value[:most]]
+    if len(value) > most:
+        shown.append(f"... {len(value) - most:,} more")
+    return f"[{', '.join(shown)}]"
+
+
+def _show_numbers(values: Sequence[Any]) -> str:
+    """Gives a list of numbers; ROS 1 writes NaN and infinity as null."""
+    try:
+        numbers = np.array([math.nan if each is None else each for each in values], dtype=float)
+    except (OverflowError, ValueError):
+        return f"[{len(values):,} numbers]"
+    if len(values) <= MOST_NUMBERS:
+        return f"[{', '.join(_inline(each, 0) for each in values)}]"
+    return _show_array(numbers)
+
+
+def _show_array(values: NDArray[Any]) -> str:
+    flat = values.ravel()
+    if flat.dtype.kind not in "iufb":
+        return f"[{flat.size:,} values]"
+    if flat.size <= MOST_NUMBERS:
+        return f"[{', '.join(_show_number(each) for each in flat)}]"
+    finite = flat[np.isfinite(flat)]
+    shape = f"{flat.size:,} numbers" if values.ndim == 1 else f"numbers, shape {values.shape}"
+    if not finite.size:
+        return f"[{shape}, none finite]"
+    low, high = finite.min(), finite.max()
+    odd = f", {flat.size - finite.size:,} not finite" if finite.size < flat.size else ""
+    if low == high:
+        return f"[{shape}, all {_show_number(low)}{odd}]"
+    first = ", ".join(_show_number(each) for each in flat[:3])
+    return f"[{shape}, {_show_number(low)} to {_show_number(high)}{odd}; first {first}]"
+
+
+def _show_number(value: NUMBERS) -> str:
+    if isinstance(value, int | np.integer):
+        return str(value) if abs(int(value)) < 2**64 else "a huge number"
+    return f"{float(value):.6g}"
+
+
+def _show_text(text: str) -> str:
+    if len(text) <= LONGEST_TEXT:
+        return f'"{text}"'
+    return f'"{text[:LONGEST_TEXT]}..." ({len(text):,} letters)'

@@ -1,0 +1,81 @@
+"""What the model reads while the robot follows a route."""
+
+from typing import Self
+
+from pydantic import Field
+
+from mapspeak.navigation.routes import RoutePlan, RouteProgress, RouteState, Stop, StopState
+from mapspeak.server.reports import PoseReport, Report
+
+__all__ = ["RouteAnswer"]
+
+DETOUR_M = 0.05
+NEXT_STEP = {
+    RouteState.DRIVING: "Call follow_route without stops to go on; stop_robot ends it.",
+    RouteState.AT_STOP: "Look, record what matters, then call follow_route without stops.",
+    RouteState.BLOCKED: (
+        "Call follow_route without stops to try again, or with when_blocked=skip to leave it out."
+    ),
+    RouteState.INTERRUPTED: (
+        "The robot was stopped or sent elsewhere. Call follow_route without stops to go on."
+    ),
+    RouteState.DONE: "The route is over.",
+}
+
+
+class RouteAnswer(Report):
+    """How a route stands."""
+
+    state: RouteState = Field(description="driving, at_stop: call again to go on")
+    reason: str
+    done: list[str]
+    skipped: list[str] = Field(description="with the reason")
+    next: str = Field(description="the stop under way")
+    remaining: list[str] = Field(description="the stops after that")
+    left_m: float | None = Field(description="by path, to the next stop")
+    legs_m: list[float] = Field(description="by path, as planned, from the robot on")
+    total_m: float
+    greedy_m: float | None = Field(
+        description="the total if the nearest candidate were taken each time, where that is more"
+    )
+    robot: PoseReport
+    next_step: str
+
+    @classmethod
+    def of(cls, progress: RouteProgress) -> Self:
+        """Makes the report of a route."""
+        ahead = [stop for stop in progress.stops if stop.state is StopState.AHEAD]
+        plan = progress.plan
+        return cls(
+            state=progress.state,
+            reason=progress.sentence,
+            done=[_say(stop) for stop in progress.stops if stop.state is StopState.DONE],
+            skipped=[
+                f"{_say(stop)}: {stop.reason}"
+                for stop in progress.stops
+                if stop.state is StopState.SKIPPED
+            ],
+            next=_say_in_full(ahead[0]) if ahead else "",
+            remaining=[_say(stop) for stop in ahead[1:]],
+            left_m=None if progress.left_m is None else round(progress.left_m, 1),
+            legs_m=[round(leg_m, 1) for leg_m in plan.legs_m],
+            total_m=round(plan.total_m, 1),
+            greedy_m=round(plan.greedy_m, 1) if _is_better(plan) else None,
+            robot=PoseReport.of(progress.pose),
+            next_step=NEXT_STEP[progress.state],
+        )
+
+
+def _is_better(plan: RoutePlan) -> bool:
+    return plan.greedy_m > plan.total_m + DETOUR_M
+
+
+def _say(stop: Stop) -> str:
+    """Gives the words of a stop, with what they are taken for where that is something else."""
+    name, words = stop.goal.name, " ".join(stop.words.split())
+    is_point = name.startswith("(")
+    return name if is_point or name.casefold() == words.casefold() else f"{words} ({name})"
+
+
+def _say_in_full(stop: Stop) -> str:
+    return stop.goal.title if stop.goal.title.startswith(stop.words) else _say(stop)

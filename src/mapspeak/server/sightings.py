@@ -1,0 +1,70 @@
+"""What the robot's camera shows now: the picture, with its caption as text."""
+
+import math
+from dataclasses import dataclass
+
+from mcp.server.mcpserver import Image
+
+from mapspeak.robot import CameraPicture, Detection, Robot
+from mapspeak.server.wording import say_pose
+
+__all__ = ["Sighting", "look_ahead"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sighting:
+    """A picture of the front camera, and what is to be said of it.
+
+    Attributes:
+        text: Where it was taken, and what the robot's own detector reports in it.
+        picture: The picture.
+        detections: The same reports as values; none where the robot has no detector.
+    """
+
+    text: str
+    picture: CameraPicture
+    detections: tuple[Detection, ...]
+
+    @property
+    def image(self) -> Image:
+        """The picture as a tool gives it."""
+        return Image(data=self.picture.data, format=self.picture.media_type.partition("/")[2])
+
+
+async def look_ahead(robot: Robot) -> Sighting:
+    """Takes a picture with the robot's front camera.
+
+    Raises:
+        LinkError: It has none, or it cannot be reached.
+    """
+    picture = await robot.fetch_picture()
+    lines = [_say_picture(picture)]
+    detector = robot.description.detector
+    detections: tuple[Detection, ...] = ()
+    if detector is not None:
+        detections = await robot.fetch_detections()
+        lines += _say_detections(detector, detections)
+    return Sighting(text="\n".join(lines), picture=picture, detections=detections)
+
+
+def _say_picture(picture: CameraPicture) -> str:
+    fov_rad = picture.horizontal_fov_rad
+    width = "" if fov_rad is None else f", {math.degrees(fov_rad):.0f} deg wide"
+    return (
+        f"Front camera, {picture.width_px} x {picture.height_px} px{width}, "
+        f"taken at {say_pose(picture.pose)}."
+    )
+
+
+def _say_detections(detector: str, detections: tuple[Detection, ...]) -> list[str]:
+    if not detections:
+        return [f"The robot's {detector} reports nothing."]
+    return [f"The robot's {detector} reports (bearing left positive):"] + [
+        f"- {seen.label}, bearing {math.degrees(seen.bearing_rad):+.0f} deg, "
+        f"{_say_range(seen.range_m)}, confidence {seen.confidence_ratio:.2f}"
+        for seen in detections
+    ]
+
+
+def _say_range(range_m: float | None) -> str:
+    return "range unknown" if range_m is None else f"range {range_m:.1f} m"

@@ -1,0 +1,178 @@
+"""The tools about actions: what there is, sending goals, how they stand, cancelling them."""
+
+from typing import Annotated, Any
+
+import anyio
+from pydantic import Field
+
+from mapspeak.errors import GoalError, LinkError
+from mapspeak.ros.definitions import check_message
+from mapspeak.ros.messages import bare_type
+from mapspeak.server.rosreports import cut, show_message
+from mapspeak.server.tools.ros.goals import ActionBook
+from mapspeak.server.tools.ros.inquiry import RosInquiry, full_name
+from mapspeak.server.tools.ros.jobs import ActionState, Job
+from mapspeak.server.tools.ros.lists import Filter, Page, choose, say_page
+from mapspeak.server.toolset import Effect, Tool
+from mapspeak.server.wording import list_some
+
+__all__ = ["ActionTools"]
+
+LONGEST_WAIT_S = 25.0
+MOST_LISTED = 20
+
+Action = Annotated[str, Field(description="full name, such as /spin", max_length=200)]
+AnyAction = Annotated[
+    str | None, Field(description="all goals of this action, others' too", max_length=200)
+]
+GoalFields = Annotated[
+    dict[str, Any],
+    Field(description="the goal's fields as ros_action shows them; those left out: defaults"),
+]
+ActionType = Annotated[
+    str | None, Field(description="only where the robot does not tell it", max_length=200)
+]
+Wait = Annotated[float, Field(description="seconds to wait for its end", ge=0, le=LONGEST_WAIT_S)]
+Handle = Annotated[
+    str | None, Field(description="from ros_send_goal; the latest when left out", max_length=40)
+]
+CancelHandle = Annotated[str | None, Field(description="from ros_send_goal", max_length=40)]
+
+NEXT_STEP = {
+    ActionState.SUCCEEDED: "",
+    ActionState.ABORTED: "The action server gave up: see its result and reason.",
+    ActionState.CANCELLED: "It was cancelled before it was done.",
+    ActionState.REJECTED: "It was not taken: check its values, and that the server is active.",
+    ActionState.LOST: "Nobody knows how it ended: look at the robot, then send it again.",
+}
+GOES_ON = "It goes on: ros_goal_status waits for it, ros_cancel_goal ends it."
+
+
+class ActionTools:
+    """Listing, describing, sending, asking, cancelling."""
+
+    def __init__(self, inquiry: RosInquiry, book: ActionBook) -> None:
+        self._inquiry = inquiry
+        self._book = book
+
+    def tools(self) -> list[Tool]:
+        """Gives the tools in their order."""
+        return [
+            Tool(function=self.ros_actions, title="List ROS actions", effect=Effect.READS),
+            Tool(function=self.ros_action, title="One ROS action", effect=Effect.READS),
+            Tool(function=self.ros_send_goal, title="Send a ROS goal", effect=Effect.MOVES),
+            Tool(function=self.ros_goal_status, title="How a ROS goal stands", effect=Effect.READS),
+            Tool(function=self.ros_cancel_goal, title="Cancel a ROS goal", effect=Effect.STOPS),
+        ]
+
+    async def ros_actions(self, filter: Filter = None, page: Page = 1) -> str:  # noqa: A002
+        """Lists the robot's ROS actions with their types.
+
+        Use it to find one; ros_action tells its fields.
+        """
+        actions = await self._inquiry.fetch_actions()
+        types = {name: await self._say_type(name) for name in actions}
+        chosen = choose(list(types.items()), filter, texts=lambda item: item)
+        return say_page(
+            "actions",
+            chosen,
+            page,
+            line=lambda item: f"{item[0]} {item[1]}",
+            n_all=len(actions),
+        )
+
+    async def ros_action(self, action: Action, type: ActionType = None) -> str:  # noqa: A002
+        """Tells a ROS action's type, and the fields of its goal, result and feedback.
+
+        Use it before ros_send_goal.
+        """
+        name = full_name(action)
+        said = await self._find_type(name, type)
+        return cut(f"{name} {said}\n{(await self._inquiry.describe(said)).say()}")
+
+    async def ros_send_goal(
+        self,
+        action: Action,
+        goal: GoalFields,
+        wait_s: Wait = 5.0,
+        type: ActionType = None,  # noqa: A002
+    ) -> str:
+        """Sends a goal to a ROS action, which may move the robot, and waits for its end.
+
+        Use navigate_to to drive somewhere. Answers how it ended or, after wait_s, its goal_id; a
+        refused goal is told as rejected. Call ros_action first for the fields.
+        """
+        name = full_name(action)
+        said = await self._find_type(name, type)
+        described = await self._inquiry.describe(said)
+        checked = check_message(described.book, described.part(0), goal)
+        job = await self._book.send(name, checked, type_name=described.type)
+        try:
+            await self._book.wait(job, wait_s=wait_s)
+        except anyio.get_cancelled_exc_class():
+            # Whoever gives up waiting gives up the goal, as with navigate_to.
+            with anyio.CancelScope(shield=True):
+                await self._book.cancel(job)
+            raise
+        return _say_job(job)
+
+    async def ros_goal_status(
+        self, goal_id: Handle = None, wait_s: Wait = 0.0, action: AnyAction = None
+    ) -> str:
+        """Says how a goal of ros_send_goal stands: state, feedback, result, also long after.
+
+        Use it to wait for the end; with an action it lists the goals its server knows.
+        """
+        if action is not None:
+            lines = await self._book.fetch_listed(full_name(action))
+            shown = "\n".join(lines[-MOST_LISTED:]) or "none"
+            ours = list_some(self._book.handles[-MOST_LISTED:], most=MOST_LISTED) or "none"
+            return f"{len(lines)} goals, by the server's ids:\n{shown}\nSent from here: {ours}"
+        job = self._book.find(goal_id)
+        await self._book.wait(job, wait_s=wait_s)
+        return _say_job(job)
+
+    async def ros_cancel_goal(self, goal_id: CancelHandle = None, action: AnyAction = None) -> str:
+        """Cancels one goal by its goal_id, or every goal of a ROS action.
+
+        Use stop_robot instead when anything is urgent.
+        """
+        if (goal_id is None) == (action is None):
+            raise GoalError(
+                "Give either goal_id or action.",
+                hint="goal_id ends one goal of ros_send_goal, action every goal of that action.",
+            )
+        if action is not None:
+            return f"{full_name(action)}: {await self._book.cancel_all(full_name(action))}."
+        job = self._book.find(goal_id)
+        if job.is_over:
+            return f"{job.handle} was over already, nothing was cancelled.\n{_say_job(job)}"
+        await self._book.cancel(job)
+        return _say_job(job)
+
+    async def _find_type(self, action: str, given: str | None) -> str:
+        """Gives an action's type as this ROS writes it; the given one where nobody tells it."""
+        if given is not None:
+            await self._inquiry.check_action(action)
+            return await self._inquiry.said(bare_type(given), kind="action")
+        type_name = await self._inquiry.fetch_action_type(action)
+        return await self._inquiry.said(type_name, kind="action")
+
+    async def _say_type(self, action: str) -> str:
+        try:
+            return await self._find_type(action, None)
+        except LinkError:
+            return "(its type is not told)"
+
+
+def _say_job(job: Job) -> str:
+    passed_s = (job.ended_s or anyio.current_time()) - job.sent_s
+    parts = [f"{job.handle} ({job.action}): {job.state} after {passed_s:.1f} s."]
+    said = [part for part in (job.reason, NEXT_STEP.get(job.state, GOES_ON)) if part]
+    if said:
+        parts.append(" ".join(said))
+    if job.result is not None:
+        parts.append(f"result:\n{show_message(job.result)}")
+    elif job.feedback is not None:
+        parts.append(f"latest feedback of {job.n_feedback}:\n{show_message(job.feedback)}")
+    return cut("\n".join(parts))

@@ -1,0 +1,158 @@
+"""Everything the ROS tools change on the robot, through one door."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import anyio
+
+from mapspeak.errors import LinkError
+from mapspeak.ros import ActionGoal, RosConnection
+from mapspeak.ros.messages import Message
+
+__all__ = ["VELOCITIES", "RosCommands", "stand_of"]
+
+SETTLE_S = 0.3
+"""From the first advertisement until the robot's nodes hear what is published, in wall time."""
+N_STANDS = 3
+PAUSE_S = 0.05
+STAND_S = 1.0
+VELOCITIES = frozenset(
+    {
+        "geometry_msgs/Twist",
+        "geometry_msgs/TwistStamped",
+        "ackermann_msgs/AckermannDrive",
+        "ackermann_msgs/AckermannDriveStamped",
+    }
+)
+"""Types on which a robot goes on until it is told otherwise, or its driver loses patience."""
+
+
+class RosCommands:
+    """Publishes, calls, sends goals and sets parameters: by the methods of the port alone.
+
+    Args:
+        connection: Gives the connection, which may be guarded.
+    """
+
+    def __init__(self, connection: Callable[[], RosConnection]) -> None:
+        self._connection = connection
+        self._advertised: set[tuple[str, str]] = set()
+
+    async def prepare(self, topic: str, type_name: str) -> None:
+        """Advertises a topic, and waits until the robot has noticed.
+
+        It stays advertised: the robot's brake may use the same topic.
+        """
+        self._connection().advertise(topic, type_name=type_name)
+        if (topic, type_name) not in self._advertised:
+            await anyio.sleep(SETTLE_S)
+            self._advertised.add((topic, type_name))
+
+    async def publish(self, topic: str, message: Message) -> None:
+        """Publishes one message on a topic that was prepared."""
+        await self._connection().publish(topic, message)
+
+    async def publish_for(
+        self,
+        topic: str,
+        message: Message,
+        *,
+        duration_s: float,
+        rate_hz: float,
+        is_over: Callable[[], bool],
+    ) -> int:
+        """Publishes again and again, and gives how often; in wall time.
+
+        Args:
+            topic: Was prepared.
+            message: Each time the same.
+            duration_s: From the first message on.
+            rate_hz: Messages a second.
+            is_over: True when the robot was stopped meanwhile.
+        """
+        started_s = anyio.current_time()
+        n_sent = 0
+        while n_sent / rate_hz < duration_s and not is_over():
+            await self.publish(topic, message)
+            n_sent += 1
+            await anyio.sleep_until(started_s + min(n_sent / rate_hz, duration_s))
+        return n_sent
+
+    async def stand(self, topic: str, message: Message) -> None:
+        """Publishes the stand for a velocity, whatever happens to the call that moved the robot.
+
+        Raises:
+            LinkError: It could not be sent.
+        """
+        zero = stand_of(message)
+        with anyio.CancelScope(shield=True), anyio.move_on_after(STAND_S):
+            n_ways = 0
+            for number in range(N_STANDS):
+                if number:
+                    await anyio.sleep(PAUSE_S)
+                n_ways += self._connection().publish_everywhere(topic, zero)
+            if n_ways == 0:
+                raise LinkError(
+                    f"The zero velocity for {topic} could not be sent: there is no connection.",
+                    hint="If the robot still moves, stop it by hand.",
+                )
+
+    async def tell_everywhere(self, topic: str, message: Message) -> None:
+        """Publishes by every way there is: for a cancellation.
+
+        Raises:
+            LinkError: There is no way.
+        """
+        if self._connection().publish_everywhere(topic, message) == 0:
+            raise LinkError(
+                f"Nothing could be sent on {topic}: there is no connection.",
+                hint="Try again: the connection is made anew by itself.",
+            )
+
+    async def call(
+        self, service: str, arguments: Mapping[str, Any], *, type_name: str, timeout_s: float
+    ) -> dict[str, Any]:
+        """Gives what a service answers."""
+        return await self._connection().call_service(
+            service, arguments, type_name=type_name, timeout_s=timeout_s
+        )
+
+    async def send_goal(self, action: str, goal: Message, *, type_name: str) -> ActionGoal:
+        """Sends a goal to an action of ROS 2."""
+        return await self._connection().send_goal(action, goal, type_name=type_name)
+
+    def cancel_goal(self, goal: ActionGoal) -> None:
+        """Asks for the end of a goal."""
+        self._connection().cancel_goal(goal)
+
+    def give_up_goal(self, goal: ActionGoal) -> None:
+        """Waits no longer for a goal without a sign of life."""
+        self._connection().give_up_goal(goal)
+
+    async def set_parameter(
+        self,
+        node: str,
+        name: str,
+        value: Any,  # noqa: ANN401 - any value ROS has
+    ) -> None:
+        """Sets a node's parameter."""
+        await self._connection().set_parameter(node, name, value)
+
+
+def stand_of(message: Message) -> dict[str, Any]:
+    """Gives a velocity message with every number at zero; header and texts stay."""
+    return {name: value if name == "header" else _zero_of(value) for name, value in message.items()}
+
+
+def _zero_of(value: Any) -> Any:  # noqa: ANN401 - ROS JSON
+    match value:
+        case bool() | str():
+            return value
+        case int() | float():
+            return type(value)(0)
+        case Mapping():
+            return stand_of(value)
+        case list():
+            return [_zero_of(each) for each in value]
+        case _:
+            return value

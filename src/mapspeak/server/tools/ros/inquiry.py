@@ -1,0 +1,295 @@
+"""Asking a ROS system what it is made of: names checked, types described, the latest graph kept."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import anyio
+
+from mapspeak.errors import ConfigError, LinkError
+from mapspeak.ros import NAME, TYPE, RosConnection, RosGraph, find_nearest
+from mapspeak.ros.definitions import (
+    TypeBook,
+    describe_type,
+    known_definitions,
+    name_parts,
+    split_parts,
+)
+from mapspeak.ros.messages import Dialect, bare_type
+from mapspeak.session import Session
+
+__all__ = ["Described", "RosInquiry", "full_name", "require_ros"]
+
+NO_ROS = "This robot is no ROS robot: the simulated one is none."
+NO_ROS_HINT = (
+    "`mapspeak simulate --rosbridge` makes the simulated robot one; connect to that, or to any "
+    "other, with --robot ws://HOST:9090."
+)
+ACTION_GOAL = "ActionGoal"
+KEPT_S = 1.0
+"""For so long a list of names is as good as new, in wall time."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Described:
+    """What a type looks like.
+
+    Attributes:
+        type: As "package/Type".
+        parts: The names of its parts: itself, or those of a service or an action.
+        book: Holds them and all types within.
+    """
+
+    type: str
+    parts: tuple[str, ...]
+    book: TypeBook
+
+    @property
+    def kind(self) -> str:
+        """What it is the type of: "msg", "srv" or "action"."""
+        return {1: "msg", 2: "srv", 3: "action"}[len(self.parts)]
+
+    def part(self, number: int) -> str:
+        """Gives the name of a part: 0 is what is sent."""
+        return self.parts[number]
+
+    def say(self) -> str:
+        """Gives its fields down to the plain values, part by part."""
+        told: list[str] = []
+        for name in self.parts:
+            lines = describe_type(self.book, name) or ["(no fields)"]
+            if len(self.parts) == 1:
+                return "\n".join(lines)
+            told.append(f"{name.rpartition('_')[2].lower()}:")
+            told += [f"  {line}" for line in lines]
+        return "\n".join(told)
+
+
+class RosInquiry:
+    """Asks over the session's connection; what it was told about names and types is kept.
+
+    Args:
+        session: Holds the connection.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._graph: RosGraph | None = None
+        self._asked_s = float("-inf")
+        self._taught: dict[str, str] = {}
+
+    @property
+    def connection(self) -> RosConnection:
+        """The connection.
+
+        Raises:
+            LinkError: The robot is no ROS robot.
+        """
+        connection = self._session.ros
+        if connection is None:
+            raise LinkError(NO_ROS, hint=NO_ROS_HINT)
+        return connection
+
+    async def fetch_graph(self) -> RosGraph:
+        """Gives the topics and actions there are, as they were a second ago at most."""
+        if self._graph is None or anyio.current_time() > self._asked_s + KEPT_S:
+            return await self._renew_graph()
+        # What is kept is no answer for a robot that has gone.
+        await self.connection.wait_until_connected()
+        return self._graph
+
+    async def fetch_dialect(self) -> Dialect:
+        """Gives which ROS it is."""
+        return (self._graph or await self.fetch_graph()).dialect
+
+    async def find_topic_type(self, topic: str) -> str | None:
+        """Gives a topic's type as "package/Type"; asks again only for what it has not heard of."""
+        graph = self._graph
+        if graph is None or topic not in graph.types:
+            graph = await self._renew_graph()
+        return graph.types.get(topic)
+
+    async def fetch_topic_type(self, topic: str) -> str:
+        """Gives a topic's type as "package/Type".
+
+        Raises:
+            LinkError: There is no such topic; names those most like it.
+        """
+        found = await self.find_topic_type(topic)
+        if found is None:
+            raise self.stranger("topic", topic, self._graph.types if self._graph else ())
+        return found
+
+    async def fetch_service_type(self, service: str) -> str:
+        """Gives a service's type as "package/Type".
+
+        Raises:
+            LinkError: There is no such service; names those most like it.
+        """
+        try:
+            return await self.connection.fetch_service_type(service)
+        except LinkError:
+            services = await self.connection.fetch_services()
+            if service in services:
+                raise
+            raise self.stranger("service", service, services) from None
+
+    async def fetch_actions(self) -> tuple[str, ...]:
+        """Gives all actions; ROS 1 shows them by their topics."""
+        return _actions_of(await self.fetch_graph())
+
+    async def check_action(self, action: str) -> None:
+        """Returns when there is such an action.
+
+        Raises:
+            LinkError: There is none; names those most like it.
+        """
+        if action not in await self.fetch_actions():
+            actions = _actions_of(await self._renew_graph())
+            if action not in actions:
+                raise self.stranger("action", action, actions)
+
+    async def fetch_action_type(self, action: str) -> str:
+        """Gives an action's type as "package/Type".
+
+        rosapi 2.1 does not tell it: then it is the one of that name, as Nav2 names its actions.
+
+        Raises:
+            LinkError: There is no such action, or nobody tells its type.
+        """
+        await self.check_action(action)
+        try:
+            return await self.connection.fetch_action_type(action)
+        except LinkError as error:
+            found = _find_type_by_name(action)
+            if found is None:
+                raise LinkError(
+                    f"The robot does not tell the type of {action}: {error.message}",
+                    hint="Give it as type, as `ros2 action list -t` says on the robot.",
+                ) from error
+            return found
+
+    async def check_node(self, node: str) -> None:
+        """Returns when there is such a node.
+
+        Raises:
+            LinkError: There is none; names those most like it.
+        """
+        nodes = await self.connection.fetch_nodes()
+        if node not in nodes:
+            raise self.stranger("node", node, nodes)
+
+    async def describe(self, type_name: str) -> Described:
+        """Gives what a type looks like.
+
+        Raises:
+            LinkError: It is no name of a type, or nobody knows it; says how to describe it.
+        """
+        _check_type_name(type_name)
+        bare = bare_type(type_name)
+        texts = await self.connection.fetch_definitions(type_name)
+        if not texts:
+            # Nobody but whoever taught us knows it.
+            texts = self._taught
+        parts = _find_parts(texts, bare)
+        if not parts:
+            raise LinkError(
+                f"Nobody knows what a {type_name} looks like: the robot does not describe it, and "
+                "it is none of the types that come with mapspeak.",
+                hint="Give its definition to ros_type, as `ros2 interface show` (ROS 1: `rosmsg "
+                "show -r`, `rossrv show -r`) prints it on the robot, with --- between the parts.",
+            )
+        return Described(type=bare, parts=parts, book=TypeBook({**self._taught, **texts}))
+
+    async def teach(self, type_name: str, definition: str) -> None:
+        """Keeps the definition of a type that nobody else knows, while the session lasts.
+
+        Raises:
+            LinkError: It is no name of a type, or the robot or mapspeak knows that type.
+        """
+        _check_type_name(type_name)
+        if await self.connection.fetch_definitions(type_name):
+            raise LinkError(
+                f"What a {type_name} looks like is known already.",
+                hint="Call ros_type without a definition to see it.",
+            )
+        self._taught |= split_parts(type_name, definition)
+
+    async def said(self, type_name: str, *, kind: str = "msg") -> str:
+        """Gives a type as this ROS writes it, such as "nav_msgs/msg/Path"."""
+        dialect = await self.fetch_dialect()
+        package, _, last = bare_type(type_name).partition("/")
+        return f"{package}/{kind}/{last}" if dialect is Dialect.ROS2 else f"{package}/{last}"
+
+    async def _renew_graph(self) -> RosGraph:
+        await self.connection.wait_until_connected()
+        self._graph = await self.connection.fetch_graph()
+        self._asked_s = anyio.current_time()
+        return self._graph
+
+    @staticmethod
+    def stranger(what: str, name: str, known: Iterable[str]) -> LinkError:
+        """Gives the error for a name that is not there."""
+        names = sorted(known)
+        near = find_nearest(name, names) or names[:5]
+        if not near:
+            return LinkError(f"The robot has no {what}s at all.", hint="Start its ROS nodes.")
+        return LinkError(
+            f"The robot has no {what} {name[:80]!r}.",
+            hint=f"The nearest of {len(names)}: {', '.join(near)}. ros_{what}s lists all.",
+        )
+
+
+def full_name(name: str) -> str:
+    """Gives a name with its leading slash.
+
+    Raises:
+        LinkError: ROS allows no such name.
+    """
+    full = f"/{name.strip().strip('/')}"
+    if not NAME.fullmatch(full):
+        raise LinkError(
+            f"{name[:80]!r} is no name in ROS.", hint="It looks like /map or /robot1/cmd_vel."
+        )
+    return full
+
+
+def _find_type_by_name(action: str) -> str | None:
+    """Gives the type that comes with mapspeak and is called as the action: /spin is a Spin."""
+    wanted = action.rpartition("/")[2].replace("_", "").lower()
+    goals = (name for name in known_definitions(Dialect.ROS2) if name.endswith("_Goal"))
+    types = (name.removesuffix("_Goal") for name in goals)
+    return next((name for name in types if name.partition("/")[2].lower() == wanted), None)
+
+
+def _actions_of(graph: RosGraph) -> tuple[str, ...]:
+    if graph.dialect is Dialect.ROS2:
+        return graph.actions
+    goals = (name for name, kind in graph.types.items() if kind.endswith(ACTION_GOAL))
+    return tuple(sorted(name.removesuffix("/goal") for name in goals if name.endswith("/goal")))
+
+
+def _check_type_name(type_name: str) -> None:
+    if not TYPE.fullmatch(type_name):
+        raise LinkError(
+            f"{type_name[:80]!r} is no type.",
+            hint="It looks like geometry_msgs/msg/Twist (ROS 2) or geometry_msgs/Twist (ROS 1).",
+        )
+
+
+def _find_parts(texts: Mapping[str, str], bare: str) -> tuple[str, ...]:
+    service, action = name_parts(bare)
+    for names in ((bare,), service, action):
+        if all(name in texts for name in names):
+            return names
+    return ()
+
+
+def require_ros(session: Session, *, toolsets: Iterable[str], tools: Iterable[str] = ()) -> None:
+    """Returns when no tool of ROS is wanted, or they can work.
+
+    Raises:
+        ConfigError: One is wanted of a robot that is no ROS robot.
+    """
+    is_wanted = "ros" in toolsets or any(name.startswith("ros_") for name in tools)
+    if is_wanted and session.ros is None:
+        raise ConfigError(f"The ros toolset needs a ROS robot. {NO_ROS}", hint=NO_ROS_HINT)

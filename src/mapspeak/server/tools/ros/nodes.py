@@ -1,0 +1,239 @@
+"""The tools about nodes and their parameters, and about the system as a whole."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import anyio
+from pydantic import Field
+
+from mapspeak.errors import LinkError, MapspeakError
+from mapspeak.ros import RosGraph
+from mapspeak.ros.messages import Dialect
+from mapspeak.server.rosreports import cut, show_value
+from mapspeak.server.tools.ros.commands import RosCommands
+from mapspeak.server.tools.ros.inquiry import RosInquiry, full_name
+from mapspeak.server.tools.ros.lists import PAGE_SIZE, Filter, Page, choose, say_page
+from mapspeak.server.toolset import Effect, Tool
+from mapspeak.server.wording import list_some
+
+__all__ = ["NodeTools"]
+
+MOST_DESCRIBED = 5
+MOST_AT_ONCE = 8
+MOST_NAMED = 40
+DESCRIBE, SET = "rcl_interfaces/srv/DescribeParameters", "rcl_interfaces/srv/SetParameters"
+KINDS = (
+    "not set", "bool", "integer", "double", "string",
+    "bytes", "bools", "integers", "doubles", "strings",
+)  # fmt: skip
+"""By rcl_interfaces/ParameterType."""
+NOTABLE = {
+    "maps": ("nav_msgs/OccupancyGrid",),
+    "velocities": ("geometry_msgs/Twist", "geometry_msgs/TwistStamped"),
+    "odometry": ("nav_msgs/Odometry",),
+    "scans and clouds": ("sensor_msgs/LaserScan", "sensor_msgs/PointCloud2"),
+    "pictures": ("sensor_msgs/Image", "sensor_msgs/CompressedImage"),
+}
+
+Node = Annotated[str, Field(description="full name, such as /bt_navigator", max_length=200)]
+ParameterNode = Annotated[
+    str, Field(description="full name of the node; / for ROS 1's global ones", max_length=200)
+]
+Parameter = Annotated[str, Field(description="its name within the node", max_length=200)]
+Value = Annotated[
+    Any, Field(description="true or false, a number, a text or a list; null deletes it")
+]
+
+
+class NodeTools:
+    """The whole, its nodes, their parameters."""
+
+    def __init__(self, inquiry: RosInquiry, commands: RosCommands) -> None:
+        self._inquiry = inquiry
+        self._commands = commands
+
+    def tools(self) -> list[Tool]:
+        """Gives the tools in their order."""
+        return [
+            Tool(function=self.ros_nodes, title="List ROS nodes", effect=Effect.READS),
+            Tool(function=self.ros_node, title="One ROS node", effect=Effect.READS),
+            Tool(function=self.ros_parameters, title="ROS parameters", effect=Effect.READS),
+            Tool(function=self.ros_set_parameter, title="Set a ROS parameter", effect=Effect.MOVES),
+        ]
+
+    async def ros_overview(self) -> str:
+        """Tells which ROS the robot runs and what there is: topics, services, actions, nodes.
+
+        Use it first of the ros_ tools. Which robot it is was chosen by the operator.
+        """
+        graph = await self._inquiry.fetch_graph()
+        connection = self._inquiry.connection
+        nodes, services = await connection.fetch_nodes(), await connection.fetch_services()
+        actions, time_s = await self._inquiry.fetch_actions(), await connection.fetch_time_s()
+        number = "1" if graph.dialect is Dialect.ROS1 else "2"
+        lines = [
+            f"ROS {number} {graph.distro}".rstrip()
+            + _say_times(connection.connected_for_s, time_s),
+            f"topics: {len(graph.types)}, services: {len(services)}, nodes: {len(nodes)}",
+            *_say_notable(graph),
+            f"actions: {list_some(actions, most=MOST_NAMED) or 'none'}",
+        ]
+        return cut("\n".join(lines))
+
+    async def ros_nodes(self, filter: Filter = None, page: Page = 1) -> str:  # noqa: A002
+        """Lists the robot's ROS nodes.
+
+        Use it to see what runs; ros_node tells what one does.
+        """
+        nodes = await self._inquiry.connection.fetch_nodes()
+        chosen = choose(nodes, filter, texts=lambda name: [name])
+        return say_page("nodes", chosen, page, line=lambda name: name, n_all=len(nodes))
+
+    async def ros_node(self, node: Node) -> str:
+        """Tells what a ROS node publishes, hears and serves.
+
+        Use it to find out who does what; ros_parameters gives its settings.
+        """
+        name = full_name(node)
+        await self._inquiry.check_node(name)
+        links = await self._inquiry.connection.fetch_node(name)
+        return cut(
+            f"{name}\npublishes: {list_some(links.publishes, most=MOST_NAMED) or 'nothing'}\n"
+            f"hears: {list_some(links.subscribes, most=MOST_NAMED) or 'nothing'}\n"
+            f"serves: {list_some(links.serves, most=MOST_NAMED) or 'nothing'}"
+        )
+
+    async def ros_parameters(
+        self,
+        node: ParameterNode,
+        filter: Filter = None,  # noqa: A002
+        page: Page = 1,
+    ) -> str:
+        """Lists a ROS node's parameters with their values; few are described in full.
+
+        Use it with a filter for one parameter; none listed means there is none.
+        """
+        name = _node_name(node)
+        names = await self._fetch_names(name)
+        chosen = choose(names, filter, texts=lambda each: [each])
+        shown = chosen[(page - 1) * PAGE_SIZE : page * PAGE_SIZE]
+        values = await self._fetch_values(name, shown)
+        notes = await self._describe(name, chosen) if len(chosen) <= MOST_DESCRIBED else {}
+        return cut(
+            say_page(
+                f"parameters of {name}",
+                chosen,
+                page,
+                line=lambda each: f"{each}: {show_value(values.get(each))}{notes.get(each, '')}",
+                n_all=len(names),
+            )
+        )
+
+    async def ros_set_parameter(
+        self, node: ParameterNode, parameter: Parameter, value: Value
+    ) -> str:
+        """Sets or deletes a ROS node's parameter, which may change how the robot moves.
+
+        Use ros_parameters first for its value and kind.
+        """
+        name = _node_name(node)
+        if value is None:
+            await self._delete(name, parameter)
+            return f"{parameter} of {name} is deleted."
+        connection = self._inquiry.connection
+        before = await connection.fetch_parameter(name, parameter)
+        await self._commands.set_parameter(name, parameter, value)
+        after = await connection.fetch_parameter(name, parameter)
+        return f"{parameter} of {name} was {show_value(before)}, is {show_value(after)} now."
+
+    async def _delete(self, node: str, parameter: str) -> None:
+        if await self._inquiry.connection.fetch_parameter(node, parameter) is None:
+            raise LinkError(
+                f"{node} has no parameter {parameter[:80]!r}.", hint="ros_parameters lists them."
+            )
+        if await self._inquiry.fetch_dialect() is Dialect.ROS1:
+            full = f"{node.rstrip('/')}/{parameter}"
+            await self._commands.call(
+                "/rosapi/delete_param", {"name": full}, type_name="rosapi/DeleteParam", timeout_s=5
+            )
+            return
+        unset = {"name": parameter, "value": {"type": 0}}
+        answer = await self._commands.call(
+            f"{node}/set_parameters", {"parameters": [unset]}, type_name=SET, timeout_s=5
+        )
+        for result in answer.get("results") or []:
+            if isinstance(result, Mapping) and not result.get("successful", False):
+                raise LinkError(
+                    f"{node} does not delete {parameter}: {result.get('reason')}",
+                    hint="A parameter that a node has declared can only be set.",
+                )
+
+    async def _fetch_names(self, node: str) -> tuple[str, ...]:
+        try:
+            names = await self._inquiry.connection.fetch_parameter_names(node)
+        except LinkError:
+            await self._inquiry.check_node(node)
+            raise
+        if not names and node != "/":
+            await self._inquiry.check_node(node)
+        return names
+
+    async def _fetch_values(self, node: str, names: list[str]) -> dict[str, Any]:
+        values: dict[str, Any] = {}
+        limiter = anyio.CapacityLimiter(MOST_AT_ONCE)
+
+        async def fetch(name: str) -> None:
+            async with limiter:
+                try:
+                    values[name] = await self._inquiry.connection.fetch_parameter(node, name)
+                except LinkError as error:
+                    values[name] = error.message
+
+        async with anyio.create_task_group() as tasks:
+            for name in names:
+                tasks.start_soon(fetch, name)
+        return values
+
+    async def _describe(self, node: str, names: list[str]) -> dict[str, str]:
+        """Gives what a node of ROS 2 says of its parameters."""
+        if not names or await self._inquiry.fetch_dialect() is Dialect.ROS1:
+            return {}
+        try:
+            answer = await self._inquiry.connection.call_service(
+                f"{node}/describe_parameters", {"names": names}, type_name=DESCRIBE
+            )
+        except MapspeakError:
+            return {}  # Neither a node nor a policy has to let us ask.
+        entries = answer.get("descriptors")
+        described = [each for each in entries or [] if isinstance(each, Mapping)]
+        return {str(each.get("name")): _say_descriptor(each) for each in described}
+
+
+def _node_name(node: str) -> str:
+    return "/" if node.strip() == "/" else full_name(node)
+
+
+def _say_times(connected_s: float | None, time_s: float | None) -> str:
+    connected = "" if connected_s is None else f", connected for {connected_s:.0f} s"
+    time = "" if time_s is None else f", robot time {time_s:.1f} s"
+    return f"{connected}{time}."
+
+
+def _say_notable(graph: RosGraph) -> list[str]:
+    found = {what: graph.topics_of(*types) for what, types in NOTABLE.items()}
+    return [
+        f"{what}: {list_some(topics, most=MOST_NAMED)}" for what, topics in found.items() if topics
+    ]
+
+
+def _say_descriptor(entry: Mapping[str, Any]) -> str:
+    kind = entry.get("type")
+    parts = [KINDS[kind]] if isinstance(kind, int) and 0 <= kind < len(KINDS) else []
+    parts += ["read only"] if entry.get("read_only") is True else []
+    for key in ("floating_point_range", "integer_range"):
+        for limits in entry.get(key) or []:
+            if isinstance(limits, Mapping):
+                parts.append(f"{limits.get('from_value')} to {limits.get('to_value')}")
+    texts = (entry.get("description"), entry.get("additional_constraints"))
+    parts += [show_value(text) for text in texts if text]
+    return f" ({', '.join(parts)})" if parts else ""

@@ -1,0 +1,119 @@
+"""Listening to a topic for one message or for a time, and stopping to listen afterwards."""
+
+from collections import deque
+from dataclasses import dataclass
+
+import anyio
+
+from mapspeak.errors import LinkError
+from mapspeak.ros import RosConnection, Subscription
+from mapspeak.ros.messages import Message
+
+__all__ = ["Heard", "hear"]
+
+RENEW_S = (2.0, 3.0)
+"""For a first message, in wall time, before a topic is asked for anew: a latched one may have been
+missed, and a large one may come only when it is asked for otherwise."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Heard:
+    """What came on a topic.
+
+    Attributes:
+        messages: The latest, in their order.
+        n_received: All that came while we listened; 0 when the latest had come before.
+        listened_s: How long we listened.
+        age_s: Since the latest came.
+    """
+
+    messages: tuple[Message, ...]
+    n_received: int
+    listened_s: float
+    age_s: float
+
+
+async def hear(
+    connection: RosConnection,
+    topic: str,
+    *,
+    type_name: str,
+    is_bulky: bool,
+    n: int,
+    wait_s: float,
+    duration_s: float,
+    renew_s: tuple[float, ...] = RENEW_S,
+) -> Heard:
+    """Gives the latest messages of a topic, all times in wall time.
+
+    Args:
+        connection: To listen with.
+        topic: Its full name.
+        type_name: As this ROS writes it.
+        is_bulky: Messages hold large arrays.
+        n: How many messages are wanted at most.
+        wait_s: Without a duration: how long to wait for so many.
+        duration_s: How long to listen; 0 ends with the last message that is wanted. Where somebody
+            listens already, a topic's latest message counts.
+        renew_s: Waits for a first message, after each of which the topic is asked for anew.
+    """
+    subscription = connection.subscribe(topic, type_name=type_name, is_bulky=is_bulky)
+    started_s = anyio.current_time()
+    try:
+        collector = _Collector(subscription, n)
+        limit_s = duration_s or wait_s
+        until = n if duration_s == 0 else None
+        if duration_s == 0:
+            collector.take_known()
+        with anyio.move_on_after(limit_s):
+            await _wait_for_first(connection, subscription, collector, renew_s)
+            await collector.collect(until)
+        return Heard(
+            messages=tuple(collector.messages),
+            n_received=subscription.n_received - collector.n_before,
+            listened_s=anyio.current_time() - started_s,
+            age_s=anyio.current_time() - subscription.arrived_s,
+        )
+    finally:
+        connection.unsubscribe(subscription)
+
+
+class _Collector:
+    def __init__(self, subscription: Subscription, n: int) -> None:
+        self._subscription = subscription
+        self._n_seen = subscription.n_received
+        self.n_before = subscription.n_received
+        self.messages: deque[Message] = deque(maxlen=n)
+
+    def take_known(self) -> None:
+        """Takes the message that is there already."""
+        if self._subscription.latest is not None:
+            self.messages.append(self._subscription.latest)
+
+    async def collect(self, until: int | None) -> None:
+        """Takes messages as they come, until there are so many or it is cancelled."""
+        while until is None or len(self.messages) < until:
+            await self.take_next(timeout_s=60.0)
+
+    async def take_next(self, *, timeout_s: float) -> bool:
+        """Takes the next message; False when none came in time."""
+        try:
+            message = await self._subscription.wait_for_more_than(self._n_seen, timeout_s=timeout_s)
+        except LinkError:
+            return False
+        self._n_seen = self._subscription.n_received
+        self.messages.append(message)
+        return True
+
+
+async def _wait_for_first(
+    connection: RosConnection,
+    subscription: Subscription,
+    collector: _Collector,
+    renew_s: tuple[float, ...],
+) -> None:
+    for patience_s in renew_s:
+        if subscription.latest is not None or collector.messages:
+            return
+        if not await collector.take_next(timeout_s=patience_s):
+            connection.renew(subscription)

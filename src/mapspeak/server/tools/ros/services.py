@@ -1,0 +1,95 @@
+"""The tools about services: what there is, what it takes and gives, calling it."""
+
+from functools import partial
+from typing import Annotated, Any
+
+from mcp.server.mcpserver import Image
+from pydantic import Field
+
+from mapspeak.ros.definitions import check_message
+from mapspeak.server.rosreports import cut, show_message
+from mapspeak.server.tools.ros.commands import RosCommands
+from mapspeak.server.tools.ros.inquiry import Described, RosInquiry, full_name
+from mapspeak.server.tools.ros.lists import Filter, Page, choose, say_page
+from mapspeak.server.tools.ros.views import VIEWED, view_message
+from mapspeak.server.toolset import Effect, Tool
+from mapspeak.session import Session
+
+__all__ = ["ServiceTools"]
+
+Service = Annotated[str, Field(description="full name, such as /reset", max_length=200)]
+Arguments = Annotated[
+    dict[str, Any] | None,
+    Field(description="the request's fields as ros_service shows them; those left out: defaults"),
+]
+Timeout = Annotated[float, Field(description="seconds to wait for the answer", ge=0.1, le=25)]
+
+
+class ServiceTools:
+    """Listing, describing and calling."""
+
+    def __init__(self, session: Session, inquiry: RosInquiry, commands: RosCommands) -> None:
+        self._session = session
+        self._inquiry = inquiry
+        self._commands = commands
+
+    def tools(self) -> list[Tool]:
+        """Gives the tools in their order."""
+        return [
+            Tool(function=self.ros_services, title="List ROS services", effect=Effect.READS),
+            Tool(function=self.ros_service, title="One ROS service", effect=Effect.READS),
+            Tool(function=self.ros_call, title="Call a ROS service", effect=Effect.MOVES),
+        ]
+
+    async def ros_services(self, filter: Filter = None, page: Page = 1) -> str:  # noqa: A002
+        """Lists the robot's ROS services.
+
+        Use it to find one; ros_service tells its type and fields, ros_call calls it.
+        """
+        services = await self._inquiry.connection.fetch_services()
+        chosen = choose(services, filter, texts=lambda name: [name])
+        return say_page("services", chosen, page, line=lambda name: name, n_all=len(services))
+
+    async def ros_service(self, service: Service) -> str:
+        """Tells a ROS service's type, and the fields of its request and its response.
+
+        Use it before ros_call.
+        """
+        name = full_name(service)
+        type_name = await self._inquiry.fetch_service_type(name)
+        said = await self._inquiry.said(type_name, kind="srv")
+        return cut(f"{name} {said}\n{(await self._inquiry.describe(said)).say()}")
+
+    async def ros_call(
+        self, service: Service, arguments: Arguments = None, timeout_s: Timeout = 5.0
+    ) -> list[str | Image]:
+        """Calls a ROS service, which may move the robot or change it, and gives its response.
+
+        Use ros_service first for its fields: the request is checked against its type.
+        """
+        name = full_name(service)
+        type_name = await self._inquiry.fetch_service_type(name)
+        said = await self._inquiry.said(type_name, kind="srv")
+        described = await self._inquiry.describe(said)
+        request = check_message(described.book, described.part(0), arguments or {})
+        answer = await self._commands.call(name, request, type_name=said, timeout_s=timeout_s)
+        return await self._show(f"{name} ({said}) answered:", described, answer)
+
+    async def _show(
+        self, head: str, described: Described, answer: dict[str, Any]
+    ) -> list[str | Image]:
+        """Gives the response; maps and the like within it as they are shown elsewhere."""
+        fields = described.book[described.part(1)].fields
+        seen = {each.name: each.type for each in fields if each.type in VIEWED}
+        plain = {name: value for name, value in answer.items() if name not in seen}
+        parts: list[str] = [head]
+        pictures: list[Image] = []
+        for name, kind in seen.items():
+            value = answer.get(name)
+            if isinstance(value, dict):
+                view = await self._session.compute(partial(view_message, kind, value))
+                parts.append(f"{name}: {view.text}")
+                pictures += [] if view.picture is None else [view.picture]
+        if plain or not seen:
+            parts.append(show_message(plain))
+        return [cut("\n".join(parts)), *pictures]

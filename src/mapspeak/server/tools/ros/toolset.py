@@ -1,0 +1,44 @@
+"""The toolset `ros`: every verb of ROS, over any connection to it."""
+
+from mapspeak.server.tools.ros.actions import ActionTools
+from mapspeak.server.tools.ros.commands import RosCommands
+from mapspeak.server.tools.ros.goals import ActionBook
+from mapspeak.server.tools.ros.inquiry import RosInquiry
+from mapspeak.server.tools.ros.nodes import NodeTools
+from mapspeak.server.tools.ros.services import ServiceTools
+from mapspeak.server.tools.ros.topics import TopicTools
+from mapspeak.server.toolset import Effect, Tool
+from mapspeak.session import Session
+
+__all__ = ["RosTools"]
+
+
+class RosTools:
+    """Looking into a ROS system, and acting on it.
+
+    Args:
+        session: Holds the connection.
+    """
+
+    def __init__(self, session: Session) -> None:
+        inquiry = RosInquiry(session)
+        commands = RosCommands(lambda: inquiry.connection)
+        self._nodes = NodeTools(inquiry, commands)
+        self._topics = TopicTools(session, inquiry, commands)
+        self._services = ServiceTools(session, inquiry, commands)
+        self._actions = ActionTools(inquiry, ActionBook(inquiry, commands))
+
+    def tools(self) -> list[Tool]:
+        """Gives the tools in their order."""
+        return [
+            Tool(
+                function=self._nodes.ros_overview,
+                title="The ROS system at a glance",
+                effect=Effect.READS,
+                is_entry=True,
+            ),
+            *self._topics.tools(),
+            *self._services.tools(),
+            *self._actions.tools(),
+            *self._nodes.tools(),
+        ]

@@ -1,0 +1,73 @@
+from pathlib import Path
+
+import anyio
+import anyio.to_thread
+import pytest
+from click.testing import CliRunner, Result
+
+from fakes import FakeRobot, two_rooms
+from guarding import make_guard
+from mapspeak.cli import cli
+from mapspeak.geometry import Pose
+from mapspeak.semantic import SemanticMapStore
+from mapspeak.session import Session
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(cli, arguments)
+
+
+@pytest.mark.anyio
+async def test_a_stop_reaches_a_server_that_watches_and_says_which_robot_stands(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(two_rooms())
+    guard = make_guard(tmp_path)
+    session = Session(robot, SemanticMapStore(tmp_path / "m.yaml"), lease_s=60.0, guard=guard)
+    with session.drives.preparing() as ticket:
+        drive = await session.drives.start(Pose(6.0, 1.4), place="there", ticket=ticket)
+    control = str(tmp_path / "control")
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(session.keep_watch)
+        result = await anyio.to_thread.run_sync(
+            lambda: run("stop", "--control", control, "--reason", "smoke", "--wait-s", "20")
+        )
+        tasks.cancel_scope.cancel()
+    assert result.exit_code == 0, result.output
+    assert "Stopped and held: fake robot" in result.output
+    assert robot.n_stops == 1
+    report = await session.drives.report(drive.goal_id)
+    assert "smoke" in report.status.reason
+
+
+def test_a_stop_that_no_server_hears_says_so_and_holds_all_the_same(tmp_path: Path) -> None:
+    control = str(tmp_path / "control")
+    result = run("stop", "--control", control, "--wait-s", "0")
+    assert result.exit_code == 1
+    assert "no server has answered" in result.output
+    assert make_guard(tmp_path).hold.read()
+    assert "Released." in run("release", "--control", control).output
+    assert make_guard(tmp_path).hold.read() is None
+    assert "Nothing was held." in run("release", "--control", control).output
+
+
+def test_a_stop_that_cannot_be_written_points_to_the_robots_own_button(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    result = run("stop", "--control", str(tmp_path / "file" / "control"))
+    assert result.exit_code != 0
+    assert "stop button" in str(result.exception)
+
+
+def test_a_hold_can_be_made_and_lifted_with_no_program_of_ours(tmp_path: Path) -> None:
+    hold = make_guard(tmp_path).hold
+    hold.folder.mkdir()
+    hold.file.touch()
+    assert hold.read() == "by hand"
+    hold.file.unlink()
+    assert hold.read() is None
+
+
+def test_a_hold_that_cannot_be_read_holds(tmp_path: Path) -> None:
+    hold = make_guard(tmp_path).hold
+    hold.file.mkdir(parents=True)
+    assert "cannot be read" in str(hold.read())

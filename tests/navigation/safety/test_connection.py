@@ -1,0 +1,194 @@
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fakes import FakeRobot, two_rooms
+from guarding import audit_of, make_guard
+from mapspeak.errors import LinkError, PolicyError
+from mapspeak.navigation.safety import Approval, GuardedConnection, Kind, Policy
+from mapspeak.ros import RosConnection
+from mapspeak.semantic import SemanticMapStore
+from mapspeak.session import Session
+
+pytestmark = pytest.mark.anyio
+
+ZERO = {"x": 0.0, "y": 0.0, "z": 0.0}
+STAND = {"linear": ZERO, "angular": ZERO}
+CREEP = {"linear": {**ZERO, "x": 0.2}, "angular": ZERO}
+RUSH = {"linear": {**ZERO, "x": 2.0}, "angular": ZERO}
+READING = {
+    "is_open",
+    "connected_for_s",
+    "start_soon",
+    "wait_until_connected",
+    "subscribe",
+    "unsubscribe",
+    "renew",
+    "advertise",
+    "unadvertise",
+}
+ENDING = {"cancel_goal", "give_up_goal", "clear_the_way"}
+
+
+class FakeRos:
+    """Notes what reaches it; the rest of the port is not used here."""
+
+    def __init__(self) -> None:
+        self.heard: list[tuple[Any, ...]] = []
+        self.is_dead = False
+
+    def advertise(self, topic: str, *, type_name: str) -> None:
+        assert topic
+        assert type_name
+
+    async def publish(self, topic: str, message: object) -> None:
+        if self.is_dead:
+            raise LinkError("The line is dead.", hint="Wait.")
+        self.heard.append((topic, message))
+
+    def publish_everywhere(self, topic: str, message: object) -> int:
+        self.heard.append((topic, message))
+        return 2
+
+    async def call_service(self, service: str, *_: object, **__: object) -> dict[str, Any]:
+        self.heard.append((service,))
+        return {"success": True}
+
+    async def send_goal(self, action: str, *_: object, **__: object) -> str:
+        self.heard.append((action,))
+        return "goal"
+
+    async def set_parameter(self, node: str, name: str, value: object) -> None:
+        self.heard.append((node, name, value))
+
+
+def guarded(ros: FakeRos, folder: Path, policy: Policy | None = None) -> GuardedConnection:
+    guard = make_guard(folder, policy)
+    connection = GuardedConnection(ros, guard=guard, now_s=lambda: 1.0)  # type: ignore[arg-type]
+    connection.advertise("/cmd_vel", type_name="geometry_msgs/msg/Twist")
+    return connection
+
+
+async def try_everything(connection: GuardedConnection) -> list[str]:
+    refused = []
+    for kind, attempt in (
+        ("publish", lambda: connection.publish("/cmd_vel", CREEP)),
+        ("call", lambda: connection.call_service("/lamp/on")),
+        ("act", lambda: connection.send_goal("/wave", {}, type_name="a/action/Wave")),
+        ("set_parameter", lambda: connection.set_parameter("/camera", "gain", 3)),
+    ):
+        try:
+            await attempt()
+        except PolicyError:
+            refused.append(kind)
+    return refused
+
+
+async def test_what_is_allowed_reaches_ros_and_the_log(tmp_path: Path) -> None:
+    ros = FakeRos()
+    assert await try_everything(guarded(ros, tmp_path)) == []
+    assert len(ros.heard) == 4
+    events = [line.event for line in audit_of(tmp_path)]
+    assert events == ["decision", "result"] * 4
+    assert audit_of(tmp_path)[0].details["type"] == "geometry_msgs/msg/Twist"
+
+
+@pytest.mark.parametrize(
+    "policy",
+    [
+        Policy(is_read_only=True),
+        Policy(rates=dict.fromkeys(Kind, 0)),
+        Policy(approval=Approval(kinds=frozenset(Kind))),
+    ],
+    ids=["read-only", "rates", "approval"],
+)
+async def test_what_is_not_allowed_never_reaches_ros(tmp_path: Path, policy: Policy) -> None:
+    ros = FakeRos()
+    refused = await try_everything(guarded(ros, tmp_path, policy))
+    assert refused == ["publish", "call", "act", "set_parameter"]
+    assert ros.heard == []
+    assert len(audit_of(tmp_path)) == 4
+
+
+async def test_a_hold_and_a_broken_log_let_nothing_through_either(tmp_path: Path) -> None:
+    ros = FakeRos()
+    guard = make_guard(tmp_path)
+    guard.hold.put("a test", at=guard.wall_clock())
+    assert len(await try_everything(guarded(ros, tmp_path))) == 4
+    guard.hold.lift()
+    (tmp_path / "audit.jsonl").unlink()
+    (tmp_path / "audit.jsonl").mkdir()
+    assert len(await try_everything(guarded(ros, tmp_path))) == 4
+    assert ros.heard == []
+
+
+async def test_a_velocity_above_the_limit_is_refused_by_every_way(tmp_path: Path) -> None:
+    ros = FakeRos()
+    connection = guarded(ros, tmp_path)
+    with pytest.raises(PolicyError, match="2 m/s"):
+        await connection.publish("/cmd_vel", RUSH)
+    with pytest.raises(PolicyError, match="2 m/s"):
+        connection.publish_everywhere("/cmd_vel", RUSH)
+    assert ros.heard == []
+
+
+async def test_standing_and_cancelling_always_pass(tmp_path: Path) -> None:
+    ros = FakeRos()
+    policy = Policy(is_read_only=True, rates=dict.fromkeys(Kind, 0))
+    connection = guarded(ros, tmp_path, policy)
+    connection.advertise("/move_base/cancel", type_name="actionlib_msgs/GoalID")
+    await connection.publish("/cmd_vel", STAND)
+    assert connection.publish_everywhere("/cmd_vel", STAND) == 2
+    assert connection.publish_everywhere("/move_base/cancel", {"id": ""}) == 2
+    assert len(ros.heard) == 3
+    assert [line.event for line in audit_of(tmp_path)] == ["stop"] * 3
+
+
+async def test_a_message_without_a_velocity_is_no_stop(tmp_path: Path) -> None:
+    ros = FakeRos()
+    connection = guarded(ros, tmp_path, Policy(is_read_only=True))
+    for message in ({}, {"data": 0}, {"linear": {}, "angular": {"z": 0.1}}):
+        with pytest.raises(PolicyError):
+            connection.publish_everywhere("/cmd_vel", message)
+
+
+async def test_a_message_that_holds_more_than_a_velocity_is_no_stop(tmp_path: Path) -> None:
+    ros = FakeRos()
+    connection = guarded(ros, tmp_path)
+    connection.advertise("/odom", type_name="nav_msgs/msg/Odometry")
+    with pytest.raises(PolicyError, match="denies"):
+        connection.publish_everywhere("/odom", {"twist": {"twist": STAND}, "pose": {}})
+    assert ros.heard == []
+
+
+async def test_what_failed_is_noted_as_given_up(tmp_path: Path) -> None:
+    ros = FakeRos()
+    connection = guarded(ros, tmp_path)
+    ros.is_dead = True
+    with pytest.raises(LinkError):
+        await connection.publish("/cmd_vel", CREEP)
+    assert [line.said for line in audit_of(tmp_path)] == ["", "given up"]
+
+
+def test_every_method_of_the_port_that_is_not_reading_is_guarded() -> None:
+    port = {name for name in vars(RosConnection) if not name.startswith("_")}
+    changing = {name for name in port if not name.startswith("fetch_")} - READING - ENDING
+    assert changing == {
+        "publish",
+        "publish_everywhere",
+        "call_service",
+        "send_goal",
+        "set_parameter",
+    }
+
+
+def test_a_guarded_session_gives_its_tools_the_guarded_connection(tmp_path: Path) -> None:
+    session = Session(
+        FakeRobot(two_rooms()),
+        SemanticMapStore(tmp_path / "m.yaml"),
+        lease_s=60.0,
+        guard=make_guard(tmp_path),
+        ros=FakeRos(),  # type: ignore[arg-type]
+    )
+    assert isinstance(session.ros, GuardedConnection)

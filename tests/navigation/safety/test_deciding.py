@@ -1,0 +1,221 @@
+import math
+from datetime import datetime, time, timedelta
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from guarding import MONDAY_NOON
+from mapspeak.geometry import Pose
+from mapspeak.navigation.goals import GoalCheck, GoalVerdict
+from mapspeak.navigation.safety import (
+    Act,
+    Allowed,
+    Approval,
+    Call,
+    Command,
+    Drive,
+    Hours,
+    Kind,
+    NeedsApproval,
+    Patterns,
+    Policy,
+    Publish,
+    Refused,
+    SetParameter,
+    Situation,
+    decide,
+)
+
+NOW = Situation()
+
+
+def drive(verdict: GoalVerdict = GoalVerdict.OK, *, path_m: float | None = 3.0) -> Drive:
+    check = GoalCheck(verdict=verdict, sentence="so it is.", clearance_m=1.0, path_m=path_m)
+    return Drive(goal=Pose(1.0, 2.0), check=check)
+
+
+def twist(linear: float, angular: float = 0.0) -> dict[str, Any]:
+    zero = {"x": 0.0, "y": 0.0, "z": 0.0}
+    return {"linear": {**zero, "x": linear}, "angular": {**zero, "z": angular}}
+
+
+def velocity(message: dict[str, Any], topic: str = "/cmd_vel") -> Publish:
+    return Publish(topic=topic, type="geometry_msgs/msg/Twist", message=message)
+
+
+COMMANDS: tuple[Command, ...] = (
+    drive(),
+    velocity(twist(0.1)),
+    Call(service="/lights/on", type="std_srvs/srv/Trigger", arguments={}),
+    Act(action="/wave", type="demo_msgs/action/Wave", goal={}),
+    SetParameter(node="/camera", name="exposure", value=3),
+)
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda each: each.kind)
+def test_what_no_rule_is_against_is_allowed(command: Command) -> None:
+    assert decide(command, policy=Policy(), situation=NOW) == Allowed()
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda each: each.kind)
+def test_a_read_only_policy_refuses_everything(command: Command) -> None:
+    decision = decide(command, policy=Policy(is_read_only=True), situation=NOW)
+    assert isinstance(decision, Refused)
+    assert decision.rule == "read_only"
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda each: each.kind)
+def test_a_hold_refuses_everything_and_names_how_it_is_lifted(command: Command) -> None:
+    decision = decide(command, policy=Policy(), situation=Situation(held_by="a person"))
+    assert isinstance(decision, Refused)
+    assert "a person" in decision.reason
+    assert "mapspeak release" in decision.hint
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda each: each.kind)
+def test_more_commands_in_a_minute_than_allowed_are_refused_with_both_numbers(
+    command: Command,
+) -> None:
+    policy = Policy(rates={command.kind: 7})
+    assert decide(command, policy=policy, situation=Situation(n_in_last_minute=6)) == Allowed()
+    decision = decide(command, policy=policy, situation=Situation(n_in_last_minute=7))
+    assert isinstance(decision, Refused)
+    assert "7" in decision.reason
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda each: each.kind)
+def test_what_needs_a_persons_word_needs_it_until_it_is_given(command: Command) -> None:
+    policy = Policy(approval=Approval(kinds=frozenset(Kind)))
+    assert isinstance(decide(command, policy=policy, situation=NOW), NeedsApproval)
+    assert decide(command, policy=policy, situation=Situation(is_approved=True)) == Allowed()
+
+
+def test_a_persons_word_does_not_lift_other_rules() -> None:
+    policy = Policy(approval=Approval(kinds=frozenset(Kind)), farthest_m=1.0)
+    decision = decide(drive(), policy=policy, situation=Situation(is_approved=True))
+    assert isinstance(decision, Refused)
+
+
+@pytest.mark.parametrize(
+    "verdict", [verdict for verdict in GoalVerdict if verdict is not GoalVerdict.OK]
+)
+def test_a_goal_that_is_no_goal_is_refused(verdict: GoalVerdict) -> None:
+    decision = decide(drive(verdict, path_m=None), policy=Policy(), situation=NOW)
+    assert isinstance(decision, Refused)
+    assert decision.reason == "so it is."
+
+
+def test_goals_without_a_known_way_can_be_allowed_but_never_closed_ones() -> None:
+    policy = Policy(needs_known_way=False)
+    unknown = drive(GoalVerdict.UNKNOWN, path_m=None)
+    assert decide(unknown, policy=policy, situation=NOW) == Allowed()
+    for verdict in (GoalVerdict.CLOSED, GoalVerdict.NOT_FINITE):
+        closed = drive(verdict, path_m=None)
+        assert isinstance(decide(closed, policy=policy, situation=NOW), Refused)
+
+
+def test_a_goal_that_is_too_far_is_refused_with_both_lengths() -> None:
+    decision = decide(drive(path_m=30.0), policy=Policy(farthest_m=20.0), situation=NOW)
+    assert isinstance(decision, Refused)
+    assert "30.0 m" in decision.reason
+    assert "20.0 m" in decision.reason
+
+
+@pytest.mark.parametrize(
+    ("message", "says"),
+    [
+        (twist(0.6), "0.6 m/s"),
+        (twist(-0.6), "0.6 m/s"),
+        (twist(0.1, 1.2), "1.2 rad/s"),
+        (twist(math.nan), "nan"),
+        (twist(math.inf), "inf"),
+        ({"linear": {"x": 0.4, "y": 0.4}}, "0.565"),
+        ({"linear": {"x": "0.1"}}, "nan"),
+        ({"linear": {"x": 10**400}}, "inf"),
+        ({"header": {}, "twist": twist(0.6)}, "0.6 m/s"),
+        ({"drive": {"speed": 0.6, "steering_angle": 0.0}}, "0.6 m/s"),
+        ({"markers": [{"twist": twist(0.6)}]}, "0.6 m/s"),
+    ],
+)
+def test_a_velocity_above_the_limit_is_refused_with_number_and_unit(
+    message: dict[str, Any], says: str
+) -> None:
+    decision = decide(velocity(message), policy=Policy(), situation=NOW)
+    assert isinstance(decision, Refused)
+    assert says in decision.reason
+
+
+def test_a_velocity_hidden_deep_in_a_message_is_refused_unread() -> None:
+    message: dict[str, Any] = twist(9.0)
+    for _ in range(50):
+        message = {"inner": message}
+    assert isinstance(decide(velocity(message), policy=Policy(), situation=NOW), Refused)
+
+
+@given(x=st.floats(-0.5, 0.5), y=st.floats(-0.5, 0.5), turn=st.floats(-2, 2))
+def test_exactly_the_velocities_within_the_limits_pass(x: float, y: float, turn: float) -> None:
+    message = {"linear": {"x": x, "y": y, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": turn}}
+    decision = decide(velocity(message), policy=Policy(), situation=NOW)
+    is_slow = math.sqrt(x**2 + y**2) <= 0.5 and abs(turn) <= 1.0
+    assert isinstance(decision, Allowed) == is_slow
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        velocity({}, topic="/goal_pose"),
+        velocity({}, topic="robot1/initialpose/"),
+        velocity({}, topic="/navigate_to_pose/_action/feedback"),
+        Call(service="/nav2/set_parameters", type="rcl_interfaces/srv/SetParameters", arguments={}),
+        Call(service="/rosapi/set_param", type="rosapi_msgs/srv/SetParam", arguments={}),
+        Call(service="/navigate_to_pose/_action/send_goal", type="x/srv/Y", arguments={}),
+        Act(action="/Navigate_To_Pose", type="nav2_msgs/action/NavigateToPose", goal={}),
+        Act(action="/r1/move_base", type="move_base_msgs/MoveBase", goal={}),
+        SetParameter(node="/controller_server", name="FollowPath.max_vel_x", value=9),
+    ],
+    ids=lambda each: str(each.kind),
+)
+def test_what_would_go_around_the_policy_is_denied_by_default(command: Command) -> None:
+    decision = decide(command, policy=Policy(), situation=NOW)
+    assert isinstance(decision, Refused)
+    assert "denies" in decision.reason
+
+
+def test_only_what_is_allowed_passes_and_a_denial_is_stronger() -> None:
+    patterns = {Kind.PUBLISH: Patterns(allow=("/lamp/*",), deny=("/lamp/laser",))}
+    policy = Policy(patterns=patterns)
+
+    def is_allowed(topic: str) -> bool:
+        return decide(velocity({}, topic=topic), policy=policy, situation=NOW) == Allowed()
+
+    assert is_allowed("/lamp/red")
+    assert not is_allowed("/lamp/laser")
+    assert not is_allowed("/cmd_vel")
+
+
+@pytest.mark.parametrize(
+    ("hours", "closed_at", "open_at"),
+    [
+        (Hours(begins=time(8), ends=time(14)), "08:00 12:00 13:59", "07:59 14:00 23:00"),
+        (Hours(begins=time(22), ends=time(6)), "22:00 23:59 00:00 05:59", "06:00 12:00 21:59"),
+        (Hours(ends=time(14)), "00:00 13:59", "14:00"),
+        (Hours(begins=time(8)), "08:00 23:59", "00:00 07:59"),
+        (Hours(), "00:00 12:00 23:59", ""),
+        (Hours(begins=time(8), ends=time(14), days=frozenset({1})), "", "08:00 12:00"),
+        (Hours(begins=time(22), ends=time(6), days=frozenset({6})), "05:59", "06:00 22:00"),
+    ],
+)
+def test_hours_close_by_the_operators_clock(hours: Hours, closed_at: str, open_at: str) -> None:
+    def on_monday(text: str) -> datetime:
+        return datetime.combine(MONDAY_NOON.date(), time.fromisoformat(text), MONDAY_NOON.tzinfo)
+
+    assert [text for text in closed_at.split() if hours.end_of(on_monday(text)) is None] == []
+    assert [text for text in open_at.split() if hours.end_of(on_monday(text))] == []
+
+
+def test_hours_say_when_they_end() -> None:
+    over_night = Hours(begins=time(22), ends=time(6))
+    late = MONDAY_NOON.replace(hour=23)
+    assert over_night.end_of(late) == MONDAY_NOON.replace(hour=6) + timedelta(days=1)

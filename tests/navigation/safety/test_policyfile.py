@@ -1,0 +1,109 @@
+from datetime import time
+from pathlib import Path
+
+import pytest
+
+from mapspeak.errors import ConfigError
+from mapspeak.geometry import Point
+from mapspeak.navigation.safety import (
+    Hours,
+    Kind,
+    Otherwise,
+    Policy,
+    WhenBusy,
+    load_policy,
+)
+
+
+def policy_of(folder: Path, text: str) -> Policy:
+    path = folder / "policy.yaml"
+    path.write_text(text)
+    return load_policy(path)
+
+
+def test_without_a_line_the_defaults_are_on(tmp_path: Path) -> None:
+    assert policy_of(tmp_path, "# nothing yet\n") == Policy()
+
+
+def test_every_key_reaches_the_policy(tmp_path: Path) -> None:
+    policy = policy_of(
+        tmp_path,
+        """
+        read_only: true
+        latch_on_stop: true
+        when_busy: wait
+        speed: {linear_mps: 0.3, angular_radps: 1}
+        goals: {known_way: false, clearance_m: 0.1, farthest_m: 20}
+        keep_out:
+          - {name: stairs, outline: [[1, 2], [3, 2], [3, 4.5]]}
+        closed:
+          - {name: corridor, region: C1, from: "08:00", until: "14:00", days: [mon, tue]}
+        publish: {allow: [/cmd_vel], deny: [/lights], usual_denials: false}
+        approval: {drives: true, otherwise: queue}
+        rates: {drives_per_minute: 3}
+        """,
+    )
+    assert policy.is_read_only
+    assert policy.latches_on_stop
+    assert policy.when_busy is WhenBusy.WAIT
+    assert policy.speeds.linear_mps == 0.3
+    assert (policy.needs_known_way, policy.clearance_m, policy.farthest_m) == (False, 0.1, 20)
+    stairs, corridor = policy.areas
+    assert stairs.outline == (Point(1, 2), Point(3, 2), Point(3, 4.5))
+    assert (corridor.region_id, corridor.hours) == (
+        "C1",
+        Hours(begins=time(8), ends=time(14), days=frozenset({0, 1})),
+    )
+    assert policy.patterns[Kind.PUBLISH].deny == ("/lights",)
+    assert policy.approval.kinds == {Kind.DRIVE}
+    assert policy.approval.otherwise is Otherwise.QUEUE
+    assert policy.rates[Kind.DRIVE] == 3
+
+
+def test_denials_of_ones_own_come_on_top_of_the_usual_ones(tmp_path: Path) -> None:
+    policy = policy_of(tmp_path, "publish: {deny: [/lights]}")
+    assert policy.patterns[Kind.PUBLISH].find_denial("/lights")
+    assert policy.patterns[Kind.PUBLISH].find_denial("/robot1/goal_pose")
+    assert policy.patterns[Kind.PUBLISH].find_denial("/cmd_vel") is None
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("read_only: true\nspeeds: {}\n", "line 2: there is no key 'speeds'. Did you mean `speed`"),
+        ("speed:\n  linear_mps: 0.5\n  angular: 1\n", "line 3: there is no key 'speed.angular'"),
+        ("read_only: yes please\n", "line 1: read_only cannot be 'yes please'"),
+        ("read_only: 1\n", "line 1: read_only"),
+        ("speed:\n  linear_mps: fast\n", "line 2: speed.linear_mps cannot be 'fast'"),
+        ("speed:\n  linear_mps: true\n", "line 2: speed.linear_mps"),
+        ("speed:\n  linear_mps: -1\n", "line 2: speed.linear_mps"),
+        ("speed:\n  linear_mps: .nan\n", "line 2: speed.linear_mps"),
+        ("keep_out:\n- name: a\n  outline: [[0, 0], [1, 0]]\n", "line 3: keep_out.0.outline"),
+        (
+            "keep_out:\n- name: a\n  outline: [[0, 0], [1, 0], [1, x]]\n",
+            "line 3: keep_out.0.outline.2.1 cannot be 'x'",
+        ),
+        ("keep_out:\n- name: a\n", "line 2: keep_out.0"),
+        ("keep_out:\n- {name: a, region: C1, area: 1}\n", "line 2: there is no key"),
+        ('closed:\n- {name: a, region: C1, until: "25:00"}\n', "line 2: closed.0.until"),
+        ("closed:\n- {name: a, region: C1, untill: 8}\n", "Did you mean `until`"),
+        ("closed:\n- {name: a, region: C1, days: [monday]}\n", "closed.0.days.0"),
+        ("when_busy: queue\n", "line 1: when_busy"),
+        ("approval: {otherwise: ask}\n", "approval.otherwise"),
+        ("rates: {drives_per_minute: 1.5}\n", "rates.drives_per_minute"),
+        ("read_only: true\nread_only: false\n", "line 2"),
+        ("a: [1\nb: 2\n", "is no YAML"),
+        ("- read_only\n", "not a list of keys and values"),
+        ("publish: [/cmd_vel]\n", "line 1: publish"),
+    ],
+)
+def test_a_mistake_is_named_with_its_line_and_key(tmp_path: Path, text: str, says: str) -> None:
+    with pytest.raises(ConfigError) as raised:
+        policy_of(tmp_path, text)
+    assert says in str(raised.value)
+    assert "policy.yaml" in str(raised.value)
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"missing\.yaml"):
+        load_policy(tmp_path / "missing.yaml")

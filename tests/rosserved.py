@@ -1,0 +1,104 @@
+"""The ROS tools over a ROS that a test has in its hands, with a client connected in memory."""
+
+from collections.abc import AsyncGenerator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import anyio
+from mcp.client import Client
+
+from bridging import SteppedRobot
+from fakes import FakeRobot, two_rooms
+from mapspeak.links.rosbridge.client import RobotAddress, Timing, open_client
+from mapspeak.links.rosbridge.server import open_rosbridge_server
+from mapspeak.navigation.safety import Guard
+from mapspeak.ros import RosConnection
+from mapspeak.ros.messages import Dialect
+from mapspeak.semantic import SemanticMapStore
+from mapspeak.server import build_server
+from mapspeak.session import Session
+from rosbridge_robot import ScriptedRobot
+from rosbridge_script import PATIENCE_S, running
+from served import text_of
+
+QUICK = Timing(first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0)
+TOOLSETS = ("drive", "ros")
+
+
+class Caller:
+    """Calls tools and gives what they answer."""
+
+    def __init__(self, client: Client) -> None:
+        self.client = client
+
+    async def ask(self, tool: str, /, **arguments: Any) -> str:  # noqa: ANN401
+        """Gives the text of an answer that is no error."""
+        result = await self.client.call_tool(tool, arguments)
+        assert not result.is_error, text_of(result)
+        return text_of(result)
+
+    async def refuse(self, tool: str, /, **arguments: Any) -> str:  # noqa: ANN401
+        """Gives the text of an answer that is an error."""
+        result = await self.client.call_tool(tool, arguments)
+        assert result.is_error, text_of(result)
+        return text_of(result)
+
+
+@asynccontextmanager
+async def served(
+    robot: FakeRobot,
+    connection: RosConnection | None,
+    folder: Path,
+    *,
+    is_read_only: bool = False,
+    guard: Guard | None = None,
+) -> AsyncGenerator[Caller]:
+    """Gives what calls the tools of a robot with that connection."""
+    memory = SemanticMapStore(folder / "semantic_map.yaml")
+    session = Session(robot, memory, lease_s=60.0, guard=guard, ros=connection)
+    server = build_server(session, toolsets=TOOLSETS, is_read_only=is_read_only)
+    with anyio.fail_after(PATIENCE_S):
+        async with Client(server) as client:
+            yield Caller(client)
+
+
+@asynccontextmanager
+async def on_our_server(
+    dialect: Dialect, folder: Path, robot: SteppedRobot | None = None
+) -> AsyncGenerator[tuple[SteppedRobot, Caller]]:
+    """Gives a robot behind our own rosbridge server, and what calls the tools."""
+    stepped = robot or SteppedRobot(two_rooms())
+    async with (
+        open_rosbridge_server(stepped, dialect=dialect) as server,
+        open_client(RobotAddress(url=server.url), timing=QUICK) as client,
+        served(stepped, client, folder) as caller,
+    ):
+        yield stepped, caller
+
+
+@asynccontextmanager
+async def on_script(
+    scripted: ScriptedRobot, folder: Path, *, timing: Timing = QUICK, guard: Guard | None = None
+) -> AsyncGenerator[Caller]:
+    """Gives what calls the tools of a robot that does as the test says."""
+    async with (
+        running(scripted.server) as server,
+        open_client(RobotAddress(url=server.url), timing=timing) as client,
+        served(FakeRobot(two_rooms()), client, folder, guard=guard) as caller,
+    ):
+        yield caller
+
+
+@asynccontextmanager
+async def time_passing(robot: SteppedRobot) -> AsyncGenerator[None]:
+    """Lets the robot's time pass while the context lasts."""
+
+    async def go_on() -> None:
+        while True:
+            await robot.let_pass(0.05)
+
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(go_on)
+        yield
+        tasks.cancel_scope.cancel()

@@ -1,0 +1,162 @@
+from pathlib import Path
+
+import pytest
+
+from fakes import FakeRobot, two_rooms
+from mapspeak.geometry import Pose
+from roaming import RoamingRobot, world_from_text
+from served import connect, pictures_of, report_of, text_of
+
+pytestmark = pytest.mark.anyio
+
+TOOLSETS = ("explore", "drive")
+
+HALL_AND_ROOM = """
+########################
+#..........#...........#
+#..........#...........#
+#..........#...........#
+#..........#...........#
+#......................#
+#......................#
+#......................#
+#......................#
+#..........#...........#
+#..........#...........#
+########################
+"""
+
+
+def _robot() -> RoamingRobot:
+    return RoamingRobot(world_from_text(HALL_AND_ROOM, start=(1.0, 1.4)), has_detector=True)
+
+
+async def test_exploring_goes_on_from_call_to_call_until_nothing_is_left(tmp_path: Path) -> None:
+    async with connect(_robot(), tmp_path, toolsets=TOOLSETS) as client:
+        answer = report_of(await client.call_tool("explore", {"wait_s": 2.0}))
+        assert answer["state"] == "driving"
+        assert answer["goal_id"] == "G1"
+        assert "explore again" in answer["next_step"]
+        for _ in range(20):
+            if answer["state"] != "driving":
+                break
+            answer = report_of(await client.call_tool("explore", {"wait_s": 5.0}))
+    assert answer["state"] == "nothing_left"
+    assert answer["known_area_m2"] > 11.0
+    assert answer["frontiers"] == []
+    assert answer["driven_m"] > 1.0
+
+
+async def test_a_picture_comes_with_every_pause_at_a_goal(tmp_path: Path) -> None:
+    arguments = {"stops_at_goals": True, "n_goals": 1, "wait_s": 25.0}
+    async with connect(_robot(), tmp_path, toolsets=TOOLSETS) as client:
+        result = await client.call_tool("explore", arguments)
+    assert report_of(result)["state"] == "at_goal"
+    assert len(pictures_of(result)) == 1
+    assert "simulated detector" in text_of(result)
+
+
+async def test_a_map_without_frontiers_is_answered_at_once(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        answer = report_of(await client.call_tool("explore", {}))
+    assert answer["state"] == "nothing_left"
+    assert robot.goals == {}
+
+
+async def test_stop_robot_ends_an_exploration(tmp_path: Path) -> None:
+    async with connect(_robot(), tmp_path, toolsets=TOOLSETS) as client:
+        await client.call_tool("explore", {"wait_s": 1.0})
+        await client.call_tool("stop_robot", {})
+        answer = report_of(await client.call_tool("explore", {"wait_s": 1.0}))
+    assert answer["state"] == "interrupted"
+
+
+async def test_a_turn_is_a_drive_in_place(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        by = report_of(await client.call_tool("turn", {"by_deg": -90}))
+        to = report_of(await client.call_tool("turn", {"to_yaw_deg": 180}))
+    assert by["robot"] == {"x": 1.5, "y": 1.4, "yaw_deg": -90.0}
+    assert to["robot"]["yaw_deg"] == 180.0
+    assert to["goal_id"] == "G2"
+
+
+@pytest.mark.parametrize("arguments", [{}, {"by_deg": 90, "to_yaw_deg": 0}])
+async def test_a_turn_is_by_an_angle_or_to_a_heading(
+    tmp_path: Path, arguments: dict[str, object]
+) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        result = await client.call_tool("turn", arguments)
+    assert result.is_error
+    assert "by_deg" in text_of(result)
+    assert robot.goals == {}
+
+
+async def test_looking_around_gives_a_picture_at_each_heading(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        result = await client.call_tool("look_around", {"n_pictures": 3})
+    assert len(pictures_of(result)) == 3
+    assert [round(goal.yaw_deg) for goal in robot.goals.values()] == [120, -120]
+
+
+async def test_looking_around_without_a_camera_moves_nothing(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms(), has_camera=False)
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        result = await client.call_tool("look_around", {})
+    assert result.is_error
+    assert robot.goals == {}
+
+
+class StoppedRobot(FakeRobot):
+    """A robot that somebody stops whenever it sets out."""
+
+    async def send_goal(self, goal: Pose) -> str:
+        goal_id = await super().send_goal(goal)
+        await self.stop()
+        return goal_id
+
+
+async def test_looking_around_ends_when_the_robot_is_stopped(tmp_path: Path) -> None:
+    robot = StoppedRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        result = await client.call_tool("look_around", {"n_pictures": 4})
+    assert len(pictures_of(result)) == 1
+    assert "No picture at 90 deg and beyond" in text_of(result)
+    assert len(robot.goals) == 1
+
+
+async def test_a_search_shows_a_picture_and_goes_on_by_what_was_seen(tmp_path: Path) -> None:
+    async with connect(_robot(), tmp_path, toolsets=TOOLSETS) as client:
+        first = await client.call_tool("search_for", {"thing": "sofa", "wait_s": 25.0})
+        assert report_of(first)["state"] == "look"
+        assert len(pictures_of(first)) == 1
+        answer = {"thing": "sofa", "seen": False, "likely": 0.2, "scores": {"F1": 0.9}}
+        second = report_of(await client.call_tool("search_for", answer))
+        assert second["n_looks"] >= 1
+        found = await client.call_tool("search_for", {"thing": "sofa", "seen": True})
+    assert report_of(found)["state"] == "found"
+    assert pictures_of(found) == []
+
+
+async def test_a_search_in_vain_says_which_places_were_seen(tmp_path: Path) -> None:
+    asked = {"thing": "sofa", "seen": False, "wait_s": 25.0}
+    async with connect(_robot(), tmp_path, toolsets=TOOLSETS) as client:
+        answer = report_of(await client.call_tool("search_for", {"thing": "sofa"}))
+        for _ in range(40):
+            if answer["state"] not in ("look", "driving", "reported"):
+                break
+            answer = report_of(await client.call_tool("search_for", asked))
+    assert answer["state"] == "not_found"
+    assert answer["places_seen"]
+    assert answer["seen_percent"] > 70
+
+
+async def test_a_robot_without_a_camera_searches_for_nothing(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms(), has_camera=False)
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        result = await client.call_tool("search_for", {"thing": "sofa"})
+    assert result.is_error
+    assert "no camera" in text_of(result)

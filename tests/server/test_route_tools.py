@@ -1,0 +1,218 @@
+from pathlib import Path
+
+import pytest
+from mcp.client import Client
+
+from fakes import FakeRobot, two_rooms
+from mapspeak.geometry import Pose
+from mapspeak.robot import GoalState
+from served import connect, pictures_of, report_of, text_of
+
+pytestmark = pytest.mark.anyio
+
+TOOLSETS = ("routes", "drive", "places", "paper")
+
+
+async def _remember(client: Client, name: str, x: float, label: str) -> None:
+    record = {"name": name, "description": "", "safety_landmarks": [label], "x": x, "y": 1.4}
+    await client.call_tool("write_semantic_data", record)
+
+
+async def test_a_route_is_followed_to_its_end_stop_by_stop(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        answer = report_of(await client.call_tool("follow_route", {"stops": ["D1", "6, 1.4, 90"]}))
+    assert answer["state"] == "done"
+    assert answer["done"] == ["D1", "(6.00, 1.40)"]
+    assert answer["legs_m"] == pytest.approx([1.9, 2.6], abs=0.3)
+    assert answer["greedy_m"] is None
+    assert answer["robot"] == {"x": 6.0, "y": 1.4, "yaw_deg": 90.0}
+
+
+async def test_a_long_route_goes_on_with_the_next_call(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    stops = ["3.0, 1.4", "6, 1.4", "2.0, 1.4"]
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        first = report_of(await client.call_tool("follow_route", {"stops": stops, "wait_s": 2.0}))
+        assert first["state"] == "driving"
+        assert (len(first["done"]), len(first["remaining"])) == (1, 1)
+        assert first["next"] == "(6.00, 1.40)"
+        assert "without stops" in first["next_step"]
+        last = report_of(await client.call_tool("follow_route", {"wait_s": 25.0}))
+    assert last["state"] == "done"
+    assert last["robot"]["x"] == 2.0
+
+
+async def test_the_answer_tells_what_the_nearest_choice_would_have_cost(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms(), pose=Pose(3.0, 1.4))
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        await _remember(client, "west", 2.0, "extinguisher")
+        await _remember(client, "east", 5.0, "extinguisher")
+        await _remember(client, "door", 6.5, "exit")
+        answer = report_of(
+            await client.call_tool("follow_route", {"stops": ["extinguisher", "exit"]})
+        )
+    assert answer["done"] == ["extinguisher (W2)", "exit (W3)"]
+    assert answer["greedy_m"] > answer["total_m"] + 1.0
+
+
+async def test_a_look_at_each_stop_comes_with_a_picture_and_pauses_the_route(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(two_rooms())
+    request = {"stops": ["D1", "R1"], "look": True}
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        first = await client.call_tool("follow_route", request)
+        second = await client.call_tool("follow_route", {})
+        third = await client.call_tool("follow_route", {})
+    assert [report_of(each)["state"] for each in (first, second, third)] == [
+        "at_stop",
+        "at_stop",
+        "done",
+    ]
+    assert [len(pictures_of(each)) for each in (first, second, third)] == [1, 1, 0]
+
+
+async def test_the_robot_stands_at_a_stop_as_long_as_was_asked_for(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    request = {"stops": ["2.5, 1.4", "1.5, 1.4"], "pause_s": 30.0, "wait_s": 20.0}
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        first = report_of(await client.call_tool("follow_route", request))
+        assert first["reason"] == "The robot pauses at a stop."
+        assert first["robot"]["x"] == 2.5
+        await client.call_tool("follow_route", {"wait_s": 15.0})
+        last = report_of(await client.call_tool("follow_route", {"wait_s": 25.0}))
+        assert last["state"] == "driving"
+        last = report_of(await client.call_tool("follow_route", {"wait_s": 25.0}))
+    assert last["state"] == "done"
+    assert robot.now_s >= 60.0
+
+
+async def test_a_route_goes_on_after_the_robot_was_stopped(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        await client.call_tool("follow_route", {"stops": ["6, 1.4"], "wait_s": 1.0})
+        await client.call_tool("cancel_goal", {})
+        answer = report_of(await client.call_tool("follow_route", {}))
+    assert answer["state"] == "done"
+    assert len(robot.goals) == 2
+
+
+class DistractedRobot(FakeRobot):
+    """Is sent elsewhere by somebody else during its first drive."""
+
+    async def sleep(self, duration_s: float) -> None:
+        await super().sleep(duration_s)
+        if len(self.goals) == 1 and not self.ended:
+            self._end(GoalState.PREEMPTED)
+
+
+async def test_a_goal_from_elsewhere_interrupts_the_route_until_the_next_call(
+    tmp_path: Path,
+) -> None:
+    async with connect(DistractedRobot(two_rooms()), tmp_path, toolsets=TOOLSETS) as client:
+        answer = report_of(await client.call_tool("follow_route", {"stops": ["6, 1.4"]}))
+        resumed = report_of(await client.call_tool("follow_route", {}))
+    assert answer["state"] == "interrupted"
+    assert "preempted" in answer["reason"]
+    assert resumed["state"] == "done"
+
+
+class StubbornRobot(FakeRobot):
+    """Cannot get to places east of 5 m."""
+
+    async def send_goal(self, goal: Pose) -> str:
+        goal_id = await super().send_goal(goal)
+        if goal.x > 5.0:
+            self._end(GoalState.BLOCKED)
+        return goal_id
+
+
+@pytest.mark.parametrize(
+    ("when_blocked", "state", "next_stop"),
+    [("wait", "blocked", "(6.00, 1.40)"), ("skip", "done", "")],
+)
+async def test_a_blocked_stop_says_so_and_waits_or_is_left_out(
+    tmp_path: Path, when_blocked: str, state: str, next_stop: str
+) -> None:
+    robot = StubbornRobot(two_rooms())
+    request = {"stops": ["6, 1.4", "2.0, 1.4"], "when_blocked": when_blocked}
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        answer = report_of(await client.call_tool("follow_route", request))
+    assert answer["state"] == state
+    assert answer["next"] == next_stop
+    assert len(answer["skipped"]) == (when_blocked == "skip")
+    assert "blocked" in answer["reason"] + "".join(answer["skipped"])
+
+
+async def test_a_stop_that_waits_may_be_left_out_with_the_next_call(tmp_path: Path) -> None:
+    robot = StubbornRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        await client.call_tool("follow_route", {"stops": ["6, 1.4", "2.0, 1.4"]})
+        answer = report_of(await client.call_tool("follow_route", {"when_blocked": "skip"}))
+    assert answer["state"] == "done"
+    assert answer["done"] == ["(2.00, 1.40)"]
+
+
+async def test_new_stops_take_the_place_of_the_route_before(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        await client.call_tool("follow_route", {"stops": ["6, 1.4", "D1"], "wait_s": 0.5})
+        answer = report_of(await client.call_tool("follow_route", {"stops": ["2, 1.4"]}))
+    assert answer["state"] == "done"
+    assert answer["done"] == ["(2.00, 1.40)"]
+
+
+@pytest.mark.parametrize(
+    ("request_", "says"),
+    [
+        ({}, "no route to go on with"),
+        ({"stops": []}, "1 to 20 stops"),
+        ({"stops": ["D1", "the moon"]}, "Stop 2: There is no place called"),
+    ],
+)
+async def test_a_route_that_makes_no_sense_moves_nothing(
+    tmp_path: Path, request_: dict[str, object], says: str
+) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        result = await client.call_tool("follow_route", request_)
+    assert result.is_error
+    assert says in text_of(result)
+    assert not robot.goals
+
+
+async def test_a_phrase_goes_into_every_tool_that_takes_a_place_and_comes_with_its_reason(
+    tmp_path: Path,
+) -> None:
+    words, reason = "right of D1", "right of D1 as seen from the robot in R2"
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=TOOLSETS) as client:
+        checked = report_of(await client.call_tool("check_goal", {"place": words}))
+        described = text_of(await client.call_tool("describe_place", {"place": words}))
+        measured = text_of(await client.call_tool("measure", {"places": [words]}))
+        driven = report_of(await client.call_tool("navigate_to", {"place": words}))
+    assert checked["verdict"] == "ok"
+    assert reason in checked["reason"]
+    assert reason in described
+    assert reason in measured
+    assert driven["place"].startswith(f"{words}: ")
+    assert reason in driven["place"]
+    assert driven["robot"] == checked["pose"]
+
+
+async def test_a_thing_found_by_a_phrase_drives_under_its_own_id(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=TOOLSETS) as client:
+        answer = report_of(await client.call_tool("navigate_to", {"place": "the nearest door"}))
+    assert answer["place"] == "D1"
+
+
+async def test_an_ambiguous_phrase_is_answered_with_the_candidates(tmp_path: Path) -> None:
+    seen = {"label": "chair", "bearing_deg": 0, "range_m": 0.5}
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=TOOLSETS) as client:
+        for name, x in (("west", 1.5), ("east", 5.0)):
+            record = {"name": name, "description": "", "functional_landmarks": [seen]}
+            await client.call_tool("write_semantic_data", {**record, "x": x, "y": 1.4})
+        result = await client.call_tool("navigate_to", {"place": "next to the chair"})
+    assert result.is_error
+    assert "seen from W1" in text_of(result)
+    assert "seen from W2" in text_of(result)
