@@ -57,6 +57,7 @@ class FakeRobot:
         self.has_camera = has_camera
         self.detections: tuple[Detection, ...] = ()
         self.n_stops = 0
+        self.foreign_goals: tuple[GoalState, ...] = ()
         self.goals: dict[str, Pose] = {}
         self.ended: dict[str, GoalStatus] = {}
         self.map_was_asked_for = anyio.Event()
@@ -110,6 +111,9 @@ class FakeRobot:
 
     async def fetch_detections(self) -> tuple[Detection, ...]:
         return self.detections
+
+    async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
+        return self.foreign_goals
 
     async def send_goal(self, goal: Pose) -> str:
         if self._current is not None:

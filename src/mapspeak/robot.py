@@ -202,6 +202,10 @@ class Robot(Protocol):
         """Gives how a drive stands, also after it has ended."""
         ...
 
+    async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
+        """Gives how goals stand that others have sent and that are under way; empty when none."""
+        ...
+
     async def cancel_goal(self, robot_goal_id: str) -> None:
         """Asks the navigation to end a drive; the robot comes to a stand."""
         ...

@@ -1,8 +1,10 @@
 """What every link promises, whatever robot is behind it."""
 
 import io
-from collections.abc import AsyncGenerator, Callable
-from contextlib import AbstractAsyncContextManager, asynccontextmanager
+import os
+from collections.abc import AsyncGenerator, Callable, Iterator
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager
+from pathlib import Path
 
 import pytest
 from PIL import Image
@@ -10,14 +12,21 @@ from PIL import Image
 from fakes import FakeRobot, two_rooms
 from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Pose
+from mapspeak.links.ros2 import open_ros2_robot
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.links.rosbridge.server import open_rosbridge_server
 from mapspeak.links.simulated import Clock, open_simulated_robot
 from mapspeak.robot import GoalState, GoalStatus, Robot
 from mapspeak.ros.messages import Dialect
 from mapspeak.simulator import Simulation, load_world
+from ros2.conftest import START, TWO_ROOMS, import_what_warns
+from ros2.robot_process import open_robot_process, ros_environment
+from ros2.rosbridge_process import open_rosbridge
 
 pytestmark = pytest.mark.anyio
+
+SPEED_MPS = 0.5
+"""Of the robot on real ROS 2: a drive of a metre must not be over before it is looked at."""
 
 OpenRobot = Callable[[], AbstractAsyncContextManager[Robot]]
 
@@ -52,9 +61,46 @@ def open_ros2() -> AbstractAsyncContextManager[Robot]:
     return open_over_rosbridge(Dialect.ROS2)
 
 
+@contextmanager
+def real_ros2_robot() -> Iterator[dict[str, str]]:
+    """A robot on real ROS 2, as a process of its own; gives what its domain is named by."""
+    import_what_warns()
+    environment = ros_environment()
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        open_robot_process(TWO_ROOMS, pose=START, speed_mps=SPEED_MPS, environment=environment),
+    ):
+        for name, value in environment.items():
+            patch.setenv(name, value)
+        yield environment
+
+
+@asynccontextmanager
+async def open_over_rclpy() -> AsyncGenerator[Robot]:
+    with real_ros2_robot():
+        async with open_ros2_robot() as robot:
+            yield robot
+
+
+@asynccontextmanager
+async def open_over_real_rosbridge() -> AsyncGenerator[Robot]:
+    source = os.environ.get("MAPSPEAK_ROSBRIDGE_SOURCE")
+    if not source:
+        pytest.skip("not run: MAPSPEAK_ROSBRIDGE_SOURCE names no folder with rosbridge_suite")
+    with real_ros2_robot() as environment, open_rosbridge(Path(source), environment) as url:
+        async with open_rosbridge_robot(url) as robot:
+            yield robot
+
+
 @pytest.fixture(
-    params=[open_fake, open_simulated, open_ros1, open_ros2],
-    ids=["fake", "simulated", "rosbridge-ros1", "rosbridge-ros2"],
+    params=[
+        pytest.param(open_fake, id="fake"),
+        pytest.param(open_simulated, id="simulated"),
+        pytest.param(open_ros1, id="rosbridge-ros1"),
+        pytest.param(open_ros2, id="rosbridge-ros2"),
+        pytest.param(open_over_rclpy, id="rclpy", marks=pytest.mark.ros2),
+        pytest.param(open_over_real_rosbridge, id="real-rosbridge", marks=pytest.mark.ros2),
+    ],
 )
 def open_robot(request: pytest.FixtureRequest) -> OpenRobot:
     chosen: OpenRobot = request.param
@@ -144,7 +190,9 @@ async def test_robot_time_passes_while_one_sleeps(open_robot: OpenRobot) -> None
     async with open_robot() as robot:
         before_s = robot.now_s
         await robot.sleep(1.0)
-    assert robot.now_s == pytest.approx(before_s + 1.0, abs=0.06)
+        passed_s = robot.now_s - before_s
+    # A real clock goes on until a busy machine wakes us.
+    assert 0.94 < passed_s < 3.0
 
 
 async def test_a_picture_is_as_large_as_it_says(open_robot: OpenRobot) -> None:

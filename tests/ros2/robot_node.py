@@ -162,6 +162,12 @@ class RobotNode:
             "is_driving": self._drive is not None,
         }
 
+    def leave(self) -> None:
+        """Ends what waits, so that the program can end."""
+        with self._lock:
+            if self._drive:
+                self.end(self._drive, self._drive.handle.abort, "The robot is switched off.")
+
     def set_recoveries(self, *, n: int) -> Reply:
         self._n_recoveries = n
         return {}
@@ -244,6 +250,7 @@ def main() -> None:
         def listen() -> None:
             for line in sys.stdin:
                 robot.obey(line)
+            robot.leave()
             executor.shutdown(timeout_sec=0.0)
 
         threading.Thread(target=listen, daemon=True).start()

@@ -179,3 +179,12 @@ async def test_true_is_no_number_of_metres(tmp_path: Path) -> None:
     assert "wants a number for x" in text_of(drive)
     assert look.is_error
     assert robot.goals == {}
+
+
+async def test_a_drive_that_somebody_else_has_begun_is_told(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    robot.foreign_goals = (GoalState.DRIVING,)
+    async with connect(robot, tmp_path) as client:
+        answer = await client.call_tool("wait_for_goal", {"wait_s": 0})
+    assert answer.is_error
+    assert "somebody else has sent: driving" in text_of(answer)

@@ -31,7 +31,13 @@ CONTROL_OPTION = click.option(
     "given.",
 )
 GUARD_OPTIONS = (
-    click.option("--policy", type=FILE, help="policy.yaml: limits, closed areas, approvals."),
+    click.option(
+        "--policy",
+        "policies",
+        multiple=True,
+        metavar="[NAME=]FILE",
+        help="policy.yaml: limits, closed areas, approvals.",
+    ),
     click.option(
         "--audit",
         type=FILE,

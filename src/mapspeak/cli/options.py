@@ -6,7 +6,15 @@ from typing import Any
 
 import click
 
-__all__ = ["DEFAULT_WORLD", "FILE", "ROBOT_OPTIONS", "SEED_OPTION", "WORLD_OPTION", "add_options"]
+__all__ = [
+    "DEFAULT_WORLD",
+    "FILE",
+    "ROBOT_HELP",
+    "ROBOT_OPTIONS",
+    "SEED_OPTION",
+    "WORLD_OPTION",
+    "add_options",
+]
 
 Command = Callable[..., Any]
 Decorator = Callable[[Command], Command]
@@ -24,14 +32,12 @@ SEED_OPTION = click.option(
 WORLD_OPTION = click.option(
     "--world", default=DEFAULT_WORLD, show_default=True, help="A world or world file."
 )
+ROBOT_HELP = (
+    "sim[:WORLD], where WORLD is a shipped world, a world file or a map; the address of a "
+    "rosbridge, such as ws://192.168.1.20:9090; or ros2[:DOMAIN] or dds[:DOMAIN] without one."
+)
 ROBOT_OPTIONS = (
-    click.option(
-        "--robot",
-        default=f"sim:{DEFAULT_WORLD}",
-        show_default=True,
-        help="sim[:WORLD], where WORLD is a shipped world or a world file; or the address of a "
-        "robot's rosbridge, such as ws://192.168.1.20:9090.",
-    ),
+    click.option("--robot", default=f"sim:{DEFAULT_WORLD}", show_default=True, help=ROBOT_HELP),
     click.option(
         "--robot-file", type=FILE, help="robot.yaml: what is not to be found by asking the robot."
     ),

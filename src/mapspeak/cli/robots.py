@@ -1,9 +1,10 @@
-"""The robot that a command is about: simulated, or behind a rosbridge."""
+"""The robot that a command is about: simulated, behind a rosbridge, or in a ROS 2 domain."""
 
 import os
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ from mapspeak.cli.options import DEFAULT_WORLD
 from mapspeak.errors import ConfigError
 
 if TYPE_CHECKING:
+    from mapspeak.links.dds import DdsNetwork
     from mapspeak.robot import Robot
     from mapspeak.ros import RosConnection
 
@@ -18,6 +20,7 @@ __all__ = ["RobotChoice", "find_connection", "open_robot"]
 
 ROBOT_TOKEN_VARIABLE = "MAPSPEAK_ROBOT_TOKEN"  # noqa: S105 - the variable's name, not a token
 ROSBRIDGE_SCHEMES = ("ws://", "wss://")
+LARGEST_DOMAIN = 232
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +28,8 @@ class RobotChoice:
     """Which robot, and how to reach it.
 
     Attributes:
-        robot: "sim", "sim:WORLD", or a rosbridge's address.
+        robot: "sim", "sim:WORLD", a rosbridge's address, or "ros2" or "dds", each perhaps with a
+            domain as in "dds:DOMAIN".
         robot_file: What is said of it in robot.yaml.
         ca_file: For wss.
         seed: Of the simulated robot's noise.
@@ -56,10 +60,15 @@ async def open_robot(choice: RobotChoice) -> AsyncGenerator["Robot"]:
         opened = _open_rosbridge(choice)
     elif kind == "sim":
         opened = _open_simulated(choice, world or DEFAULT_WORLD)
+    elif kind == "ros2":
+        opened = _open_ros2(choice, world)
+    elif kind == "dds":
+        opened = _open_dds(choice, world)
     else:
         raise ConfigError(
             f"There is no link for the robot {choice.robot!r}.",
-            hint="Use sim, sim:WORLD, sim:PATH to a world file, or ws://HOST:9090 for a rosbridge.",
+            hint="Use sim, sim:WORLD, sim:PATH to a world file, ws://HOST:9090 for a rosbridge, or "
+            "for ROS 2 without one ros2 (as a node of it) or dds (without ROS here).",
         )
     async with opened as robot:
         yield robot
@@ -70,11 +79,7 @@ async def _open_rosbridge(choice: RobotChoice) -> AsyncGenerator["Robot"]:
     from mapspeak.links.ros import RobotOverrides, load_robot_file  # noqa: PLC0415 - heavy
     from mapspeak.links.rosbridge import RobotAddress, open_rosbridge_robot  # noqa: PLC0415
 
-    if choice.clock == "virtual" or choice.has_detector or choice.state_log is not None:
-        raise ConfigError(
-            "--clock virtual, --detector and --state-log are for the simulated robot.",
-            hint="Leave them away, or use --robot sim.",
-        )
+    _refuse_simulators_options(choice)
     token = os.environ.get(ROBOT_TOKEN_VARIABLE)
     address = RobotAddress(
         url=choice.robot,
@@ -87,14 +92,95 @@ async def _open_rosbridge(choice: RobotChoice) -> AsyncGenerator["Robot"]:
 
 
 @asynccontextmanager
+async def _open_ros2(choice: RobotChoice, domain: str) -> AsyncGenerator["Robot"]:
+    """Takes what is there: rclpy, else DDS without ROS."""
+    if find_spec("rclpy") is None and find_spec("cyclonedds") is not None:
+        async with _open_dds(choice, domain) as robot:
+            yield robot
+        return
+    _refuse_simulators_options(choice)
+    if choice.ca_file is not None:
+        raise ConfigError("--ca-file is for wss://.", hint="Leave it away: DDS has no such thing.")
+    if domain and not (domain.isascii() and domain.isdigit() and int(domain) <= LARGEST_DOMAIN):
+        raise ConfigError(
+            f"{domain[:40]!r} is no ROS domain.",
+            hint=f"Use ros2, or ros2:DOMAIN with a number from 0 to {LARGEST_DOMAIN}.",
+        )
+    from mapspeak.links.ros import RobotOverrides, load_robot_file  # noqa: PLC0415 - heavy
+    from mapspeak.links.ros2 import open_ros2_robot  # noqa: PLC0415
+
+    overrides = load_robot_file(choice.robot_file) if choice.robot_file else RobotOverrides()
+    async with open_ros2_robot(
+        domain_id=int(domain) if domain else None,
+        distro=os.environ.get("ROS_DISTRO", ""),
+        overrides=overrides,
+    ) as robot:
+        yield robot
+
+
+@asynccontextmanager
+async def _open_dds(choice: RobotChoice, domain: str) -> AsyncGenerator["Robot"]:
+    _refuse_simulators_options(choice)
+    if choice.ca_file is not None:
+        raise ConfigError("--ca-file is for wss://.", hint="Leave it away: DDS has no such thing.")
+    if find_spec("cyclonedds") is None:
+        raise ConfigError(
+            "--robot dds needs a package that is not installed.",
+            hint='Install it: pip install "mapspeak[dds]". It is there for Python 3.11 to 3.13.',
+        )
+    from mapspeak.links.dds import open_dds_robot  # noqa: PLC0415 - optional, and heavy
+    from mapspeak.links.ros import RobotOverrides, load_robot_file  # noqa: PLC0415
+
+    network = read_network(domain, os.environ)
+    overrides = load_robot_file(choice.robot_file) if choice.robot_file else RobotOverrides()
+    async with open_dds_robot(network, overrides=overrides) as robot:
+        yield robot
+
+
+def read_network(domain: str, environment: Mapping[str, str]) -> "DdsNetwork":
+    """Gives where to look for a ROS 2 system, as the variables say that ROS itself heeds.
+
+    Args:
+        domain: As given with --robot; empty takes ROS_DOMAIN_ID.
+        environment: The variables.
+
+    Raises:
+        ConfigError: That is no domain.
+    """
+    from mapspeak.links.dds import DdsNetwork  # noqa: PLC0415 - optional, and heavy
+
+    said = domain or environment.get("ROS_DOMAIN_ID") or "0"
+    if not (said.isascii() and said.isdigit() and int(said) <= LARGEST_DOMAIN):
+        raise ConfigError(
+            f"{said[:40]!r} is no ROS domain.",
+            hint=f"Use dds, or dds:DOMAIN with a number from 0 to {LARGEST_DOMAIN}.",
+        )
+    peers = environment.get("ROS_STATIC_PEERS", "")
+    return DdsNetwork(
+        domain_id=int(said),
+        is_local=environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() == "LOCALHOST"
+        or environment.get("ROS_LOCALHOST_ONLY") == "1",
+        peers=tuple(peer.strip() for peer in peers.split(";") if peer.strip()),
+    )
+
+
+def _refuse_simulators_options(choice: RobotChoice) -> None:
+    if choice.clock == "virtual" or choice.has_detector or choice.state_log is not None:
+        raise ConfigError(
+            "--clock virtual, --detector and --state-log are for the simulated robot.",
+            hint="Leave them away, or use --robot sim.",
+        )
+
+
+@asynccontextmanager
 async def _open_simulated(choice: RobotChoice, world: str) -> AsyncGenerator["Robot"]:
     from mapspeak.links.simulated import Clock, open_simulated_robot  # noqa: PLC0415
     from mapspeak.simulator import Simulation, StateLog, load_world  # noqa: PLC0415
 
     if choice.robot_file is not None or choice.ca_file is not None:
         raise ConfigError(
-            "--robot-file and --ca-file are for a robot behind a rosbridge.",
-            hint="Leave them away, or name the robot with --robot ws://HOST:9090.",
+            "--robot-file and --ca-file are for a robot that speaks ROS.",
+            hint="Leave them away, or name the robot with --robot ws://HOST:9090 or dds.",
         )
     simulation = Simulation(load_world(world), seed=choice.seed)
     log = StateLog(simulation, choice.state_log) if choice.state_log else None

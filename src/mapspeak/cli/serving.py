@@ -4,18 +4,23 @@ import math
 import os
 import re
 import signal
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from contextlib import AsyncExitStack
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import anyio
 import click
 
+from mapspeak.cli.fleet import file_for, name_robots, split_files
 from mapspeak.cli.guarding import GUARD_OPTIONS, GuardChoice, build_guard, data_folder
-from mapspeak.cli.options import FILE, ROBOT_OPTIONS, add_options
+from mapspeak.cli.options import DEFAULT_WORLD, FILE, ROBOT_HELP, ROBOT_OPTIONS, add_options
 from mapspeak.cli.robots import RobotChoice, find_connection, open_robot
+from mapspeak.errors import ConfigError
 
 if TYPE_CHECKING:
+    from mapspeak.server import MapspeakServer
     from mapspeak.session import Session
 
 __all__ = ["serve", "usual_semantic_map"]
@@ -28,14 +33,37 @@ DEFAULT_HTTP = "127.0.0.1:8766"
 class ServeOptions:
     """What `mapspeak serve` was asked for."""
 
-    robot: RobotChoice
+    robots: Mapping[str, "RobotStart"]
     http: str | None
     toolsets: tuple[str, ...]
     tools: tuple[str, ...]
     is_read_only: bool
-    semantic_map: Path | None
     lease_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotStart:
+    """One robot as it is to be served.
+
+    Attributes:
+        choice: Which robot, and how to reach it.
+        semantic_map: Its memory; None for the usual file.
+        guard: What its commands are held to.
+    """
+
+    choice: RobotChoice
+    semantic_map: Path | None
     guard: GuardChoice
+
+
+@dataclass(frozen=True, slots=True)
+class RobotOptions:
+    """What may be said for each robot apart, as on the command line: "NAME=..."."""
+
+    robots: tuple[str, ...]
+    robot_files: tuple[str, ...]
+    semantic_maps: tuple[str, ...]
+    policies: tuple[str, ...]
 
 
 def _split_names(
@@ -47,7 +75,23 @@ def _split_names(
 
 
 @click.command()
-@add_options(ROBOT_OPTIONS)
+@click.option(
+    "--robot",
+    "robots",
+    multiple=True,
+    metavar="[NAME=]ROBOT",
+    default=(f"sim:{DEFAULT_WORLD}",),
+    show_default=True,
+    help=f"{ROBOT_HELP} Several robots need a name each: --robot hall=ws://... --robot yard=...",
+)
+@click.option(
+    "--robot-file",
+    "robot_files",
+    multiple=True,
+    metavar="[NAME=]FILE",
+    help="robot.yaml: what is not to be found by asking the robot.",
+)
+@add_options(ROBOT_OPTIONS[2:])
 @click.option(
     "--clock",
     type=click.Choice(["real", "virtual"]),
@@ -70,7 +114,9 @@ def _split_names(
 @click.option("--read-only", "is_read_only", is_flag=True, help="No tool that changes anything.")
 @click.option(
     "--semantic-map",
-    type=FILE,
+    "semantic_maps",
+    multiple=True,
+    metavar="[NAME=]FILE",
     help="The YAML file of remembered places; one per map in the user's data folder unless given.",
 )
 @click.option(
@@ -84,8 +130,8 @@ def _split_names(
 )
 @add_options(GUARD_OPTIONS)
 def serve(
-    robot: str,
-    robot_file: Path | None,
+    robots: tuple[str, ...],
+    robot_files: tuple[str, ...],
     ca_file: Path | None,
     seed: int,
     clock: str,
@@ -94,77 +140,142 @@ def serve(
     toolsets: tuple[str, ...] | None,
     tools: tuple[str, ...] | None,
     is_read_only: bool,  # noqa: FBT001 - a flag
-    semantic_map: Path | None,
+    semantic_maps: tuple[str, ...],
     state_log: Path | None,
     lease_s: float,
-    policy: Path | None,
+    policies: tuple[str, ...],
     audit: Path | None,
     control: Path | None,
 ) -> None:
-    """Serves a robot to MCP clients, over stdio or streaming HTTP."""
+    """Serves a robot, or several, to MCP clients, over stdio or streaming HTTP."""
     from mapspeak.server import DEFAULT_TOOLSETS  # noqa: PLC0415 - heavy; help must be quick
 
-    options = ServeOptions(
-        robot=RobotChoice(
-            robot=robot,
-            robot_file=robot_file,
+    starts = _read_starts(
+        RobotOptions(robots, robot_files, semantic_maps, policies),
+        RobotChoice(
+            robot="",
             ca_file=ca_file,
             seed=seed,
             clock=clock,
             has_detector=has_detector,
             state_log=state_log,
         ),
+        GuardChoice(audit=audit, control=control),
+    )
+    options = ServeOptions(
+        robots=starts,
         http=http,
         toolsets=DEFAULT_TOOLSETS if toolsets is None else toolsets,
         tools=tools or (),
         is_read_only=is_read_only,
-        semantic_map=semantic_map,
         lease_s=lease_s,
-        guard=GuardChoice(policy=policy, audit=audit, control=control),
     )
     anyio.run(_serve, options)
 
 
+def _read_starts(
+    given: RobotOptions, choice: RobotChoice, guard: GuardChoice
+) -> dict[str, RobotStart]:
+    """Gives each robot as it is to be served, by its name.
+
+    Args:
+        given: What may differ between robots.
+        choice: What is the same for all of them.
+        guard: Likewise.
+
+    Raises:
+        ConfigError: Something does not fit together.
+    """
+    named = name_robots(given.robots)
+    files = split_files(given.robot_files, named, "--robot-file")
+    maps = split_files(given.semantic_maps, named, "--semantic-map")
+    limits = split_files(given.policies, named, "--policy")
+    if len(named) > 1 and choice.state_log is not None:
+        raise ConfigError("--state-log is for one robot.", hint="Serve one, or leave it away.")
+    if len(named) > 1 and file_for("", maps) is not None:
+        raise ConfigError(
+            "--semantic-map needs a robot's name: places belong to one map.",
+            hint="Write --semantic-map NAME=FILE for each robot.",
+        )
+    return {
+        name: RobotStart(
+            choice=replace(choice, robot=address, robot_file=file_for(name, files)),
+            semantic_map=file_for(name, maps),
+            guard=replace(guard, policy=file_for(name, limits)),
+        )
+        for name, address in named.items()
+    }
+
+
 async def _serve(options: ServeOptions) -> None:
+    from mapspeak.server import FleetServer, serve_http, serve_stdio  # noqa: PLC0415 - heavy
+
+    async with AsyncExitStack() as links:
+        sessions = {
+            name: await _open_session(name, start, options, links)
+            for name, start in options.robots.items()
+        }
+        servers = {name: _build_server(session, options) for name, session in sessions.items()}
+        server = next(iter(servers.values())) if list(servers) == [""] else FleetServer(servers)
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(_end_on_signal, sessions.values())
+            for session in sessions.values():
+                tasks.start_soon(session.keep_watch)
+            try:
+                if options.http is None:
+                    await serve_stdio(server)
+                else:
+                    token = os.environ.get(TOKEN_VARIABLE) or None
+                    await serve_http(server, options.http, token=token)
+            finally:
+                await _close_all(sessions.values())
+                tasks.cancel_scope.cancel()
+
+
+async def _open_session(
+    name: str, start: RobotStart, options: ServeOptions, links: AsyncExitStack
+) -> "Session":
     from mapspeak.semantic import SemanticMapStore  # noqa: PLC0415 - heavy; help must be quick
-    from mapspeak.server import build_server, serve_http, serve_stdio  # noqa: PLC0415
-    from mapspeak.server.tools import require_ros  # noqa: PLC0415
     from mapspeak.session import Session  # noqa: PLC0415
 
-    guard = build_guard(options.guard, robot=options.robot.robot)
-    async with open_robot(options.robot) as robot, anyio.create_task_group() as tasks:
-        map_name = robot.description.map_name
-        path = options.semantic_map or usual_semantic_map(map_name, options.robot.robot)
-        # A client on stdio cannot vanish unnoticed: its end of the pipe closes.
-        lease_s = math.inf if options.http is None else options.lease_s
-        memory = SemanticMapStore(path, map_id=map_name or None)
-        ros = find_connection(robot, options.robot)
-        session = Session(robot, memory, lease_s=lease_s, guard=guard, ros=ros)
-        require_ros(session, toolsets=options.toolsets, tools=options.tools)
-        server = build_server(
-            session,
-            toolsets=options.toolsets,
-            tools=options.tools,
-            is_read_only=options.is_read_only,
-        )
-        tasks.start_soon(_end_on_signal, session)
-        tasks.start_soon(session.keep_watch)
-        try:
-            if options.http is None:
-                await serve_stdio(server)
-            else:
-                await serve_http(server, options.http, token=os.environ.get(TOKEN_VARIABLE) or None)
-        finally:
-            await session.close()
-            tasks.cancel_scope.cancel()
+    guard = build_guard(start.guard, robot=name or start.choice.robot)
+    robot = await links.enter_async_context(open_robot(start.choice))
+    map_name = robot.description.map_name
+    path = start.semantic_map or usual_semantic_map(map_name, start.choice.robot)
+    # A client on stdio cannot vanish unnoticed: its end of the pipe closes.
+    lease_s = math.inf if options.http is None else options.lease_s
+    memory = SemanticMapStore(path, map_id=map_name or None)
+    ros = find_connection(robot, start.choice)
+    return Session(robot, memory, lease_s=lease_s, guard=guard, ros=ros)
 
 
-async def _end_on_signal(session: "Session") -> None:
+def _build_server(session: "Session", options: ServeOptions) -> "MapspeakServer":
+    from mapspeak.server import build_server  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.server.tools import require_ros  # noqa: PLC0415
+
+    require_ros(session, toolsets=options.toolsets, tools=options.tools)
+    return build_server(
+        session,
+        toolsets=options.toolsets,
+        tools=options.tools,
+        is_read_only=options.is_read_only,
+    )
+
+
+async def _end_on_signal(sessions: "Collection[Session]") -> None:
     with anyio.open_signal_receiver(signal.SIGINT, signal.SIGTERM) as signals:
         async for number in signals:
-            await session.close()
+            await _close_all(sessions)
             # A thread may wait for standard input for ever; there is nothing left to wait for.
             os._exit(128 + number)
+
+
+async def _close_all(sessions: "Collection[Session]") -> None:
+    """Leaves every robot standing, all at once."""
+    with anyio.CancelScope(shield=True):
+        async with anyio.create_task_group() as tasks:
+            for session in sessions:
+                tasks.start_soon(session.close)
 
 
 def usual_semantic_map(map_name: str, robot: str) -> Path:

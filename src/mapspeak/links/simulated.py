@@ -115,6 +115,10 @@ class SimulatedRobot:
         async with self._looking:
             return await anyio.to_thread.run_sync(self._detect)
 
+    async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
+        """Gives nothing: nobody else can send this robot anywhere."""
+        return ()
+
     async def send_goal(self, goal: Pose) -> str:
         """Starts a drive in the simulated navigation."""
         return str(await self._run(lambda: self._simulation.start_goal(goal)))

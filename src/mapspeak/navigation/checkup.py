@@ -20,9 +20,20 @@ async def examine(robot: Robot) -> tuple[Finding, ...]:
     found.append(await _ask("pose", lambda: _look_at_pose(robot)))
     if found[0].health is not Health.MISSING and found[1].health is not Health.MISSING:
         found.append(await _ask("place", lambda: _look_at_place(robot)))
+    if goals := await robot.fetch_foreign_goals():
+        found.append(_busy(len(goals)))
     if robot.description.has_camera:
         found.append(await _ask("picture", lambda: _look_at_picture(robot)))
     return tuple(found)
+
+
+def _busy(n_goals: int) -> Finding:
+    return Finding(
+        what="goals",
+        health=Health.DOUBTFUL,
+        said=f"{n_goals} under way that somebody else has sent",
+        hint="A new goal replaces them; stop_robot ends them.",
+    )
 
 
 async def _ask(what: str, look: Callable[[], Awaitable[Finding]]) -> Finding:

@@ -185,6 +185,8 @@ class DriveBook:
             GoalError: No drive has that id.
             LinkError: The robot does not answer.
         """
+        if goal_id is None and not self._drives:
+            await self._check_foreign_goals()
         drive = self._find(goal_id)
         status = drive.final or await self._fetch_status(drive)
         drive = self._note_end(drive, status)
@@ -358,6 +360,15 @@ class DriveBook:
         with anyio.CancelScope(shield=True):
             await self._robot.stop()
         return await self.report(drive.goal_id)
+
+    async def _check_foreign_goals(self) -> None:
+        goals = await self._robot.fetch_foreign_goals()
+        if goals:
+            raise GoalError(
+                f"No drive of ours is under way, but {len(goals)} that somebody else has sent: "
+                f"{', '.join(goals)}.",
+                hint="The robot moves by itself: wait, or end it with stop_robot.",
+            )
 
     def _find(self, goal_id: str | None) -> Drive:
         drive = self.latest if goal_id is None else self._drives.get(goal_id.strip().upper())

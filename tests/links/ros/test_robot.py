@@ -12,7 +12,7 @@ from mapspeak.geometry import Pose
 from mapspeak.links.ros import DrivingPatience, RosRobot
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.links.rosbridge.client import Timing
-from rosbridge_robot import ScriptedRobot
+from rosbridge_robot import CANCEL_SERVICE, ScriptedRobot
 from rosbridge_script import PATIENCE_S, Operation, running
 
 pytestmark = pytest.mark.anyio
@@ -56,6 +56,19 @@ async def test_navigation_that_is_found_late_takes_the_first_goal() -> None:
         assert robot.profile.navigation_name is None
         await robot.send_goal(Pose(4.0, 2.0))
     assert len(scripted.goals) == 1
+
+
+async def test_stop_ends_the_goals_of_a_navigation_that_is_found_only_then() -> None:
+    scripted = ScriptedRobot()
+    found = scripted.services["/rosapi/action_servers"](Operation({}))
+    scripted.services["/rosapi/action_servers"] = only_after(
+        1, found, nothing={"action_servers": []}
+    )
+    async with connected(scripted) as robot:
+        assert robot.profile.navigation_name is None
+        await robot.stop()
+    called = [each["service"] for each in scripted.server.asked("call_service")]
+    assert CANCEL_SERVICE in called
 
 
 async def test_a_map_that_is_found_late_is_waited_for() -> None:

@@ -200,6 +200,18 @@ async def test_cancelling_names_the_goal_and_stopping_names_all() -> None:
     assert all(each["msg"]["stamp"] == {"secs": 0, "nsecs": 0} for each in cancels)
 
 
+async def test_a_goal_that_another_client_has_sent_to_move_base_is_seen() -> None:
+    scripted = ScriptedRobot(ros=1)
+    async with connected(scripted) as robot:
+        goal_id = await send(scripted, robot)
+        await tell(scripted, status_of(goal_id, 1), status_of("theirs", 1))
+
+        async def is_seen() -> bool:
+            return await robot.fetch_foreign_goals() == (GoalState.DRIVING,)
+
+        await eventually(is_seen)
+
+
 async def test_odd_messages_of_move_base_are_left_away() -> None:
     scripted = ScriptedRobot(ros=1)
     async with connected(scripted) as robot:

@@ -420,6 +420,32 @@ async def test_a_goal_that_replaces_another_does_not_wait_behind_it() -> None:
     assert len(scripted.server.visitors) == 2
 
 
+async def test_a_goal_that_another_client_has_sent_is_seen_until_it_ends() -> None:
+    scripted = ScriptedRobot()
+    async with connected(scripted) as robot:
+        await scripted.tell_status(OTHERS, 2)
+
+        async def is_seen() -> bool:
+            return await robot.fetch_foreign_goals() == (GoalState.DRIVING,)
+
+        await eventually(is_seen)
+        await scripted.tell_status(OTHERS, SUCCEEDED)
+
+        async def is_gone() -> bool:
+            return await robot.fetch_foreign_goals() == ()
+
+        await eventually(is_gone)
+
+
+async def test_our_own_goal_is_not_taken_for_another_clients() -> None:
+    scripted = ScriptedRobot()
+    async with connected(scripted) as robot:
+        goal_id = await robot.send_goal(GOAL)
+        await scripted.tell_status(OURS, 2)
+        await until_state(robot, goal_id, GoalState.DRIVING)
+        assert await robot.fetch_foreign_goals() == ()
+
+
 async def test_a_goal_of_another_client_that_replaces_ours_is_told_as_that() -> None:
     scripted = ScriptedRobot()
     async with connected(scripted) as robot:

@@ -1,6 +1,7 @@
 """The port implemented over any connection to ROS 1 or ROS 2."""
 
 from collections import OrderedDict
+from collections.abc import Callable
 from contextlib import suppress
 
 import anyio
@@ -33,6 +34,7 @@ from mapspeak.links.ros.velocity import Brake
 from mapspeak.robot import (
     CameraPicture,
     Detection,
+    GoalState,
     GoalStatus,
     RobotDescription,
     StampedPose,
@@ -43,6 +45,8 @@ from mapspeak.spatial import OccupancyGrid
 MOST_GOALS_KEPT = 1_000
 LOOK_AGAIN_S = 5.0
 """Between two looks for a better source of the pose while no new frames appear, in wall time."""
+SETTLING_PAUSE_S = 0.2
+"""Between two looks right after connecting, when a robot is still found bit by bit."""
 USUAL_PATIENCE = DrivingPatience()
 NOTHING_SAID = RobotOverrides()
 
@@ -56,7 +60,7 @@ class RosRobot:
         frames: Listens to its coordinate frames.
         clock: Tells its time.
         overrides: What robot.yaml says, for what is found only later.
-        patience: How long to wait for its navigation.
+        patience: How long to wait for what it offers, and for its navigation.
     """
 
     def __init__(
@@ -107,8 +111,7 @@ class RosRobot:
     async def fetch_map(self) -> OccupancyGrid:
         """Gives the latest map; the same value as long as it has not changed."""
         await self.connection.wait_until_connected()
-        if self.profile.map_topic is None:
-            await self._look_again()
+        await self._look_until(lambda: self.profile.map_topic is not None)
         return await self._maps.fetch()
 
     async def fetch_pose(self) -> StampedPose:
@@ -121,8 +124,7 @@ class RosRobot:
     async def fetch_picture(self) -> CameraPicture:
         """Takes a picture with the front camera."""
         await self.connection.wait_until_connected()
-        if self.profile.camera_topic is None:
-            await self._look_again()
+        await self._look_until(lambda: self.profile.camera_topic is not None)
         picture = await self._camera.fetch()
         return CameraPicture(
             data=picture.data,
@@ -141,8 +143,7 @@ class RosRobot:
     async def send_goal(self, goal: Pose) -> str:
         """Starts a drive; returns when navigation has taken or refused it."""
         await self.connection.wait_until_connected()
-        if self._driver is None:
-            await self._look_again()
+        await self._look_until(lambda: self._driver is not None)
         record = await self._wanted_driver().send(goal)
         self._goals[record.goal_id] = record
         while len(self._goals) > MOST_GOALS_KEPT:
@@ -157,6 +158,10 @@ class RosRobot:
             await self._wanted_driver().look_at(record)
         return record.status
 
+    async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
+        """Gives how goals stand that other clients have sent, as far as navigation tells."""
+        return () if self._driver is None else self._driver.foreign_goals
+
     async def cancel_goal(self, robot_goal_id: str) -> None:
         """Asks navigation to end a drive, and waits a moment until it has."""
         record = self._record(robot_goal_id)
@@ -169,8 +174,21 @@ class RosRobot:
         if not self.connection.is_open:
             await self.connection.wait_until_connected()
         self._brake.pull()
+        if self._driver is None:
+            # Others may have sent goals to a navigation that we have not found yet.
+            with suppress(LinkError):
+                await self._look_again()
         if self._driver is not None:
             await self._driver.cancel_all()
+
+    async def _look_until(self, is_found: Callable[[], bool]) -> None:
+        """Looks for what was not found yet: once, and right after connecting for a while."""
+        is_settling = True
+        while not is_found() and is_settling:
+            is_settling = (self.connection.connected_for_s or 0.0) < self._patience.settling_s
+            await self._look_again()
+            if is_settling and not is_found():
+                await anyio.sleep(SETTLING_PAUSE_S)
 
     async def _look_again(self) -> None:
         """Takes in what has been started since: people start rosbridge first and SLAM later."""
@@ -266,7 +284,7 @@ async def build_ros_robot(
     Args:
         connection: To the robot; stays open as long as the robot is used.
         overrides: What robot.yaml says.
-        patience: Time limits of navigation.
+        patience: Time limits for what it offers, and of navigation.
         frames_s: How long to wait for its frames, in wall time.
 
     Raises:
@@ -274,8 +292,28 @@ async def build_ros_robot(
     """
     frames = FrameListener(connection)
     clock = RobotClock(connection)
-    profile = await discover_robot(connection, frames, overrides, frames_s=frames_s)
+    profile = await _discover_soon(
+        connection, frames, overrides, frames_s=frames_s, settling_s=patience.settling_s
+    )
     await clock.start(profile.clock_topic)
     return RosRobot(
         connection, profile, frames=frames, clock=clock, overrides=overrides, patience=patience
     )
+
+
+async def _discover_soon(
+    connection: RosConnection,
+    frames: FrameListener,
+    overrides: RobotOverrides,
+    *,
+    frames_s: float,
+    settling_s: float,
+) -> RobotProfile:
+    """Asks again right after connecting: who would say what there is may not be found yet."""
+    while True:
+        try:
+            return await discover_robot(connection, frames, overrides, frames_s=frames_s)
+        except LinkError:
+            if (connection.connected_for_s or 0.0) >= settling_s:
+                raise
+        await anyio.sleep(SETTLING_PAUSE_S)

@@ -133,6 +133,10 @@ class GuardedRobot:
         """Takes a picture with the front camera."""
         return await self._robot.fetch_picture()
 
+    async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
+        """Gives how goals stand that others have sent."""
+        return await self._robot.fetch_foreign_goals()
+
     async def fetch_detections(self) -> tuple[Detection, ...]:
         """Gives what the robot's own object detector reports in the camera view."""
         return await self._robot.fetch_detections()

@@ -5,6 +5,7 @@ from typing import Protocol
 
 from mapspeak.geometry import Pose
 from mapspeak.links.ros.driving.record import GoalRecord
+from mapspeak.robot import GoalState
 
 LATEST_S = 0.0
 """A stamp that ROS takes for "as it is now"; our idea of robot time may be off."""
@@ -19,16 +20,23 @@ class DrivingPatience:
         end_s: For a goal to end that was cancelled or replaced.
         result_s: For the result of a goal whose end is known already.
         return_s: After a reconnection, for word of a goal that was under way.
+        settling_s: After connecting, for all that the robot offers to be found.
     """
 
     acceptance_s: float = 3.0
     end_s: float = 2.0
     result_s: float = 1.0
     return_s: float = 5.0
+    settling_s: float = 3.0
 
 
 class Driver(Protocol):
     """One way of sending goals."""
+
+    @property
+    def foreign_goals(self) -> tuple[GoalState, ...]:
+        """How goals stand that others have sent and that are under way, as last heard."""
+        ...
 
     async def send(self, goal: Pose) -> GoalRecord:
         """Sends a goal in the map frame, and gives the record of what becomes of it.

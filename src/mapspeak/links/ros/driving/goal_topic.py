@@ -57,6 +57,11 @@ class GoalTopicDriver:
         self._progress: _Progress | None = None
         connection.advertise(topic, type_name=dialect.type_name("geometry_msgs/PoseStamped"))
 
+    @property
+    def foreign_goals(self) -> tuple[GoalState, ...]:
+        """Nothing: a topic for goals does not tell what became of them."""
+        return ()
+
     async def send(self, goal: Pose) -> GoalRecord:
         """Publishes a goal; nobody confirms it."""
         record = GoalRecord(new_id(), goal)

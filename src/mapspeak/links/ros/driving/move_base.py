@@ -63,6 +63,7 @@ class MoveBaseDriver:
         self._map_frame = map_frame
         self._patience = patience
         self._records: dict[str, GoalRecord] = {}
+        self._foreign: list[GoalState] = []
         connection.advertise(f"{name}/goal", type_name=GOAL_TYPE)
         connection.advertise(f"{name}/cancel", type_name=CANCEL_TYPE)
         self._lists = connection.subscribe(f"{name}/status", type_name=STATUS_TYPE)
@@ -71,6 +72,11 @@ class MoveBaseDriver:
         results.listen(self._take_one)
         feedback = connection.subscribe(f"{name}/feedback", type_name=FEEDBACK_TYPE)
         feedback.listen(self._take_feedback)
+
+    @property
+    def foreign_goals(self) -> tuple[GoalState, ...]:
+        """How goals of others stand, by the list of all."""
+        return tuple(self._foreign)
 
     async def send(self, goal: Pose) -> GoalRecord:
         """Sends a goal, and waits until move_base has taken or refused it."""
@@ -152,6 +158,11 @@ class MoveBaseDriver:
     def _take_statuses(self, message: Message) -> None:
         entries = message.get("status_list")
         listed = [self._take_status(entry) for entry in _as_list(entries)]
+        self._foreign = [
+            GoalState.ACCEPTED if entry.get("status") == PENDING else GoalState.DRIVING
+            for entry, record in zip(_as_list(entries), listed, strict=True)
+            if record is None and isinstance(entry, dict) and entry.get("status") in LIVE
+        ]
         for record in self._records.values():
             if record.is_accepted and not record.is_over and record not in listed:
                 # actionlib lists a goal until five seconds after its end.

@@ -79,6 +79,17 @@ class Nav2Driver:
         self._arrays = connection.subscribe(f"{action}/_action/status", type_name=STATUS_TYPE)
         self._arrays.listen(self._take_statuses)
 
+    @property
+    def foreign_goals(self) -> tuple[GoalState, ...]:
+        """How goals of others stand; nothing while it is unknown which of them is ours."""
+        going = [each for each in self._pursuits.values() if not each.record.is_over]
+        if any(each.ros_id is None for each in going):
+            return ()
+        return tuple(
+            GoalState.ACCEPTED if self._statuses[ros_id] == ACCEPTED else GoalState.DRIVING
+            for ros_id in self._foreign_ids()
+        )
+
     async def send(self, goal: Pose) -> GoalRecord:
         """Sends a goal, and waits until the robot has taken or refused it."""
         self._pursuits = {
@@ -252,13 +263,16 @@ class Nav2Driver:
         pursuit.record.end(state, reason)
 
     def _is_replaced_by_others(self, pursuit: _Pursuit) -> bool:
+        is_known = pursuit.ros_id is not None and not pursuit.record.is_replaced
+        return is_known and bool(self._foreign_ids())
+
+    def _foreign_ids(self) -> list[str]:
         ours = {each.ros_id for each in self._pursuits.values()}
-        others = [
+        return [
             ros_id
             for ros_id, status in self._statuses.items()
             if status in LIVE and ros_id not in ours
         ]
-        return bool(others) and pursuit.ros_id is not None and not pursuit.record.is_replaced
 
 
 def _read_statuses(message: Message) -> list[tuple[str, int]]:

@@ -1,0 +1,11 @@
+"""Robots on ROS 2 over DDS: no ROS here, and nothing but their own nodes on the robot.
+
+Needs the optional packages of mapspeak[dds].
+"""
+
+from mapspeak.links.dds.connection import DdsConnection, open_dds_connection
+from mapspeak.links.dds.network import DdsNetwork
+from mapspeak.links.dds.opening import open_dds_robot
+from mapspeak.links.dds.timing import DdsTiming
+
+__all__ = ["DdsConnection", "DdsNetwork", "DdsTiming", "open_dds_connection", "open_dds_robot"]

@@ -1,0 +1,161 @@
+"""The services and actions that we use, each with its topics opened once and kept."""
+
+from collections.abc import Awaitable, Callable, Coroutine, Mapping
+from typing import Any
+
+from mapspeak.errors import LinkError
+from mapspeak.links.dds.discovery import Discovery
+from mapspeak.links.dds.endpoints import Sample
+from mapspeak.links.dds.goals import ActionClient
+from mapspeak.links.dds.names import (
+    SERVICE_PART,
+    ServiceName,
+    action_type_of,
+    dds_topic,
+    reply_topic,
+)
+from mapspeak.links.dds.participant import Participant
+from mapspeak.links.dds.services import ServiceClient
+from mapspeak.links.dds.topics import Topics, check_name, wrong_type
+from mapspeak.links.dds.types import Types
+from mapspeak.links.ros import PursuedGoal
+from mapspeak.ros import ActionGoal
+from mapspeak.ros.messages import Message, bare_type
+
+StartSoon = Callable[[Callable[[], Coroutine[Any, Any, None]]], None]
+Learn = Callable[..., Awaitable[None]]
+
+
+class Calls:
+    """Calls services, and pursues goals.
+
+    Args:
+        participant: Ours.
+        discovery: Says who serves what.
+        types: Encodes and decodes.
+        topics: Reads what actions say of their goals.
+        learn: Makes types known by asking the node behind an endpoint; raises `LinkError`.
+        start_soon: Runs something in the background.
+    """
+
+    def __init__(
+        self,
+        participant: Participant,
+        discovery: Discovery,
+        types: Types,
+        topics: Topics,
+        *,
+        learn: Learn,
+        start_soon: StartSoon,
+    ) -> None:
+        self._participant = participant
+        self._discovery = discovery
+        self._types = types
+        self._topics = topics
+        self._learn = learn
+        self._start_soon = start_soon
+        self._services: dict[str, ServiceClient] = {}
+        self._actions: dict[str, ActionClient] = {}
+
+    async def call(
+        self,
+        service: str,
+        arguments: Mapping[str, Any],
+        *,
+        type_name: str | None,
+        timeout_s: float,
+    ) -> Sample:
+        """Gives what a service answers, and when it did.
+
+        Raises:
+            LinkError: Nobody serves it, it has another type, or it does not answer.
+        """
+        check_name(service)
+        found = self._discovery.service_type(service)
+        if type_name is not None and found not in (None, bare_type(type_name)):
+            raise wrong_type(service, str(found), type_name)
+        client = await self._service(service)
+        return await client.call(arguments, timeout_s=timeout_s)
+
+    async def send_goal(
+        self, action: str, arguments: Message, *, type_name: str, timeout_s: float
+    ) -> PursuedGoal:
+        """Sends a goal and gives what becomes of it, as it becomes.
+
+        Raises:
+            LinkError: Nobody serves the action, it has another type, or the goal does not fit.
+        """
+        check_name(action)
+        found = self._discovery.actions.get(action)
+        if found not in (None, bare_type(type_name)):
+            raise wrong_type(action, str(found), type_name)
+        client = self._actions.get(action) or await self._open_action(action)
+        return await client.send_goal(action, arguments, timeout_s=timeout_s)
+
+    def cancel_goal(self, goal: ActionGoal) -> None:
+        """Asks for the end of a goal."""
+        if goal.action in self._actions:
+            self._actions[goal.action].cancel_goal(goal.goal_id)
+
+    def give_up_goal(self, goal: ActionGoal) -> None:
+        """Waits no longer for a goal."""
+        if goal.action in self._actions:
+            self._actions[goal.action].give_up_goal(goal.goal_id)
+
+    def note_change(self, dds_name: str) -> None:
+        """Takes in that others have begun or ended to read or write a topic."""
+        for action, client in self._actions.items():
+            if dds_name == reply_topic(_part(action, "send_goal")):
+                client.note_servers([each.key for each in self._discovery.writers_of(dds_name)])
+        for service, asked in self._services.items():
+            if reply_topic(service) == dds_name:
+                server = self._discovery.server_of(service)
+                asked.note_server(None if server is None else server.framing)
+
+    async def _service(self, service: str) -> ServiceClient:
+        server = self._discovery.server_of(service)
+        if server is None:
+            raise LinkError(
+                f"Nobody serves {service[:80]}.",
+                hint="Ask for the list of services; the node that offers it may have ended.",
+            )
+        name = ServiceName(service=service, type_name=SERVICE_PART.sub("", server.type_name))
+        await self._learn(server, name.request_type, name.reply_type)
+        if service not in self._services:
+            self._services[service] = ServiceClient(
+                self._participant,
+                name,
+                framing=server.framing,
+                encode=self._types.encode,
+                decode=self._types.decode,
+            )
+        return self._services[service]
+
+    async def _open_action(self, action: str) -> ActionClient:
+        send, result, cancel = [
+            await self._service(_part(action, name))
+            for name in ("send_goal", "get_result", "cancel_goal")
+        ]
+        if action in self._actions:
+            return self._actions[action]
+        client = ActionClient(send=send, result=result, cancel=cancel, start_soon=self._start_soon)
+        self._actions[action] = client
+        self.note_change(send.name.reply_topic)
+        await self._learn_feedback(action)
+        for name, take in (("status", client.take_statuses), ("feedback", client.take_feedback)):
+            subscription = self._topics.subscribe(
+                _part(action, name), type_name=None, is_bulky=False, throttle_ms=0
+            )
+            subscription.listen(take)
+            if name == "status" and subscription.latest is not None:
+                take(subscription.latest)
+        return client
+
+    async def _learn_feedback(self, action: str) -> None:
+        writers = self._discovery.writers_of(dds_topic(_part(action, "feedback")))
+        if writers:
+            await self._learn(writers[0], f"{action_type_of(writers[0].type_name)}_Feedback")
+
+
+def _part(action: str, name: str) -> str:
+    return f"{action}/_action/{name}"

@@ -1,0 +1,281 @@
+"""A ROS 2 system over DDS, with no ROS here and nothing else on the robot."""
+
+from collections.abc import AsyncGenerator, Callable, Coroutine, Iterator, Mapping
+from contextlib import asynccontextmanager, contextmanager
+from typing import Any
+
+import anyio
+from anyio.abc import TaskGroup
+
+from mapspeak.errors import LinkError
+from mapspeak.links.dds.calls import Calls
+from mapspeak.links.dds.discovery import Discovery, FramingOf, framing_by_vendor
+from mapspeak.links.dds.endpoints import Quality, Sample
+from mapspeak.links.dds.graph import GraphQuestions
+from mapspeak.links.dds.names import DISCOVERY_TOPIC, DISCOVERY_TYPE
+from mapspeak.links.dds.network import DdsNetwork
+from mapspeak.links.dds.participant import Participant
+from mapspeak.links.dds.timing import DdsTiming
+from mapspeak.links.dds.topics import Topics
+from mapspeak.links.dds.types import Types
+from mapspeak.links.ros import PursuedGoal, TopicSubscription
+from mapspeak.ros import ActionGoal, Subscription
+from mapspeak.ros.messages import Message
+
+NODES_QUALITY = Quality(is_reliable=True, is_latched=True, depth=1000)
+LONG_NODES_TYPE = "rmw_dds_common/LongParticipantEntitiesInfo"
+USUAL_TIMING = DdsTiming()
+HINT = (
+    "Check that the robot runs ROS 2 on Fast DDS or Cyclone DDS, that its ROS_DOMAIN_ID is this "
+    "one (--robot dds:DOMAIN), and that the network lets multicast pass; else name the robot's "
+    "address in ROS_STATIC_PEERS."
+)
+
+
+class DdsConnection(GraphQuestions):
+    """One ROS 2 system, as a member of its DDS domain sees it.
+
+    Args:
+        network: Which domain, and how others in it are found.
+        timing: All time limits.
+        framing_of: Tells how a node frames services, by the id of its writer.
+
+    Raises:
+        LinkError: DDS cannot be started.
+    """
+
+    def __init__(
+        self,
+        network: DdsNetwork,
+        *,
+        timing: DdsTiming = USUAL_TIMING,
+        framing_of: FramingOf = framing_by_vendor,
+    ) -> None:
+        self.network = network
+        self.timing = timing
+        self._participant = Participant(network)
+        discovery = Discovery(
+            self._participant.key, on_change=self._note_change, framing_of=framing_of
+        )
+        super().__init__(discovery, Types())
+        self._tasks: TaskGroup | None = None
+        self._found_s: float | None = None
+        self._topics = Topics(
+            self._participant,
+            self.discovery,
+            self.types,
+            ask_type=self.ask_type,
+            start_soon=self.start_soon,
+        )
+        self._calls = Calls(
+            self._participant,
+            self.discovery,
+            self.types,
+            self._topics,
+            learn=self.learn,
+            start_soon=self.start_soon,
+        )
+
+    @property
+    def is_open(self) -> bool:
+        """True while a node of ROS is there."""
+        return not self.discovery.is_empty
+
+    @property
+    def connected_for_s(self) -> float | None:
+        """Since when nodes have been there, in wall time; None while none is."""
+        return None if self._found_s is None else anyio.current_time() - self._found_s
+
+    def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        """Runs something in the background until the connection is closed."""
+        if self._tasks is not None:
+            self._tasks.start_soon(work)
+
+    async def start(self, tasks: TaskGroup) -> None:
+        """Enters the domain, and returns when those who are there have been found.
+
+        Raises:
+            LinkError: Nobody is there.
+        """
+        self._tasks = tasks
+        self._participant.watch_endpoints(self.discovery.take_writer, self.discovery.take_reader)
+        tasks.start_soon(self._participant.run)
+        await self._wait_for_node(self.timing.first_sign_s)
+        # Fast DDS sends what is latched at once to a reader that knows the writer already, and
+        # otherwise within three seconds. So no topic is read before somebody is there.
+        self._participant.read(
+            DISCOVERY_TOPIC,
+            DISCOVERY_TYPE,
+            quality=NODES_QUALITY,
+            decode=self._decode_nodes,
+            take=self._take_nodes,
+        )
+        with anyio.move_on_after(self.timing.longest_look_s):
+            is_news = True
+            while is_news:
+                with anyio.move_on_after(self.timing.quiet_s) as quiet:
+                    await self.discovery.wait_for_news()
+                is_news = not quiet.cancelled_caught
+
+    async def aclose(self) -> None:
+        """Leaves the domain, once what was published last has arrived."""
+        if self._topics.has_advertised:
+            await self._participant.flush(timeout_s=self.timing.arrival_s)
+        self._participant.close()
+
+    async def wait_until_connected(self) -> None:
+        """Returns at once, or when a node is there again.
+
+        Raises:
+            LinkError: None is, within the usual time for an answer.
+        """
+        await self._wait_for_node(self.timing.answer_s)
+
+    # --- topics
+
+    def subscribe(
+        self,
+        topic: str,
+        *,
+        type_name: str | None = None,
+        is_bulky: bool = False,
+        throttle_ms: int = 0,
+    ) -> TopicSubscription:
+        """Gives the subscription to a topic; it is read as soon as somebody writes it."""
+        return self._topics.subscribe(
+            topic, type_name=type_name, is_bulky=is_bulky, throttle_ms=throttle_ms
+        )
+
+    def unsubscribe(self, subscription: Subscription) -> None:
+        """Ends one use of a subscription; the last one ends the reading too."""
+        self._topics.unsubscribe(subscription.topic, subscription)
+
+    def renew(self, subscription: Subscription) -> None:
+        """Reads a topic anew: latched messages come again."""
+        self._topics.renew(subscription.topic)
+
+    def advertise(self, topic: str, *, type_name: str) -> None:
+        """Says that we will publish."""
+        self._topics.advertise(topic, type_name=type_name)
+
+    def unadvertise(self, topic: str) -> None:
+        """Takes back what `advertise` said."""
+        self._topics.unadvertise(topic)
+
+    async def publish(self, topic: str, message: Message) -> None:
+        """Publishes on an advertised topic, once known listeners are connected to it."""
+        await self._topics.publish(topic, message)
+
+    def publish_everywhere(self, topic: str, message: Message) -> int:
+        """Publishes at once, for a stop; there is one way, so it gives 1."""
+        self._topics.publish_at_once(topic, message)
+        return 1
+
+    # --- services and actions
+
+    async def call_service(
+        self,
+        service: str,
+        arguments: Mapping[str, Any] | None = None,
+        *,
+        type_name: str | None = None,
+        timeout_s: float | None = None,
+    ) -> dict[str, Any]:
+        """Gives what a service answers."""
+        limit_s = self.timing.answer_s if timeout_s is None else timeout_s
+        answer = await self._calls.call(
+            service, arguments or {}, type_name=type_name, timeout_s=limit_s
+        )
+        content: dict[str, Any] = answer.content
+        return content
+
+    async def ask(self, service: str, arguments: Mapping[str, Any], *, timeout_s: float) -> Sample:
+        """Gives what a service answers, and when it did."""
+        return await self._calls.call(service, arguments, type_name=None, timeout_s=timeout_s)
+
+    async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> PursuedGoal:
+        """Sends a goal to an action and gives what becomes of it, as it becomes."""
+        return await self._calls.send_goal(
+            action, arguments, type_name=type_name, timeout_s=self.timing.answer_s
+        )
+
+    def cancel_goal(self, goal: ActionGoal) -> None:
+        """Asks for the end of a goal; its `end` tells whether that worked."""
+        self._calls.cancel_goal(goal)
+
+    def give_up_goal(self, goal: ActionGoal) -> None:
+        """Waits no longer for a goal that shows no sign of life."""
+        self._calls.give_up_goal(goal)
+
+    def clear_the_way(self) -> None:
+        """Does nothing: over DDS, nothing is held up by what was sent before."""
+
+    # --- who is there
+
+    async def _wait_for_node(self, limit_s: float) -> None:
+        with anyio.move_on_after(limit_s):
+            while self.discovery.is_empty:
+                await self.discovery.wait_for_news()
+        if self.discovery.is_empty:
+            raise LinkError(
+                f"No node of ROS 2 was found in DDS domain {self.network.domain_id} within "
+                f"{limit_s:g} s.",
+                hint=HINT,
+            )
+
+    def _note_change(self, dds_name: str) -> None:
+        if self.discovery.is_empty:
+            self._found_s = None
+        elif self._found_s is None:
+            self._found_s = anyio.current_time()
+        self._topics.note_change(dds_name)
+        self._calls.note_change(dds_name)
+
+    def _decode_nodes(self, data: bytes) -> dict[str, Any]:
+        try:
+            return self.types.decode(DISCOVERY_TYPE, data)
+        except LinkError:
+            return self.types.decode(LONG_NODES_TYPE, data)
+
+    def _take_nodes(self, sample: Sample) -> None:
+        if sample.refusal is not None:
+            return
+        self.discovery.take_nodes(sample)
+        if self.discovery.has_long_ids:
+            self.types.take_humble()
+
+
+@asynccontextmanager
+async def open_dds_connection(
+    network: DdsNetwork,
+    *,
+    timing: DdsTiming = USUAL_TIMING,
+    framing_of: FramingOf = framing_by_vendor,
+) -> AsyncGenerator[DdsConnection]:
+    """Keeps us in a domain while the context lasts; see `DdsConnection`.
+
+    Raises:
+        LinkError: DDS cannot be started, or nobody is there.
+    """
+    with _plain_errors():
+        async with anyio.create_task_group() as tasks:
+            connection = DdsConnection(network, timing=timing, framing_of=framing_of)
+            try:
+                await connection.start(tasks)
+                yield connection
+            finally:
+                with anyio.CancelScope(shield=True):
+                    await connection.aclose()
+                tasks.cancel_scope.cancel()
+
+
+@contextmanager
+def _plain_errors() -> Iterator[None]:
+    """Lets an error pass as it was raised, out of the group that a task group makes of it."""
+    try:
+        yield
+    except BaseExceptionGroup as group:
+        error: BaseException = group
+        while isinstance(error, BaseExceptionGroup) and len(error.exceptions) == 1:
+            error = error.exceptions[0]
+        raise error from error.__cause__

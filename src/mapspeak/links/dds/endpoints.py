@@ -1,0 +1,177 @@
+"""What reads and what writes one topic of DDS, as bytes."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import anyio
+from cyclonedds.core import DDSException, InstanceState, ReadCondition, SampleState, ViewState
+from cyclonedds.idl import IdlStruct
+from cyclonedds.pub import DataWriter
+from cyclonedds.qos import Policy, Qos
+from cyclonedds.sub import DataReader
+
+from mapspeak.errors import LinkError
+
+MOST_AT_ONCE = 256
+NOT_READ = ViewState.Any | InstanceState.Any | SampleState.NotRead
+LIFESPAN_NS = 1_000_000_000
+"""A command that did not arrive in time must not reach the node that is started next."""
+PLAIN_CDR = Policy.DataRepresentation(use_cdrv0_representation=True)
+
+
+class RawMessage(IdlStruct):
+    """A message as its bytes; it has no fields, so that DDS leaves them alone."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data = data
+
+    def serialize(self, *_arguments: object, **_options: object) -> bytes:
+        """Gives the bytes, which hold their own header."""
+        return self.data
+
+    @classmethod
+    def deserialize(cls, data: bytes, *_arguments: object, **_options: object) -> "RawMessage":
+        """Keeps the bytes."""
+        return cls(data)
+
+    @classmethod
+    def deserialize_key(cls, data: bytes, *_arguments: object, **_options: object) -> "RawMessage":
+        """Keeps the bytes, which only tell that a writer has gone."""
+        return cls(data)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quality:
+    """The part of DDS's quality of service that ROS uses most.
+
+    Attributes:
+        is_reliable: What is lost is sent again.
+        is_latched: Who comes late gets what was sent last ("transient local").
+        depth: So many samples are kept.
+    """
+
+    is_reliable: bool
+    is_latched: bool
+    depth: int
+
+    @property
+    def writers_qos(self) -> Qos:
+        """As Cyclone DDS takes it for a writer."""
+        return self.qos if self.is_latched else Qos(Policy.Lifespan(LIFESPAN_NS), base=self.qos)
+
+    @property
+    def qos(self) -> Qos:
+        """As Cyclone DDS takes it for a reader."""
+        reliable = Policy.Reliability.Reliable(max_blocking_time=100_000_000)
+        return Qos(
+            reliable if self.is_reliable else Policy.Reliability.BestEffort,
+            Policy.Durability.TransientLocal if self.is_latched else Policy.Durability.Volatile,
+            Policy.History.KeepLast(self.depth),
+            PLAIN_CDR,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sample:
+    """What one message brings.
+
+    Attributes:
+        content: The message, decoded; None where that failed.
+        source_s: When it was written, by its writer's clock.
+        refusal: Why it could not be decoded.
+    """
+
+    content: Any
+    source_s: float
+    refusal: LinkError | None = None
+
+
+Decode = Callable[[bytes], Any]
+Take = Callable[[Sample], None]
+
+
+class Inlet:
+    """A reader of one topic. Both functions are given with it: one decodes, one takes."""
+
+    def __init__(self, reader: DataReader[Any], decode: Decode, take: Take) -> None:
+        self._reader: DataReader[Any] | None = reader
+        self.condition = ReadCondition(reader, NOT_READ)
+        self.decode = decode
+        self.take = take
+
+    def collect(self) -> list[Any]:
+        """Takes what has come from DDS; nothing once closed."""
+        if self._reader is None:
+            return []
+        try:
+            return self._reader.take(MOST_AT_ONCE)
+        except DDSException:
+            return []
+
+    def understand(self, sample: Any) -> Sample | None:  # noqa: ANN401 - without types
+        """Decodes a sample; None for one that only tells that a writer has gone."""
+        if not isinstance(sample, RawMessage):
+            return None
+        info: Any = getattr(sample, "sample_info")  # noqa: B009 - set by the library, undeclared
+        source_s = info.source_timestamp / 1e9
+        try:
+            return Sample(content=self.decode(sample.data), source_s=source_s)
+        except LinkError as error:
+            return Sample(content=None, source_s=source_s, refusal=error)
+
+    def close(self) -> None:
+        """Lets go of DDS's reader."""
+        del self.condition
+        self._reader = None
+
+    @property
+    def is_open(self) -> bool:
+        """False once closed."""
+        return self._reader is not None
+
+
+class EndpointInlet(Inlet):
+    """A reader of DDS's own topic about all writers, or about all readers."""
+
+    def understand(self, sample: Any) -> Sample | None:  # noqa: ANN401 - without types
+        """Gives the sample as it is."""
+        return Sample(content=sample, source_s=0.0)
+
+
+class Outlet:
+    """A writer of one topic."""
+
+    def __init__(self, writer: DataWriter[Any], raw_type: type[RawMessage]) -> None:
+        self.writer: DataWriter[Any] | None = writer
+        self._raw_type = raw_type
+        self.n_matched = 0
+        self._news = anyio.Event()
+
+    def write(self, data: bytes) -> None:
+        """Sends the bytes of one message.
+
+        Raises:
+            LinkError: DDS does not take it.
+        """
+        if self.writer is None:
+            raise LinkError("The connection is closed.", hint="Connect again.")
+        try:
+            self.writer.write(self._raw_type(data))
+        except DDSException as error:
+            raise LinkError(
+                f"DDS did not send a message: {error}", hint="Try again; the network may be full."
+            ) from error
+
+    def note_matched(self, n_matched: int) -> None:
+        """Takes in how many readers there are."""
+        self.n_matched = n_matched
+        news, self._news = self._news, anyio.Event()
+        news.set()
+
+    async def wait_for_reader(self, *, timeout_s: float) -> bool:
+        """Returns once somebody reads, or the time is over; tells whether somebody does."""
+        with anyio.move_on_after(timeout_s):
+            while not self.n_matched:
+                await self._news.wait()
+        return self.n_matched > 0

@@ -1,0 +1,175 @@
+"""What a ROS system is made of, as DDS and its nodes tell: the part of the port that only asks."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mapspeak.errors import LinkError
+from mapspeak.links.dds.discovery import Discovery, Endpoint
+from mapspeak.links.dds.endpoints import Sample
+from mapspeak.links.dds.names import SERVICE_PART, is_hidden
+from mapspeak.links.dds.types import Types
+from mapspeak.links.ros import NodeParameters
+from mapspeak.ros import NodeLinks, RosGraph
+from mapspeak.ros.messages import Dialect
+
+DESCRIBE = "get_type_description"
+DESCRIBE_TYPE = "type_description_interfaces/srv/GetTypeDescription"
+ASKED_FOR_TIME = "/get_parameter_types"
+PATIENCE_S = 2.0
+
+
+class GraphQuestions(ABC):
+    """Answers from what was discovered, by whatever way services are called."""
+
+    def __init__(self, discovery: Discovery, types: Types) -> None:
+        self.discovery = discovery
+        self.types = types
+        self._parameters = NodeParameters(self)
+
+    @abstractmethod
+    async def wait_until_connected(self) -> None:
+        """Returns at once, or when somebody is there again."""
+
+    @abstractmethod
+    async def call_service(
+        self,
+        service: str,
+        arguments: Mapping[str, Any] | None = None,
+        *,
+        type_name: str | None = None,
+        timeout_s: float | None = None,
+    ) -> dict[str, Any]:
+        """Gives what a service answers."""
+
+    @abstractmethod
+    async def ask(self, service: str, arguments: Mapping[str, Any], *, timeout_s: float) -> Sample:
+        """Gives what a service answers, and when it did."""
+
+    async def learn(self, endpoint: Endpoint, *wanted: str) -> None:
+        """Makes types known: does nothing where they are, else asks the node behind an endpoint.
+
+        Raises:
+            LinkError: They stay unknown.
+        """
+        if not all(map(self.types.knows, wanted)):
+            await self.ask_type(endpoint)
+
+    async def ask_type(self, endpoint: Endpoint) -> None:
+        """Asks the node behind a reader or writer of a topic for its type.
+
+        Nodes find a type by its hash, and DDS tells the hashes of topics' types alone.
+
+        Raises:
+            LinkError: It does not tell.
+        """
+        service = f"{self.discovery.node_with(endpoint.key)}/{DESCRIBE}"
+        is_told = bool(endpoint.type_hash) and not SERVICE_PART.search(endpoint.type_name)
+        if not is_told or self.discovery.server_of(service) is None:
+            raise LinkError(
+                f"We do not know what a {endpoint.type_name} looks like, and DDS does not tell.",
+                hint="Nodes of ROS 2 Jazzy and later tell the types of topics, and no others. "
+                "Take rosbridge or rclpy for this robot.",
+            )
+        request = {
+            "type_name": endpoint.type_name,
+            "type_hash": endpoint.type_hash,
+            "include_type_sources": False,
+        }
+        answer = await self.call_service(service, request, type_name=DESCRIBE_TYPE)
+        self.types.take_description(answer)
+
+    # --- the questions of the port
+
+    async def fetch_graph(self) -> RosGraph:
+        """Gives the topics and actions there are."""
+        await self.wait_until_connected()
+        return RosGraph(
+            dialect=Dialect.ROS2,
+            distro="humble" if self.discovery.has_long_ids else "",
+            types=self.discovery.topics,
+            actions=tuple(sorted(self.discovery.actions)),
+        )
+
+    async def fetch_time_s(self) -> float | None:
+        """Gives robot time: when some node answered a question that costs it nothing."""
+        servers = sorted(
+            service for service in self.discovery.services if service.endswith(ASKED_FOR_TIME)
+        )
+        if not servers:
+            return None
+        try:
+            return (await self.ask(servers[0], {"names": []}, timeout_s=PATIENCE_S)).source_s
+        except LinkError:
+            return None
+
+    async def fetch_nodes(self) -> tuple[str, ...]:
+        """Gives the full names of all nodes."""
+        return tuple(sorted(self.discovery.nodes))
+
+    async def fetch_node(self, node: str) -> NodeLinks:
+        """Gives what a node publishes, subscribes to and serves."""
+        keys = self.discovery.nodes.get(node)
+        if keys is None:
+            raise _unknown(node)
+        return self.discovery.links_of(keys)
+
+    async def fetch_publishers(self, topic: str) -> tuple[str, ...]:
+        """Gives the nodes that publish on a topic."""
+        return self.discovery.publishers(topic)
+
+    async def fetch_subscribers(self, topic: str) -> tuple[str, ...]:
+        """Gives the nodes that listen to a topic."""
+        return self.discovery.subscribers(topic)
+
+    async def fetch_services(self) -> tuple[str, ...]:
+        """Gives the full names of all services but the parts of actions."""
+        return tuple(sorted(name for name in self.discovery.services if not is_hidden(name)))
+
+    async def fetch_service_type(self, service: str) -> str:
+        """Gives a service's type."""
+        found = self.discovery.service_type(service)
+        if found is None:
+            raise _unknown(service)
+        return found
+
+    async def fetch_action_type(self, action: str) -> str:
+        """Gives an action's type."""
+        found = self.discovery.actions.get(action)
+        if found is None:
+            raise _unknown(action)
+        return found
+
+    async def fetch_definitions(self, type_name: str) -> Mapping[str, str]:
+        """Gives the .msg texts of a type and of all within: ours, or those that a node tells."""
+        known = self.types.definitions(type_name)
+        if known:
+            return known
+        for endpoint in self.discovery.with_type(type_name):
+            try:
+                await self.learn(endpoint, endpoint.type_name)
+            except LinkError:
+                continue
+        return self.types.definitions(type_name)
+
+    async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
+        """Gives the names of a node's parameters."""
+        return await self._parameters.fetch_names(node)
+
+    async def fetch_parameter(self, node: str, name: str) -> Any:  # noqa: ANN401 - any value
+        """Gives the value of a node's parameter; None where it is not set."""
+        value = await self._parameters.fetch(node, name)
+        return value.tolist() if isinstance(value, np.ndarray) else value
+
+    async def set_parameter(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401
+        """Sets a node's parameter."""
+        await self._parameters.put(node, name, value)
+
+
+def _unknown(name: str) -> LinkError:
+    return LinkError(
+        f"The robot knows no {name[:80]}.",
+        hint="Ask for the list of what there is first.",
+    )

@@ -1,0 +1,256 @@
+"""Our member of a DDS domain: what it reads and writes, as bytes, and the thread that listens.
+
+DDS wakes no event loop, so one thread waits for all readers. It decodes, which may take a while for
+a picture, and hands over to the event loop, and waits until that has taken it: where the loop is
+busy, DDS keeps the newest samples and forgets the rest.
+"""
+
+import logging
+import os
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
+
+import anyio
+from anyio import from_thread, to_thread
+from cyclonedds.builtin import (
+    BuiltinDataReader,
+    BuiltinTopicDcpsPublication,
+    BuiltinTopicDcpsSubscription,
+)
+from cyclonedds.core import DDSException, DDSStatus, GuardCondition, WaitSet
+from cyclonedds.domain import DomainParticipant
+from cyclonedds.idl import make_idl_struct
+from cyclonedds.pub import DataWriter, Publisher
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+
+from mapspeak.errors import LinkError
+from mapspeak.links.dds.endpoints import (
+    Decode,
+    EndpointInlet,
+    Inlet,
+    Outlet,
+    Quality,
+    RawMessage,
+    Sample,
+    Take,
+)
+from mapspeak.links.dds.names import dds_type
+from mapspeak.links.dds.network import DdsNetwork
+
+logger = logging.getLogger(__name__)
+
+CONFIGURATION_VARIABLE = "CYCLONEDDS_URI"
+FOR_EVER_NS = 2**63 - 1
+
+
+class Participant:
+    """Our member of a domain.
+
+    Args:
+        network: Which domain, and how to find others in it.
+
+    Raises:
+        LinkError: DDS cannot be started.
+    """
+
+    def __init__(self, network: DdsNetwork) -> None:
+        try:
+            # The library reads its configuration there, and when a process enters a domain only.
+            with _environment(CONFIGURATION_VARIABLE, network.configuration):
+                self._participant = DomainParticipant(network.domain_id)
+            self._publisher = Publisher(self._participant)
+            self._waitset = WaitSet(self._participant)
+            self._closing = GuardCondition(self._participant)
+        except DDSException as error:
+            raise LinkError(
+                f"DDS cannot enter domain {network.domain_id}: {error}",
+                hint="Check CYCLONEDDS_URI and the network; another program may hold its ports.",
+            ) from error
+        self._waitset.attach(self._closing)
+        self._lock = threading.Lock()
+        self._topics: dict[tuple[str, str], tuple[Topic[Any], type[RawMessage]]] = {}
+        self._inlets: list[Inlet] = []
+        self._outlets: list[Outlet] = []
+        self._is_closing = False
+
+    @property
+    def key(self) -> bytes:
+        """What is common to the ids of all our readers and writers: twelve bytes."""
+        return bytes(self._participant.guid.bytes[:12])
+
+    def watch_endpoints(self, take_writer: Take, take_reader: Take) -> None:
+        """Tells of every reader and writer in the domain, those that are there and that come."""
+        for topic, take in (
+            (BuiltinTopicDcpsPublication, take_writer),
+            (BuiltinTopicDcpsSubscription, take_reader),
+        ):
+            reader = BuiltinDataReader(self._participant, topic)
+            self._keep(EndpointInlet(reader, lambda data: data, take))
+
+    def read(
+        self, topic: str, type_name: str, *, quality: Quality, decode: Decode, take: Take
+    ) -> Inlet:
+        """Begins to read a topic.
+
+        Args:
+            topic: As DDS names it, such as rt/map.
+            type_name: As ROS names it, such as "nav_msgs/msg/OccupancyGrid".
+            quality: What is asked of the writers; one that offers less is not heard.
+            decode: Is called in another thread.
+            take: Is called in the event loop.
+
+        Raises:
+            LinkError: The topic is in use with another type.
+        """
+        try:
+            known, _ = self._topic(topic, type_name)
+            return self._keep(
+                Inlet(DataReader(self._participant, known, quality.qos), decode, take)
+            )
+        except DDSException as error:
+            raise _unusable(topic, type_name, error) from error
+
+    def write_to(self, topic: str, type_name: str, *, quality: Quality) -> Outlet:
+        """Begins to write on a topic; see `read`.
+
+        Raises:
+            LinkError: The topic is in use with another type.
+        """
+        try:
+            known, raw_type = self._topic(topic, type_name)
+            writer = DataWriter(self._publisher, known, quality.writers_qos)
+        except DDSException as error:
+            raise _unusable(topic, type_name, error) from error
+        outlet = Outlet(writer, raw_type)
+        with self._lock:
+            self._outlets.append(outlet)
+            writer.set_status_mask(DDSStatus.PublicationMatched)
+            self._waitset.attach(writer)
+        return outlet
+
+    def end_reading(self, inlet: Inlet) -> None:
+        """Reads a topic no longer."""
+        with self._lock:
+            if inlet in self._inlets:
+                self._inlets.remove(inlet)
+                self._waitset.detach(inlet.condition)
+                inlet.close()
+
+    def end_writing(self, outlet: Outlet) -> None:
+        """Writes on a topic no longer."""
+        with self._lock:
+            if outlet in self._outlets and outlet.writer is not None:
+                self._outlets.remove(outlet)
+                self._waitset.detach(outlet.writer)
+                outlet.writer = None
+
+    async def flush(self, *, timeout_s: float) -> None:
+        """Returns when all that was written has arrived, or the time is over."""
+        limit_ns = int(timeout_s * 1e9)
+        with suppress(DDSException):
+            await to_thread.run_sync(self._publisher.wait_for_acks, limit_ns)
+
+    async def run(self) -> None:
+        """Listens until `close` is called, and leaves the domain then."""
+        try:
+            await to_thread.run_sync(self._listen, limiter=anyio.CapacityLimiter(1))
+        finally:
+            self._leave()
+
+    def close(self) -> None:
+        """Ends the listening, and with it `run`."""
+        self._is_closing = True
+        with suppress(DDSException):
+            self._closing.set(True)
+
+    def _keep(self, inlet: Inlet) -> Inlet:
+        with self._lock:
+            self._inlets.append(inlet)
+            self._waitset.attach(inlet.condition)
+        return inlet
+
+    def _topic(self, topic: str, type_name: str) -> tuple[Topic[Any], type[RawMessage]]:
+        known = self._topics.get((topic, type_name))
+        if known is not None:
+            return known
+        raw_type: Any = make_idl_struct(
+            "Raw", dds_type(type_name), {}, dataclassify=False, bases=(RawMessage,)
+        )
+        made = self._topics[topic, type_name] = (
+            Topic(self._participant, topic, raw_type),
+            raw_type,
+        )
+        return made
+
+    # --- in the thread
+
+    def _listen(self) -> None:
+        while not self._is_closing:
+            self._waitset.wait(FOR_EVER_NS)
+            # The lock is not held while the event loop is waited for: it takes it too.
+            with self._lock:
+                collected = [(inlet, inlet.collect()) for inlet in self._inlets]
+                matched = [(outlet, _count_readers(outlet)) for outlet in self._outlets]
+            heard = [
+                (inlet, understood)
+                for inlet, samples in collected
+                for sample in samples
+                if (understood := inlet.understand(sample)) is not None
+            ]
+            if not self._is_closing:
+                from_thread.run_sync(_hand_over, heard, matched)
+
+    def _leave(self) -> None:
+        with self._lock:
+            for inlet in self._inlets:
+                inlet.close()
+            for outlet in self._outlets:
+                outlet.writer = None
+            self._inlets, self._outlets = [], []
+        # All that is ours goes with it, whatever still refers to it in Python.
+        self._participant.__del__()
+
+
+def _hand_over(heard: list[tuple[Inlet, Sample]], matched: list[tuple[Outlet, int]]) -> None:
+    for outlet, n_matched in matched:
+        if n_matched != outlet.n_matched:
+            outlet.note_matched(n_matched)
+    for inlet, sample in heard:
+        if not inlet.is_open:
+            continue
+        try:
+            inlet.take(sample)
+        except Exception:
+            # A fault of ours; one odd message must not cost the robot its connection.
+            logger.exception("What the robot said could not be taken in")
+
+
+def _count_readers(outlet: Outlet) -> int:
+    if outlet.writer is None:
+        return 0
+    # Reading the status also lets the wait begin anew.
+    status = outlet.writer.get_publication_matched_status()  # type: ignore[no-untyped-call]
+    return int(status.current_count)
+
+
+def _unusable(topic: str, type_name: str, error: DDSException) -> LinkError:
+    return LinkError(
+        f"{topic} cannot be used as {type_name}: {error}",
+        hint="A topic has one type: look it up on the robot.",
+    )
+
+
+@contextmanager
+def _environment(name: str, value: str) -> Iterator[None]:
+    before = os.environ.get(name)
+    os.environ[name] = f"{before},{value}" if before else value
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before

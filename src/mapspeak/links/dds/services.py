@@ -1,0 +1,216 @@
+"""Calls of services over DDS: everybody's answers come on one topic, and ours must be found there.
+
+Robots on Cyclone DDS put a number before each request and answer. Robots on Fast DDS keep it in a
+part of the DDS message that no library shows us: there, one call of a service is under way at a
+time, and answers are taken in the order in which they were asked for. The answer to another client
+that asks the same service at the same moment cannot be told from ours.
+"""
+
+import struct
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import anyio
+
+from mapspeak.errors import LinkError
+from mapspeak.links.dds.cdr import HEADER_BYTES
+from mapspeak.links.dds.discovery import Framing
+from mapspeak.links.dds.endpoints import Outlet, Quality, Sample
+from mapspeak.links.dds.names import ServiceName
+from mapspeak.links.dds.participant import Participant
+from mapspeak.ros import new_id
+
+QUALITY = Quality(is_reliable=True, is_latched=False, depth=100)
+NUMBER = struct.Struct("<Qq")
+MOST_AT_ONCE = 8
+"""Calls of one service: its node keeps ten requests and forgets the oldest."""
+LATE_ANSWER_S = 1.0
+"""So long an answer is held that may belong to an earlier call, which was given up."""
+
+Answer = dict[str, Any]
+Encode = Callable[[str, Mapping[str, Any]], bytes]
+DecodeFrom = Callable[[str, bytes, int], Answer]
+
+
+class _Call:
+    """One request of ours under way, and what was answered while it was."""
+
+    def __init__(self, n_before: int) -> None:
+        self.n_before = n_before
+        self.held: Sample | None = None
+        self.answer: Sample | None = None
+        self.is_answered = anyio.Event()
+
+    def take(self, sample: Sample) -> None:
+        """Takes an answer, which belongs to an earlier call while such are open."""
+        if self.n_before:
+            self.n_before -= 1
+            self.held = sample
+        elif self.answer is None:
+            self.answer = sample
+            self.is_answered.set()
+
+
+class ServiceClient:
+    """Asks one service.
+
+    Args:
+        participant: Ours.
+        name: Of the service, and its type.
+        framing: How the robot frames requests and answers.
+        encode: Gives the bytes of a message of a type.
+        decode: Gives the message of a type in bytes, behind so many that are something else.
+    """
+
+    def __init__(
+        self,
+        participant: Participant,
+        name: ServiceName,
+        *,
+        framing: Framing,
+        encode: Encode,
+        decode: DecodeFrom,
+    ) -> None:
+        self.name = name
+        self._participant = participant
+        self._framing = framing
+        self._encode = encode
+        self._decode = decode
+        self.on_answer: Callable[[int, Answer], None] | None = None
+        """Is called with every answer, and the number of its request; 0 where that is not known."""
+        self._id = int(new_id()[:16], 16)
+        self._number = 0
+        self._n_open = 0
+        self._turns = anyio.CapacityLimiter(MOST_AT_ONCE if self.tells_whom else 1)
+        self._calls: dict[int, _Call] = {}
+        # Who reads our requests must know our reader by then: it is announced first.
+        self._inlet = participant.read(
+            name.reply_topic,
+            name.reply_type,
+            quality=QUALITY,
+            decode=self._understand,
+            take=self._take,
+        )
+        self._outlet: Outlet = participant.write_to(
+            name.request_topic, name.request_type, quality=QUALITY
+        )
+
+    async def call(self, arguments: Mapping[str, Any], *, timeout_s: float) -> Sample:
+        """Gives what the service answers.
+
+        Raises:
+            LinkError: It does not answer in time, or the request does not fit.
+        """
+        deadline_s = anyio.current_time() + timeout_s
+        await self.wait_for_server(timeout_s=timeout_s)
+        with anyio.move_on_at(deadline_s):
+            async with self._turns:
+                return await self._call(arguments, deadline_s=deadline_s, timeout_s=timeout_s)
+        raise self._silence(timeout_s)
+
+    async def wait_for_server(self, *, timeout_s: float) -> None:
+        """Returns when somebody reads our requests.
+
+        Raises:
+            LinkError: Nobody does, within that time.
+        """
+        if not await self._outlet.wait_for_reader(timeout_s=timeout_s):
+            raise LinkError(
+                f"Nobody serves {self.name.service}.",
+                hint=f"Start the node that does: `ros2 service info {self.name.service}`.",
+            )
+
+    @property
+    def tells_whom(self) -> bool:
+        """True when answers say whose request they answer."""
+        return self._framing is Framing.NUMBERED
+
+    def note_server(self, framing: Framing | None) -> None:
+        """Takes in who serves now, or that nobody does, whose answers will never come."""
+        if framing is None:
+            self._n_open = 0
+        else:
+            self._framing = framing
+            self._turns.total_tokens = MOST_AT_ONCE if self.tells_whom else 1
+
+    def check(self, arguments: Mapping[str, Any]) -> None:
+        """Does nothing for a request that fits.
+
+        Raises:
+            LinkError: It does not.
+        """
+        self._encode(self.name.request_type, arguments)
+
+    def post(self, arguments: Mapping[str, Any]) -> int:
+        """Sends a request without waiting for the answer, and gives its number.
+
+        Raises:
+            LinkError: The request does not fit.
+        """
+        data = self._encode(self.name.request_type, arguments)
+        self._number += 1
+        if self._framing is Framing.NUMBERED:
+            number = NUMBER.pack(self._id, self._number)
+            data = data[:HEADER_BYTES] + number + data[HEADER_BYTES:]
+        self._outlet.write(data)
+        self._n_open += 1
+        return self._number
+
+    def close(self) -> None:
+        """Lets go of both topics."""
+        self._participant.end_reading(self._inlet)
+        self._participant.end_writing(self._outlet)
+
+    async def _call(
+        self, arguments: Mapping[str, Any], *, deadline_s: float, timeout_s: float
+    ) -> Sample:
+        n_before = 0 if self.tells_whom else self._n_open
+        number = self.post(arguments)
+        call = self._calls[number] = _Call(n_before)
+        try:
+            with anyio.move_on_at(deadline_s) as scope:
+                if n_before:
+                    scope.deadline = min(deadline_s, anyio.current_time() + LATE_ANSWER_S)
+                await call.is_answered.wait()
+            if call.answer is None and call.held is None:
+                with anyio.move_on_at(deadline_s):
+                    await call.is_answered.wait()
+        finally:
+            del self._calls[number]
+        # What was held is ours after all where nothing followed: the earlier call had no answer.
+        found = call.answer or call.held
+        if found is None:
+            raise self._silence(timeout_s)
+        self._n_open = 0
+        if found.refusal is not None:
+            raise found.refusal
+        return found
+
+    def _silence(self, timeout_s: float) -> LinkError:
+        return LinkError(
+            f"{self.name.service} has not answered within {timeout_s:g} s.",
+            hint="The node that serves it may be busy or stuck: try again, or restart it.",
+        )
+
+    # --- answers
+
+    def _understand(self, data: bytes) -> tuple[int | None, Answer]:
+        """Gives the number of the request, None for others' and 0 where unknown, and the answer."""
+        if self._framing is Framing.BARE:
+            return 0, self._decode(self.name.reply_type, data, 0)
+        asker, number = NUMBER.unpack_from(data.ljust(HEADER_BYTES + NUMBER.size), HEADER_BYTES)
+        if asker != self._id:
+            return None, {}
+        return number, self._decode(self.name.reply_type, data, NUMBER.size)
+
+    def _take(self, sample: Sample) -> None:
+        number, answer = (0, None) if sample.refusal is not None else sample.content
+        if number is None:
+            return
+        if self.on_answer is not None and answer is not None:
+            self.on_answer(number, answer)
+        call = self._calls.get(number) if number else next(iter(self._calls.values()), None)
+        if call is not None:
+            call.take(replace(sample, content=answer))
+        self._n_open = max(self._n_open - 1, 0)

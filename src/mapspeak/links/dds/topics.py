@@ -1,0 +1,290 @@
+"""The topics that we read and write: each in the quality that fits the others there."""
+
+import logging
+from collections.abc import Awaitable, Callable, Coroutine
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import anyio
+
+from mapspeak.errors import LinkError
+from mapspeak.links.dds.discovery import Discovery, Endpoint
+from mapspeak.links.dds.endpoints import Inlet, Outlet, Quality, Sample
+from mapspeak.links.dds.names import dds_topic, full_type
+from mapspeak.links.dds.participant import Participant
+from mapspeak.links.dds.types import Types
+from mapspeak.links.ros import TopicSubscription
+from mapspeak.ros import NAME, TYPE
+from mapspeak.ros.messages import Message, bare_type
+
+logger = logging.getLogger(__name__)
+
+DEPTH, BULKY_DEPTH = 200, 5
+LISTENER_S = 1.0
+"""For a known listener to be connected to what we advertised."""
+
+StartSoon = Callable[[Callable[[], Coroutine[Any, Any, None]]], None]
+AskType = Callable[[Endpoint], Awaitable[None]]
+
+
+@dataclass(slots=True, eq=False)
+class _Request:
+    """How a topic was asked for.
+
+    Attributes:
+        subscription: Of the topic.
+        is_bulky: Fewer messages are kept for a slow reader.
+        throttle_s: The least time between two messages.
+        quality: In which it is read now; None while it is not.
+        inlet: What reads it.
+        writers: The ids of those who wrote it when the reading began.
+        taken_s: When the last message was taken, by the event loop's clock.
+        has_learned: Its type was asked for already.
+    """
+
+    subscription: TopicSubscription
+    is_bulky: bool
+    throttle_s: float
+    quality: Quality | None = None
+    inlet: Inlet | None = None
+    writers: frozenset[bytes] = frozenset()
+    taken_s: float = float("-inf")
+    has_learned: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Advertised:
+    type_name: str
+    outlet: Outlet
+
+
+class Topics:
+    """Reads and writes topics of ROS.
+
+    A topic is read only once somebody writes it, because how it can be read depends on who does: a
+    reader that asks for more than a writer offers is not served, and one that asks for less misses
+    the latched map.
+
+    Args:
+        participant: Ours.
+        discovery: Says who reads and writes what.
+        types: Encodes and decodes.
+        ask_type: Makes the type of an endpoint known by asking its node; raises `LinkError`.
+        start_soon: Runs something in the background.
+    """
+
+    def __init__(
+        self,
+        participant: Participant,
+        discovery: Discovery,
+        types: Types,
+        *,
+        ask_type: AskType,
+        start_soon: StartSoon,
+    ) -> None:
+        self._participant = participant
+        self._discovery = discovery
+        self._types = types
+        self._ask_type = ask_type
+        self._start_soon = start_soon
+        self._requests: dict[str, _Request] = {}
+        self._advertised: dict[str, _Advertised] = {}
+
+    # --- reading
+
+    def subscribe(
+        self, topic: str, *, type_name: str | None, is_bulky: bool, throttle_ms: int
+    ) -> TopicSubscription:
+        """Gives the subscription to a topic; the first subscriber decides how often it is heard.
+
+        Raises:
+            LinkError: The name or the type is none, or the topic has another type.
+        """
+        request = self._requests.get(topic)
+        if request is None:
+            self._check(topic, type_name)
+            subscription = TopicSubscription(topic, type_name=type_name)
+            request = _Request(subscription, is_bulky, throttle_ms / 1e3)
+            self._requests[topic] = request
+            self._arrange(request)
+        request.subscription.n_users += 1
+        return request.subscription
+
+    def unsubscribe(self, topic: str, subscription: object) -> None:
+        """Ends one use of a subscription, and with the last one the reading."""
+        request = self._requests.get(topic)
+        if request is None or request.subscription is not subscription:
+            return
+        request.subscription.n_users -= 1
+        if request.subscription.n_users == 0:
+            del self._requests[topic]
+            self._end(request)
+
+    def renew(self, topic: str) -> None:
+        """Reads a topic anew: latched messages come again."""
+        request = self._requests.get(topic)
+        if request is not None:
+            self._end(request)
+            self._arrange(request)
+
+    def note_change(self, dds_name: str) -> None:
+        """Takes in that others have begun or ended to read or write a topic."""
+        for request in self._requests.values():
+            if dds_topic(request.subscription.topic) == dds_name:
+                self._arrange(request)
+
+    def _arrange(self, request: _Request) -> None:
+        """Reads a topic in the best quality that all of its writers offer.
+
+        It is read anew when somebody new writes: Fast DDS serves at once a reader that comes after
+        its writer, and may take three seconds to serve one that was there before.
+        """
+        name = dds_topic(request.subscription.topic)
+        writers = self._discovery.writers_of(name)
+        if not writers:
+            return
+        if not self._types.knows(writers[0].type_name):
+            self._learn(request, writers[0])
+            return
+        quality = Quality(
+            is_reliable=all(each.is_reliable for each in writers),
+            is_latched=all(each.is_latched for each in writers),
+            depth=BULKY_DEPTH if request.is_bulky else DEPTH,
+        )
+        keys = frozenset(each.key for each in writers)
+        if request.quality == quality and keys <= request.writers:
+            return
+        self._end(request)
+        request.quality, request.writers = quality, keys
+        request.inlet = self._participant.read(
+            name,
+            writers[0].type_name,
+            quality=quality,
+            decode=partial(self._types.decode, writers[0].type_name),
+            take=partial(self._take, request),
+        )
+
+    def _learn(self, request: _Request, writer: Endpoint) -> None:
+        """Asks once for a type that we do not know, or know in another version."""
+        if not request.has_learned:
+            request.has_learned = True
+            self._start_soon(partial(self._learn_and_arrange, request, writer))
+
+    async def _learn_and_arrange(self, request: _Request, writer: Endpoint) -> None:
+        topic = request.subscription.topic
+        try:
+            await self._ask_type(writer)
+        except LinkError as error:
+            logger.warning("%s cannot be read: %s", topic, error)
+            return
+        if self._requests.get(topic) is request:
+            self.renew(topic)
+
+    def _end(self, request: _Request) -> None:
+        if request.inlet is not None:
+            self._participant.end_reading(request.inlet)
+        request.inlet = request.quality = None
+
+    def _take(self, request: _Request, sample: Sample) -> None:
+        if sample.refusal is not None:
+            for writer in self._discovery.writers_of(dds_topic(request.subscription.topic))[:1]:
+                self._learn(request, writer)
+            return
+        now_s = anyio.current_time()
+        if now_s - request.taken_s < request.throttle_s:
+            return
+        request.taken_s = now_s
+        request.subscription.take(sample.content)
+
+    # --- writing
+
+    @property
+    def has_advertised(self) -> bool:
+        """True when something may have been published."""
+        return bool(self._advertised)
+
+    def advertise(self, topic: str, *, type_name: str) -> None:
+        """Says that we will publish.
+
+        Raises:
+            LinkError: The name or the type is none, or the topic has another type.
+        """
+        self._check(topic, type_name)
+        full = full_type(type_name)
+        known = self._advertised.get(topic)
+        if known is not None:
+            if known.type_name != full:
+                raise wrong_type(topic, known.type_name, type_name)
+            return
+        name = dds_topic(topic)
+        is_latched = any(each.is_latched for each in self._discovery.readers_of(name))
+        quality = Quality(is_reliable=True, is_latched=is_latched, depth=DEPTH)
+        outlet = self._participant.write_to(name, full, quality=quality)
+        self._advertised[topic] = _Advertised(full, outlet)
+
+    def unadvertise(self, topic: str) -> None:
+        """Takes back what `advertise` said."""
+        known = self._advertised.pop(topic, None)
+        if known is not None:
+            self._participant.end_writing(known.outlet)
+
+    async def publish(self, topic: str, message: Message) -> None:
+        """Publishes, once those who are known to listen are connected.
+
+        Raises:
+            LinkError: The topic was not advertised, or the message does not fit its type.
+        """
+        known = self._wanted(topic)
+        listeners = self._discovery.readers_of(dds_topic(topic))
+        if listeners and not self._types.knows(known.type_name):
+            await self._ask_type(listeners[0])
+        data = self._types.encode(known.type_name, message)
+        if listeners:
+            await known.outlet.wait_for_reader(timeout_s=LISTENER_S)
+        known.outlet.write(data)
+
+    def publish_at_once(self, topic: str, message: Message) -> None:
+        """Publishes to those who are connected already.
+
+        Raises:
+            LinkError: The topic was not advertised, or the message does not fit its type.
+        """
+        known = self._wanted(topic)
+        known.outlet.write(self._types.encode(known.type_name, message))
+
+    def _wanted(self, topic: str) -> _Advertised:
+        known = self._advertised.get(topic)
+        if known is None:
+            raise LinkError(f"{topic[:80]} was not advertised.", hint="Advertise it first.")
+        return known
+
+    def _check(self, topic: str, type_name: str | None) -> None:
+        check_name(topic)
+        if type_name is None:
+            return
+        if not TYPE.fullmatch(type_name):
+            raise LinkError(
+                f"{type_name[:80]!r} is no type.", hint='Types are written "package/msg/Type".'
+            )
+        found = self._discovery.type_of(dds_topic(topic))
+        if found is not None and bare_type(found) != bare_type(type_name):
+            raise wrong_type(topic, found, type_name)
+
+
+def check_name(name: str) -> None:
+    """Does nothing for the full name of a topic, a service or an action.
+
+    Raises:
+        LinkError: It is none.
+    """
+    if not (name.startswith("/") and NAME.fullmatch(name)):
+        raise LinkError(f"{name[:80]!r} is no full name in ROS.", hint="Such as /robot/map.")
+
+
+def wrong_type(name: str, found: str, given: str) -> LinkError:
+    """Gives the error for a topic, service or action that is of another type than given."""
+    return LinkError(
+        f"{name} is a {bare_type(found)}, not a {bare_type(given)}.",
+        hint="Use the type that the robot uses.",
+    )

@@ -1,0 +1,232 @@
+"""A ROS 2 system over rclpy, as one of its nodes sees it."""
+
+from collections.abc import AsyncGenerator, Callable, Coroutine, Iterator, Mapping
+from contextlib import asynccontextmanager, contextmanager, suppress
+from typing import Any
+
+import anyio
+from anyio.abc import TaskGroup
+from anyio.from_thread import BlockingPortal
+
+from mapspeak.errors import LinkError
+from mapspeak.links.ros import PursuedGoal, TopicSubscription
+from mapspeak.links.ros2.goals import Goals
+from mapspeak.links.ros2.graph import GraphQuestions
+from mapspeak.links.ros2.participant import Participant, errors_of_ros, wait_until
+from mapspeak.links.ros2.services import Services
+from mapspeak.links.ros2.topics import Topics
+from mapspeak.ros import ActionGoal, Subscription
+from mapspeak.ros.messages import Message
+
+ANSWER_S = 5.0
+"""For a service's answer, where the caller says nothing else, and for a first node."""
+FIRST_SIGN_S = 2.0
+"""For the first node of others to be found before we begin without."""
+QUIET_S = 0.3
+"""Without anything new, after which all that is there counts as found."""
+LONGEST_LOOK_S = 3.0
+WATCH_S = 0.2
+"""Between two looks at who reads and writes what."""
+HINT = (
+    "Check that the robot runs ROS 2, that its ROS_DOMAIN_ID and RMW_IMPLEMENTATION are those of "
+    "mapspeak (--robot ros2:DOMAIN), and that `ros2 node list` on this machine shows it."
+)
+
+
+class Ros2Connection(GraphQuestions):
+    """One ROS 2 system, as our node in it sees it.
+
+    Args:
+        participant: Ours.
+        tasks: For what is done in the background.
+        distro: Such as "jazzy"; empty where that is unknown.
+    """
+
+    def __init__(self, participant: Participant, tasks: TaskGroup, *, distro: str) -> None:
+        super().__init__(participant, distro=distro)
+        self._tasks = tasks
+        self._found_s: float | None = None
+        self._topics = Topics(participant)
+        self._services = Services(participant)
+        self._goals = Goals(participant, self._services, start_soon=self.start_soon)
+
+    @property
+    def is_open(self) -> bool:
+        """True: who reads what we publish is another matter."""
+        return True
+
+    @property
+    def connected_for_s(self) -> float | None:
+        """Since when others have been found, in wall time; None before."""
+        return None if self._found_s is None else anyio.current_time() - self._found_s
+
+    def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        """Runs something in the background until the connection is closed."""
+        self._tasks.start_soon(work)
+
+    async def start(self) -> None:
+        """Returns when those who are there have been found; also when nobody is."""
+        self._tasks.start_soon(self._watch)
+        if await wait_until(self._sees_others, within_s=FIRST_SIGN_S):
+            with anyio.move_on_after(LONGEST_LOOK_S):
+                await self._wait_until_quiet()
+
+    async def aclose(self) -> None:
+        """Waits a moment until what was published last has arrived."""
+        await self._topics.flush()
+
+    async def wait_until_connected(self) -> None:
+        """Returns at once, or when the first node of others is found.
+
+        Raises:
+            LinkError: None is, within the usual time for an answer.
+        """
+        if not await wait_until(self._sees_others, within_s=ANSWER_S):
+            raise LinkError("No other node of ROS 2 has been found in our domain.", hint=HINT)
+
+    # --- topics
+
+    def subscribe(
+        self,
+        topic: str,
+        *,
+        type_name: str | None = None,
+        is_bulky: bool = False,
+        throttle_ms: int = 0,
+    ) -> TopicSubscription:
+        """Gives the subscription to a topic; it is read as soon as somebody writes it."""
+        return self._topics.subscribe(
+            topic, type_name=type_name, is_bulky=is_bulky, throttle_ms=throttle_ms
+        )
+
+    def unsubscribe(self, subscription: Subscription) -> None:
+        """Ends one use of a subscription; the last one ends the reading too."""
+        self._topics.unsubscribe(subscription.topic, subscription)
+
+    def renew(self, subscription: Subscription) -> None:
+        """Reads a topic anew: latched messages come again."""
+        self._topics.renew(subscription.topic)
+
+    def advertise(self, topic: str, *, type_name: str) -> None:
+        """Says that we will publish."""
+        self._topics.advertise(topic, type_name=type_name)
+
+    def unadvertise(self, topic: str) -> None:
+        """Takes back what `advertise` said."""
+        self._topics.unadvertise(topic)
+
+    async def publish(self, topic: str, message: Message) -> None:
+        """Publishes on an advertised topic, once known listeners are connected to it."""
+        await self._topics.publish(topic, message)
+
+    def publish_everywhere(self, topic: str, message: Message) -> int:
+        """Publishes at once, for a stop; there is one way, so it gives 1."""
+        self._topics.publish_at_once(topic, message)
+        return 1
+
+    # --- services and actions
+
+    async def call_service(
+        self,
+        service: str,
+        arguments: Mapping[str, Any] | None = None,
+        *,
+        type_name: str | None = None,
+        timeout_s: float | None = None,
+    ) -> dict[str, Any]:
+        """Gives what a service answers."""
+        limit_s = ANSWER_S if timeout_s is None else timeout_s
+        return await self._services.call(
+            service, arguments or {}, type_name=type_name, timeout_s=limit_s
+        )
+
+    async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> PursuedGoal:
+        """Sends a goal to an action and gives what becomes of it, as it becomes."""
+        return await self._goals.send(action, arguments, type_name=type_name)
+
+    def cancel_goal(self, goal: ActionGoal) -> None:
+        """Asks for the end of a goal; its `end` tells whether that worked."""
+        self._goals.cancel(goal)
+
+    def give_up_goal(self, goal: ActionGoal) -> None:
+        """Waits no longer for a goal that shows no sign of life."""
+        self._goals.give_up(goal)
+
+    def clear_the_way(self) -> None:
+        """Does nothing: in ROS 2 itself, nothing is held up by what was sent before."""
+
+    # --- who is there
+
+    async def _watch(self) -> None:
+        while True:
+            # What ROS cannot tell now, it is asked again.
+            with suppress(LinkError), errors_of_ros("ROS does not tell who is there"):
+                self._topics.refresh()
+                self._goals.refresh()
+            await anyio.sleep(WATCH_S)
+
+    def _sees_others(self) -> bool:
+        """True once somebody has been there; who goes later is found out by what stays silent."""
+        if self._found_s is None and self.nodes():
+            self._found_s = anyio.current_time()
+        return self._found_s is not None
+
+    async def _wait_until_quiet(self) -> None:
+        graph, before = await self.fetch_graph(), None
+        while graph != before:
+            await anyio.sleep(QUIET_S)
+            graph, before = await self.fetch_graph(), graph
+
+
+@asynccontextmanager
+async def open_connection(
+    *, domain_id: int | None = None, distro: str = ""
+) -> AsyncGenerator[Ros2Connection]:
+    """Keeps a node of ours in a domain while the context lasts.
+
+    Args:
+        domain_id: As in ROS_DOMAIN_ID; None takes what that says.
+        distro: Such as "jazzy"; empty where that is unknown.
+
+    Raises:
+        LinkError: ROS cannot be started.
+    """
+    with _plain_errors():
+        async with (
+            BlockingPortal() as portal,
+            _open_participant(domain_id, portal) as participant,
+            anyio.create_task_group() as tasks,
+        ):
+            connection = Ros2Connection(participant, tasks, distro=distro)
+            try:
+                await connection.start()
+                yield connection
+            finally:
+                with anyio.CancelScope(shield=True):
+                    await connection.aclose()
+                tasks.cancel_scope.cancel()
+
+
+@asynccontextmanager
+async def _open_participant(
+    domain_id: int | None, portal: BlockingPortal
+) -> AsyncGenerator[Participant]:
+    participant = Participant(domain_id=domain_id, portal=portal)
+    await participant.start()
+    try:
+        yield participant
+    finally:
+        with anyio.CancelScope(shield=True):
+            await participant.aclose()
+
+
+@contextmanager
+def _plain_errors() -> Iterator[None]:
+    """Lets an error pass as it was raised, out of the group that a task group makes of it."""
+    try:
+        yield
+    except BaseExceptionGroup as group:
+        error: BaseException = group
+        while isinstance(error, BaseExceptionGroup) and len(error.exceptions) == 1:
+            error = error.exceptions[0]
+        raise error from error.__cause__

@@ -1,0 +1,190 @@
+"""What a ROS system is made of, as rclpy tells: the part of the port that only asks."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from rclpy.exceptions import NameValidationException
+
+from mapspeak.errors import LinkError
+from mapspeak.links.ros import NodeParameters
+from mapspeak.links.ros2.definitions import find_definitions
+from mapspeak.links.ros2.participant import Participant
+from mapspeak.links.ros2.topics import check_name
+from mapspeak.ros import NodeLinks, RosGraph
+from mapspeak.ros.messages import Dialect, bare_type
+
+UNNAMED = "_NODE_NAME_UNKNOWN_"
+"""A node of which more is not known yet."""
+SEND_GOAL = "/_action/send_goal"
+NANOSECONDS = 1_000_000_000
+
+
+class GraphQuestions(ABC):
+    """Answers from what our node has discovered, and services of the nodes.
+
+    Args:
+        participant: Ours.
+        distro: Such as "jazzy"; empty where that is unknown.
+    """
+
+    def __init__(self, participant: Participant, *, distro: str) -> None:
+        self._participant = participant
+        self._distro = distro
+        self._parameters = NodeParameters(self)
+
+    @abstractmethod
+    async def call_service(
+        self,
+        service: str,
+        arguments: Mapping[str, Any] | None = None,
+        *,
+        type_name: str | None = None,
+        timeout_s: float | None = None,
+    ) -> dict[str, Any]:
+        """Gives what a service answers."""
+
+    async def fetch_graph(self) -> RosGraph:
+        """Gives the topics and actions there are."""
+        node = self._participant.node
+        return RosGraph(
+            dialect=Dialect.ROS2,
+            distro=self._distro,
+            types={
+                topic: bare_type(types[0])
+                for topic, types in sorted(node.get_topic_names_and_types())
+                if types and not _is_hidden(topic) and self._is_of_others(topic)
+            },
+            actions=tuple(sorted(self._action_types())),
+        )
+
+    async def fetch_time_s(self) -> float | None:
+        """Gives the time of this machine: the machines of a ROS 2 system have the same."""
+        return float(self._participant.node.get_clock().now().nanoseconds) / NANOSECONDS
+
+    async def fetch_nodes(self) -> tuple[str, ...]:
+        """Gives the full names of all nodes but ours."""
+        return self.nodes()
+
+    def nodes(self) -> tuple[str, ...]:
+        """Gives the full names of all nodes but ours, as they are known now."""
+        found = self._participant.node.get_node_names_and_namespaces()
+        names = {
+            f"{namespace.rstrip('/')}/{name}"
+            for name, namespace in found
+            if name not in (UNNAMED, self._participant.name)
+        }
+        return tuple(sorted(names))
+
+    async def fetch_node(self, node: str) -> NodeLinks:
+        """Gives what a node publishes, subscribes to and serves."""
+        namespace, _, name = node.rpartition("/")
+        ours = self._participant.node
+        if node not in self.nodes():
+            raise _unknown(node)
+        asked = (
+            ours.get_publisher_names_and_types_by_node,
+            ours.get_subscriber_names_and_types_by_node,
+            ours.get_service_names_and_types_by_node,
+        )
+        try:
+            publishes, subscribes, serves = [ask(name, namespace or "/") for ask in asked]
+        except (RuntimeError, NameValidationException) as error:
+            raise _unknown(node) from error
+        return NodeLinks(
+            publishes=_shown(publishes), subscribes=_shown(subscribes), serves=_shown(serves)
+        )
+
+    async def fetch_publishers(self, topic: str) -> tuple[str, ...]:
+        """Gives the nodes that publish on a topic."""
+        check_name(topic)
+        return self._nodes_of(self._participant.node.get_publishers_info_by_topic(topic))
+
+    async def fetch_subscribers(self, topic: str) -> tuple[str, ...]:
+        """Gives the nodes that listen to a topic."""
+        check_name(topic)
+        return self._nodes_of(self._participant.node.get_subscriptions_info_by_topic(topic))
+
+    async def fetch_services(self) -> tuple[str, ...]:
+        """Gives the full names of all services but the parts of actions."""
+        return tuple(sorted(name for name in self._service_types() if not _is_hidden(name)))
+
+    async def fetch_service_type(self, service: str) -> str:
+        """Gives a service's type."""
+        found = self._service_types().get(service)
+        if found is None:
+            raise _unknown(service)
+        return bare_type(found)
+
+    async def fetch_action_type(self, action: str) -> str:
+        """Gives an action's type."""
+        found = self._action_types().get(action)
+        if found is None:
+            raise _unknown(action)
+        return bare_type(found)
+
+    async def fetch_definitions(self, type_name: str) -> Mapping[str, str]:
+        """Gives the .msg texts of a type and of all within, as this machine's ROS has them."""
+        return find_definitions(type_name)
+
+    async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
+        """Gives the names of a node's parameters."""
+        return await self._parameters.fetch_names(node)
+
+    async def fetch_parameter(self, node: str, name: str) -> Any:  # noqa: ANN401 - any value
+        """Gives the value of a node's parameter; None where it is not set."""
+        value = await self._parameters.fetch(node, name)
+        if isinstance(value, bytes):
+            return list(value)
+        return value.tolist() if isinstance(value, np.ndarray) else value
+
+    async def set_parameter(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401
+        """Sets a node's parameter."""
+        await self._parameters.put(node, name, value)
+
+    def _service_types(self) -> dict[str, str]:
+        """Gives the types of what somebody serves: a mere client shows as a service too."""
+        node, ours = self._participant.node, f"/{self._participant.name}/"
+        return {
+            service: types[0]
+            for service, types in node.get_service_names_and_types()
+            if types and node.count_services(service) and not service.startswith(ours)
+        }
+
+    def _action_types(self) -> dict[str, str]:
+        return {
+            service.removesuffix(SEND_GOAL): type_name.removesuffix("_SendGoal")
+            for service, type_name in self._service_types().items()
+            if service.endswith(SEND_GOAL)
+        }
+
+    def _is_of_others(self, topic: str) -> bool:
+        node = self._participant.node
+        # One after the other: most topics have somebody who writes them.
+        return bool(
+            self._nodes_of(node.get_publishers_info_by_topic(topic))
+            or self._nodes_of(node.get_subscriptions_info_by_topic(topic))
+        )
+
+    def _nodes_of(self, infos: Iterable[Any]) -> tuple[str, ...]:
+        names = {
+            f"{each.node_namespace.rstrip('/')}/{each.node_name}"
+            for each in infos
+            if each.node_name != self._participant.name
+        }
+        return tuple(sorted(names))
+
+
+def _is_hidden(name: str) -> bool:
+    return "/_" in name
+
+
+def _shown(found: Iterable[tuple[str, Any]]) -> tuple[str, ...]:
+    return tuple(sorted(name for name, _ in found if not _is_hidden(name)))
+
+
+def _unknown(name: str) -> LinkError:
+    return LinkError(
+        f"The robot knows no {name[:80]}.", hint="Ask for the list of what there is first."
+    )

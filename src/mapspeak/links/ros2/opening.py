@@ -1,0 +1,65 @@
+"""A robot on ROS 2, through rclpy; nothing here needs that before a robot is opened."""
+
+from collections.abc import AsyncGenerator
+from contextlib import asynccontextmanager
+
+from mapspeak.errors import ConfigError
+from mapspeak.links.ros import DrivingPatience, RobotOverrides, RosRobot, build_ros_robot
+from mapspeak.ros import RosConnection
+
+USUAL_PATIENCE = DrivingPatience()
+NOTHING_SAID = RobotOverrides()
+HINT = (
+    "Source ROS 2 (`source /opt/ros/$ROS_DISTRO/setup.sh`) and start mapspeak with its Python, or "
+    "install ROS's wheels in an environment of their own on Python 3.12: see "
+    "docs/howto/connect-without-rosbridge.md. `--robot dds` needs no ROS on this machine."
+)
+
+
+@asynccontextmanager
+async def open_ros2_connection(
+    *, domain_id: int | None = None, distro: str = ""
+) -> AsyncGenerator[RosConnection]:
+    """Keeps a node of ours in a ROS 2 domain while the context lasts.
+
+    Args:
+        domain_id: As in ROS_DOMAIN_ID; None takes what that says.
+        distro: Such as "jazzy"; empty where that is unknown.
+
+    Raises:
+        ConfigError: This Python has no rclpy.
+        LinkError: ROS cannot be started.
+    """
+    try:
+        from mapspeak.links.ros2.connection import open_connection  # noqa: PLC0415 - needs rclpy
+    except ImportError as error:
+        # Without its libraries rclpy fails as if it were not there, and says which one is missing.
+        raise ConfigError(f"This Python has no rclpy: {error}.", hint=HINT) from error
+    async with open_connection(domain_id=domain_id, distro=distro) as connection:
+        yield connection
+
+
+@asynccontextmanager
+async def open_ros2_robot(
+    *,
+    domain_id: int | None = None,
+    distro: str = "",
+    overrides: RobotOverrides = NOTHING_SAID,
+    patience: DrivingPatience = USUAL_PATIENCE,
+) -> AsyncGenerator[RosRobot]:
+    """Offers the robot in a ROS 2 domain while the context lasts.
+
+    Leaving the context does not stop the robot: call `stop` before, where that is wanted.
+
+    Args:
+        domain_id: As in ROS_DOMAIN_ID; None takes what that says.
+        distro: Such as "jazzy"; empty where that is unknown.
+        overrides: What robot.yaml says.
+        patience: Time limits of navigation.
+
+    Raises:
+        ConfigError: This Python has no rclpy.
+        LinkError: ROS cannot be started.
+    """
+    async with open_ros2_connection(domain_id=domain_id, distro=distro) as connection:
+        yield await build_ros_robot(connection, overrides=overrides, patience=patience)

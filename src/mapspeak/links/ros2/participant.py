@@ -1,0 +1,157 @@
+"""Our node in a ROS 2 domain: its callbacks run in a thread of their own and come to the loop."""
+
+import logging
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError
+from contextlib import contextmanager
+from typing import Any
+
+import anyio
+import rclpy
+from anyio.from_thread import BlockingPortal
+from rclpy.context import Context
+from rclpy.exceptions import NameValidationException, NoTypeSupportImportedException
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+
+from mapspeak.errors import LinkError
+from mapspeak.ros import new_id
+
+LOG = logging.getLogger(__name__)
+N_DIGITS = 8
+"""Of the id in our node's name; two of the same name in one domain would be taken for one."""
+LOOK_S = 0.02
+"""Between two looks at what rclpy does not tell by itself."""
+PAUSE_S = 0.2
+"""After an error of rclpy, so that one that stays does not fill the log."""
+
+Node = Any  # rclpy has no types
+ERRORS = (RuntimeError, OverflowError, NameValidationException, NoTypeSupportImportedException)
+"""What rclpy raises; what ROS's own library says is a RuntimeError."""
+
+
+class Participant:
+    """A node, in a context of its own, whose callbacks a thread of its own runs.
+
+    Args:
+        domain_id: As in ROS_DOMAIN_ID; None takes what that says.
+        portal: To the event loop.
+    """
+
+    def __init__(self, *, domain_id: int | None, portal: BlockingPortal) -> None:
+        self.name = f"mapspeak_{new_id()[:N_DIGITS]}"
+        self._domain_id = domain_id
+        self._portal = portal
+        self._context = Context()
+        self._end = Future()
+        self._pause = threading.Event()
+        self._loop_thread = threading.get_ident()
+        self._thread = threading.Thread(target=self._run, name=self.name, daemon=True)
+        self.node: Node = None
+
+    async def start(self) -> None:
+        """Enters the domain.
+
+        Raises:
+            LinkError: ROS cannot be started.
+        """
+        try:
+            await anyio.to_thread.run_sync(self._enter)
+        except LinkError:
+            self._context.try_shutdown()
+            raise
+        self._thread.start()
+
+    async def aclose(self) -> None:
+        """Leaves the domain; neither the thread nor the node is left."""
+        if self.node is not None:
+            await anyio.to_thread.run_sync(self._leave)
+
+    def hand_over(self, work: Callable[..., None], *arguments: Any) -> None:  # noqa: ANN401
+        """Lets the event loop do something, and waits until it has.
+
+        That one waits keeps a fast robot from filling our memory: what comes meanwhile is left to
+        ROS, which keeps the newest few messages of each topic.
+        """
+        if threading.get_ident() == self._loop_thread:
+            work(*arguments)
+            return
+        try:
+            self._portal.call(work, *arguments)
+        except (CancelledError, RuntimeError):
+            # While we leave nobody takes it any more.
+            if not self._pause.is_set():
+                raise
+
+    async def wait_for(self, future: Any) -> Any:  # noqa: ANN401 - rclpy has no types
+        """Gives the result of one of rclpy's futures.
+
+        Raises:
+            LinkError: It ended with an error.
+        """
+        is_done = anyio.Event()
+        future.add_done_callback(lambda _: self.hand_over(is_done.set))
+        await is_done.wait()
+        with errors_of_ros("The answer"):
+            return future.result()
+
+    def _enter(self) -> None:
+        with errors_of_ros("ROS 2 cannot be started"):
+            rclpy.init(
+                args=[],
+                context=self._context,
+                domain_id=self._domain_id,
+                signal_handler_options=SignalHandlerOptions.NO,
+            )
+            self.node = rclpy.create_node(
+                self.name,
+                context=self._context,
+                use_global_arguments=False,
+                enable_rosout=False,
+                start_parameter_services=False,
+            )
+            self._executor = SingleThreadedExecutor(context=self._context)
+            self._executor.add_node(self.node)
+
+    def _run(self) -> None:
+        while not self._end.done():
+            try:
+                self._executor.spin_until_future_complete(self._end)
+            except Exception:  # a message that cannot be read must not end all others
+                LOG.exception("an error of rclpy")
+                self._pause.wait(PAUSE_S)
+
+    def _leave(self) -> None:
+        self._pause.set()
+        self._end.set_result(None)
+        self._executor.wake()
+        self._thread.join()
+        self._executor.shutdown()
+        self.node.destroy_node()
+        self._context.try_shutdown()
+
+
+async def wait_until(is_so: Callable[[], bool], *, within_s: float) -> bool:
+    """Returns whether something is so, as soon as it is, and at last after so long."""
+    with anyio.move_on_after(within_s):
+        while not is_so():  # noqa: ASYNC110 - rclpy has no event for it
+            await anyio.sleep(LOOK_S)
+    return is_so()
+
+
+@contextmanager
+def errors_of_ros(what: str) -> Iterator[None]:
+    """Turns what rclpy raises into a `LinkError`.
+
+    Args:
+        what: Failed.
+    """
+    try:
+        yield
+    except ERRORS as error:
+        first = " ".join(str(error).split())
+        raise LinkError(
+            f"{what}: {first[:300]}", hint="Check ROS on this machine: `ros2 topic list`."
+        ) from error

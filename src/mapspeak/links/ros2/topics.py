@@ -1,0 +1,282 @@
+"""The topics that we read and write: each in the quality of service that fits the others there."""
+
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import anyio
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from mapspeak.errors import LinkError
+from mapspeak.links.ros import TopicSubscription
+from mapspeak.links.ros2.participant import Participant, errors_of_ros, wait_until
+from mapspeak.links.ros2.reading import read_message
+from mapspeak.links.ros2.types import find_message
+from mapspeak.links.ros2.writing import write_message
+from mapspeak.ros import NAME
+from mapspeak.ros.messages import Message, bare_type
+
+DEPTH, BULKY_DEPTH = 200, 5
+"""How many messages ROS keeps until we take them."""
+LISTENER_S = 1.0
+"""For a known listener to be connected to what we advertised."""
+YOUNG_S = 0.5
+"""A listener that we know of may hear of us that much later, and miss what was published before."""
+ARRIVAL_S = 0.5
+"""For what was published last to arrive, before we leave."""
+
+
+@dataclass(slots=True, eq=False)
+class _Request:
+    """How a topic was asked for.
+
+    Attributes:
+        subscription: Of the topic.
+        is_bulky: Fewer messages are kept for a slow reader.
+        throttle_s: The least time between two messages.
+        quality: In which it is read now; None while it is not.
+        reader: What reads it in rclpy.
+        n_readers: How many there have been; what an earlier one still brings is dropped.
+        taken_s: When the last message was taken.
+    """
+
+    subscription: TopicSubscription
+    is_bulky: bool
+    throttle_s: float
+    quality: QoSProfile | None = None
+    reader: Any = None
+    n_readers: int = 0
+    taken_s: float = float("-inf")
+
+
+@dataclass(frozen=True, slots=True)
+class _Advertised:
+    message_class: Any
+    publisher: Any
+    made_s: float
+
+
+class Topics:
+    """Reads and writes topics of ROS.
+
+    A topic is read only once somebody writes it, because how it can be read depends on who does: a
+    reader that asks for more than a writer offers is not served, and one that asks for less misses
+    the latched map.
+
+    Args:
+        participant: Ours.
+    """
+
+    def __init__(self, participant: Participant) -> None:
+        self._participant = participant
+        self._requests: dict[str, _Request] = {}
+        self._advertised: dict[str, _Advertised] = {}
+
+    # --- reading
+
+    def subscribe(
+        self, topic: str, *, type_name: str | None, is_bulky: bool, throttle_ms: int
+    ) -> TopicSubscription:
+        """Gives the subscription to a topic; the first subscriber decides how often it is heard.
+
+        Raises:
+            LinkError: The name or the type is none, or the topic has another type.
+        """
+        request = self._requests.get(topic)
+        if request is None:
+            self._check(topic, type_name)
+            subscription = TopicSubscription(topic, type_name=type_name)
+            request = _Request(subscription, is_bulky, throttle_ms / 1e3)
+            self._arrange(request)
+            self._requests[topic] = request
+        request.subscription.n_users += 1
+        return request.subscription
+
+    def unsubscribe(self, topic: str, subscription: object) -> None:
+        """Ends one use of a subscription, and with the last one the reading."""
+        request = self._requests.get(topic)
+        if request is None or request.subscription is not subscription:
+            return
+        request.subscription.n_users -= 1
+        if request.subscription.n_users == 0:
+            del self._requests[topic]
+            self._end(request)
+
+    def renew(self, topic: str) -> None:
+        """Reads a topic anew: latched messages come again."""
+        request = self._requests.get(topic)
+        if request is not None:
+            self._end(request)
+            self._arrange(request)
+
+    def refresh(self) -> None:
+        """Takes in that others have begun or ended to write topics that we read."""
+        for request in list(self._requests.values()):
+            # What cannot be read stays silent; who waits for it is told so.
+            with suppress(LinkError):
+                self._arrange(request)
+
+    def _arrange(self, request: _Request) -> None:
+        """Reads a topic in the best quality that all of its writers offer."""
+        topic = request.subscription.topic
+        node = self._participant.node
+        writers = node.get_publishers_info_by_topic(topic)
+        if not writers:
+            return
+        profiles = [writer.qos_profile for writer in writers]
+        is_reliable = all(each.reliability != ReliabilityPolicy.BEST_EFFORT for each in profiles)
+        is_latched = all(each.durability == DurabilityPolicy.TRANSIENT_LOCAL for each in profiles)
+        quality = _quality(
+            is_reliable=is_reliable,
+            is_latched=is_latched,
+            depth=BULKY_DEPTH if request.is_bulky else DEPTH,
+        )
+        if request.quality == quality:
+            return
+        message_class = find_message(request.subscription.type_name or writers[0].topic_type)
+        self._end(request)
+        with errors_of_ros(f"{topic} cannot be read"):
+            request.reader = node.create_subscription(
+                message_class, topic, partial(self._take, request, request.n_readers), quality
+            )
+        request.quality = quality
+
+    def _end(self, request: _Request) -> None:
+        if request.reader is not None:
+            self._participant.node.destroy_subscription(request.reader)
+        request.reader = request.quality = None
+        request.n_readers += 1
+
+    def _take(self, request: _Request, number: int, message: Any) -> None:  # noqa: ANN401 - rclpy has no types
+        """Takes a message, in the thread of rclpy, and reads it there."""
+        now_s = time.monotonic()
+        if now_s - request.taken_s < request.throttle_s:
+            return
+        request.taken_s = now_s
+        self._participant.hand_over(self._give, request, number, read_message(message))
+
+    def _give(self, request: _Request, number: int, message: Message) -> None:
+        if request.n_readers == number:
+            request.subscription.take(message)
+
+    # --- writing
+
+    def advertise(self, topic: str, *, type_name: str) -> None:
+        """Says that we will publish.
+
+        Raises:
+            LinkError: The name or the type is none, or the topic has another type.
+        """
+        self._check(topic, type_name)
+        message_class = find_message(type_name)
+        known = self._advertised.get(topic)
+        if known is not None:
+            if known.message_class is not message_class:
+                raise LinkError(
+                    f"{topic} was advertised with another type than {bare_type(type_name)}.",
+                    hint="A topic has one type: look it up on the robot.",
+                )
+            return
+        node = self._participant.node
+        readers = [each.qos_profile for each in node.get_subscriptions_info_by_topic(topic)]
+        is_latched = any(each.durability == DurabilityPolicy.TRANSIENT_LOCAL for each in readers)
+        quality = _quality(is_reliable=True, is_latched=is_latched, depth=DEPTH)
+        with errors_of_ros(f"{topic} cannot be written"):
+            publisher = node.create_publisher(message_class, topic, quality)
+        self._advertised[topic] = _Advertised(message_class, publisher, anyio.current_time())
+
+    def unadvertise(self, topic: str) -> None:
+        """Takes back what `advertise` said."""
+        known = self._advertised.pop(topic, None)
+        if known is not None:
+            self._participant.node.destroy_publisher(known.publisher)
+
+    async def publish(self, topic: str, values: Message) -> None:
+        """Publishes, once those who are known to listen are connected.
+
+        Raises:
+            LinkError: The topic was not advertised, or the message does not fit its type.
+        """
+        known = self._wanted(topic)
+        message = write_message(known.message_class, values)
+        if self._has_listeners(topic):
+            count = known.publisher.get_subscription_count
+            await wait_until(lambda: bool(count()), within_s=LISTENER_S)
+            await anyio.sleep_until(known.made_s + YOUNG_S)
+        self._write(topic, known, message)
+
+    def publish_at_once(self, topic: str, values: Message) -> None:
+        """Publishes to those who are connected already.
+
+        Raises:
+            LinkError: The topic was not advertised, or the message does not fit its type.
+        """
+        known = self._wanted(topic)
+        self._write(topic, known, write_message(known.message_class, values))
+
+    async def flush(self) -> None:
+        """Returns when all that was published has arrived, or after a short while."""
+        publishers = [each.publisher for each in self._advertised.values()]
+        await anyio.to_thread.run_sync(_wait_for_arrival, publishers)
+
+    def _write(self, topic: str, known: _Advertised, message: Any) -> None:  # noqa: ANN401
+        with errors_of_ros(f"Nothing can be published on {topic}"):
+            known.publisher.publish(message)
+
+    def _has_listeners(self, topic: str) -> bool:
+        infos = self._participant.node.get_subscriptions_info_by_topic(topic)
+        return any(each.node_name != self._participant.name for each in infos)
+
+    def _wanted(self, topic: str) -> _Advertised:
+        known = self._advertised.get(topic)
+        if known is None:
+            raise LinkError(f"{topic[:80]} was not advertised.", hint="Advertise it first.")
+        return known
+
+    def _check(self, topic: str, type_name: str | None) -> None:
+        check_name(topic)
+        if type_name is None:
+            return
+        find_message(type_name)
+        node = self._participant.node
+        infos = [
+            *node.get_publishers_info_by_topic(topic),
+            *node.get_subscriptions_info_by_topic(topic),
+        ]
+        found = {bare_type(each.topic_type) for each in infos}
+        if found and bare_type(type_name) not in found:
+            raise wrong_type(topic, min(found), type_name)
+
+
+def check_name(name: str) -> None:
+    """Does nothing for the full name of a topic, a service or an action.
+
+    Raises:
+        LinkError: It is none.
+    """
+    if not (name.startswith("/") and NAME.fullmatch(name)):
+        raise LinkError(f"{name[:80]!r} is no full name in ROS.", hint="Such as /robot/map.")
+
+
+def wrong_type(name: str, found: str, given: str) -> LinkError:
+    """Gives the error for a topic, service or action that is of another type than given."""
+    return LinkError(
+        f"{name} is a {bare_type(found)}, not a {bare_type(given)}.",
+        hint="Use the type that the robot uses.",
+    )
+
+
+def _quality(*, is_reliable: bool, is_latched: bool, depth: int) -> QoSProfile:
+    return QoSProfile(
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE if is_reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if is_latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+def _wait_for_arrival(publishers: list[Any]) -> None:
+    for publisher in publishers:
+        publisher.wait_for_all_acked(Duration(seconds=ARRIVAL_S))

@@ -1,0 +1,231 @@
+"""A node of ROS 2 in this process, made of our own DDS: what links/dds is tested against.
+
+It frames services as nodes on Cyclone DDS do, because that is what it is, or bare as those on Fast
+DDS do, when a test asks for it.
+"""
+
+import os
+import random
+import socket
+import struct
+from collections.abc import AsyncGenerator, Callable
+from contextlib import asynccontextmanager
+from typing import Any
+
+import anyio
+from cyclonedds.pub import DataWriter
+from cyclonedds.qos import Policy, Qos
+
+from mapspeak.links.dds import DdsConnection, DdsTiming, open_dds_connection
+from mapspeak.links.dds.cdr import HEADER_BYTES
+from mapspeak.links.dds.discovery import Framing
+from mapspeak.links.dds.endpoints import Inlet, Outlet, Quality, Sample
+from mapspeak.links.dds.names import (
+    DISCOVERY_TOPIC,
+    DISCOVERY_TYPE,
+    ServiceName,
+    dds_topic,
+)
+from mapspeak.links.dds.network import DdsNetwork
+from mapspeak.links.dds.participant import Participant
+from mapspeak.links.dds.types import Types
+
+RELIABLE = Quality(is_reliable=True, is_latched=False, depth=10)
+LATCHED = Quality(is_reliable=True, is_latched=True, depth=10)
+BEST_EFFORT = Quality(is_reliable=False, is_latched=False, depth=10)
+QUICK = DdsTiming(quiet_s=0.05)
+SET_BOOL = "std_srvs/srv/SetBool"
+NUMBER_BYTES = struct.calcsize("<Qq")
+
+Request = dict[str, Any]
+Reply = Callable[[Request], None]
+
+
+def some_network() -> DdsNetwork:
+    """Gives a domain on this machine that nobody uses: each worker of pytest has its own dozen."""
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")) % 8
+    dozen = range(1 + 12 * worker, 13 + 12 * worker)
+    domains = random.sample(dozen, k=len(dozen))
+    return DdsNetwork(domain_id=next(filter(_is_free, domains)), is_local=True)
+
+
+def _is_free(domain_id: int) -> bool:
+    """Tells whether the port of a domain's first participant is not taken."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind(("127.0.0.1", 7410 + 250 * domain_id))
+        except OSError:
+            return False
+    return True
+
+
+class DdsNode:
+    """A node: publishes, listens, and serves what it is told to.
+
+    Attributes:
+        heard: What came on each topic it listens to.
+        types: Its own, to which a test may add.
+    """
+
+    def __init__(self, network: DdsNetwork, *, name: str = "/robot") -> None:
+        self.name = name
+        self.participant = Participant(network)
+        self.types = Types()
+        self.heard: dict[str, list[Request]] = {}
+        self._outlets: dict[str, tuple[str, Outlet]] = {}
+        self._inlets: list[Inlet] = []
+        self._introduction = self.participant.write_to(
+            DISCOVERY_TOPIC, DISCOVERY_TYPE, quality=LATCHED
+        )
+
+    def advertise(self, topic: str, type_name: str, *, quality: Quality = RELIABLE) -> None:
+        outlet = self.participant.write_to(dds_topic(topic), type_name, quality=quality)
+        self._outlets[topic] = (type_name, outlet)
+        self.introduce()
+
+    def publish(self, topic: str, message: Request) -> None:
+        type_name, outlet = self._outlets[topic]
+        outlet.write(self.types.encode(type_name, message))
+
+    def publish_hashed(self, topic: str, type_name: str, type_hash: str) -> None:
+        """Advertises a topic and tells the hash of its type, as newer versions of ROS do."""
+        known, raw_type = self.participant._topic(dds_topic(topic), type_name)
+        described = Policy.Userdata(f"typehash={type_hash};".encode())
+        qos = Qos(described, base=RELIABLE.qos)
+        writer: DataWriter[Any] = DataWriter(self.participant._publisher, known, qos)
+        self._outlets[topic] = (type_name, Outlet(writer, raw_type))
+        self.introduce()
+
+    def listen(self, topic: str, type_name: str, *, quality: Quality = RELIABLE) -> None:
+        heard = self.heard.setdefault(topic, [])
+        self._read(dds_topic(topic), type_name, quality, heard.append)
+
+    def serve(
+        self,
+        service: str,
+        type_name: str,
+        answer: Callable[[Request, Reply], None],
+        *,
+        framing: Framing = Framing.NUMBERED,
+    ) -> None:
+        """Serves: `answer` gets each request, and a function that replies, at once or later."""
+        name = ServiceName(service=service, type_name=type_name)
+        replies = self.participant.write_to(name.reply_topic, name.reply_type, quality=RELIABLE)
+        self._outlets[name.reply_topic] = (name.reply_type, replies)
+        skip = NUMBER_BYTES if framing is Framing.NUMBERED else 0
+
+        def decode(data: bytes) -> tuple[bytes, Request]:
+            number = data[HEADER_BYTES : HEADER_BYTES + skip]
+            return number, self.types.decode(name.request_type, data, skip)
+
+        def take(request: tuple[bytes, Request]) -> None:
+            number, arguments = request
+
+            def reply(message: Request) -> None:
+                data = self.types.encode(name.reply_type, message)
+                replies.write(data[:HEADER_BYTES] + number + data[HEADER_BYTES:])
+
+            answer(arguments, reply)
+
+        self._inlets.append(
+            self.participant.read(
+                name.request_topic,
+                name.request_type,
+                quality=RELIABLE,
+                decode=decode,
+                take=lambda sample: take(_content(sample)),
+            )
+        )
+        self.introduce()
+
+    def stop_serving(self, service: str) -> None:
+        topic = f"rr{service}Reply"
+        _, outlet = self._outlets.pop(topic)
+        self.participant.end_writing(outlet)
+
+    def introduce(self) -> None:
+        """Tells which readers and writers are this node's, as the middlewares of ROS do."""
+        namespace, _, last = self.name.rpartition("/")
+        writers = [outlet.writer for _, outlet in self._outlets.values() if outlet.writer]
+        readers = [inlet._reader for inlet in self._inlets if inlet._reader]
+        node = {
+            "node_namespace": namespace or "/",
+            "node_name": last,
+            "reader_gid_seq": [{"data": reader.guid.bytes} for reader in readers],
+            "writer_gid_seq": [{"data": writer.guid.bytes} for writer in writers],
+        }
+        message = {
+            "gid": {"data": self.participant.key.ljust(16, b"\x00")},
+            "node_entities_info_seq": [node],
+        }
+        self._introduction.write(self.types.encode(DISCOVERY_TYPE, message))
+
+    def _read(
+        self, topic: str, type_name: str, quality: Quality, take: Callable[[Request], None]
+    ) -> None:
+        self._inlets.append(
+            self.participant.read(
+                topic,
+                type_name,
+                quality=quality,
+                decode=lambda data: self.types.decode(type_name, data),
+                take=lambda sample: take(_content(sample)),
+            )
+        )
+        self.introduce()
+
+
+def _content(sample: Sample) -> Any:  # noqa: ANN401 - ROS JSON
+    if sample.refusal is not None:
+        raise sample.refusal
+    return sample.content
+
+
+@asynccontextmanager
+async def open_dds_node(network: DdsNetwork, *, name: str = "/robot") -> AsyncGenerator[DdsNode]:
+    node = DdsNode(network, name=name)
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(node.participant.run)
+        try:
+            yield node
+        finally:
+            node.participant.close()
+
+
+@asynccontextmanager
+async def open_here(
+    network: DdsNetwork, *, framing: Framing = Framing.NUMBERED
+) -> AsyncGenerator[DdsConnection]:
+    """Connects to nodes in this process, which find each other at once.
+
+    All of DDS here is Cyclone's: that a node is on Fast DDS can only be claimed.
+    """
+    async with open_dds_connection(
+        network, timing=QUICK, framing_of=lambda _key: framing
+    ) as connection:
+        yield connection
+
+
+async def until(is_so: Callable[[], object], *, within_s: float = 5.0) -> None:
+    """Returns when something is so; DDS does not tell of everything that a test wants to know."""
+    with anyio.fail_after(within_s):
+        while not is_so():  # noqa: ASYNC110 - see above
+            await anyio.sleep(0.01)
+
+
+@asynccontextmanager
+async def open_both(
+    prepare: Callable[[DdsNode], None] = lambda node: node.introduce(),
+    *,
+    framing: Framing = Framing.NUMBERED,
+) -> AsyncGenerator[tuple[DdsNode, DdsConnection]]:
+    network = some_network()
+    async with open_dds_node(network) as node:
+        prepare(node)
+        async with open_here(network, framing=framing) as connection:
+            yield node, connection
+
+
+def answer_set_bool(request: Request, reply: Reply) -> None:
+    """Serves std_srvs/SetBool."""
+    reply({"success": request["data"], "message": "as you wish"})

@@ -1,0 +1,215 @@
+from contextlib import suppress
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+pytest.importorskip("cyclonedds", reason="has no wheel for this Python")
+
+from mapspeak.errors import LinkError
+from mapspeak.links.dds.cdr import Codec
+from mapspeak.links.dds.definitions import action_parts, build_type_book, read_type_description
+from mapspeak.ros.definitions import TypeBook
+
+BOOK = build_type_book()
+CODEC = Codec(BOOK)
+ODD = TypeBook(
+    {
+        "odd/All": (
+            "bool truth\nint8 a\nuint16 b\nint64 c\nfloat32 d\nstring text\nstring[] texts\n"
+            "float64[] many\nfloat32[3] three\nbool[] truths\nuint8[] data\nint16[<=4] few\n"
+            "odd/Inner inner\nodd/Inner[] inners\nodd/Nothing nothing"
+        ),
+        "odd/Inner": "uint8 small\nfloat64 large",
+        "odd/Nothing": "",
+    }
+)
+
+
+def floats(width: int) -> st.SearchStrategy[float]:
+    return st.floats(allow_nan=False, allow_infinity=False, width=32 if width == 32 else 64)
+
+
+INNER = st.fixed_dictionaries({"small": st.integers(0, 255), "large": floats(64)})
+TEXT = st.text(st.characters(exclude_characters="\x00", codec="utf-8"), max_size=8)
+ALL = st.fixed_dictionaries(
+    {
+        "truth": st.booleans(),
+        "a": st.integers(-128, 127),
+        "b": st.integers(0, 65535),
+        "c": st.integers(-(2**63), 2**63 - 1),
+        "d": floats(32),
+        "text": TEXT,
+        "texts": st.lists(TEXT, max_size=3),
+        "many": st.lists(floats(64), max_size=3),
+        "three": st.lists(floats(32), min_size=3, max_size=3),
+        "truths": st.lists(st.booleans(), max_size=3),
+        "data": st.binary(max_size=5),
+        "few": st.lists(st.integers(-(2**15), 2**15 - 1), max_size=4),
+        "inner": INNER,
+        "inners": st.lists(INNER, max_size=3),
+        "nothing": st.just({}),
+    }
+)
+
+
+def plain(value: object) -> object:
+    match value:
+        case dict():
+            return {name: plain(each) for name, each in value.items()}
+        case list():
+            return [plain(each) for each in value]
+        case np.ndarray():
+            return value.tolist()
+        case _:
+            return value
+
+
+@given(ALL)
+def test_a_message_comes_back_as_it_was_written(message: dict[str, object]) -> None:
+    codec = Codec(ODD)
+    assert plain(codec.decode("odd/msg/All", codec.encode("odd/msg/All", message))) == message
+
+
+@given(st.binary(max_size=80), st.sampled_from([0, 1]))
+def test_any_bytes_are_a_message_or_an_error(data: bytes, order: int) -> None:
+    with suppress(LinkError):
+        Codec(ODD).decode("odd/All", bytes([0, order, 0, 0]) + data)
+
+
+@given(ALL, st.data())
+def test_a_message_cut_off_is_an_error(message: dict[str, object], data: st.DataObject) -> None:
+    codec = Codec(ODD)
+    written = codec.encode("odd/All", message)
+    length = data.draw(st.integers(0, len(written) - 1))
+    with pytest.raises(LinkError):
+        codec.decode("odd/All", written[:length])
+
+
+def test_numbers_stand_at_multiples_of_their_size() -> None:
+    header = {"stamp": {"sec": 1, "nanosec": 2}, "frame_id": "map"}
+    written = CODEC.encode("geometry_msgs/msg/PointStamped", {"header": header, "point": {"x": 1}})
+    assert written.hex(" ", 4) == (
+        "00010000 01000000 02000000 04000000 6d617000 "  # four bytes of header, not counted
+        "00000000 0000f03f 00000000 00000000 00000000 00000000"
+    )
+
+
+def test_the_other_byte_order_is_understood() -> None:
+    written = bytes.fromhex("00000000 00000001 00000002 00000004 6d617000")
+    assert CODEC.decode("std_msgs/msg/Header", written) == {
+        "stamp": {"sec": 1, "nanosec": 2},
+        "frame_id": "map",
+    }
+
+
+def test_a_message_without_fields_is_one_byte_and_its_padding_may_be_left_away() -> None:
+    assert CODEC.encode("std_srvs/srv/Empty_Request", {}) == b"\x00\x01\x00\x00\x00"
+    assert CODEC.decode("std_srvs/srv/Empty_Response", b"\x00\x01\x00\x00\x00\x00\x00\x00") == {}
+
+
+def test_what_is_left_out_holds_its_default() -> None:
+    pose = CODEC.decode("geometry_msgs/Pose", CODEC.encode("geometry_msgs/Pose", {}))
+    assert pose["position"] == {"x": 0.0, "y": 0.0, "z": 0.0}
+    assert pose["orientation"]["w"] == 1.0
+
+
+def test_cells_are_read_where_they_lie() -> None:
+    cells = np.arange(6, dtype=np.int8)
+    grid = {"info": {"width": 3, "height": 2}, "data": cells}
+    written = CODEC.encode("nav_msgs/OccupancyGrid", grid)
+    read = CODEC.decode("nav_msgs/OccupancyGrid", written)["data"]
+    assert read.dtype == np.int8
+    assert not read.flags.owndata
+    assert read.tolist() == cells.tolist()
+
+
+@pytest.mark.parametrize(
+    ("type_name", "message", "named"),
+    [
+        ("geometry_msgs/Twist", {"linear": {"x": float("nan")}}, "'x'"),
+        ("geometry_msgs/Twist", {"linear": {"x": float("inf")}}, "'x'"),
+        ("sensor_msgs/LaserScan", {"ranges": [1.0, float("inf")]}, "'ranges'"),
+        ("sensor_msgs/LaserScan", {"ranges": np.array([np.nan])}, "'ranges'"),
+        ("std_msgs/Float32", {"data": 1e300}, "'data'"),
+        ("std_msgs/UInt8", {"data": 256}, "'data'"),
+        ("std_msgs/UInt8", {"data": True}, "'data'"),
+        ("std_msgs/Int32", {"data": 1.5}, "'data'"),
+        ("std_msgs/Int32", {"data": 10**400}, "'data'"),
+        ("std_msgs/Bool", {"data": "yes"}, "'data'"),
+        ("std_msgs/String", {"data": 7}, "'data'"),
+        ("std_msgs/String", {"data": "\ud800"}, "'data'"),
+        ("std_msgs/String", {"data": "a\x00b"}, "'data'"),
+        ("std_msgs/String", {"text": "a"}, "'text'"),
+        ("std_msgs/String", [], "std_msgs/String"),
+        ("unique_identifier_msgs/UUID", {"uuid": b"short"}, "'uuid'"),
+        ("unique_identifier_msgs/UUID", {"uuid": "no base64"}, "'uuid'"),
+        ("tf2_msgs/TFMessage", {"transforms": {}}, "'transforms'"),
+        ("sensor_msgs/JointState", {"position": [[1.0]]}, "'position'"),
+        ("nav_msgs/OccupancyGrid", {"data": [200]}, "'data'"),
+    ],
+)
+def test_what_does_not_fit_is_refused_by_its_name(
+    type_name: str, message: dict[str, object], named: str
+) -> None:
+    with pytest.raises(LinkError) as refused:
+        CODEC.encode(type_name, message)
+    assert named in refused.value.message
+
+
+def test_an_unknown_type_is_an_error_that_says_what_to_do() -> None:
+    with pytest.raises(LinkError, match="my_msgs/Secret"):
+        CODEC.decode("my_msgs/msg/Secret", b"\x00\x01\x00\x00")
+
+
+def test_another_encoding_is_no_message() -> None:
+    with pytest.raises(LinkError):
+        CODEC.decode("std_msgs/Header", b"\x00\x07\x00\x00" + bytes(12))
+
+
+def test_an_action_has_the_parts_that_ros_makes_of_it() -> None:
+    book = TypeBook({**BOOK.texts, **action_parts("my_msgs/action/Dance")})
+    assert (
+        book.texts["my_msgs/Dance_GetResult_Response"] == "int8 status\nmy_msgs/Dance_Result result"
+    )
+
+
+def test_humbles_navigation_has_an_empty_result() -> None:
+    humble = Codec(build_type_book(is_humble=True))
+    data = bytes.fromhex("00010000 04 00")
+    assert humble.decode("nav2_msgs/action/NavigateToPose_GetResult_Response", data) == {
+        "status": 4,
+        "result": {"result": {}},
+    }
+
+
+def field(name: str, type_id: int, *, capacity: int = 0, nested: str = "") -> dict[str, object]:
+    kind = {"type_id": type_id, "capacity": capacity, "nested_type_name": nested}
+    return {"name": name, "type": kind}
+
+
+def test_a_type_is_learned_from_what_a_node_says() -> None:
+    described = {
+        "type_name": "my_msgs/msg/Secret",
+        "fields": [
+            field("label", 17),
+            field("where", 1, nested="geometry_msgs/msg/Point"),
+            field("corners", 145, nested="geometry_msgs/msg/Point"),
+            field("three", 59, capacity=3),
+            field("few", 99, capacity=2),
+        ],
+    }
+    answer = {
+        "successful": True,
+        "type_description": {"type_description": described, "referenced_type_descriptions": []},
+    }
+    assert read_type_description(answer) == {
+        "my_msgs/Secret": "string label\ngeometry_msgs/msg/Point where\n"
+        "geometry_msgs/msg/Point[] corners\nfloat64[3] three\nuint8[<=2] few"
+    }
+
+
+def test_a_node_that_does_not_know_its_type_is_an_error() -> None:
+    with pytest.raises(LinkError, match="no such type"):
+        read_type_description({"successful": False, "failure_reason": "no such type"})

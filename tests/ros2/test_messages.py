@@ -1,0 +1,112 @@
+"""Messages of rclpy become mappings and come back as they were, or are refused with their field."""
+
+import base64
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mapspeak.errors import LinkError
+from ros2.conftest import import_what_warns
+
+pytestmark = pytest.mark.ros2
+
+
+def there_and_back(type_name: str, values: object) -> Any:  # noqa: ANN401 - rclpy has no types
+    import_what_warns()
+    from mapspeak.links.ros2.reading import read_message  # noqa: PLC0415 - needs rclpy
+    from mapspeak.links.ros2.types import find_message  # noqa: PLC0415
+    from mapspeak.links.ros2.writing import write_message  # noqa: PLC0415
+
+    return read_message(write_message(find_message(type_name), values))
+
+
+@pytest.mark.parametrize(
+    ("type_name", "field", "value"),
+    [
+        ("std_msgs/msg/String", "data", "größer"),
+        ("std_msgs/msg/Bool", "data", True),
+        ("std_msgs/msg/Byte", "data", 255),
+        ("std_msgs/msg/UInt64", "data", 2**64 - 1),
+        ("std_msgs/Float32", "data", 0.5),
+        ("rcl_interfaces/msg/ParameterValue", "byte_array_value", b"\x01\xff"),
+        ("rcl_interfaces/msg/ParameterValue", "string_array_value", ["a", ""]),
+        ("rcl_interfaces/msg/ParameterValue", "bool_array_value", [True, False]),
+        ("sensor_msgs/msg/Image", "data", b"\x00\xff"),
+        ("unique_identifier_msgs/msg/UUID", "uuid", bytes(range(16))),
+    ],
+)
+def test_a_value_comes_back_as_it_was(type_name: str, field: str, value: object) -> None:
+    assert there_and_back(type_name, {field: value})[field] == value
+
+
+@pytest.mark.parametrize(
+    ("type_name", "field", "value", "dtype"),
+    [
+        ("sensor_msgs/msg/LaserScan", "ranges", [0.5, 1], "float32"),
+        ("sensor_msgs/msg/CameraInfo", "k", list(range(9)), "float64"),
+        ("nav_msgs/msg/OccupancyGrid", "data", [-1, 0, 100], "int8"),
+        ("nav_msgs/msg/OccupancyGrid", "data", [], "int8"),
+        ("nav_msgs/msg/OccupancyGrid", "data", np.array([-1, 100], np.int64), "int8"),
+        ("rcl_interfaces/msg/ParameterValue", "integer_array_value", [2**62], "int64"),
+    ],
+)
+def test_numbers_come_back_in_an_array_of_their_type(
+    type_name: str, field: str, value: object, dtype: str
+) -> None:
+    array = there_and_back(type_name, {field: value})[field]
+    assert array.dtype == dtype
+    assert array.tolist() == list(np.asarray(value))
+
+
+def test_bytes_may_be_sent_as_json_has_them() -> None:
+    text = base64.b64encode(b"\x00\xff").decode()
+    assert there_and_back("sensor_msgs/msg/Image", {"data": text})["data"] == b"\x00\xff"
+    assert there_and_back("sensor_msgs/msg/Image", {"data": [0, 255]})["data"] == b"\x00\xff"
+
+
+def test_messages_within_lists_are_kept_in_their_order() -> None:
+    frames = [{"child_frame_id": "base"}, {"child_frame_id": "camera"}]
+    read = there_and_back("tf2_msgs/msg/TFMessage", {"transforms": frames})["transforms"]
+    assert [frame["child_frame_id"] for frame in read] == ["base", "camera"]
+    assert read[0]["transform"]["rotation"]["w"] == 1.0
+
+
+def test_an_empty_message_has_no_fields() -> None:
+    assert there_and_back("std_msgs/msg/Empty", {}) == {}
+
+
+@pytest.mark.parametrize(
+    ("type_name", "values", "said"),
+    [
+        ("std_msgs/msg/UInt8", {"data": 256}, "data wants a whole number from 0 to 255"),
+        ("std_msgs/msg/Int64", {"data": 2**63}, "data wants a whole number"),
+        ("std_msgs/msg/Float32", {"data": 1e39}, "data wants a finite number"),
+        ("std_msgs/msg/Float64", {"data": 10**400}, "data wants a finite number"),
+        ("std_msgs/msg/String", {"data": "a\0b"}, "data wants a text"),
+        ("std_msgs/msg/String", {"data": "\ud800"}, "data wants a text"),
+        ("std_msgs/msg/String", {"data": None}, "data wants a text"),
+        ("sensor_msgs/msg/CameraInfo", {"k": [1.0]}, "k wants float64.9., not 1 values"),
+        ("sensor_msgs/msg/Image", {"data": "!"}, "data wants bytes in base64"),
+        ("sensor_msgs/msg/LaserScan", {"ranges": [1.0, float("nan")]}, r"ranges\[1\] wants a fin"),
+        ("sensor_msgs/msg/LaserScan", {"ranges": np.array([np.inf])}, "ranges wants a finite"),
+        ("sensor_msgs/msg/LaserScan", {"ranges": 1.0}, "ranges wants a list"),
+        ("tf2_msgs/msg/TFMessage", {"transforms": [{"x": 1}]}, r"'transforms\[0\].x'"),
+        ("tf2_msgs/msg/TFMessage", {"transforms": [1]}, r"transforms\[0\] wants an object"),
+        ("tf2_msgs/msg/TFMessage", [], "The message wants an object"),
+        ("std_msgs/msg/Header", {"stamp": {"secs": 1}}, "no field 'stamp.secs'. Did you mean sec"),
+    ],
+)
+def test_what_does_not_fit_is_refused_with_its_field(
+    type_name: str, values: object, said: str
+) -> None:
+    with pytest.raises(LinkError, match=said):
+        there_and_back(type_name, values)
+
+
+@pytest.mark.parametrize(
+    "type_name", ["antigravity/msg/Fly", "os/msg/Path", "no type", "std_msgs/srv/String", ""]
+)
+def test_a_type_that_ros_does_not_have_imports_nothing(type_name: str) -> None:
+    with pytest.raises(LinkError, match=r"is no type|knows no message"):
+        there_and_back(type_name, {})
