@@ -209,6 +209,10 @@ class RosConnection(Protocol):
         """Gives the topics and actions there are."""
         ...
 
+    async def fetch_topics(self) -> Mapping[str, str]:
+        """Gives the type of each topic, as "package/Type"; costs less than the whole graph."""
+        ...
+
     async def fetch_time_s(self) -> float | None:
         """Gives robot time; None where the robot does not say."""
         ...

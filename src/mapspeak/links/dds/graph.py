@@ -93,6 +93,10 @@ class GraphQuestions(ABC):
             actions=tuple(sorted(self.discovery.actions)),
         )
 
+    async def fetch_topics(self) -> Mapping[str, str]:
+        """Gives the type of each topic."""
+        return (await self.fetch_graph()).types
+
     async def fetch_time_s(self) -> float | None:
         """Gives robot time: when some node answered a question that costs it nothing."""
         servers = sorted(

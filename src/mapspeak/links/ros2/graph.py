@@ -59,6 +59,10 @@ class GraphQuestions(ABC):
             actions=tuple(sorted(self._action_types())),
         )
 
+    async def fetch_topics(self) -> Mapping[str, str]:
+        """Gives the type of each topic."""
+        return (await self.fetch_graph()).types
+
     async def fetch_time_s(self) -> float | None:
         """Gives the time of this machine: the machines of a ROS 2 system have the same."""
         return float(self._participant.node.get_clock().now().nanoseconds) / NANOSECONDS

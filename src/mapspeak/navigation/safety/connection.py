@@ -18,6 +18,7 @@ VELOCITY_TYPE = re.compile(
     r"geometry_msgs/(?:msg/)?Twist(?:Stamped)?|ackermann_msgs/(?:msg/)?AckermannDrive(?:Stamped)?"
 )
 CANCEL_TYPE = re.compile(r"actionlib_msgs/(?:msg/)?GoalID")
+CANCEL_SERVICE_TYPE = re.compile(r"action_msgs/(?:srv/)?CancelGoal")
 
 
 class GuardedConnection:
@@ -83,12 +84,13 @@ class GuardedConnection:
             PolicyError: It does not.
         """
         command = Call(service=service, type=type_name or "", arguments=arguments or {})
-        return await self._guarded(
-            command,
-            self._connection.call_service(
-                service, arguments, type_name=type_name, timeout_s=timeout_s
-            ),
+        answer = self._connection.call_service(
+            service, arguments, type_name=type_name, timeout_s=timeout_s
         )
+        if _is_stop(command):
+            self._note_stop(command)
+            return await answer
+        return await self._guarded(command, answer)
 
     async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
         """Sends a goal to an action of ROS 2 that the policy allows.
@@ -125,8 +127,9 @@ class GuardedConnection:
             self._guard.note_result(cleared, said, robot_s=self._now_s())
         return result
 
-    def _note_stop(self, command: Publish) -> None:
-        said = f"a stand, or the end of a goal, on {command.topic}"
+    def _note_stop(self, command: Publish | Call) -> None:
+        name = command.service if isinstance(command, Call) else command.topic
+        said = f"a stand, or the end of a goal, on {name}"
         self._guard.note_event("stop", said, robot_s=self._now_s())
 
     # --- what ends something: never refused ---
@@ -198,6 +201,10 @@ class GuardedConnection:
         """Gives the topics and actions there are."""
         return await self._connection.fetch_graph()
 
+    async def fetch_topics(self) -> Mapping[str, str]:
+        """Gives the type of each topic."""
+        return await self._connection.fetch_topics()
+
     async def fetch_time_s(self) -> float | None:
         """Gives robot time; None where the robot does not say."""
         return await self._connection.fetch_time_s()
@@ -243,8 +250,12 @@ class GuardedConnection:
         return await self._connection.fetch_parameter(node, name)
 
 
-def _is_stop(command: Publish) -> bool:
-    """True for a velocity of zero, and for the message by which ROS 1 cancels a goal."""
+def _is_stop(command: Publish | Call) -> bool:
+    """True for a velocity of zero, and for what cancels goals in ROS 1 and ROS 2."""
+    if isinstance(command, Call):
+        # The name is asked for too: a type is what the caller says, and some links do not check it.
+        is_cancel = not command.type or CANCEL_SERVICE_TYPE.fullmatch(command.type) is not None
+        return is_cancel and command.service.endswith("/_action/cancel_goal")
     if CANCEL_TYPE.fullmatch(command.type) and command.topic.endswith("/cancel"):
         return True
     # Only types that hold nothing else: an odometry with a speed of zero is no stop.

@@ -47,6 +47,25 @@ class Rosapi(ABC):
         Raises:
             LinkError: rosapi is missing, or gives no usable answer.
         """
+        listed = await self._list_topics()
+        dialect, distro = await self._fetch_version(list(listed.values()))
+        actions: tuple[str, ...] = ()
+        if dialect is Dialect.ROS2:
+            actions = await self._fetch_actions()
+        return RosGraph(
+            dialect=dialect,
+            distro=distro,
+            types={topic: bare_type(name) for topic, name in listed.items()},
+            actions=actions,
+        )
+
+    async def fetch_topics(self) -> Mapping[str, str]:
+        """Gives the type of each topic."""
+        listed = await self._list_topics()
+        return {topic: bare_type(name) for topic, name in listed.items()}
+
+    async def _list_topics(self) -> dict[str, str]:
+        """Gives the type of each topic, as rosapi writes it."""
         try:
             listed = await self.call_service("/rosapi/topics")
         except LinkError as error:
@@ -59,16 +78,7 @@ class Rosapi(ABC):
                 f"The robot's rosapi lists {len(topics)} topics and {len(types)} types.",
                 hint="Restart rosapi on the robot.",
             )
-        dialect, distro = await self._fetch_version(types)
-        actions: tuple[str, ...] = ()
-        if dialect is Dialect.ROS2:
-            actions = await self._fetch_actions()
-        return RosGraph(
-            dialect=dialect,
-            distro=distro,
-            types={topic: bare_type(name) for topic, name in zip(topics, types, strict=True)},
-            actions=actions,
-        )
+        return dict(zip(topics, types, strict=True))
 
     async def fetch_time_s(self) -> float | None:
         """Gives robot time; None where rosapi does not say."""

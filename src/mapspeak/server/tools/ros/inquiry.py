@@ -1,7 +1,7 @@
 """Asking a ROS system what it is made of: names checked, types described, the latest graph kept."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import anyio
 
@@ -75,6 +75,7 @@ class RosInquiry:
         self._session = session
         self._graph: RosGraph | None = None
         self._asked_s = float("-inf")
+        self._listed_s = float("-inf")
         self._taught: dict[str, str] = {}
 
     @property
@@ -97,6 +98,15 @@ class RosInquiry:
         await self.connection.wait_until_connected()
         return self._graph
 
+    async def fetch_topics(self) -> RosGraph:
+        """Gives the topics as they were a second ago at most; the actions may be older."""
+        if self._graph is not None and anyio.current_time() > self._listed_s + KEPT_S:
+            return await self._renew_topics(self._graph)
+        if self._graph is None:
+            return await self._renew_graph()
+        await self.connection.wait_until_connected()
+        return self._graph
+
     async def fetch_dialect(self) -> Dialect:
         """Gives which ROS it is."""
         return (self._graph or await self.fetch_graph()).dialect
@@ -105,7 +115,7 @@ class RosInquiry:
         """Gives a topic's type as "package/Type"; asks again only for what it has not heard of."""
         graph = self._graph
         if graph is None or topic not in graph.types:
-            graph = await self._renew_graph()
+            graph = await (self._renew_graph() if graph is None else self._renew_topics(graph))
         return graph.types.get(topic)
 
     async def fetch_topic_type(self, topic: str) -> str:
@@ -223,7 +233,13 @@ class RosInquiry:
     async def _renew_graph(self) -> RosGraph:
         await self.connection.wait_until_connected()
         self._graph = await self.connection.fetch_graph()
-        self._asked_s = anyio.current_time()
+        self._asked_s = self._listed_s = anyio.current_time()
+        return self._graph
+
+    async def _renew_topics(self, graph: RosGraph) -> RosGraph:
+        await self.connection.wait_until_connected()
+        self._graph = replace(graph, types=await self.connection.fetch_topics())
+        self._listed_s = anyio.current_time()
         return self._graph
 
     @staticmethod

@@ -81,7 +81,7 @@ class TopicTools:
 
         Use it to find a topic, by its name or type; ros_topic tells more of one, ros_read reads it.
         """
-        graph = await self._inquiry.fetch_graph()
+        graph = await self._inquiry.fetch_topics()
         topics = sorted(graph.types.items())
         chosen = choose(topics, filter, texts=lambda item: item)
         return say_page(
