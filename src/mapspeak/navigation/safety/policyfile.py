@@ -1,16 +1,11 @@
 """policy.yaml, read into a `Policy`; a mistake in it is named with its line and key."""
 
-import difflib
 from datetime import time
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
-from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from mapspeak.errors import ConfigError
 from mapspeak.geometry import Point
 from mapspeak.navigation.safety.commands import Kind
 from mapspeak.navigation.safety.policy import (
@@ -26,10 +21,9 @@ from mapspeak.navigation.safety.policy import (
     Speeds,
     WhenBusy,
 )
+from mapspeak.settings import read_settings
 
 __all__ = ["load_policy"]
-
-MAX_FILE_BYTES = 1_000_000
 
 _Name = Annotated[str, Field(min_length=1, max_length=80)]
 _Pattern = Annotated[str, Field(min_length=1, max_length=200)]
@@ -184,77 +178,8 @@ def load_policy(path: Path) -> Policy:
     Raises:
         ConfigError: The file cannot be read, or has a mistake; says the line and the key.
     """
-    tree = _load_yaml(path)
-    if tree is None:
-        return Policy()
-    if not isinstance(tree, CommentedMap):
-        raise ConfigError(
-            f"{path}, line 1: this is not a list of keys and values.",
-            hint="Write lines like `read_only: true`.",
-        )
-    try:
-        return _PolicyFile.model_validate(tree).policy()
-    except ValidationError as error:
-        raise _fault_in(path, tree, error) from error
-
-
-def _load_yaml(path: Path) -> Any:  # noqa: ANN401 - whatever a person wrote
-    try:
-        if path.stat().st_size > MAX_FILE_BYTES:
-            raise ConfigError(
-                f"{path} is larger than {MAX_FILE_BYTES:,} bytes.", hint="Give a policy.yaml."
-            )
-        return YAML(typ="rt").load(path.read_text(encoding="utf-8"))
-    except MarkedYAMLError as error:
-        mark = error.problem_mark
-        line = f", line {mark.line + 1}" if mark is not None else ""
-        raise ConfigError(
-            f"{path}{line} is no YAML: {error.problem}.", hint="Write `key: value` on each line."
-        ) from error
-    except (OSError, UnicodeDecodeError, YAMLError, RecursionError, ValueError) as error:
-        raise ConfigError(
-            f"{path} cannot be read: {error}.", hint="Check the path, and that it is a text file."
-        ) from error
-
-
-def _fault_in(path: Path, tree: CommentedMap, error: ValidationError) -> ConfigError:
-    first, *others = error.errors()
-    location = first["loc"]
-    key = ".".join(str(part) for part in location)
-    more = f" {len(others)} more mistakes follow." if others else ""
-    if first["type"] == "extra_forbidden":
-        known = _keys_beside(location)
-        near = difflib.get_close_matches(str(location[-1]), known, n=1)
-        what = f"there is no key {key!r}."
-        hint = f"Did you mean `{near[0]}`?" if near else f"Here belong: {', '.join(known)}."
-    else:
-        what = f"{key or 'the file'} cannot be {str(first['input'])[:80]!r}: {first['msg']}."
-        hint = "docs/howto/limits.md explains every key."
-    return ConfigError(f"{path}, line {_line_of(tree, location)}: {what}{more}", hint=hint)
-
-
-def _keys_beside(location: tuple[int | str, ...]) -> list[str]:
-    """Gives the keys that a place of the file may have."""
-    model: Any = _PolicyFile
-    for part in location[:-1]:
-        if isinstance(part, int):
-            continue
-        annotation: Any = model.model_fields[part].annotation
-        model = getattr(annotation, "__args__", (annotation,))[0]
-    return [each.alias or name for name, each in model.model_fields.items()]
-
-
-def _line_of(tree: CommentedMap, location: tuple[int | str, ...]) -> int:
-    """Gives the line of the innermost part of a place that the file has."""
-    node: Any = tree
-    line = 0
-    for part in location:
-        places = node.lc.data if isinstance(node, CommentedMap | CommentedSeq) else None
-        if not places or (part not in places):
-            break
-        line = int(places[part][0])
-        node = node[part]
-    return line + 1
+    advice = "docs/howto/limits.md explains every key."
+    return read_settings(path, _PolicyFile, name="policy.yaml", advice=advice).policy()
 
 
 def _read_time(text: str) -> time:

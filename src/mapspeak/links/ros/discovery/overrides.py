@@ -1,17 +1,13 @@
 """What a person knows better than the search: robot.yaml, one line for each thing."""
 
-import difflib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from pydantic import BaseModel, ConfigDict, Field
 
-from mapspeak.errors import ConfigError
 from mapspeak.ros import NAME, TYPE
+from mapspeak.settings import read_settings
 
-MAX_FILE_BYTES = 1_000_000
 TopicName = Annotated[str, Field(pattern=rf"^{NAME.pattern}$")]
 TypeName = Annotated[str, Field(pattern=rf"^{TYPE.pattern}$")]
 FrameName = Annotated[str, Field(pattern=r"^/?[\w/.-]+$")]
@@ -72,57 +68,5 @@ def load_robot_file(path: Path) -> RobotOverrides:
     Raises:
         ConfigError: The file cannot be read, or a line of it is wrong; says which.
     """
-    tree = _load_yaml(path)
-    if tree is None:
-        return RobotOverrides()
-    if not isinstance(tree, dict):
-        raise ConfigError(
-            f"{path} is not a list of keys and values.", hint="Write lines like `map_topic: /map`."
-        )
-    try:
-        return RobotOverrides.model_validate(dict(tree))
-    except ValidationError as error:
-        raise _fault_in(path, tree, error) from error
-
-
-def _load_yaml(path: Path) -> Any:  # noqa: ANN401 - whatever a person wrote
-    try:
-        if path.stat().st_size > MAX_FILE_BYTES:
-            raise ConfigError(
-                f"{path} is larger than {MAX_FILE_BYTES:,} bytes.",
-                hint="Give the robot.yaml, not a recording or a map.",
-            )
-        return YAML(typ="rt").load(path.read_text(encoding="utf-8"))
-    except MarkedYAMLError as error:
-        mark = error.problem_mark
-        line = f", line {mark.line + 1}" if mark is not None else ""
-        raise ConfigError(
-            f"{path}{line} is no YAML: {error.problem}.", hint="Write `key: value` on each line."
-        ) from error
-    except (OSError, UnicodeDecodeError, YAMLError, RecursionError) as error:
-        raise ConfigError(
-            f"{path} cannot be read: {error}.", hint="Check the path, and that it is a text file."
-        ) from error
-
-
-def _fault_in(path: Path, tree: Any, error: ValidationError) -> ConfigError:  # noqa: ANN401
-    first, *others = error.errors()
-    key = str(first["loc"][0]) if first["loc"] else ""
-    more = f" {len(others)} more lines are wrong." if others else ""
-    if first["type"] == "extra_forbidden":
-        known = difflib.get_close_matches(key, RobotOverrides.model_fields, n=1)
-        what = f"'{key}' is not a key of robot.yaml."
-        hint = f"Did you mean `{known[0]}`?" if known else f"The keys are: {_keys()}."
-    else:
-        what = f"'{key}' cannot be {str(first['input'])[:80]!r}: {first['msg']}."
-        hint = "Topics look like /map, types like sensor_msgs/msg/Image, lengths like 0.18."
-    return ConfigError(f"{path}, line {_line_of(tree, key)}: {what}{more}", hint=hint)
-
-
-def _line_of(tree: Any, key: str) -> int:  # noqa: ANN401 - ruamel's own mapping
-    lines = tree.lc.data or {}
-    return int(lines[key][0]) + 1 if key in lines else 1
-
-
-def _keys() -> str:
-    return ", ".join(RobotOverrides.model_fields)
+    advice = "Topics look like /map, types like sensor_msgs/msg/Image, lengths like 0.18."
+    return read_settings(path, RobotOverrides, name="robot.yaml", advice=advice)
