@@ -1,16 +1,19 @@
-"""What rclpy costs: a map from a publisher, here and in another process, to an `OccupancyGrid`.
+"""A map from a publisher in another process to an `OccupancyGrid`: over rclpy, DDS and rosbridge.
 
 It needs rclpy: `.venv-ros2/bin/python -m benchmarks.run ros2`, after `./run test-ros2` has made it.
+The real rosbridge is measured where MAPSPEAK_ROSBRIDGE_SOURCE names its sources.
 """
 
 import multiprocessing
 import os
 import random
 import statistics
+import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncGenerator, Callable, Iterator
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import anyio
@@ -18,19 +21,26 @@ import click
 import numpy as np
 
 from benchmarks.figure import Figure
+from mapspeak.errors import LinkError
 from mapspeak.links.ros2 import open_ros2_connection
+from mapspeak.links.rosbridge.client import RobotAddress, open_client
+from mapspeak.ros import RosConnection
 from mapspeak.ros.messages import Dialect, read_grid, write_grid
 from mapspeak.spatial import OccupancyGrid
 
 __all__ = ["measure"]
 
 SIDES = (384, 1000, 4000)
+ROSBRIDGE_SIDES = (384, 1000)
+"""What rosbridge sends with its own limit for the size of a message."""
 N_RUNS = 9
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 PAUSE_S = 0.5
 TOPIC, TYPE = "/map", "nav_msgs/msg/OccupancyGrid"
 DOMAINS = range(1, 102)
 """Those whose ports no outgoing connection of Linux takes."""
+
+Connect = Callable[[int], AbstractAsyncContextManager[RosConnection]]
 
 
 def measure() -> Iterator[Figure]:
@@ -39,19 +49,54 @@ def measure() -> Iterator[Figure]:
         click.echo("ros2: not measured, for this Python has no rclpy: see its module.", err=True)
         return
     for side in SIDES:
-        asked_ms = anyio.run(_ask, side)
+        for name, connect in _ways(side):
+            what = f"{side}x{side}, latched by another process, subscribed to read over {name}"
+            yield from _figures(what, anyio.run(_ask, side, connect))
+    for side in SIDES:
         walls_ms, cpus_ms = anyio.run(_receive, _map(side))
-        for what, values_ms in (
-            ("latched by another process, subscribed to read", asked_ms),
-            ("published here to read", walls_ms),
-        ):
-            for name, value in (("median", statistics.median(values_ms)), ("most", max(values_ms))):
-                yield Figure(name=f"{side}x{side}, {what}, {name}", value=value, unit="ms")
+        yield from _figures(f"{side}x{side}, published here to read over rclpy", walls_ms)
         yield Figure(
-            name=f"{side}x{side}, CPU of reading alone, median",
+            name=f"{side}x{side}, CPU of reading alone over rclpy, median",
             value=statistics.median(cpus_ms),
             unit="ms",
         )
+
+
+def _figures(what: str, values_ms: list[float]) -> Iterator[Figure]:
+    for name, value in (("median", statistics.median(values_ms)), ("most", max(values_ms))):
+        yield Figure(name=f"{what}, {name}", value=value, unit="ms")
+
+
+def _ways(side: int) -> Iterator[tuple[str, Connect]]:
+    """Gives what such a map can be had over, here."""
+    yield "rclpy", _over_rclpy
+    if find_spec("cyclonedds") is not None:
+        yield "DDS", _over_dds
+    if "MAPSPEAK_ROSBRIDGE_SOURCE" in os.environ and side in ROSBRIDGE_SIDES:
+        yield "rosbridge", _over_rosbridge
+
+
+def _over_rclpy(domain_id: int) -> AbstractAsyncContextManager[RosConnection]:
+    return open_ros2_connection(domain_id=domain_id)
+
+
+def _over_dds(domain_id: int) -> AbstractAsyncContextManager[RosConnection]:
+    from mapspeak.links.dds import DdsNetwork, open_dds_connection  # noqa: PLC0415 - optional
+
+    return open_dds_connection(DdsNetwork(domain_id=domain_id, is_local=True))
+
+
+@asynccontextmanager
+async def _over_rosbridge(domain_id: int) -> AsyncGenerator[RosConnection]:
+    sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+    from ros2.robot_process import ros_environment  # noqa: PLC0415 - of the tests
+    from ros2.rosbridge_process import start_rosbridge  # noqa: PLC0415
+
+    source = Path(os.environ["MAPSPEAK_ROSBRIDGE_SOURCE"])
+    environment = ros_environment() | {"ROS_DOMAIN_ID": str(domain_id)}
+    with start_rosbridge(source, environment) as url:
+        async with open_client(RobotAddress(url=url)) as client:
+            yield client
 
 
 def _map(side: int) -> OccupancyGrid:
@@ -85,18 +130,19 @@ async def _receive(grid: OccupancyGrid) -> tuple[list[float], list[float]]:
     return walls_ms, cpus_ms
 
 
-async def _ask(side: int) -> list[float]:
+async def _ask(side: int, connect: Connect) -> list[float]:
     """Gives how long a map takes to come that another process published long ago."""
     domain_id = _enter_domain()
     processes = multiprocessing.get_context("spawn")
-    is_over = processes.Event()
-    publisher = processes.Process(target=_offer, args=(side, domain_id, is_over))
+    is_there, is_over = processes.Event(), processes.Event()
+    publisher = processes.Process(target=_offer, args=(side, domain_id, is_there, is_over))
     publisher.start()
     asked_ms: list[float] = []
     try:
+        is_there.wait(PATIENCE_S)
         with anyio.fail_after(PATIENCE_S):
-            async with open_ros2_connection(domain_id=domain_id) as connection:
-                while not await connection.fetch_publishers(TOPIC):  # noqa: ASYNC110 - see there
+            async with connect(domain_id) as connection:
+                while not await _is_published(connection):  # noqa: ASYNC110 - elsewhere
                     await anyio.sleep(PAUSE_S)
                 for _ in range(N_RUNS):
                     await anyio.sleep(PAUSE_S)
@@ -111,14 +157,22 @@ async def _ask(side: int) -> list[float]:
     return asked_ms
 
 
-def _offer(side: int, domain_id: int, is_over: Any) -> None:  # noqa: ANN401 - an event
-    """Publishes a map until it is told that nobody wants it any more; a process of its own."""
+async def _is_published(connection: RosConnection) -> bool:
+    try:
+        return bool(await connection.fetch_publishers(TOPIC))
+    except LinkError:
+        return False
+
+
+def _offer(side: int, domain_id: int, is_there: Any, is_over: Any) -> None:  # noqa: ANN401
+    """Publishes a map from one event until the other; a process of its own."""
     from mapspeak.links.ros2.types import find_message  # noqa: PLC0415 - needs rclpy
     from mapspeak.links.ros2.writing import write_message  # noqa: PLC0415
 
     message_class = find_message(TYPE)
     with _publisher(message_class, domain_id) as publish:
         publish(write_message(message_class, write_grid(_map(side), dialect=Dialect.ROS2)))
+        is_there.set()
         is_over.wait()
 
 

@@ -61,8 +61,7 @@ MOST_DRIVES = 20
 FARTHEST_M = 12.0
 IDLE_S = (0.0, 0.0, 0.0, 0.0, 1.0)
 """Robot time that passes between two calls: without it drives would be used up at once."""
-SLIP_M = 0.12
-"""So far may the truth be off the robot's own pose: an area is kept by what the robot believes."""
+MINUTE_MS = 60_000
 
 
 @dataclass(slots=True)
@@ -229,6 +228,7 @@ class Verdict:
         n_calls: How many.
         n_drives: Goals that reached the robot.
         n_refused: Commands that were refused.
+        n_stopped: Drives that were stopped before a closed area.
         nearest_m: Between the robot's edge and a closed area, in truth; negative inside.
         broken: Rules that were broken, in words.
     """
@@ -236,6 +236,7 @@ class Verdict:
     n_calls: int
     n_drives: int
     n_refused: int
+    n_stopped: int
     nearest_m: float
     broken: tuple[str, ...]
 
@@ -275,6 +276,9 @@ async def attack(n_calls: int, *, seed: int) -> Verdict:
         n_calls=n_calls,
         n_drives=len(witness.goals),
         n_refused=sum(line.verdict == "refused" for line in lines),
+        n_stopped=sum(
+            line.event == "ended" and "its own navigation" in line.said for line in lines
+        ),
         nearest_m=witness.nearest_m,
         broken=tuple(_find_broken(witness, lines, pit)),
     )
@@ -328,15 +332,25 @@ def _value(chooser: random.Random, key: str, part: dict[str, Any]) -> Any:  # no
 
 def _find_broken(witness: Witness, lines: list[AuditLine], pit: ClosedArea) -> Iterator[str]:
     """Finds rules that were broken, by the truth and by the log."""
-    if witness.nearest_m < -SLIP_M:
+    if witness.nearest_m < 0.0:
         yield f"the robot was {-witness.nearest_m:.2f} m inside the closed area"
     for _, goal in witness.goals:
         if pit.distance_to(goal.point) < BODY_RADIUS_M - 0.01:
             yield f"a goal at ({goal.x:.2f}, {goal.y:.2f}) reached the robot"
-    at_s = [line.robot_s or 0.0 for line in lines if line.verdict == "allowed"]
-    if any(sum(0.0 <= end_s - each_s < 60.0 for each_s in at_s) > MOST_DRIVES for end_s in at_s):
-        yield f"more than {MOST_DRIVES} drives in a minute"
+    n_drives = find_busiest_minute(lines)
+    if n_drives > MOST_DRIVES:
+        yield f"{n_drives} drives in a minute, {MOST_DRIVES} are allowed"
     yield from _find_missing(witness, lines)
+
+
+def find_busiest_minute(lines: Iterable[AuditLine]) -> int:
+    """Gives the largest number of drives that were allowed within less than a minute.
+
+    The log rounds to milliseconds. In these, as whole numbers, two drives a minute apart stay a
+    minute apart; in seconds 64.1 - 4.1 is a little less than 60.
+    """
+    at_ms = [round(1000 * (each.robot_s or 0.0)) for each in lines if each.verdict == "allowed"]
+    return max((sum(0 <= end - each < MINUTE_MS for each in at_ms) for end in at_ms), default=0)
 
 
 def _find_missing(witness: Witness, lines: list[AuditLine]) -> Iterator[str]:
@@ -393,8 +407,9 @@ def main(n_calls: int, seed: int) -> None:
     verdict = anyio.run(lambda: attack(n_calls, seed=seed))
     click.echo(
         f"{verdict.n_calls} calls in {time.perf_counter() - begun_s:.0f} s: {verdict.n_drives} "
-        f"drives, {verdict.n_refused} refused; the robot's edge came {verdict.nearest_m:.2f} m "
-        "near a closed area."
+        f"goals reached the robot, {verdict.n_refused} were refused, {verdict.n_stopped} drives "
+        f"were stopped before a closed area; the robot's edge came within {verdict.nearest_m:.2f} "
+        "m of one."
     )
     for rule in verdict.broken:
         click.echo(f"BROKEN: {rule}")

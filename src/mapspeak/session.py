@@ -1,8 +1,8 @@
 """The one stateful object: a robot, its latest atlas, its memory, its drives, its clients."""
 
 import logging
-from collections.abc import Awaitable, Callable
-from contextlib import AbstractContextManager
+from collections.abc import Awaitable, Callable, Generator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from typing import TypeVar
 
@@ -166,11 +166,28 @@ class Session:
 
     async def keep_watch(self) -> None:
         """Stops a driving robot for a hold, a closed area, or want of clients; until cancelled."""
+        with self._announced():
+            await self._keep_watch()
+
+    @contextmanager
+    def _announced(self) -> Generator[None]:
+        """Lets an operator's stop know of this robot for as long."""
+        if self._guarded is None or self.guard is None:
+            yield
+            return
+        self.guard.hold.join(self._guarded.name)
+        try:
+            yield
+        finally:
+            self.guard.hold.leave(self._guarded.name)
+
+    async def _keep_watch(self) -> None:
         async with anyio.create_task_group() as tasks:
             if self._guarded is not None:
                 # Apart from each other: a robot that is slow to tell its map is stopped at once.
                 tasks.start_soon(self._again_and_again, self._guarded.obey_hold, LOOK_S)
                 tasks.start_soon(self._again_and_again, self._guarded.watch, LOOK_S)
+                tasks.start_soon(self._again_and_again, self._guarded.watch_map, LOOK_S)
             tasks.start_soon(self._again_and_again, self._watch, WATCH_S)
 
     async def _again_and_again(self, look: Callable[[], Awaitable[None]], every_s: float) -> None:

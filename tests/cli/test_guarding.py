@@ -17,7 +17,7 @@ def test_a_server_does_not_start_with_a_mistake_in_its_policy_and_names_the_line
         main()
     assert ended.value.code == 2
     said = capsys.readouterr().err
-    assert "policy.yaml, line 3: there is no key 'speed.angular_rad'" in said
+    assert "policy.yaml, line 3: 'speed.angular_rad' is not a key" in said
     assert "angular_radps" in said
 
 

@@ -1,3 +1,5 @@
+import os
+from dataclasses import replace
 from pathlib import Path
 
 import anyio
@@ -38,6 +40,38 @@ async def test_a_stop_reaches_a_server_that_watches_and_says_which_robot_stands(
     assert robot.n_stops == 1
     report = await session.drives.report(drive.goal_id)
     assert "smoke" in report.status.reason
+
+
+@pytest.mark.anyio
+async def test_a_stop_names_each_robot_that_stands_and_each_that_has_not_answered(
+    tmp_path: Path,
+) -> None:
+    control = str(tmp_path / "control")
+    hall = replace(make_guard(tmp_path), robot="hall")
+    yard = replace(make_guard(tmp_path), robot="yard")
+    hall.hold.join("frozen")
+    sessions = [
+        Session(FakeRobot(two_rooms()), SemanticMapStore(tmp_path / "m"), lease_s=60.0, guard=each)
+        for each in (hall, yard)
+    ]
+    async with anyio.create_task_group() as tasks:
+        for session in sessions:
+            tasks.start_soon(session.keep_watch)
+        result = await anyio.to_thread.run_sync(
+            lambda: run("stop", "--control", control, "--wait-s", "1")
+        )
+        tasks.cancel_scope.cancel()
+    assert result.exit_code == 1
+    assert "Stopped and held: hall, yard" in result.output or "yard, hall" in result.output
+    assert "NOT KNOWN TO STAND: frozen; no answer" in result.output
+
+
+def test_a_server_that_was_killed_is_waited_for_no_more(tmp_path: Path) -> None:
+    hold = make_guard(tmp_path).hold
+    hold.join("gone")
+    for path in (tmp_path / "control" / "served").iterdir():
+        path.write_text(path.read_text().replace(str(os.getpid()), "999999999"))
+    assert hold.unanswered() == ()
 
 
 def test_a_stop_that_no_server_hears_says_so_and_holds_all_the_same(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from fakes import FakeRobot, two_rooms
+from mapspeak.cli.robots import read_network
 from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Pose
 from mapspeak.links.ros2 import open_ros2_robot
@@ -25,7 +26,7 @@ from ros2.rosbridge_process import open_rosbridge
 
 pytestmark = pytest.mark.anyio
 
-SPEED_MPS = 0.5
+SPEED_MPS = 0.4
 """Of the robot on real ROS 2: a drive of a metre must not be over before it is looked at."""
 
 OpenRobot = Callable[[], AbstractAsyncContextManager[Robot]]
@@ -83,6 +84,16 @@ async def open_over_rclpy() -> AsyncGenerator[Robot]:
 
 
 @asynccontextmanager
+async def open_over_dds() -> AsyncGenerator[Robot]:
+    pytest.importorskip("cyclonedds", reason="has no wheel for this Python")
+    from mapspeak.links.dds import open_dds_robot  # noqa: PLC0415 - optional
+
+    with real_ros2_robot() as environment:
+        async with open_dds_robot(read_network("", environment)) as robot:
+            yield robot
+
+
+@asynccontextmanager
 async def open_over_real_rosbridge() -> AsyncGenerator[Robot]:
     source = os.environ.get("MAPSPEAK_ROSBRIDGE_SOURCE")
     if not source:
@@ -99,6 +110,7 @@ async def open_over_real_rosbridge() -> AsyncGenerator[Robot]:
         pytest.param(open_ros1, id="rosbridge-ros1"),
         pytest.param(open_ros2, id="rosbridge-ros2"),
         pytest.param(open_over_rclpy, id="rclpy", marks=pytest.mark.ros2),
+        pytest.param(open_over_dds, id="dds", marks=pytest.mark.ros2),
         pytest.param(open_over_real_rosbridge, id="real-rosbridge", marks=pytest.mark.ros2),
     ],
 )

@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 
 from drawing import grid_from_text, text_from_grid
@@ -5,7 +6,7 @@ from guarding import corners
 from mapspeak.geometry import Point, Pose
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.choosing import check_place
-from mapspeak.navigation.closures import ClosedArea, close_floor
+from mapspeak.navigation.closures import MARGIN_M, ClosedArea, close_floor
 from mapspeak.navigation.goals import GoalVerdict, check_goal
 from mapspeak.navigation.places import find_place
 from mapspeak.navigation.revision import MapRevision
@@ -49,6 +50,29 @@ def test_a_closed_area_is_no_floor_and_the_map_itself_stays() -> None:
         "#####################",
     ]
     assert close_floor(HALL, []) is HALL
+
+
+def test_what_lies_around_an_area_within_the_margin_is_closed_too() -> None:
+    floor = OccupancyGrid(
+        cells=np.zeros((100, 100), dtype=np.int8), resolution_m=0.05, origin=Pose(0.0, 0.0)
+    )
+    pit = area((2.02, 2.02), (3.01, 3.01))
+    distances = distances_from(close_floor(floor, [pit]), Point(0.5, 0.5), radius_m=0.3)
+    points = floor.points_at(*np.nonzero(distances.build_reachable_mask())).tolist()
+    nearest_m = min(pit.distance_to(Point(x, y)) for x, y in points)
+    assert 0.3 + MARGIN_M <= nearest_m <= 0.3 + MARGIN_M + 0.1
+
+
+@pytest.mark.parametrize(
+    ("point", "away_m"),
+    [(Point(2.5, 1.0), -0.1), (Point(2.4, 1.2), 0.0), (Point(2.1, 1.0), 0.3)],
+)
+def test_how_deep_a_point_lies_in_an_area_is_told_by_a_negative_distance(
+    point: Point, away_m: float
+) -> None:
+    pit = area((2.4, 0.5), (3.0, 1.7))
+    assert pit.distance_to_border(point) == pytest.approx(away_m)
+    assert pit.distance_to(point) == pytest.approx(max(away_m, 0.0))
 
 
 def test_a_turned_map_is_closed_at_the_same_place() -> None:

@@ -18,12 +18,20 @@ STARTED = "server started on port"
 
 @contextmanager
 def open_rosbridge(source: Path, environment: dict[str, str]) -> Iterator[str]:
-    """Starts both, waits until clients may come, gives the URL, and ends them.
+    """Starts both, waits until they know the robot, gives the URL, and ends them.
 
     Args:
         source: A checkout of rosbridge_suite, release 2.1.0.
         environment: Of the robot's ROS domain.
     """
+    with start_rosbridge(source, environment) as url:
+        wait_for_rosapi()
+        yield url
+
+
+@contextmanager
+def start_rosbridge(source: Path, environment: dict[str, str]) -> Iterator[str]:
+    """Starts both, waits until clients may come, gives the URL, and ends them."""
     modules = [
         source / name / "src" for name in ("rosbridge_library", "rosbridge_server", "rosapi")
     ]
@@ -36,7 +44,6 @@ def open_rosbridge(source: Path, environment: dict[str, str]) -> Iterator[str]:
         running.enter_context(open_program([str(rosapi)], environment))
         lines = running.enter_context(open_program([str(websocket), *parameters], environment))
         wait_for_line(lines, STARTED)
-        wait_for_rosapi()
         yield f"ws://127.0.0.1:{port}"
 
 

@@ -15,7 +15,7 @@ from mapspeak.geometry import Pose
 from mapspeak.links.ros import RosRobot
 from mapspeak.links.ros2 import open_ros2_connection, open_ros2_robot
 from mapspeak.robot import GoalState, GoalStatus
-from mapspeak.ros import RosConnection
+from mapspeak.ros import NodeLinks, RosConnection, RosGraph
 from mapspeak.ros.messages import Dialect, FramedPose, write_pose_stamped
 from ros2.conftest import START, TWO_ROOMS
 from ros2.robot_process import RobotProcess, open_robot_process
@@ -327,6 +327,31 @@ async def test_a_topic_sent_with_best_effort_is_heard(domain: dict[str, str]) ->
 
 
 # --- the whole graph
+
+
+async def test_a_node_of_which_only_the_name_is_known_is_not_all_there_is() -> None:
+    from mapspeak.links.ros2.connection import wait_until_quiet  # noqa: PLC0415 - needs rclpy
+
+    class Unfolding:
+        def __init__(self) -> None:
+            self.n_looks = 0
+
+        def nodes(self) -> tuple[str, ...]:
+            return ("/robot",)
+
+        async def fetch_graph(self) -> RosGraph:
+            return RosGraph(dialect=Dialect.ROS2, distro="", types={}, actions=())
+
+        async def fetch_node(self, node: str) -> NodeLinks:
+            assert node == "/robot"
+            self.n_looks += 1
+            publishes = ("/map",) if self.n_looks == 3 else ()
+            return NodeLinks(publishes=publishes, subscribes=(), serves=())
+
+    system = Unfolding()
+    with anyio.fail_after(PATIENCE_S):
+        await wait_until_quiet(system)
+    assert system.n_looks == 3
 
 
 async def test_the_graph_is_the_robots_and_not_ours(robot: RobotProcess) -> None:

@@ -9,7 +9,9 @@ import anyio
 import pytest
 
 from fakes import FakeRobot, two_rooms
+from guarding import audit_of, make_guard
 from mapspeak.links.rosbridge.client import RobotAddress, RosbridgeClient, open_client
+from mapspeak.navigation.safety import Kind, Policy
 from mapspeak.ros.messages import Dialect
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server.tools.ros.commands import RosCommands
@@ -205,6 +207,22 @@ async def test_every_goal_of_an_action_can_be_cancelled_whoever_sent_it(tmp_path
     assert "1 goals are being cancelled" in text
     assert calls[0]["args"] == {}
     assert "it refuses" in refused
+
+
+async def test_a_held_robot_lets_goals_be_cancelled_by_their_service(tmp_path: Path) -> None:
+    scripted = with_types(ScriptedRobot())
+    service = f"{ACTION}/_action/cancel_goal"
+    scripted.services[service] = lambda _: {"return_code": 0, "goals_canceling": []}
+    scripted.services["/rosapi/service_type"] = lambda _: {"type": "action_msgs/srv/CancelGoal"}
+    guard = make_guard(tmp_path, Policy(rates=dict.fromkeys(Kind, 0)))
+    guard.hold.put("a test", at=guard.wall_clock())
+    async with on_script(scripted, tmp_path, guard=guard) as caller:
+        by_tool = await caller.ask("ros_cancel_goal", action=ACTION)
+        by_service = await caller.ask("ros_call", service=service)
+    assert "0 goals are being cancelled" in by_tool
+    assert "answered" in by_service
+    stops = [line.said for line in audit_of(tmp_path) if line.event == "stop"]
+    assert len([said for said in stops if service in said]) == 2
 
 
 async def test_a_goal_that_does_not_fit_is_not_sent(tmp_path: Path) -> None:

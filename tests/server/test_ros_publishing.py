@@ -51,6 +51,22 @@ async def test_publishing_a_velocity_for_a_time_ends_when_it_says_with_a_stand(
     assert all(each == STAND for each in messages[4:]), "nothing moves after the stand"
 
 
+async def test_nothing_is_published_before_the_robot_knows_that_somebody_will(
+    tmp_path: Path,
+) -> None:
+    scripted, before = listening(ScriptedRobot()), list[int]()
+
+    def tell(_: object) -> dict[str, list[str]]:
+        before.append(len(published(scripted)))
+        return {"publishers": ["/rosbridge_websocket"] if len(before) > 2 else []}
+
+    scripted.services["/rosapi/publishers"] = tell
+    async with on_script(scripted, tmp_path) as caller:
+        await caller.ask("ros_publish", topic="/cmd_vel", message=STAND)
+        await scripted.until(lambda: published(scripted))
+    assert before == [0, 0, 0]
+
+
 async def test_a_velocity_without_an_end_is_refused(tmp_path: Path) -> None:
     scripted = listening(ScriptedRobot())
     async with on_script(scripted, tmp_path) as caller:
@@ -194,6 +210,20 @@ async def test_parameters_are_listed_set_and_deleted(dialect: Dialect, tmp_path:
     assert "robot_radius: 0.3" in after
     assert none.startswith("parameters of /robot_base: 0 of ")
     assert "has no parameter 'colour'" in missing
+
+
+@both
+async def test_a_misspelt_parameter_or_node_is_not_made_up(
+    dialect: Dialect, tmp_path: Path
+) -> None:
+    async with on_our_server(dialect, tmp_path) as (_, caller):
+        parameter = await caller.refuse(
+            "ros_set_parameter", node="/robot_base", parameter="robot_radios", value=0.3
+        )
+        await caller.refuse(
+            "ros_set_parameter", node="/robot_bas", parameter="robot_radius", value=0.3
+        )
+    assert "such as robot_radius" in parameter
 
 
 async def test_ros_2_describes_its_parameters(tmp_path: Path) -> None:

@@ -26,7 +26,8 @@ def name_robots(given: Sequence[str]) -> dict[str, str]:
         match = NAME.fullmatch(each)
         if match is None:
             raise ConfigError(
-                f"With several robots each needs a name; {each!r} has none.",
+                f"With several robots each needs a name of letters, digits, _ and - (40 at most); "
+                f"{each[:80]!r} has none.",
                 hint="Write --robot hall=ws://192.168.1.20:9090 --robot yard=ws://192.168.1.21:9090.",
             )
         if match["name"] in named:

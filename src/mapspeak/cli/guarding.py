@@ -91,6 +91,7 @@ def build_guard(choice: GuardChoice, *, robot: str) -> "Guard":
         hold=Hold(control),
         approvals=Approvals(WaitingRoom(control / "approvals"), time.monotonic),
         wall_clock=wall_clock,
+        robot=robot,
     )
 
 

@@ -1,5 +1,6 @@
 """`mapspeak serve`: a robot for MCP clients."""
 
+import gc
 import math
 import os
 import re
@@ -217,6 +218,10 @@ async def _serve(options: ServeOptions) -> None:
         }
         servers = {name: _build_server(session, options) for name, session in sessions.items()}
         server = next(iter(servers.values())) if list(servers) == [""] else FleetServer(servers)
+        # What was loaded stays for good: no later collection has to go through it, which would
+        # hold up a stop by a tenth of a second.
+        gc.collect()
+        gc.freeze()
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(_end_on_signal, sessions.values())
             for session in sessions.values():

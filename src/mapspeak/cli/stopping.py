@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 __all__ = ["release", "stop"]
 
 POLL_S = 0.01
-OTHERS_S = 0.3
-"""Once one server has answered, so long is waited for others."""
 
 
 @click.command()
@@ -28,19 +26,23 @@ OTHERS_S = 0.3
 def stop(control: Path | None, reason: str, wait_s: float) -> None:
     """Stops every robot that is served from here, and holds it until `mapspeak release`.
 
-    Ends with 1 when no server has answered; the hold is there all the same.
+    Ends with 1 when a robot has not answered, or none; the hold is there all the same.
     """
     from mapspeak.navigation.safety import Hold  # noqa: PLC0415 - heavy; help must be quick
 
     hold = Hold(control_folder(control))
     hold.put(" ".join(reason.split()), at=wall_clock())
-    robots = _wait_for_answers(hold, wait_s=wait_s)
-    if robots:
-        click.echo(f"Stopped and held: {', '.join(robots)}. `mapspeak release` lets them go on.")
+    _wait_for_answers(hold, wait_s=wait_s)
+    stopped, unanswered = hold.answers(), hold.unanswered()
+    if stopped:
+        click.echo(f"Stopped and held: {', '.join(stopped)}. `mapspeak release` lets them go on.")
+    if stopped and not unanswered:
         return
+    said = "no server has answered"
+    if unanswered:
+        said = f"NOT KNOWN TO STAND: {', '.join(unanswered)}; no answer"
     click.echo(
-        f"Held, but no server has answered within {wait_s:g} s. If a robot moves, press its own "
-        "stop button.",
+        f"Held, but {said} within {wait_s:g} s. If a robot moves, press its own stop button.",
         err=True,
     )
     sys.exit(1)
@@ -56,10 +58,8 @@ def release(control: Path | None) -> None:
     click.echo("Released." if was_held else "Nothing was held.")
 
 
-def _wait_for_answers(hold: "Hold", *, wait_s: float) -> tuple[str, ...]:
+def _wait_for_answers(hold: "Hold", *, wait_s: float) -> None:
+    """Returns when every robot that is served has answered, or after so long."""
     deadline_s = time.monotonic() + wait_s
-    while not hold.answers() and time.monotonic() < deadline_s:
+    while time.monotonic() < deadline_s and (hold.unanswered() or not hold.answers()):
         time.sleep(POLL_S)
-    if hold.answers():
-        time.sleep(min(OTHERS_S, max(deadline_s - time.monotonic(), 0.0)))
-    return hold.answers()

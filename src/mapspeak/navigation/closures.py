@@ -11,10 +11,15 @@ from mapspeak.geometry import Point
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.grid import IntArray, Mask
 
-__all__ = ["ClosedArea", "ClosedFloor", "close_floor", "mask_areas"]
+__all__ = ["MARGIN_M", "ClosedArea", "ClosedFloor", "close_floor", "distance_to_line", "mask_areas"]
 
 CLOSED = 100
 """A closed cell is as little floor to drive on as one with a wall."""
+MARGIN_M = 0.15
+"""What ways and goals leave between the robot's edge and a closed area.
+
+A pose is off by some centimetres, and no navigation follows a way exactly.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,9 +53,12 @@ class ClosedArea:
 
     def distance_to(self, point: Point) -> float:
         """Gives the metres from a point to the area; 0 inside it."""
-        if self.contains(point):
-            return 0.0
-        return min(_distance_to_side(point, start, end) for start, end in self._sides())
+        return max(self.distance_to_border(point), 0.0)
+
+    def distance_to_border(self, point: Point) -> float:
+        """Gives the metres from a point to the outline; negative inside it."""
+        away_m = min(distance_to_line(point, start, end) for start, end in self._sides())
+        return -away_m if self.contains(point) else away_m
 
     def _sides(self) -> Iterator[tuple[Point, Point]]:
         return zip(self.outline, (*self.outline[1:], self.outline[0]), strict=True)
@@ -76,13 +84,14 @@ class ClosedFloor(OccupancyGrid):
 def close_floor(grid: OccupancyGrid, areas: Sequence[ClosedArea]) -> OccupancyGrid:
     """Gives the map without the floor that is closed; the map itself where nothing is.
 
-    One cell around each area is closed too: distances run between the centres of cells, and a
-    robot that keeps its radius from those must not be over the area.
+    What lies around an area within the margin is closed too. Distances run between the centres of
+    cells, of which up to half a diagonal lies nearer: that of two cells is added.
     """
     if not areas:
         return grid
-    touched = mask_areas(grid, areas).astype(np.uint8)
-    is_closed = cv2.dilate(touched, np.ones((3, 3), dtype=np.uint8)) > 0
+    untouched = np.logical_not(mask_areas(grid, areas)).astype(np.uint8)
+    off_cells = cv2.distanceTransform(untouched, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    is_closed = off_cells * grid.resolution_m <= MARGIN_M + math.sqrt(2) * grid.resolution_m
     cells = np.where(is_closed & grid.free, CLOSED, grid.cells)
     return ClosedFloor(
         cells=cells.astype(np.int8),
@@ -113,7 +122,8 @@ _FAR_CELLS = 30_000
 """OpenCV draws with 16 bits before the point; no map has so many rows or columns."""
 
 
-def _distance_to_side(point: Point, start: Point, end: Point) -> float:
+def distance_to_line(point: Point, start: Point, end: Point) -> float:
+    """Gives the metres from a point to the straight line between two others."""
     along_x, along_y = end.x - start.x, end.y - start.y
     squared = along_x**2 + along_y**2
     if squared == 0.0:

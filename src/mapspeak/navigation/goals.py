@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.navigation.closures import ClosedFloor
+from mapspeak.navigation.closures import MARGIN_M, ClosedFloor
 from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, Mask
 from mapspeak.spatial.paths import DistanceField, clearance_m, distances_from
@@ -122,7 +122,7 @@ def _say_closed(
         return None
     # Borders of areas and of cells differ: what is reachable decides between the two.
     cell_m = floor.resolution_m
-    reach_m = distances.radius_m - cell_m if is_reachable else distances.radius_m + 2 * cell_m
+    reach_m = distances.radius_m if is_reachable else distances.radius_m + MARGIN_M + 2 * cell_m
     area = floor.find_area(goal.point, within_m=reach_m)
     if area is not None:
         off_m = area.distance_to(goal.point)

@@ -92,13 +92,13 @@ class FleetServer(MCPServer[Any]):
                 answer = await server.call_tool(STOP, arguments, context)
                 said[name] = _text_of(answer)
             except ToolError as error:
-                said[name] = f"NOT STOPPED: {error}"
+                said[name] = str(error)
 
         async with anyio.create_task_group() as tasks:
             for name, server in self._servers.items():
                 tasks.start_soon(stop, name, server)
         text = "\n".join(f"{name}: {said[name]}" for name in self._servers)
-        if any(line.startswith("NOT STOPPED") for line in said.values()):
+        if any("NOT STOPPED" in line for line in said.values()):
             raise ToolError(text)
         return CallToolResult.model_validate({"content": [{"type": "text", "text": text}]})
 

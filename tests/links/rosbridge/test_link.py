@@ -458,6 +458,18 @@ async def test_a_goal_of_another_client_that_replaces_ours_is_told_as_that() -> 
     assert "Another client" in status.reason
 
 
+async def test_a_result_that_overtakes_the_list_of_goals_is_understood_by_it() -> None:
+    scripted = ScriptedRobot()
+    async with connected(scripted, patience=LONG) as robot:
+        goal_id = await robot.send_goal(GOAL)
+        await scripted.tell_status(OURS, 2)
+        await scripted.end_goal(ABORTED)
+        await scripted.tell_status(OTHERS, 2)
+        await scripted.tell_status(OURS, ABORTED)
+        status = await until_state(robot, goal_id, GoalState.PREEMPTED)
+    assert "Another client" in status.reason
+
+
 async def test_a_drive_goes_on_through_a_lost_connection_and_its_end_is_told() -> None:
     scripted = ScriptedRobot()
     async with connected(scripted) as robot:

@@ -37,10 +37,11 @@ class FakeRos:
     def __init__(self) -> None:
         self.heard: list[tuple[Any, ...]] = []
         self.is_dead = False
+        self.advertised: list[str] = []
 
     def advertise(self, topic: str, *, type_name: str) -> None:
-        assert topic
         assert type_name
+        self.advertised.append(topic)
 
     async def publish(self, topic: str, message: object) -> None:
         if self.is_dead:
@@ -52,6 +53,8 @@ class FakeRos:
         return 2
 
     async def call_service(self, service: str, *_: object, **__: object) -> dict[str, Any]:
+        if self.is_dead:
+            raise LinkError("The line is dead.", hint="Wait.")
         self.heard.append((service,))
         return {"success": True}
 
@@ -145,6 +148,51 @@ async def test_standing_and_cancelling_always_pass(tmp_path: Path) -> None:
     assert [line.event for line in audit_of(tmp_path)] == ["stop"] * 3
 
 
+@pytest.mark.parametrize(
+    "type_name", ["action_msgs/srv/CancelGoal", "action_msgs/CancelGoal", None]
+)
+async def test_cancelling_by_the_service_of_an_action_always_passes(
+    tmp_path: Path, type_name: str | None
+) -> None:
+    ros = FakeRos()
+    policy = Policy(is_read_only=True, rates=dict.fromkeys(Kind, 0))
+    guard = make_guard(tmp_path)
+    guard.hold.put("a test", at=guard.wall_clock())
+    connection = guarded(ros, tmp_path, policy)
+    service = "/navigate_to_pose/_action/cancel_goal"
+    assert await connection.call_service(service, {}, type_name=type_name) == {"success": True}
+    assert ros.heard == [(service,)]
+    assert [line.event for line in audit_of(tmp_path)] == ["stop"]
+
+
+async def test_a_cancellation_is_noted_also_when_nobody_answers(tmp_path: Path) -> None:
+    ros = FakeRos()
+    connection = guarded(ros, tmp_path)
+    ros.is_dead = True
+    with pytest.raises(LinkError):
+        await connection.call_service("/wave/_action/cancel_goal", {})
+    assert [line.event for line in audit_of(tmp_path)] == ["stop"]
+
+
+@pytest.mark.parametrize(
+    ("service", "type_name"),
+    [
+        ("/lamp/on", "action_msgs/srv/CancelGoal"),
+        ("/wave/_action/cancel_goal", "std_srvs/srv/Trigger"),
+        ("/wave/_action/send_goal", "action_msgs/srv/CancelGoal"),
+        ("/cancel_goal", "action_msgs/srv/CancelGoal"),
+    ],
+)
+async def test_a_call_that_only_looks_like_a_cancellation_is_no_stop(
+    tmp_path: Path, service: str, type_name: str
+) -> None:
+    ros = FakeRos()
+    connection = guarded(ros, tmp_path, Policy(is_read_only=True))
+    with pytest.raises(PolicyError, match="read-only"):
+        await connection.call_service(service, {}, type_name=type_name)
+    assert ros.heard == []
+
+
 async def test_a_message_without_a_velocity_is_no_stop(tmp_path: Path) -> None:
     ros = FakeRos()
     connection = guarded(ros, tmp_path, Policy(is_read_only=True))
@@ -156,7 +204,8 @@ async def test_a_message_without_a_velocity_is_no_stop(tmp_path: Path) -> None:
 async def test_a_message_that_holds_more_than_a_velocity_is_no_stop(tmp_path: Path) -> None:
     ros = FakeRos()
     connection = guarded(ros, tmp_path)
-    connection.advertise("/odom", type_name="nav_msgs/msg/Odometry")
+    with pytest.raises(PolicyError, match="denies"):
+        connection.advertise("/odom", type_name="nav_msgs/msg/Odometry")
     with pytest.raises(PolicyError, match="denies"):
         connection.publish_everywhere("/odom", {"twist": {"twist": STAND}, "pose": {}})
     assert ros.heard == []
@@ -192,3 +241,13 @@ def test_a_guarded_session_gives_its_tools_the_guarded_connection(tmp_path: Path
         ros=FakeRos(),  # type: ignore[arg-type]
     )
     assert isinstance(session.ros, GuardedConnection)
+
+
+async def test_a_forbidden_topic_is_not_even_advertised(tmp_path: Path) -> None:
+    ros = FakeRos()
+    connection = guarded(ros, tmp_path)
+    with pytest.raises(PolicyError, match="denies"):
+        connection.advertise("/goal_pose", type_name="geometry_msgs/msg/PoseStamped")
+    connection.advertise("/move_base/cancel", type_name="actionlib_msgs/GoalID")
+    assert ros.advertised == ["/cmd_vel", "/move_base/cancel"]
+    assert audit_of(tmp_path)[-1].verdict == "refused"

@@ -24,6 +24,7 @@ from mapspeak.navigation.safety import (
     Surveyor,
     calling,
 )
+from mapspeak.navigation.safety.lookout import KEEP_M
 from mapspeak.robot import GoalState, StampedPose
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.session import Session
@@ -45,6 +46,7 @@ HALL = grid_from_text(
     """,
     resolution_m=0.5,
 )
+FINE_HALL = grid_from_text("\n".join("." * 90 for _ in range(40)), resolution_m=0.05)
 WEST, EAST = Pose(1.5, 2.25), Pose(9.5, 2.25)
 MIDDLE = rectangle("pit", (5.0, 1.5), (6.0, 3.0))
 
@@ -169,7 +171,7 @@ async def test_a_robot_whose_navigation_knows_no_areas_is_led_round_them_in_legs
         await robot.sleep(0.2)
     assert status.state is GoalState.ARRIVED
     assert fake.pose == EAST
-    assert nearest_m >= fake.description.radius_m
+    assert nearest_m >= fake.description.radius_m + KEEP_M
     assert lengths_m == sorted(lengths_m, reverse=True)
     assert lengths_m[0] > 8.0
     n_legs = [line.event for line in audit_of(tmp_path)].count("leg")
@@ -228,11 +230,85 @@ async def test_a_robot_that_goes_another_way_is_stopped_before_it_enters_an_area
     assert [line.event for line in audit_of(tmp_path)][-2:] == ["stop", "ended"]
 
 
+@pytest.mark.parametrize("sleep_s", [0.03, 0.1, 0.2, 0.25, 5.0])
+async def test_a_drive_is_watched_however_short_the_waits_for_it_are(
+    tmp_path: Path, sleep_s: float
+) -> None:
+    fake = SwervingRobot(HALL, pose=WEST)
+    robot = guarded(fake, tmp_path, Policy(areas=(MIDDLE,)))
+    await robot.send_goal(EAST)
+    while robot.now_s < 10.0:
+        await robot.sleep(sleep_s)
+    assert fake.n_stops == 1
+    assert fake.pose.x < 5.0 - fake.description.radius_m
+
+
 async def test_a_robot_inside_an_area_may_leave_it(tmp_path: Path) -> None:
     at_the_edge = Pose(5.1, 2.25)
     fake = FakeRobot(HALL, pose=at_the_edge)
     robot = guarded(fake, tmp_path, Policy(areas=(MIDDLE,)))
     goal_id = await robot.send_goal(WEST)
+    await robot.sleep(20.0)
+    assert (await robot.fetch_goal_status(goal_id)).state is GoalState.ARRIVED
+
+
+async def test_a_robot_whose_own_way_would_graze_an_area_is_led_further_off(
+    tmp_path: Path,
+) -> None:
+    start = Pose(1.0, 1.0)
+    fake = FakeRobot(FINE_HALL, pose=start)
+    pit = rectangle("pit", (2.0, 0.0), (2.5, 0.76))
+    robot = guarded(fake, tmp_path, Policy(areas=(pit,)))
+    await robot.send_goal(Pose(3.5, 1.0))
+    nearest_m = 99.0
+    for _ in range(60):
+        nearest_m = min(
+            nearest_m, ClosedArea(name="", outline=pit.outline).distance_to(fake.pose.point)
+        )
+        await robot.sleep(0.1)
+    assert fake.pose == Pose(3.5, 1.0)
+    assert nearest_m >= fake.description.radius_m + KEEP_M
+    # It stops at the end of each leg.
+    assert 2 <= len(fake.goals) <= 8
+
+
+async def test_a_robot_beside_an_area_may_turn_where_it_stands(tmp_path: Path) -> None:
+    beside = Pose(5.0 - 0.25, 2.25)
+    fake = FakeRobot(HALL, pose=beside)
+    robot = guarded(fake, tmp_path, Policy(areas=(MIDDLE,)))
+    goal_id = await robot.send_goal(Pose(beside.x, beside.y, 2.0))
+    await robot.sleep(2.0)
+    assert (await robot.fetch_goal_status(goal_id)).state is GoalState.ARRIVED
+
+
+async def test_a_robot_that_is_partly_over_an_area_may_not_even_turn(tmp_path: Path) -> None:
+    over = Pose(5.0 - 0.15, 2.25)
+    robot = guarded(FakeRobot(HALL, pose=over), tmp_path, Policy(areas=(MIDDLE,)))
+    assert "keep-out area 'pit'" in await refusal_of(robot, Pose(over.x, over.y, 2.0))
+
+
+async def test_a_robot_is_stopped_before_an_area_while_a_map_is_slow_to_come(
+    tmp_path: Path,
+) -> None:
+    fake = SwervingRobot(HALL, pose=WEST)
+    robot = guarded(fake, tmp_path, Policy(areas=(MIDDLE,)))
+    await robot.send_goal(EAST)
+    fake.may_give_map = anyio.Event()
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(robot.watch_map)
+        with anyio.fail_after(20.0):
+            while not fake.n_stops:
+                await fake.sleep(0.1)
+                await robot.watch()
+        tasks.cancel_scope.cancel()
+    assert fake.pose.x < 5.0 - fake.description.radius_m
+
+
+async def test_a_map_that_does_not_come_ends_no_drive(tmp_path: Path) -> None:
+    fake = FakeRobot(HALL, pose=WEST)
+    robot = guarded(fake, tmp_path)
+    goal_id = await robot.send_goal(EAST)
+    fake.grid = None
     await robot.sleep(20.0)
     assert (await robot.fetch_goal_status(goal_id)).state is GoalState.ARRIVED
 

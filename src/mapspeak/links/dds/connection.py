@@ -1,7 +1,7 @@
 """A ROS 2 system over DDS, with no ROS here and nothing else on the robot."""
 
-from collections.abc import AsyncGenerator, Callable, Coroutine, Iterator, Mapping
-from contextlib import asynccontextmanager, contextmanager
+from collections.abc import AsyncGenerator, Callable, Coroutine, Mapping
+from contextlib import asynccontextmanager
 from typing import Any
 
 import anyio
@@ -18,7 +18,7 @@ from mapspeak.links.dds.participant import Participant
 from mapspeak.links.dds.timing import DdsTiming
 from mapspeak.links.dds.topics import Topics
 from mapspeak.links.dds.types import Types
-from mapspeak.links.ros import PursuedGoal, TopicSubscription
+from mapspeak.links.ros import PursuedGoal, TopicSubscription, plain_errors
 from mapspeak.ros import ActionGoal, Subscription
 from mapspeak.ros.messages import Message
 
@@ -257,7 +257,7 @@ async def open_dds_connection(
     Raises:
         LinkError: DDS cannot be started, or nobody is there.
     """
-    with _plain_errors():
+    with plain_errors():
         async with anyio.create_task_group() as tasks:
             connection = DdsConnection(network, timing=timing, framing_of=framing_of)
             try:
@@ -267,15 +267,3 @@ async def open_dds_connection(
                 with anyio.CancelScope(shield=True):
                     await connection.aclose()
                 tasks.cancel_scope.cancel()
-
-
-@contextmanager
-def _plain_errors() -> Iterator[None]:
-    """Lets an error pass as it was raised, out of the group that a task group makes of it."""
-    try:
-        yield
-    except BaseExceptionGroup as group:
-        error: BaseException = group
-        while isinstance(error, BaseExceptionGroup) and len(error.exceptions) == 1:
-            error = error.exceptions[0]
-        raise error from error.__cause__

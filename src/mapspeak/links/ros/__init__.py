@@ -7,6 +7,7 @@ from mapspeak.links.ros.discovery import (
     load_robot_file,
 )
 from mapspeak.links.ros.driving import DrivingPatience
+from mapspeak.links.ros.errors import plain_errors
 from mapspeak.links.ros.goal import PursuedGoal
 from mapspeak.links.ros.parameters import NodeParameters
 from mapspeak.links.ros.poses import describe_pose_source
@@ -25,4 +26,5 @@ __all__ = [
     "describe_pose_source",
     "describe_profile",
     "load_robot_file",
+    "plain_errors",
 ]

@@ -1,27 +1,30 @@
 """A ROS 2 system over rclpy, as one of its nodes sees it."""
 
-from collections.abc import AsyncGenerator, Callable, Coroutine, Iterator, Mapping
-from contextlib import asynccontextmanager, contextmanager, suppress
-from typing import Any
+from collections.abc import AsyncGenerator, Callable, Coroutine, Mapping
+from contextlib import asynccontextmanager, suppress
+from typing import Any, Protocol
 
 import anyio
 from anyio.abc import TaskGroup
 from anyio.from_thread import BlockingPortal
 
 from mapspeak.errors import LinkError
-from mapspeak.links.ros import PursuedGoal, TopicSubscription
+from mapspeak.links.ros import PursuedGoal, TopicSubscription, plain_errors
 from mapspeak.links.ros2.goals import Goals
 from mapspeak.links.ros2.graph import GraphQuestions
 from mapspeak.links.ros2.participant import Participant, errors_of_ros, wait_until
 from mapspeak.links.ros2.services import Services
 from mapspeak.links.ros2.topics import Topics
-from mapspeak.ros import ActionGoal, Subscription
+from mapspeak.ros import ActionGoal, NodeLinks, RosGraph, Subscription
 from mapspeak.ros.messages import Message
 
 ANSWER_S = 5.0
 """For a service's answer, where the caller says nothing else, and for a first node."""
-FIRST_SIGN_S = 2.0
-"""For the first node of others to be found before we begin without."""
+FIRST_SIGN_S = 5.0
+"""For the first node of others to be found before we begin without.
+
+A call that is lost on a busy machine comes again after three seconds: so Fast DDS has it.
+"""
 QUIET_S = 0.3
 """Without anything new, after which all that is there counts as found."""
 LONGEST_LOOK_S = 3.0
@@ -69,7 +72,7 @@ class Ros2Connection(GraphQuestions):
         self._tasks.start_soon(self._watch)
         if await wait_until(self._sees_others, within_s=FIRST_SIGN_S):
             with anyio.move_on_after(LONGEST_LOOK_S):
-                await self._wait_until_quiet()
+                await wait_until_quiet(self)
 
     async def aclose(self) -> None:
         """Waits a moment until what was published last has arrived."""
@@ -171,11 +174,40 @@ class Ros2Connection(GraphQuestions):
             self._found_s = anyio.current_time()
         return self._found_s is not None
 
-    async def _wait_until_quiet(self) -> None:
-        graph, before = await self.fetch_graph(), None
-        while graph != before:
-            await anyio.sleep(QUIET_S)
-            graph, before = await self.fetch_graph(), graph
+
+class Surroundings(Protocol):
+    """What can be asked of a system that is still being found."""
+
+    def nodes(self) -> tuple[str, ...]:
+        """Gives the full names of all nodes that are known now."""
+        ...
+
+    async def fetch_node(self, node: str) -> NodeLinks:
+        """Gives what a node does."""
+        ...
+
+    async def fetch_graph(self) -> RosGraph:
+        """Gives the topics and actions there are."""
+        ...
+
+
+async def wait_until_quiet(system: Surroundings) -> None:
+    """Returns when nothing new comes, and no node is a mere name: what it does comes later."""
+    graph, before = await system.fetch_graph(), None
+    while graph != before or not await _shows_all_nodes(system):
+        await anyio.sleep(QUIET_S)
+        graph, before = await system.fetch_graph(), graph
+
+
+async def _shows_all_nodes(system: Surroundings) -> bool:
+    for node in system.nodes():
+        try:
+            links = await system.fetch_node(node)
+        except LinkError:
+            return False
+        if not (links.publishes or links.serves):
+            return False
+    return True
 
 
 @asynccontextmanager
@@ -191,7 +223,7 @@ async def open_connection(
     Raises:
         LinkError: ROS cannot be started.
     """
-    with _plain_errors():
+    with plain_errors():
         async with (
             BlockingPortal() as portal,
             _open_participant(domain_id, portal) as participant,
@@ -218,15 +250,3 @@ async def _open_participant(
     finally:
         with anyio.CancelScope(shield=True):
             await participant.aclose()
-
-
-@contextmanager
-def _plain_errors() -> Iterator[None]:
-    """Lets an error pass as it was raised, out of the group that a task group makes of it."""
-    try:
-        yield
-    except BaseExceptionGroup as group:
-        error: BaseException = group
-        while isinstance(error, BaseExceptionGroup) and len(error.exceptions) == 1:
-            error = error.exceptions[0]
-        raise error from error.__cause__

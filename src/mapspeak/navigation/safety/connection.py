@@ -5,7 +5,7 @@ from collections.abc import Callable, Coroutine, Mapping
 from typing import Any, TypeVar
 
 from mapspeak.navigation.safety.commands import Act, Call, Command, Publish, SetParameter
-from mapspeak.navigation.safety.deciding import find_speeds
+from mapspeak.navigation.safety.deciding import find_speeds, is_name_denied
 from mapspeak.navigation.safety.guard import Guard
 from mapspeak.ros import ActionGoal, NodeLinks, RosConnection, RosGraph, Subscription
 from mapspeak.ros.messages import Message
@@ -189,7 +189,14 @@ class GuardedConnection:
         self._connection.renew(subscription)
 
     def advertise(self, topic: str, *, type_name: str) -> None:
-        """Says that we will publish; the robot needs a moment until it listens."""
+        """Says that we will publish; the robot needs a moment until it listens.
+
+        Raises:
+            PolicyError: The policy forbids the topic: the robot must not even hear of it.
+        """
+        command = Publish(topic=topic, type=type_name, message={})
+        if not _is_stop(command) and is_name_denied(command, self._guard.policy):
+            self._guard.clear(command, robot_s=self._now_s())
         self._types[topic] = type_name
         self._connection.advertise(topic, type_name=type_name)
 

@@ -17,7 +17,16 @@ from mapspeak.navigation.safety.commands import (
 )
 from mapspeak.navigation.safety.policy import Policy
 
-__all__ = ["Allowed", "Decision", "NeedsApproval", "Refused", "Situation", "decide", "find_speeds"]
+__all__ = [
+    "Allowed",
+    "Decision",
+    "NeedsApproval",
+    "Refused",
+    "Situation",
+    "decide",
+    "find_speeds",
+    "is_name_denied",
+]
 
 MOST_NESTED = 8
 """No message of speeds is nested deeper; what is, is refused unread."""
@@ -108,6 +117,11 @@ def _against_everything(policy: Policy, situation: Situation) -> Refused | None:
             hint="Tell the person at the robot; only `mapspeak release` lets it drive again.",
         )
     return None
+
+
+def is_name_denied(command: Command, policy: Policy) -> bool:
+    """True when the policy forbids a command for its name, whatever it says."""
+    return _against_name(command, policy) is not None
 
 
 def _against_name(command: Command, policy: Policy) -> Refused | None:

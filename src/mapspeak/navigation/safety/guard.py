@@ -66,6 +66,7 @@ class Guard:
         hold: What keeps the robot standing.
         approvals: What waits for a person's word.
         wall_clock: The operator's.
+        robot: What the operator calls it; empty leaves that to the robot.
     """
 
     policy: Policy
@@ -73,6 +74,7 @@ class Guard:
     hold: Hold
     approvals: Approvals
     wall_clock: Callable[[], datetime]
+    robot: str = ""
     _rates: RateLog = field(default_factory=RateLog)
 
     def clear(self, command: Command, *, robot_s: float) -> Clearance:

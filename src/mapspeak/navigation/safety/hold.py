@@ -6,10 +6,13 @@ be made and removed by a person with no program of ours at all.
 
 import json
 import os
-from collections.abc import Callable
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 from mapspeak.errors import ConfigError
 
@@ -17,6 +20,7 @@ __all__ = ["Hold"]
 
 HOLD = "hold"
 ANSWERS = "standing"
+SERVED = "served"
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +71,7 @@ class Hold:
 
         A server that cannot answer has stopped its robot all the same.
         """
-        path = self.folder / ANSWERS / f"{os.getpid()}-{abs(hash(robot))}.json"
+        path = self.folder / ANSWERS / _file_of(robot)
         try:
             self._write(path, json.dumps({"robot": robot, "held_by": held_by}))
         except OSError:
@@ -76,15 +80,38 @@ class Hold:
     def answers(self) -> tuple[str, ...]:
         """Gives the robots that were commanded to stand because of the present hold."""
         held_by = self.read()
-        robots = []
-        for path in sorted((self.folder / ANSWERS).glob("*.json")):
-            try:
-                told = json.loads(path.read_text(encoding="utf-8"))
-            except (OSError, ValueError):
-                continue
-            if isinstance(told, dict) and told.get("held_by") == held_by:
-                robots.append(str(told.get("robot")))
-        return tuple(robots)
+        return tuple(
+            str(told.get("robot"))
+            for _, told in _read_all(self.folder / ANSWERS)
+            if told.get("held_by") == held_by
+        )
+
+    def join(self, robot: str) -> None:
+        """Tells that a robot is served from here, so that a stop knows whose answer it awaits."""
+        with suppress(OSError):
+            self._write(
+                self.folder / SERVED / _file_of(robot),
+                json.dumps({"robot": robot, "process": os.getpid()}),
+            )
+
+    def leave(self, robot: str) -> None:
+        """Tells that it no longer is."""
+        with suppress(OSError):
+            (self.folder / SERVED / _file_of(robot)).unlink(missing_ok=True)
+
+    def unanswered(self) -> tuple[str, ...]:
+        """Gives the robots that are served and have not answered to the present hold."""
+        held_by = self.read()
+        answered = {
+            path.name
+            for path, told in _read_all(self.folder / ANSWERS)
+            if told.get("held_by") == held_by
+        }
+        return tuple(
+            str(told.get("robot"))
+            for path, told in _read_all(self.folder / SERVED)
+            if path.name not in answered and _is_running(told.get("process"))
+        )
 
     def clear_answers(self) -> None:
         """Forgets the answers to earlier holds."""
@@ -106,3 +133,29 @@ class Hold:
                 f"{self.file} cannot be changed: {error.strerror or error}.",
                 hint="Check who owns that folder; press the robot's own stop button meanwhile.",
             ) from error
+
+
+def _file_of(robot: str) -> str:
+    return f"{os.getpid()}-{zlib.crc32(robot.encode()):08x}.json"
+
+
+def _read_all(folder: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
+    """Gives what servers have written there; what cannot be read is left away."""
+    for path in sorted(folder.glob("*.json")):
+        try:
+            told = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            continue
+        if isinstance(told, dict):
+            yield path, told
+
+
+def _is_running(process: object) -> bool:
+    """True unless a process has ended for sure; one that hangs still has a robot."""
+    try:
+        os.kill(int(str(process)), 0)
+    except (ProcessLookupError, ValueError, OverflowError):
+        return False
+    except OSError:
+        return True
+    return True

@@ -1,6 +1,8 @@
 """What is looked out for while a robot drives: closed areas ahead, and a goal that went bad."""
 
-from mapspeak.geometry import Point, Pose
+import math
+
+from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.navigation.closures import ClosedArea
 from mapspeak.navigation.revision import MapRevision
 
@@ -13,11 +15,15 @@ OCCUPIED_FOR_S = 5.0
 REACTION_S = 0.2
 """Between a look at the pose and the wheels' answer to a stop."""
 BRAKING_MPS2 = 1.0
-SLACK_M = 0.05
-"""A goal at the very edge of a closed area can be reached."""
+KEEP_M = 0.05
+"""What a stop leaves between the robot's edge and an area; less than ways and goals leave."""
+WAVER_M = 0.01
+"""By so much the pose of a robot that stands differs from one look to the next."""
 LEAST_STEP_S = 0.05
 LOST_TRACK_S = 2.0
 """What lies longer ago says nothing about how fast the robot drives now."""
+N_STEPS = 8
+"""At so many places of the way to a stand is looked how near the areas are."""
 
 
 class Lookout:
@@ -33,9 +39,10 @@ class Lookout:
         self._radius_m = radius_m
         self._next_map_s = 0.0
         self._occupied_since_s: float | None = None
-        self._before: tuple[Point, float] | None = None
+        self._before: tuple[Pose, float] | None = None
+        self._least_m: dict[ClosedArea, float] = {}
 
-    def begin_at(self, here: Point, *, now_s: float) -> None:
+    def begin_at(self, here: Pose, *, now_s: float) -> None:
         """Notes where the robot stands before it is sent off."""
         self._before = (here, now_s)
 
@@ -64,19 +71,15 @@ class Lookout:
         what = "is off the map now" if is_off else "has an obstacle on it now"
         return f"The map has changed: the goal {what}; the robot was stopped."
 
-    def judge_motion(self, revision: MapRevision, here: Point, *, now_s: float) -> str | None:
+    def judge_motion(self, revision: MapRevision, here: Pose, *, now_s: float) -> str | None:
         """Gives which closed area the robot is about to enter; None where it enters none.
 
-        One that leaves an area is let go.
+        One that stands too near may drive along the area and away, and no nearer.
         """
-        ahead = self._where_it_would_stand(here, now_s)
-        if ahead is None:
-            return None
-        reach_m = self._radius_m - SLACK_M
+        way = (here.point, *self._find_way_to_stand(here, now_s))
         for area in revision.areas:
-            left_m, then_m = area.distance_to(here), area.distance_to(ahead)
-            is_deeper = area.contains(here) and area.contains(ahead)
-            if then_m < reach_m and (then_m < left_m or is_deeper):
+            left_m = area.distance_to_border(here.point)
+            if any(area.distance_to_border(each) < self._find_least(area, left_m) for each in way):
                 edge_m = max(left_m - self._radius_m, 0.0)
                 return (
                     f"The robot was stopped {edge_m:.2f} m before the {area.title}: its own "
@@ -84,23 +87,61 @@ class Lookout:
                 )
         return None
 
-    def _closest(self, revision: MapRevision, point: Point) -> ClosedArea | None:
-        reach_m = self._radius_m - SLACK_M
-        return next((a for a in revision.areas if a.distance_to(point) < reach_m), None)
+    def _find_least(self, area: ClosedArea, left_m: float) -> float:
+        """Gives how near to an area the robot's centre may come: as near as it is, if too near."""
+        least_m = min(self._radius_m + KEEP_M, left_m - WAVER_M)
+        self._least_m[area] = max(least_m, self._least_m.get(area, least_m))
+        return self._least_m[area]
 
-    def _where_it_would_stand(self, here: Point, now_s: float) -> Point | None:
-        """Gives where the robot would come to stand if it was told to stop now."""
+    def _closest(self, revision: MapRevision, point: Point) -> ClosedArea | None:
+        near = (area for area in revision.areas if area.distance_to(point) < self._radius_m)
+        return next(near, None)
+
+    def _find_way_to_stand(self, here: Pose, now_s: float) -> tuple[Point, ...]:
+        """Gives the way that the robot would still go if the next look told it to stop."""
         before, self._before = self._before, (here, now_s)
         if before is None:
-            return None
-        point, then_s = before
+            return ()
+        then, then_s = before
         passed_s = now_s - then_s
         if passed_s < LEAST_STEP_S:
             self._before = before
-            return None
-        if passed_s > LOST_TRACK_S:
-            return None
-        speed_mps = point.distance_to(here) / passed_s
-        further_s = REACTION_S + speed_mps / (2 * BRAKING_MPS2)
-        share = further_s / passed_s
-        return Point(here.x + share * (here.x - point.x), here.y + share * (here.y - point.y))
+            return ()
+        moved_m = then.point.distance_to(here.point)
+        if passed_s > LOST_TRACK_S or moved_m <= WAVER_M:
+            return ()
+        speed_mps = moved_m / passed_s
+        # The next look is as far away as the last one was.
+        further_m = speed_mps * (passed_s + REACTION_S + speed_mps / (2 * BRAKING_MPS2))
+        turned_rad = _find_turn(then, here)
+        heading_rad = then.point.bearing_to(here.point) + turned_rad / 2
+        return _follow_arc(here.point, heading_rad, turned_rad / moved_m, further_m)
+
+
+def _find_turn(then: Pose, here: Pose) -> float:
+    """Gives by how much a robot turned as it drove, without what it turned on the spot before.
+
+    At the end of an arc it looks half the turn away from the chord, and after a turn on the spot
+    along it.
+    """
+    turned_rad = wrap_angle(here.yaw_rad - then.yaw_rad)
+    off_rad = wrap_angle(here.yaw_rad - then.point.bearing_to(here.point))
+    if abs(off_rad) > math.pi / 2:
+        off_rad = wrap_angle(off_rad + math.pi)
+    low, high = min(turned_rad, 0.0), max(turned_rad, 0.0)
+    return min(max(2 * off_rad, low), high)
+
+
+def _follow_arc(
+    start: Point, heading_rad: float, curvature_radpm: float, length_m: float
+) -> tuple[Point, ...]:
+    """Gives places along a way that goes on turning as it did."""
+    step_m = length_m / N_STEPS
+    points = [start]
+    for number in range(N_STEPS):
+        toward_rad = heading_rad + curvature_radpm * step_m * (number + 0.5)
+        last = points[-1]
+        points.append(
+            Point(last.x + step_m * math.cos(toward_rad), last.y + step_m * math.sin(toward_rad))
+        )
+    return tuple(points[1:])

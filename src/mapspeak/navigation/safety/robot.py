@@ -1,22 +1,22 @@
 """A robot behind the guard: the only one that a session and its tools get."""
 
-import itertools
 import logging
 from collections import OrderedDict
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import anyio
 import anyio.to_thread
 
 from mapspeak.errors import ConfigError, LinkError, MapspeakError, PolicyError
-from mapspeak.geometry import Point, Pose
-from mapspeak.navigation.goals import GoalCheck, GoalVerdict, check_goal
+from mapspeak.geometry import Pose
+from mapspeak.navigation.goals import GoalVerdict, check_goal
 from mapspeak.navigation.safety.caller import NOBODY, current_caller
 from mapspeak.navigation.safety.commands import Drive, say_command
 from mapspeak.navigation.safety.guard import Clearance, Guard
 from mapspeak.navigation.safety.legs import plan_legs
 from mapspeak.navigation.safety.lookout import Lookout
 from mapspeak.navigation.safety.surveying import Surveyor
+from mapspeak.navigation.safety.underway import GuardedDrive, Plan
 from mapspeak.robot import (
     CameraPicture,
     Detection,
@@ -32,6 +32,7 @@ __all__ = ["GuardedRobot"]
 
 WATCH_S = 0.1
 """Robot time between two looks at where a drive leads."""
+EPSILON_S = 1e-6
 BLIND_S = 2.0
 """Wall time without a pose after which a robot that must keep off some area is stopped."""
 SAME_PLACE_M = 0.1
@@ -39,45 +40,6 @@ SAME_PLACE_M = 0.1
 N_KEPT = 200
 
 logger = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Plan:
-    """How the robot would get to a goal.
-
-    Attributes:
-        check: What the map says of the goal.
-        legs: The poses to send it to, the goal last.
-        here: Where it is.
-    """
-
-    check: GoalCheck
-    legs: tuple[Pose, ...]
-    here: Point
-
-
-@dataclass(slots=True, kw_only=True)
-class _Drive:
-    """A drive under way, as far as anyone has asked.
-
-    Attributes:
-        goal_id: The id it is known by: that of its first leg.
-        leg_id: What the robot calls the leg that it drives now.
-        legs: Those after it.
-    """
-
-    goal_id: str
-    leg_id: str
-    legs: list[Pose]
-    leg: Pose
-    cleared: Clearance
-    lookout: Lookout
-
-    @property
-    def further_m(self) -> float:
-        """How far it is from the end of this leg to the goal."""
-        ends = [self.leg, *self.legs]
-        return sum(a.point.distance_to(b.point) for a, b in itertools.pairwise(ends))
 
 
 class GuardedRobot:
@@ -93,7 +55,7 @@ class GuardedRobot:
         self._robot = robot
         self._guard = guard
         self._surveyor = surveyor
-        self._drive: _Drive | None = None
+        self._drive: GuardedDrive | None = None
         self._verdicts: OrderedDict[str, GoalStatus] = OrderedDict()
         self._n_stops = 0
         self._answered_hold: str | None = None
@@ -115,10 +77,11 @@ class GuardedRobot:
     async def sleep(self, duration_s: float) -> None:
         """Returns when that much robot time has passed; a drive is watched meanwhile."""
         deadline_s = self.now_s + duration_s
-        while self._drive is not None and self.now_s < deadline_s - WATCH_S:
-            await self._robot.sleep(WATCH_S)
+        while self._drive is not None and self.now_s < deadline_s - EPSILON_S:
+            await self._robot.sleep(min(WATCH_S, deadline_s - self.now_s))
             await self.obey_hold()
             await self.watch()
+            await self.watch_map()
         await self._robot.sleep(max(deadline_s - self.now_s, 0.0))
 
     async def fetch_map(self) -> OccupancyGrid:
@@ -194,6 +157,11 @@ class GuardedRobot:
         """Ends every drive and commands zero velocity, at once; never refused."""
         await self._stop("stopped")
 
+    @property
+    def name(self) -> str:
+        """What the operator calls the robot."""
+        return self._guard.robot or self._robot.description.name
+
     async def obey_hold(self) -> None:
         """Stops the robot for a hold; to be called often, and apart from what asks the robot.
 
@@ -208,7 +176,7 @@ class GuardedRobot:
         else:
             await self._stop("held")
         self._answered_hold = held_by
-        self._guard.hold.answer(self._robot.description.name, held_by=held_by)
+        self._guard.hold.answer(self.name, held_by=held_by)
 
     async def watch(self) -> None:
         """Stops the robot before it enters a closed area; to be called often."""
@@ -222,16 +190,34 @@ class GuardedRobot:
             elif drive.legs and drive is self._drive:
                 await self._follow(drive)
 
+    async def watch_map(self) -> None:
+        """Stops the robot when its goal is closed or full by now; to be called often.
+
+        A map may take long to come and to be looked through: `watch` must not wait for it.
+        """
+        drive = self._drive
+        if drive is None or not drive.lookout.is_map_due(self.now_s):
+            return
+        try:
+            grid = await self._robot.fetch_map()
+        except LinkError as error:
+            logger.warning("While watching the map: %s", error)
+            return
+        revision = await self._surveyor.survey(grid, radius_m=self.description.radius_m)
+        fault = drive.lookout.judge_goal(revision, now_s=self.now_s)
+        if fault is not None and drive is self._drive:
+            await self._end(drive, GoalState.BLOCKED, fault)
+
     # --- inside ---
 
-    def _take_up(self, robot_goal_id: str, plan: _Plan, cleared: Clearance) -> None:
+    def _take_up(self, robot_goal_id: str, plan: Plan, cleared: Clearance) -> None:
         """Begins to look after a drive that the robot has accepted."""
         self._note_replaced()
         self._seen_at_s = anyio.current_time()
         first, *others = plan.legs
         lookout = Lookout(goal=plan.legs[-1], radius_m=self.description.radius_m)
         lookout.begin_at(plan.here, now_s=self.now_s)
-        self._drive = _Drive(
+        self._drive = GuardedDrive(
             goal_id=robot_goal_id,
             leg_id=robot_goal_id,
             leg=first,
@@ -242,7 +228,7 @@ class GuardedRobot:
         said = f", in {len(plan.legs)} legs round what is closed" if others else ""
         self._guard.note_result(cleared, f"accepted as {robot_goal_id}{said}", robot_s=self.now_s)
 
-    async def _follow(self, drive: _Drive) -> GoalStatus:
+    async def _follow(self, drive: GuardedDrive) -> GoalStatus:
         """Gives how a drive stands, and sends the robot on where a leg of it has ended."""
         async with self._stepping:
             status = await self._robot.fetch_goal_status(drive.leg_id)
@@ -255,7 +241,7 @@ class GuardedRobot:
             return status
         return replace(status, distance_left_m=left_m + drive.further_m)
 
-    async def _send_on(self, drive: _Drive) -> None:
+    async def _send_on(self, drive: GuardedDrive) -> None:
         n_stops = self._n_stops
         if self._guard.hold.read() is not None:
             return
@@ -267,7 +253,7 @@ class GuardedRobot:
             with anyio.CancelScope(shield=True):
                 await self.stop()
 
-    async def _plan(self, goal: Pose) -> _Plan:
+    async def _plan(self, goal: Pose) -> Plan:
         """Judges a goal, and gives the legs by which the robot would get there."""
         grid = await self._robot.fetch_map()
         here = (await self._robot.fetch_pose()).pose
@@ -277,14 +263,15 @@ class GuardedRobot:
         )
         if check.is_ok:
             legs = await anyio.to_thread.run_sync(lambda: plan_legs(revision, here.point, goal))
-            return _Plan(check=check, legs=legs, here=here.point)
+            return Plan(check=check, legs=legs, here=here)
         is_turn = goal.is_finite() and here.point.distance_to(goal.point) <= SAME_PLACE_M
-        if is_turn and check.verdict is not GoalVerdict.CLOSED:
+        is_over = any(area.distance_to(here.point) < revision.radius_m for area in revision.areas)
+        if is_turn and not is_over:
             # Where it stands it can stand, however tight the map shows that place to be.
             check = replace(check, verdict=GoalVerdict.OK, path_m=0.0, nearest=None)
-        return _Plan(check=check, legs=(goal,), here=here.point)
+        return Plan(check=check, legs=(goal,), here=here)
 
-    async def _find_fault(self, drive: _Drive) -> str | None:
+    async def _find_fault(self, drive: GuardedDrive) -> str | None:
         """Finds why a drive must not go on; that nothing can be seen is a reason after a while."""
         try:
             return await self._judge(drive)
@@ -294,21 +281,15 @@ class GuardedRobot:
                 return None
             return f"The robot was stopped: where it is was unknown for {blind_s:.0f} s. {error}"
 
-    async def _judge(self, drive: _Drive) -> str | None:
+    async def _judge(self, drive: GuardedDrive) -> str | None:
         revision = self._surveyor.latest
-        if drive.lookout.is_map_due(self.now_s):
-            grid = await self._robot.fetch_map()
-            revision = await self._surveyor.survey(grid, radius_m=self.description.radius_m)
-        if revision is None:
+        if revision is None or not revision.areas:
             return None
-        fault = drive.lookout.judge_goal(revision, now_s=self.now_s)
-        if fault is not None or not revision.areas:
-            return fault
         pose = (await self._robot.fetch_pose()).pose
         self._seen_at_s = anyio.current_time()
-        return drive.lookout.judge_motion(revision, pose.point, now_s=self.now_s)
+        return drive.lookout.judge_motion(revision, pose, now_s=self.now_s)
 
-    async def _end(self, drive: _Drive, state: GoalState, reason: str) -> None:
+    async def _end(self, drive: GuardedDrive, state: GoalState, reason: str) -> None:
         """Stops the robot and remembers why, whatever its navigation will say of the drive."""
         self._verdicts[drive.goal_id] = GoalStatus(state=state, reason=reason)
         logger.warning("%s", reason)
@@ -357,7 +338,7 @@ class GuardedRobot:
         said = f"{status.state}: {status.reason}" if status.reason else str(status.state)
         self._guard.note_end(drive.cleared, said, robot_s=self.now_s)
 
-    def _give_up_legs(self, drive: _Drive, reason: str) -> None:
+    def _give_up_legs(self, drive: GuardedDrive, reason: str) -> None:
         """Ends a drive that was to go on after its present leg: its end is not the goal."""
         if drive.legs:
             drive.legs.clear()

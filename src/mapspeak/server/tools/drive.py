@@ -5,6 +5,7 @@ from typing import Annotated
 from mcp.server.mcpserver import Context
 from pydantic import Field
 
+from mapspeak.errors import LinkError
 from mapspeak.server.callers import client_of, tell_progress
 from mapspeak.server.reports import DriveAnswer
 from mapspeak.server.toolset import Effect, Tool
@@ -117,9 +118,15 @@ class DriveTools:
         Use it whenever going on could do harm; it works during any other call.
         """
         ended = self._session.drives.under_way
-        await self._session.drives.stop()
-        told = "no drive was under way" if ended is None else f"{ended.goal_id} was ended"
-        return f"The robot was told to stop; {told}."
+        try:
+            await self._session.drives.stop()
+        except LinkError as error:
+            raise LinkError(
+                f"NOT STOPPED: {error.message}",
+                hint=f"The robot may still move: press its own stop button. {error.hint}",
+            ) from error
+        told = "" if ended is None else f" {ended.goal_id} was ended."
+        return f"The robot was told to stop, whoever had sent it.{told}"
 
     async def _wait(self, context: Context, goal_id: str | None, wait_s: float) -> DriveAnswer:
         report = await self._session.drives.wait(

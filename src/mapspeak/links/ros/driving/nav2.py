@@ -195,7 +195,8 @@ class Nav2Driver:
         if record.is_over:
             return
         if action.end is not None:
-            self._end_by_result(pursuit)
+            if not self._may_be_replaced_yet(pursuit, action.end.status):
+                self._end_by_result(pursuit)
             return
         if action.is_accepted and not record.is_accepted:
             record.accept()
@@ -236,6 +237,20 @@ class Nav2Driver:
                 "The connection was lost during the drive, and navigation does not know the goal "
                 "any more: it or the robot was restarted.",
             )
+
+    def _may_be_replaced_yet(self, pursuit: _Pursuit, status: int | None) -> bool:
+        """True while the list of all goals, which may name a newer one of others, is behind.
+
+        Of a goal that was aborted, the list that says so shows what replaced it; the result comes
+        another way, and may come first.
+        """
+        if pursuit.record.is_replaced:
+            return False
+        if status != ABORTED or self._statuses.get(pursuit.ros_id or "") not in LIVE:
+            return False
+        now_s = anyio.current_time()
+        pursuit.ended_s = pursuit.ended_s or now_s
+        return now_s - pursuit.ended_s < self._patience.result_s
 
     def _end_by_result(self, pursuit: _Pursuit) -> None:
         end = pursuit.action.end

@@ -1,8 +1,8 @@
 """The client of one robot: what it subscribes to, publishes, calls and pursues."""
 
 from collections import deque
-from collections.abc import AsyncGenerator, Callable, Coroutine, Iterator, Mapping
-from contextlib import asynccontextmanager, contextmanager
+from collections.abc import AsyncGenerator, Callable, Coroutine, Mapping
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,7 @@ import anyio
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError
-from mapspeak.links.ros import PursuedGoal, TopicSubscription
+from mapspeak.links.ros import PursuedGoal, TopicSubscription, plain_errors
 from mapspeak.links.rosbridge import protocol
 from mapspeak.links.rosbridge.client.address import RobotAddress
 from mapspeak.links.rosbridge.client.channel import Channel
@@ -363,7 +363,7 @@ async def open_client(
         LinkError: It cannot be reached.
     """
     client = RosbridgeClient(address, timing=timing)
-    with _plain_errors():
+    with plain_errors():
         async with anyio.create_task_group() as tasks:
             await client.start(tasks)
             try:
@@ -372,15 +372,3 @@ async def open_client(
                 with anyio.CancelScope(shield=True):
                     await client.aclose()
                 tasks.cancel_scope.cancel()
-
-
-@contextmanager
-def _plain_errors() -> Iterator[None]:
-    """Lets an error pass as it was raised, out of the group that a task group makes of it."""
-    try:
-        yield
-    except BaseExceptionGroup as group:
-        error: BaseException = group
-        while isinstance(error, BaseExceptionGroup) and len(error.exceptions) == 1:
-            error = error.exceptions[0]
-        raise error from error.__cause__

@@ -1,6 +1,7 @@
 """Everything the ROS tools change on the robot, through one door."""
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from typing import Any
 
 import anyio
@@ -13,6 +14,9 @@ __all__ = ["VELOCITIES", "RosCommands", "stand_of"]
 
 SETTLE_S = 0.3
 """From the first advertisement until the robot's nodes hear what is published, in wall time."""
+LONGEST_SETTLE_S = 1.0
+"""So much longer where the robot, under load, does not know yet that anybody publishes."""
+LOOK_S = 0.1
 N_STANDS = 3
 PAUSE_S = 0.05
 STAND_S = 1.0
@@ -46,7 +50,15 @@ class RosCommands:
         self._connection().advertise(topic, type_name=type_name)
         if (topic, type_name) not in self._advertised:
             await anyio.sleep(SETTLE_S)
+            await self._wait_until_known(topic)
             self._advertised.add((topic, type_name))
+
+    async def _wait_until_known(self, topic: str) -> None:
+        """Returns when the robot knows somebody who publishes, or cannot say, or after a while."""
+        with suppress(LinkError), anyio.move_on_after(LONGEST_SETTLE_S):
+            fetch = self._connection().fetch_publishers
+            while not await fetch(topic):  # noqa: ASYNC110 - it happens in other programs
+                await anyio.sleep(LOOK_S)
 
     async def publish(self, topic: str, message: Message) -> None:
         """Publishes one message on a topic that was prepared."""

@@ -246,12 +246,13 @@ class RosInquiry:
     def stranger(what: str, name: str, known: Iterable[str]) -> LinkError:
         """Gives the error for a name that is not there."""
         names = sorted(known)
-        near = find_nearest(name, names) or names[:5]
-        if not near:
+        near = find_nearest(name, names)
+        if not names:
             return LinkError(f"The robot has no {what}s at all.", hint="Start its ROS nodes.")
+        said = f"The nearest of {len(names)}:" if near else f"There are {len(names)}, such as"
         return LinkError(
             f"The robot has no {what} {name[:80]!r}.",
-            hint=f"The nearest of {len(names)}: {', '.join(near)}. ros_{what}s lists all.",
+            hint=f"{said} {', '.join(near or names[:5])}. ros_{what}s lists all.",
         )
 
 

@@ -7,7 +7,7 @@ import anyio
 from pydantic import Field
 
 from mapspeak.errors import LinkError, MapspeakError
-from mapspeak.ros import RosGraph
+from mapspeak.ros import RosGraph, find_nearest
 from mapspeak.ros.messages import Dialect
 from mapspeak.server.rosreports import cut, show_value
 from mapspeak.server.tools.ros.commands import RosCommands
@@ -142,9 +142,30 @@ class NodeTools:
             return f"{parameter} of {name} is deleted."
         connection = self._inquiry.connection
         before = await connection.fetch_parameter(name, parameter)
+        if before is None and name != "/":
+            await self._check_parameter(name, parameter)
         await self._commands.set_parameter(name, parameter, value)
         after = await connection.fetch_parameter(name, parameter)
         return f"{parameter} of {name} was {show_value(before)}, is {show_value(after)} now."
+
+    async def _check_parameter(self, node: str, parameter: str) -> None:
+        """Returns when there is such a parameter: ROS 1 takes any name, and nobody ever reads it.
+
+        Raises:
+            LinkError: There is none; names those most like it.
+        """
+        connection = self._inquiry.connection
+        known = await connection.fetch_parameter_names(node)
+        if parameter in known:
+            return
+        nodes = await connection.fetch_nodes()
+        if not known and node not in nodes:
+            raise self._inquiry.stranger("node", node, nodes)
+        near = find_nearest(parameter, known) or list(known[:5])
+        raise LinkError(
+            f"{node} has no parameter {parameter[:80]!r}.",
+            hint=f"It has {len(known)}, such as {', '.join(near)}." if near else "It has none.",
+        )
 
     async def _delete(self, node: str, parameter: str) -> None:
         if await self._inquiry.connection.fetch_parameter(node, parameter) is None:
