@@ -245,11 +245,18 @@ def judge(task: Task, detections: Sequence[Detection]) -> Judgement:
     labels = {each.label for each in detections}
     if task.thing in labels:
         return Judgement(is_seen=True)
-    if not labels:
+    shown = [_count_of(group, labels) for group in ROOM_KINDS]
+    # Most of what is in the picture says which kind of room it is: a table stands in many.
+    rooms = [group for group, n in zip(ROOM_KINDS, shown, strict=True) if n and n == max(shown)]
+    is_known = any(task.kind in group for group in ROOM_KINDS)
+    if not rooms or not is_known:
         return Judgement(is_seen=False)
-    like = {find_kind(kind).label for group in ROOM_KINDS if task.kind in group for kind in group}
-    likely = NEAR_ITS_LIKE if labels & like else AMONG_OTHERS
-    return Judgement(is_seen=False, likely=likely if like else None)
+    is_like = any(task.kind in group for group in rooms)
+    return Judgement(is_seen=False, likely=NEAR_ITS_LIKE if is_like else AMONG_OTHERS)
+
+
+def _count_of(group: Sequence[str], labels: set[str]) -> int:
+    return sum(find_kind(kind).label in labels for kind in group)
 
 
 # --- one run ---------------------------------------------------------------------------------
@@ -327,7 +334,8 @@ def measure() -> Iterator[Figure]:
     ours = runs[take_best]
     for rule in RULES[1:]:
         gains = [a.spl - b.spl for a, b in zip(ours, runs[rule], strict=True)]
-        yield from _with_interval(f"SPL beyond {rule.__name__.replace('_', ' ')}", gains)
+        name = f"SPL beyond {rule.__name__.replace('_', ' ')} (target: all above 0)"
+        yield from _with_interval(name, gains)
 
 
 def _with_interval(name: str, values: list[float]) -> Iterator[Figure]:

@@ -8,6 +8,7 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.navigation.drive import DriveReport
 from mapspeak.navigation.search import (
     Budget,
+    Candidate,
     CandidateKind,
     Judgement,
     Opinions,
@@ -15,10 +16,12 @@ from mapspeak.navigation.search import (
     SearchState,
     SeenFloor,
     Standing,
+    find_company_score,
     speaks_of,
 )
 from mapspeak.navigation.search.candidates import find_candidates
 from mapspeak.navigation.search.opinions import weight_of
+from mapspeak.robot import Detection
 from mapspeak.semantic import Waypoint
 from mapspeak.simulator import World, load_world
 from roaming import RoamingRobot, session_of
@@ -41,6 +44,17 @@ FLAT = {
 }
 NO_BUDGET = Budget()
 NOT_SEEN = Judgement(is_seen=False)
+
+
+class ReportingRobot(RoamingRobot):
+    """A robot whose detector reports one thing, straight ahead, wherever it looks."""
+
+    def __init__(self, world: World, *, label: str) -> None:
+        super().__init__(world, has_detector=True)
+        self._label = label
+
+    async def fetch_detections(self) -> tuple[Detection, ...]:
+        return (Detection(label=self._label, confidence_ratio=0.9, bearing_rad=0.0, range_m=2.0),)
 
 
 @pytest.fixture
@@ -144,6 +158,37 @@ async def test_the_models_scores_lead_the_search(tmp_path: Path, flat: World) ->
     assert frontiers_by(opinions)[0] == neutral[-1]
 
 
+@pytest.mark.parametrize(("label", "likelier"), [("coffee machine", True), ("desk", False)])
+async def test_what_the_detector_reports_on_the_way_tells_where_the_thing_may_be(
+    tmp_path: Path, flat: World, label: str, likelier: object
+) -> None:
+    robot = ReportingRobot(flat, label=label)
+    searcher = Searcher(session_of(robot, tmp_path))
+    scores: set[float] = set()
+    for _ in range(4):
+        standing = await _step(robot, searcher, "fridge", Judgement())
+        scores |= {each.score for each in standing.next}
+    assert scores - {0.5}
+    assert all((score > 0.5) is likelier for score in scores - {0.5})
+
+
+async def test_a_remembered_kitchen_is_likelier_to_have_a_fridge_than_the_other_rooms(
+    tmp_path: Path, flat: World
+) -> None:
+    robot = RoamingRobot(flat)
+    session = session_of(robot, tmp_path)
+    kitchen = Point(6.5, 2.5)
+    session.memory.write(Waypoint(name="kitchen", pose=Pose(kitchen.x, kitchen.y)))
+    first = await _step(robot, Searcher(session), "fridge", Judgement())
+    by_nearness = sorted(first.next, key=lambda each: _looked_at(each).distance_to(kitchen))
+    assert by_nearness[0].score > 0.55
+    assert by_nearness[0].score > by_nearness[-1].score
+
+
+def _looked_at(candidate: Candidate) -> Point:
+    return candidate.frontier.anchor if candidate.frontier else candidate.pose.point
+
+
 async def test_a_search_ends_when_its_budget_is_spent(tmp_path: Path, flat: World) -> None:
     robot = RoamingRobot(flat, has_detector=True)
     searcher = Searcher(session_of(robot, tmp_path))
@@ -214,6 +259,32 @@ def test_words_speak_of_a_thing_by_the_rules_of_the_memory(
     words: str, thing: str, speaks: object
 ) -> None:
     assert speaks_of(words, thing) is speaks
+
+
+@pytest.mark.parametrize(
+    ("words", "thing", "score"),
+    [
+        ("coffee machine", "a fridge", 0.8),
+        ("toilets", "the fridge", 0.3),
+        ("sink", "fridge", 0.55),
+        ("coffee table", "coffee machine", 0.3),
+        ("fire extinguisher", "fridge", None),
+        ("desk", "robot", None),
+    ],
+)
+def test_things_are_likely_near_what_belongs_to_the_same_room(
+    words: str, thing: str, score: float | None
+) -> None:
+    assert find_company_score(words, thing) == (score and pytest.approx(score))
+
+
+def test_what_the_model_says_of_a_view_counts_more_than_what_stands_there() -> None:
+    opinions = Opinions()
+    assert opinions.add_company(Point(0.0, 0.0), 0.8)
+    assert not opinions.add_company(Point(0.5, 0.0), 0.8)
+    assert opinions.score_at(Point(0.0, 0.0), ids=()) == pytest.approx(0.65)
+    opinions.add_view(Point(0.0, 0.0), 0.0)
+    assert opinions.score_at(Point(0.0, 0.0), ids=()) < 0.5
 
 
 def test_a_view_says_something_about_what_is_near_it_and_an_id_says_more() -> None:

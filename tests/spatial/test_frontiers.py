@@ -143,6 +143,24 @@ def test_a_gap_narrower_than_the_robot_is_refused_with_its_width() -> None:
     assert report.refused[0].sentence == "gap of 0.2 m, the robot needs 0.40 m"
 
 
+@pytest.mark.parametrize("slit_cells", [3, 5])
+def test_a_long_border_seen_through_a_slit_is_refused_for_the_slit(slit_cells: int) -> None:
+    cells = np.full((80, 120), -1, np.int8)
+    cells[:, :40] = 0
+    cells[:, 40] = 100
+    cells[[0, -1]] = 100
+    cells[:, 0] = 100
+    # Through the slit the robot has seen a fan of floor, from the slit itself on.
+    for col in range(40, 100):
+        half = slit_cells / 2 + (col - 40) * 0.5
+        cells[max(round(40 - half), 1) : min(round(40 + half), 79), col] = 0
+    grid = OccupancyGrid(cells=cells, resolution_m=0.05)
+    report = find_frontiers(grid, Point(1.0, 2.0), radius_m=RADIUS_M)
+    assert not report.frontiers
+    assert reasons(report) == {RefusalReason.TOO_NARROW}
+    assert all(each.sentence.startswith("gap of") for each in report.refused)
+
+
 def test_speckle_is_refused() -> None:
     cells = np.zeros((80, 80), np.int8)
     cells[[0, -1]] = 100

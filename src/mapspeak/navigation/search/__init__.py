@@ -1,6 +1,7 @@
 """Finding a named thing: remembered places first, then where most that is unseen can be seen."""
 
 from mapspeak.navigation.search.candidates import Candidate, CandidateKind
+from mapspeak.navigation.search.company import find_company_score
 from mapspeak.navigation.search.opinions import Opinions
 from mapspeak.navigation.search.searcher import Budget, Choose, Judgement, Searcher
 from mapspeak.navigation.search.seenfloor import SeenFloor
@@ -18,5 +19,6 @@ __all__ = [
     "Searcher",
     "SeenFloor",
     "Standing",
+    "find_company_score",
     "speaks_of",
 ]

@@ -13,6 +13,7 @@ from mapspeak.navigation.atlas import Atlas, RememberedPlace
 from mapspeak.navigation.goals import check_goal
 from mapspeak.navigation.search.opinions import Opinions, weight_of
 from mapspeak.navigation.search.seenfloor import REACH_M, SeenFloor
+from mapspeak.navigation.search.sightlines import cast_sight_lines
 from mapspeak.semantic import SemanticMap, find_waypoints
 from mapspeak.spatial.frontiers import Frontier
 
@@ -244,17 +245,12 @@ def _places_to_stand(atlas: Atlas) -> tuple[FloatArray, FloatArray]:
 def _areas_by_heading(atlas: Atlas, seen: Mask, places: FloatArray, half_rad: float) -> FloatArray:
     """Gives the unseen floor in view from places by heading, shape (places, N_RAYS), in m2."""
     grid = atlas.grid
-    angles = np.arange(N_RAYS) * (math.tau / N_RAYS)
+    angles: FloatArray = np.arange(N_RAYS, dtype=np.float64) * (math.tau / N_RAYS)
     # No step is longer than a cell, so that no ray passes a wall between two of them.
     step_m = grid.resolution_m
     steps_m = np.arange(step_m, REACH_M + 1e-9, step_m)
-    xs = places[:, 0, None, None] + np.outer(np.cos(angles), steps_m)
-    ys = places[:, 1, None, None] + np.outer(np.sin(angles), steps_m)
-    rows, cols = grid.cells_at(np.stack([xs.ravel(), ys.ravel()], axis=1))
-    is_inside = (rows >= 0) & (rows < grid.n_rows) & (cols >= 0) & (cols < grid.n_cols)
-    rows, cols = np.where(is_inside, rows, 0), np.where(is_inside, cols, 0)
-    is_free = (is_inside & grid.free[rows, cols]).reshape(xs.shape)
-    is_new = np.logical_and.accumulate(is_free, axis=2) & ~seen[rows, cols].reshape(xs.shape)
+    lines = cast_sight_lines(grid, places, angles=angles, steps_m=steps_m)
+    is_new = lines.is_open & ~seen[lines.rows, lines.cols]
     by_ray = is_new @ (steps_m * step_m * math.tau / N_RAYS)
     half = max(round(half_rad / (math.tau / N_RAYS)), 1)
     around = np.concatenate([by_ray[:, -half:], by_ray, by_ray[:, :half]], axis=1)

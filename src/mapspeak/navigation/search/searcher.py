@@ -24,6 +24,7 @@ from mapspeak.navigation.search.candidates import (
     find_candidates,
     unseen_area_m2,
 )
+from mapspeak.navigation.search.company import find_company_score
 from mapspeak.navigation.search.opinions import Opinions
 from mapspeak.navigation.search.seenfloor import REACH_M, SeenFloor
 from mapspeak.navigation.search.standing import SearchState, SeenRegion, Standing
@@ -246,6 +247,7 @@ class Searcher:
         return await self._trips.set_out(target, ticket=ticket, client=client, grid=atlas.grid)
 
     def _find_candidates(self, atlas: Atlas) -> list[Candidate]:
+        self._recall_company(atlas)
         found = find_candidates(
             atlas, self._thing, seen=self._seen, opinions=self._opinions, visited=self._visited
         )
@@ -256,6 +258,15 @@ class Searcher:
             if not blocked.is_closed(each.pose.point, atlas.grid)
             and (each.kind is CandidateKind.REMEMBERED or not self._seen.has_look_from(each.pose))
         ]
+
+    def _recall_company(self, atlas: Atlas) -> None:
+        """Takes in what remembered places say of where the thing may be; a kitchen has fridges."""
+        for place in atlas.places:
+            waypoint = place.waypoint
+            named = (*waypoint.safety_landmarks, *waypoint.functional_landmarks)
+            words = ", ".join((waypoint.name, *(each.label for each in named)))
+            if (score := find_company_score(words, self._thing)) is not None:
+                self._opinions.add_company(waypoint.pose.point, score)
 
     async def _is_pointless(self, atlas: Atlas, here: Candidate) -> bool:
         """True when what a place had to show was seen on the way, or it cannot be stood in."""
@@ -279,12 +290,16 @@ class Searcher:
         detections = await robot.fetch_detections()
         pose = (await robot.fetch_pose()).pose
         self._seen.add(pose, None)
+        found = None
         for each in detections:
             place = _place_of(each, pose)
             is_new = all(place.distance_to(other) > DISMISSED_M for other in self._dismissed)
-            if is_new and speaks_of(each.label, self._thing):
-                self._reported = place
-                return each.label
+            if speaks_of(each.label, self._thing):
+                if is_new and found is None:
+                    self._reported, found = place, each.label
+            elif (score := find_company_score(each.label, self._thing)) is not None:
+                self._has_new_opinion |= self._opinions.add_company(place, score)
+        return found
         return None
 
     def _what_is_spent(self, budget: Budget) -> str | None:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.navigation.search.sightlines import cast_sight_lines
 from mapspeak.spatial import OccupancyGrid
 
 __all__ = ["HALF_VIEW_RAD", "REACH_M", "SeenFloor"]
@@ -99,11 +100,6 @@ def _cells_in_view(grid: OccupancyGrid, view: _View) -> tuple[NDArray[np.intp], 
     n_rays = math.ceil(2 * view.half_rad * REACH_M / grid.resolution_m * 1.2)
     angles = view.pose.yaw_rad + np.linspace(-view.half_rad, view.half_rad, n_rays)
     steps_m = np.arange(0.0, REACH_M, grid.resolution_m * 0.9)
-    xs = view.pose.x + np.outer(np.cos(angles), steps_m)
-    ys = view.pose.y + np.outer(np.sin(angles), steps_m)
-    rows, cols = grid.cells_at(np.stack([xs.ravel(), ys.ravel()], axis=1))
-    is_inside = (rows >= 0) & (rows < grid.n_rows) & (cols >= 0) & (cols < grid.n_cols)
-    rows, cols = np.where(is_inside, rows, 0), np.where(is_inside, cols, 0)
-    is_free = (is_inside & grid.free[rows, cols]).reshape(xs.shape)
-    is_seen = np.logical_and.accumulate(is_free, axis=1).ravel()
-    return rows[is_seen], cols[is_seen]
+    place = np.array([[view.pose.x, view.pose.y]])
+    lines = cast_sight_lines(grid, place, angles=angles, steps_m=steps_m)
+    return lines.rows[lines.is_open], lines.cols[lines.is_open]

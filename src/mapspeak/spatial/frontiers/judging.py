@@ -9,6 +9,7 @@ import numpy as np
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.spatial.frontiers.edges import Border
 from mapspeak.spatial.frontiers.frontier import Frontier, RefusedFrontier
+from mapspeak.spatial.frontiers.gaps import find_parts_beyond
 from mapspeak.spatial.frontiers.lookouts import Lookout, find_lookouts
 from mapspeak.spatial.frontiers.merging import merge_by_place
 from mapspeak.spatial.frontiers.ranking import gain_rate
@@ -65,7 +66,13 @@ def judge(
             frontiers.append(_frontier(terrain, border, best))
         elif border.length_m >= SPECK_M:
             dull.append((border, best.prospect.area_m2))
-    refused += [refuse_dull(terrain, each, gain_m2, least_m2) for each, gain_m2 in dull]
+    for (border, gain_m2), beyond in zip(
+        dull, find_parts_beyond(terrain, [border for border, _ in dull]), strict=True
+    ):
+        if beyond is None:
+            refused.append(refuse_dull(terrain, border, gain_m2, least_m2))
+        else:
+            cut_off.append(beyond)
     refused += refuse_cut_off(terrain, cut_off)
     n_specks = len(borders) - len(frontiers) - len(refused)
     return Judgement(merge_by_place(frontiers, apart_m=LOOKED_NEAR_M), refused, n_specks)
