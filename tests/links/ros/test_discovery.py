@@ -69,6 +69,12 @@ def test_a_turtlebot_4_is_understood() -> None:
     assert profile.velocity_topic == "/cmd_vel"
 
 
+def test_the_robots_own_planner_is_found() -> None:
+    actions = ("/navigate_to_pose", "/compute_path_to_pose")
+    assert choose(TURTLEBOT_4, actions=actions).planner_name == "/compute_path_to_pose"
+    assert choose(TURTLEBOT_4, actions=actions[:1]).planner_name is None
+
+
 def test_costmaps_alone_are_no_map() -> None:
     assert choose({"/local_costmap/costmap": GRID}).map_topic is None
 
@@ -104,6 +110,7 @@ def test_move_base_is_found_by_its_goal_topic() -> None:
     profile = choose(types, dialect=Dialect.ROS1)
     assert profile.navigation is NavigationKind.MOVE_BASE
     assert profile.navigation_name == "/move_base"
+    assert profile.planner_name == "/move_base/make_plan"
 
 
 def test_a_goal_topic_serves_where_there_is_no_action() -> None:

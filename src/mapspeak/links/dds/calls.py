@@ -3,8 +3,10 @@
 from collections.abc import Awaitable, Callable, Coroutine, Mapping
 from typing import Any
 
+import anyio
+
 from mapspeak.errors import LinkError
-from mapspeak.links.dds.discovery import Discovery
+from mapspeak.links.dds.discovery import Discovery, Endpoint
 from mapspeak.links.dds.endpoints import Sample
 from mapspeak.links.dds.goals import ActionClient
 from mapspeak.links.dds.names import (
@@ -24,6 +26,8 @@ from mapspeak.ros.messages import Message, bare_type
 
 StartSoon = Callable[[Callable[[], Coroutine[Any, Any, None]]], None]
 Learn = Callable[..., Awaitable[None]]
+APPEARANCE_S = 1.0
+"""For a service to be found that is asked for, in wall time."""
 
 
 class Calls:
@@ -56,6 +60,7 @@ class Calls:
         self._start_soon = start_soon
         self._services: dict[str, ServiceClient] = {}
         self._actions: dict[str, ActionClient] = {}
+        self._news = anyio.Event()
 
     async def call(
         self,
@@ -104,6 +109,8 @@ class Calls:
 
     def note_change(self, dds_name: str) -> None:
         """Takes in that others have begun or ended to read or write a topic."""
+        news, self._news = self._news, anyio.Event()
+        news.set()
         for action, client in self._actions.items():
             if dds_name == reply_topic(_part(action, "send_goal")):
                 client.note_servers([each.key for each in self._discovery.writers_of(dds_name)])
@@ -112,8 +119,15 @@ class Calls:
                 server = self._discovery.server_of(service)
                 asked.note_server(None if server is None else server.framing)
 
+    async def _find_server(self, service: str) -> Endpoint | None:
+        """Finds who serves a service; right after opening, others are still found bit by bit."""
+        with anyio.move_on_after(APPEARANCE_S):
+            while self._discovery.server_of(service) is None:
+                await self._news.wait()
+        return self._discovery.server_of(service)
+
     async def _service(self, service: str) -> ServiceClient:
-        server = self._discovery.server_of(service)
+        server = await self._find_server(service)
         if server is None:
             raise LinkError(
                 f"Nobody serves {service[:80]}.",

@@ -22,6 +22,7 @@ def describe_profile(profile: RobotProfile) -> tuple[Finding, ...]:
         _describe_pose(profile),
         _found("camera topic", profile.camera_topic, START_CAMERA, Health.DOUBTFUL),
         _describe_navigation(profile),
+        _describe_planner(profile),
         _found("velocity topic", profile.velocity_topic, START_VELOCITY, Health.DOUBTFUL),
         _describe_radius(profile),
     )
@@ -49,6 +50,11 @@ def _describe_pose(profile: RobotProfile) -> Finding:
             )
         case PoseSource.NONE:
             return _found("pose source", None, START_POSE)
+
+
+def _describe_planner(profile: RobotProfile) -> Finding:
+    said = profile.planner_name or "none found, and none needed for goals"
+    return Finding(what="planner", health=Health.FINE, said=said)
 
 
 def _describe_radius(profile: RobotProfile) -> Finding:

@@ -63,6 +63,7 @@ class RobotProfile:
         scan_topic: Of sensor_msgs/LaserScan.
         navigation: How goals are sent.
         navigation_name: The action, or the topic for goals.
+        planner_name: The action or service that plans a path without driving it.
         velocity_topic: Takes velocities.
         velocity_type: Twist or TwistStamped, as "package/Type".
         clock_topic: Where a simulation tells its time.
@@ -89,6 +90,7 @@ class RobotProfile:
     scan_topic: str | None = None
     navigation: NavigationKind = NavigationKind.NONE
     navigation_name: str | None = None
+    planner_name: str | None = None
     velocity_topic: str | None = None
     velocity_type: str | None = None
     clock_topic: str | None = None
@@ -135,6 +137,7 @@ def choose_profile(
         scan_topic=overrides.scan_topic or ranking.best(graph, ranking.SCANS, near),
         navigation=navigation,
         navigation_name=navigation_name,
+        planner_name=_choose_planner(graph, near, navigation, navigation_name),
         velocity_topic=velocity_topic,
         velocity_type=velocity_type,
         clock_topic="/clock" if "/clock" in graph.types else None,
@@ -192,6 +195,17 @@ def _choose_navigation(
         return kind, overrides.navigation_name or found.get(kind)
     kind = NavigationKind(overrides.navigation)
     return kind, overrides.navigation_name or found.get(kind) or _usual_name(kind, graph.dialect)
+
+
+def _choose_planner(
+    graph: RosGraph, near: ranking.Nearness, navigation: NavigationKind, name: str | None
+) -> str | None:
+    """Gives Nav2's ComputePathToPose, or the service that every move_base has."""
+    if navigation is NavigationKind.MOVE_BASE and name is not None:
+        return f"{name}/make_plan"
+    return near.first(
+        action for action in graph.actions if action.endswith("/compute_path_to_pose")
+    )
 
 
 def _usual_name(kind: NavigationKind, dialect: Dialect) -> str | None:
