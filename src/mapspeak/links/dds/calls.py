@@ -18,9 +18,9 @@ from mapspeak.links.dds.names import (
 )
 from mapspeak.links.dds.participant import Participant
 from mapspeak.links.dds.services import ServiceClient
-from mapspeak.links.dds.topics import Topics, check_name, wrong_type
+from mapspeak.links.dds.topics import Topics
 from mapspeak.links.dds.types import Types
-from mapspeak.links.ros import PursuedGoal
+from mapspeak.links.ros import PursuedGoal, check_name, wrong_type
 from mapspeak.ros import ActionGoal
 from mapspeak.ros.messages import Message, bare_type
 

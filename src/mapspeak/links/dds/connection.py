@@ -18,8 +18,8 @@ from mapspeak.links.dds.participant import Participant
 from mapspeak.links.dds.timing import DdsTiming
 from mapspeak.links.dds.topics import Topics
 from mapspeak.links.dds.types import Types
-from mapspeak.links.ros import PursuedGoal, TopicSubscription, plain_errors
-from mapspeak.ros import ActionGoal, Subscription
+from mapspeak.links.ros import NativeConnection, PursuedGoal, plain_errors
+from mapspeak.ros import ActionGoal
 from mapspeak.ros.messages import Message
 
 NODES_QUALITY = Quality(is_reliable=True, is_latched=True, depth=1000)
@@ -32,7 +32,7 @@ HINT = (
 )
 
 
-class DdsConnection(GraphQuestions):
+class DdsConnection(GraphQuestions, NativeConnection):
     """One ROS 2 system, as a member of its DDS domain sees it.
 
     Args:
@@ -86,6 +86,11 @@ class DdsConnection(GraphQuestions):
         """Since when nodes have been there, in wall time; None while none is."""
         return None if self._found_s is None else anyio.current_time() - self._found_s
 
+    @property
+    def topics(self) -> Topics:
+        """What is read and written."""
+        return self._topics
+
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Runs something in the background until the connection is closed."""
         if self._tasks is not None:
@@ -131,46 +136,6 @@ class DdsConnection(GraphQuestions):
         """
         await self._wait_for_node(self.timing.answer_s)
 
-    # --- topics
-
-    def subscribe(
-        self,
-        topic: str,
-        *,
-        type_name: str | None = None,
-        is_bulky: bool = False,
-        throttle_ms: int = 0,
-    ) -> TopicSubscription:
-        """Gives the subscription to a topic; it is read as soon as somebody writes it."""
-        return self._topics.subscribe(
-            topic, type_name=type_name, is_bulky=is_bulky, throttle_ms=throttle_ms
-        )
-
-    def unsubscribe(self, subscription: Subscription) -> None:
-        """Ends one use of a subscription; the last one ends the reading too."""
-        self._topics.unsubscribe(subscription.topic, subscription)
-
-    def renew(self, subscription: Subscription) -> None:
-        """Reads a topic anew: latched messages come again."""
-        self._topics.renew(subscription.topic)
-
-    def advertise(self, topic: str, *, type_name: str) -> None:
-        """Says that we will publish."""
-        self._topics.advertise(topic, type_name=type_name)
-
-    def unadvertise(self, topic: str) -> None:
-        """Takes back what `advertise` said."""
-        self._topics.unadvertise(topic)
-
-    async def publish(self, topic: str, message: Message) -> None:
-        """Publishes on an advertised topic, once known listeners are connected to it."""
-        await self._topics.publish(topic, message)
-
-    def publish_everywhere(self, topic: str, message: Message) -> int:
-        """Publishes at once, for a stop; there is one way, so it gives 1."""
-        self._topics.publish_at_once(topic, message)
-        return 1
-
     # --- services and actions
 
     async def call_service(
@@ -206,9 +171,6 @@ class DdsConnection(GraphQuestions):
     def give_up_goal(self, goal: ActionGoal) -> None:
         """Waits no longer for a goal that shows no sign of life."""
         self._calls.give_up_goal(goal)
-
-    def clear_the_way(self) -> None:
-        """Does nothing: over DDS, nothing is held up by what was sent before."""
 
     # --- who is there
 

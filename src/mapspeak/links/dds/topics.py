@@ -14,8 +14,8 @@ from mapspeak.links.dds.endpoints import Inlet, Outlet, Quality, Sample
 from mapspeak.links.dds.names import dds_topic, full_type
 from mapspeak.links.dds.participant import Participant
 from mapspeak.links.dds.types import Types
-from mapspeak.links.ros import TopicSubscription
-from mapspeak.ros import NAME, TYPE
+from mapspeak.links.ros import NativeTopics, TopicSubscription, check_name, wrong_type
+from mapspeak.ros import TYPE
 from mapspeak.ros.messages import Message, bare_type
 
 logger = logging.getLogger(__name__)
@@ -59,7 +59,7 @@ class _Advertised:
     outlet: Outlet
 
 
-class Topics:
+class Topics(NativeTopics[_Request]):
     """Reads and writes topics of ROS.
 
     A topic is read only once somebody writes it, because how it can be read depends on who does: a
@@ -83,58 +83,29 @@ class Topics:
         ask_type: AskType,
         start_soon: StartSoon,
     ) -> None:
+        super().__init__()
         self._participant = participant
         self._discovery = discovery
         self._types = types
         self._ask_type = ask_type
         self._start_soon = start_soon
-        self._requests: dict[str, _Request] = {}
         self._advertised: dict[str, _Advertised] = {}
 
     # --- reading
 
-    def subscribe(
-        self, topic: str, *, type_name: str | None, is_bulky: bool, throttle_ms: int
-    ) -> TopicSubscription:
-        """Gives the subscription to a topic; the first subscriber decides how often it is heard.
-
-        Raises:
-            LinkError: The name or the type is none, or the topic has another type.
-        """
-        request = self._requests.get(topic)
-        if request is None:
-            self._check(topic, type_name)
-            subscription = TopicSubscription(topic, type_name=type_name)
-            request = _Request(subscription, is_bulky, throttle_ms / 1e3)
-            self._requests[topic] = request
-            self._arrange(request)
-        request.subscription.n_users += 1
-        return request.subscription
-
-    def unsubscribe(self, topic: str, subscription: object) -> None:
-        """Ends one use of a subscription, and with the last one the reading."""
-        request = self._requests.get(topic)
-        if request is None or request.subscription is not subscription:
-            return
-        request.subscription.n_users -= 1
-        if request.subscription.n_users == 0:
-            del self._requests[topic]
-            self._end(request)
-
-    def renew(self, topic: str) -> None:
-        """Reads a topic anew: latched messages come again."""
-        request = self._requests.get(topic)
-        if request is not None:
-            self._end(request)
-            self._arrange(request)
+    def request(
+        self, subscription: TopicSubscription, *, is_bulky: bool, throttle_s: float
+    ) -> _Request:
+        """Gives a request that nothing has been done for yet."""
+        return _Request(subscription, is_bulky, throttle_s)
 
     def note_change(self, dds_name: str) -> None:
         """Takes in that others have begun or ended to read or write a topic."""
-        for request in self._requests.values():
+        for request in self.requests.values():
             if dds_topic(request.subscription.topic) == dds_name:
-                self._arrange(request)
+                self.arrange(request)
 
-    def _arrange(self, request: _Request) -> None:
+    def arrange(self, request: _Request) -> None:
         """Reads a topic in the best quality that all of its writers offer.
 
         It is read anew when somebody new writes: Fast DDS serves at once a reader that comes after
@@ -155,7 +126,7 @@ class Topics:
         keys = frozenset(each.key for each in writers)
         if request.quality == quality and keys <= request.writers:
             return
-        self._end(request)
+        self.end(request)
         request.quality, request.writers = quality, keys
         request.inlet = self._participant.read(
             name,
@@ -178,10 +149,11 @@ class Topics:
         except LinkError as error:
             logger.warning("%s cannot be read: %s", topic, error)
             return
-        if self._requests.get(topic) is request:
+        if self.requests.get(topic) is request:
             self.renew(topic)
 
-    def _end(self, request: _Request) -> None:
+    def end(self, request: _Request) -> None:
+        """Reads a topic no longer."""
         if request.inlet is not None:
             self._participant.end_reading(request.inlet)
         request.inlet = request.quality = None
@@ -210,7 +182,7 @@ class Topics:
         Raises:
             LinkError: The name or the type is none, or the topic has another type.
         """
-        self._check(topic, type_name)
+        self.check(topic, type_name)
         full = full_type(type_name)
         known = self._advertised.get(topic)
         if known is not None:
@@ -259,7 +231,8 @@ class Topics:
             raise LinkError(f"{topic[:80]} was not advertised.", hint="Advertise it first.")
         return known
 
-    def _check(self, topic: str, type_name: str | None) -> None:
+    def check(self, topic: str, type_name: str | None) -> None:
+        """Raises `LinkError` where a name or a type is none, or does not go with the other."""
         check_name(topic)
         if type_name is None:
             return
@@ -270,21 +243,3 @@ class Topics:
         found = self._discovery.type_of(dds_topic(topic))
         if found is not None and bare_type(found) != bare_type(type_name):
             raise wrong_type(topic, found, type_name)
-
-
-def check_name(name: str) -> None:
-    """Does nothing for the full name of a topic, a service or an action.
-
-    Raises:
-        LinkError: It is none.
-    """
-    if not (name.startswith("/") and NAME.fullmatch(name)):
-        raise LinkError(f"{name[:80]!r} is no full name in ROS.", hint="Such as /robot/map.")
-
-
-def wrong_type(name: str, found: str, given: str) -> LinkError:
-    """Gives the error for a topic, service or action that is of another type than given."""
-    return LinkError(
-        f"{name} is a {bare_type(found)}, not a {bare_type(given)}.",
-        hint="Use the type that the robot uses.",
-    )

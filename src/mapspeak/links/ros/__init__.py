@@ -9,6 +9,7 @@ from mapspeak.links.ros.discovery import (
 from mapspeak.links.ros.driving import DrivingPatience
 from mapspeak.links.ros.errors import plain_errors
 from mapspeak.links.ros.goal import PursuedGoal
+from mapspeak.links.ros.native import NativeConnection, NativeTopics, check_name, wrong_type
 from mapspeak.links.ros.parameters import NodeParameters
 from mapspeak.links.ros.poses import describe_pose_source
 from mapspeak.links.ros.robot import RosRobot, build_ros_robot
@@ -16,6 +17,8 @@ from mapspeak.links.ros.subscription import TopicSubscription
 
 __all__ = [
     "DrivingPatience",
+    "NativeConnection",
+    "NativeTopics",
     "NodeParameters",
     "PursuedGoal",
     "RobotOverrides",
@@ -23,8 +26,10 @@ __all__ = [
     "RosRobot",
     "TopicSubscription",
     "build_ros_robot",
+    "check_name",
     "describe_pose_source",
     "describe_profile",
     "load_robot_file",
     "plain_errors",
+    "wrong_type",
 ]

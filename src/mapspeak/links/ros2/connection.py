@@ -9,13 +9,13 @@ from anyio.abc import TaskGroup
 from anyio.from_thread import BlockingPortal
 
 from mapspeak.errors import LinkError
-from mapspeak.links.ros import PursuedGoal, TopicSubscription, plain_errors
+from mapspeak.links.ros import NativeConnection, PursuedGoal, plain_errors
 from mapspeak.links.ros2.goals import Goals
 from mapspeak.links.ros2.graph import GraphQuestions
 from mapspeak.links.ros2.participant import Participant, errors_of_ros, wait_until
 from mapspeak.links.ros2.services import Services
 from mapspeak.links.ros2.topics import Topics
-from mapspeak.ros import ActionGoal, NodeLinks, RosGraph, Subscription
+from mapspeak.ros import ActionGoal, NodeLinks, RosGraph
 from mapspeak.ros.messages import Message
 
 ANSWER_S = 5.0
@@ -36,7 +36,7 @@ HINT = (
 )
 
 
-class Ros2Connection(GraphQuestions):
+class Ros2Connection(GraphQuestions, NativeConnection):
     """One ROS 2 system, as our node in it sees it.
 
     Args:
@@ -63,6 +63,11 @@ class Ros2Connection(GraphQuestions):
         """Since when others have been found, in wall time; None before."""
         return None if self._found_s is None else anyio.current_time() - self._found_s
 
+    @property
+    def topics(self) -> Topics:
+        """What is read and written."""
+        return self._topics
+
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Runs something in the background until the connection is closed."""
         self._tasks.start_soon(work)
@@ -86,46 +91,6 @@ class Ros2Connection(GraphQuestions):
         """
         if not await wait_until(self._sees_others, within_s=ANSWER_S):
             raise LinkError("No other node of ROS 2 has been found in our domain.", hint=HINT)
-
-    # --- topics
-
-    def subscribe(
-        self,
-        topic: str,
-        *,
-        type_name: str | None = None,
-        is_bulky: bool = False,
-        throttle_ms: int = 0,
-    ) -> TopicSubscription:
-        """Gives the subscription to a topic; it is read as soon as somebody writes it."""
-        return self._topics.subscribe(
-            topic, type_name=type_name, is_bulky=is_bulky, throttle_ms=throttle_ms
-        )
-
-    def unsubscribe(self, subscription: Subscription) -> None:
-        """Ends one use of a subscription; the last one ends the reading too."""
-        self._topics.unsubscribe(subscription.topic, subscription)
-
-    def renew(self, subscription: Subscription) -> None:
-        """Reads a topic anew: latched messages come again."""
-        self._topics.renew(subscription.topic)
-
-    def advertise(self, topic: str, *, type_name: str) -> None:
-        """Says that we will publish."""
-        self._topics.advertise(topic, type_name=type_name)
-
-    def unadvertise(self, topic: str) -> None:
-        """Takes back what `advertise` said."""
-        self._topics.unadvertise(topic)
-
-    async def publish(self, topic: str, message: Message) -> None:
-        """Publishes on an advertised topic, once known listeners are connected to it."""
-        await self._topics.publish(topic, message)
-
-    def publish_everywhere(self, topic: str, message: Message) -> int:
-        """Publishes at once, for a stop; there is one way, so it gives 1."""
-        self._topics.publish_at_once(topic, message)
-        return 1
 
     # --- services and actions
 
@@ -154,9 +119,6 @@ class Ros2Connection(GraphQuestions):
     def give_up_goal(self, goal: ActionGoal) -> None:
         """Waits no longer for a goal that shows no sign of life."""
         self._goals.give_up(goal)
-
-    def clear_the_way(self) -> None:
-        """Does nothing: in ROS 2 itself, nothing is held up by what was sent before."""
 
     # --- who is there
 

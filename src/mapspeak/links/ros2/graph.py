@@ -8,10 +8,9 @@ import numpy as np
 from rclpy.exceptions import NameValidationException
 
 from mapspeak.errors import LinkError
-from mapspeak.links.ros import NodeParameters
+from mapspeak.links.ros import NodeParameters, check_name
 from mapspeak.links.ros2.definitions import find_definitions
 from mapspeak.links.ros2.participant import Participant
-from mapspeak.links.ros2.topics import check_name
 from mapspeak.ros import NodeLinks, RosGraph
 from mapspeak.ros.messages import Dialect, bare_type
 

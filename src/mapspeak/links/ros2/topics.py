@@ -11,12 +11,11 @@ from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from mapspeak.errors import LinkError
-from mapspeak.links.ros import TopicSubscription
+from mapspeak.links.ros import NativeTopics, TopicSubscription, check_name, wrong_type
 from mapspeak.links.ros2.participant import Participant, errors_of_ros, wait_until
 from mapspeak.links.ros2.reading import read_message
 from mapspeak.links.ros2.types import find_message
 from mapspeak.links.ros2.writing import write_message
-from mapspeak.ros import NAME
 from mapspeak.ros.messages import Message, bare_type
 
 DEPTH, BULKY_DEPTH = 200, 5
@@ -59,7 +58,7 @@ class _Advertised:
     made_s: float
 
 
-class Topics:
+class Topics(NativeTopics[_Request]):
     """Reads and writes topics of ROS.
 
     A topic is read only once somebody writes it, because how it can be read depends on who does: a
@@ -71,55 +70,26 @@ class Topics:
     """
 
     def __init__(self, participant: Participant) -> None:
+        super().__init__()
         self._participant = participant
-        self._requests: dict[str, _Request] = {}
         self._advertised: dict[str, _Advertised] = {}
 
     # --- reading
 
-    def subscribe(
-        self, topic: str, *, type_name: str | None, is_bulky: bool, throttle_ms: int
-    ) -> TopicSubscription:
-        """Gives the subscription to a topic; the first subscriber decides how often it is heard.
-
-        Raises:
-            LinkError: The name or the type is none, or the topic has another type.
-        """
-        request = self._requests.get(topic)
-        if request is None:
-            self._check(topic, type_name)
-            subscription = TopicSubscription(topic, type_name=type_name)
-            request = _Request(subscription, is_bulky, throttle_ms / 1e3)
-            self._arrange(request)
-            self._requests[topic] = request
-        request.subscription.n_users += 1
-        return request.subscription
-
-    def unsubscribe(self, topic: str, subscription: object) -> None:
-        """Ends one use of a subscription, and with the last one the reading."""
-        request = self._requests.get(topic)
-        if request is None or request.subscription is not subscription:
-            return
-        request.subscription.n_users -= 1
-        if request.subscription.n_users == 0:
-            del self._requests[topic]
-            self._end(request)
-
-    def renew(self, topic: str) -> None:
-        """Reads a topic anew: latched messages come again."""
-        request = self._requests.get(topic)
-        if request is not None:
-            self._end(request)
-            self._arrange(request)
+    def request(
+        self, subscription: TopicSubscription, *, is_bulky: bool, throttle_s: float
+    ) -> _Request:
+        """Gives a request that nothing has been done for yet."""
+        return _Request(subscription, is_bulky, throttle_s)
 
     def refresh(self) -> None:
         """Takes in that others have begun or ended to write topics that we read."""
-        for request in list(self._requests.values()):
+        for request in list(self.requests.values()):
             # What cannot be read stays silent; who waits for it is told so.
             with suppress(LinkError):
-                self._arrange(request)
+                self.arrange(request)
 
-    def _arrange(self, request: _Request) -> None:
+    def arrange(self, request: _Request) -> None:
         """Reads a topic in the best quality that all of its writers offer."""
         topic = request.subscription.topic
         node = self._participant.node
@@ -137,14 +107,15 @@ class Topics:
         if request.quality == quality:
             return
         message_class = find_message(request.subscription.type_name or writers[0].topic_type)
-        self._end(request)
+        self.end(request)
         with errors_of_ros(f"{topic} cannot be read"):
             request.reader = node.create_subscription(
                 message_class, topic, partial(self._take, request, request.n_readers), quality
             )
         request.quality = quality
 
-    def _end(self, request: _Request) -> None:
+    def end(self, request: _Request) -> None:
+        """Reads a topic no longer."""
         if request.reader is not None:
             self._participant.node.destroy_subscription(request.reader)
         request.reader = request.quality = None
@@ -170,7 +141,7 @@ class Topics:
         Raises:
             LinkError: The name or the type is none, or the topic has another type.
         """
-        self._check(topic, type_name)
+        self.check(topic, type_name)
         message_class = find_message(type_name)
         known = self._advertised.get(topic)
         if known is not None:
@@ -236,7 +207,8 @@ class Topics:
             raise LinkError(f"{topic[:80]} was not advertised.", hint="Advertise it first.")
         return known
 
-    def _check(self, topic: str, type_name: str | None) -> None:
+    def check(self, topic: str, type_name: str | None) -> None:
+        """Raises `LinkError` where a name or a type is none, or does not go with the other."""
         check_name(topic)
         if type_name is None:
             return
@@ -249,24 +221,6 @@ class Topics:
         found = {bare_type(each.topic_type) for each in infos}
         if found and bare_type(type_name) not in found:
             raise wrong_type(topic, min(found), type_name)
-
-
-def check_name(name: str) -> None:
-    """Does nothing for the full name of a topic, a service or an action.
-
-    Raises:
-        LinkError: It is none.
-    """
-    if not (name.startswith("/") and NAME.fullmatch(name)):
-        raise LinkError(f"{name[:80]!r} is no full name in ROS.", hint="Such as /robot/map.")
-
-
-def wrong_type(name: str, found: str, given: str) -> LinkError:
-    """Gives the error for a topic, service or action that is of another type than given."""
-    return LinkError(
-        f"{name} is a {bare_type(found)}, not a {bare_type(given)}.",
-        hint="Use the type that the robot uses.",
-    )
 
 
 def _quality(*, is_reliable: bool, is_latched: bool, depth: int) -> QoSProfile:

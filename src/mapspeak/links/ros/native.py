@@ -1,0 +1,165 @@
+"""What connections have in common that are in the robot's own network: rclpy, and DDS itself."""
+
+from abc import ABC, abstractmethod
+from typing import Any, Generic, Protocol, TypeVar
+
+from mapspeak.errors import LinkError
+from mapspeak.links.ros.subscription import TopicSubscription
+from mapspeak.ros import NAME, Subscription
+from mapspeak.ros.messages import Message, bare_type
+
+
+class TopicRequest(Protocol):
+    """How a topic was asked for."""
+
+    @property
+    def subscription(self) -> TopicSubscription:
+        """What everybody who asked for it shares."""
+        ...
+
+
+Request = TypeVar("Request", bound=TopicRequest)
+
+
+class NativeTopics(ABC, Generic[Request]):
+    """Keeps what was asked for; how a topic is read and written is each network's own matter."""
+
+    def __init__(self) -> None:
+        self.requests: dict[str, Request] = {}
+
+    def subscribe(
+        self, topic: str, *, type_name: str | None, is_bulky: bool, throttle_ms: int
+    ) -> TopicSubscription:
+        """Gives the subscription to a topic; the first subscriber decides how often it is heard.
+
+        Raises:
+            LinkError: The name or the type is none, or the topic has another type.
+        """
+        request = self.requests.get(topic)
+        if request is None:
+            self.check(topic, type_name)
+            subscription = TopicSubscription(topic, type_name=type_name)
+            request = self.request(subscription, is_bulky=is_bulky, throttle_s=throttle_ms / 1e3)
+            self.arrange(request)
+            self.requests[topic] = request
+        request.subscription.n_users += 1
+        return request.subscription
+
+    def unsubscribe(self, topic: str, subscription: object) -> None:
+        """Ends one use of a subscription, and with the last one the reading."""
+        request = self.requests.get(topic)
+        if request is None or request.subscription is not subscription:
+            return
+        request.subscription.n_users -= 1
+        if request.subscription.n_users == 0:
+            del self.requests[topic]
+            self.end(request)
+
+    def renew(self, topic: str) -> None:
+        """Reads a topic anew: latched messages come again."""
+        request = self.requests.get(topic)
+        if request is not None:
+            self.end(request)
+            self.arrange(request)
+
+    @abstractmethod
+    def check(self, topic: str, type_name: str | None) -> None:
+        """Raises `LinkError` where a name or a type is none, or does not go with the other."""
+
+    @abstractmethod
+    def request(
+        self, subscription: TopicSubscription, *, is_bulky: bool, throttle_s: float
+    ) -> Request:
+        """Gives a request that nothing has been done for yet."""
+
+    @abstractmethod
+    def arrange(self, request: Request) -> None:
+        """Reads a topic in the best quality that all of its writers offer."""
+
+    @abstractmethod
+    def end(self, request: Request) -> None:
+        """Reads a topic no longer."""
+
+    @abstractmethod
+    def advertise(self, topic: str, *, type_name: str) -> None:
+        """Says that we will publish."""
+
+    @abstractmethod
+    def unadvertise(self, topic: str) -> None:
+        """Takes back what `advertise` said."""
+
+    @abstractmethod
+    async def publish(self, topic: str, message: Message) -> None:
+        """Publishes, once those who are known to listen are connected."""
+
+    @abstractmethod
+    def publish_at_once(self, topic: str, message: Message) -> None:
+        """Publishes to those who are connected already."""
+
+
+class NativeConnection(ABC):
+    """The part of the port that is about topics."""
+
+    @property
+    @abstractmethod
+    def topics(self) -> NativeTopics[Any]:
+        """What is read and written."""
+
+    def subscribe(
+        self,
+        topic: str,
+        *,
+        type_name: str | None = None,
+        is_bulky: bool = False,
+        throttle_ms: int = 0,
+    ) -> TopicSubscription:
+        """Gives the subscription to a topic; it is read as soon as somebody writes it."""
+        return self.topics.subscribe(
+            topic, type_name=type_name, is_bulky=is_bulky, throttle_ms=throttle_ms
+        )
+
+    def unsubscribe(self, subscription: Subscription) -> None:
+        """Ends one use of a subscription; the last one ends the reading too."""
+        self.topics.unsubscribe(subscription.topic, subscription)
+
+    def renew(self, subscription: Subscription) -> None:
+        """Reads a topic anew: latched messages come again."""
+        self.topics.renew(subscription.topic)
+
+    def advertise(self, topic: str, *, type_name: str) -> None:
+        """Says that we will publish."""
+        self.topics.advertise(topic, type_name=type_name)
+
+    def unadvertise(self, topic: str) -> None:
+        """Takes back what `advertise` said."""
+        self.topics.unadvertise(topic)
+
+    async def publish(self, topic: str, message: Message) -> None:
+        """Publishes on an advertised topic, once known listeners are connected to it."""
+        await self.topics.publish(topic, message)
+
+    def publish_everywhere(self, topic: str, message: Message) -> int:
+        """Publishes at once, for a stop; there is one way, so it gives 1."""
+        self.topics.publish_at_once(topic, message)
+        return 1
+
+    def clear_the_way(self) -> None:  # noqa: B027 - nothing is to be done, by anybody
+        """Does nothing: in ROS 2 itself, nothing is held up by what was sent before."""
+
+
+def check_name(name: str) -> None:
+    """Does nothing for the full name of a topic, a service or an action.
+
+    Raises:
+        LinkError: It is none.
+    """
+    if not (name.startswith("/") and NAME.fullmatch(name)):
+        raise LinkError(f"{name[:80]!r} is no full name in ROS.", hint="Such as /robot/map.")
+
+
+def wrong_type(name: str, found: str, given: str) -> LinkError:
+    """Gives the error for a topic, service or action that is of another type than given."""
+    return LinkError(
+        f"{name} is a {bare_type(found)}, not a {bare_type(given)}.",
+        hint="Use the type that the robot uses.",
+    )
