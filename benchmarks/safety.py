@@ -1,11 +1,16 @@
 """How fast the robot is stopped, what the guard costs, and a hostile caller against a policy.
 
+`python -m benchmarks.safety stop` measures stops during every other kind of call, with the load of
+the machine: the target, 50 ms, is for the wall clock of a machine with nothing else to do.
+
 `python -m benchmarks.safety [N]` lets a hostile caller make N calls (10,000 unless given) of every
 tool with random arguments, on the simulated robot with a tight policy. Whether a rule was broken is
 judged by the simulator's truth, which no tool can see, and by the audit log.
 """
 
+import gc
 import math
+import os
 import random
 import statistics
 import tempfile
@@ -140,8 +145,17 @@ BUSY_CALLS: dict[str, dict[str, Any]] = {
     "look_at_map": {},
     "look_through_camera": {},
     "draw_robot_pose": {},
+    "subscribe_map_as_image": {},
     "get_robot_pose": {},
     "measure": {},
+    "describe_place": {"place": "3, 0"},
+    "check_goal": {"place": "3, 0"},
+    "explore": {},
+    "search_for": {"thing": "ladder", "seen": False},
+    "follow_route": {"stops": ["1, 0", "0, 1"]},
+    "look_around": {},
+    "turn": {"by_deg": 90},
+    "write_semantic_data": {"name": "here", "description": "a place"},
 }
 
 
@@ -156,7 +170,7 @@ async def time_stops(busy_with: str) -> list[float]:
         session = Session(robot, memory, lease_s=60.0, guard=make_guard(folder, Policy()))
         async with (
             anyio.create_task_group() as tasks,
-            Client(build_server(session)) as client,
+            Client(build_server(session, tools=tuple(BUSY_CALLS)[1:])) as client,
         ):
             tasks.start_soon(session.keep_watch)
             chooser = random.Random(2)  # noqa: S311 - no secret
@@ -398,11 +412,32 @@ def _spread(name: str, values_ms: list[float]) -> Iterator[Figure]:
     yield Figure(name=f"{name}, worst", value=max(values_ms), unit="ms")
 
 
+def print_stops() -> None:
+    """Prints how long a stop takes during each kind of call."""
+    # As `mapspeak serve` does: what was loaded stays for good.
+    gc.collect()
+    gc.freeze()
+    for busy_with in BUSY_CALLS:
+        taken_ms = anyio.run(time_stops, busy_with)
+        click.echo(
+            f"during {busy_with}: median {statistics.median(taken_ms):.1f} ms, worst "
+            f"{max(taken_ms):.1f} ms of {len(taken_ms)}; load {os.getloadavg()[0]:.1f}"
+        )
+    taken_ms = anyio.run(time_outside_stops)
+    click.echo(
+        f"from outside: median {statistics.median(taken_ms):.1f} ms, worst {max(taken_ms):.1f} ms"
+    )
+
+
 @click.command()
-@click.argument("n_calls", default=N_CALLS)
+@click.argument("part", default=str(N_CALLS))
 @click.option("--seed", default=0, show_default=True)
-def main(n_calls: int, seed: int) -> None:
-    """Lets a hostile caller make N_CALLS calls and prints what came of them."""
+def main(part: str, seed: int) -> None:
+    """Lets a hostile caller make PART calls, a number, or measures stops where PART is "stop"."""
+    if part == "stop":
+        print_stops()
+        return
+    n_calls = int(part)
     begun_s = time.perf_counter()
     verdict = anyio.run(lambda: attack(n_calls, seed=seed))
     click.echo(

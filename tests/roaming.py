@@ -47,4 +47,5 @@ class RoamingRobot(SimulatedRobot):
 
 def session_of(robot: RoamingRobot, folder: Path) -> Session:
     """Gives a session over that robot, with its memory in that folder."""
-    return Session(robot, SemanticMapStore(folder / "semantic_map.yaml"), lease_s=60.0)
+    memory = SemanticMapStore(folder / "semantic_map.yaml")
+    return Session(robot, memory, lease_s=60.0, find_model=lambda: None)

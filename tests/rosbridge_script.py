@@ -91,6 +91,7 @@ class ScriptedServer:
     answers_pings: bool = True
     hangs_up: bool = False
     """Whoever comes is sent away, as by a machine that is still booting."""
+    n_sent_away: int = 0
     _news: anyio.Event = field(default_factory=anyio.Event)
 
     @property
@@ -134,6 +135,8 @@ class ScriptedServer:
         )
         if self.hangs_up:
             await anyio.aclose_forcefully(stream)
+            self.n_sent_away += 1
+            self.tell()
             return
         visitor = Visitor(len(self.visitors), stream, protocol)
         try:

@@ -53,12 +53,15 @@ async def served(
     *,
     is_read_only: bool = False,
     guard: Guard | None = None,
+    within_s: float = PATIENCE_S,
 ) -> AsyncGenerator[Caller]:
-    """Gives what calls the tools of a robot with that connection."""
+    """Gives what calls the tools of a robot with that connection; all of it has a time limit."""
     memory = SemanticMapStore(folder / "semantic_map.yaml")
-    session = Session(robot, memory, lease_s=60.0, guard=guard, ros=connection)
+    session = Session(
+        robot, memory, lease_s=60.0, guard=guard, ros=connection, find_model=lambda: None
+    )
     server = build_server(session, toolsets=TOOLSETS, is_read_only=is_read_only)
-    with anyio.fail_after(PATIENCE_S):
+    with anyio.fail_after(within_s):
         async with Client(server) as client:
             yield Caller(client)
 

@@ -12,7 +12,7 @@ from mcp_types import CallToolResult, ImageContent, TextContent
 from mapspeak.navigation.safety import Guard
 from mapspeak.robot import Robot
 from mapspeak.semantic import SemanticMapStore
-from mapspeak.server import DEFAULT_TOOLSETS, build_server
+from mapspeak.server import DEFAULT_TOOLSETS, CallLog, Representation, build_server
 from mapspeak.session import Session
 
 MODES = ("auto", "legacy")
@@ -29,11 +29,20 @@ async def connect(
     is_read_only: bool = False,
     guard: Guard | None = None,
     on_question: ElicitationFnT | None = None,
+    representation: Representation = Representation.PICTURE_TABLE,
+    call_log: CallLog | None = None,
 ) -> AsyncGenerator[Client]:
     """Gives a client of a server over that robot, with its memory in that folder."""
     memory = SemanticMapStore(folder / "semantic_map.yaml", map_id=robot.description.map_name)
-    session = Session(robot, memory, lease_s=60.0, guard=guard)
-    server = build_server(session, toolsets=toolsets, tools=tools, is_read_only=is_read_only)
+    session = Session(robot, memory, lease_s=60.0, guard=guard, find_model=lambda: None)
+    server = build_server(
+        session,
+        toolsets=toolsets,
+        tools=tools,
+        is_read_only=is_read_only,
+        representation=representation,
+        call_log=call_log,
+    )
     async with Client(server, mode=mode, elicitation_callback=on_question) as client:
         yield client
 

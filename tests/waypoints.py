@@ -5,7 +5,7 @@ from datetime import UTC, datetime, timedelta, timezone
 from hypothesis import strategies as st
 
 from mapspeak.geometry import Pose
-from mapspeak.semantic import Landmark, Waypoint
+from mapspeak.semantic import Confidence, Landmark, Waypoint
 
 # One on each line: what YAML, or a reader of lines, might take for something else.
 _TRICKY_TEXTS = """\
@@ -69,7 +69,11 @@ def landmarks() -> st.SearchStrategy[Landmark]:
         purpose=st.none() | _WORDS,
         bearing_rad=st.none() | _ANGLES,
         range_m=st.none() | st.floats(0, 100),
+        confidence=st.none() | st.sampled_from(Confidence),
         note=st.none() | _WORDS,
+        picture=st.none() | _WORDS,
+        stamp_s=st.none() | st.floats(0, 2e9),
+        recorded_at=st.none() | _TIMES,
     )
     return st.builds(Landmark, label=_LINES) | full
 
@@ -87,4 +91,6 @@ def waypoints() -> st.SearchStrategy[Waypoint]:
         geometric_features=st.lists(_WORDS, max_size=3).map(tuple),
         stamp_s=st.none() | st.floats(0, 2e9),
         recorded_at=st.none() | _TIMES,
+        room_id=st.none() | _WORDS,
+        picture=st.none() | _WORDS,
     )

@@ -4,22 +4,36 @@ import logging
 from collections.abc import Awaitable, Callable, Generator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
+from datetime import datetime
 from typing import TypeVar
 
 import anyio
 import anyio.to_thread
 
-from mapspeak.errors import MapError, MapspeakError, SemanticMapError
+from mapspeak.errors import LinkError, MapError, MapspeakError, SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.choosing import CheckedGoal, choose_goal
+from mapspeak.navigation.diary import Diary, Keeping
 from mapspeak.navigation.drive import DriveBook
 from mapspeak.navigation.lease import Lease
+from mapspeak.navigation.recollection import Recollector
 from mapspeak.navigation.revision import MapRevision
 from mapspeak.navigation.safety import Guard, GuardedConnection, GuardedRobot, Surveyor, WhenBusy
-from mapspeak.robot import Robot
+from mapspeak.robot import CameraPicture, Robot
 from mapspeak.ros import RosConnection
-from mapspeak.semantic import SemanticMap, SemanticMapStore
+from mapspeak.semantic import PictureBook, SemanticMap, SemanticMapStore
+from mapspeak.semantic.alignment import MapComparison, MapKeeper, MapRelation
+from mapspeak.semantic.episodes import (
+    EpisodePage,
+    EpisodeQuery,
+    EpisodeStore,
+    VectorRank,
+    memory_folder,
+    named_pictures,
+)
+from mapspeak.semantic.events import Event
+from mapspeak.semantic.retrieval import Embedder, find_model
 from mapspeak.spatial import OccupancyGrid
 
 __all__ = ["Session"]
@@ -43,10 +57,15 @@ class Session:
         lease_s: Without a client for so long, a driving robot is stopped.
         guard: What commands are held to; without one, as in tests, to nothing.
         ros: The connection of a robot that speaks ROS.
+        find_model: Finds what compares meanings; asked once, when it is needed.
 
     Attributes:
         robot: The port to the robot, behind the guard.
         memory: The semantic map's file.
+        pictures: The pictures that were taken lately, by their ids.
+        diary: Every observation, as it was made.
+        keeper: The map that the memory belongs to.
+        recollector: What was made of the memory, until it changes.
         drives: Every drive of the robot.
         guard: What commands are held to.
         ros: The connection of a robot that speaks ROS; None for any other.
@@ -60,20 +79,32 @@ class Session:
         lease_s: float,
         guard: Guard | None = None,
         ros: RosConnection | None = None,
+        find_model: Callable[[], Embedder | None] = find_model,
     ) -> None:
         self.guard = guard
         self._surveyor: Surveyor | None = None
         self._guarded: GuardedRobot | None = None
         when_busy = WhenBusy.REPLACE
         if guard is not None:
-            self._surveyor = Surveyor(guard.policy.areas, wall_clock=guard.wall_clock)
+            self._surveyor = Surveyor(
+                guard.policy.areas, wall_clock=guard.wall_clock, read_events=self._recall_events
+            )
             self._guarded = GuardedRobot(robot, guard=guard, surveyor=self._surveyor)
             when_busy = guard.policy.when_busy
             if ros is not None:
-                ros = GuardedConnection(ros, guard=guard, now_s=lambda: robot.now_s)
+                ros = GuardedConnection(
+                    ros, guard=guard, now_s=lambda: robot.now_s, by_hand=self._guarded.by_hand
+                )
         self.ros = ros
         self.robot: Robot = self._guarded or robot
         self.memory = memory
+        self.pictures = PictureBook()
+        folder = memory_folder(memory.path)
+        episodes = EpisodeStore(folder, named_pictures=lambda: named_pictures(memory.read()))
+        self.diary = Diary(episodes, wall_clock=None if guard is None else guard.wall_clock)
+        self.keeper = MapKeeper(memory)
+        self._rank: VectorRank | None = None
+        self.recollector = Recollector(find_model, kept=folder / "vectors.npz")
         self.drives = DriveBook(self.robot, when_busy=when_busy)
         self._lease = Lease(lease_s)
         self._atlas: Atlas | None = None
@@ -119,6 +150,7 @@ class Session:
                 looked_from=self.drives.frontiers_tried,
                 previous=self._atlas,
                 revision=revision,
+                recollector=self.recollector,
             )
             return self._atlas
 
@@ -134,6 +166,55 @@ class Session:
             rooms = await self.compute(lambda: atlas.rooms)
         region = rooms.find_region_at(point)
         return None if region is None else region.id
+
+    async def keep_picture(self, picture: CameraPicture, *, labels: tuple[str, ...]) -> Keeping:
+        """Keeps a picture as an episode, with what the robot's detector reports in it."""
+        if not self.diary.is_kept:
+            return Keeping()
+        try:
+            room_id = await self.find_room_id(picture.pose.point)
+        except (LinkError, MapError):
+            room_id = None
+        return await self.compute(
+            lambda: self.diary.keep_picture(
+                picture.data,
+                pose=picture.pose,
+                stamp_s=picture.stamp_s,
+                labels=labels,
+                room_id=room_id,
+                map_id=self.memory.map_id,
+            )
+        )
+
+    def find_wall_time(self) -> datetime | None:
+        """Gives the time by the calendar; None where the operator's clock is not known."""
+        return None if self.guard is None else self.guard.wall_clock()
+
+    def find_episodes(self, query: EpisodeQuery) -> EpisodePage:
+        """Gives the observations that pass a query, compared by meaning where that is possible."""
+        embedder = self.recollector.embedder
+        if self._rank is None and embedder is not None:
+            self._rank = VectorRank(self.diary.store.database, embedder)
+        return self.diary.store.find(query, rank=self._rank)
+
+    async def keep_vectors(self) -> None:
+        """Keeps the vectors of remembered texts, so that a later session need not make them."""
+        if self.diary.is_kept:
+            await self.compute(self.recollector.keep)
+
+    async def keep_map(self) -> str:
+        """Keeps the map with the memory after a write; gives what a reader should hear of it."""
+        try:
+            grid = await self.robot.fetch_map()
+        except LinkError:
+            return ""
+        if not grid.cells.size:
+            return ""
+        return await self.compute(lambda: _said_of(self.keeper.keep, grid))
+
+    async def find_map_warning(self, grid: OccupancyGrid) -> str:
+        """Says so where the memory belongs to another map, or to this one before it moved."""
+        return await self.compute(lambda: _said_of(self.keeper.compare, grid))
 
     async def find_goal(
         self, *, place: str | None, x: float | None, y: float | None, yaw_deg: float | None
@@ -156,6 +237,13 @@ class Session:
             return None, ()
         revision = await surveyor.survey(grid, radius_m=self.robot.description.radius_m)
         return revision, await self.compute(lambda: surveyor.describe(revision))
+
+    def _recall_events(self) -> tuple[Event, ...]:
+        """Gives the events that are remembered; of a broken file those that were read before."""
+        try:
+            return self.memory.read_events()
+        except SemanticMapError:
+            return ()
 
     def _recall(self) -> SemanticMap:
         """Gives what is remembered; a broken file costs the memory, not the map."""
@@ -211,3 +299,19 @@ class Session:
         with anyio.CancelScope(shield=True):
             if self.drives.is_busy:
                 await self.drives.stop("The server ended.")
+
+
+def _said_of(compare: Callable[[OccupancyGrid], MapComparison | None], grid: OccupancyGrid) -> str:
+    """Gives what a comparison of maps gives a reader to do; empty where all is well."""
+    try:
+        comparison = compare(grid)
+    except SemanticMapError as error:
+        return str(error)
+    if comparison is None or comparison.relation is MapRelation.SAME:
+        return ""
+    next_step = {
+        MapRelation.MOVED: "Remembered poses are off by as much: realign_memory moves them.",
+        MapRelation.OTHER: "Remembered poses mean nothing here: another memory belongs to it.",
+    }
+    unsure = "Remembered poses may be off: let the robot see more, then call realign_memory."
+    return f"{comparison.sentence} {next_step.get(comparison.relation, unsure)}"

@@ -1,6 +1,7 @@
 """Files of settings that people write, as YAML: read strictly, each fault named with its line."""
 
 import difflib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -19,7 +20,14 @@ Settings = TypeVar("Settings", bound=BaseModel)
 Location = tuple[int | str, ...]
 
 
-def read_settings(path: Path, model: type[Settings], *, name: str, advice: str) -> Settings:
+def read_settings(
+    path: Path,
+    model: type[Settings],
+    *,
+    name: str,
+    advice: str,
+    context: Mapping[str, Any] | None = None,
+) -> Settings:
     """Reads a file into a model; an empty file takes every default.
 
     Args:
@@ -27,6 +35,7 @@ def read_settings(path: Path, model: type[Settings], *, name: str, advice: str) 
         model: What may stand in it, all of it with a default.
         name: What people call such a file, as in "robot.yaml".
         advice: What to do about a value that cannot be.
+        context: What the model's validators need to know besides, such as the file's folder.
 
     Raises:
         ConfigError: The file cannot be read, or has a mistake; says the line and the key.
@@ -40,7 +49,7 @@ def read_settings(path: Path, model: type[Settings], *, name: str, advice: str) 
             hint=f"Write lines like `{next(iter(model.model_fields))}: ...`.",
         )
     try:
-        return model.model_validate(tree)
+        return model.model_validate(tree, context=context)
     except ValidationError as error:
         raise _fault_in(path, tree, error, model=model, name=name, advice=advice) from error
 

@@ -18,13 +18,15 @@ from served import pictures_of
 pytestmark = [pytest.mark.ros2, pytest.mark.anyio]
 
 ACTION = "/navigate_to_pose"
+BUSY_S = 90.0
+"""For everything together: on a busy machine a goal may have to be sent several times."""
 
 
 @asynccontextmanager
 async def tools(url: str, folder: Path) -> AsyncGenerator[Caller]:
     async with (
         open_client(RobotAddress(url=url)) as client,
-        served(FakeRobot(two_rooms()), client, folder) as caller,
+        served(FakeRobot(two_rooms()), client, folder, within_s=BUSY_S) as caller,
     ):
         # rosbridge itself may not have seen rosapi yet.
         await eventually(lambda: sees_rosapi(client))
@@ -91,6 +93,16 @@ async def send(caller: Caller, goal: dict[str, Any], *, wait_s: float) -> str:
     return said
 
 
+async def cancel_on_the_way(caller: Caller) -> str:
+    """Cancels a drive before its end: a busy machine may be slower than the robot."""
+    for x in (1, 4) * 5:
+        going = await send(caller, pose(x, 2.25), wait_s=0)
+        said = await caller.ask("ros_cancel_goal", goal_id=handle_of(going))
+        if "succeeded" not in said:
+            break
+    return said
+
+
 def handle_of(said: str) -> str:
     return said.partition(" ")[0]
 
@@ -99,8 +111,7 @@ async def test_goals_are_told_apart_by_how_they_end(rosbridge_url: str, tmp_path
     async with tools(rosbridge_url, tmp_path) as caller:
         arrived = await send(caller, pose(3, 2.25), wait_s=15)
         blocked = await send(caller, pose(5.25, 3), wait_s=15)
-        going = await send(caller, pose(1, 2.25), wait_s=0)
-        cancelled = await caller.ask("ros_cancel_goal", goal_id=handle_of(going))
+        cancelled = await cancel_on_the_way(caller)
         later = await caller.ask("ros_goal_status", goal_id=handle_of(blocked))
     assert "succeeded" in arrived
     assert "aborted" in blocked

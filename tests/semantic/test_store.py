@@ -3,6 +3,7 @@ import stat
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -117,6 +118,32 @@ def test_removing_an_unknown_name_tells_the_names_near_to_it(store: SemanticMapS
 
     with pytest.raises(SemanticMapError, match=r"No waypoint is called 'dock'.*'Dock corner'"):
         store.remove("dock")
+
+
+def test_what_is_remembered_of_a_place_joins_what_was(store: SemanticMapStore) -> None:
+    hose, tap = Landmark(label="hose"), Landmark(label="tap")
+    store.remember(replace(place("dock"), safety_landmarks=(hose,)))
+
+    receipt, merge = store.remember(replace(place("Dock"), functional_landmarks=(tap,)))
+
+    assert [each.label for each in merge.kept] == ["hose"]
+    assert receipt.waypoint.landmarks == store.read().waypoints[0].landmarks == (hose, tap)
+    assert receipt.previous is not None
+    assert receipt.previous.landmarks == (hose,)
+
+
+def test_what_two_stores_remember_of_one_place_is_both_there(
+    store: SemanticMapStore, path: Path
+) -> None:
+    other = SemanticMapStore(path, map_id="b1")
+    other.read()
+    for number in range(4):
+        label = Landmark(label=f"thing {number}")
+        writer = store if number % 2 else other
+        writer.remember(replace(place("dock"), functional_landmarks=(label,)))
+
+    labels = {each.label for each in store.read().waypoints[0].landmarks}
+    assert labels == {f"thing {number}" for number in range(4)}
 
 
 # --- maps ------------------------------------------------------------------------------------

@@ -5,7 +5,7 @@ import pytest
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
-from mapspeak.semantic import Landmark, SemanticMap, Waypoint
+from mapspeak.semantic import Confidence, Landmark, SemanticMap, Waypoint
 
 HERE = Pose(1.0, 2.0, 0.5)
 
@@ -70,6 +70,8 @@ def test_numbers_that_are_not_finite_are_refused(bad: float) -> None:
         Landmark(label="tap", bearing_rad=bad)
     with pytest.raises(SemanticMapError, match="range of 'tap'"):
         Landmark(label="tap", range_m=bad)
+    with pytest.raises(SemanticMapError, match="stamp of 'tap'"):
+        Landmark(label="tap", stamp_s=bad)
 
 
 def test_a_range_below_zero_is_refused() -> None:
@@ -83,6 +85,28 @@ def test_a_time_without_its_zone_is_refused() -> None:
     assert Waypoint(name="dock", pose=HERE, recorded_at=now).recorded_at == now
     with pytest.raises(SemanticMapError, match="zone"):
         Waypoint(name="dock", pose=HERE, recorded_at=now.replace(tzinfo=None))
+    with pytest.raises(SemanticMapError, match=r"time of 'tap'.*zone"):
+        Landmark(label="tap", recorded_at=now.replace(tzinfo=None))
+
+
+def test_a_landmark_has_the_time_and_picture_of_its_waypoint_unless_it_says_its_own() -> None:
+    tap = Landmark(label="tap", confidence=Confidence.LIKELY)
+    sign = Landmark(label="exit sign", picture="P2.jpg")
+    hose = Landmark(label="fire hose", stamp_s=3.0)
+    waypoint = Waypoint(
+        name="dock", pose=HERE, functional_landmarks=(tap,), stamp_s=9.0, picture="P1.jpg"
+    )
+
+    assert (waypoint.dated(tap).stamp_s, waypoint.dated(tap).picture) == (9.0, "P1.jpg")
+    assert (waypoint.dated(sign).stamp_s, waypoint.dated(sign).picture) == (9.0, "P2.jpg")
+    assert waypoint.dated(hose) == hose
+
+
+def test_an_empty_room_or_picture_is_none() -> None:
+    waypoint = Waypoint(name="dock", pose=HERE, room_id=" ", picture="\n")
+
+    assert (waypoint.room_id, waypoint.picture) == (None, None)
+    assert Landmark(label="tap", picture="").picture is None
 
 
 def test_a_place_is_found_by_its_name_whatever_its_case_and_spaces() -> None:

@@ -7,7 +7,7 @@ from mcp_types import CallToolResult
 from fakes import FakeRobot, two_rooms
 from mapspeak.geometry import Pose
 from mapspeak.navigation.drive import DriveReport
-from mapspeak.robot import GoalState
+from mapspeak.robot import GoalState, StampedPose
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.session import Session
 from served import MODES, connect, report_of, text_of
@@ -55,15 +55,17 @@ async def test_a_remembered_name_is_a_goal(tmp_path: Path) -> None:
     assert answer["robot"] == {"x": 1.5, "y": 1.4, "yaw_deg": 0.0}
 
 
-async def test_a_thing_that_remembered_places_speak_of_is_answered_with_those_places(
+async def test_what_is_like_the_words_only_in_meaning_is_named_and_not_driven_to(
     tmp_path: Path,
 ) -> None:
     record = {"name": "west", "description": "by the sink", "safety_landmarks": ["extinguisher"]}
-    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
         await client.call_tool("write_semantic_data", record)
-        result = await client.call_tool("navigate_to", {"place": "extinguisher"})
+        result = await client.call_tool("navigate_to", {"place": "extinguisher for paper"})
     assert result.is_error
-    assert "W1 (west)" in text_of(result)
+    assert "use T1" in text_of(result)
+    assert robot.goals == {}
 
 
 @pytest.mark.parametrize(
@@ -188,3 +190,31 @@ async def test_a_drive_that_somebody_else_has_begun_is_told(tmp_path: Path) -> N
         answer = await client.call_tool("wait_for_goal", {"wait_s": 0})
     assert answer.is_error
     assert "somebody else has sent: driving" in text_of(answer)
+
+
+async def test_a_robot_that_another_client_drives_on_does_not_stand_at_the_goal(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        arrived = report_of(await client.call_tool("navigate_to", {"x": 2.0, "y": 1.4}))
+        robot.foreign_goals = (GoalState.DRIVING,)
+        later = report_of(await client.call_tool("wait_for_goal", {}))
+    assert arrived["next_step"] == "The robot stands at the goal."
+    assert later["state"] == "arrived"
+    assert "Another client's goal drives the robot now" in later["next_step"]
+
+
+async def test_a_pose_that_is_old_by_robot_time_is_doubted(tmp_path: Path) -> None:
+    class Forgetful(FakeRobot):
+        async def fetch_pose(self) -> StampedPose:
+            return StampedPose(self.pose, 0.0)
+
+    robot = Forgetful(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        fresh = report_of(await client.call_tool("get_robot_pose", {}))
+        await robot.sleep(12.0)
+        old = report_of(await client.call_tool("get_robot_pose", {}))
+    assert fresh["doubt"] == ""
+    assert old["age_s"] == 12.0
+    assert "Robot time has gone on for 12 s since this estimate" in old["doubt"]

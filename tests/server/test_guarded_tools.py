@@ -2,6 +2,8 @@
 
 import random
 from collections.abc import Callable
+from dataclasses import replace
+from datetime import time
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +15,21 @@ from drawing import grid_from_text
 from fakes import FakeRobot
 from guarding import audit_of, make_guard, rectangle
 from mapspeak.geometry import Pose
-from mapspeak.navigation.safety import Approval, AreaRule, Guard, GuardedRobot, Kind, Policy
+from mapspeak.navigation.safety import (
+    Approval,
+    AreaRule,
+    Guard,
+    GuardedRobot,
+    Hours,
+    Kind,
+    Policy,
+    load_policy,
+)
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server.tools import build_toolsets
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.session import Session
-from served import MODES, connect, report_of, text_of
+from served import MODES, connect, pictures_of, report_of, text_of
 
 pytestmark = pytest.mark.anyio
 
@@ -202,11 +213,53 @@ async def test_a_goal_in_a_closed_area_is_refused_by_name_with_another_pose(
 
 
 async def test_what_is_closed_is_told_with_the_map(tmp_path: Path) -> None:
-    pit = rectangle("pit", (2.5, 0.2), (3.5, 1.3))
-    guard = make_guard(tmp_path, Policy(areas=(pit,)))
+    pit = replace(rectangle("pit", (2.5, 0.2), (3.5, 1.3)), reason="deep | dark")
+    lab = replace(rectangle("lab", (6.0, 0.5), (7.0, 1.0)), hours=Hours(ends=time(14)))
+    dock = replace(rectangle("dock", (6.0, 0.5), (7.0, 1.0)), hours=Hours(begins=time(18)))
+    guard = make_guard(tmp_path, Policy(areas=(pit, lab, dock)))
+    async with connect(FakeRobot(HALL, pose=START), tmp_path, guard=guard) as client:
+        answer = await client.call_tool("look_at_map", {"layers": ["doors"]})
+        again = await client.call_tool("look_at_map", {"layers": ["doors"]})
+        zoomed = text_of(await client.call_tool("look_at_map", {"around": "9, 1", "radius_m": 3}))
+    assert (
+        "## Closed to the robot, hatched in the picture\n"
+        "name | until | x | y | reason\n"
+        "pit | always | 2.5 to 3.5 | 0.2 to 1.3 | deep / dark\n"
+        "lab | 14:00 | 6.0 to 7.0 | 0.5 to 1.0 | -\n"
+    ) in text_of(answer)
+    assert "dock" not in text_of(answer)
+    assert pictures_of(answer)[0].data == pictures_of(again)[0].data
+    assert "\nlab | 14:00" in zoomed
+    assert "\npit |" not in zoomed
+
+
+async def test_very_many_closed_areas_leave_the_map_readable(tmp_path: Path) -> None:
+    many = tuple(
+        replace(rectangle(f"{n} {'x' * 75}", (2.5, 0.2), (3.5, 1.3)), reason="y" * 200)
+        for n in range(500)
+    )
+    guard = make_guard(tmp_path, Policy(areas=many))
     async with connect(FakeRobot(HALL, pose=START), tmp_path, guard=guard) as client:
         answer = text_of(await client.call_tool("look_at_map", {}))
-    assert "Closed to the robot: keep-out area 'pit' (x 2.5 to 3.5, y 0.2 to 1.3)." in answer
+    assert "(showing 20 of 500)" in answer
+    assert len(answer) < 20_000
+
+
+async def test_a_mask_of_the_policy_file_is_kept_out_of_and_shown(tmp_path: Path) -> None:
+    (tmp_path / "mask.pgm").write_bytes(b"P5\n4 3\n255\n" + bytes([0] * 4 + [254] * 8))
+    (tmp_path / "mask.yaml").write_text(
+        "image: mask.pgm\nresolution: 0.25\norigin: [2.75, 0.5, 0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.25\nmode: scale\n"
+    )
+    (tmp_path / "policy.yaml").write_text("keep_out: [{name: machines, mask: mask.yaml}]\n")
+    guard = make_guard(tmp_path, load_policy(tmp_path / "policy.yaml"))
+    robot = FakeRobot(HALL, pose=START)
+    async with connect(robot, tmp_path, guard=guard) as client:
+        drive = await client.call_tool("navigate_to", {"x": 3.0, "y": 1.1})
+        seen = text_of(await client.call_tool("look_at_map", {}))
+    assert "lies in the keep-out area 'machines'" in text_of(drive)
+    assert not robot.goals
+    assert "machines | always | 2.7 to 3.8 | 0.9 to 1.3 | -" in seen
 
 
 async def test_a_rule_about_a_region_that_is_not_there_is_told(tmp_path: Path) -> None:

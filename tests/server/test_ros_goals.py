@@ -121,9 +121,12 @@ async def test_a_rejected_goal_is_told_as_rejected(tmp_path: Path) -> None:
 
         tasks.start_soon(ask)
         await scripted.until(lambda: scripted.goals)
-        await scripted.end_goal(0, is_result=False)
+        visitor, sent = scripted.goals[0]
+        refused = {"status": 0, "result": False, "values": "out of the map"}
+        end = {"op": "action_result", "action": ACTION, "id": sent["id"]}
+        await visitor.send({**end, **refused})
     assert "rejected" in said[0]
-    assert "It was not taken" in said[0]
+    assert "out of the map. It was not taken" in said[0]
 
 
 async def test_a_result_can_be_fetched_long_after_the_end(tmp_path: Path) -> None:
@@ -204,7 +207,7 @@ async def test_every_goal_of_an_action_can_be_cancelled_whoever_sent_it(tmp_path
         scripted.services[service] = lambda _: {"return_code": 1}
         refused = await caller.refuse("ros_cancel_goal", action=ACTION)
     assert f"{OTHERS.hex()}: running" in listed
-    assert "1 goals are being cancelled" in text
+    assert "1 goal being cancelled" in text
     assert calls[0]["args"] == {}
     assert "it refuses" in refused
 
@@ -219,7 +222,7 @@ async def test_a_held_robot_lets_goals_be_cancelled_by_their_service(tmp_path: P
     async with on_script(scripted, tmp_path, guard=guard) as caller:
         by_tool = await caller.ask("ros_cancel_goal", action=ACTION)
         by_service = await caller.ask("ros_call", service=service)
-    assert "0 goals are being cancelled" in by_tool
+    assert "0 goals being cancelled" in by_tool
     assert "answered" in by_service
     stops = [line.said for line in audit_of(tmp_path) if line.event == "stop"]
     assert len([said for said in stops if service in said]) == 2
@@ -316,7 +319,7 @@ def status_of(goal_id: str, status: int, text: str = "") -> dict[str, Any]:
         (None, ActionState.LOST, "does not know the goal any more"),
         (3, ActionState.SUCCEEDED, "Its result has not come"),
         (4, ActionState.ABORTED, "stuck. Its result has not come"),
-        (5, ActionState.REJECTED, "stuck"),
+        (5, ActionState.REJECTED, "stuck."),
         (8, ActionState.CANCELLED, "stuck"),
     ],
 )

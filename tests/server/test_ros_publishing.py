@@ -1,5 +1,7 @@
 """The ROS tools that change something: publishing, calling, setting; checked before it is sent."""
 
+from collections.abc import AsyncGenerator
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -174,13 +176,46 @@ async def test_a_service_that_fails_is_an_error_with_its_words(tmp_path: Path) -
     scripted = ScriptedRobot()
     scripted.services["/rosapi/service_type"] = lambda _: {"type": "std_srvs/srv/SetBool"}
     async with on_script(scripted, tmp_path) as caller:
-        gone = await caller.refuse("ros_call", service="/lamp", arguments={"data": True})
+        gone = await caller.refuse(
+            "ros_call", service="/lamp", arguments={"data": True}, timeout_s=0.1
+        )
         wrong = await caller.refuse("ros_call", service="/lamp", arguments={"data": 1})
         scripted.services["/lamp"] = lambda _: {"success": True, "message": "on"}
         answer = await caller.ask("ros_call", service="/lamp", arguments={"data": True})
     assert "/lamp does not exist" in gone
     assert "data wants true or false (bool), not 1" in wrong
     assert 'success: true\nmessage: "on"' in answer
+
+
+@both
+async def test_the_services_of_rosapi_itself_are_called(dialect: Dialect, tmp_path: Path) -> None:
+    async with on_our_server(dialect, tmp_path) as (_, caller):
+        answer = await caller.ask(
+            "ros_call", service="/rosapi/topic_type", arguments={"topic": "/map"}
+        )
+        details = await caller.ask("ros_service", service="/rosapi/message_details")
+        parameter = await caller.ask("ros_service", service="/rosapi/get_param")
+    assert dialect.type_name("nav_msgs/OccupancyGrid") in answer
+    assert "fieldnames: string[]" in details
+    assert ("  default: string" in parameter) is (dialect is Dialect.ROS1)
+
+
+async def test_a_service_that_rosbridge_finds_later_than_rosapi_is_called_all_the_same(
+    tmp_path: Path,
+) -> None:
+    scripted = ScriptedRobot()
+    looks = list[object]()
+
+    def tell(call: object) -> dict[str, str]:
+        looks.append(call)
+        if len(looks) == 3:
+            scripted.services["/lamp"] = lambda _: {"success": True, "message": "on"}
+        return {"type": "std_srvs/srv/SetBool"}
+
+    scripted.services["/rosapi/service_type"] = tell
+    async with on_script(scripted, tmp_path) as caller:
+        answer = await caller.ask("ros_call", service="/lamp", arguments={"data": True})
+    assert "success: true" in answer
 
 
 async def test_a_service_that_never_answers_holds_up_nobody(tmp_path: Path) -> None:
@@ -256,14 +291,65 @@ async def test_a_speed_above_the_operators_limit_is_refused_and_the_robot_left_s
     assert all(each == STAND for each in published(scripted))
 
 
+@both
+@pytest.mark.parametrize(
+    ("node", "parameter", "value"),
+    [
+        ("/slam_toolbox", "base_frame", "base_lnk"),
+        ("/robot_base", "use_sim_time", False),
+        ("/slam_toolbox", "scan_topic", "/nothing"),
+        ("/robot_base", "robot_radius", 0.1),
+    ],
+)
+async def test_parameters_with_which_a_robot_loses_itself_are_denied(
+    dialect: Dialect, tmp_path: Path, node: str, parameter: str, value: object
+) -> None:
+    async with guarded_server(dialect, tmp_path, Policy()) as caller:
+        text = await caller.refuse("ros_set_parameter", node=node, parameter=parameter, value=value)
+    assert "the policy denies *" in text
+
+
+async def test_what_may_be_set_may_be_deleted(tmp_path: Path) -> None:
+    async with guarded_server(Dialect.ROS1, tmp_path, Policy()) as caller:
+        await caller.ask("ros_set_parameter", node="/", parameter="colour", value="red")
+        text = await caller.ask("ros_set_parameter", node="/", parameter="colour", value=None)
+        await caller.ask("ros_set_parameter", node="/", parameter="lamp", value="red")
+        denied = await caller.refuse(
+            "ros_set_parameter", node="/", parameter="use_sim_time", value=None
+        )
+    assert text == "colour of / is deleted."
+    assert "may not delete /:use_sim_time: the policy denies *use_sim_time" in denied
+
+
+async def test_what_is_denied_is_said_before_anything_else_is_wrong_with_it(
+    tmp_path: Path,
+) -> None:
+    scripted = ScriptedRobot()
+    scripted.services["/rosapi/service_type"] = lambda _: {"type": "odd_msgs/srv/Odd"}
+    async with on_script(scripted, tmp_path, guard=make_guard(tmp_path)) as caller:
+        called = await caller.refuse("ros_call", service="/base/shutdown")
+        published = await caller.refuse("ros_publish", topic="/map", message={"odd": 1})
+        sent = await caller.refuse("ros_send_goal", action="/navigate_to_pose", goal={"x": 1})
+    assert "the policy denies *shutdown*" in called
+    assert "the policy denies */map" in published
+    assert "the policy denies *navigate_to_pose*" in sent
+
+
 async def test_parameters_are_read_under_a_policy_that_lets_nothing_be_called(
     tmp_path: Path,
 ) -> None:
-    guard = make_guard(tmp_path, Policy(is_read_only=True))
-    async with (
-        open_rosbridge_server(SteppedRobot(two_rooms()), dialect=Dialect.ROS2) as server,
-        open_client(RobotAddress(url=server.url)) as client,
-        served(SteppedRobot(two_rooms()), client, tmp_path, guard=guard) as caller,
-    ):
+    async with guarded_server(Dialect.ROS2, tmp_path, Policy(is_read_only=True)) as caller:
         text = await caller.ask("ros_parameters", node="/robot_base")
     assert "robot_radius: 0.2" in text
+
+
+@asynccontextmanager
+async def guarded_server(dialect: Dialect, folder: Path, policy: Policy) -> AsyncGenerator[Caller]:
+    """Gives what calls the tools of a robot behind our own server, under a policy."""
+    guard = make_guard(folder, policy)
+    async with (
+        open_rosbridge_server(SteppedRobot(two_rooms()), dialect=dialect) as server,
+        open_client(RobotAddress(url=server.url)) as client,
+        served(SteppedRobot(two_rooms()), client, folder, guard=guard) as caller,
+    ):
+        yield caller

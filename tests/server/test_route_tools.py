@@ -52,7 +52,7 @@ async def test_the_answer_tells_what_the_nearest_choice_would_have_cost(tmp_path
         answer = report_of(
             await client.call_tool("follow_route", {"stops": ["extinguisher", "exit"]})
         )
-    assert answer["done"] == ["extinguisher (W2)", "exit (W3)"]
+    assert answer["done"] == ["extinguisher (T2)", "exit"]
     assert answer["greedy_m"] > answer["total_m"] + 1.0
 
 
@@ -207,12 +207,12 @@ async def test_a_thing_found_by_a_phrase_drives_under_its_own_id(tmp_path: Path)
 
 
 async def test_an_ambiguous_phrase_is_answered_with_the_candidates(tmp_path: Path) -> None:
-    seen = {"label": "chair", "bearing_deg": 0, "range_m": 0.5}
+    seen = {"label": "chair", "bearing_deg": 90, "range_m": 0.5}
     async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=TOOLSETS) as client:
         for name, x in (("west", 1.5), ("east", 5.0)):
             record = {"name": name, "description": "", "functional_landmarks": [seen]}
             await client.call_tool("write_semantic_data", {**record, "x": x, "y": 1.4})
         result = await client.call_tool("navigate_to", {"place": "next to the chair"})
     assert result.is_error
-    assert "seen from W1" in text_of(result)
-    assert "seen from W2" in text_of(result)
+    assert "T1 at " in text_of(result)
+    assert "T2 at " in text_of(result)

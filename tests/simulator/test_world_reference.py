@@ -33,3 +33,8 @@ def test_every_world_that_comes_with_mapspeak_is_named() -> None:
     named = line_that_starts_with("Give its path")
 
     assert all(f"`{name}`" in named for name in world_names())
+
+
+def test_the_table_says_of_each_world_what_its_file_says() -> None:
+    for name in world_names():
+        assert line_that_starts_with(f"| `{name}` |") == f"| `{name}` | {load_world(name).title} |"

@@ -7,8 +7,10 @@ import click
 from mapspeak import __version__
 from mapspeak.cli.approving import approve
 from mapspeak.cli.demonstrating import demo
+from mapspeak.cli.evaluating import evaluate
 from mapspeak.cli.examining import doctor
 from mapspeak.cli.mapping import map_command
+from mapspeak.cli.memory import memory
 from mapspeak.cli.replaying import replay
 from mapspeak.cli.serving import serve
 from mapspeak.cli.simulating import simulate
@@ -30,7 +32,20 @@ def cli(context: click.Context) -> None:
         context.invoke(serve)
 
 
-for command in (serve, demo, doctor, simulate, map_command, stop, release, approve, replay):
+COMMANDS = (
+    serve,
+    demo,
+    evaluate,
+    doctor,
+    simulate,
+    map_command,
+    memory,
+    stop,
+    release,
+    approve,
+    replay,
+)
+for command in COMMANDS:
     cli.add_command(command)
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from mapspeak.cli.options import DEFAULT_WORLD
 from mapspeak.errors import ConfigError
+from mapspeak.geometry import Pose
 
 if TYPE_CHECKING:
     from mapspeak.links.dds import DdsNetwork
@@ -36,6 +37,9 @@ class RobotChoice:
         clock: Of the simulated robot: real or virtual.
         has_detector: The simulated robot has one.
         state_log: Where the simulator's truth goes.
+        final_map: Where the simulated robot's map goes in the end.
+        known_map: A finished map in which the simulated robot finds its place.
+        start: Where the simulated robot stands at first, in the world's own frame.
     """
 
     robot: str
@@ -45,6 +49,9 @@ class RobotChoice:
     clock: str = "real"
     has_detector: bool = False
     state_log: Path | None = None
+    final_map: Path | None = None
+    known_map: Path | None = None
+    start: Pose | None = None
 
 
 @asynccontextmanager
@@ -165,9 +172,11 @@ def read_network(domain: str, environment: Mapping[str, str]) -> "DdsNetwork":
 
 
 def _refuse_simulators_options(choice: RobotChoice) -> None:
-    if choice.clock == "virtual" or choice.has_detector or choice.state_log is not None:
+    files = (choice.state_log, choice.final_map, choice.known_map, choice.start)
+    if choice.clock == "virtual" or choice.has_detector or any(each is not None for each in files):
         raise ConfigError(
-            "--clock virtual, --detector and --state-log are for the simulated robot.",
+            "--clock virtual, --detector, --state-log, --final-map, --map and --start are for the "
+            "simulated robot.",
             hint="Leave them away, or use --robot sim.",
         )
 
@@ -176,13 +185,19 @@ def _refuse_simulators_options(choice: RobotChoice) -> None:
 async def _open_simulated(choice: RobotChoice, world: str) -> AsyncGenerator["Robot"]:
     from mapspeak.links.simulated import Clock, open_simulated_robot  # noqa: PLC0415
     from mapspeak.simulator import Simulation, StateLog, load_world  # noqa: PLC0415
+    from mapspeak.spatial.mapfiles import MapMode, load_map, write_map  # noqa: PLC0415
 
     if choice.robot_file is not None or choice.ca_file is not None:
         raise ConfigError(
             "--robot-file and --ca-file are for a robot that speaks ROS.",
             hint="Leave them away, or name the robot with --robot ws://HOST:9090 or dds.",
         )
-    simulation = Simulation(load_world(world), seed=choice.seed)
+    simulation = Simulation(
+        load_world(world),
+        seed=choice.seed,
+        known=load_map(choice.known_map).grid if choice.known_map else None,
+        start=choice.start,
+    )
     log = StateLog(simulation, choice.state_log) if choice.state_log else None
     try:
         async with open_simulated_robot(
@@ -195,6 +210,8 @@ async def _open_simulated(choice: RobotChoice, world: str) -> AsyncGenerator["Ro
     finally:
         if log is not None:
             log.close()
+        if choice.final_map is not None:
+            write_map(simulation.map(), choice.final_map, mode=MapMode.RAW)
 
 
 def find_connection(robot: "Robot", choice: RobotChoice) -> "RosConnection | None":

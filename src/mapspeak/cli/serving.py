@@ -19,9 +19,10 @@ from mapspeak.cli.guarding import GUARD_OPTIONS, GuardChoice, build_guard, data_
 from mapspeak.cli.options import DEFAULT_WORLD, FILE, ROBOT_HELP, ROBOT_OPTIONS, add_options
 from mapspeak.cli.robots import RobotChoice, find_connection, open_robot
 from mapspeak.errors import ConfigError
+from mapspeak.geometry import Pose
 
 if TYPE_CHECKING:
-    from mapspeak.server import MapspeakServer
+    from mapspeak.server import CallLog, MapspeakServer, Representation
     from mapspeak.session import Session
 
 __all__ = ["serve", "usual_semantic_map"]
@@ -36,10 +37,12 @@ class ServeOptions:
 
     robots: Mapping[str, "RobotStart"]
     http: str | None
-    toolsets: tuple[str, ...]
+    toolsets: tuple[str, ...] | None
     tools: tuple[str, ...]
     is_read_only: bool
     lease_s: float
+    representation: "Representation | None"
+    call_log: Path | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,6 +76,33 @@ def _split_names(
     if value is None:
         return None
     return tuple(name.strip() for name in value.split(",") if name.strip())
+
+
+def _read_pose(
+    _context: click.Context, _parameter: click.Parameter, value: str | None
+) -> Pose | None:
+    if value is None:
+        return None
+    try:
+        x, y, yaw_deg = (float(part) for part in value.split(","))
+        pose = Pose(x, y, math.radians(yaw_deg))
+    except ValueError:
+        raise click.BadParameter("write three numbers, such as 2.5,1,90") from None
+    if not pose.is_finite():
+        raise click.BadParameter("the numbers have to be finite")
+    return pose
+
+
+def _read_representation(
+    _context: click.Context, _parameter: click.Parameter, value: str | None
+) -> "Representation | None":
+    if value is None:
+        return None
+    from mapspeak.server import Representation  # noqa: PLC0415 - heavy; help must be quick
+
+    if value not in set(Representation):
+        raise click.BadParameter(f"choose from {', '.join(Representation)}")
+    return Representation(value)
 
 
 @click.command()
@@ -124,10 +154,37 @@ def _split_names(
     "--state-log", type=FILE, help="Write the simulator's truth here, as JSON lines, for scoring."
 )
 @click.option(
+    "--final-map",
+    type=FILE,
+    help="Write the simulated robot's map here in the end, as map_server's .yaml and .pgm.",
+)
+@click.option(
+    "--map",
+    "known_map",
+    type=FILE,
+    help="The finished map (map_server's .yaml) in which the simulated robot finds its place.",
+)
+@click.option(
+    "--start",
+    callback=_read_pose,
+    metavar="X,Y,YAW_DEG",
+    help="Where the simulated robot stands at first, as the world file counts.",
+)
+@click.option(
     "--lease-s",
     default=60.0,
     show_default=True,
     help="Over HTTP, a driving robot is stopped when no client was heard for so long.",
+)
+@click.option(
+    "--representation",
+    callback=_read_representation,
+    metavar="NAME",
+    help="For evaluations, how look_at_map shows the map: picture-table (default), table, "
+    "picture-rooms, picture-numbers, paper-picture or raw-grid.",
+)
+@click.option(
+    "--call-log", type=FILE, help="Note every call and answer here, as JSON lines, with pictures."
 )
 @add_options(GUARD_OPTIONS)
 def serve(
@@ -143,14 +200,17 @@ def serve(
     is_read_only: bool,  # noqa: FBT001 - a flag
     semantic_maps: tuple[str, ...],
     state_log: Path | None,
+    final_map: Path | None,
+    known_map: Path | None,
+    start: Pose | None,
     lease_s: float,
+    representation: "Representation | None",
+    call_log: Path | None,
     policies: tuple[str, ...],
     audit: Path | None,
     control: Path | None,
 ) -> None:
     """Serves a robot, or several, to MCP clients, over stdio or streaming HTTP."""
-    from mapspeak.server import DEFAULT_TOOLSETS  # noqa: PLC0415 - heavy; help must be quick
-
     starts = _read_starts(
         RobotOptions(robots, robot_files, semantic_maps, policies),
         RobotChoice(
@@ -160,16 +220,21 @@ def serve(
             clock=clock,
             has_detector=has_detector,
             state_log=state_log,
+            final_map=final_map,
+            known_map=known_map,
+            start=start,
         ),
         GuardChoice(audit=audit, control=control),
     )
     options = ServeOptions(
         robots=starts,
         http=http,
-        toolsets=DEFAULT_TOOLSETS if toolsets is None else toolsets,
+        toolsets=toolsets,
         tools=tools or (),
         is_read_only=is_read_only,
         lease_s=lease_s,
+        representation=representation,
+        call_log=call_log,
     )
     anyio.run(_serve, options)
 
@@ -191,8 +256,11 @@ def _read_starts(
     files = split_files(given.robot_files, named, "--robot-file")
     maps = split_files(given.semantic_maps, named, "--semantic-map")
     limits = split_files(given.policies, named, "--policy")
-    if len(named) > 1 and choice.state_log is not None:
-        raise ConfigError("--state-log is for one robot.", hint="Serve one, or leave it away.")
+    if len(named) > 1 and _is_for_one(choice):
+        raise ConfigError(
+            "--state-log, --final-map, --map and --start are for one robot.",
+            hint="Serve one, or leave them away.",
+        )
     if len(named) > 1 and file_for("", maps) is not None:
         raise ConfigError(
             "--semantic-map needs a robot's name: places belong to one map.",
@@ -208,15 +276,23 @@ def _read_starts(
     }
 
 
+def _is_for_one(choice: RobotChoice) -> bool:
+    files = (choice.state_log, choice.final_map, choice.known_map, choice.start)
+    return any(each is not None for each in files)
+
+
 async def _serve(options: ServeOptions) -> None:
-    from mapspeak.server import FleetServer, serve_http, serve_stdio  # noqa: PLC0415 - heavy
+    from mapspeak.server import CallLog, FleetServer, serve_http, serve_stdio  # noqa: PLC0415
 
     async with AsyncExitStack() as links:
         sessions = {
             name: await _open_session(name, start, options, links)
             for name, start in options.robots.items()
         }
-        servers = {name: _build_server(session, options) for name, session in sessions.items()}
+        call_log = None if options.call_log is None else CallLog(options.call_log)
+        servers = {
+            name: _build_server(session, options, call_log) for name, session in sessions.items()
+        }
         server = next(iter(servers.values())) if list(servers) == [""] else FleetServer(servers)
         # What was loaded stays for good: no later collection has to go through it, which would
         # hold up a stop by a tenth of a second.
@@ -254,16 +330,25 @@ async def _open_session(
     return Session(robot, memory, lease_s=lease_s, guard=guard, ros=ros)
 
 
-def _build_server(session: "Session", options: ServeOptions) -> "MapspeakServer":
-    from mapspeak.server import build_server  # noqa: PLC0415 - heavy; help must be quick
+def _build_server(
+    session: "Session", options: ServeOptions, call_log: "CallLog | None"
+) -> "MapspeakServer":
+    from mapspeak.server import (  # noqa: PLC0415 - heavy; help must be quick
+        DEFAULT_TOOLSETS,
+        Representation,
+        build_server,
+    )
     from mapspeak.server.tools import require_ros  # noqa: PLC0415
 
-    require_ros(session, toolsets=options.toolsets, tools=options.tools)
+    toolsets = DEFAULT_TOOLSETS if options.toolsets is None else options.toolsets
+    require_ros(session, toolsets=toolsets, tools=options.tools)
     return build_server(
         session,
-        toolsets=options.toolsets,
+        toolsets=toolsets,
         tools=options.tools,
         is_read_only=options.is_read_only,
+        representation=options.representation or Representation.PICTURE_TABLE,
+        call_log=call_log,
     )
 
 

@@ -12,7 +12,7 @@ from mapspeak.cli.guarding import CONTROL_OPTION, control_folder, wall_clock
 if TYPE_CHECKING:
     from mapspeak.navigation.safety import Hold
 
-__all__ = ["release", "stop"]
+__all__ = ["hold_robots", "release", "stop"]
 
 POLL_S = 0.01
 
@@ -31,9 +31,7 @@ def stop(control: Path | None, reason: str, wait_s: float) -> None:
     from mapspeak.navigation.safety import Hold  # noqa: PLC0415 - heavy; help must be quick
 
     hold = Hold(control_folder(control))
-    hold.put(" ".join(reason.split()), at=wall_clock())
-    _wait_for_answers(hold, wait_s=wait_s)
-    stopped, unanswered = hold.answers(), hold.unanswered()
+    stopped, unanswered = hold_robots(hold, reason=" ".join(reason.split()), wait_s=wait_s)
     if stopped:
         click.echo(f"Stopped and held: {', '.join(stopped)}. `mapspeak release` lets them go on.")
     if stopped and not unanswered:
@@ -56,6 +54,24 @@ def release(control: Path | None) -> None:
 
     was_held = Hold(control_folder(control)).lift()
     click.echo("Released." if was_held else "Nothing was held.")
+
+
+def hold_robots(
+    hold: "Hold", *, reason: str, wait_s: float
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Holds every robot of a folder, and gives those that stand and those that did not answer.
+
+    Args:
+        hold: Of that folder.
+        reason: For the log.
+        wait_s: How long to wait for answers, in wall time.
+
+    Raises:
+        ConfigError: The hold cannot be written.
+    """
+    hold.put(reason, at=wall_clock())
+    _wait_for_answers(hold, wait_s=wait_s)
+    return hold.answers(), hold.unanswered()
 
 
 def _wait_for_answers(hold: "Hold", *, wait_s: float) -> None:

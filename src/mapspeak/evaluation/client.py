@@ -3,14 +3,18 @@
 import base64
 import time
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 from mcp.client import Client
-from mcp_types import CallToolResult, ImageContent, TextContent
+from mcp_types import CallToolResult, ImageContent, TextContent, Tool
 
-from mapspeak.errors import LinkError
+from mapspeak.errors import LinkError, MapspeakError
 
-__all__ = ["Answer", "CallRecord", "Picture", "ToolClient"]
+__all__ = ["Answer", "CallRecord", "OutOfBudgetError", "Picture", "ToolClient", "Witness"]
+
+
+class OutOfBudgetError(MapspeakError):
+    """A call would have gone beyond what was allowed; whoever gave the limits catches it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,22 +71,60 @@ class CallRecord:
     wall_s: float
 
 
+class Witness(Protocol):
+    """Whoever hears every call, and may refuse one."""
+
+    def hear_call(self, tool: str, arguments: dict[str, Any]) -> None:
+        """Hears of a call before it is made.
+
+        Raises:
+            OutOfBudgetError: It must not be made.
+        """
+        ...
+
+    def hear_answer(self, tool: str, arguments: dict[str, Any], answer: Answer) -> None:
+        """Hears what was answered."""
+        ...
+
+    def hear_words(
+        self,
+        role: str,
+        text: str,
+        *,
+        n_input_tokens: int | None = None,
+        n_output_tokens: int | None = None,
+        n_picture_tokens: int | None = None,
+    ) -> None:
+        """Hears what was said besides calls: role is "system", "user" or "agent"."""
+        ...
+
+
 @dataclass(slots=True)
 class ToolClient:
     """Calls tools over MCP and remembers every call.
 
     Attributes:
-        client: The connected MCP client.
+        client: The connected MCP client; None where the agent reaches the server by itself.
         calls: Every call so far.
+        witness: Hears them too; None where nobody does.
     """
 
-    client: Client
+    client: Client | None
     calls: list[CallRecord] = field(default_factory=list)
+    witness: Witness | None = None
 
-    async def call(self, tool: str, **arguments: object) -> Answer:
-        """Calls a tool and gives its answer, also when that is an error."""
+    async def call(self, tool: str, /, **arguments: object) -> Answer:
+        """Calls a tool and gives its answer, also when that is an error.
+
+        Raises:
+            LinkError: There is no client.
+            OutOfBudgetError: The witness does not let it be made.
+        """
+        client = self._connected()
+        if self.witness is not None:
+            self.witness.hear_call(tool, arguments)
         begun_s = time.perf_counter()
-        result = await self.client.call_tool(tool, arguments)
+        result = await client.call_tool(tool, arguments)
         answer = _read(result)
         self.calls.append(
             CallRecord(
@@ -93,9 +135,24 @@ class ToolClient:
                 wall_s=time.perf_counter() - begun_s,
             )
         )
+        if self.witness is not None:
+            self.witness.hear_answer(tool, arguments, answer)
         return answer
 
-    async def demand(self, tool: str, **arguments: object) -> Answer:
+    async def list_tools(self) -> list[Tool]:
+        """Gives the tools as the server describes them to any model.
+
+        Raises:
+            LinkError: There is no client.
+        """
+        return (await self._connected().list_tools()).tools
+
+    def _connected(self) -> Client:
+        if self.client is None:
+            raise LinkError("No client is connected.", hint="Call through the agent's own program.")
+        return self.client
+
+    async def demand(self, tool: str, /, **arguments: object) -> Answer:
         """Calls a tool that has to succeed.
 
         Raises:

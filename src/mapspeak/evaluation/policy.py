@@ -14,7 +14,7 @@ from mapspeak.evaluation.survey import find_viewpoint
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import OccupancyGrid
 
-__all__ = ["PolicyResult", "ScriptedPolicy", "Stage", "Step"]
+__all__ = ["PolicyResult", "ScriptedPolicy", "Stage", "Step", "is_room"]
 
 MOST_GOALS = 80
 WAIT_S = 20.0
@@ -146,7 +146,7 @@ class ScriptedPolicy:
     async def go_to_smallest_room(self) -> str | None:
         """Task 2: the smallest row of the table of rooms that is a room and no nook."""
         view = await self._look(Stage.SMALLEST_ROOM)
-        rooms = [row for row in view.rows("Rooms") if _is_room(row, view.rows("Doors"))]
+        rooms = [row for row in view.rows("Rooms") if is_room(row, view.rows("Doors"))]
         if not rooms:
             return None
         smallest = min(rooms, key=lambda row: row.number("floor m2"))
@@ -241,7 +241,7 @@ def _records(answer: Answer) -> list[dict[str, Any]]:
     return list(answer.report["waypoints"])
 
 
-def _is_room(row: Row, doors: tuple[Row, ...]) -> bool:
+def is_room(row: Row, doors: tuple[Row, ...]) -> bool:
     """True for a room; what furniture cuts off is tiny, or open to one neighbour several times."""
     names = re.findall(r"D\d+", row.cells["doors"])
     ways_in = [

@@ -4,14 +4,25 @@ An atlas is made from a map, a pose and the memory. Ids come from the atlas befo
 stays R3 while the map grows.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.navigation.doorways import find_crossing
+from mapspeak.navigation.judging import Judge
+from mapspeak.navigation.recollection import (
+    Recollection,
+    Recollector,
+    RememberedPlace,
+    RememberedThing,
+    number_places,
+)
 from mapspeak.navigation.revision import MapRevision
-from mapspeak.semantic import SemanticMap, Waypoint
+from mapspeak.semantic import SemanticMap
+from mapspeak.semantic.consistency import check_memory
+from mapspeak.semantic.things import find_approach, find_fronts
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import (
     FrontierReport,
@@ -22,20 +33,10 @@ from mapspeak.spatial.frontiers import (
 from mapspeak.spatial.paths import DistanceField
 from mapspeak.spatial.rooms import Door, RoomMap
 
-__all__ = ["Atlas", "RememberedPlace", "number_places"]
+__all__ = ["Atlas", "RememberedPlace", "RememberedThing", "number_places"]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RememberedPlace:
-    """A waypoint of the semantic map under its id.
-
-    Attributes:
-        id: "W1" for the first in the file.
-        waypoint: The record.
-    """
-
-    id: str
-    waypoint: Waypoint
+STEP_M = 0.2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,12 +48,29 @@ class Reach:
         crossings: Where it passes each door, by the door's id; None where it does not.
         standing: Where it would stand in each region, by the region's id.
         frontiers: By the places from which it has looked already.
+        reminders: What was found of remembered things; of one state of the memory at a time.
     """
 
     start: Point
     crossings: dict[str, Point | None] = field(default_factory=dict)
     standing: dict[str, Point | None] = field(default_factory=dict)
     frontiers: dict[tuple[Point, ...], FrontierReport] = field(default_factory=dict)
+    reminders: dict[Recollection, "Reminders"] = field(default_factory=dict)
+
+
+@dataclass(slots=True, eq=False)
+class Reminders:
+    """What was found of remembered things on one map, for one state of the memory.
+
+    Attributes:
+        approaches: Where the robot would stand before a thing.
+        rooms: The rooms before a thing, by id.
+        judge: What may be trusted; None until somebody asks.
+    """
+
+    approaches: dict[RememberedThing, Pose | None] = field(default_factory=dict)
+    rooms: dict[RememberedThing, tuple[str, ...]] = field(default_factory=dict)
+    judge: Judge | None = None
 
 
 class Atlas:
@@ -66,11 +84,14 @@ class Atlas:
         looked_from: Places of former frontiers that the robot has been to.
         previous: The atlas before, whose ids are kept and whose parts are used where they hold.
         revision: The state of the map, where somebody has made it already.
+        recollector: Keeps what is made of the memory; that of the atlas before where None.
 
     Attributes:
         map: The state of the map.
         robot: Where the robot is.
+        memory: What is remembered.
         places: Remembered places.
+        recollector: Keeps what is made of the memory.
         warnings: What a reader of the memory should know.
     """
 
@@ -84,6 +105,7 @@ class Atlas:
         looked_from: Sequence[Point] = (),
         previous: "Atlas | None" = None,
         revision: MapRevision | None = None,
+        recollector: Recollector | None = None,
     ) -> None:
         before = None if previous is None else previous.map
         is_unchanged = before is not None and before.is_of(grid)
@@ -93,8 +115,12 @@ class Atlas:
             else MapRevision(grid, radius_m=radius_m, previous=before)
         )
         self.robot = robot
+        self.memory = memory
         self.places = number_places(memory.waypoints)
         self.warnings = memory.warnings
+        self.recollector: Recollector = recollector or (
+            Recollector() if previous is None else previous.recollector
+        )
         self._looked_from = tuple(looked_from)
         self._previous_frontiers = None if previous is None else previous.latest_frontiers
         has_only_moved = previous is not None and previous.map is self.map
@@ -176,6 +202,75 @@ class Atlas:
         return crossings[door.id]
 
     @cached_property
+    def recollection(self) -> Recollection:
+        """What is remembered, joined with the map: things, and the index to find them."""
+        return self.recollector.recollect(self.memory, self.grid)
+
+    @property
+    def things(self) -> tuple[RememberedThing, ...]:
+        """Remembered things, in the order of their ids."""
+        return self.recollection.things
+
+    @property
+    def judge(self) -> Judge:
+        """Says how far what is remembered may be trusted, and what is odd about it."""
+        known = self._reminders
+        if known.judge is None:
+            findings = check_memory(
+                self.memory, self.recollection.found, distances=self.distances, rooms=self.rooms
+            )
+            known.judge = Judge(findings)
+        return known.judge
+
+    def find_approach(self, remembered: RememberedThing) -> Pose | None:
+        """Finds where the robot stands to face a thing from near; None where it cannot."""
+        known = self._reminders.approaches
+        if remembered not in known:
+            position = remembered.thing.position
+            known[remembered] = (
+                None
+                if position is None
+                else find_approach(
+                    self.recollection.found.sight,
+                    self.distances,
+                    position,
+                    [view.place for view in remembered.thing.supporting],
+                )
+            )
+        return known[remembered]
+
+    def rooms_before(self, remembered: RememberedThing) -> tuple[str, ...]:
+        """Gives the rooms a thing may be in, by id: those on the side that it was seen from."""
+        known = self._reminders.rooms
+        if remembered not in known:
+            thing = remembered.thing
+            seen_from = fronts = [view.place for view in thing.supporting]
+            if thing.position is not None:
+                fronts = find_fronts(self.recollection.found.sight, thing.position, seen_from)
+            room_ids = map(self._find_room_on_line, fronts, seen_from)
+            known[remembered] = tuple(dict.fromkeys(filter(None, room_ids)))
+        return known[remembered]
+
+    def _find_room_on_line(self, end: Point, start: Point) -> str | None:
+        """Gives the room of the last floor on a line: what hangs on a wall is in no room itself."""
+        n_steps = math.ceil(start.distance_to(end) / STEP_M)
+        for step in range(n_steps, -1, -1):
+            share = step / max(n_steps, 1)
+            x, y = start.x + share * (end.x - start.x), start.y + share * (end.y - start.y)
+            room_id = self.find_room_id(Point(x, y))
+            if room_id is not None:
+                return room_id
+        return None
+
+    @property
+    def _reminders(self) -> Reminders:
+        known = self.reach.reminders
+        if self.recollection not in known:
+            known.clear()
+            known[self.recollection] = Reminders()
+        return known[self.recollection]
+
+    @cached_property
     def growing_ids(self) -> frozenset[str]:
         """The regions that border on the unknown: their areas are not final."""
         frontiers = self.frontiers
@@ -185,11 +280,3 @@ class Atlas:
             *(refused.anchor for refused in frontiers.refused),
         )
         return frozenset(filter(None, map(self.find_room_id, borders)))
-
-
-def number_places(waypoints: Sequence[Waypoint]) -> tuple[RememberedPlace, ...]:
-    """Gives remembered places their ids, in the order of the file."""
-    return tuple(
-        RememberedPlace(id=f"W{number}", waypoint=waypoint)
-        for number, waypoint in enumerate(waypoints, start=1)
-    )

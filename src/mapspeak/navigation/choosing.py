@@ -5,10 +5,15 @@ from dataclasses import dataclass
 
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.navigation.atlas import Atlas, RememberedPlace
+from mapspeak.navigation.atlas import Atlas, RememberedPlace, RememberedThing
 from mapspeak.navigation.goals import GoalCheck, check_goal
 from mapspeak.navigation.places import Place, Spot, find_place, is_taken_name, say_spot
-from mapspeak.navigation.standing import arrival_pose, facing_in, find_standing_point
+from mapspeak.navigation.standing import (
+    arrival_pose,
+    facing_in,
+    find_standing_point,
+    stand_before,
+)
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region
 
@@ -96,6 +101,8 @@ def stand_at(atlas: Atlas, place: Place) -> Pose:
             return pose
         case RememberedPlace(waypoint=waypoint):
             return waypoint.pose
+        case RememberedThing() as remembered:
+            return stand_before(atlas, remembered)
         case Spot(point=point, yaw_rad=yaw_rad):
             straight_on = arrival_pose(atlas, point)
             return straight_on if yaw_rad is None else Pose(point.x, point.y, yaw_rad)

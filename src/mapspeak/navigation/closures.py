@@ -1,17 +1,25 @@
 """Areas that are closed to the robot, and a map's floor without them."""
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
 
 from mapspeak.geometry import Point
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.spatial.grid import IntArray, Mask
+from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 
-__all__ = ["MARGIN_M", "ClosedArea", "ClosedFloor", "close_floor", "distance_to_line", "mask_areas"]
+__all__ = [
+    "MARGIN_M",
+    "ClosedArea",
+    "ClosedFloor",
+    "Outline",
+    "close_floor",
+    "distance_to_line",
+    "mask_areas",
+]
 
 CLOSED = 100
 """A closed cell is as little floor to drive on as one with a wall."""
@@ -22,6 +30,10 @@ A pose is off by some centimetres, and no navigation follows a way exactly.
 """
 
 
+Outline = tuple[Point, ...]
+"""Corners in order; the last one is joined to the first."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClosedArea:
     """A part of the floor that no part of the robot may be over.
@@ -29,12 +41,33 @@ class ClosedArea:
     Attributes:
         name: What people call it.
         outline: Its corners in order, in the map frame.
+        further_outlines: Of its other parts and of the holes in them: what lies within an even
+            number of all outlines is outside.
         until: When it opens again, as people read it; empty where it never does.
+        reason: Why it is closed, in the operator's words; may be empty.
     """
 
     name: str
-    outline: tuple[Point, ...]
+    outline: Outline
+    further_outlines: tuple[Outline, ...] = ()
     until: str = ""
+    reason: str = ""
+    _sides: FloatArray = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        # A mask has thousands of sides, and distances are asked for many times a second.
+        sides = np.concatenate([_sides_of(outline) for outline in self.outlines])
+        sides.setflags(write=False)
+        object.__setattr__(self, "_sides", sides)
+
+    def __hash__(self) -> int:
+        """Gives the same for equal areas without looking at all corners of a mask."""
+        return hash((self.name, self.until, self.outline[0], len(self.outline)))
+
+    @property
+    def outlines(self) -> tuple[Outline, ...]:
+        """All outlines, of parts and of holes."""
+        return (self.outline, *self.further_outlines)
 
     @property
     def title(self) -> str:
@@ -42,26 +75,40 @@ class ClosedArea:
         kind = f"area {self.name!r}, closed until {self.until}"
         return kind if self.until else f"keep-out area {self.name!r}"
 
+    @property
+    def bounds(self) -> tuple[Point, Point]:
+        """The corners with the least and the greatest x and y."""
+        low, high = self._sides[:, :2].min(axis=0), self._sides[:, :2].max(axis=0)
+        return Point(*low.tolist()), Point(*high.tolist())
+
     def contains(self, point: Point) -> bool:
-        """True when a point lies inside the outline."""
-        n_crossings = 0
-        for start, end in self._sides():
-            if (start.y > point.y) != (end.y > point.y):
-                share = (point.y - start.y) / (end.y - start.y)
-                n_crossings += start.x + share * (end.x - start.x) > point.x
-        return n_crossings % 2 == 1
+        """True when a point lies inside."""
+        x0, y0, x1, y1 = self._sides.T
+        is_crossed = (y0 > point.y) != (y1 > point.y)
+        x0, y0, x1, y1 = self._sides[is_crossed].T
+        crossed_x = x0 + (point.y - y0) / (y1 - y0) * (x1 - x0)
+        return int(np.count_nonzero(crossed_x > point.x)) % 2 == 1
 
     def distance_to(self, point: Point) -> float:
         """Gives the metres from a point to the area; 0 inside it."""
         return max(self.distance_to_border(point), 0.0)
 
     def distance_to_border(self, point: Point) -> float:
-        """Gives the metres from a point to the outline; negative inside it."""
-        away_m = min(distance_to_line(point, start, end) for start, end in self._sides())
+        """Gives the metres from a point to the nearest outline; negative inside the area."""
+        x0, y0, x1, y1 = self._sides.T
+        along_x, along_y = x1 - x0, y1 - y0
+        squared = along_x**2 + along_y**2
+        share = (point.x - x0) * along_x + (point.y - y0) * along_y
+        share = np.clip(share / np.where(squared > 0.0, squared, 1.0), 0.0, 1.0)
+        off_x, off_y = x0 + share * along_x - point.x, y0 + share * along_y - point.y
+        away_m = float(np.sqrt((off_x**2 + off_y**2).min()))
         return -away_m if self.contains(point) else away_m
 
-    def _sides(self) -> Iterator[tuple[Point, Point]]:
-        return zip(self.outline, (*self.outline[1:], self.outline[0]), strict=True)
+
+def _sides_of(outline: Outline) -> FloatArray:
+    """Gives the sides of an outline as rows of x, y, x, y."""
+    corners = np.array([[corner.x, corner.y] for corner in outline], dtype=np.float64)
+    return np.hstack([corners, np.roll(corners, -1, axis=0)])
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -106,14 +153,14 @@ def mask_areas(grid: OccupancyGrid, areas: Sequence[ClosedArea]) -> Mask:
     """True at the cells of a map that some area touches."""
     drawn = np.zeros(grid.cells.shape, dtype=np.uint8)
     for area in areas:
-        corners = [_corners_in(grid, area)]
-        cv2.fillPoly(drawn, corners, 1)
+        # Several outlines are filled as `contains` counts them; a border belongs to its area.
+        cv2.fillPoly(drawn, [_corners_in(grid, outline) for outline in area.outlines], 1)
     return np.asarray(drawn > 0, dtype=np.bool_)
 
 
-def _corners_in(grid: OccupancyGrid, area: ClosedArea) -> IntArray:
-    """Gives the cells of an outline's corners as (col, row); a border belongs to its area."""
-    points = np.array([[corner.x, corner.y] for corner in area.outline])
+def _corners_in(grid: OccupancyGrid, outline: Outline) -> IntArray:
+    """Gives the cells of an outline's corners as (col, row)."""
+    points = np.array([[corner.x, corner.y] for corner in outline])
     rows, cols = grid.cells_at(points)
     return np.stack([cols, rows], axis=1).clip(-_FAR_CELLS, _FAR_CELLS).astype(np.int32)
 

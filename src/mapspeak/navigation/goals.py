@@ -1,7 +1,7 @@
 """Is this goal sensible? Why not? What instead?"""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -12,7 +12,7 @@ from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, Mask
 from mapspeak.spatial.paths import DistanceField, clearance_m, distances_from
 
-__all__ = ["GoalCheck", "GoalVerdict", "check_goal"]
+__all__ = ["GoalCheck", "GoalVerdict", "check_goal", "judge_goal"]
 
 
 class GoalVerdict(StrEnum):
@@ -70,6 +70,14 @@ def check_goal(grid: OccupancyGrid, distances: DistanceField, goal: Pose) -> Goa
         distances: From the robot, on that map or on its floor without closed areas.
         goal: Where to stand.
     """
+    check = judge_goal(grid, distances, goal)
+    if check.is_ok or check.verdict is GoalVerdict.NOT_FINITE:
+        return check
+    return replace(check, nearest=_find_nearest(grid, distances, goal))
+
+
+def judge_goal(grid: OccupancyGrid, distances: DistanceField, goal: Pose) -> GoalCheck:
+    """Judges a goal as `check_goal`, without looking for another where it does not work."""
     if not goal.is_finite() or max(abs(goal.x), abs(goal.y)) > FARTHEST_M:
         sentence = f"({goal.x:g}, {goal.y:g}) is no place: a goal is two numbers of metres."
         return GoalCheck(verdict=GoalVerdict.NOT_FINITE, sentence=sentence, clearance_m=0.0)
@@ -77,13 +85,7 @@ def check_goal(grid: OccupancyGrid, distances: DistanceField, goal: Pose) -> Goa
     path_m = distances.distance_to(goal.point)
     closed = _say_closed(distances, goal, is_reachable=path_m is not None)
     verdict, sentence = closed or _judge(grid, distances, goal, clear_m, path_m)
-    return GoalCheck(
-        verdict=verdict,
-        sentence=sentence,
-        clearance_m=clear_m,
-        path_m=path_m,
-        nearest=None if verdict is GoalVerdict.OK else _find_nearest(grid, distances, goal),
-    )
+    return GoalCheck(verdict=verdict, sentence=sentence, clearance_m=clear_m, path_m=path_m)
 
 
 def _judge(

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point, wrap_angle
-from mapspeak.navigation.atlas import Atlas, RememberedPlace
+from mapspeak.navigation.atlas import Atlas, RememberedPlace, RememberedThing
 from mapspeak.navigation.goals import FARTHEST_M
-from mapspeak.semantic import SemanticMap, find_waypoints, name_key
+from mapspeak.semantic import name_key
+from mapspeak.semantic.retrieval import Answer, Basis, Verdict
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region
 
@@ -28,6 +29,7 @@ __all__ = [
 ]
 
 MOST_NAMED = 12
+MOST_GUESSES = 3
 ID = re.compile(r"(?P<letter>[A-Za-z])(?P<number>\d+)")
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 SPOT = re.compile(
@@ -50,7 +52,7 @@ class Spot:
     yaw_rad: float | None = None
 
 
-Thing = Region | Door | Frontier | RememberedPlace | Spot
+Thing = Region | Door | Frontier | RememberedPlace | RememberedThing | Spot
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +79,8 @@ class Place:
                 return pose.point
             case RememberedPlace(waypoint=waypoint):
                 return waypoint.pose.point
+            case RememberedThing() as remembered:
+                return remembered.point
 
 
 class AmbiguousPlaceError(GoalError):
@@ -128,6 +132,9 @@ def _find_by_id(atlas: Atlas, place_id: str) -> Place | None:
     region = atlas.rooms.find_region(place_id)
     if region is not None:
         return Place(region.id, region)
+    if place_id.startswith("T"):
+        remembered = atlas.recollection.find_thing(place_id)
+        return None if remembered is None else Place(remembered.id, remembered)
     things: list[Door | Frontier | RememberedPlace] = [
         *atlas.rooms.doors,
         *atlas.frontiers.frontiers,
@@ -172,19 +179,16 @@ def _what_became_of(atlas: Atlas, place: str) -> str:
         return f"{gone.id} is no longer found on the map."
     if re.fullmatch(r"[Ff]\d+", place) and int(place[1:]) <= atlas.frontiers.n_named:
         return f"Frontier {place.upper()} is gone: what lay behind it has been seen or refused."
+    if re.fullmatch(r"[Tt]\d+", place) and int(place[1:]) <= atlas.recollection.n_named:
+        return f"The thing {place.upper()} is no longer remembered."
     return f"There is no place called {place[:80]!r}."
 
 
 def _known_places(atlas: Atlas, wanted: str) -> str:
-    waypoints = tuple(place.waypoint for place in atlas.places)
-    mentioned = [
-        f"{place.id} ({place.waypoint.name})"
-        for match in find_waypoints(SemanticMap(waypoints=waypoints), wanted)
-        for place in atlas.places
-        if place.waypoint is match.waypoint
-    ]
-    if mentioned:
-        return f"Remembered places that speak of it: {', '.join(mentioned)}. Use one of them."
+    if atlas.places and not ID.fullmatch(wanted):
+        answer = atlas.recollection.find(wanted, limit=MOST_GUESSES)
+        if answer.verdict is not Verdict.NOT_REMEMBERED:
+            return _say_guesses(answer)
     groups = {
         "rooms and corridors": [region.id for region in atlas.rooms.regions],
         "doors": [door.id for door in atlas.rooms.doors],
@@ -193,6 +197,17 @@ def _known_places(atlas: Atlas, wanted: str) -> str:
     }
     known = [f"{name} {_some_of(ids)}" for name, ids in groups.items() if ids]
     return f"Known are {'; '.join(known) or 'no places yet'}. Call look_at_map to see them."
+
+
+def _say_guesses(answer: Answer) -> str:
+    """Names what may be meant, for the reader to confirm: a likeness alone is no goal."""
+    first = answer.candidates[0]
+    by = "meaning" if first.basis is Basis.MEANING else "words"
+    told = ", ".join(f"{each.entry.id} ({each.entry.name[:80]})" for each in answer.candidates)
+    return (
+        f"Nothing remembered is called so; nearest in {by}: {told}. If {first.entry.id} is meant, "
+        f"use {first.entry.id}; find_place says more."
+    )
 
 
 def _some_of(ids: list[str]) -> str:

@@ -10,9 +10,11 @@ import numpy as np
 
 from mapspeak.geometry import Point
 from mapspeak.navigation.closures import ClosedArea, close_floor
+from mapspeak.navigation.hindrances import Hindrance, weigh_floor
 from mapspeak.spatial import Cell, OccupancyGrid
-from mapspeak.spatial.paths import DistanceField, clearance_m, distances_from
+from mapspeak.spatial.paths import DistanceField, Path, clearance_m, distances_from
 from mapspeak.spatial.paths.clearance import Clearance
+from mapspeak.spatial.paths.wavefront import Costs
 from mapspeak.spatial.rooms import CorridorWalk, Region, RoomMap, find_rooms, walk_along
 
 __all__ = ["MapRevision"]
@@ -29,11 +31,13 @@ class MapRevision:
         radius_m: Of the robot.
         previous: The state before, whose rooms give theirs their ids.
         areas: What is closed of the floor: no way leads over it.
+        hindrances: What ways lead round where that is not too far.
 
     Attributes:
         grid: The map.
         radius_m: Of the robot.
         areas: What is closed of the floor.
+        hindrances: What costs more than its length.
     """
 
     def __init__(
@@ -43,10 +47,12 @@ class MapRevision:
         radius_m: float,
         previous: "MapRevision | None" = None,
         areas: Sequence[ClosedArea] = (),
+        hindrances: Sequence[Hindrance] = (),
     ) -> None:
         self.grid = grid
         self.radius_m = radius_m
         self.areas = tuple(areas)
+        self.hindrances = tuple(hindrances)
         self._open: MapRevision | None = None
         self._earlier_rooms = None if previous is None else previous.latest_rooms
         self._fields: dict[Cell, DistanceField] = {}
@@ -60,9 +66,17 @@ class MapRevision:
             and np.array_equal(self.grid.cells, grid.cells)
         )
 
-    def with_areas(self, areas: Sequence[ClosedArea]) -> "MapRevision":
-        """Gives the same map with other areas closed; its rooms are the same ones."""
-        other = MapRevision(self.grid, radius_m=self.radius_m, previous=self, areas=areas)
+    def with_areas(
+        self, areas: Sequence[ClosedArea], hindrances: Sequence[Hindrance] = ()
+    ) -> "MapRevision":
+        """Gives the same map with other areas closed or hindered; its rooms are the same ones."""
+        other = MapRevision(
+            self.grid,
+            radius_m=self.radius_m,
+            previous=self,
+            areas=areas,
+            hindrances=hindrances,
+        )
         other._open = self.open
         if "rooms" in self.__dict__:
             other.__dict__["rooms"] = self.rooms
@@ -71,7 +85,7 @@ class MapRevision:
     @property
     def open(self) -> "MapRevision":
         """The same map with nothing closed, as a robot sees it that knows of no areas."""
-        if not self.areas:
+        if not (self.areas or self.hindrances):
             return self
         if self._open is None:
             self._open = MapRevision(self.grid, radius_m=self.radius_m, previous=self)
@@ -106,6 +120,21 @@ class MapRevision:
         if region.id not in self._walks:
             self._walks[region.id] = walk_along(self.rooms, region)
         return self._walks[region.id]
+
+    @cached_property
+    def weights(self) -> Costs | None:
+        """What a metre counts in each cell of the map; None where it is one everywhere."""
+        return weigh_floor(self.grid, self.hindrances)
+
+    def find_path(self, start: Point, goal: Point) -> Path | None:
+        """Finds the way to take from one place to another, round hindrances where that pays."""
+        return self.find_path_over(self.distances_from(start), goal)
+
+    def find_path_over(self, distances: DistanceField, goal: Point) -> Path | None:
+        """Finds the way to take from where distances were measured."""
+        if self.weights is None:
+            return distances.path_to(goal)
+        return distances.cheapest_path_to(goal, self.weights)
 
     def distances_from(self, point: Point) -> DistanceField:
         """Gives the path distances from a place to every other."""

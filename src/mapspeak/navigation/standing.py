@@ -5,12 +5,12 @@ import math
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.navigation.atlas import Atlas
+from mapspeak.navigation.atlas import Atlas, RememberedThing
 from mapspeak.navigation.goals import FARTHEST_M
 from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.rooms import Region, RoomClass
 
-__all__ = ["arrival_pose", "facing_in", "find_standing_point"]
+__all__ = ["arrival_pose", "facing_in", "find_standing_point", "stand_before"]
 
 COMFORT_M = 0.15
 """How much more than its radius a robot should have around it where it is sent to stand."""
@@ -67,6 +67,20 @@ def arrival_pose(atlas: Atlas, point: Point) -> Pose:
     )
     yaw_rad = before.bearing_to(point) if before != point else atlas.robot.yaw_rad
     return Pose(point.x, point.y, yaw_rad)
+
+
+def stand_before(atlas: Atlas, remembered: RememberedThing) -> Pose:
+    """Gives the pose that faces a thing from near, else one that it was seen from."""
+    near = atlas.find_approach(remembered)
+    if near is not None:
+        return near
+    thing = remembered.thing
+    records = map(atlas.recollection.find_place, thing.waypoints)
+    poses = [record.waypoint.pose for record in records if record is not None]
+    pose = next((pose for pose in poses if atlas.path_m(pose.point) is not None), poses[0])
+    if thing.position is None or thing.position == pose.point:
+        return pose
+    return Pose(pose.x, pose.y, pose.point.bearing_to(thing.position))
 
 
 def facing_in(atlas: Atlas, region: Region, point: Point) -> float:

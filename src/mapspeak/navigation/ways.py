@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapspeak.geometry import Point
-from mapspeak.navigation.atlas import Atlas
+from mapspeak.navigation.atlas import Atlas, RememberedThing
 from mapspeak.navigation.naming import Place, Spot
-from mapspeak.navigation.standing import find_standing_point
+from mapspeak.navigation.standing import find_standing_point, stand_before
 from mapspeak.spatial.paths import DistanceField, Path
 from mapspeak.spatial.rooms import Door, Region
 
@@ -42,7 +42,10 @@ class Way:
 def measure_path(atlas: Atlas, start: Place, goal: Place) -> float | None:
     """Gives the metres by path between two places; None where the robot cannot get through."""
     distances = _distances_from(atlas, start)
-    return None if distances is None else distances.distance_to(standing_point(atlas, goal))
+    end = standing_point(atlas, goal)
+    if distances is None or atlas.map.weights is None:
+        return None if distances is None else distances.distance_to(end)
+    return _measure(atlas, distances, atlas.map.find_path_over(distances, end), end)
 
 
 def find_way(atlas: Atlas, start: Place, goal: Place) -> Way:
@@ -50,8 +53,8 @@ def find_way(atlas: Atlas, start: Place, goal: Place) -> Way:
     begin, end = standing_point(atlas, start), standing_point(atlas, goal)
     straight_m = begin.distance_to(end)
     distances = _distances_from(atlas, start)
-    path = None if distances is None else distances.path_to(end)
-    path_m = None if distances is None else distances.distance_to(end)
+    path = None if distances is None else atlas.map.find_path_over(distances, end)
+    path_m = _measure(atlas, distances, path, end)
     if path is None or path_m is None:
         return Way(start=start, goal=goal, end=end, straight_m=straight_m)
     cells = _cells_along(atlas, path)
@@ -64,6 +67,16 @@ def find_way(atlas: Atlas, start: Place, goal: Place) -> Way:
         through=_name_regions(atlas, *cells),
         clearance_m=float(atlas.map.clearance_m[cells].min()),
     )
+
+
+def _measure(
+    atlas: Atlas, distances: DistanceField | None, path: Path | None, end: Point
+) -> float | None:
+    """Gives the metres to the end: by the way round where that is not the shortest one."""
+    if distances is None or path is None:
+        return None
+    is_shortest = atlas.map.weights is None
+    return distances.distance_to(end) if is_shortest else path.length_m
 
 
 def _distances_from(atlas: Atlas, start: Place) -> DistanceField | None:
@@ -85,6 +98,8 @@ def standing_point(atlas: Atlas, place: Place) -> Point:
             return find_standing_point(atlas, region) or place.point
         case Door() as door:
             return atlas.find_crossing(door) or place.point
+        case RememberedThing() as remembered:
+            return stand_before(atlas, remembered).point
         case _:
             return place.point
 

@@ -121,6 +121,11 @@ class RosConnection(Protocol):
         """Since when topics and goals have been connected, in wall time; None while not."""
         ...
 
+    @property
+    def lost_for_s(self) -> float | None:
+        """Since when the connection has been lost, in wall time; None while there is one."""
+        ...
+
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Runs something in the background until the connection is closed."""
         ...
@@ -268,7 +273,7 @@ class RosConnection(Protocol):
         ...
 
     async def set_parameter(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401
-        """Sets a node's parameter.
+        """Sets a node's parameter; None deletes it.
 
         Raises:
             LinkError: The node refuses it, and says why.

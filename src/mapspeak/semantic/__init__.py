@@ -1,5 +1,8 @@
 """What is where, in words: remembered places and the file that holds them."""
 
+from mapspeak.semantic.filtering import LEFT_OUT, Concern, Objection, find_objection, gives_orders
+from mapspeak.semantic.merging import SAME_SPOT_M, Merge, Reunion, merge_waypoint, seen_from
+from mapspeak.semantic.pictures import PictureBook, TakenPicture
 from mapspeak.semantic.retrieval import (
     MatchEvidence,
     MatchField,
@@ -8,18 +11,31 @@ from mapspeak.semantic.retrieval import (
     find_waypoints,
 )
 from mapspeak.semantic.store import SemanticMapStore, WriteReceipt
-from mapspeak.semantic.waypoint import Landmark, SemanticMap, Waypoint, name_key
+from mapspeak.semantic.waypoint import Confidence, Landmark, SemanticMap, Waypoint, name_key
 
 __all__ = [
+    "LEFT_OUT",
+    "SAME_SPOT_M",
+    "Concern",
+    "Confidence",
     "Landmark",
     "MatchEvidence",
     "MatchField",
     "MatchKind",
+    "Merge",
+    "Objection",
+    "PictureBook",
+    "Reunion",
     "SemanticMap",
     "SemanticMapStore",
+    "TakenPicture",
     "Waypoint",
     "WaypointMatch",
     "WriteReceipt",
+    "find_objection",
     "find_waypoints",
+    "gives_orders",
+    "merge_waypoint",
     "name_key",
+    "seen_from",
 ]

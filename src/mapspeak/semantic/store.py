@@ -5,19 +5,22 @@ but what it read last.
 """
 
 import difflib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.semantic.durable import DurableFile, Fingerprint
+from mapspeak.semantic.events import Event
 from mapspeak.semantic.mapfile import (
     MapDocument,
     bound_to,
     parse_document,
+    with_event,
     with_waypoint,
     without_waypoint,
 )
+from mapspeak.semantic.merging import Merge, merge_waypoint
 from mapspeak.semantic.waypoint import SemanticMap, Waypoint, clean_line, name_key
 
 LOCK_TIMEOUT_S = 5.0
@@ -92,26 +95,78 @@ class SemanticMapStore:
             SemanticMapError: The file cannot be read, or has a fault and was never without one.
         """
         seen = self._look()
-        if seen.document is None:
-            raise _raised_again(seen.fault)
-        places = seen.document.to_map()
+        places = self._document_of(seen).to_map()
         return replace(places, warnings=(*places.warnings, *self._warnings(seen)))
 
+    def read_events(self) -> tuple[Event, ...]:
+        """Gives all events of the file, also those that are over; as `read` otherwise.
+
+        Of a file that belongs to another map there are none: they are at other places here.
+        """
+        document = self._read_document()
+        if not self._is_same_map(document.map_id):
+            return ()
+        return tuple(record.event for record in document.events.values())
+
+    def read_entry(self, key: str) -> str | None:
+        """Gives what the file says under a key of its own, such as `snapshot`; as `read`."""
+        return self._read_document().find_entry(key)
+
+    def write_event(self, event: Event) -> Event:
+        """Writes an event, in its own record where its id is there already; gives it with its id.
+
+        Raises:
+            SemanticMapError: As for `write`.
+        """
+        _, after = self._change(lambda document: _with_event(document, event, self.map_id))
+        ids = [event.id] if event.id else list(after.events)[-1:]
+        return after.events[ids[0]].event
+
     def write(self, waypoint: Waypoint) -> WriteReceipt:
-        """Creates a waypoint, or updates the one of that name; done when it returns.
+        """Creates a waypoint, or puts it in place of the one of that name; done when it returns.
 
         Raises:
             SemanticMapError: The file belongs to another map, has a fault, cannot be written, or is
                 held by another program. Nothing was changed.
         """
+        return self._write(waypoint, lambda _: waypoint)
+
+    def remember(
+        self, waypoint: Waypoint, *, gone: Iterable[str] = ()
+    ) -> tuple[WriteReceipt, Merge]:
+        """Joins a waypoint with what is remembered under its name; done when it returns.
+
+        What another program remembers of it in the same moment is joined, too.
+
+        Args:
+            waypoint: What is seen now.
+            gone: Labels of landmarks that are not there any more.
+
+        Raises:
+            SemanticMapError: As for `write`.
+        """
+        labels = tuple(gone)
+        merges: list[Merge] = []
+
+        def join(before: Waypoint | None) -> Waypoint:
+            merges.append(merge_waypoint(before, waypoint, gone=labels))
+            return merges[-1].waypoint
+
+        receipt = self._write(waypoint, join)
+        return receipt, merges[-1]
+
+    def _write(
+        self, waypoint: Waypoint, change: Callable[[Waypoint | None], Waypoint]
+    ) -> WriteReceipt:
         map_id = self.map_id or waypoint.map_id
         self._require_same_map(waypoint.map_id, f"The waypoint '{waypoint.name}'")
         key = name_key(waypoint.name)
-        before, after = self._change(lambda document: _written(document, waypoint, map_id))
-        previous = before.records.get(key)
+        before, after = self._change(
+            lambda document: _written(document, change(_known(document, key)), map_id)
+        )
         return WriteReceipt(
             waypoint=after.records[key].reading.waypoint,
-            previous=previous.reading.waypoint if previous else None,
+            previous=_known(before, key),
             n_waypoints=len(after.records),
         )
 
@@ -124,16 +179,42 @@ class SemanticMapStore:
         before, _ = self._change(lambda document: _removed(document, name))
         return before.records[name_key(name)].reading.waypoint
 
+    def _read_document(self) -> MapDocument:
+        return self._document_of(self._look())
+
+    def _document_of(self, seen: _Seen) -> MapDocument:
+        if seen.document is None:
+            raise _raised_again(seen.fault)
+        return seen.document
+
     def _change(
         self, change: Callable[[MapDocument], MapDocument]
     ) -> tuple[MapDocument, MapDocument]:
-        """Replaces the file by a changed one and gives both, whoever else writes meanwhile."""
+        """Replaces the file of this map by a changed one and gives both."""
+
+        def change_of_this_map(document: MapDocument) -> MapDocument:
+            self._require_same_map(document.map_id, f"The file {self.path}")
+            return change(document)
+
+        return self.rewrite(change_of_this_map)
+
+    def rewrite(
+        self, change: Callable[[MapDocument], MapDocument]
+    ) -> tuple[MapDocument, MapDocument]:
+        """Replaces the file by a changed one and gives both, whoever else writes meanwhile.
+
+        Args:
+            change: Called with the file as it is, once or more often; whichever map it belongs to.
+
+        Raises:
+            SemanticMapError: The file has a fault, cannot be written, or is held by another
+                program. Nothing was changed.
+        """
         with self._file.locked():
             for _ in range(_N_TRIES):
                 seen = self._look()
                 if seen.document is None or seen.fault is not None:
                     raise _raised_again(seen.fault)
-                self._require_same_map(seen.document.map_id, f"The file {self.path}")
                 after = change(seen.document)
                 fingerprint = self._file.replace(after.content, expected=seen.fingerprint)
                 if fingerprint is not None:
@@ -183,10 +264,21 @@ class SemanticMapStore:
             )
 
 
+def _known(document: MapDocument, key: str) -> Waypoint | None:
+    record = document.records.get(key)
+    return None if record is None else record.reading.waypoint
+
+
 def _written(document: MapDocument, waypoint: Waypoint, map_id: str | None) -> MapDocument:
     if document.map_id is None and map_id is not None:
         document = bound_to(document, map_id)
     return with_waypoint(document, waypoint)
+
+
+def _with_event(document: MapDocument, event: Event, map_id: str | None) -> MapDocument:
+    if document.map_id is None and map_id is not None:
+        document = bound_to(document, map_id)
+    return with_event(document, event)[0]
 
 
 def _removed(document: MapDocument, name: str) -> MapDocument:

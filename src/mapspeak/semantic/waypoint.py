@@ -2,8 +2,9 @@
 
 import math
 import unicodedata
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
+from enum import StrEnum
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
@@ -30,39 +31,57 @@ def name_key(name: str) -> str:
     return clean_line(unicodedata.normalize("NFKC", name).casefold())
 
 
+class Confidence(StrEnum):
+    """How sure an observer was of what it saw, in its own word."""
+
+    CERTAIN = "certain"
+    LIKELY = "likely"
+    UNSURE = "unsure"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Landmark:
     """A thing seen from a waypoint. Only the label is always known.
+
+    It has the time and the picture of its own waypoint where it does not say otherwise
+    (`Waypoint.dated`), and always its map and the room it was seen from.
 
     Attributes:
         label: What it is, in a few words.
         purpose: What it is good for.
         bearing_rad: Its direction from the waypoint's heading, left positive.
         range_m: Its distance from the waypoint.
+        confidence: How sure the observer was; None where it did not say.
         note: Anything else.
+        picture: The picture it was seen in, by its relative name, if not the waypoint's.
+        stamp_s: Robot time it was last seen at, if not the waypoint's.
+        recorded_at: The same by the calendar, with its time zone, if not the waypoint's.
 
     Raises:
-        SemanticMapError: The label is empty, or a number is not finite or below zero.
+        SemanticMapError: The label is empty, a number is not finite or below zero, or the time has
+            no zone.
     """
 
     label: str
     purpose: str | None = None
     bearing_rad: float | None = None
     range_m: float | None = None
+    confidence: Confidence | None = None
     note: str | None = None
+    picture: str | None = None
+    stamp_s: float | None = None
+    recorded_at: datetime | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "label", _required_line(self.label, "A landmark's label"))
-        if self.purpose is not None:
-            object.__setattr__(self, "purpose", clean_line(self.purpose) or None)
-        if self.note is not None:
-            object.__setattr__(self, "note", clean_line(self.note) or None)
+        _clean_lines(self, "purpose", "note", "picture")
         if self.bearing_rad is not None:
             _require(math.isfinite(self.bearing_rad), f"The bearing of {self.label!r}", "an angle")
             object.__setattr__(self, "bearing_rad", wrap_angle(self.bearing_rad))
         if self.range_m is not None:
             is_distance = math.isfinite(self.range_m) and self.range_m >= 0
             _require(is_distance, f"The range of {self.label!r}", "0 m or more")
+        _require_time(self.stamp_s, self.recorded_at, self.label)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,6 +98,8 @@ class Waypoint:
         stamp_s: Robot time of the observation.
         recorded_at: The same by the calendar, with its time zone.
         map_id: Which map the pose belongs to; None where the store decides.
+        room_id: The room or corridor it was observed from, by the id that it had then.
+        picture: The picture that was taken there, by its relative name.
 
     Raises:
         SemanticMapError: The name is empty, the pose or stamp not finite, or the time has no zone.
@@ -93,6 +114,8 @@ class Waypoint:
     stamp_s: float | None = None
     recorded_at: datetime | None = None
     map_id: str | None = None
+    room_id: str | None = None
+    picture: str | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", _required_line(self.name, "A waypoint's name"))
@@ -100,15 +123,27 @@ class Waypoint:
         features = (clean_line(feature) for feature in self.geometric_features)
         object.__setattr__(self, "geometric_features", tuple(filter(None, features)))
         _require(self.pose.is_finite(), f"The pose of {self.name!r}", "three finite numbers")
-        is_stamped = self.stamp_s is None or math.isfinite(self.stamp_s)
-        _require(is_stamped, f"The stamp of {self.name!r}", "a finite number of seconds")
-        has_zone = self.recorded_at is None or self.recorded_at.tzinfo is not None
-        _require(has_zone, f"The time of {self.name!r}", "a time with its zone")
+        _clean_lines(self, "room_id", "picture")
+        _require_time(self.stamp_s, self.recorded_at, self.name)
 
     @property
     def landmarks(self) -> tuple[Landmark, ...]:
         """The safety landmarks, then the functional ones."""
         return self.safety_landmarks + self.functional_landmarks
+
+    def dated(self, landmark: Landmark) -> Landmark:
+        """Gives one of its landmarks with the time and picture that it has from this waypoint.
+
+        A landmark with a time of its own was last seen in an earlier picture, if in any.
+        """
+        if landmark.stamp_s is not None or landmark.recorded_at is not None:
+            return landmark
+        return replace(
+            landmark,
+            stamp_s=self.stamp_s,
+            recorded_at=self.recorded_at,
+            picture=landmark.picture or self.picture,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,6 +165,22 @@ class SemanticMap:
         """Gives the place of that name, whatever its case, or None."""
         key = name_key(name)
         return next((place for place in self.waypoints if name_key(place.name) == key), None)
+
+
+def _clean_lines(value: Landmark | Waypoint, *names: str) -> None:
+    """Puts texts that may be absent on one line, and None where nothing is left of them."""
+    for name in names:
+        text = getattr(value, name)
+        if text is not None:
+            object.__setattr__(value, name, clean_line(text) or None)
+
+
+def _require_time(stamp_s: float | None, recorded_at: datetime | None, name: str) -> None:
+    if stamp_s is not None:
+        is_finite = math.isfinite(stamp_s)
+        _require(is_finite, f"The stamp of {name!r}", "a finite number of seconds")
+    if recorded_at is not None:
+        _require(recorded_at.tzinfo is not None, f"The time of {name!r}", "a time with its zone")
 
 
 def _required_line(text: str, what: str) -> str:

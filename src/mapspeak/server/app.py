@@ -1,6 +1,7 @@
 """The MCP server around a session: chosen tools, readable errors, lean schemas."""
 
-from collections.abc import Iterable
+import json
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from mcp.server import MCPServer
@@ -15,10 +16,13 @@ from mapspeak import __version__
 from mapspeak.errors import ConfigError, MapspeakError
 from mapspeak.navigation.safety import ApprovalNeededError, Caller, calling
 from mapspeak.server.asking import Asking
+from mapspeak.server.calllog import CallLog
 from mapspeak.server.leanness import lean_input, lean_output
 from mapspeak.server.prompts import add_prompts, read_text
+from mapspeak.server.representations import Representation
 from mapspeak.server.tools import build_toolsets
 from mapspeak.server.toolset import Effect, Tool
+from mapspeak.server.visible import show_controls, show_controls_of
 from mapspeak.session import Session
 
 __all__ = ["DEFAULT_TOOLSETS", "MapspeakServer", "build_server"]
@@ -26,10 +30,14 @@ __all__ = ["DEFAULT_TOOLSETS", "MapspeakServer", "build_server"]
 DEFAULT_TOOLSETS = ("look", "places", "drive", "paper")
 
 
+MOST_BYTES = 1_000_000
+"""Of the arguments of one call, written as JSON; no model writes a hundredth of that."""
+
+
 class MapspeakServer(MCPServer[Any]):
     """An MCP server whose every call passes one door: the client is heard, errors are readable."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Session, *, call_log: CallLog | None = None) -> None:
         super().__init__(
             "mapspeak",
             title="mapspeak: a robot's map, eyes and memory of places",
@@ -38,6 +46,7 @@ class MapspeakServer(MCPServer[Any]):
             log_level="WARNING",
         )
         self._session = session
+        self._call_log = call_log
         self._arguments: dict[str, frozenset[str]] = {}
         self._numbers: dict[str, frozenset[str]] = {}
         self._remembering: set[str] = set()
@@ -46,6 +55,20 @@ class MapspeakServer(MCPServer[Any]):
         self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None = None
     ) -> CallToolResult | InputRequiredResult:
         """Calls a tool; what went wrong on purpose reaches the model with its hint."""
+        if self._call_log is None:
+            return await self._call_readably(name, arguments, context)
+        with self._call_log.noting(name, arguments) as note:
+            try:
+                answer = await self._call_readably(name, arguments, context)
+            except ToolError as error:
+                note.error = str(error)
+                raise
+            note.answer = answer if isinstance(answer, CallToolResult) else None
+            return answer
+
+    async def _call_readably(
+        self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None
+    ) -> CallToolResult | InputRequiredResult:
         caller = Caller(client=name_client(context), tool=name)
         with self._session.client_is_heard(), calling(caller):
             self._check_arguments(name, arguments)
@@ -55,15 +78,16 @@ class MapspeakServer(MCPServer[Any]):
                 readable = _explain(name, error.__cause__)
                 if readable is None:
                     raise
-                raise ToolError(readable) from error.__cause__
+                raise ToolError(show_controls(readable)) from error.__cause__
             self._note_memory(name, arguments)
-            return answer
+            return show_controls_of(answer) if isinstance(answer, CallToolResult) else answer
 
     def _note_memory(self, name: str, arguments: dict[str, Any]) -> None:
         """Notes in the audit log that a tool has changed what is remembered."""
         guard = self._session.guard
         if guard is not None and name in self._remembering:
-            said = f"remembered {str(arguments.get('name', ''))[:120]!r}"
+            what = arguments.get("name") or arguments.get("text") or arguments.get("event") or name
+            said = f"remembered {str(what)[:120]!r}"
             guard.note_event("memory", said, robot_s=self._session.robot.now_s)
 
     async def _call_with_approval(
@@ -118,7 +142,16 @@ class MapspeakServer(MCPServer[Any]):
         return await super().get_prompt(name, arguments, context)
 
     def _check_arguments(self, name: str, given: dict[str, Any]) -> None:
-        """Refuses what would be dropped without a word, such as yaw, or taken for 1, as true is."""
+        """Refuses what would be dropped without a word, such as yaw, or taken for 1, as true is.
+
+        What is too large would cut the connection to a robot, which limits the size of a message.
+        """
+        n_bytes = len(json.dumps(given, default=str))
+        if n_bytes > MOST_BYTES:
+            raise ToolError(
+                f"{name} was called with {n_bytes / 1e6:.1f} MB of arguments; at most "
+                f"{MOST_BYTES / 1e6:g} MB are taken. Nothing was done; send less."
+            )
         strangers = sorted(set(given) - self._arguments.get(name, frozenset(given)))
         if strangers:
             known = ", ".join(sorted(self._arguments[name])) or "none"
@@ -161,6 +194,8 @@ def build_server(
     toolsets: Iterable[str] = DEFAULT_TOOLSETS,
     tools: Iterable[str] = (),
     is_read_only: bool = False,
+    representation: Representation = Representation.PICTURE_TABLE,
+    call_log: CallLog | None = None,
 ) -> MapspeakServer:
     """Builds the server with the chosen tools, always in the same order.
 
@@ -169,37 +204,47 @@ def build_server(
         toolsets: Names of the groups to offer.
         tools: Single tools to offer besides.
         is_read_only: Leaves out every tool that changes something; stopping stays.
+        representation: How look_at_map shows the map.
+        call_log: Where every call is noted; None for nowhere.
 
     Raises:
         ConfigError: There is no such toolset or tool.
     """
-    server = MapspeakServer(session)
+    server = MapspeakServer(session, call_log=call_log)
     is_read_only = is_read_only or (session.guard is not None and session.guard.policy.is_read_only)
-    for tool in choose_tools(session, toolsets=toolsets, tools=tools, is_read_only=is_read_only):
+    if is_read_only:
+        session.diary.close()
+    known = build_toolsets(session, representation)
+    for tool in choose_tools(known, toolsets=toolsets, tools=tools, is_read_only=is_read_only):
         server.offer(tool)
     add_prompts(server)
     return server
 
 
 def choose_tools(
-    session: Session, *, toolsets: Iterable[str], tools: Iterable[str], is_read_only: bool
+    known: Mapping[str, Sequence[Tool]],
+    *,
+    toolsets: Iterable[str],
+    tools: Iterable[str],
+    is_read_only: bool,
 ) -> list[Tool]:
     """Gives the chosen tools in their fixed order.
 
     Raises:
         ConfigError: There is no such toolset or tool.
     """
-    known = build_toolsets(session)
     chosen_sets, chosen_tools = set(toolsets), set(tools)
     _check_names("toolset", chosen_sets, set(known))
     _check_names("tool", chosen_tools, {tool.name for group in known.values() for tool in group})
-    return [
+    chosen = [
         tool
         for toolset, group in known.items()
         for tool in group
         if (toolset in chosen_sets or tool.name in chosen_tools)
         and (not is_read_only or tool.effect in (Effect.READS, Effect.STOPS))
     ]
+    # find_place stands in two toolsets.
+    return list({tool.name: tool for tool in reversed(chosen)}.values())[::-1]
 
 
 def _check_names(what: str, asked: set[str], known: set[str]) -> None:

@@ -3,12 +3,12 @@
 import math
 from collections.abc import Iterator
 
-from mapspeak.navigation.atlas import Atlas, RememberedPlace
+from mapspeak.navigation.atlas import Atlas, RememberedPlace, RememberedThing
 from mapspeak.navigation.choosing import CheckedGoal, check_place
 from mapspeak.navigation.places import Place
 from mapspeak.navigation.ways import standing_point
-from mapspeak.semantic import Landmark
 from mapspeak.server.roomtables import say_walk
+from mapspeak.server.thingtexts import say_landmark, say_things_from, say_things_in, thing_lines
 from mapspeak.server.wording import (
     join_words,
     say_direction,
@@ -38,6 +38,8 @@ def describe_place(atlas: Atlas, place: Place) -> str:
             lines = _frontier_lines(atlas, frontier)
         case RememberedPlace() as remembered:
             lines = _remembered_lines(atlas, remembered)
+        case RememberedThing() as thing:
+            lines = thing_lines(atlas, thing)
         case _:
             lines = _spot_lines(atlas, place)
     why = [f"{place.name} is {place.reason}."] if place.reason else []
@@ -83,6 +85,7 @@ def _region_lines(atlas: Atlas, region: Region) -> Iterator[str]:
     for remembered in atlas.places:
         if atlas.find_room_id(remembered.waypoint.pose.point) == region.id:
             yield f"Remembered in it: {_say_remembered(remembered)}."
+    yield from say_things_in(atlas, region)
 
 
 def _say_rank(atlas: Atlas, region: Region) -> str:
@@ -147,21 +150,12 @@ def _remembered_lines(atlas: Atlas, remembered: RememberedPlace) -> Iterator[str
     if waypoint.description:
         yield f'Description: "{" ".join(waypoint.description.split())}"'
     for landmark in waypoint.landmarks:
-        yield f"Landmark: {_say_landmark(landmark)}."
+        yield f"Landmark: {say_landmark(landmark)}."
     for feature in waypoint.geometric_features:
         yield f'Layout: "{feature}"'
+    yield from say_things_from(atlas, remembered)
     if waypoint.recorded_at is not None:
         yield f"Recorded at {waypoint.recorded_at.isoformat(timespec='seconds')}."
-
-
-def _say_landmark(landmark: Landmark) -> str:
-    purpose = "" if landmark.purpose is None else f" for {landmark.purpose}"
-    parts = [f'"{landmark.label}"{purpose}']
-    if landmark.bearing_rad is not None:
-        parts.append(f"bearing {math.degrees(landmark.bearing_rad):+.0f} deg, left positive")
-    if landmark.range_m is not None:
-        parts.append(f"{landmark.range_m:.1f} m away")
-    return ", ".join(parts)
 
 
 def _say_remembered(remembered: RememberedPlace) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.server.views import Layer, MapLook, MapView
-from mapspeak.server.wording import list_some
+from mapspeak.server.wording import list_some, shorten
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.picture import (
     NORTH_UP_RAD,
@@ -22,6 +22,7 @@ from mapspeak.spatial.picture import (
     RegionLayer,
     Sample,
     Shape,
+    Zone,
     draw_map,
 )
 from mapspeak.spatial.picture import Region as Area
@@ -37,6 +38,7 @@ LEGEND = (
     LegendEntry(sample=Shape.CROSS, text="door, no way for the robot"),
     LegendEntry(sample=Shape.TRIANGLE, text="frontier"),
     LegendEntry(sample=Shape.DIAMOND, text="remembered place"),
+    LegendEntry(sample=Sample.ZONE, text="closed to the robot"),
     LegendEntry(sample=Sample.ROBOT, text="robot"),
     LegendEntry(sample=LineStyle.DASHED, text="way to the best frontier"),
     LegendEntry(sample=Sample.ORIGIN, text="origin"),
@@ -72,6 +74,7 @@ def draw_atlas(view: MapView) -> AtlasPicture:
         atlas.grid,
         layers=MapLayers(
             regions=_rooms_in(view, has_areas=is_detailed) if Layer.ROOMS in look.layers else None,
+            zones=_closed_areas(view),
             lines=_way_to_first_frontier(atlas) if look.layers >= WITH_PATH else (),
             marks=(
                 *(_door_mark(door, is_way=bool(atlas.find_crossing(door))) for door in doors),
@@ -172,6 +175,14 @@ def _places(view: MapView) -> tuple[Mark, ...]:
             colour=Colour.BLUE,
         )
         for place in view.places.items
+    )
+
+
+def _closed_areas(view: MapView) -> tuple[Zone, ...]:
+    """Gives all that is closed; only what is listed has its name written in it."""
+    return tuple(
+        Zone(outlines=area.outlines, label=shorten(area.name) if area in view.closed.items else "")
+        for area in view.atlas.map.areas
     )
 
 

@@ -13,12 +13,13 @@ Schema = Any
 """JSON of any shape."""
 
 REF = "#/$defs/"
-LENGTHS = ("minLength", "maxLength", "maxItems")
+CHECKED = ("title", "minLength", "maxLength", "maxItems", "additionalProperties")
+"""What a model reads nothing in before it has broken it, and is told of then."""
 
 
 def lean_input(schema: Schema) -> Schema:
     """Gives the schema of a tool's arguments: what may be left out need not be null as well."""
-    return _inline(_rewrite(_rewrite(schema, _without(("title", *LENGTHS))), _short_optional))
+    return _inline(_rewrite(_rewrite(schema, _without(CHECKED)), _short_optional))
 
 
 def lean_output(schema: Schema) -> Schema:

@@ -1,6 +1,7 @@
 """What the model reads: frozen reports, each field with one line of explanation."""
 
 import math
+from collections.abc import Iterable, Sequence
 from typing import Self
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -12,7 +13,9 @@ from mapspeak.navigation.choosing import CheckedGoal
 from mapspeak.navigation.drive import DriveReport
 from mapspeak.navigation.goals import GoalVerdict
 from mapspeak.robot import GoalState, StampedPose
-from mapspeak.semantic import Landmark, SemanticMap, Waypoint, WriteReceipt, name_key
+from mapspeak.semantic import Landmark, Merge, SemanticMap, WriteReceipt, name_key
+from mapspeak.server.remembering import say_landmarks, say_replaced
+from mapspeak.server.wording import say_pose
 
 __all__ = [
     "DriveAnswer",
@@ -27,6 +30,8 @@ __all__ = [
 
 
 MOST_NAMED = 12
+OLD_POSE_S = 5.0
+"""Robot time after which an estimate is no sure answer to where a robot is."""
 
 
 class Report(BaseModel):
@@ -58,12 +63,23 @@ class PoseAnswer(Report):
     pose: PoseReport
     place: str = Field(description="the room or corridor it stands in, by id")
     age_s: float = Field(description="seconds since the estimate")
+    doubt: str = Field(description="why the robot may be elsewhere; empty for a fresh estimate")
 
     @classmethod
     def of(cls, stamped: StampedPose, *, place: str, now_s: float) -> Self:
         """Makes the report of a stamped pose."""
         age_s = max(0.0, round(now_s - stamped.stamp_s, 2))
-        return cls(pose=PoseReport.of(stamped.pose), place=place, age_s=age_s)
+        pose, doubt = PoseReport.of(stamped.pose), _say_doubt(age_s)
+        return cls(pose=pose, place=place, age_s=age_s, doubt=doubt)
+
+
+def _say_doubt(age_s: float) -> str:
+    if age_s <= OLD_POSE_S:
+        return ""
+    return (
+        f"Robot time has gone on for {age_s:.0f} s since this estimate: unless the robot stood "
+        "still, it is elsewhere. Check that localisation runs and that the clocks agree."
+    )
 
 
 NEXT_STEP = {
@@ -78,6 +94,12 @@ NEXT_STEP = {
     GoalState.TIMED_OUT: "Check the robot's navigation; stop_robot, then send a new goal.",
     GoalState.LOST: "The robot no longer answers for this goal; check it, then send a new one.",
 }
+
+
+FOREIGN_DRIVE = (
+    "Another client's goal drives the robot now: wait for its end, or call stop_robot, which ends "
+    "it too."
+)
 
 
 class DriveAnswer(Report):
@@ -96,8 +118,8 @@ class DriveAnswer(Report):
     next_step: str
 
     @classmethod
-    def of(cls, report: DriveReport) -> Self:
-        """Makes the report of a drive."""
+    def of(cls, report: DriveReport, *, foreign_goals: Sequence[GoalState] = ()) -> Self:
+        """Makes the report of a drive, with the goals of others that drive the robot after it."""
         is_there = report.status.state is GoalState.ARRIVED
         left_m = 0.0 if is_there else report.status.distance_left_m
         return cls(
@@ -109,7 +131,7 @@ class DriveAnswer(Report):
             distance_left_m=None if left_m is None else round(left_m, 2),
             elapsed_s=round(report.elapsed_s, 1),
             reason=report.status.reason,
-            next_step=NEXT_STEP[report.status.state],
+            next_step=FOREIGN_DRIVE if foreign_goals else NEXT_STEP[report.status.state],
         )
 
 
@@ -148,6 +170,8 @@ class LandmarkReport(Report):
     purpose: str | None = None
     bearing_deg: float | None = Field(None, description="from the pose's heading, left positive")
     range_m: float | None = None
+    confidence: str | None = None
+    note: str | None = None
 
     @classmethod
     def of(cls, landmark: Landmark) -> Self:
@@ -158,6 +182,8 @@ class LandmarkReport(Report):
             purpose=landmark.purpose,
             bearing_deg=None if bearing_rad is None else round(math.degrees(bearing_rad), 1),
             range_m=None if landmark.range_m is None else round(landmark.range_m, 2),
+            confidence=landmark.confidence,
+            note=landmark.note,
         )
 
 
@@ -214,45 +240,57 @@ class MemoryAnswer(Report):
                 f"No place called {name[:80]!r} is remembered.",
                 hint=f"Remembered are {known or 'no places yet'}; without a name all are given.",
             )
+        return cls.of_places(memory, shown)
+
+    @classmethod
+    def of_places(
+        cls, memory: SemanticMap, shown: Iterable[RememberedPlace], *, advice: Sequence[str] = ()
+    ) -> Self:
+        """Makes the report of some places, with what else is to be said of them."""
         return cls(
             map=memory.map_id,
-            n_places=len(places),
+            n_places=len(memory.waypoints),
             waypoints=[WaypointReport.of(place) for place in shown],
-            warnings=list(memory.warnings),
+            warnings=[*advice, *memory.warnings],
         )
 
 
 class WriteAnswer(Report):
-    """What was remembered."""
+    """What was remembered, and what was not."""
 
     id: str = Field(description="takes you there with navigate_to")
-    name: str
-    pose: PoseReport
+    seen_from: str = Field(description="pose, and the room by id")
     is_new: bool
-    replaced: str = Field(description="the record before")
+    replaced: str = Field(description="what was known of the place and reads otherwise now")
+    landmarks: list[str] = Field(description="new, merged, kept or gone, and what changed")
+    refused: list[str] = Field(description="what stays out, and why")
     n_places: int = Field(description="remembered in all")
+    warnings: list[str]
 
     @classmethod
-    def of(cls, receipt: WriteReceipt, memory: SemanticMap) -> Self:
+    def of(
+        cls,
+        receipt: WriteReceipt,
+        memory: SemanticMap,
+        *,
+        merge: Merge,
+        refused: Sequence[str],
+        warnings: Sequence[str] = (),
+    ) -> Self:
         """Makes the report of a write, with the id that the place has in the memory now."""
         places = number_places(memory.waypoints)
         stored = next(place for place in places if _is_called(place, receipt.name))
+        waypoint = receipt.waypoint
         return cls(
             id=stored.id,
-            name=stored.waypoint.name,
-            pose=PoseReport.of(stored.waypoint.pose),
+            seen_from=f"{say_pose(waypoint.pose)}, in {waypoint.room_id or 'no room'}",
             is_new=receipt.is_created,
-            replaced=_say_previous(receipt.previous),
+            replaced="; ".join(say_replaced(receipt.previous, merge.waypoint)),
+            landmarks=list(say_landmarks(merge)),
+            refused=list(refused),
             n_places=receipt.n_waypoints,
+            warnings=list(warnings),
         )
-
-
-def _say_previous(previous: Waypoint | None) -> str:
-    if previous is None:
-        return ""
-    pose = PoseReport.of(previous.pose)
-    labels = ", ".join(landmark.label for landmark in previous.landmarks) or "no landmarks"
-    return f"{previous.description} ({pose.x}, {pose.y}, {pose.yaw_deg} deg; {labels})"
 
 
 def _is_called(place: RememberedPlace, name: str) -> bool:

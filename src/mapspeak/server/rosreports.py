@@ -1,5 +1,6 @@
 """ROS messages as a model reads them: short, whatever they hold."""
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -141,6 +142,8 @@ def _show_number(value: NUMBERS) -> str:
 
 
 def _show_text(text: str) -> str:
+    # On one line, whatever is in it: a text must not look like another field.
     if len(text) <= LONGEST_TEXT:
-        return f'"{text}"'
-    return f'"{text[:LONGEST_TEXT]}..." ({len(text):,} letters)'
+        return json.dumps(text, ensure_ascii=False)
+    shown = json.dumps(f"{text[:LONGEST_TEXT]}...", ensure_ascii=False)
+    return f"{shown} ({len(text):,} letters)"

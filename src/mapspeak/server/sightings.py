@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 from mcp.server.mcpserver import Image
 
-from mapspeak.robot import CameraPicture, Detection, Robot
+from mapspeak.robot import CameraPicture, Detection
 from mapspeak.server.wording import say_pose
+from mapspeak.session import Session
 
 __all__ = ["Sighting", "look_ahead"]
 
@@ -31,27 +32,39 @@ class Sighting:
         return Image(data=self.picture.data, format=self.picture.media_type.partition("/")[2])
 
 
-async def look_ahead(robot: Robot) -> Sighting:
-    """Takes a picture with the robot's front camera.
+async def look_ahead(session: Session) -> Sighting:
+    """Takes a picture with the robot's front camera, names it, and keeps it as an episode.
 
     Raises:
         LinkError: It has none, or it cannot be reached.
     """
+    robot = session.robot
     picture = await robot.fetch_picture()
-    lines = [_say_picture(picture)]
     detector = robot.description.detector
     detections: tuple[Detection, ...] = ()
     if detector is not None:
         detections = await robot.fetch_detections()
-        lines += _say_detections(detector, detections)
+    kept = await session.keep_picture(picture, labels=tuple(seen.label for seen in detections))
+    taken = session.pictures.add(
+        picture.data,
+        media_type=picture.media_type,
+        pose=picture.pose,
+        stamp_s=picture.stamp_s,
+        width_px=picture.width_px,
+        horizontal_fov_rad=picture.horizontal_fov_rad,
+        name=kept.picture,
+    )
+    lines = [_say_picture(taken.id, picture)]
+    lines += [] if detector is None else _say_detections(detector, detections)
+    lines += [kept.fault] if kept.fault else []
     return Sighting(text="\n".join(lines), picture=picture, detections=detections)
 
 
-def _say_picture(picture: CameraPicture) -> str:
+def _say_picture(picture_id: str, picture: CameraPicture) -> str:
     fov_rad = picture.horizontal_fov_rad
     width = "" if fov_rad is None else f", {math.degrees(fov_rad):.0f} deg wide"
     return (
-        f"Front camera, {picture.width_px} x {picture.height_px} px{width}, "
+        f"Picture {picture_id}: front camera, {picture.width_px} x {picture.height_px} px{width}, "
         f"taken at {say_pose(picture.pose)}."
     )
 

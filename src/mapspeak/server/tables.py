@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 from mapspeak.navigation.atlas import Atlas, RememberedPlace
+from mapspeak.navigation.closures import ClosedArea
 from mapspeak.server.roomtables import room_tables, say_walk
 from mapspeak.server.views import Layer, MapLook, MapView
 from mapspeak.server.wording import (
@@ -37,7 +38,8 @@ def describe_atlas(view: MapView) -> str:
         Layer.PLACES: _place_table,
     }
     shown = [build(view) for layer, build in tables.items() if layer in view.look.layers]
-    return "\n\n".join([_summary(view.atlas, view.look), *shown])
+    closed = [_closed_table(view)] if view.atlas.map.areas else []
+    return "\n\n".join([_summary(view.atlas, view.look), *closed, *shown])
 
 
 def _summary(atlas: Atlas, look: MapLook) -> str:
@@ -56,6 +58,27 @@ def _summary(atlas: Atlas, look: MapLook) -> str:
         square = f"{look.zoom.radius_m:.1f} m to all sides of {say_point(look.zoom.centre)}"
         lines.append(f"Shown and listed: only what lies around {look.around.name}, {square}.")
     return "\n".join(lines)
+
+
+def _closed_table(view: MapView) -> str:
+    return build_table(
+        "Closed to the robot, hatched in the picture",
+        ("name", "until", "x", "y", "reason"),
+        view.closed.items,
+        _closed_row,
+        n_all=view.closed.n_all,
+    )
+
+
+def _closed_row(area: ClosedArea) -> Sequence[str]:
+    low, high = area.bounds
+    return (
+        shorten(area.name),
+        area.until or "always",
+        f"{low.x:.1f} to {high.x:.1f}",
+        f"{low.y:.1f} to {high.y:.1f}",
+        shorten(area.reason) or "-",
+    )
 
 
 def _door_table(view: MapView) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from mapspeak.geometry import Point
 from mapspeak.navigation.atlas import Atlas, RememberedPlace
+from mapspeak.navigation.closures import ClosedArea
 from mapspeak.navigation.places import Place, find_place
 from mapspeak.spatial.frontiers import Frontier, RefusedFrontier
 from mapspeak.spatial.picture import NORTH_UP_RAD, Zoom
@@ -25,6 +26,7 @@ MOST_DOORS = 40
 MOST_FRONTIERS = 10
 MOST_PLACES = 30
 MOST_REFUSED = 5
+MOST_CLOSED = 20
 SLACK = 1.25
 AROUND_M = 5.0
 """So much is shown around a place that has no size of its own."""
@@ -129,6 +131,7 @@ class MapView:
         frontiers: Best first.
         refused: Borders with the unknown that are not offered, longest first.
         places: Remembered ones, nearest first.
+        closed: Areas that are closed to the robot now, in the order of the policy.
     """
 
     atlas: Atlas
@@ -139,6 +142,7 @@ class MapView:
     frontiers: Part[Frontier]
     refused: Part[RefusedFrontier]
     places: Part[RememberedPlace]
+    closed: Part[ClosedArea]
 
 
 def view_of(atlas: Atlas, look: MapLook) -> MapView:
@@ -170,7 +174,18 @@ def view_of(atlas: Atlas, look: MapLook) -> MapView:
         places=Part.first(
             sorted(places, key=lambda place: path_or_far(place.waypoint.pose.point)), MOST_PLACES
         ),
+        closed=Part.first(
+            [area for area in atlas.map.areas if _shows_some(look, area)], MOST_CLOSED
+        ),
     )
+
+
+def _shows_some(look: MapLook, area: ClosedArea) -> bool:
+    """True when some of an area may lie in the square that is shown."""
+    if look.zoom is None:
+        return True
+    farthest_m = look.zoom.radius_m * math.sqrt(2)
+    return area.distance_to(look.zoom.centre) <= farthest_m
 
 
 def look_at(

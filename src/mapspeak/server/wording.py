@@ -14,6 +14,7 @@ __all__ = [
     "join_words",
     "list_some",
     "say_compass",
+    "say_count",
     "say_direction",
     "say_kind",
     "say_obstruction",
@@ -50,6 +51,11 @@ COMPASS = (
     "south-east",
 )
 """The same from the map's x axis on."""
+
+
+def say_count(number: int, what: str) -> str:
+    """Gives "1 goal", "2 goals"."""
+    return f"{number:,} {what}{'' if number == 1 else 's'}"
 
 
 def say_pose(pose: Pose) -> str:

@@ -5,11 +5,13 @@ Occupancy grids with log-odds are Moravec and Elfes, "High resolution maps from 
 """
 
 import math
+from typing import Self
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from mapspeak.errors import MapError
 from mapspeak.geometry import Pose
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 
@@ -44,6 +46,39 @@ class LogOddsMap:
         self._hit_rows = np.zeros(self._log_odds.shape)
         self._row_of_zero = _GROWTH_CELLS
         self._col_of_zero = _GROWTH_CELLS
+
+    @classmethod
+    def of(cls, known: OccupancyGrid) -> Self:
+        """Gives a map as SLAM would hold it; its surfaces lie in the middles of their cells.
+
+        What is solid and not beside free floor is the inside of a wall and no surface.
+
+        Raises:
+            MapError: Its cells are not those of SLAM: of another size, turned, or shifted.
+        """
+        shift = np.array([known.origin.x, known.origin.y]) / CELL_SIZE_M
+        is_like_ours = math.isclose(known.resolution_m, CELL_SIZE_M, rel_tol=1e-6)
+        if not is_like_ours or known.origin.yaw_rad or np.abs(shift - np.rint(shift)).max() > 1e-3:
+            raise MapError(
+                f"The simulated robot finds its place only in maps with cells of {CELL_SIZE_M} m "
+                "whose borders lie at whole cells, unturned.",
+                hint="Give a map that the simulated robot has made.",
+            )
+        made = cls()
+        margin = _GROWTH_CELLS
+        beside_floor = cv2.dilate(known.free.view(np.uint8), np.ones((3, 3), dtype=np.uint8)) > 0
+        shown = np.where(known.occupied & ~beside_floor, UNKNOWN, known.cells)
+        cells = np.pad(shown.astype(np.float32), margin, constant_values=UNKNOWN)
+        share = np.clip(cells / 100.0, 0.02, 0.98)
+        made._is_seen = cells != UNKNOWN
+        made._log_odds = np.where(made._is_seen, np.log(share / (1 - share)), 0.0).astype(
+            np.float32
+        )
+        made._n_hits = np.where(made.occupied, 1.0, 0.0)
+        made._hit_cols = made._n_hits / 2
+        made._hit_rows = made._n_hits / 2
+        made._col_of_zero, made._row_of_zero = (margin - np.rint(shift)).astype(int).tolist()
+        return made
 
     @property
     def occupied(self) -> Mask:

@@ -6,6 +6,7 @@ import numpy as np
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.simulator.lidar import BEAM_ANGLES_RAD, measure_ranges
+from mapspeak.simulator.models import find_kind
 from mapspeak.simulator.slices import slice_world
 from mapspeak.simulator.world import World, WorldObject
 
@@ -20,7 +21,12 @@ SIDEWAYS_M = (-0.2, -0.1, 0.0, 0.1, 0.2)
 
 
 def is_in_sight(world: World, place: Point, thing: WorldObject) -> bool:
-    """True when nothing as high as the camera hides all of a thing from a place."""
+    """True when nothing as high as the camera hides all of a thing from a place.
+
+    What hangs on a wall is hidden from everywhere behind that wall.
+    """
+    if find_kind(thing.kind).is_wall_hung and thing.pose.inverse().transform(place).x <= 0:
+        return False
     solids = slice_world(world, low_m=EYE_BAND_M[0], high_m=EYE_BAND_M[1])
     ahead = int(np.argmin(np.abs(BEAM_ANGLES_RAD)))
     across = Pose(thing.pose.x, thing.pose.y, place.bearing_to(thing.pose.point))

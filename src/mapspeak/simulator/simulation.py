@@ -5,7 +5,7 @@ body moves, the wheels report, and at every second tick the LiDAR measures and S
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +18,7 @@ from mapspeak.simulator.body import RobotBody
 from mapspeak.simulator.camera import HORIZONTAL_FOV_RAD, Camera
 from mapspeak.simulator.detector import SimulatedDetection, SimulatedDetector
 from mapspeak.simulator.lidar import Lidar, LidarScan
+from mapspeak.simulator.localising import Localiser
 from mapspeak.simulator.mapping import Mapper
 from mapspeak.simulator.motion import BODY_BAND_M, STANDING, Odometry, Velocity
 from mapspeak.simulator.navigator import DriveState, DriveStatus, Navigator, Senses
@@ -57,18 +58,34 @@ class Simulation:
     Args:
         world: Where the robot drives.
         seed: Of all noise; the same seed and the same commands give the same run.
+        known: A finished map of the world, whose frame starts at the world's start; the robot finds
+            its place in it instead of making one.
+        start: Where the robot stands at first, in the world's own frame; None for the world's own.
+            Without a known map, the map frame starts there.
     """
 
-    def __init__(self, world: World, *, seed: int) -> None:
+    def __init__(
+        self,
+        world: World,
+        *,
+        seed: int,
+        known: OccupancyGrid | None = None,
+        start: Pose | None = None,
+    ) -> None:
+        start = world.start if start is None else start
+        world = world if known is not None else replace(world, start=start)
         solids = slice_world(world, low_m=BODY_BAND_M[0], high_m=BODY_BAND_M[1])
-        for_lidar, for_wheels, for_detector = np.random.default_rng(seed).spawn(3)
+        for_lidar, for_wheels, for_detector, for_guess = np.random.default_rng(seed).spawn(4)
         self._world = world
         self._n_ticks = 0
-        self._body = RobotBody(solids, world.start)
+        self._body = RobotBody(solids, start)
         self._lidar = Lidar(solids, random=for_lidar)
         self._odometry = Odometry(random=for_wheels)
         self._detector = SimulatedDetector(random=for_detector)
-        self._mapper = Mapper()
+        self._mapper: Mapper | Localiser = Mapper()
+        if known is not None:
+            pose = world.start.inverse() @ start
+            self._mapper = Localiser(known, pose, random=for_guess)
         self._navigator = Navigator()
         self._ended: dict[int, DriveStatus] = {}
         self._goal_id = 0
@@ -206,7 +223,7 @@ class Simulation:
             pose=self.pose_in_map,
             speed_mps=self._body.velocity.speed_mps,
             obstacles=Obstacles.seen_from(self._scan.points_in_base, now_from_scan),
-            map=self.map(),
+            map=self._mapper.planning_map or self.map(),
         )
 
     def _measure(self) -> None:

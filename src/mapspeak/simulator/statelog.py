@@ -3,6 +3,7 @@
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Self
 
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Pose
@@ -40,6 +41,20 @@ class StateRecord:
         """Where the robot truly stood."""
         return Pose(self.x, self.y, self.yaw_rad)
 
+    @classmethod
+    def of(cls, simulation: Simulation) -> Self:
+        """Gives how a simulation truly stands now."""
+        truth = simulation.truth
+        return cls(
+            time_s=round(simulation.time_s, 3),
+            x=truth.pose.x,
+            y=truth.pose.y,
+            yaw_rad=truth.pose.yaw_rad,
+            slam_error_m=truth.slam_error_m,
+            driven_m=truth.driven_m,
+            n_collisions=truth.n_collisions,
+        )
+
 
 class StateLog:
     """Writes a record at most five times per second of robot time."""
@@ -62,16 +77,7 @@ class StateLog:
         if now_s - self._last_s < PERIOD_S:
             return
         self._last_s = now_s
-        truth = self._simulation.truth
-        record = StateRecord(
-            time_s=round(now_s, 3),
-            x=truth.pose.x,
-            y=truth.pose.y,
-            yaw_rad=truth.pose.yaw_rad,
-            slam_error_m=truth.slam_error_m,
-            driven_m=truth.driven_m,
-            n_collisions=truth.n_collisions,
-        )
+        record = StateRecord.of(self._simulation)
         self._file.write(json.dumps(asdict(record)) + "\n")
         self._file.flush()
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mapspeak.simulator.gridmap import CELL_SIZE_M, LogOddsMap
 
-__all__ = ["NearestLines", "SurfaceField"]
+__all__ = ["FinishedField", "NearestLines", "SurfaceField"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
@@ -122,6 +122,47 @@ class SurfaceField:
             cells[..., 1].clip(margin, n_rows - 1 - margin),
             cells[..., 0].clip(margin, n_cols - 1 - margin),
         )
+
+
+class FinishedField(SurfaceField):
+    """The surfaces of a map that never changes again: every line is fitted once, beforehand."""
+
+    def __init__(self, log_odds_map: LogOddsMap) -> None:
+        super().__init__(log_odds_map)
+        margin = _REACH_CELLS
+        inner = self._occupied[margin:-margin, margin:-margin]
+        rows, cols = (index + margin for index in np.nonzero(inner))
+        self._middles, self._normals, self._has_direction = self._fit_lines(rows, cols)
+        self._nearest = np.full(self._occupied.shape, -1, dtype=np.int32)
+        # The farthest first, so that nearer ones overwrite them.
+        for row_step, col_step in _BY_DISTANCE[::-1]:
+            self._nearest[rows - row_step, cols - col_step] = np.arange(len(rows))
+
+    def find_lines(self, points_in_map: FloatArray) -> NearestLines:
+        """Looks up the surface near each point."""
+        nearest = self._nearest[self._cells(points_in_map, margin=_REACH_CELLS)]
+        is_near = nearest >= 0
+        nearest = np.where(is_near, nearest, 0)
+        if not len(self._middles):
+            return _no_lines(len(points_in_map))
+        normals = self._normals[nearest]
+        away = self._map.fractional_cells(points_in_map) - self._middles[nearest]
+        return NearestLines(
+            offsets_m=(away * normals).sum(axis=1) * CELL_SIZE_M,
+            normals=normals,
+            is_line=is_near & self._has_direction[nearest],
+            is_near=is_near,
+        )
+
+
+def _no_lines(n_points: int) -> NearestLines:
+    nowhere = np.zeros(n_points, dtype=np.bool_)
+    return NearestLines(
+        offsets_m=np.zeros(n_points),
+        normals=np.zeros((n_points, 2)),
+        is_line=nowhere,
+        is_near=nowhere,
+    )
 
 
 def _square(reach: int) -> IntArray:

@@ -16,6 +16,7 @@ from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.simulator.body import RobotBody
 from mapspeak.simulator.gridmap import CELL_SIZE_M
 from mapspeak.simulator.lidar import BEAM_DIRECTIONS, MAX_RANGE_M, measure_ranges
+from mapspeak.simulator.localising import Localiser
 from mapspeak.simulator.mapping import Mapper
 from mapspeak.simulator.motion import BODY_BAND_M, BODY_RADIUS_M
 from mapspeak.simulator.scanmatch import place_points
@@ -148,7 +149,7 @@ class TrueFloor:
 class Truth:
     """How a running simulation truly stands."""
 
-    def __init__(self, world: World, body: RobotBody, mapper: Mapper) -> None:
+    def __init__(self, world: World, body: RobotBody, mapper: Mapper | Localiser) -> None:
         self.world = world
         self.floor = TrueFloor(world)
         self._body = body

@@ -41,7 +41,7 @@ from mapspeak.simulator.world import Door, TrueRoom, Wall, World, WorldObject
 from mapspeak.spatial.mapfiles import load_map
 from mapspeak.spatial.rooms import RoomClass
 
-__all__ = ["load_world", "world_names"]
+__all__ = ["load_world", "parse_world", "read_world_text", "world_names"]
 
 _DOOR_REACH_M = 0.05
 """How far beside a wall's centre line, beyond half its thickness, a door may be written."""
@@ -78,6 +78,19 @@ def load_world(name_or_path: str | Path) -> World:
     tree = _parse_yaml(text, label)
     if "image" in tree:
         return build_map_world(load_map(Path(name_or_path)).grid, name=stem)
+    return _read_tree(tree, label, stem)
+
+
+def parse_world(text: str, *, name: str) -> World:
+    """Reads the text of a world file.
+
+    Raises:
+        ConfigError: It has a fault; the message names the line and the fault.
+    """
+    return _read_tree(_parse_yaml(text, name), name, name)
+
+
+def _read_tree(tree: CommentedMap, label: str, stem: str) -> World:
     try:
         written = _WorldFile.model_validate(tree)
         world = _build_world(written, stem)
@@ -88,6 +101,15 @@ def load_world(name_or_path: str | Path) -> World:
     except _FaultError as error:
         raise _fault(label, tree, error.location, error.message) from error
     return world
+
+
+def read_world_text(name_or_path: str | Path) -> str:
+    """Gives what a world's file says, word for word.
+
+    Raises:
+        ConfigError: There is no such world.
+    """
+    return _read_text(name_or_path)[2]
 
 
 # --- what a file says ------------------------------------------------------------------------

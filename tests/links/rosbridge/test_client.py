@@ -2,6 +2,7 @@
 
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
+from dataclasses import replace
 
 import anyio
 import orjson
@@ -202,10 +203,29 @@ async def test_a_server_that_comes_back_later_is_found_again() -> None:
     async with connected(server) as client:
         server.hangs_up = True
         await server.drop_all()
-        with pytest.raises(LinkError, match="was lost"):
+        with pytest.raises(LinkError, match="lost"):
             await client.call_service("/add", timeout_s=0.05)
         server.hangs_up = False
         assert await client.call_service("/add", {"a": 2}, timeout_s=PATIENCE_S) == {"a": 2}
+
+
+async def test_waits_for_a_robot_that_has_gone_do_not_add_up() -> None:
+    server = ScriptedServer({"call_service": echo})
+    timing = replace(QUICK, answer_s=0.5, attempt_s=0.01)
+    async with connected(server, timing=timing) as client:
+        server.hangs_up = True
+        await server.drop_all()
+        while client.lost_for_s is None:
+            await anyio.lowlevel.checkpoint()
+        for _ in range(60):
+            # Half a second each would be more than a test may take.
+            with pytest.raises(LinkError, match="has been lost for"):
+                await client.wait_until_connected()
+        assert client.lost_for_s is not None
+        server.hangs_up = False
+        await client.call_service("/add", timeout_s=PATIENCE_S)
+        await client.wait_until_connected()
+        assert client.lost_for_s is None
 
 
 async def test_a_hundred_losses_leave_no_socket_behind() -> None:

@@ -20,6 +20,7 @@ RUSH = {"linear": {**ZERO, "x": 2.0}, "angular": ZERO}
 READING = {
     "is_open",
     "connected_for_s",
+    "lost_for_s",
     "start_soon",
     "wait_until_connected",
     "subscribe",

@@ -107,6 +107,13 @@ def test_a_goal_that_is_no_goal_is_refused(verdict: GoalVerdict) -> None:
     assert decision.reason == "so it is."
 
 
+def test_the_time_of_a_hold_is_told_to_the_second() -> None:
+    held = Situation(held_by="`mapspeak stop`, at 2026-11-22 10:00:01.123456")
+    decision = decide(drive(), policy=Policy(), situation=held)
+    assert isinstance(decision, Refused)
+    assert decision.reason == "The robot is held: `mapspeak stop`, at 2026-11-22 10:00:01."
+
+
 def test_goals_without_a_known_way_can_be_allowed_but_never_closed_ones() -> None:
     policy = Policy(needs_known_way=False)
     unknown = drive(GoalVerdict.UNKNOWN, path_m=None)
@@ -128,14 +135,14 @@ def test_a_goal_that_is_too_far_is_refused_with_both_lengths() -> None:
     [
         (twist(0.6), "0.6 m/s"),
         (twist(-0.6), "0.6 m/s"),
-        (twist(0.1, 1.2), "1.2 rad/s"),
+        (twist(0.1, 1.2), "An angular speed of 1.2 rad/s"),
         (twist(math.nan), "nan"),
         (twist(math.inf), "inf"),
         ({"linear": {"x": 0.4, "y": 0.4}}, "0.565"),
         ({"linear": {"x": "0.1"}}, "nan"),
         ({"linear": {"x": 10**400}}, "inf"),
         ({"header": {}, "twist": twist(0.6)}, "0.6 m/s"),
-        ({"drive": {"speed": 0.6, "steering_angle": 0.0}}, "0.6 m/s"),
+        ({"drive": {"speed": 0.6, "steering_angle": 0.0}}, "A speed of 0.6 m/s"),
         ({"markers": [{"twist": twist(0.6)}]}, "0.6 m/s"),
     ],
 )

@@ -33,6 +33,12 @@ def test_every_key_is_documented() -> None:
 
 def test_every_example_loads(tmp_path: Path) -> None:
     path = tmp_path / "policy.yaml"
+    for name in ("keepout", "loading"):
+        (tmp_path / f"{name}.pgm").write_bytes(b"P5\n2 1\n255\n\x00\xfe")
+        (tmp_path / f"{name}.yaml").write_text(
+            f"image: {name}.pgm\nresolution: 0.5\norigin: [0, 0, 0]\nnegate: 0\n"
+            "occupied_thresh: 0.65\nfree_thresh: 0.25\n"
+        )
     for example in examples():
         path.write_text(example)
         load_policy(path)

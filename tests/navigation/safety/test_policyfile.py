@@ -1,3 +1,4 @@
+from collections.abc import Callable
 from datetime import time
 from pathlib import Path
 
@@ -5,6 +6,7 @@ import pytest
 
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Point
+from mapspeak.navigation.closures import ClosedArea
 from mapspeak.navigation.safety import (
     Hours,
     Kind,
@@ -110,3 +112,72 @@ def test_a_mistake_is_named_with_its_line_and_key(tmp_path: Path, text: str, say
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"missing\.yaml"):
         load_policy(tmp_path / "missing.yaml")
+
+
+def write_mask(folder: Path, rows: str, *, more: str = "origin: [10.0, 5.0, 0.0]") -> None:
+    """Draws a mask of half a metre per pixel, # for closed, as map_server keeps it."""
+    lines = rows.split()
+    pixels = bytes(0 if letter == "#" else 254 for line in lines for letter in line)
+    header = f"P5\n{len(lines[0])} {len(lines)}\n255\n".encode()
+    (folder / "keepout.pgm").write_bytes(header + pixels)
+    (folder / "keepout.yaml").write_text(
+        f"image: keepout.pgm\nresolution: 0.5\n{more}\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.196\nmode: trinary\n"
+    )
+
+
+def area_of(policy: Policy) -> ClosedArea:
+    (rule,) = policy.areas
+    return ClosedArea(name=rule.name, outline=rule.outline, further_outlines=rule.further_outlines)
+
+
+MASKED = "keep_out:\n  - name: machines\n    mask: keepout.yaml\n"
+
+
+def test_a_mask_closes_its_black_pixels_in_its_own_frame_and_leaves_its_holes_open(
+    tmp_path: Path,
+) -> None:
+    write_mask(tmp_path, ".......  .#####.  .#...#.  .#...#.  .#####.  ......#")
+    area = area_of(policy_of(tmp_path, MASKED))
+    assert [area.contains(Point(x, 6.25)) for x in (10.25, 10.75, 11.75, 12.75, 13.25)] == [
+        False,
+        True,
+        False,
+        True,
+        False,
+    ]
+    assert area.contains(Point(13.25, 5.25))
+    assert area.distance_to(Point(11.75, 6.5)) == pytest.approx(0.5 - 0.125)
+
+
+def test_a_turned_mask_lies_turned_on_the_map(tmp_path: Path) -> None:
+    write_mask(tmp_path, "....  ..#.  ....", more="origin: [10.0, 5.0, 1.5707963]")
+    area = area_of(policy_of(tmp_path, MASKED))
+    assert area.contains(Point(10.0 - 0.75, 5.0 + 1.25))
+    assert not area.contains(Point(10.0 + 1.25, 5.0 + 0.75))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "says"),
+    [
+        (lambda folder: (folder / "keepout.pgm").unlink(), "keepout.pgm is missing"),
+        (lambda folder: (folder / "keepout.yaml").unlink(), "keepout.yaml"),
+        (lambda folder: (folder / "keepout.pgm").write_bytes(b"P5\n9 9\n255\n.."), "keepout.pgm"),
+        (lambda folder: write_mask(folder, "... ..."), "closes nothing"),
+        (lambda folder: write_mask(folder, "#..", more="origin: [0.0]"), "origin"),
+    ],
+)
+def test_a_mistake_in_a_mask_is_named_with_its_file_and_the_policys_line(
+    tmp_path: Path, spoil: Callable[[Path], object], says: str
+) -> None:
+    write_mask(tmp_path, "#..")
+    spoil(tmp_path)
+    with pytest.raises(ConfigError) as raised:
+        policy_of(tmp_path, MASKED)
+    assert f"{tmp_path / 'policy.yaml'}, line 3: 'keep_out.0.mask'" in str(raised.value)
+    assert says in str(raised.value)
+
+
+def test_an_area_says_why_it_is_closed(tmp_path: Path) -> None:
+    text = "keep_out: [{name: pit, region: R1, reason: wet paint}]"
+    assert policy_of(tmp_path, text).areas[0].reason == "wet paint"

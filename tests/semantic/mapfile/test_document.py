@@ -1,8 +1,10 @@
+from datetime import UTC, datetime
+
 import pytest
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
-from mapspeak.semantic import Landmark, SemanticMap
+from mapspeak.semantic import Confidence, Landmark, SemanticMap
 from mapspeak.semantic.mapfile import parse_document
 
 
@@ -80,6 +82,27 @@ waypoints:
     assert lift == Landmark(label="lift", range_m=4.0)
 
 
+def test_confidence_picture_time_and_room_are_read() -> None:
+    (place,) = read(
+        """\
+waypoints:
+  - name: hall
+    pose: {x: 0, y: 0, yaw_deg: 0}
+    functional_landmarks:
+      - {label: tap, confidence: likely, picture: P3.jpg, stamp_s: 4.5}
+      - {label: lift, recorded_at: 2026-11-02T10:30:00+00:00, confidence: unsure}
+    room_id: R3
+    picture: P4.jpg
+"""
+    ).waypoints
+
+    tap, lift = place.functional_landmarks
+    assert tap == Landmark(label="tap", confidence=Confidence.LIKELY, picture="P3.jpg", stamp_s=4.5)
+    assert lift.recorded_at == datetime(2026, 11, 2, 10, 30, tzinfo=UTC)
+    assert lift.confidence is Confidence.UNSURE
+    assert (place.room_id, place.picture) == ("R3", "P4.jpg")
+
+
 @pytest.mark.parametrize("name", ["101", "0101", "1.5", "yes", "on", "2026-11-02", "1e3"])
 def test_a_name_is_what_stands_there_even_if_yaml_knows_a_number_of_that_spelling(
     name: str,
@@ -155,13 +178,16 @@ waypoints:
   - name: a
     pose: {x: 0, y: 0, yaw_deg: 0}
     decription: cold
-    safety_landmarks: [{label: hose, range: 3}]
+    rooom_id: R1
+    safety_landmarks: [{label: hose, range: 3, confidense: likely}]
 """
     )
 
     assert places.warnings == (
         "The key 'decription' of 'a' (line 2) is not used; 'description' would be.",
+        "The key 'rooom_id' of 'a' (line 2) is not used; 'room_id' would be.",
         "The key 'range' of 'a' (line 2) is not used; 'range_m' would be.",
+        "The key 'confidense' of 'a' (line 2) is not used; 'confidence' would be.",
     )
 
 
@@ -221,6 +247,13 @@ def test_a_faulty_line_is_reported_with_its_place_and_an_example(
         ("geometric_features: [{label: x}]", "geometric_features.0 is not text"),
         ("recorded_at: 2026-11-02 10:30", "is not a date and time with a time zone"),
         ("stamp_s: now", "stamp_s, 'now', is not a number"),
+        ("room_id: [R1]", "room_id is not text"),
+        ("picture: {}", "picture is not text"),
+        (
+            "safety_landmarks: [{label: x, confidence: high}]",
+            "confidence, 'high', is none of certain, likely, unsure. Write it like `confidence: l",
+        ),
+        ("safety_landmarks: [{label: x, stamp_s: now}]", "0.stamp_s, 'now', is not a number"),
     ],
 )
 def test_a_wrong_value_is_reported_with_what_is_expected(line: str, reason: str) -> None:

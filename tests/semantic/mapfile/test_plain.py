@@ -18,6 +18,7 @@ RECORD = """\
     safety_landmarks: [fire extinguisher, exit sign]
     functional_landmarks:
       - {label: tap, bearing_deg: 28.65, range_m: 2.25}
+      - {label: sink, confidence: likely, picture: P1.jpg, recorded_at: 2026-11-02T10:30:00Z}
       - rack
     geometric_features: []
     recorded_at: 2026-11-02T10:30:00+00:00

@@ -101,6 +101,11 @@ class NativeConnection(ABC):
     """The part of the port that is about topics."""
 
     @property
+    def lost_for_s(self) -> float | None:
+        """None: in the robot's own network nothing stands between us and its nodes."""
+        return None
+
+    @property
     @abstractmethod
     def topics(self) -> NativeTopics[Any]:
         """What is read and written."""

@@ -18,6 +18,7 @@ FIELD_OF_KIND = {
     9: "string_array_value",
 }
 """By rcl_interfaces/ParameterType, the field of ParameterValue that holds the value; 0 is unset."""
+NOT_SET = 0
 KIND_OF: dict[type, int] = {bool: 1, int: 2, float: 3, str: 4}
 DOUBLE, DOUBLE_ARRAY, ARRAY_SHIFT = 3, 8, 5
 
@@ -68,22 +69,26 @@ class NodeParameters:
     async def put(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401 - likewise
         """Sets a parameter; a whole number becomes a double where the node keeps doubles.
 
+        None deletes it, which a node allows only for what it has not declared.
+
         Raises:
             LinkError: The node does not answer, or refuses, and says why.
         """
-        types = await self._call(
-            node, "get_parameter_types", "GetParameterTypes", {"names": [name]}
-        )
-        parameter = {"name": name, "value": _write(value, wanted=_first_of(types.get("types")))}
+        parameter = {"name": name, "value": await self._write(node, name, value)}
         answer = await self._call(
             node, "set_parameters", "SetParameters", {"parameters": [parameter]}
         )
         for result in _part(answer, "results", node):
             if isinstance(result, dict) and not result.get("successful", False):
-                raise LinkError(
-                    f"{node} refuses {name} = {str(value)[:80]}: {result.get('reason')}",
-                    hint="Read the parameter and its type first; give a value of that type.",
-                )
+                raise _refused(node, name, value, result.get("reason"))
+
+    async def _write(self, node: str, name: str, value: Any) -> dict[str, Any]:  # noqa: ANN401
+        if value is None:
+            return {"type": NOT_SET}
+        types = await self._call(
+            node, "get_parameter_types", "GetParameterTypes", {"names": [name]}
+        )
+        return _write(value, wanted=_first_of(types.get("types")))
 
     async def _call(
         self, node: str, service: str, type_name: str, arguments: Mapping[str, Any]
@@ -91,6 +96,19 @@ class NodeParameters:
         return await self._caller.call_service(
             f"{node}/{service}", arguments, type_name=f"rcl_interfaces/srv/{type_name}"
         )
+
+
+def _refused(node: str, name: str, value: object, said: object) -> LinkError:
+    reason = str(said or "it gives no reason").rstrip(". ") + "."
+    if value is None:
+        return LinkError(
+            f"{node} does not delete {name}: {reason}",
+            hint="A parameter that a node has declared can only be set.",
+        )
+    return LinkError(
+        f"{node} refuses {name} = {str(value)[:80]}: {reason}",
+        hint="Read the parameter and its type first; give a value of that type.",
+    )
 
 
 def _first_of(numbers: Any) -> int:  # noqa: ANN401 - uint8[]: base64, bytes or a list

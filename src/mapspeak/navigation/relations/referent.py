@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from mapspeak.geometry import Point
-from mapspeak.navigation.atlas import Atlas, RememberedPlace
+from mapspeak.navigation.atlas import Atlas, RememberedPlace, RememberedThing
 from mapspeak.navigation.goals import FARTHEST_M
 from mapspeak.navigation.naming import Place, Spot
 from mapspeak.navigation.relations.outlines import find_outline
@@ -71,12 +71,22 @@ def refer_to(atlas: Atlas, place: Place) -> Referent:
         case RememberedPlace(id=place_id, waypoint=waypoint):
             name = place.name if place.name == place_id else f"{place_id} ({place.name})"
             return refer_to_point(atlas, name, waypoint.pose.point, front_rad=waypoint.pose.yaw_rad)
+        case RememberedThing(id=thing_id, thing=thing) as remembered:
+            rooms = [atlas.rooms.region(each) for each in atlas.rooms_before(remembered)]
+            home = rooms[0] if len(rooms) == 1 else None
+            name = f"{thing.label} ({thing_id}, seen from {_say_seen_from(atlas, remembered)})"
+            return refer_to_point(atlas, name, remembered.point, home=home)
         case Frontier(pose=pose):
             return refer_to_point(atlas, place.name, pose.point)
         case Spot(point=point, yaw_rad=yaw_rad):
             is_robot = place.name == "robot"
             name = "the robot" if is_robot else place.name
             return refer_to_point(atlas, name, point, front_rad=yaw_rad, is_robot=is_robot)
+
+
+def _say_seen_from(atlas: Atlas, remembered: RememberedThing) -> str:
+    places = map(atlas.recollection.find_place, remembered.thing.waypoints)
+    return " and ".join(dict.fromkeys(place.id for place in places if place is not None))
 
 
 def refer_to_point(

@@ -22,6 +22,7 @@ from mapspeak.navigation.safety.deciding import (
     Situation,
     decide,
 )
+from mapspeak.navigation.safety.errands import Errand, on_errand
 from mapspeak.navigation.safety.guard import ApprovalNeededError, Clearance, Guard
 from mapspeak.navigation.safety.hold import Hold
 from mapspeak.navigation.safety.policy import (
@@ -37,6 +38,7 @@ from mapspeak.navigation.safety.policy import (
 from mapspeak.navigation.safety.policyfile import load_policy
 from mapspeak.navigation.safety.robot import GuardedRobot
 from mapspeak.navigation.safety.surveying import Surveyor
+from mapspeak.navigation.safety.velocities import HandDriving, publishing_for
 
 __all__ = [
     "NOBODY",
@@ -54,9 +56,11 @@ __all__ = [
     "Command",
     "Decision",
     "Drive",
+    "Errand",
     "Guard",
     "GuardedConnection",
     "GuardedRobot",
+    "HandDriving",
     "Hold",
     "Hours",
     "Kind",
@@ -76,6 +80,8 @@ __all__ = [
     "current_caller",
     "decide",
     "load_policy",
+    "on_errand",
+    "publishing_for",
     "read_audit",
     "say_command",
 ]

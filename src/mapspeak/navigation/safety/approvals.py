@@ -8,6 +8,7 @@ from pathlib import Path
 
 from mapspeak.errors import ConfigError
 from mapspeak.navigation.safety.commands import Command, is_same, say_command
+from mapspeak.navigation.safety.errands import Errand
 
 __all__ = ["Approvals", "WaitingRoom"]
 
@@ -16,19 +17,23 @@ VALID_S = 600.0
 MOST_WAITING = 50
 
 
+Wanted = Command | Errand
+"""What a person's word may be for: one command, or the drives of an errand."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Wish:
-    """A command that somebody asked for.
+    """What somebody asked for.
 
     Attributes:
         id: What an operator calls it.
-        command: The command.
+        wanted: What for.
         client: Who asked.
         asked_s: When, by the same clock as all times here.
     """
 
     id: str
-    command: Command
+    wanted: Wanted
     client: str
     asked_s: float
 
@@ -106,16 +111,16 @@ class Approvals:
     _n_wishes: int = 0
     _prefix: str = field(default_factory=lambda: secrets.token_hex(2))
 
-    def ask(self, command: Command, *, client: str) -> str:
+    def ask(self, wanted: Wanted, *, client: str) -> str:
         """Notes a wish and gives its id; the same one for the same wish."""
         self._forget_old()
         for known in self._wishes.values():
-            if _is_of(known, command, client):
+            if _is_of(known, wanted, client):
                 return known.id
         self._n_wishes += 1
         wish_id = f"{self._prefix}-{self._n_wishes}"
         self._wishes[wish_id] = _Wish(
-            id=wish_id, command=command, client=client, asked_s=self.now_s()
+            id=wish_id, wanted=wanted, client=client, asked_s=self.now_s()
         )
         return wish_id
 
@@ -123,7 +128,7 @@ class Approvals:
         """Lets a wish wait for `mapspeak approve`."""
         wish = self._wishes[wish_id]
         who = f", asked by {wish.client}" if wish.client else ""
-        self.room.add(wish_id, f"{say_command(wish.command)}{who}")
+        self.room.add(wish_id, f"{_say(wish.wanted)}{who}")
 
     def grant(self, wish_id: str) -> bool:
         """Notes a person's word for a wish, and gives whether there is such a wish."""
@@ -131,16 +136,16 @@ class Approvals:
             self._granted.add(wish_id)
         return wish_id in self._wishes
 
-    def is_granted(self, command: Command, *, client: str) -> bool:
-        """True once for each word that a person gave for this command of this client."""
+    def take_word(self, wanted: Wanted, *, client: str) -> str | None:
+        """Gives the id of the word that a person gave for this wish of this client, once."""
         self._forget_old()
         for wish in list(self._wishes.values()):
-            if not _is_of(wish, command, client):
+            if not _is_of(wish, wanted, client):
                 continue
             if wish.id in self._granted or self.room.take_approved(wish.id):
                 self._forget(wish.id)
-                return True
-        return False
+                return wish.id
+        return None
 
     def close(self) -> None:
         """Forgets everything: what waits here can no longer be done."""
@@ -160,5 +165,11 @@ class Approvals:
         self.room.remove(wish_id)
 
 
-def _is_of(wish: _Wish, command: Command, client: str) -> bool:
-    return wish.client == client and is_same(wish.command, command)
+def _is_of(wish: _Wish, wanted: Wanted, client: str) -> bool:
+    if isinstance(wish.wanted, Errand) or isinstance(wanted, Errand):
+        return wish.client == client and wish.wanted == wanted
+    return wish.client == client and is_same(wish.wanted, wanted)
+
+
+def _say(wanted: Wanted) -> str:
+    return wanted.said if isinstance(wanted, Errand) else say_command(wanted)

@@ -124,6 +124,8 @@ def say_command(command: Command) -> str:
             return f"call {command.service} ({command.type})"
         case Act():
             return f"send a goal to {command.action} ({command.type})"
+        case SetParameter(value=None):
+            return f"delete {command.full_name}"
         case SetParameter():
             return f"set {command.full_name} to {str(command.value)[:MOST_SHOWN]!r}"
 

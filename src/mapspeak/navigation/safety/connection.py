@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 from mapspeak.navigation.safety.commands import Act, Call, Command, Publish, SetParameter
 from mapspeak.navigation.safety.deciding import find_speeds, is_name_denied
 from mapspeak.navigation.safety.guard import Guard
+from mapspeak.navigation.safety.velocities import HandDriving, stand_of
 from mapspeak.ros import ActionGoal, NodeLinks, RosConnection, RosGraph, Subscription
 from mapspeak.ros.messages import Message
 
@@ -28,12 +29,19 @@ class GuardedConnection:
         connection: The connection itself.
         guard: Decides and notes.
         now_s: Robot time.
+        by_hand: Knows where velocities would take the robot; None where nothing is closed.
     """
 
     def __init__(
-        self, connection: RosConnection, *, guard: Guard, now_s: Callable[[], float]
+        self,
+        connection: RosConnection,
+        *,
+        guard: Guard,
+        now_s: Callable[[], float],
+        by_hand: HandDriving | None = None,
     ) -> None:
         self._connection = connection
+        self._by_hand = by_hand
         self._guard = guard
         self._now_s = now_s
         self._types: dict[str, str] = {}
@@ -51,8 +59,11 @@ class GuardedConnection:
             await self._connection.publish(topic, message)
             self._note_stop(command)
             return
+        objection = await self._by_hand.find_objection(message) if self._by_hand else None
         done = self._connection.publish(topic, message)
-        await self._guarded(command, done)
+        # From before it is sent: what fails half-way may move the robot all the same.
+        self._watch_over(command, objection)
+        await self._guarded(command, done, objection)
 
     def publish_everywhere(self, topic: str, message: Message) -> int:
         """Publishes at once by every way that is open, and gives how many: for a stop.
@@ -65,7 +76,8 @@ class GuardedConnection:
             n_ways = self._connection.publish_everywhere(topic, message)
             self._note_stop(command)
             return n_ways
-        cleared = self._guard.clear(command, robot_s=self._now_s())
+        objection = self._objection_unseen(command)
+        cleared = self._guard.clear(command, robot_s=self._now_s(), objection=objection)
         n_ways = self._connection.publish_everywhere(topic, message)
         self._guard.note_result(cleared, f"by {n_ways} ways", robot_s=self._now_s())
         return n_ways
@@ -112,10 +124,39 @@ class GuardedConnection:
         command = SetParameter(node=node, name=name, value=value)
         await self._guarded(command, self._connection.set_parameter(node, name, value))
 
-    async def _guarded(self, command: Command, work: Coroutine[Any, Any, T]) -> T:
+    def check_name(self, command: Command) -> None:
+        """Returns when a command is not denied for its name, whatever else it says.
+
+        Raises:
+            PolicyError: It is.
+        """
+        is_stop = isinstance(command, Publish | Call) and _is_stop(command)
+        if not is_stop and is_name_denied(command, self._guard.policy):
+            self._guard.clear(command, robot_s=self._now_s())
+
+    def _watch_over(self, command: Publish, objection: str | None) -> None:
+        """Lets the robot be watched that is about to be driven by a velocity."""
+        if self._by_hand is None or objection is not None or not any(find_speeds(command.message)):
+            return
+        stand = stand_of(command.message)
+        self._by_hand.begin(
+            command.topic,
+            stand=lambda: self._connection.publish_everywhere(command.topic, stand),
+        )
+
+    def _objection_unseen(self, command: Publish) -> str | None:
+        """Gives what is against a velocity where there is no time to look for the robot."""
+        is_free = self._by_hand is None or not self._by_hand.knows_areas
+        if is_free or not any(find_speeds(command.message)):
+            return None
+        return "A velocity goes out by all ways at once only to make the robot stand."
+
+    async def _guarded(
+        self, command: Command, work: Coroutine[Any, Any, T], objection: str | None = None
+    ) -> T:
         """Does what was decided to be allowed, and notes how it ended."""
         try:
-            cleared = self._guard.clear(command, robot_s=self._now_s())
+            cleared = self._guard.clear(command, robot_s=self._now_s(), objection=objection)
         except BaseException:
             work.close()
             raise
@@ -128,6 +169,8 @@ class GuardedConnection:
         return result
 
     def _note_stop(self, command: Publish | Call) -> None:
+        if self._by_hand is not None and isinstance(command, Publish):
+            self._by_hand.end(command.topic)
         name = command.service if isinstance(command, Call) else command.topic
         said = f"a stand, or the end of a goal, on {name}"
         self._guard.note_event("stop", said, robot_s=self._now_s())
@@ -158,6 +201,11 @@ class GuardedConnection:
     def connected_for_s(self) -> float | None:
         """Since when topics and goals have been connected, in wall time; None while not."""
         return self._connection.connected_for_s
+
+    @property
+    def lost_for_s(self) -> float | None:
+        """Since when the connection has been lost, in wall time; None while there is one."""
+        return self._connection.lost_for_s
 
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Runs something in the background until the connection is closed."""
@@ -194,9 +242,7 @@ class GuardedConnection:
         Raises:
             PolicyError: The policy forbids the topic: the robot must not even hear of it.
         """
-        command = Publish(topic=topic, type=type_name, message={})
-        if not _is_stop(command) and is_name_denied(command, self._guard.policy):
-            self._guard.clear(command, robot_s=self._now_s())
+        self.check_name(Publish(topic=topic, type=type_name, message={}))
         self._types[topic] = type_name
         self._connection.advertise(topic, type_name=type_name)
 

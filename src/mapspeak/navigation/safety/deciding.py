@@ -15,6 +15,7 @@ from mapspeak.navigation.safety.commands import (
     SetParameter,
     say_command,
 )
+from mapspeak.navigation.safety.hold import say_hold
 from mapspeak.navigation.safety.policy import Policy
 
 __all__ = [
@@ -34,7 +35,13 @@ MOST_NESTED = 8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Allowed:
-    """The command may go to the robot."""
+    """The command may go to the robot.
+
+    Attributes:
+        by: The person's word that covers it; empty where none was needed.
+    """
+
+    by: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,11 +86,13 @@ class Situation:
         held_by: Why the robot is held; None where it is not.
         n_in_last_minute: Commands of this kind that were allowed in the last minute.
         is_approved: A person has agreed to this command.
+        objection: Why a published velocity must not be, by where it would take the robot.
     """
 
     held_by: str | None = None
     n_in_last_minute: int = 0
     is_approved: bool = False
+    objection: str | None = None
 
 
 def decide(command: Command, *, policy: Policy, situation: Situation) -> Decision:
@@ -93,6 +102,7 @@ def decide(command: Command, *, policy: Policy, situation: Situation) -> Decisio
         _against_name(command, policy),
         _against_goal(command, policy),
         _against_speed(command, policy),
+        _against_way(situation),
         _against_rate(command, policy, situation),
     )
     refused = next((each for each in refusals if each is not None), None)
@@ -113,7 +123,7 @@ def _against_everything(policy: Policy, situation: Situation) -> Refused | None:
     if situation.held_by is not None:
         return Refused(
             rule="hold",
-            reason=f"The robot is held: {situation.held_by}.",
+            reason=f"The robot is held: {say_hold(situation.held_by)}.",
             hint="Tell the person at the robot; only `mapspeak release` lets it drive again.",
         )
     return None
@@ -175,17 +185,17 @@ def _against_speed(command: Command, policy: Policy) -> Refused | None:
     if not isinstance(command, Publish):
         return None
     limits = {
-        "linear": (policy.speeds.linear_mps, "m/s"),
-        "angular": (policy.speeds.angular_radps, "rad/s"),
-        "speed": (policy.speeds.linear_mps, "m/s"),
+        "linear": ("A linear speed", policy.speeds.linear_mps, "m/s"),
+        "angular": ("An angular speed", policy.speeds.angular_radps, "rad/s"),
+        "speed": ("A speed", policy.speeds.linear_mps, "m/s"),
     }
     for part, speed in find_speeds(command.message):
-        most, unit = limits[part]
+        name, most, unit = limits[part]
         # Written so that what is no number is refused too.
         if not speed <= most:
             return Refused(
                 rule=f"speed.{part}",
-                reason=f"A {part} speed of {speed:g} {unit} is above the limit, {most:g} {unit}.",
+                reason=f"{name} of {speed:g} {unit} is above the limit, {most:g} {unit}.",
                 hint=f"Publish at most {most:g} {unit}.",
             )
     return None
@@ -219,6 +229,16 @@ def _number(value: object) -> float:
         return float(value) if is_number else math.nan  # type: ignore[arg-type]
     except OverflowError:
         return math.inf
+
+
+def _against_way(situation: Situation) -> Refused | None:
+    if situation.objection is None:
+        return None
+    return Refused(
+        rule="keep_out",
+        reason=situation.objection,
+        hint="Publish a velocity that leads away, or use navigate_to, which leads round.",
+    )
 
 
 def _against_rate(command: Command, policy: Policy, situation: Situation) -> Refused | None:

@@ -2,14 +2,14 @@
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 
 from mapspeak.errors import GoalError, PolicyError
 from mapspeak.navigation.safety.approvals import Approvals
 from mapspeak.navigation.safety.audit import AuditLog
 from mapspeak.navigation.safety.caller import Caller, current_caller
-from mapspeak.navigation.safety.commands import Command
+from mapspeak.navigation.safety.commands import Command, Drive
 from mapspeak.navigation.safety.deciding import (
     Allowed,
     Decision,
@@ -18,6 +18,7 @@ from mapspeak.navigation.safety.deciding import (
     Situation,
     decide,
 )
+from mapspeak.navigation.safety.errands import Errand, Errands, current_errand
 from mapspeak.navigation.safety.hold import Hold
 from mapspeak.navigation.safety.policy import Otherwise, Policy
 from mapspeak.navigation.safety.rates import RateLog
@@ -76,9 +77,15 @@ class Guard:
     wall_clock: Callable[[], datetime]
     robot: str = ""
     _rates: RateLog = field(default_factory=RateLog)
+    _errands: Errands = field(default_factory=Errands)
 
-    def clear(self, command: Command, *, robot_s: float) -> Clearance:
+    def clear(self, command: Command, *, robot_s: float, objection: str | None = None) -> Clearance:
         """Allows a command, and notes that; between this and the command nothing may wait.
+
+        Args:
+            command: What is wanted.
+            robot_s: Robot time.
+            objection: What is against it by where it would take the robot.
 
         Raises:
             ApprovalNeededError: A person has to agree first.
@@ -87,7 +94,7 @@ class Guard:
         """
         caller = current_caller()
         cleared = Clearance(number=self.audit.next_number(), command=command, caller=caller)
-        decision = self._decide(command, caller, robot_s)
+        decision = self._decide(command, caller, robot_s, objection)
         verdict, said = _say_decision(decision)
         self._note("decision", cleared, robot_s=robot_s, verdict=verdict, said=said)
         match decision:
@@ -129,20 +136,44 @@ class Guard:
         except PolicyError as error:
             logger.error("%s", error)  # noqa: TRY400 - it says all there is to say
 
-    def _decide(self, command: Command, caller: Caller, robot_s: float) -> Decision:
-        situation = self._situation(command, robot_s)
+    def _decide(
+        self, command: Command, caller: Caller, robot_s: float, objection: str | None
+    ) -> Decision:
+        situation = replace(self._situation(command, robot_s), objection=objection)
         decision = decide(command, policy=self.policy, situation=situation)
-        is_asked_for = isinstance(decision, NeedsApproval)
-        if is_asked_for and self.approvals.is_granted(command, client=caller.client):
-            return Allowed()
-        return decision
+        if not isinstance(decision, NeedsApproval):
+            return decision
+        errand = _errand_of(command)
+        if errand is None:
+            wish_id = self.approvals.take_word(command, client=caller.client)
+        else:
+            wish_id = self._take_part(errand, caller.client, robot_s)
+            decision = NeedsApproval(question=_ask_for(errand))
+        if wish_id is None:
+            return decision
+        return Allowed(by=wish_id if errand is None else f"{wish_id}: {errand.said}")
+
+    def _take_part(self, errand: Errand, client: str, robot_s: float) -> str | None:
+        """Gives the word that covers another drive of an errand; None where none does any more."""
+        wish_id = self._errands.take_drive(errand, client=client, robot_s=robot_s)
+        if wish_id is not None:
+            return wish_id
+        wish_id = self.approvals.take_word(errand, client=client)
+        if wish_id is None:
+            return None
+        self._errands.begin(errand, client=client, wish_id=wish_id, robot_s=robot_s)
+        return self._errands.take_drive(errand, client=client, robot_s=robot_s)
+
+    def end_errands(self) -> None:
+        """Lets a person be asked again for what is left of errands: the robot was stopped."""
+        self._errands.end_all()
 
     def _situation(self, command: Command, robot_s: float) -> Situation:
         n_lately = self._rates.count(command.kind, robot_s)
         return Situation(held_by=self.hold.read(), n_in_last_minute=n_lately)
 
     def _ask(self, command: Command, question: str, caller: Caller) -> ApprovalNeededError:
-        wish_id = self.approvals.ask(command, client=caller.client)
+        wish_id = self.approvals.ask(_errand_of(command) or command, client=caller.client)
         hint = "The client cannot ask anybody: tell the person that the policy wants their word."
         if self.policy.approval.otherwise is Otherwise.QUEUE:
             self.approvals.queue(wish_id)
@@ -176,5 +207,14 @@ def _say_decision(decision: Decision) -> tuple[str, str]:
             return "refused", f"{rule}: {reason}"
         case NeedsApproval(question=question):
             return "needs approval", question
-        case Allowed():
-            return "allowed", ""
+        case Allowed(by=by):
+            return "allowed", f"by approval {by}" if by else ""
+
+
+def _errand_of(command: Command) -> Errand | None:
+    """Gives what a drive is a part of; None for one that is for itself, and for other commands."""
+    return current_errand() if isinstance(command, Drive) else None
+
+
+def _ask_for(errand: Errand) -> str:
+    return f"May the robot {errand.said}? The limits of its policy stay."

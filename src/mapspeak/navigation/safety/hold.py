@@ -6,6 +6,7 @@ be made and removed by a person with no program of ours at all.
 
 import json
 import os
+import re
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -16,7 +17,9 @@ from typing import Any
 
 from mapspeak.errors import ConfigError
 
-__all__ = ["Hold"]
+__all__ = ["Hold", "say_hold"]
+
+FRACTION = re.compile(r"(?<=:\d\d)\.\d+$")
 
 HOLD = "hold"
 ANSWERS = "standing"
@@ -133,6 +136,11 @@ class Hold:
                 f"{self.file} cannot be changed: {error.strerror or error}.",
                 hint="Check who owns that folder; press the robot's own stop button meanwhile.",
             ) from error
+
+
+def say_hold(held_by: str) -> str:
+    """Gives why a robot is held, to the second; the rest tells one hold from another."""
+    return FRACTION.sub("", held_by)
 
 
 def _file_of(robot: str) -> str:

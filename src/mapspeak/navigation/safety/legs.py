@@ -11,7 +11,7 @@ from mapspeak.navigation.closures import MARGIN_M, ClosedArea, distance_to_line
 from mapspeak.navigation.revision import MapRevision
 from mapspeak.navigation.safety.lookout import KEEP_M
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.spatial.paths import find_path
+from mapspeak.spatial.paths import Path, find_path
 
 __all__ = ["plan_legs"]
 
@@ -30,16 +30,22 @@ def plan_legs(revision: MapRevision, here: Point, goal: Pose) -> tuple[Pose, ...
     """Gives the poses to drive to one after the other, the goal last.
 
     The robot's own navigation is expected to go the shortest way over the floor as it knows it.
-    Where that is clear of areas it gets the goal alone; else the corners of the way round them.
+    Where that is clear of areas, and of hindrances that can be avoided, it gets the goal alone;
+    else the corners of the way round them.
     """
-    if not revision.areas:
+    if not (revision.areas or revision.hindrances):
         return (goal,)
     reach_m = revision.radius_m + MARGIN_M
     expected = revision.open.distances_from(here).path_to(goal.point)
-    if expected is not None and _is_clear(expected.points, revision.areas, reach_m):
+    if expected is not None and not _is_clear(expected.points, revision.areas, reach_m):
+        expected = None
+    if expected is not None and not _find_crossed(revision, expected):
         return (goal,)
-    way = revision.distances_from(here).path_to(goal.point)
+    way = revision.find_path(here, goal.point)
     if way is None:
+        return (goal,)
+    if expected is not None and _find_crossed(revision, expected) <= _find_crossed(revision, way):
+        # The robot's own way is no worse than ours.
         return (goal,)
     corners = _split(revision, _simplify(way.points))[1:-1]
     ends = [*corners[1:], goal.point]
@@ -50,6 +56,11 @@ def plan_legs(revision: MapRevision, here: Point, goal: Pose) -> tuple[Pose, ...
         ),
         goal,
     )
+
+
+def _find_crossed(revision: MapRevision, way: Path) -> set[int]:
+    """Gives the numbers of the hindrances that a way leads over."""
+    return {n for n, each in enumerate(revision.hindrances) if each.is_crossed_by(way)}
 
 
 def _simplify(points: Sequence[Point]) -> list[Point]:

@@ -1,12 +1,13 @@
 """What is looked out for while a robot drives: closed areas ahead, and a goal that went bad."""
 
 import math
+from collections.abc import Sequence
 
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.navigation.closures import ClosedArea
 from mapspeak.navigation.revision import MapRevision
 
-__all__ = ["Lookout"]
+__all__ = ["BRAKING_MPS2", "KEEP_M", "REACTION_S", "Lookout", "find_entered"]
 
 MAP_EVERY_S = 1.0
 """Robot time between two looks at the map; so late may a closing hour be noticed."""
@@ -32,10 +33,21 @@ class Lookout:
     Args:
         goal: Where the drive leads.
         radius_m: Of the robot.
+        culprit: What drives it, in words.
+        advice: What to do instead when it was stopped.
     """
 
-    def __init__(self, *, goal: Pose, radius_m: float) -> None:
+    def __init__(
+        self,
+        *,
+        goal: Pose,
+        radius_m: float,
+        culprit: str = "its own navigation",
+        advice: str = "Lead it round by goals on the way.",
+    ) -> None:
         self._goal = goal
+        self._culprit = culprit
+        self._advice = advice
         self._radius_m = radius_m
         self._next_map_s = 0.0
         self._occupied_since_s: float | None = None
@@ -82,8 +94,8 @@ class Lookout:
             if any(area.distance_to_border(each) < self._find_least(area, left_m) for each in way):
                 edge_m = max(left_m - self._radius_m, 0.0)
                 return (
-                    f"The robot was stopped {edge_m:.2f} m before the {area.title}: its own "
-                    "navigation was about to drive into it. Lead it round by goals on the way."
+                    f"The robot was stopped {edge_m:.2f} m before the {area.title}: "
+                    f"{self._culprit} was about to drive into it. {self._advice}"
                 )
         return None
 
@@ -116,6 +128,17 @@ class Lookout:
         turned_rad = _find_turn(then, here)
         heading_rad = then.point.bearing_to(here.point) + turned_rad / 2
         return _follow_arc(here.point, heading_rad, turned_rad / moved_m, further_m)
+
+
+def find_entered(
+    areas: Sequence[ClosedArea], here: Point, way: Sequence[Point], *, radius_m: float
+) -> ClosedArea | None:
+    """Finds the area that a robot would come too near to on a way; it may always drive away."""
+    for area in areas:
+        least_m = min(radius_m + KEEP_M, area.distance_to_border(here) - WAVER_M)
+        if any(area.distance_to_border(each) < least_m for each in way):
+            return area
+    return None
 
 
 def _find_turn(then: Pose, here: Pose) -> float:

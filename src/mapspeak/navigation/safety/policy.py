@@ -59,14 +59,18 @@ class AreaRule:
     Attributes:
         name: What people call it.
         outline: Its corners in order; empty where it is a region.
+        further_outlines: Of other parts and of holes, as a mask has them.
         region_id: Of the room or corridor that it is, such as "C1"; empty where it has an outline.
         hours: When it is closed; None for always.
+        reason: Why, in the operator's words; may be empty.
     """
 
     name: str
     outline: tuple[Point, ...] = ()
+    further_outlines: tuple[tuple[Point, ...], ...] = ()
     region_id: str = ""
     hours: Hours | None = None
+    reason: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,12 +132,19 @@ USUAL_DENIALS = {
     Kind.CALL: (
         *("*set_param*", "*delete_param*", "*shutdown*", "*change_state*", "*manage_nodes*"),
         *("*load_node", "*unload_node", "*kill*", "*/_action/*", "*set_pose*", "*set_logger_*"),
+        # These end or hang the rosapi of ROS 2, and with it all questions to the robot.
+        *("*/message_details", "*/service_re*_details", "*/get_param_names"),
     ),
     Kind.ACT: (
         *("*navigate_to_pose*", "*navigate_through_poses*", "*follow_path*", "*move_base*"),
         *("*follow_waypoints*", "*drive_on_heading*", "*backup*", "*spin*", "*dock_robot*"),
     ),
-    Kind.SET_PARAMETER: ("*vel*", "*speed*", "*footprint*", "*radius*", "*costmap*", "*keepout*"),
+    Kind.SET_PARAMETER: (
+        *("*vel*", "*speed*", "*footprint*", "*radius*", "*costmap*", "*keepout*"),
+        # With these a robot loses itself: its frames, its clock, what it listens to, its place.
+        *("*frame*", "*use_sim_time", "*topic*", "*initial_pose*", "*map_server*"),
+        *("*publish_tf*", "*tf_broadcast*", "*tf_prefix*"),
+    ),
 }
 """What would go around this policy, or around the robot's own safety."""
 

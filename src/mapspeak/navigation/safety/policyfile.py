@@ -2,12 +2,22 @@
 
 from datetime import time
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    ValidationInfo,
+    model_validator,
+)
 
+from mapspeak.errors import MapError
 from mapspeak.geometry import Point
+from mapspeak.navigation.closures import Outline
 from mapspeak.navigation.safety.commands import Kind
+from mapspeak.navigation.safety.masks import load_mask
 from mapspeak.navigation.safety.policy import (
     DAYS,
     USUAL_DENIALS,
@@ -25,7 +35,11 @@ from mapspeak.settings import read_settings
 
 __all__ = ["load_policy"]
 
+N_OTHER_WAYS = 2
+"""An area is said in one of three ways, and not in the others."""
+
 _Name = Annotated[str, Field(min_length=1, max_length=80)]
+_Reason = Annotated[str, Field(max_length=200)]
 _Pattern = Annotated[str, Field(min_length=1, max_length=200)]
 _Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 _Corner = Annotated[list[_Coordinate], Field(min_length=2, max_length=2)]
@@ -34,6 +48,21 @@ _Region = Annotated[str, Field(pattern=r"^[A-Z]\d+$")]
 _TimeOfDay = Annotated[str, Field(pattern=r"^(?:[01]\d|2[0-3]):[0-5]\d$|^24:00$")]
 _Day = Literal["mon", "tue", "wed", "thu", "fri", "sat", "sun"]
 _PerMinute = Annotated[int, Field(ge=0)]
+
+
+def _read_mask(written: Any, info: ValidationInfo) -> tuple[Outline, ...]:  # noqa: ANN401 - YAML
+    """Reads the mask that is named, from beside the policy's file."""
+    if not isinstance(written, str) or not written:
+        message = "the name of a map's .yaml is wanted"
+        raise ValueError(message)
+    folder: Path = (info.context or {}).get("folder", Path())
+    try:
+        return load_mask(folder / written)
+    except MapError as error:
+        raise ValueError(str(error).rstrip(".")) from error
+
+
+_Mask = Annotated[tuple[Outline, ...], PlainValidator(_read_mask)]
 
 
 class _Written(BaseModel):
@@ -55,17 +84,27 @@ class _WrittenArea(_Written):
     name: _Name
     outline: _Outline | None = None
     region: _Region | None = None
+    mask: _Mask | None = None
+    reason: _Reason = ""
 
     @model_validator(mode="after")
     def _is_somewhere(self) -> Self:
-        if (self.outline is None) == (self.region is None):
-            message = f"{self.name!r} needs either an outline or a region"
+        if [self.outline, self.region, self.mask].count(None) != N_OTHER_WAYS:
+            message = f"{self.name!r} needs one of: outline, region, mask"
             raise ValueError(message)
         return self
 
     def rule(self, hours: Hours | None = None) -> AreaRule:
         corners = tuple(Point(x, y) for x, y in self.outline or ())
-        return AreaRule(name=self.name, outline=corners, region_id=self.region or "", hours=hours)
+        outline, *further = self.mask or (corners,)
+        return AreaRule(
+            name=self.name,
+            outline=outline,
+            further_outlines=tuple(further),
+            region_id=self.region or "",
+            hours=hours,
+            reason=" ".join(self.reason.split()),
+        )
 
 
 class _WrittenClosure(_WrittenArea):
@@ -176,10 +215,14 @@ def load_policy(path: Path) -> Policy:
     """Reads policy.yaml; what is left away keeps its default.
 
     Raises:
-        ConfigError: The file cannot be read, or has a mistake; says the line and the key.
+        ConfigError: The file cannot be read, or has a mistake; says the line and the key. So does
+            a mask that it names, which lies beside it unless its path is absolute.
     """
     advice = "docs/howto/limits.md explains every key."
-    return read_settings(path, _PolicyFile, name="policy.yaml", advice=advice).policy()
+    read = read_settings(
+        path, _PolicyFile, name="policy.yaml", advice=advice, context={"folder": path.parent}
+    )
+    return read.policy()
 
 
 def _read_time(text: str) -> time:

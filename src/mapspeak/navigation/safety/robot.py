@@ -2,6 +2,7 @@
 
 import logging
 from collections import OrderedDict
+from contextlib import suppress
 from dataclasses import replace
 
 import anyio
@@ -13,10 +14,12 @@ from mapspeak.navigation.goals import GoalVerdict, check_goal
 from mapspeak.navigation.safety.caller import NOBODY, current_caller
 from mapspeak.navigation.safety.commands import Drive, say_command
 from mapspeak.navigation.safety.guard import Clearance, Guard
+from mapspeak.navigation.safety.hold import say_hold
 from mapspeak.navigation.safety.legs import plan_legs
 from mapspeak.navigation.safety.lookout import Lookout
 from mapspeak.navigation.safety.surveying import Surveyor
 from mapspeak.navigation.safety.underway import GuardedDrive, Plan
+from mapspeak.navigation.safety.velocities import HandDriving
 from mapspeak.robot import (
     CameraPicture,
     Detection,
@@ -49,6 +52,9 @@ class GuardedRobot:
         robot: The robot itself; nobody else may have it.
         guard: Decides and notes.
         surveyor: Knows what is closed now.
+
+    Attributes:
+        by_hand: Looks after the robot while published velocities drive it.
     """
 
     def __init__(self, robot: Robot, *, guard: Guard, surveyor: Surveyor) -> None:
@@ -62,6 +68,7 @@ class GuardedRobot:
         self._watching = anyio.Lock()
         self._stepping = anyio.Lock()
         self._seen_at_s = float("-inf")
+        self.by_hand = HandDriving(robot, surveyor=surveyor, radius_m=self.description.radius_m)
 
     @property
     def description(self) -> RobotDescription:
@@ -77,7 +84,7 @@ class GuardedRobot:
     async def sleep(self, duration_s: float) -> None:
         """Returns when that much robot time has passed; a drive is watched meanwhile."""
         deadline_s = self.now_s + duration_s
-        while self._drive is not None and self.now_s < deadline_s - EPSILON_S:
+        while self._is_moving and self.now_s < deadline_s - EPSILON_S:
             await self._robot.sleep(min(WATCH_S, deadline_s - self.now_s))
             await self.obey_hold()
             await self.watch()
@@ -172,7 +179,9 @@ class GuardedRobot:
             self._answered_hold = held_by
             return
         if self._drive is not None:
-            await self._end(self._drive, GoalState.CANCELLED, f"The robot is held: {held_by}.")
+            await self._end(
+                self._drive, GoalState.CANCELLED, f"The robot is held: {say_hold(held_by)}."
+            )
         else:
             await self._stop("held")
         self._answered_hold = held_by
@@ -181,6 +190,7 @@ class GuardedRobot:
     async def watch(self) -> None:
         """Stops the robot before it enters a closed area; to be called often."""
         async with self._watching:
+            await self._watch_hand_driving()
             drive = self._drive
             if drive is None:
                 return
@@ -209,6 +219,22 @@ class GuardedRobot:
             await self._end(drive, GoalState.BLOCKED, fault)
 
     # --- inside ---
+
+    @property
+    def _is_moving(self) -> bool:
+        return self._drive is not None or self.by_hand.is_under_way
+
+    async def _watch_hand_driving(self) -> None:
+        """Stops a robot that published velocities drive towards what is closed."""
+        fault = None
+        # While nobody knows where the robot is, the next message is refused, and a stand follows.
+        with suppress(LinkError):
+            fault = await self.by_hand.find_fault()
+        if fault is not None:
+            logger.warning("%s", fault)
+            with anyio.CancelScope(shield=True):
+                self.by_hand.stand()
+                await self._stop(fault)
 
     def _take_up(self, robot_goal_id: str, plan: Plan, cleared: Clearance) -> None:
         """Begins to look after a drive that the robot has accepted."""
@@ -304,6 +330,7 @@ class GuardedRobot:
 
     async def _stop(self, why: str) -> None:
         self._n_stops += 1
+        self._guard.end_errands()
         if self._drive is not None:
             self._give_up_legs(self._drive, "The robot was stopped.")
         try:

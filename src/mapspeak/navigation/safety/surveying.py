@@ -5,15 +5,14 @@ from datetime import datetime
 
 import anyio
 import anyio.to_thread
-import cv2
-import numpy as np
 
-from mapspeak.geometry import Point
-from mapspeak.navigation.closures import ClosedArea
+from mapspeak.navigation.closures import ClosedArea, Outline
+from mapspeak.navigation.footprints import outlines_of_region
+from mapspeak.navigation.notices import close_floor_of, find_hindrances, say_events, say_unplaced
 from mapspeak.navigation.revision import MapRevision
 from mapspeak.navigation.safety.policy import AreaRule
+from mapspeak.semantic.events import Effect, Event
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.spatial.rooms import Region, RoomMap
 
 __all__ = ["Surveyor"]
 
@@ -24,13 +23,28 @@ class Surveyor:
     Args:
         rules: Which areas are closed, and when.
         wall_clock: The operator's.
+        read_events: Gives the events that are remembered. They close what they say, and never
+            open what a rule closes.
     """
 
-    def __init__(self, rules: Sequence[AreaRule], *, wall_clock: Callable[[], datetime]) -> None:
+    def __init__(
+        self,
+        rules: Sequence[AreaRule],
+        *,
+        wall_clock: Callable[[], datetime],
+        read_events: Callable[[], Sequence[Event]] = tuple,
+    ) -> None:
         self._rules = tuple(rules)
+        self._read_events = read_events
         self._wall_clock = wall_clock
         self._turn = anyio.Lock()
         self._latest: MapRevision | None = None
+
+    @property
+    def has_rules(self) -> bool:
+        """True when there is anything that may be closed, now or at another hour."""
+        has_closure = any(each.effect is Effect.CLOSED for each in self._read_events())
+        return bool(self._rules) or has_closure
 
     @property
     def latest(self) -> MapRevision | None:
@@ -44,13 +58,14 @@ class Surveyor:
             return self._latest
 
     def describe(self, revision: MapRevision) -> tuple[str, ...]:
-        """Gives what is closed in words, and rules about regions that are not on the map."""
+        """Gives events in words, and which rules are about regions that are not on the map."""
+        events, now = self._read_events(), self._wall_clock()
         unplaced = tuple(
             f"The policy closes {rule.region_id} ({rule.name}), which is not on this map."
             for rule in self._rules
             if rule.region_id and revision.rooms.find_region(rule.region_id) is None
         )
-        return (*(_say_closed(area) for area in revision.areas), *unplaced)
+        return (*unplaced, *say_events(events, now), *say_unplaced(events, revision, now))
 
     def _survey(self, grid: OccupancyGrid, radius_m: float) -> MapRevision:
         before = self._latest
@@ -60,8 +75,12 @@ class Surveyor:
             if before is not None and is_known
             else MapRevision(grid, radius_m=radius_m, previous=before)
         )
-        areas = tuple(self._find_closed(revision))
-        return revision if areas == revision.areas else revision.with_areas(areas)
+        events, now = self._read_events(), self._wall_clock()
+        areas = (*self._find_closed(revision), *close_floor_of(events, revision, now))
+        hindrances = tuple(find_hindrances(events, revision, now))
+        if areas == revision.areas and hindrances == revision.hindrances:
+            return revision
+        return revision.with_areas(areas, hindrances)
 
     def _find_closed(self, revision: MapRevision) -> Iterator[ClosedArea]:
         now = self._wall_clock()
@@ -70,29 +89,21 @@ class Surveyor:
             if rule.hours is not None and ends is None:
                 continue
             until = "" if ends is None else f"{ends:%H:%M}"
-            for outline in _outlines_of(rule, revision):
-                yield ClosedArea(name=rule.name, outline=outline, until=until)
+            for outline, *further in _outlines_of(rule, revision):
+                yield ClosedArea(
+                    name=rule.name,
+                    outline=outline,
+                    further_outlines=tuple(further),
+                    until=until,
+                    reason=rule.reason,
+                )
 
 
-def _say_closed(area: ClosedArea) -> str:
-    xs, ys = [corner.x for corner in area.outline], [corner.y for corner in area.outline]
-    extent = f"x {min(xs):.1f} to {max(xs):.1f}, y {min(ys):.1f} to {max(ys):.1f}"
-    return f"Closed to the robot: {area.title} ({extent})."
-
-
-def _outlines_of(rule: AreaRule, revision: MapRevision) -> Iterator[tuple[Point, ...]]:
+def _outlines_of(rule: AreaRule, revision: MapRevision) -> Iterator[tuple[Outline, ...]]:
+    """Gives the outlines of each area that a rule closes."""
     if rule.outline:
-        yield rule.outline
+        yield (rule.outline, *rule.further_outlines)
         return
     region = revision.rooms.find_region(rule.region_id)
     if region is not None:
-        yield from _outlines_of_region(revision.rooms, region)
-
-
-def _outlines_of_region(rooms: RoomMap, region: Region) -> Iterator[tuple[Point, ...]]:
-    """Gives the outer borders of a region's parts, through the centres of its border cells."""
-    inside = (rooms.labels == region.index).astype(np.uint8)
-    contours, _ = cv2.findContours(inside, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-    for contour in contours:
-        cols, rows = contour[:, 0, 0].astype(np.intp), contour[:, 0, 1].astype(np.intp)
-        yield tuple(Point(x, y) for x, y in rooms.grid.points_at(rows, cols).tolist())
+        yield from ((outline,) for outline in outlines_of_region(revision.rooms, region))

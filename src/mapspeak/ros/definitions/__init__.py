@@ -11,6 +11,7 @@ from mapspeak.ros.definitions.parsing import (
     Constant,
     Field,
     MessageType,
+    find_odd_lines,
     parse_definition,
 )
 from mapspeak.ros.definitions.parts import (
@@ -18,6 +19,7 @@ from mapspeak.ros.definitions.parts import (
     GENERATED,
     SERVICE_PARTS,
     find_actions_of_ros1,
+    kinds_of,
     name_parts,
     split_definition,
     split_parts,
@@ -38,6 +40,8 @@ __all__ = [
     "check_message",
     "describe_type",
     "find_actions_of_ros1",
+    "find_odd_lines",
+    "kinds_of",
     "known_definitions",
     "name_parts",
     "parse_definition",

@@ -9,6 +9,7 @@ from mapspeak.ros.definitions.texts import (
     GEOMETRY,
     NAVIGATION,
     PARAMETERS,
+    ROSAPI,
     SENSORS,
     STANDARD,
 )
@@ -26,7 +27,8 @@ def known_definitions(dialect: Dialect) -> dict[str, str]:
     The parts of services and actions are named as `RosConnection.fetch_definitions` says.
     """
     known: dict[str, str] = {}
-    for name, text in _entries():
+    for said, text in _entries():
+        name = said.replace("rosapi_msgs/", "rosapi/") if dialect is Dialect.ROS1 else said
         for part, part_text in split_parts(name, text).items():
             known[part] = _translate(part, part_text, dialect)
             if part.endswith("_Feedback"):
@@ -37,7 +39,7 @@ def known_definitions(dialect: Dialect) -> dict[str, str]:
 
 
 def _entries() -> Iterator[tuple[str, str]]:
-    for group in (STANDARD, PARAMETERS, GEOMETRY, SENSORS, NAVIGATION, ACTIONS):
+    for group in (STANDARD, PARAMETERS, GEOMETRY, SENSORS, NAVIGATION, ACTIONS, ROSAPI):
         _, *found = ENTRY.split(group)
         for name, text in zip(found[1::3], found[2::3], strict=True):
             yield name, text.strip("\n")
@@ -53,6 +55,8 @@ def _translate(name: str, text: str, dialect: Dialect) -> str:
         text = f"uint32 seq\n{text}"
     if name == "geometry_msgs/Quaternion":
         text = re.sub(r" \d$", "", text, flags=re.MULTILINE)
+    if name.startswith("rosapi/GetParam_"):
+        text = text.replace("default_value", "default")
     if name == "sensor_msgs/CameraInfo":
         text = re.sub(r"\b([dkrp])$", lambda match: match[1].upper(), text, flags=re.MULTILINE)
     return text

@@ -5,7 +5,16 @@ from dataclasses import dataclass
 
 from mapspeak.ros.messages import bare_type
 
-__all__ = ["FLOATS", "TIMES", "WHOLES", "Constant", "Field", "MessageType", "parse_definition"]
+__all__ = [
+    "FLOATS",
+    "TIMES",
+    "WHOLES",
+    "Constant",
+    "Field",
+    "MessageType",
+    "find_odd_lines",
+    "parse_definition",
+]
 
 LINE = re.compile(
     r"(?P<type>[\w/]+)(?:<=(?P<most_letters>\d+))?"
@@ -107,6 +116,22 @@ def parse_definition(type_name: str, text: str) -> MessageType:
         else:
             fields.append(_field(found, package))
     return MessageType(name=bare_type(type_name), fields=tuple(fields), constants=tuple(constants))
+
+
+def find_odd_lines(text: str) -> list[str]:
+    """Gives the lines of a definition that define nothing and are no remarks."""
+    return [line.strip() for line in text.splitlines() if _is_odd(line.strip())]
+
+
+def _is_odd(line: str) -> bool:
+    if not line or line.startswith("#"):
+        return False
+    found = LINE.fullmatch(line)
+    if found is None:
+        return True
+    rest = found["rest"].partition("#")[0].strip()
+    # After the name comes a constant's value, or the default of a plain value.
+    return bool(rest) and not rest.startswith("=") and found["type"] not in PLAIN
 
 
 def _constant(found: re.Match[str]) -> Constant:

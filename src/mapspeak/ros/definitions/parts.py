@@ -10,6 +10,7 @@ __all__ = [
     "GENERATED",
     "SERVICE_PARTS",
     "find_actions_of_ros1",
+    "kinds_of",
     "name_parts",
     "split_definition",
     "split_parts",
@@ -67,6 +68,19 @@ def split_parts(type_name: str, text: str) -> dict[str, str]:
     if names is None:
         return {bare_type(type_name): parts[0]}
     return dict(zip(names, parts, strict=True))
+
+
+def kinds_of(texts: Iterable[str]) -> dict[str, str]:
+    """Gives the kind of each type by its name: "msg", "srv" or "action", where parts are named."""
+    kinds: dict[str, str] = {}
+    for name in texts:
+        part = GENERATED.search(name)
+        if part is None:
+            kinds.setdefault(name, "msg")
+        else:
+            kind = "srv" if part[1] in SERVICE_PARTS else "action"
+            kinds[name.removesuffix(part[0])] = kind
+    return kinds
 
 
 def find_actions_of_ros1(texts: Mapping[str, str]) -> dict[str, str]:

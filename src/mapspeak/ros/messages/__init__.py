@@ -37,6 +37,7 @@ from mapspeak.ros.messages.poses import (
 from mapspeak.ros.messages.scans import (
     CameraInfo,
     LaserScan,
+    mend_scan,
     read_camera_info,
     read_scan,
     write_camera_info,
@@ -54,6 +55,7 @@ __all__ = [
     "Twist",
     "apply_grid_update",
     "bare_type",
+    "mend_scan",
     "read_camera_info",
     "read_compressed_image",
     "read_depth",

@@ -1,7 +1,7 @@
 """Camera pictures of ROS messages, raw or compressed, as PNG or JPEG files."""
 
 import io
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -35,6 +35,7 @@ class EncodedPicture:
         height_px: Rows.
         frame_id: The camera's frame.
         stamp_s: Robot time of the exposure.
+        is_depth: Its grey levels are shaded depth.
     """
 
     data: bytes
@@ -43,6 +44,7 @@ class EncodedPicture:
     height_px: int
     frame_id: str
     stamp_s: float
+    is_depth: bool = False
 
 
 def read_image(message: Message) -> EncodedPicture:
@@ -55,7 +57,7 @@ def read_image(message: Message) -> EncodedPicture:
     """
     encoding = text_of(message, "encoding")
     if encoding in ("16UC1", "32FC1"):
-        return _encode(shade_depth(read_depth(message)), message)
+        return replace(_encode(shade_depth(read_depth(message)), message), is_depth=True)
     return _encode(read_pixels(message), message)
 
 
@@ -68,10 +70,12 @@ def read_compressed_image(message: Message) -> EncodedPicture:
     frame_id, stamp_s = read_header(message)
     form, data = text_of(message, "format"), bytes_of(message)
     if "compressedDepth" in form:
-        return _encode(shade_depth(read_compressed_depth(data, form)), message)
+        return replace(
+            _encode(shade_depth(read_compressed_depth(data, form)), message), is_depth=True
+        )
     kind, mode, (width_px, height_px) = _identify(data, form)
     if mode.startswith("I"):  # 16 bits: no model sees those
-        return _encode(shade_depth(_decode_wide(data)), message)
+        return replace(_encode(shade_depth(_decode_wide(data)), message), is_depth=True)
     return EncodedPicture(
         data=data,
         media_type=MEDIA_TYPES[kind],

@@ -1,12 +1,14 @@
 """Laser scans and camera descriptions of ROS messages."""
 
 import math
+import sys
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mapspeak.errors import LinkError
 from mapspeak.ros.messages.dialect import Dialect, read_header, write_header
 from mapspeak.ros.messages.fields import (
     Message,
@@ -18,6 +20,14 @@ from mapspeak.ros.messages.fields import (
 
 LARGEST_SIDE_PX = 65535
 MOST_BEAMS = 1_000_000
+SAYING_NOTHING: dict[str, Any] = {
+    "header": {"frame_id": "(not said)", "stamp": {"sec": 0, "nanosec": 0}},
+    "angle_min": 0.0,
+    "angle_increment": 0.0,
+    "range_min": 0.0,
+    "range_max": sys.float_info.max,
+}
+"""What a scan's field holds instead of something that it cannot be."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -90,6 +100,29 @@ def read_scan(message: Message) -> LaserScan:
     )
 
 
+def mend_scan(message: Message) -> tuple[dict[str, Any], dict[str, str]]:
+    """Gives a sensor_msgs/LaserScan that can be read, and what was wrong with each of its fields.
+
+    A field that is wrong holds what says nothing instead: zero for an angle, no limit for a range,
+    NaN for a single beam.
+    """
+    mended, faults = dict(message), dict[str, str]()
+    for name, nothing in SAYING_NOTHING.items():
+        try:
+            read_header(message) if name == "header" else number_of(message, name)
+        except LinkError as error:
+            mended[name], faults[name] = nothing, error.message
+    ranges = message.get("ranges")
+    if isinstance(ranges, list | tuple):
+        odd = [number for number, each in enumerate(ranges) if not _is_range(each)]
+        if odd:
+            mended["ranges"] = [each if _is_range(each) else None for each in ranges]
+            more = f" ({len(odd) - 1:,} more are none either)" if len(odd) > 1 else ""
+            fault = misfit(f"ranges[{odd[0]}]", ranges[odd[0]], f"a number{more}")
+            faults["ranges"] = fault.message
+    return mended, faults
+
+
 def write_scan(scan: LaserScan, *, dialect: Dialect) -> dict[str, Any]:
     """Writes sensor_msgs/LaserScan; a beam without a range becomes infinite (REP 117)."""
     ranges_m = np.where(np.isnan(scan.ranges_m), np.inf, scan.ranges_m)
@@ -156,6 +189,10 @@ def write_camera_info(info: CameraInfo, *, dialect: Dialect) -> dict[str, Any]:
         "binning_y": 0,
         "roi": roi,
     }
+
+
+def _is_range(value: object) -> bool:
+    return value is None or (isinstance(value, int | float) and not isinstance(value, bool))
 
 
 def _fov(width_px: int, *, focal_px: float, centre_px: float) -> float | None:

@@ -13,7 +13,9 @@ from operator import add
 from pydantic import ValidationError
 
 from mapspeak.errors import SemanticMapError
+from mapspeak.semantic.events.event import Event
 from mapspeak.semantic.mapfile import plain
+from mapspeak.semantic.mapfile.eventschema import read_events
 from mapspeak.semantic.mapfile.layout import Layout, find_records, whole
 from mapspeak.semantic.mapfile.schema import (
     fault_in,
@@ -27,6 +29,7 @@ from mapspeak.semantic.mapfile.tree import (
     ListNode,
     MappingNode,
     Node,
+    ScalarNode,
     TextError,
     line_and_column,
     parse_tree,
@@ -61,6 +64,15 @@ class Record:
     end: int
 
 
+@dataclass(frozen=True, slots=True)
+class EventRecord:
+    """What an event's record says and where it stands in the text."""
+
+    event: Event
+    start: int
+    end: int
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class MapDocument:
     """A semantic map file that was read without a fault.
@@ -73,6 +85,7 @@ class MapDocument:
         root: Its top mapping without the records; None where the file says nothing.
         layout: Where the records stand in the text.
         records: By `name_key`, in the order of the file.
+        events: By their ids, likewise.
         map_id: The map that the file says it belongs to, if any.
         warnings: Keys that look misspelt.
     """
@@ -84,6 +97,7 @@ class MapDocument:
     root: MappingNode | None
     layout: Layout
     records: Mapping[str, Record]
+    events: Mapping[str, EventRecord]
     map_id: str | None
     warnings: tuple[str, ...]
     readings: Mapping[str, Reading] = field(repr=False)
@@ -92,6 +106,11 @@ class MapDocument:
     def content(self) -> bytes:
         """The file's bytes."""
         return self.encoded(self.text)
+
+    def find_entry(self, key: str) -> str | None:
+        """Gives what the file says under a key of its own, beside the records."""
+        node = self.root.find_value(key) if self.root else None
+        return node.data if isinstance(node, ScalarNode) else None
 
     def encoded(self, text: str) -> bytes:
         """Gives a text in the bytes of this file: its line ends, its byte order mark."""
@@ -120,11 +139,12 @@ def parse_document(
     decoded = _decoded(content, source)
     text = decoded.removeprefix(_BOM).replace("\r\n", "\n")
     try:
-        layout, root = _cut(text)
+        layout, root = _cut(text, previous)
         map_id = _map_id(root, layout)
         known = previous.readings if previous and previous.map_id == map_id else {}
         records = [*_cut_records(text, layout, map_id, known), *_listed_records(root, map_id)]
         by_key = _by_key(records)
+        events = _events(root, layout)
     except TextError as fault:
         raise _at_its_place(fault, source, text) from fault
     return MapDocument(
@@ -135,6 +155,7 @@ def parse_document(
         root=root,
         layout=layout,
         records=by_key,
+        events=events,
         map_id=map_id,
         warnings=tuple(_warnings(text, root, records)),
         readings={text[record.start : record.end]: record.reading for record in records},
@@ -164,13 +185,21 @@ def _at_its_place(fault: TextError, source: str, text: str) -> SemanticMapError:
 # --- what stands beside the records ----------------------------------------------------------
 
 
-def _cut(text: str) -> tuple[Layout, MappingNode | None]:
+def _cut(text: str, previous: MapDocument | None) -> tuple[Layout, MappingNode | None]:
     layout = find_records(text)
-    root = _root(text, layout)
+    root = _known_root(text, layout, previous) or _root(text, layout)
     if layout.spans and _list_items(root):
         # A part of the list stands where its dashes do not show it.
         return whole(text), _root(text, whole(text))
     return layout, root
+
+
+def _known_root(text: str, layout: Layout, previous: MapDocument | None) -> MappingNode | None:
+    """Gives what was read before where only records have changed."""
+    if previous is None or not (previous.layout.spans and layout.spans):
+        return None
+    is_same = previous.layout.skeleton(previous.text) == layout.skeleton(text)
+    return previous.root if is_same else None
 
 
 def _root(text: str, layout: Layout) -> MappingNode | None:
@@ -199,6 +228,17 @@ def _map_id(root: MappingNode | None, layout: Layout) -> str | None:
         return map_id_from(root.data)
     except ValidationError as error:
         raise fault_in(root, error).moved(layout.offset_in_text) from error
+
+
+def _events(root: MappingNode | None, layout: Layout) -> dict[str, EventRecord]:
+    try:
+        found = read_events(root)
+    except TextError as fault:
+        raise fault.moved(layout.offset_in_text) from fault
+    place = layout.offset_in_text
+    return {
+        event.id: EventRecord(event, place(node.start), place(node.end)) for event, node in found
+    }
 
 
 # --- records ---------------------------------------------------------------------------------

@@ -78,7 +78,7 @@ def _read_flow_mapping(text: str) -> Data:
 
 
 def _read_flow_scalar(text: str) -> str:
-    _sure(is_plain_in_flow(text) or _NUMBER.fullmatch(text))
+    _sure(is_plain_in_flow(text) or _NUMBER.fullmatch(text) or _TIME.fullmatch(text))
     return text
 
 

@@ -8,7 +8,9 @@ from mapspeak.semantic.mapfile.tree import Data
 MAX_COLUMNS = 100
 """A list that would be wider stands with one item a line."""
 
-_BARE_KEYS = frozenset({"x", "y", "yaw_deg", "bearing_deg", "range_m", "stamp_s", "recorded_at"})
+_BARE_KEYS = frozenset(
+    {"x", "y", "yaw_deg", "bearing_deg", "range_m", "stamp_s", "recorded_at", "from", "until"}
+)
 """Their values are numbers or times, and stand without quotes."""
 
 _OTHER_MEANING = frozenset({"true", "false", "yes", "no", "on", "off", "null", "y", "n"})

@@ -9,20 +9,26 @@ from mapspeak.semantic.mapfile.tree import Data, ListNode, line_and_column
 from mapspeak.semantic.waypoint import Waypoint, name_key
 
 _GREETING = "# mapspeak semantic map. Edit freely: comments and order are kept.\n"
-_OPTIONAL_KEYS = ("stamp_s", "recorded_at")
+_OPTIONAL_KEYS = ("stamp_s", "recorded_at", "room_id", "picture")
 
 
 def bound_to(document: MapDocument, map_id: str) -> MapDocument:
-    """Gives the file with the map that its waypoints belong to; it named none before."""
+    """Gives the file with the map that its waypoints belong to."""
+    return with_entry(document, "map", map_id)
+
+
+def with_entry(document: MapDocument, key: str, value: str) -> MapDocument:
+    """Gives the file with one key of its own, beside the records, saying something else."""
     text = document.text
-    entry = entry_text("map", map_id, indent=0)
-    present = document.root.find_value("map") if document.root else None
-    key = document.root.find_key("waypoints") if document.root else None
-    if present is not None and present.end <= document.layout.start:
-        value = entry.removeprefix("map:")
-        text = text[: present.start].rstrip(" ") + value + text[present.end :]
-    elif key is not None:
-        text = text[: key.start] + entry + "\n" + text[key.start :]
+    entry = entry_text(key, value, indent=0)
+    present = document.root.find_value(key) if document.root else None
+    listed = document.root.find_key("waypoints") if document.root else None
+    if present is not None:
+        start, end = map(document.layout.offset_in_text, (present.start, present.end))
+        text = text[:start].rstrip(" ") + entry.removeprefix(f"{key}:") + text[end:]
+    elif listed is not None:
+        start = document.layout.offset_in_text(listed.start)
+        text = text[:start] + entry + "\n" + text[start:]
     elif document.root is not None:
         text = _ended(text) + entry + "\n"
     else:

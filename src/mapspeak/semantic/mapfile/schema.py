@@ -18,7 +18,7 @@ from pydantic import (
 
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.semantic.mapfile.tree import Data, ListNode, MappingNode, Node, TextError
-from mapspeak.semantic.waypoint import Landmark, Waypoint, clean_line
+from mapspeak.semantic.waypoint import Confidence, Landmark, Waypoint, clean_line
 
 FILE_VERSION = 1
 
@@ -38,6 +38,9 @@ def _time_with_zone(value: object) -> datetime | None:
     if value is not None and (time is None or time.tzinfo is None):
         raise ValueError
     return time
+
+
+_Time = Annotated[datetime | None, BeforeValidator(_time_with_zone)]
 
 
 def _line_or_none(text: str | None) -> str | None:
@@ -64,7 +67,11 @@ class _LandmarkEntry(BaseModel):
     purpose: str | None = None
     bearing_deg: FiniteFloat | None = None
     range_m: Annotated[FiniteFloat, Field(ge=0)] | None = None
+    confidence: Confidence | None = None
     note: str | None = None
+    picture: str | None = None
+    stamp_s: FiniteFloat | None = None
+    recorded_at: _Time = None
 
     def to_landmark(self) -> Landmark:
         bearing_rad = None if self.bearing_deg is None else math.radians(self.bearing_deg)
@@ -73,7 +80,11 @@ class _LandmarkEntry(BaseModel):
             purpose=self.purpose,
             bearing_rad=bearing_rad,
             range_m=self.range_m,
+            confidence=self.confidence,
             note=self.note,
+            picture=self.picture,
+            stamp_s=self.stamp_s,
+            recorded_at=self.recorded_at,
         )
 
 
@@ -93,7 +104,9 @@ class _WaypointEntry(BaseModel):
     functional_landmarks: _Landmarks = []
     geometric_features: Annotated[list[_Words], BeforeValidator(_nothing_as_empty)] = []
     stamp_s: FiniteFloat | None = None
-    recorded_at: Annotated[datetime | None, BeforeValidator(_time_with_zone)] = None
+    recorded_at: _Time = None
+    room_id: str | None = None
+    picture: str | None = None
 
     def to_waypoint(self, map_id: str | None) -> Waypoint:
         return Waypoint(
@@ -106,6 +119,8 @@ class _WaypointEntry(BaseModel):
             stamp_s=self.stamp_s,
             recorded_at=self.recorded_at,
             map_id=map_id,
+            room_id=self.room_id,
+            picture=self.picture,
         )
 
 
@@ -117,7 +132,7 @@ class _FileEntry(BaseModel):
     waypoints: Annotated[list[Any], BeforeValidator(_nothing_as_empty)] = []
 
 
-_FILE_KEYS = frozenset(_FileEntry.model_fields)
+_FILE_KEYS = frozenset(_FileEntry.model_fields) | {"events", "snapshot"}
 _WAYPOINT_KEYS = frozenset(_WaypointEntry.model_fields)
 _LANDMARK_KEYS = frozenset(_LandmarkEntry.model_fields)
 
@@ -133,6 +148,9 @@ _EXAMPLES = {
     "geometric_features": "geometric_features: [corner of two walls]",
     "stamp_s": "stamp_s: 12.5",
     "recorded_at": "recorded_at: 2026-11-02T10:30:00+00:00",
+    "room_id": "room_id: R3",
+    "picture": "picture: P12.jpg",
+    "confidence": "confidence: likely",
 }
 _EXPECTED = {
     "missing": "is missing",
@@ -143,6 +161,7 @@ _EXPECTED = {
     "greater_than_equal": "is below zero",
     "string_type": "is not text",
     "string_pattern_mismatch": "is empty",
+    "enum": f"is none of {', '.join(Confidence)}",
     "literal_error": "is not a version that this mapspeak reads",
     "list_type": "is not a list",
     "model_type": "is not a mapping of keys to values",
@@ -171,7 +190,6 @@ def map_id_from(data: Data) -> str | None:
 def record_data(waypoint: Waypoint) -> dict[str, Data]:
     """Gives what a record says of a waypoint: millimetres and hundredths of a degree."""
     pose = waypoint.pose
-    time = waypoint.recorded_at
     return {
         "name": waypoint.name,
         "description": waypoint.description,
@@ -179,8 +197,10 @@ def record_data(waypoint: Waypoint) -> dict[str, Data]:
         "safety_landmarks": [_landmark_data(thing) for thing in waypoint.safety_landmarks],
         "functional_landmarks": [_landmark_data(thing) for thing in waypoint.functional_landmarks],
         "geometric_features": list(waypoint.geometric_features),
-        "stamp_s": None if waypoint.stamp_s is None else _length(waypoint.stamp_s),
-        "recorded_at": None if time is None else time.isoformat(timespec="seconds"),
+        "stamp_s": _length_if_any(waypoint.stamp_s),
+        "recorded_at": _time(waypoint.recorded_at),
+        "room_id": waypoint.room_id,
+        "picture": waypoint.picture,
     }
 
 
@@ -207,7 +227,9 @@ def fault_in(node: Node, error: ValidationError) -> TextError:
     shown = f", '{first['input']}'," if isinstance(first["input"], str) else ""
     expected = _EXPECTED.get(first["type"], f"is wrong: {first['msg']}")
     more = f" {len(others)} more faults follow in this record." if others else ""
-    example = _EXAMPLES.get(str(first["loc"][0]) if first["loc"] else "", _EXAMPLES["name"])
+    example = next(
+        (_EXAMPLES[k] for k in reversed(first["loc"]) if k in _EXAMPLES), _EXAMPLES["name"]
+    )
     return TextError(
         f"{path}{shown} {expected}.{more}", hint=f"Write it like `{example}`.", offset=place.start
     )
@@ -238,12 +260,24 @@ def _landmark_data(landmark: Landmark) -> Data:
     entries: dict[str, Data] = {
         "label": landmark.label,
         "bearing_deg": None if landmark.bearing_rad is None else _angle(landmark.bearing_rad),
-        "range_m": None if landmark.range_m is None else _length(landmark.range_m),
+        "range_m": _length_if_any(landmark.range_m),
         "purpose": landmark.purpose,
+        "confidence": landmark.confidence and str(landmark.confidence),
         "note": landmark.note,
+        "picture": landmark.picture,
+        "stamp_s": _length_if_any(landmark.stamp_s),
+        "recorded_at": _time(landmark.recorded_at),
     }
     said = [key for key, value in entries.items() if value is not None]
     return landmark.label if said == ["label"] else {key: entries[key] for key in said}
+
+
+def _time(time: datetime | None) -> str | None:
+    return None if time is None else time.isoformat(timespec="seconds")
+
+
+def _length_if_any(value: float | None) -> str | None:
+    return None if value is None else _length(value)
 
 
 def _length(value: float) -> str:

@@ -19,7 +19,7 @@ LONGEST_WAIT_S = 25.0
 Place = Annotated[
     str | None,
     Field(
-        description="an id from look_at_map (R3, C1, D1, F2, W5), a remembered name, or a phrase: "
+        description="an id (R3, C1, D1, F2, W5, T1), a remembered name or thing, or a phrase: "
         "left of W3, between D1 and D2, corner of R2"
     ),
 ]
@@ -132,4 +132,6 @@ class DriveTools:
         report = await self._session.drives.wait(
             goal_id, wait_s=wait_s, on_progress=tell_progress(context)
         )
-        return DriveAnswer.of(report)
+        is_over = report.status.state.is_final and self._session.drives.under_way is None
+        foreign = await self._session.robot.fetch_foreign_goals() if is_over else ()
+        return DriveAnswer.of(report, foreign_goals=foreign)

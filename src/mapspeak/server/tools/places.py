@@ -9,6 +9,7 @@ from mapspeak.navigation.places import find_place
 from mapspeak.server.descriptions import describe_place
 from mapspeak.server.measures import describe_measures
 from mapspeak.server.reports import GoalAnswer
+from mapspeak.server.tools.finding import FindTools
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.session import Session
 
@@ -39,6 +40,7 @@ class PlaceTools:
     def tools(self) -> list[Tool]:
         """Gives the tools in their order."""
         return [
+            *FindTools(self._session).tools(),
             Tool(function=self.describe_place, title="One place in full", effect=Effect.READS),
             Tool(function=self.measure, title="Measure ways and sizes", effect=Effect.READS),
             Tool(

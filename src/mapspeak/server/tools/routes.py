@@ -8,16 +8,20 @@ from mcp_types import CallToolResult, ImageContent, TextContent
 from pydantic import Field
 
 from mapspeak.navigation.routes import RouteBook, RouteState, WhenBlocked
+from mapspeak.navigation.safety import Errand, on_errand
 from mapspeak.server.callers import client_of, tell_progress
 from mapspeak.server.routereports import RouteAnswer
 from mapspeak.server.sightings import Sighting, look_ahead
 from mapspeak.server.toolset import Effect, Tool
+from mapspeak.server.wording import shorten
 from mapspeak.session import Session
 
 __all__ = ["RouteTools"]
 
 LONGEST_WAIT_S = 25.0
 MOST_STOPS = 20
+ERRAND_S = 1800.0
+"""A person's word for a route is good for so much robot time."""
 
 Stops = Annotated[
     list[Annotated[str, Field(min_length=1, max_length=200)]] | None,
@@ -42,6 +46,7 @@ class RouteTools:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._routes = RouteBook(session)
+        self._errand = Errand(what="follow a route", n_drives=0, duration_s=ERRAND_S)
 
     def tools(self) -> list[Tool]:
         """Gives the tools in their order."""
@@ -71,15 +76,21 @@ class RouteTools:
         """
         if stops is not None:
             await self._routes.begin(stops, pause_s=pause_s, is_looking=look)
-        progress = await self._routes.advance(
-            wait_s=wait_s,
-            when_blocked=when_blocked,
-            on_progress=tell_progress(context),
-            client=client_of(context),
-        )
+            past = f"drive past {'; '.join(shorten(each) for each in stops)}"
+            self._errand = Errand(what=past, n_drives=len(stops), duration_s=ERRAND_S)
+        with on_errand(self._errand):
+            progress = await self._routes.advance(
+                wait_s=wait_s,
+                when_blocked=when_blocked,
+                on_progress=tell_progress(context),
+                client=client_of(context),
+            )
         robot = self._session.robot
         sees = progress.state is RouteState.AT_STOP and robot.description.has_camera
-        return _answer(RouteAnswer.of(progress), await look_ahead(robot) if sees else None)
+        return _answer(
+            RouteAnswer.of(progress),
+            await look_ahead(self._session) if sees else None,
+        )
 
 
 def _answer(report: RouteAnswer, sighting: Sighting | None) -> CallToolResult:

@@ -1,8 +1,10 @@
 """Every toolset by its name."""
 
+from mapspeak.server.representations import Representation
 from mapspeak.server.tools.drive import DriveTools
 from mapspeak.server.tools.explore import ExploreTools
 from mapspeak.server.tools.look import LookTools
+from mapspeak.server.tools.memory import MemoryTools
 from mapspeak.server.tools.paper import PaperTools
 from mapspeak.server.tools.places import PlaceTools
 from mapspeak.server.tools.ros import RosTools
@@ -13,14 +15,22 @@ from mapspeak.session import Session
 __all__ = ["build_toolsets"]
 
 
-def build_toolsets(session: Session) -> dict[str, list[Tool]]:
-    """Gives every toolset by its name, in the order in which tools are listed."""
+def build_toolsets(
+    session: Session, representation: Representation = Representation.PICTURE_TABLE
+) -> dict[str, list[Tool]]:
+    """Gives every toolset by its name, in the order in which tools are listed.
+
+    Args:
+        session: What the tools work on.
+        representation: How look_at_map shows the map.
+    """
     return {
-        "look": LookTools(session).tools(),
+        "look": LookTools(session, representation).tools(),
         "places": PlaceTools(session).tools(),
         "drive": DriveTools(session).tools(),
         "explore": ExploreTools(session).tools(),
         "routes": RouteTools(session).tools(),
         "paper": PaperTools(session).tools(),
+        "memory": MemoryTools(session).tools(),
         "ros": RosTools(session).tools(),
     }

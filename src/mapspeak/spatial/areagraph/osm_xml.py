@@ -206,8 +206,13 @@ def _element_lines(name: str, element: OsmElement) -> Iterable[str]:
     parts = [
         *(f'<nd ref="{ref}"/>' for ref in element.refs),
         *(f'<member type="{m.type}" ref="{m.ref}" role="{m.role}"/>' for m in element.members),
-        *(f'<tag k="{escape(key)}" v="{escape(text)}"/>' for key, text in element.tags.items()),
+        *(f'<tag k="{_quoted(key)}" v="{_quoted(text)}"/>' for key, text in element.tags.items()),
     ]
     if not parts:
         return [f"  <{name} {attributes}/>"]
     return [f"  <{name} {attributes}>", *(f"    {part}" for part in parts), f"  </{name}>"]
+
+
+def _quoted(text: str) -> str:
+    """Gives a text as it stands between quotes; a bare line break there would read as a space."""
+    return escape(text).replace("\n", "&#10;")

@@ -56,6 +56,23 @@ class DistanceField:
         way = descend(self.lattice.moves, None, self.costs, goal)
         return find_path_near(self.lattice, way, (self.start, point), radius_m=self.radius_m)
 
+    def cheapest_path_to(self, point: Point, weights: Costs) -> Path | None:
+        """Finds a way near the cheapest one where some floor costs more.
+
+        Args:
+            point: Where to.
+            weights: What a metre costs in each cell of the map, 1 or more.
+        """
+        goal = self.lattice.index_at(point)
+        seeds = find_seeds(self.lattice, self.start, radius_m=self.radius_m)
+        if goal is None or seeds is None or not math.isfinite(self.costs[goal]):
+            return None
+        coarse = self.lattice.coarsened(weights)
+        costs = spread(self.lattice.moves, coarse, seeds, goals=np.array([goal]))
+        way = descend(self.lattice.moves, coarse, costs, goal)
+        ends = (self.start, point)
+        return find_path_near(self.lattice, way, ends, radius_m=self.radius_m, weights=weights)
+
     def way_to(self, point: Point) -> tuple[Point, ...] | None:
         """Gives the shortest way from cell to cell, good enough to draw; `path_to` is to drive."""
         goal = self.lattice.index_at(point)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mapspeak.geometry import Point
 from mapspeak.spatial.grid import IntArray, Mask, OccupancyGrid
 from mapspeak.spatial.paths.clearance import Clearance, clearance_m
-from mapspeak.spatial.paths.wavefront import BITS, Moves
+from mapspeak.spatial.paths.wavefront import BITS, Costs, Moves
 
 __all__ = ["Lattice", "build_coarse_lattice", "build_fine_lattice", "moves_within", "restrict"]
 
@@ -65,6 +65,12 @@ class Lattice:
             return None
         index = int(self.indices(np.array([cell.row]), np.array([cell.col]))[0])
         return index if self.is_open.flat[index] else None
+
+    def coarsened(self, weights: Costs) -> Costs:
+        """Gives the largest of the weights of the map's cells within each lattice cell."""
+        if self.factor == 1:
+            return weights
+        return functools.reduce(np.maximum, _quarters(weights))
 
     def indices(self, rows: IntArray, cols: IntArray) -> IntArray:
         """Gives the flat indices of the lattice cells that hold cells of the map."""

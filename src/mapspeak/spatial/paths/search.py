@@ -43,17 +43,27 @@ def find_path(grid: OccupancyGrid, start: Point, goal: Point, *, radius_m: float
 
 
 def find_path_near(
-    lattice: Lattice, rough_way: IntArray, ends: tuple[Point, Point], *, radius_m: float
+    lattice: Lattice,
+    rough_way: IntArray,
+    ends: tuple[Point, Point],
+    *,
+    radius_m: float,
+    weights: Costs | None = None,
 ) -> Path | None:
     """Finds the way over fine cells that stays near a rough way over lattice cells.
 
     Near also means near the straight legs that could replace the rough way, as its own directions
-    are multiples of 45 degrees.
+    are multiples of 45 degrees. Weights are those of the map's cells, where some cost more.
     """
-    corridor = _build_corridor(lattice, rough_way, radius_m)
-    weights = _wall_weights(corridor, radius_m)
-    way = _find_way(corridor, weights, ends, radius_m)
-    return None if way is None else straighten(corridor, weights, way, ends)
+    rough_costs = _wall_weights(lattice, radius_m)
+    if weights is not None:
+        rough_costs = rough_costs * lattice.coarsened(weights)
+    corridor, window = _build_corridor(lattice, rough_way, rough_costs, radius_m)
+    costs = _wall_weights(corridor, radius_m)
+    if weights is not None:
+        costs = costs * weights[window]
+    way = _find_way(corridor, costs, ends, radius_m)
+    return None if way is None else straighten(corridor, costs, way, ends)
 
 
 def _find_way(
@@ -74,14 +84,16 @@ def _wall_weights(lattice: Lattice, radius_m: float) -> Costs:
     return np.asarray(1 + WALL_WEIGHT * lacking**2, dtype=np.float32)
 
 
-def _build_corridor(lattice: Lattice, way: IntArray, radius_m: float) -> Lattice:
-    """Gives the fine lattice of the cells near a way, on the part of the map that it needs."""
+def _build_corridor(
+    lattice: Lattice, way: IntArray, costs: Costs, radius_m: float
+) -> tuple[Lattice, tuple[slice, slice]]:
+    """Gives the fine lattice of the cells near a way, and the part of the map that it covers."""
     margin = int(np.ceil((CORRIDOR_M + radius_m + COMFORT_M) / lattice.cell_size_m))
     rows, cols = np.divmod(way, lattice.n_cols)
     top, left = max(int(rows.min()) - margin, 0), max(int(cols.min()) - margin, 0)
     shape = (int(rows.max()) + margin + 1 - top, int(cols.max()) + margin + 1 - left)
     places = np.stack([rows, cols], axis=1) + 0.5
-    corners = pull_straight(lattice.is_open, _wall_weights(lattice, radius_m), places)
+    corners = pull_straight(lattice.is_open, costs, places)
     drawn = np.zeros(shape, dtype=np.uint8)
     for line in (places, corners):
         cells = np.floor(line[:, ::-1] - (left, top)).astype(np.int32)
@@ -90,6 +102,7 @@ def _build_corridor(lattice: Lattice, way: IntArray, radius_m: float) -> Lattice
     near = cv2.dilate(drawn, np.ones((side, side), dtype=np.uint8)) > 0
     near = near.repeat(lattice.factor, axis=0).repeat(lattice.factor, axis=1)
     top, left = top * lattice.factor, left * lattice.factor
-    crop = lattice.grid.crop(slice(top, top + near.shape[0]), slice(left, left + near.shape[1]))
+    window = (slice(top, top + near.shape[0]), slice(left, left + near.shape[1]))
+    crop = lattice.grid.crop(*window)
     n_rows, n_cols = crop.cells.shape
-    return restrict(build_fine_lattice(crop, radius_m), near[:n_rows, :n_cols])
+    return restrict(build_fine_lattice(crop, radius_m), near[:n_rows, :n_cols]), window

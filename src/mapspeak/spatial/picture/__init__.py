@@ -10,6 +10,7 @@ from mapspeak.spatial.picture.marks import (
     RegionLayer,
     Sample,
     Shape,
+    Zone,
 )
 from mapspeak.spatial.picture.palette import Colour
 from mapspeak.spatial.picture.paper import (
@@ -38,6 +39,7 @@ __all__ = [
     "Sample",
     "Shape",
     "View",
+    "Zone",
     "Zoom",
     "draw_map",
     "draw_map_axis",

@@ -29,7 +29,7 @@ from mapspeak.spatial.picture.legend import (
     grounds_in,
     n_rows_of,
 )
-from mapspeak.spatial.picture.marks import LegendEntry, Line, Mark, Region, RegionLayer
+from mapspeak.spatial.picture.marks import LegendEntry, Line, Mark, Region, RegionLayer, Zone
 from mapspeak.spatial.picture.palette import (
     FREE,
     PALETTE,
@@ -41,6 +41,7 @@ from mapspeak.spatial.picture.palette import (
 from mapspeak.spatial.picture.poles import find_poles
 from mapspeak.spatial.picture.spacing import even_spacing_m
 from mapspeak.spatial.picture.view import NORTH_UP_RAD, View
+from mapspeak.spatial.picture.zones import paint_zones
 
 __all__ = ["MapLayers", "MapPicture", "draw_axes", "draw_map", "encode", "finish", "plan_sheet"]
 
@@ -60,6 +61,7 @@ class MapLayers:
 
     Attributes:
         regions: Areas of the floor.
+        zones: Parts of the map that are set apart from it, such as what is closed.
         lines: Paths, doors, borders.
         marks: Places, each with a label.
         robot: Where the robot stands.
@@ -68,6 +70,7 @@ class MapLayers:
     """
 
     regions: RegionLayer | None = None
+    zones: tuple[Zone, ...] = ()
     lines: tuple[Line, ...] = ()
     marks: tuple[Mark, ...] = ()
     robot: Pose | None = None
@@ -193,8 +196,9 @@ def finish(
     legend: Legend,
     regions: NDArray[np.uint16] | None,
 ) -> MapPicture:
-    """Draws lines, symbols, the robot, all labels and the legend, and gives the picture."""
-    sight = _look(view, layers, regions)
+    """Draws zones, lines, symbols, the robot, all labels and the legend; gives the picture."""
+    zones = paint_zones(view.area_of(canvas), view, layers.zones)
+    sight = _look(view, layers, regions, zones)
     left_out = _draw_scene(view.area_of(canvas), view, sight, regions)
     bottom = legend.limited_to(sight.scene).draw(canvas, view, axes.legend_top(view))
     height_px = min(view.height_px, bottom + _LEGEND_RIM_PX)
@@ -230,10 +234,11 @@ def encode(canvas: Canvas) -> bytes:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Sight:
-    """What a picture shows, and where in it the labels of regions stand best."""
+    """What a picture shows, and where in it the labels of regions and zones stand best."""
 
     scene: Scene
     poles: dict[int, tuple[float, float]]
+    zones: dict[Zone, tuple[float, float] | None]
 
 
 def _robot_label(robot: Pose) -> str:
@@ -258,6 +263,7 @@ def _everything(layers: MapLayers) -> Scene:
     """Gives all that a picture of the whole map would show."""
     return Scene(
         regions=_regions_of(layers),
+        zones=layers.zones,
         lines=layers.lines,
         marks=layers.marks,
         robot=layers.robot,
@@ -265,19 +271,25 @@ def _everything(layers: MapLayers) -> Scene:
     )
 
 
-def _look(view: View, layers: MapLayers, regions: NDArray[np.uint16] | None) -> _Sight:
+def _look(
+    view: View,
+    layers: MapLayers,
+    regions: NDArray[np.uint16] | None,
+    zones: dict[Zone, tuple[float, float] | None],
+) -> _Sight:
     """Gives the part of all that which lies in the view."""
     named = _regions_of(layers)
     poles = {} if regions is None else find_poles(regions, tuple(r.label for r in named))
     robot = layers.robot
     scene = Scene(
         regions=tuple(region for region in named if region.label in poles),
+        zones=tuple(zones),
         lines=tuple(line for line in layers.lines if symbols.is_in_view(view, line)),
         marks=tuple(itertools.compress(layers.marks, view.shows_each(_points_of(layers.marks)))),
         robot=robot if robot is not None and view.shows(robot.point) else None,
         has_origin=view.shows(Point(0.0, 0.0)),
     )
-    return _Sight(scene=scene, poles=poles)
+    return _Sight(scene=scene, poles=poles, zones=zones)
 
 
 def _paint_regions(
@@ -305,7 +317,15 @@ def _draw_scene(
         for mark, place in zip(scene.marks, places, strict=True)
         if mark.shape is not None
     ]
-    labels = labels_of_regions(scene.regions, sight.poles) + labels_of_marks(scene.marks, places)
+    labels = [
+        *(
+            label_at(np.array(pole), zone.label, clearance_px=0.0)
+            for zone, pole in sight.zones.items()
+            if zone.label and pole is not None
+        ),
+        *labels_of_regions(scene.regions, sight.poles),
+        *labels_of_marks(scene.marks, places),
+    ]
     if scene.robot is not None:
         at, reach_px = _place_of(scene.robot, view), symbols.ARROW_REACH_PX
         obstacles.append(symbols.symbol_box(at, reach_px))
@@ -319,7 +339,8 @@ def _draw_scene(
         heading_rad = view.heading_at(scene.robot.yaw_rad)
         symbols.draw_arrow(inside, _place_of(scene.robot, view), heading_rad)
     draw_texts(inside, placed)
-    return left_out
+    covered = (zone.label for zone, pole in sight.zones.items() if zone.label and pole is None)
+    return (*covered, *left_out)
 
 
 def _place_of(robot: Pose, view: View) -> FloatArray:

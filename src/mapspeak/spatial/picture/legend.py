@@ -23,6 +23,7 @@ from mapspeak.spatial.picture.marks import (
     Region,
     Sample,
     Shape,
+    Zone,
 )
 from mapspeak.spatial.picture.palette import (
     FILLS,
@@ -37,6 +38,7 @@ from mapspeak.spatial.picture.palette import (
 from mapspeak.spatial.picture.spacing import round_length_m
 from mapspeak.spatial.picture.symbols import draw_arrow, draw_run, draw_shape, draw_zero_ring
 from mapspeak.spatial.picture.view import View, is_north_up
+from mapspeak.spatial.picture.zones import ZONE_NUMBER
 
 __all__ = ["ROW_PX", "GroundEntry", "Legend", "Scene", "grounds_in", "n_rows_of"]
 
@@ -67,6 +69,7 @@ class Scene:
 
     Attributes:
         regions: Areas of the floor.
+        zones: Hatched parts of the map.
         lines: Paths and borders.
         marks: Symbols with labels.
         robot: The robot's pose.
@@ -74,6 +77,7 @@ class Scene:
     """
 
     regions: tuple[Region, ...] = ()
+    zones: tuple[Zone, ...] = ()
     lines: tuple[Line, ...] = ()
     marks: tuple[Mark, ...] = ()
     robot: Pose | None = None
@@ -81,19 +85,17 @@ class Scene:
 
     def shows(self, sample: Sample) -> bool:
         """True when that kind of thing is to be seen."""
-        match sample:
-            case Sample.ROBOT:
-                return self.robot is not None
-            case Sample.ORIGIN:
-                return self.has_origin
-            case Sample.HATCHED_REGION:
-                return any(region.is_hatched for region in self.regions)
-            case Sample.DOTTED_REGION:
-                return any(region.is_dotted for region in self.regions)
-            case Sample.HIGHLIGHTED_REGION:
-                return any(region.is_highlighted for region in self.regions)
-            case Sample.PLAIN_REGION:
-                return any(not (r.is_hatched or r.is_dotted) for r in self.regions)
+        regions = self.regions
+        is_shown = {
+            Sample.ZONE: bool(self.zones),
+            Sample.ROBOT: self.robot is not None,
+            Sample.ORIGIN: self.has_origin,
+            Sample.HATCHED_REGION: any(region.is_hatched for region in regions),
+            Sample.DOTTED_REGION: any(region.is_dotted for region in regions),
+            Sample.HIGHLIGHTED_REGION: any(region.is_highlighted for region in regions),
+            Sample.PLAIN_REGION: any(not (r.is_hatched or r.is_dotted) for r in regions),
+        }
+        return is_shown[sample]
 
     def find_colour(self, entry: LegendEntry) -> Colour | None:
         """Gives the colour of the first mark or line that an entry explains."""
@@ -215,6 +217,8 @@ def _item_of_entry(entry: LegendEntry) -> _Item:
         draw = partial(_draw_line, style=sample, colour=colour)
     elif sample is Sample.ROBOT:
         draw = _draw_robot
+    elif sample is Sample.ZONE:
+        draw = _draw_zone
     elif sample is Sample.ORIGIN:
         return _Item(text=entry.text, sample_px=_SWATCH_PX, draw=_draw_origin)
     else:
@@ -260,6 +264,15 @@ def _draw_robot(canvas: Canvas, left: int, middle: int) -> None:
 
 def _draw_origin(canvas: Canvas, left: int, middle: int) -> None:
     draw_zero_ring(canvas, np.array([left + _SWATCH_PX / 2, middle + 0.5]))
+
+
+def _draw_zone(canvas: Canvas, left: int, middle: int) -> None:
+    right, half_px = left + _WIDE_SWATCH_PX, _SWATCH_PX // 2
+    cv2.rectangle(canvas, (left, middle - half_px), (right, middle + half_px), (FREE,), cv2.FILLED)
+    inner = canvas[middle - half_px : middle + half_px, left:right]
+    row, col = np.indices(inner.shape)
+    inner[(row - col) % 6 < 2] = ZONE_NUMBER
+    cv2.rectangle(canvas, (left, middle - half_px), (right, middle + half_px), (ZONE_NUMBER,), 2)
 
 
 def _draw_region(canvas: Canvas, left: int, middle: int, *, sample: Sample) -> None:

@@ -10,7 +10,17 @@ from mapspeak.errors import MapError
 from mapspeak.geometry import Point
 from mapspeak.spatial.picture.palette import Colour
 
-__all__ = ["LegendEntry", "Line", "LineStyle", "Mark", "Region", "RegionLayer", "Sample", "Shape"]
+__all__ = [
+    "LegendEntry",
+    "Line",
+    "LineStyle",
+    "Mark",
+    "Region",
+    "RegionLayer",
+    "Sample",
+    "Shape",
+    "Zone",
+]
 
 _MAX_LABEL = np.iinfo(np.uint16).max
 
@@ -39,6 +49,7 @@ class Sample(StrEnum):
     HATCHED_REGION = "hatched region"
     DOTTED_REGION = "dotted region"
     HIGHLIGHTED_REGION = "highlighted region"
+    ZONE = "zone"
     ROBOT = "robot"
     ORIGIN = "origin"
 
@@ -127,6 +138,20 @@ class RegionLayer:
         locked = np.array(labels, dtype=np.uint16, order="C")
         locked.setflags(write=False)
         object.__setattr__(self, "labels", locked)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Zone:
+    """A part of the map with a bold outline and wide hatching; walls in it stay to be seen.
+
+    Attributes:
+        outlines: Corners in order, of parts and of holes: what lies within an even number of them
+            is outside.
+        label: What is written in it; empty for nothing.
+    """
+
+    outlines: tuple[tuple[Point, ...], ...]
+    label: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

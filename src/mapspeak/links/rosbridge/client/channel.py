@@ -45,7 +45,9 @@ class Channel:
         self._is_up = anyio.Event()
         self._fault: LinkError | None = None
         self._is_closing = False
+        self._wanted = anyio.Event()
         self._up_since_s = 0.0
+        self._lost_since_s: float | None = None
         self.n_connections = 0
         """How often it has been connected; more than one means that it was lost in between."""
 
@@ -63,6 +65,11 @@ class Channel:
     def up_for_s(self) -> float | None:
         """Since when it has been connected, in wall time; None while it is not."""
         return anyio.current_time() - self._up_since_s if self.is_up else None
+
+    @property
+    def lost_for_s(self) -> float | None:
+        """Since when it has been lost, in wall time; None while it is connected."""
+        return None if self._lost_since_s is None else anyio.current_time() - self._lost_since_s
 
     async def start(self, tasks: TaskGroup) -> None:
         """Connects for the first time, and keeps connected in the background.
@@ -129,7 +136,7 @@ class Channel:
                 self.replace(connection)
             raise LinkError(f"{what} did not answer within {timeout_s:g} s.", hint=SERVICE_HINT)
         if answer is None:
-            raise self._lost(f"while {what} was asked")
+            raise self._lost(f"was lost while {what} was asked")
         return _values_of(answer, what)
 
     def replace(self, connection: Connection | None = None) -> None:
@@ -151,13 +158,17 @@ class Channel:
             if self._is_closing:
                 return
             self._is_up = anyio.Event()
+            self._lost_since_s = anyio.current_time()
             self._on_loss(self)
             await self._connect_again(tasks)
 
     async def _connect_again(self, tasks: TaskGroup) -> None:
         pause_s = 0.0
         while True:
-            await anyio.sleep(pause_s)
+            with anyio.move_on_after(pause_s):
+                # Whoever waits for the robot learns at once whether it is back.
+                await self._wanted.wait()
+            self._wanted = anyio.Event()
             try:
                 await self._connect(tasks)
             except LinkError as error:
@@ -177,24 +188,32 @@ class Channel:
             connection.send(text)
         self._connection = connection
         self.n_connections += 1
-        self._fault = None
+        self._fault = self._lost_since_s = None
         tasks.start_soon(connection.serve)
         self._up_since_s = anyio.current_time()
         self._is_up.set()
 
     async def _wait_for_connection(self, timeout_s: float) -> Connection:
-        with anyio.move_on_after(timeout_s):
+        with anyio.move_on_after(self._patience_s(timeout_s)):
             while self._connection is None or not self.is_up or self._connection.is_over.is_set():
                 # A connection that has just ended is noticed by `_keep_up` before long.
+                self._wanted.set()
                 await self._is_up.wait()
                 await anyio.lowlevel.checkpoint()
             return self._connection
-        raise self._lost(f"for {timeout_s:g} s")
+        raise self._lost(f"has been lost for {self.lost_for_s or 0.0:.0f} s")
 
-    def _lost(self, when: str) -> LinkError:
+    def _patience_s(self, timeout_s: float) -> float:
+        """Gives how long to wait: from the loss on, so that waits for a lost robot do not add up.
+
+        One that has been away for longer gets the time of one attempt.
+        """
+        return min(timeout_s, max(timeout_s - (self.lost_for_s or 0.0), self._timing.attempt_s))
+
+    def _lost(self, what: str) -> LinkError:
         why = f" {self._fault.message}" if self._fault is not None else ""
         return LinkError(
-            f"The connection to {self._address.shown} was lost {when}.{why}",
+            f"The connection to {self._address.shown} {what}.{why}",
             hint="It is made anew by itself; check that the robot and its rosbridge still run.",
         )
 
@@ -202,8 +221,9 @@ class Channel:
 def _values_of(answer: ServiceAnswered, what: str) -> object:
     if answer.is_success:
         return answer.values
-    reason = answer.values if isinstance(answer.values, str) else "it gave no reason"
+    said = answer.values if isinstance(answer.values, str) else ""
+    reason = " ".join(said.split())[:300].rstrip(". ")
     raise LinkError(
-        f"{what} failed: {' '.join(reason.split())[:300] or 'it gave no reason'}.",
+        f"{what} failed: {reason or 'it gave no reason'}.",
         hint="Check its name, its type and the fields of the request.",
     )

@@ -13,6 +13,7 @@ from mapspeak.errors import LinkError
 from mapspeak.links.ros import PursuedGoal, TopicSubscription, plain_errors
 from mapspeak.links.rosbridge import protocol
 from mapspeak.links.rosbridge.client.address import RobotAddress
+from mapspeak.links.rosbridge.client.calling import ServiceCaller
 from mapspeak.links.rosbridge.client.channel import Channel
 from mapspeak.links.rosbridge.client.rosapi import Rosapi
 from mapspeak.links.rosbridge.client.timing import Timing
@@ -83,6 +84,7 @@ class RosbridgeClient(Rosapi):
         self.timing = timing
         self._control = self._channel()
         self._urgent = self._channel()
+        self._caller = ServiceCaller(self._free_for_calls)
         self._requests: dict[str, _Request] = {}
         self._advertised: dict[str, str] = {}
         self._goals: dict[str, tuple[PursuedGoal, Channel]] = {}
@@ -110,6 +112,14 @@ class RosbridgeClient(Rosapi):
         In wall time.
         """
         return self._control.up_for_s
+
+    @property
+    def lost_for_s(self) -> float | None:
+        """Since when the socket that carries topics and goals has been gone; None while it is not.
+
+        In wall time.
+        """
+        return self._control.lost_for_s
 
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Runs something in the background until the client is closed."""
@@ -243,14 +253,12 @@ class RosbridgeClient(Rosapi):
         Raises:
             LinkError: No answer, a refusal, or no connection.
         """
-        call_id = new_id()
-        text = protocol.call_service(
-            service, arguments or {}, operation_id=call_id, type_name=type_name
+        return await self._caller.call(
+            service,
+            arguments or {},
+            type_name=type_name,
+            timeout_s=self.timing.answer_s if timeout_s is None else timeout_s,
         )
-        limit_s = self.timing.answer_s if timeout_s is None else timeout_s
-        channel = self._free_for_calls()
-        values = await channel.call(text, call_id=call_id, what=service, timeout_s=limit_s)
-        return values if isinstance(values, dict) else {}
 
     async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> PursuedGoal:
         """Sends a goal to an action of ROS 2 and gives what becomes of it, as it becomes.

@@ -156,11 +156,14 @@ class Rosapi(ABC):
             ) from error
 
     async def set_parameter(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401
-        """Sets a node's parameter."""
+        """Sets a node's parameter; None deletes it."""
         if await self._fetch_dialect() is Dialect.ROS2:
             await self._parameters.put(node, name, value)
             return
         full = f"{node.rstrip('/')}/{name}"
+        if value is None:
+            await self.call_service("/rosapi/delete_param", {"name": full})
+            return
         await self.call_service("/rosapi/set_param", {"name": full, "value": json.dumps(value)})
 
     async def _fetch_dialect(self) -> Dialect:

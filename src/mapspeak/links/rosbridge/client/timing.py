@@ -10,6 +10,7 @@ class Timing:
     Attributes:
         connect_s: For one attempt to connect, handshake included.
         answer_s: For a service's answer, where the caller says nothing else.
+        attempt_s: For a connection that has been gone for longer than that: one more attempt.
         first_pause_s: Before the first attempt to reconnect; doubled after each failure.
         longest_pause_s: Between two attempts to reconnect.
         ping_s: Between two pings.
@@ -23,6 +24,7 @@ class Timing:
 
     connect_s: float = 5.0
     answer_s: float = 5.0
+    attempt_s: float = 0.5
     first_pause_s: float = 0.1
     longest_pause_s: float = 5.0
     ping_s: float = 5.0

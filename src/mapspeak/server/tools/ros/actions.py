@@ -6,15 +6,18 @@ import anyio
 from pydantic import Field
 
 from mapspeak.errors import GoalError, LinkError
+from mapspeak.navigation.safety import Act
 from mapspeak.ros.definitions import check_message
 from mapspeak.ros.messages import bare_type
 from mapspeak.server.rosreports import cut, show_message
+from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.goals import ActionBook
 from mapspeak.server.tools.ros.inquiry import RosInquiry, full_name
 from mapspeak.server.tools.ros.jobs import ActionState, Job
 from mapspeak.server.tools.ros.lists import Filter, Page, choose, say_page
+from mapspeak.server.tools.ros.losses import say_loss
 from mapspeak.server.toolset import Effect, Tool
-from mapspeak.server.wording import list_some
+from mapspeak.server.wording import say_count
 
 __all__ = ["ActionTools"]
 
@@ -51,8 +54,9 @@ GOES_ON = "It goes on: ros_goal_status waits for it, ros_cancel_goal ends it."
 class ActionTools:
     """Listing, describing, sending, asking, cancelling."""
 
-    def __init__(self, inquiry: RosInquiry, book: ActionBook) -> None:
+    def __init__(self, inquiry: RosInquiry, commands: RosCommands, book: ActionBook) -> None:
         self._inquiry = inquiry
+        self._commands = commands
         self._book = book
 
     def tools(self) -> list[Tool]:
@@ -103,6 +107,7 @@ class ActionTools:
         refused goal is told as rejected. Call ros_action first for the fields.
         """
         name = full_name(action)
+        self._commands.check_name(Act(action=name, type=type or "", goal=goal))
         said = await self._find_type(name, type)
         described = await self._inquiry.describe(said)
         checked = check_message(described.book, described.part(0), goal)
@@ -114,7 +119,7 @@ class ActionTools:
             with anyio.CancelScope(shield=True):
                 await self._book.cancel(job)
             raise
-        return _say_job(job)
+        return self._say_job(job)
 
     async def ros_goal_status(
         self, goal_id: Handle = None, wait_s: Wait = 0.0, action: AnyAction = None
@@ -124,13 +129,10 @@ class ActionTools:
         Use it to wait for the end; with an action it lists the goals its server knows.
         """
         if action is not None:
-            lines = await self._book.fetch_listed(full_name(action))
-            shown = "\n".join(lines[-MOST_LISTED:]) or "none"
-            ours = list_some(self._book.handles[-MOST_LISTED:], most=MOST_LISTED) or "none"
-            return f"{len(lines)} goals, by the server's ids:\n{shown}\nSent from here: {ours}"
+            return await self._say_listed(full_name(action))
         job = self._book.find(goal_id)
         await self._book.wait(job, wait_s=wait_s)
-        return _say_job(job)
+        return self._say_job(job)
 
     async def ros_cancel_goal(self, goal_id: CancelHandle = None, action: AnyAction = None) -> str:
         """Cancels one goal by its goal_id, or every goal of a ROS action.
@@ -146,9 +148,19 @@ class ActionTools:
             return f"{full_name(action)}: {await self._book.cancel_all(full_name(action))}."
         job = self._book.find(goal_id)
         if job.is_over:
-            return f"{job.handle} was over already, nothing was cancelled.\n{_say_job(job)}"
+            return f"{job.handle} was over already, nothing was cancelled.\n{self._say_job(job)}"
         await self._book.cancel(job)
-        return _say_job(job)
+        return self._say_job(job)
+
+    async def _say_listed(self, action: str) -> str:
+        listed = await self._book.fetch_listed(action)
+        lines = [
+            f"{goal.id}: {goal.state}, {f'ours, {goal.handle}' if goal.handle else 'not ours'}"
+            for goal in listed
+        ]
+        loss = say_loss(self._inquiry.connection, since_s=self._book.heard_s(action))
+        head = f"{say_count(len(lines), 'goal')}, by the server's ids:"
+        return "\n".join([head, *(lines[-MOST_LISTED:] or ["none"]), *([loss] if loss else [])])
 
     async def _find_type(self, action: str, given: str | None) -> str:
         """Gives an action's type as this ROS writes it; the given one where nobody tells it."""
@@ -164,15 +176,16 @@ class ActionTools:
         except LinkError:
             return "(its type is not told)"
 
-
-def _say_job(job: Job) -> str:
-    passed_s = (job.ended_s or anyio.current_time()) - job.sent_s
-    parts = [f"{job.handle} ({job.action}): {job.state} after {passed_s:.1f} s."]
-    said = [part for part in (job.reason, NEXT_STEP.get(job.state, GOES_ON)) if part]
-    if said:
-        parts.append(" ".join(said))
-    if job.result is not None:
-        parts.append(f"result:\n{show_message(job.result)}")
-    elif job.feedback is not None:
-        parts.append(f"latest feedback of {job.n_feedback}:\n{show_message(job.feedback)}")
-    return cut("\n".join(parts))
+    def _say_job(self, job: Job) -> str:
+        passed_s = (job.ended_s or anyio.current_time()) - job.sent_s
+        parts = [f"{job.handle} ({job.action}): {job.state} after {passed_s:.1f} s."]
+        connection = self._inquiry.connection
+        loss = "" if job.is_over else say_loss(connection, since_s=job.sent_s)
+        said = [part for part in (loss, job.reason, NEXT_STEP.get(job.state, GOES_ON)) if part]
+        if said:
+            parts.append(" ".join(said))
+        if job.result is not None:
+            parts.append(f"result:\n{show_message(job.result)}")
+        elif job.feedback is not None:
+            parts.append(f"latest feedback of {job.n_feedback}:\n{show_message(job.feedback)}")
+        return cut("\n".join(parts))

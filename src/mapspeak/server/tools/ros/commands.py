@@ -7,6 +7,7 @@ from typing import Any
 import anyio
 
 from mapspeak.errors import LinkError
+from mapspeak.navigation.safety import Act, Call, GuardedConnection, Publish, SetParameter
 from mapspeak.ros import ActionGoal, RosConnection
 from mapspeak.ros.messages import Message
 
@@ -42,6 +43,16 @@ class RosCommands:
         self._connection = connection
         self._advertised: set[tuple[str, str]] = set()
 
+    def check_name(self, command: Publish | Call | Act | SetParameter) -> None:
+        """Returns when a command is not denied for its name: said before anything else is checked.
+
+        Raises:
+            PolicyError: It is.
+        """
+        connection = self._connection()
+        if isinstance(connection, GuardedConnection):
+            connection.check_name(command)
+
     async def prepare(self, topic: str, type_name: str) -> None:
         """Advertises a topic, and waits until the robot has noticed.
 
@@ -64,50 +75,33 @@ class RosCommands:
         """Publishes one message on a topic that was prepared."""
         await self._connection().publish(topic, message)
 
-    async def publish_for(
-        self,
-        topic: str,
-        message: Message,
-        *,
-        duration_s: float,
-        rate_hz: float,
-        is_over: Callable[[], bool],
-    ) -> int:
-        """Publishes again and again, and gives how often; in wall time.
-
-        Args:
-            topic: Was prepared.
-            message: Each time the same.
-            duration_s: From the first message on.
-            rate_hz: Messages a second.
-            is_over: True when the robot was stopped meanwhile.
-        """
-        started_s = anyio.current_time()
-        n_sent = 0
-        while n_sent / rate_hz < duration_s and not is_over():
-            await self.publish(topic, message)
-            n_sent += 1
-            await anyio.sleep_until(started_s + min(n_sent / rate_hz, duration_s))
-        return n_sent
-
-    async def stand(self, topic: str, message: Message) -> None:
-        """Publishes the stand for a velocity, whatever happens to the call that moved the robot.
+    async def publish_at_once(self, topic: str, message: Message) -> None:
+        """Publishes one message on a topic that was prepared, now or not at all.
 
         Raises:
-            LinkError: It could not be sent.
+            LinkError: There is no connection.
+        """
+        connection = self._connection()
+        if connection.lost_for_s is not None:
+            raise LinkError(
+                f"Nothing can be sent on {topic}: there is no connection.",
+                hint="Try again: the connection is made anew by itself.",
+            )
+        await connection.publish(topic, message)
+
+    async def stand(self, topic: str, message: Message) -> bool:
+        """Publishes the stand for a velocity, whatever happens to the call that moved the robot.
+
+        Where the connection is lost it is waited for a moment. Gives whether a stand was sent.
         """
         zero = stand_of(message)
+        n_sent = 0
         with anyio.CancelScope(shield=True), anyio.move_on_after(STAND_S):
-            n_ways = 0
-            for number in range(N_STANDS):
-                if number:
-                    await anyio.sleep(PAUSE_S)
-                n_ways += self._connection().publish_everywhere(topic, zero)
-            if n_ways == 0:
-                raise LinkError(
-                    f"The zero velocity for {topic} could not be sent: there is no connection.",
-                    hint="If the robot still moves, stop it by hand.",
-                )
+            while n_sent < N_STANDS:
+                if self._connection().publish_everywhere(topic, zero):
+                    n_sent += 1
+                await anyio.sleep(PAUSE_S)
+        return n_sent > 0
 
     async def tell_everywhere(self, topic: str, message: Message) -> None:
         """Publishes by every way there is: for a cancellation.

@@ -1,6 +1,7 @@
 """Every goal that was sent with the ROS tools, by its handle; the latest last."""
 
 from collections import OrderedDict
+from dataclasses import dataclass
 
 import anyio
 
@@ -10,7 +11,7 @@ from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.goals1 import Ros1Pursuer
 from mapspeak.server.tools.ros.goals2 import Ros2Pursuer
 from mapspeak.server.tools.ros.inquiry import RosInquiry
-from mapspeak.server.tools.ros.jobs import Job
+from mapspeak.server.tools.ros.jobs import ActionState, Job
 from mapspeak.server.tools.ros.pursuing import ActionPatience, Pursuer
 
 __all__ = ["ActionBook"]
@@ -18,6 +19,21 @@ __all__ = ["ActionBook"]
 MOST_KEPT = 200
 POLL_S = 0.2
 USUAL_PATIENCE = ActionPatience()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ListedGoal:
+    """A goal that an action server knows.
+
+    Attributes:
+        id: The server's.
+        state: As the server says.
+        handle: What a model calls it; None for one of others.
+    """
+
+    id: str
+    state: ActionState
+    handle: str | None
 
 
 class ActionBook:
@@ -106,11 +122,19 @@ class ActionBook:
             await job.wait_until_over(within_s=self._patience.end_s)
         return said
 
-    async def fetch_listed(self, action: str) -> list[str]:
-        """Gives a line for each goal that an action server knows, ours and others'."""
+    async def fetch_listed(self, action: str) -> list[ListedGoal]:
+        """Gives each goal that an action server knows, ours and others'."""
         pursuer = await self._pursuer_of(action)
         await pursuer.wait_for_list()
-        return [f"{goal_id}: {state}" for goal_id, state in pursuer.listed.items()]
+        ours = pursuer.handles
+        return [
+            ListedGoal(id=goal_id, state=state, handle=ours.get(goal_id))
+            for goal_id, state in pursuer.listed.items()
+        ]
+
+    def heard_s(self, action: str) -> float:
+        """Gives when an action server's list of goals came, by the event loop's clock."""
+        return self._pursuers[action].listed_s
 
     async def _pursuer_of(self, action: str) -> Pursuer:
         if action not in self._pursuers:

@@ -10,6 +10,7 @@ from mapspeak.ros.messages import Dialect, Message, write_header, write_stamp
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.jobs import ActionState, Job
 from mapspeak.server.tools.ros.pursuing import GONE, NOT_TAKEN, RESULT_LATE, ActionPatience
+from mapspeak.server.wording import say_count
 
 __all__ = ["Ros1Pursuer"]
 
@@ -66,6 +67,16 @@ class Ros1Pursuer:
         """The goals that the action server knows."""
         return self._statuses
 
+    @property
+    def listed_s(self) -> float:
+        """When that list came."""
+        return self._lists.arrived_s
+
+    @property
+    def handles(self) -> Mapping[str, str]:
+        """Our own goals by their ids."""
+        return {goal_id: handle for handle, goal_id in self._ids.items()}
+
     async def wait_for_list(self) -> None:
         """Waits a moment for the goals there are."""
         try:
@@ -120,7 +131,7 @@ class Ros1Pursuer:
         await self._commands.prepare(f"{self._action}/cancel", "actionlib_msgs/GoalID")
         await self._tell_cancel("")
         n_live = sum(not state.is_final for state in self._statuses.values())
-        return f"{n_live} goals are being cancelled"
+        return f"{say_count(n_live, 'goal')} being cancelled"
 
     async def _tell_cancel(self, goal_id: str) -> None:
         stamp = write_stamp(0.0, dialect=Dialect.ROS1)

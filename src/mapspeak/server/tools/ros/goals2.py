@@ -13,6 +13,7 @@ from mapspeak.ros.messages import Message
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.jobs import ActionState, Job
 from mapspeak.server.tools.ros.pursuing import GONE, NOT_TAKEN, RESULT_LATE, ActionPatience
+from mapspeak.server.wording import say_count
 
 __all__ = ["Ros2Pursuer"]
 
@@ -79,6 +80,16 @@ class Ros2Pursuer:
         """The goals that the action server knows."""
         return self._statuses
 
+    @property
+    def listed_s(self) -> float:
+        """When that list came."""
+        return self._arrays.arrived_s
+
+    @property
+    def handles(self) -> Mapping[str, str]:
+        """Our own goals by the server's ids, as far as these are known."""
+        return {each.ros_id: handle for handle, each in self._goals.items() if each.ros_id}
+
     async def wait_for_list(self) -> None:
         """Waits a moment for the goals there are, so that none is taken for ours."""
         try:
@@ -141,7 +152,7 @@ class Ros2Pursuer:
                 f"{self._action} cancels nothing: {CANCEL_ANSWERS.get(code, f'code {code}')}.",
                 hint="Call ros_goal_status for the goals there are.",
             )
-        return f"{len(answer.get('goals_canceling') or [])} goals are being cancelled"
+        return say_count(len(answer.get("goals_canceling") or []), "goal") + " being cancelled"
 
     def _take_statuses(self, message: Message) -> None:
         self._statuses = dict(_read_statuses(message))

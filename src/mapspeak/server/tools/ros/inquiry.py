@@ -10,8 +10,11 @@ from mapspeak.ros import NAME, TYPE, RosConnection, RosGraph, find_nearest
 from mapspeak.ros.definitions import (
     TypeBook,
     describe_type,
+    find_odd_lines,
+    kinds_of,
     known_definitions,
     name_parts,
+    parse_definition,
     split_parts,
 )
 from mapspeak.ros.messages import Dialect, bare_type
@@ -25,6 +28,7 @@ NO_ROS_HINT = (
     "other, with --robot ws://HOST:9090."
 )
 ACTION_GOAL = "ActionGoal"
+MOST_NEAR = 5
 KEPT_S = 1.0
 """For so long a list of names is as good as new, in wall time."""
 
@@ -194,7 +198,7 @@ class RosInquiry:
         Raises:
             LinkError: It is no name of a type, or nobody knows it; says how to describe it.
         """
-        _check_type_name(type_name)
+        await self._check_type_name(type_name)
         bare = bare_type(type_name)
         texts = await self.connection.fetch_definitions(type_name)
         if not texts:
@@ -202,9 +206,11 @@ class RosInquiry:
             texts = self._taught
         parts = _find_parts(texts, bare)
         if not parts:
+            near = await self._find_types(type_name)
+            meant = f" The nearest that are known: {', '.join(near)}." if near else ""
             raise LinkError(
                 f"Nobody knows what a {type_name} looks like: the robot does not describe it, and "
-                "it is none of the types that come with mapspeak.",
+                f"it is none of the types that come with mapspeak.{meant}",
                 hint="Give its definition to ros_type, as `ros2 interface show` (ROS 1: `rosmsg "
                 "show -r`, `rossrv show -r`) prints it on the robot, with --- between the parts.",
             )
@@ -214,21 +220,63 @@ class RosInquiry:
         """Keeps the definition of a type that nobody else knows, while the session lasts.
 
         Raises:
-            LinkError: It is no name of a type, or the robot or mapspeak knows that type.
+            LinkError: It is no name of a type, or the robot or mapspeak knows that type, or the
+                text is no definition.
         """
-        _check_type_name(type_name)
+        await self._check_type_name(type_name)
         if await self.connection.fetch_definitions(type_name):
             raise LinkError(
                 f"What a {type_name} looks like is known already.",
                 hint="Call ros_type without a definition to see it.",
             )
-        self._taught |= split_parts(type_name, definition)
+        texts = split_parts(type_name, definition)
+        for name, text in texts.items():
+            await self._check_definition(name, text)
+        self._taught |= texts
 
     async def said(self, type_name: str, *, kind: str = "msg") -> str:
         """Gives a type as this ROS writes it, such as "nav_msgs/msg/Path"."""
         dialect = await self.fetch_dialect()
         package, _, last = bare_type(type_name).partition("/")
         return f"{package}/{kind}/{last}" if dialect is Dialect.ROS2 else f"{package}/{last}"
+
+    async def _check_type_name(self, type_name: str) -> None:
+        if TYPE.fullmatch(type_name):
+            return
+        near = await self._find_types(type_name)
+        meant = f"It may be {', '.join(near)}. " if near else ""
+        raise LinkError(
+            f"{type_name[:80]!r} is no full name of a type.",
+            hint=f"{meant}It looks like geometry_msgs/msg/Twist (ROS 2) or geometry_msgs/Twist "
+            "(ROS 1).",
+        )
+
+    async def _check_definition(self, name: str, text: str) -> None:
+        """Returns when every line of a definition is one, and every type within is known."""
+        for line in find_odd_lines(text):
+            raise LinkError(
+                f"The definition of {name} has a line that defines nothing: {line[:80]!r}.",
+                hint="A line is a type and a name, as in `float64 x`, or a constant: `uint8 A=1`.",
+            )
+        fields = parse_definition(name, text).fields
+        for kind in dict.fromkeys(field.type for field in fields if field.is_message):
+            is_known = kind in self._taught or await self.connection.fetch_definitions(kind)
+            if not is_known:
+                raise LinkError(
+                    f"The definition of {name} holds the type {kind}, which nobody knows.",
+                    hint=f"Give the definition of {kind} to ros_type first.",
+                )
+
+    async def _find_types(self, wanted: str) -> list[str]:
+        """Gives the known types most like a name; first those that end as it does."""
+        graph = self._graph or await self.fetch_graph()
+        texts = {**known_definitions(graph.dialect), **self._taught}
+        kinds = dict.fromkeys(graph.types.values(), "msg") | kinds_of(texts)
+        last = f"/{wanted.strip('/').rpartition('/')[2].lower()}"
+        ending = sorted(name for name in kinds if name.lower().endswith(last))
+        near = [*ending, *find_nearest(bare_type(wanted), kinds)]
+        nearest = list(dict.fromkeys(near))[:MOST_NEAR]
+        return [await self.said(name, kind=kinds[name]) for name in nearest]
 
     async def _renew_graph(self) -> RosGraph:
         await self.connection.wait_until_connected()
@@ -283,14 +331,6 @@ def _actions_of(graph: RosGraph) -> tuple[str, ...]:
         return graph.actions
     goals = (name for name, kind in graph.types.items() if kind.endswith(ACTION_GOAL))
     return tuple(sorted(name.removesuffix("/goal") for name in goals if name.endswith("/goal")))
-
-
-def _check_type_name(type_name: str) -> None:
-    if not TYPE.fullmatch(type_name):
-        raise LinkError(
-            f"{type_name[:80]!r} is no type.",
-            hint="It looks like geometry_msgs/msg/Twist (ROS 2) or geometry_msgs/Twist (ROS 1).",
-        )
 
 
 def _find_parts(texts: Mapping[str, str], bare: str) -> tuple[str, ...]:

@@ -96,7 +96,8 @@ class Job:
             self.result = result
         if self.is_over:
             return
-        self.state, self.reason = state, " ".join(reason.split())[:300]
+        said = " ".join(reason.split())[:300].rstrip(". ")
+        self.state, self.reason = state, f"{said}." if said else ""
         self.ended_s = anyio.current_time()
         self._tell()
 

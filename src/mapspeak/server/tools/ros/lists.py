@@ -49,6 +49,9 @@ def say_page(
     of_all = "" if len(items) == n_all else f" of {n_all}"
     head = f"{what}: {len(items)}{of_all}"
     n_pages = max(1, -(-len(items) // PAGE_SIZE))
+    if page > n_pages:
+        last = "the only one" if n_pages == 1 else "the last"
+        return f"{head}. There is no page {page}: page {n_pages} is {last}."
     if n_pages > 1:
         head += f", page {page} of {n_pages}"
     return "\n".join([head, *(line(item) for item in shown)])

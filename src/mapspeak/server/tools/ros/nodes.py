@@ -7,6 +7,7 @@ import anyio
 from pydantic import Field
 
 from mapspeak.errors import LinkError, MapspeakError
+from mapspeak.navigation.safety import SetParameter
 from mapspeak.ros import RosGraph, find_nearest
 from mapspeak.ros.messages import Dialect
 from mapspeak.server.rosreports import cut, show_value
@@ -21,7 +22,7 @@ __all__ = ["NodeTools"]
 MOST_DESCRIBED = 5
 MOST_AT_ONCE = 8
 MOST_NAMED = 40
-DESCRIBE, SET = "rcl_interfaces/srv/DescribeParameters", "rcl_interfaces/srv/SetParameters"
+DESCRIBE = "rcl_interfaces/srv/DescribeParameters"
 KINDS = (
     "not set", "bool", "integer", "double", "string",
     "bytes", "bools", "integers", "doubles", "strings",
@@ -137,6 +138,7 @@ class NodeTools:
         Use ros_parameters first for its value and kind.
         """
         name = _node_name(node)
+        self._commands.check_name(SetParameter(node=name, name=parameter, value=value))
         if value is None:
             await self._delete(name, parameter)
             return f"{parameter} of {name} is deleted."
@@ -172,22 +174,7 @@ class NodeTools:
             raise LinkError(
                 f"{node} has no parameter {parameter[:80]!r}.", hint="ros_parameters lists them."
             )
-        if await self._inquiry.fetch_dialect() is Dialect.ROS1:
-            full = f"{node.rstrip('/')}/{parameter}"
-            await self._commands.call(
-                "/rosapi/delete_param", {"name": full}, type_name="rosapi/DeleteParam", timeout_s=5
-            )
-            return
-        unset = {"name": parameter, "value": {"type": 0}}
-        answer = await self._commands.call(
-            f"{node}/set_parameters", {"parameters": [unset]}, type_name=SET, timeout_s=5
-        )
-        for result in answer.get("results") or []:
-            if isinstance(result, Mapping) and not result.get("successful", False):
-                raise LinkError(
-                    f"{node} does not delete {parameter}: {result.get('reason')}",
-                    hint="A parameter that a node has declared can only be set.",
-                )
+        await self._commands.set_parameter(node, parameter, None)
 
     async def _fetch_names(self, node: str) -> tuple[str, ...]:
         try:

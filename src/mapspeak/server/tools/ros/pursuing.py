@@ -9,7 +9,10 @@ from mapspeak.server.tools.ros.jobs import ActionState, Job
 
 __all__ = ["GONE", "NOT_TAKEN", "RESULT_LATE", "ActionPatience", "Pursuer"]
 
-NOT_TAKEN = "The action server gave no sign of taking the goal within {:g} s; it was cancelled."
+NOT_TAKEN = (
+    "The action server gave no sign of taking the goal within {:g} s; it was cancelled. What "
+    "has just started may not be found yet by all: send it again."
+)
 GONE = "The connection was lost meanwhile, and the action server does not know the goal any more."
 RESULT_LATE = "Its result has not come."
 
@@ -61,4 +64,14 @@ class Pursuer(Protocol):
     @property
     def listed(self) -> Mapping[str, ActionState]:
         """The goals that the action server knows, ours and others', by its own ids."""
+        ...
+
+    @property
+    def listed_s(self) -> float:
+        """When that list came, by the event loop's clock."""
+        ...
+
+    @property
+    def handles(self) -> Mapping[str, str]:
+        """The handles of our own goals by the server's ids, as far as these are known."""
         ...

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 from mcp.server.mcpserver import Image
 from pydantic import Field
 
+from mapspeak.navigation.safety import Call
 from mapspeak.ros.definitions import check_message
 from mapspeak.server.rosreports import cut, show_message
 from mapspeak.server.tools.ros.commands import RosCommands
@@ -70,6 +71,7 @@ class ServiceTools:
         name = full_name(service)
         type_name = await self._inquiry.fetch_service_type(name)
         said = await self._inquiry.said(type_name, kind="srv")
+        self._commands.check_name(Call(service=name, type=said, arguments=arguments or {}))
         described = await self._inquiry.describe(said)
         request = check_message(described.book, described.part(0), arguments or {})
         answer = await self._commands.call(name, request, type_name=said, timeout_s=timeout_s)

@@ -26,7 +26,7 @@ class RosTools:
         self._nodes = NodeTools(inquiry, commands)
         self._topics = TopicTools(session, inquiry, commands)
         self._services = ServiceTools(session, inquiry, commands)
-        self._actions = ActionTools(inquiry, ActionBook(inquiry, commands))
+        self._actions = ActionTools(inquiry, commands, ActionBook(inquiry, commands))
 
     def tools(self) -> list[Tool]:
         """Gives the tools in their order."""

@@ -7,12 +7,15 @@ from mcp.server.mcpserver import Image
 from pydantic import Field
 
 from mapspeak.errors import LinkError
+from mapspeak.navigation.safety import Publish
 from mapspeak.ros.definitions import check_message
 from mapspeak.ros.messages import Message, bare_type
 from mapspeak.server.rosreports import cut
 from mapspeak.server.tools.ros.commands import VELOCITIES, RosCommands, stand_of
 from mapspeak.server.tools.ros.inquiry import RosInquiry, full_name
 from mapspeak.server.tools.ros.lists import Filter, Page, choose, say_page
+from mapspeak.server.tools.ros.losses import say_loss
+from mapspeak.server.tools.ros.publishing import Publication, Publisher
 from mapspeak.server.tools.ros.reading import Heard, hear
 from mapspeak.server.tools.ros.views import BULKY, View, view_message
 from mapspeak.server.toolset import Effect, Tool
@@ -64,6 +67,7 @@ class TopicTools:
         self._session = session
         self._inquiry = inquiry
         self._commands = commands
+        self._publisher = Publisher(session, commands)
         self._viewed: dict[str, tuple[Message, View]] = {}
 
     def tools(self) -> list[Tool]:
@@ -129,6 +133,7 @@ class TopicTools:
         """
         name = full_name(topic)
         type_name = await self._inquiry.fetch_topic_type(name)
+        started_s = anyio.current_time()
         heard = await hear(
             self._inquiry.connection,
             name,
@@ -140,7 +145,10 @@ class TopicTools:
         )
         if not heard.messages:
             raise await self._nothing_heard(name, duration_s or wait_s)
+        since_s = started_s if duration_s else anyio.current_time() - heard.age_s
+        loss = say_loss(self._inquiry.connection, since_s=since_s)
         head = f"{name} ({await self._inquiry.said(type_name)}): {_say_heard(heard, duration_s)}"
+        head += f"\n{loss}" if loss else ""
         return await self._show(name, type_name, heard, head)
 
     async def ros_publish(
@@ -154,10 +162,11 @@ class TopicTools:
         """Publishes on a ROS topic, once or for a time, which may move the robot.
 
         Use navigate_to to drive somewhere. The message is checked against its type first. A
-        velocity needs duration_s and ends with a stand, whatever happens; stop_robot ends it too.
+        velocity needs duration_s, goes out alone and ends with a stand; stop_robot ends it too.
         """
         name = full_name(topic)
         type_name = await self._type_to_publish(name, type)
+        self._commands.check_name(Publish(topic=name, type=type_name, message=message))
         described = await self._inquiry.describe(await self._inquiry.said(type_name))
         checked = check_message(described.book, type_name, message)
         is_moving = type_name in VELOCITIES and stand_of(checked) != checked
@@ -166,53 +175,24 @@ class TopicTools:
                 f"{name} takes velocities: without an end the robot would go on.",
                 hint=f"Give duration_s, in seconds up to {LONGEST_S:g}.",
             )
-        with self._session.drives.preparing() as ticket:
-            await self._commands.prepare(name, await self._inquiry.said(type_name))
-            if self._was_stopped(ticket):
-                raise LinkError(
-                    "The robot was stopped before anything was published.",
-                    hint="Publish again when it may move.",
-                )
-            if duration_s is None:
-                await self._commands.publish(name, checked)
-                said = "Published once"
-            else:
-                said = await self._publish_for(
-                    name, checked, duration_s, rate_hz, ticket, is_moving=is_moving
-                )
-        subscribers = await self._inquiry.connection.fetch_subscribers(name)
-        return f"{said} on {name}. Heard by: {_say_nodes(subscribers)}."
-
-    async def _publish_for(
-        self,
-        topic: str,
-        message: Message,
-        duration_s: float,
-        rate_hz: float,
-        ticket: int,
-        *,
-        is_moving: bool,
-    ) -> str:
-        started_s = anyio.current_time()
-        try:
-            n_sent = await self._commands.publish_for(
-                topic,
-                message,
+        said = await self._publisher.publish(
+            Publication(
+                topic=name,
+                type=await self._inquiry.said(type_name),
+                message=checked,
+                is_moving=is_moving,
                 duration_s=duration_s,
                 rate_hz=rate_hz,
-                is_over=lambda: self._was_stopped(ticket),
             )
-        finally:
-            passed_s = anyio.current_time() - started_s
-            if is_moving:
-                await self._commands.stand(topic, message)
-        end = ", then a stand" if is_moving else ""
-        cut_short = " until the robot was stopped" if self._was_stopped(ticket) else ""
-        return f"Published {n_sent} times in {passed_s:.2f} s{cut_short}{end}"
+        )
+        return f"{said} {await self._say_hearers(name)}"
 
-    def _was_stopped(self, ticket: int) -> bool:
-        with self._session.drives.preparing() as now:
-            return now != ticket
+    async def _say_hearers(self, topic: str) -> str:
+        try:
+            subscribers = await self._inquiry.connection.fetch_subscribers(topic)
+        except LinkError as error:
+            return f"Who heard it is not known: {error.message}"
+        return f"Heard by: {_say_nodes(subscribers)}."
 
     async def _type_to_publish(self, topic: str, given: str | None) -> str:
         """Gives the topic's own type; the one that was given only where there is no topic yet."""
@@ -235,6 +215,12 @@ class TopicTools:
             return str(error)
 
     async def _nothing_heard(self, topic: str, waited_s: float) -> LinkError:
+        loss = say_loss(self._inquiry.connection, since_s=anyio.current_time() - waited_s)
+        if loss:
+            return LinkError(
+                f"No message came on {topic} within {waited_s:g} s. {loss}",
+                hint="Read it again once the connection is back.",
+            )
         publishers = await self._inquiry.connection.fetch_publishers(topic)
         if not publishers:
             hint = "Nobody publishes it: start the node that should."

@@ -1,0 +1,5 @@
+"""Shows every building."""
+
+from benchmarks.memory.measuring import main
+
+main()

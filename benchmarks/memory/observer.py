@@ -1,0 +1,142 @@
+"""A scripted observer: it writes down what it sees, and errs as people and models do."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from benchmarks.memory.sites import Site, TrueThing
+from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.semantic import Landmark, SemanticMap, Waypoint
+
+__all__ = ["Memory", "observe"]
+
+BEARING_NOISE_RAD = math.radians(10)
+RANGE_NOISE_RATIO = 0.15
+WRONG_RATIO = 0.2
+NEVER_RATIO = 1 / 3
+N_VIEWS = 3
+NEAREST_M, FARTHEST_M = 1.0, 5.0
+HALF_VIEW_RAD = math.radians(45)
+MOST_TRIES = 60
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Memory:
+    """What was written down, and, for judging alone, of what.
+
+    Attributes:
+        places: The records.
+        truth: The thing that each landmark was seen of, by the name of the waypoint and landmark.
+        wrong: Landmarks with another label or direction.
+        annotated: Things that were written down at all.
+    """
+
+    places: SemanticMap
+    truth: dict[tuple[str, Landmark], TrueThing]
+    wrong: frozenset[tuple[str, Landmark]]
+    annotated: tuple[TrueThing, ...]
+
+
+@dataclass(slots=True)
+class _Notebook:
+    site: Site
+    random: np.random.Generator
+    has_ranges: bool
+    n_views: dict[TrueThing, int]
+    truth: dict[tuple[str, Landmark], TrueThing] = field(default_factory=dict)
+    wrong: set[tuple[str, Landmark]] = field(default_factory=set)
+    waypoints: list[Waypoint] = field(default_factory=list)
+
+    def look(self, pose: Pose) -> None:
+        """Writes down a place: everything in view that has too few views as yet."""
+        name = f"view {len(self.waypoints)}"
+        seen = [thing for thing, n in self.n_views.items() if n < N_VIEWS]
+        seen = [thing for thing in seen if _is_in_view(self.site, pose, thing)]
+        landmarks: dict[bool, list[Landmark]] = {True: [], False: []}
+        for thing in seen:
+            landmark, is_wrong = self._write_down(pose, thing)
+            if (name, landmark) in self.truth:
+                continue
+            self.n_views[thing] += 1
+            landmarks[thing.is_safety].append(landmark)
+            self.truth[name, landmark] = thing
+            if is_wrong:
+                self.wrong.add((name, landmark))
+        self.waypoints.append(
+            Waypoint(
+                name=name,
+                pose=pose,
+                safety_landmarks=tuple(landmarks[True]),
+                functional_landmarks=tuple(landmarks[False]),
+            )
+        )
+
+    def _write_down(self, pose: Pose, thing: TrueThing) -> tuple[Landmark, bool]:
+        label = thing.label
+        off_rad = wrap_angle(pose.point.bearing_to(thing.point) - pose.yaw_rad)
+        bearing_rad = off_rad + BEARING_NOISE_RAD * self.random.normal()
+        range_m = pose.point.distance_to(thing.point)
+        range_m *= max(1 + RANGE_NOISE_RATIO * self.random.normal(), 0.1)
+        is_wrong = bool(self.random.random() < WRONG_RATIO)
+        if is_wrong and self.random.random() < 0.5:
+            others = sorted({other.label for other in self.site.things} - {label})
+            label = others[int(self.random.integers(len(others)))]
+        elif is_wrong:
+            bearing_rad = self.random.uniform(-HALF_VIEW_RAD, HALF_VIEW_RAD)
+            range_m = self.random.uniform(NEAREST_M, FARTHEST_M)
+        landmark = Landmark(
+            label=label,
+            bearing_rad=float(bearing_rad),
+            range_m=float(range_m) if self.has_ranges else None,
+        )
+        return landmark, is_wrong
+
+
+def observe(site: Site, *, seed: int, has_ranges: bool) -> Memory:
+    """Writes down two things in three, each from three places."""
+    random = np.random.default_rng(seed)
+    order = [site.things[i] for i in random.permutation(len(site.things)).tolist()]
+    annotated = order[: round(len(order) * (1 - NEVER_RATIO))]
+    book = _Notebook(site, random, has_ranges, dict.fromkeys(annotated, 0))
+    for thing in annotated:
+        for pose in _lookouts(site, thing, random):
+            if book.n_views[thing] >= N_VIEWS:
+                break
+            book.look(pose)
+    return Memory(
+        places=SemanticMap(waypoints=tuple(book.waypoints)),
+        truth=book.truth,
+        wrong=frozenset(book.wrong),
+        annotated=tuple(annotated),
+    )
+
+
+def _lookouts(site: Site, thing: TrueThing, random: np.random.Generator) -> Iterator[Pose]:
+    """Gives places from which a thing is in view, roughly ahead."""
+    off_m = np.hypot(*(site.places - (thing.point.x, thing.point.y)).T)
+    near = np.flatnonzero((off_m >= NEAREST_M) & (off_m <= FARTHEST_M))
+    for i in random.permutation(near)[:MOST_TRIES].tolist():
+        place = Point(*site.places[i].tolist())
+        ahead = place.bearing_to(thing.point) + random.uniform(-0.5, 0.5)
+        pose = Pose(place.x, place.y, wrap_angle(float(ahead)))
+        if _is_in_view(site, pose, thing):
+            yield pose
+
+
+def _is_in_view(site: Site, pose: Pose, thing: TrueThing) -> bool:
+    far_m = pose.point.distance_to(thing.point)
+    off_rad = wrap_angle(pose.point.bearing_to(thing.point) - pose.yaw_rad)
+    is_ahead = NEAREST_M <= far_m <= FARTHEST_M and abs(off_rad) <= HALF_VIEW_RAD
+    return is_ahead and site.sees(pose.point, thing)
+
+
+def views_of(memory: Memory, thing: TrueThing) -> Sequence[tuple[Waypoint, Landmark]]:
+    """Gives the records that were made of a thing, wrong ones as well."""
+    return [
+        (waypoint, landmark)
+        for waypoint in memory.places.waypoints
+        for landmark in waypoint.landmarks
+        if memory.truth[waypoint.name, landmark] is thing
+    ]

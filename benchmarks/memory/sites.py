@@ -1,0 +1,186 @@
+"""Buildings with things in them: shipped, drawn by a seeded generator, and real maps furnished."""
+
+import dataclasses
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.search import build_worlds
+from mapspeak.geometry import Point, Pose
+from mapspeak.simulator import (
+    BODY_RADIUS_M,
+    TrueFloor,
+    World,
+    WorldObject,
+    load_world,
+)
+from mapspeak.simulator.models import Category, find_kind, footprint
+from mapspeak.simulator.sight import EYE_BAND_M, OWN_SIZE_M, SIDEWAYS_M
+from mapspeak.simulator.slices import slice_world
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.paths import clearance_m
+from mapspeak.spatial.rooms import RoomMap, find_rooms
+
+__all__ = ["Site", "TrueThing", "build_sites"]
+
+MAPS = Path(__file__).parents[2] / "tests" / "maps"
+REAL_MAPS = (MAPS / "aws_small_house" / "map.yaml", MAPS / "freiburg79" / "whole.yaml")
+N_PLACED = 40
+HUNG = ("fire_extinguisher", "whiteboard", "first_aid_box", "exit_sign", "sink", "fire_hose_reel")
+STANDING = ("cabinet", "printer", "plant", "trash_bin", "fridge", "sofa", "ladder", "crate")
+APART_M = 1.2
+BODY_HEIGHT_M = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrueThing:
+    """A thing as it truly is, in the map frame.
+
+    Attributes:
+        seen: As the simulator knows it.
+        label: What people call it.
+        is_safety: By the filtering policy.
+        pose: Where it is.
+    """
+
+    seen: WorldObject
+    label: str
+    is_safety: bool
+    pose: Pose
+
+    @property
+    def point(self) -> Point:
+        """Where it is: of what hangs on a wall its back, else its middle."""
+        return self.pose.point
+
+    def distance_to(self, place: Point) -> float:
+        """Gives the metres from a place to the thing's body."""
+        outlines = footprint(self.seen.kind, 0.0, BODY_HEIGHT_M)
+        inside = self.pose.inverse().transform(place)
+        offs = [
+            -cv2.pointPolygonTest(
+                np.array([(p.x, p.y) for p in outline], dtype=np.float32),
+                (inside.x, inside.y),
+                measureDist=True,
+            )
+            for outline in outlines
+        ]
+        return max(min(offs, default=self.point.distance_to(place)), 0.0)
+
+
+class Site:
+    """A building, its map, and what is true of it."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self.name = world.name
+        floor = TrueFloor(world)
+        self.grid: OccupancyGrid = floor.visible
+        self._standable = floor.standable & (clearance_m(floor.solid) >= BODY_RADIUS_M + 0.1)
+        map_from_world = world.start.inverse()
+        self.things = tuple(
+            TrueThing(
+                seen=thing,
+                label=find_kind(thing.kind).label,
+                is_safety=find_kind(thing.kind).category is Category.SAFETY,
+                pose=map_from_world @ thing.pose,
+            )
+            for thing in world.objects
+        )
+
+    @cached_property
+    def places(self) -> NDArray[np.float64]:
+        """Where an observer can stand, shape (n, 2)."""
+        return self.grid.points_at(*np.nonzero(self._standable))
+
+    @cached_property
+    def rooms(self) -> RoomMap:
+        """The rooms that are found on the map."""
+        return find_rooms(self.grid)
+
+    def room_of(self, thing: TrueThing) -> str | None:
+        """Gives the room a thing faces."""
+        for off_m in (0.3, 0.6, 0.9, 0.0):
+            region = self.rooms.find_region_at(thing.pose.transform(Point(off_m, 0.0)))
+            if region is not None:
+                return region.id
+        return None
+
+    def sees(self, place: Point, thing: TrueThing) -> bool:
+        """True when a thing can be seen from a place of the map, as `is_in_sight` says."""
+        start = self.world.start.transform(place)
+        across = Pose(thing.seen.pose.x, thing.seen.pose.y, start.bearing_to(thing.seen.pose.point))
+        return any(
+            _free_m(self._edges, start, part) >= start.distance_to(part) - OWN_SIZE_M
+            for part in (across.transform(Point(0.0, sideways_m)) for sideways_m in SIDEWAYS_M)
+        )
+
+    @cached_property
+    def _edges(self) -> NDArray[np.float64]:
+        return slice_world(self.world, low_m=EYE_BAND_M[0], high_m=EYE_BAND_M[1]).edges
+
+
+def _free_m(edges: NDArray[np.float64], start: Point, end: Point) -> float:
+    """Gives the metres to the first edge on the way to a point and beyond it."""
+    far_m = start.distance_to(end)
+    way = np.array([end.x - start.x, end.y - start.y]) / far_m
+    first = edges[:, :2] - (start.x, start.y)
+    along = edges[:, 2:] - edges[:, :2]
+    crossed = way[0] * along[:, 1] - way[1] * along[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ray = (first[:, 0] * along[:, 1] - first[:, 1] * along[:, 0]) / crossed
+        edge = (first[:, 0] * way[1] - first[:, 1] * way[0]) / crossed
+    is_hit = (ray >= 0) & (edge >= 0) & (edge <= 1)
+    return float(ray[is_hit].min(initial=np.inf))
+
+
+def build_sites() -> Iterator[Site]:
+    """Gives all buildings."""
+    with TemporaryDirectory() as folder:
+        for world in build_worlds(Path(folder)):
+            yield Site(world)
+    for number, path in enumerate(REAL_MAPS):
+        yield Site(furnish(load_world(path), np.random.default_rng(500 + number)))
+
+
+def furnish(world: World, random: np.random.Generator) -> World:
+    """Gives a building of a map with things along its walls."""
+    floor = TrueFloor(world)
+    clear_m = clearance_m(floor.solid)
+    beside = floor.standable & (clear_m <= BODY_RADIUS_M + 0.1)
+    spots = floor.solid.points_at(*np.nonzero(beside))
+    down, across = np.gradient(cv2.GaussianBlur(clear_m, (9, 9), 0))
+    slopes = np.stack([across[beside], down[beside]], axis=1)
+    placed: list[WorldObject] = []
+    for i in random.permutation(len(spots)).tolist():
+        spot, yaw_rad = Point(*spots[i].tolist()), math.atan2(slopes[i, 1], slopes[i, 0])
+        kinds = HUNG if random.random() < 0.5 else STANDING
+        kind = kinds[int(random.integers(len(kinds)))]
+        back_m = float(clear_m[beside][i]) if kind in HUNG else 0.0
+        at = Pose(spot.x, spot.y, yaw_rad) @ Pose(-back_m, 0.0)
+        if kind in HUNG and not _is_on_wall(floor, at):
+            continue
+        pose = world.start @ at
+        near = [pose.point, world.start.point]
+        if all(thing.pose.point.distance_to(near[0]) >= APART_M for thing in placed) and (
+            near[0].distance_to(near[1]) >= APART_M
+        ):
+            placed.append(WorldObject(name=f"{kind} {len(placed)}", kind=kind, pose=pose))
+        if len(placed) == N_PLACED:
+            break
+    return dataclasses.replace(world, objects=tuple(placed))
+
+
+def _is_on_wall(floor: TrueFloor, at: Pose) -> bool:
+    """True where a wall begins, and floor lies before it."""
+    behind, before = (floor.solid.cell_at(at.transform(Point(x, 0.0))) for x in (-0.06, 0.15))
+    return bool(
+        floor.solid.occupied[behind.row, behind.col] and floor.solid.free[before.row, before.col]
+    )

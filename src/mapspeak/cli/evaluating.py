@@ -1,0 +1,160 @@
+"""`mapspeak eval`: tasks, agents and worlds, trial by trial, scored from the simulator's truth."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from mapspeak.evaluation.runs import RunOptions
+
+__all__ = ["evaluate"]
+
+TABLE_WIDTH = 180
+"""Characters of the table where nobody knows the width, as in a file."""
+
+
+def _split(_context: click.Context, _parameter: click.Parameter, value: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in value.split(",") if part.strip())
+
+
+@click.command("eval")
+@click.option(
+    "--agent",
+    "agents",
+    callback=_split,
+    default="scripted",
+    show_default=True,
+    help="Who answers, comma-separated: scripted, oracle, random, or a model.",
+)
+@click.option(
+    "--task",
+    "tasks",
+    callback=_split,
+    default="paper",
+    show_default=True,
+    help="Tasks, or groups of them: paper, rooms, objects, relations, routes, search, questions, "
+    "failures, all.",
+)
+@click.option(
+    "--worlds",
+    callback=_split,
+    default="all",
+    show_default=True,
+    help="Worlds, world files or maps, comma-separated; all: those that come with mapspeak.",
+)
+@click.option(
+    "--trials",
+    "n_trials",
+    type=click.IntRange(min=1),
+    default=30,
+    show_default=True,
+    help="Of each task in each world; a world is explored once.",
+)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option(
+    "--out",
+    "folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("out/eval"),
+    show_default=True,
+    help="Where everything goes; what is done there already is not done again.",
+)
+@click.option(
+    "--representation",
+    "representations",
+    callback=_split,
+    default="picture-table",
+    show_default=True,
+    help="How the server shows the map, comma-separated.",
+)
+@click.option(
+    "--thinking", callback=_split, default="", help="How much a model may think, comma-separated."
+)
+@click.option(
+    "--jobs", "n_jobs", type=click.IntRange(min=1), default=2, show_default=True, help="At a time."
+)
+@click.option(
+    "--hang-s",
+    type=click.FloatRange(min=1.0),
+    default=1200.0,
+    show_default=True,
+    help="A trial that takes longer by the wall clock is killed, and the others go on.",
+)
+@click.option("--quiet", "is_quiet", is_flag=True, help="Print the table only.")
+@click.option(
+    "--report",
+    "is_report_only",
+    is_flag=True,
+    help="Run nothing; make the report of --out anew from what is there.",
+)
+def evaluate(
+    agents: tuple[str, ...],
+    tasks: tuple[str, ...],
+    worlds: tuple[str, ...],
+    n_trials: int,
+    seed: int,
+    folder: Path,
+    representations: tuple[str, ...],
+    thinking: tuple[str, ...],
+    n_jobs: int,
+    hang_s: float,
+    is_quiet: bool,  # noqa: FBT001 - a flag
+    is_report_only: bool,  # noqa: FBT001 - a flag
+) -> None:
+    """Runs tasks in simulated worlds and scores them by the simulator's truth.
+
+    Started again with the same folder, it goes on where it was left off. The exit status is 0 when
+    every trial came to a result, whatever the result is; 1 when one crashed or hung.
+    """
+    from mapspeak.evaluation.agents import check_agent  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.evaluation.runs import RunOptions  # noqa: PLC0415
+
+    if is_report_only:
+        _report(folder)
+        return
+    for agent in agents:
+        for amount in thinking or (None,):
+            check_agent(agent, amount)
+    options = RunOptions(
+        agents=agents,
+        tasks=tasks,
+        worlds=worlds,
+        n_trials=n_trials,
+        seed=seed,
+        folder=folder,
+        representations=representations,
+        thinking=thinking or (None,),
+        n_jobs=n_jobs,
+        hang_s=hang_s,
+    )
+    sys.exit(_run(options, is_quiet=is_quiet))
+
+
+def _report(folder: Path) -> None:
+    """Makes the report of a run's folder and says where it is."""
+    from mapspeak.evaluation.report import write_report  # noqa: PLC0415 - heavy
+
+    report = write_report(folder)
+    for problem in report.problems:
+        click.echo(problem, err=True)
+    click.echo(f"The report is {report.page}.")
+
+
+def _run(options: "RunOptions", *, is_quiet: bool) -> int:
+    """Runs an evaluation, prints its table, and gives the exit status."""
+    from rich.console import Console  # noqa: PLC0415 - heavy; help must be quick
+
+    from mapspeak.evaluation.runs import build_table, run_evaluation, show_run  # noqa: PLC0415
+    from mapspeak.evaluation.scores import count_rows  # noqa: PLC0415
+    from mapspeak.evaluation.trials import read_results  # noqa: PLC0415
+
+    with show_run(is_quiet=is_quiet) as bar:
+        run_evaluation(options, on_plan=bar.begin, on_done=bar.note)
+    console = Console()
+    if not console.is_terminal:
+        console.width = TABLE_WIDTH
+    console.print(build_table(count_rows(read_results(options.folder))))
+    _report(options.folder)
+    return 1 if bar.n_broken else 0

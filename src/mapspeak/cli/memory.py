@@ -1,0 +1,203 @@
+"""`mapspeak memory`: the remembered places and observations, without a robot."""
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from mapspeak.cli.memory_episodes import episodes
+from mapspeak.cli.memory_exchange import export, import_, merge
+from mapspeak.cli.memory_files import JSON_OPTION, MEMORY_OPTION, open_memory, read_places
+from mapspeak.cli.options import FILE
+from mapspeak.errors import SemanticMapError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from mapspeak.semantic import SemanticMap, Waypoint
+    from mapspeak.semantic.retrieval import Candidate
+
+__all__ = ["memory"]
+
+
+@click.group()
+def memory() -> None:
+    """Looks at, checks and shares a memory of places: a semantic map file and its episodes."""
+
+
+@memory.command("list")
+@MEMORY_OPTION
+@JSON_OPTION
+def list_(semantic_map: Path | None, as_json: bool) -> None:  # noqa: FBT001 - a flag
+    """Lists all places."""
+    places = read_places(open_memory(semantic_map))
+    if as_json:
+        click.echo(json.dumps(_facts_of(places), ensure_ascii=False, indent=2))
+        return
+    for place in places.waypoints:
+        click.echo(_line(place))
+    click.echo(f"{len(places.waypoints)} places on the map {places.map_id or 'that nobody named'}.")
+
+
+@memory.command()
+@click.argument("name", nargs=-1, required=True)
+@MEMORY_OPTION
+@JSON_OPTION
+def show(name: tuple[str, ...], semantic_map: Path | None, as_json: bool) -> None:  # noqa: FBT001 - a flag
+    """Shows all that is known of the place NAME."""
+    from mapspeak.semantic.exchange import facts_of  # noqa: PLC0415 - heavy; help must be quick
+
+    place = _named(" ".join(name), read_places(open_memory(semantic_map)))
+    if as_json:
+        click.echo(json.dumps(facts_of(place), ensure_ascii=False, indent=2))
+        return
+    for key, value in facts_of(place).items():
+        items = value if isinstance(value, list) else []
+        click.echo(f"{key}:" if items else f"{key}: {value}")
+        for item in items:
+            said = item if isinstance(item, dict) else {"": item}
+            click.echo("  - " + ", ".join(f"{k}: {v}".removeprefix(": ") for k, v in said.items()))
+
+
+@memory.command()
+@click.argument("words", nargs=-1, required=True)
+@click.option("--limit", type=click.IntRange(1, 100), default=5, show_default=True)
+@MEMORY_OPTION
+@JSON_OPTION
+def find(
+    words: tuple[str, ...],
+    limit: int,
+    semantic_map: Path | None,
+    as_json: bool,  # noqa: FBT001 - a flag
+) -> None:
+    """Finds the places and things that WORDS may mean.
+
+    Ends with 1 when nothing of the kind is remembered.
+    """
+    from mapspeak.semantic.episodes import memory_folder  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.semantic.retrieval import (  # noqa: PLC0415
+        EntryIndex,
+        TextVectors,
+        Verdict,
+        find_model,
+        list_entries,
+    )
+
+    store = open_memory(semantic_map)
+    places = read_places(store)
+    model = find_model()
+    vectors = None if model is None else TextVectors.in_folder(memory_folder(store.path), model)
+    answer = EntryIndex(list_entries(places), vectors=vectors).find(" ".join(words), limit=limit)
+    if vectors is not None:
+        vectors.keep()
+    if as_json:
+        found = {
+            "query": answer.query,
+            "verdict": answer.verdict,
+            "candidates": [_candidate(each) for each in answer.candidates],
+        }
+        click.echo(json.dumps(found, ensure_ascii=False, indent=2))
+    else:
+        click.echo(f"{answer.verdict.replace('_', ' ')}: {answer.understood}")
+        for each in map(_candidate, answer.candidates):
+            place = f" at {each['place']}" if each["place"] else ""
+            click.echo(f"  {each['score']:.2f}  {each['name']}{place}: {each['text']}")
+        if answer.limits:
+            click.echo(answer.limits)
+    sys.exit(1 if answer.verdict is Verdict.NOT_REMEMBERED else 0)
+
+
+@memory.command()
+@click.option("--map", "map_file", type=FILE, help="A map_server .yaml that the places are on.")
+@MEMORY_OPTION
+@JSON_OPTION
+def check(map_file: Path | None, semantic_map: Path | None, as_json: bool) -> None:  # noqa: FBT001 - a flag
+    """Checks the file, and with --map whether what it says can be true on that map.
+
+    Ends with 0 when nothing is odd, with 1 when something is, with 2 when the file has a fault.
+    """
+    places = open_memory(semantic_map).read()
+    findings: list[dict[str, object]] = [
+        {"kind": "file", "sentence": text, "waypoints": []} for text in places.warnings
+    ]
+    if map_file is not None:
+        findings += _findings(places, map_file)
+    if as_json:
+        click.echo(json.dumps(findings, ensure_ascii=False, indent=2))
+    else:
+        for finding in findings:
+            click.echo(f"{finding['kind']}: {finding['sentence']}")
+        on = "" if map_file is None else f" on {map_file}"
+        click.echo(f"{len(places.waypoints)} places looked at{on}, {len(findings)} findings.")
+    sys.exit(1 if findings else 0)
+
+
+for command in (episodes, export, import_, merge):
+    memory.add_command(command)
+
+
+def _findings(places: "SemanticMap", map_file: Path) -> list[dict[str, object]]:
+    from mapspeak.semantic.consistency import (  # noqa: PLC0415 - heavy; help must be quick
+        check_memory,
+    )
+    from mapspeak.semantic.things import find_things  # noqa: PLC0415
+    from mapspeak.spatial.mapfiles import load_map  # noqa: PLC0415
+    from mapspeak.spatial.rooms import find_rooms  # noqa: PLC0415
+
+    grid = load_map(map_file).grid
+    found = find_things(places, grid)
+    findings = check_memory(places, found, rooms=find_rooms(grid))
+    return [
+        {"kind": str(each.kind), "sentence": each.sentence, "waypoints": list(each.waypoints)}
+        for each in findings
+    ]
+
+
+def _named(name: str, places: "SemanticMap") -> "Waypoint":
+    import difflib  # noqa: PLC0415 - only for a mistake
+
+    place = places.find_waypoint(name)
+    if place is None:
+        names = [each.name for each in places.waypoints]
+        near = ", ".join(f"'{each}'" for each in difflib.get_close_matches(name, names, cutoff=0.5))
+        hint = f"Near to it: {near}." if near else "mapspeak memory list shows the names."
+        raise SemanticMapError(f"No place is called '{name}'.", hint=hint)
+    return place
+
+
+def _line(place: "Waypoint") -> str:
+    pose = place.pose
+    seen = ", ".join(landmark.label for landmark in place.landmarks)
+    parts = (
+        f"{place.name}  ({pose.x:.2f}, {pose.y:.2f}) m, {pose.yaw_deg:.0f} deg",
+        place.room_id or "",
+        "" if place.recorded_at is None else f"{place.recorded_at:%Y-%m-%d %H:%M}",
+        seen,
+    )
+    return "  ".join(filter(None, parts))
+
+
+def _facts_of(places: "SemanticMap") -> dict[str, object]:
+    from mapspeak.semantic.exchange import facts_of, place_of  # noqa: PLC0415 - heavy
+
+    def records() -> "Iterator[dict[str, object]]":
+        for place in places.waypoints:
+            point = place_of(place)
+            yield {"x_m": point.x, "y_m": point.y} | facts_of(place)
+
+    return {"map": places.map_id, "waypoints": list(records())}
+
+
+def _candidate(candidate: "Candidate") -> dict[str, object]:
+    entry = candidate.entry
+    return {
+        "name": entry.name,
+        "kind": str(entry.kind),
+        "place": entry.place,
+        "score": round(candidate.score_ratio, 3),
+        "field": str(candidate.field),
+        "text": candidate.text,
+        "words": [each.found_word for each in candidate.evidence],
+    }

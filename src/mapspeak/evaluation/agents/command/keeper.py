@@ -1,0 +1,32 @@
+"""Runs a client program, and ends it with all it has started when nobody waits for it any more.
+
+A trial's process may be killed at any moment; a program that asks a model must not go on, and cost,
+without it. This file is started as a script, in a process group of its own: it imports nothing of
+ours. Its standard input says that somebody waits, by being open.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+__all__: list[str] = []
+
+
+def main() -> int:
+    """Runs the program that its arguments name, and gives its exit status."""
+    program = subprocess.Popen(sys.argv[1:], stdin=subprocess.DEVNULL)  # noqa: S603 - the user's own
+    signal.signal(signal.SIGTERM, lambda *_: program.terminate())
+    threading.Thread(target=_end_with_input, daemon=True).start()
+    return program.wait()
+
+
+def _end_with_input() -> None:
+    while os.read(0, 1024):  # no buffer: its lock would hold up the end of this process
+        pass
+    os.killpg(0, signal.SIGKILL)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,241 @@
+"""Client programs as data: how each is started, told of the server, and read."""
+
+import json
+import shutil
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict
+
+from mapspeak.errors import ConfigError
+from mapspeak.evaluation.agents.models import Thinking
+from mapspeak.settings import read_settings
+
+__all__ = ["AnswerForm", "Program", "Start", "find_program"]
+
+SERVER = "robot"
+"""What the server is called in the programs' own settings."""
+ALWAYS = ("PATH", "HOME", "USER", "LANG", "TMPDIR")
+"""Variables every program gets: they hold no secrets, and logins are found by them."""
+
+
+class AnswerForm(StrEnum):
+    """Where a program leaves its last words."""
+
+    TEXT = "text"
+    """All that it writes to standard output."""
+    JSON = "json"
+    """Under a key of the JSON object on standard output."""
+    FILE = "file"
+    """In the file named by {answer}."""
+
+
+class Program(BaseModel):
+    """A client program that works without a person, as data.
+
+    In `command` and `thinking`, {prompt}, {config}, {folder}, {answer}, {thinking}, {server} (the
+    server's program, quoted) and {arguments} (its arguments as a JSON list) are filled in.
+
+    Attributes:
+        command: The program and its arguments.
+        thinking: What follows them where it is said how much to think; empty where it cannot be.
+        config: Where in its folder the server is named, in the usual `mcpServers` JSON.
+        server: What else that JSON says about the server.
+        environment: Names of variables that are passed on, besides PATH, HOME, USER, LANG, TMPDIR.
+        settings: Variables that are set for it, with their values.
+        answer: Where it leaves its last words.
+        answer_key: Their key, for JSON; parts are joined by dots, * is any key.
+        input_tokens: Keys whose numbers together are the tokens read, for JSON.
+        output_tokens: The same for those written.
+        turns: The same for times that the model was asked.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    command: tuple[str, ...] = ()
+    thinking: tuple[str, ...] = ()
+    config: str = "mcp.json"
+    server: dict[str, Any] = {}
+    environment: tuple[str, ...] = ()
+    settings: dict[str, str] = {}
+    answer: AnswerForm = AnswerForm.TEXT
+    answer_key: str = "result"
+    input_tokens: tuple[str, ...] = ()
+    output_tokens: tuple[str, ...] = ()
+    turns: tuple[str, ...] = ()
+
+    def check(self, thinking: Thinking | None) -> None:
+        """Returns when the program is there and can be told how much to think.
+
+        Raises:
+            ConfigError: It is not, or it cannot.
+        """
+        if not self.command:
+            raise ConfigError("The program has no command.", hint="Write `command: [...]`.")
+        if shutil.which(self.command[0]) is None:
+            raise ConfigError(
+                f"There is no program {self.command[0]!r}.", hint="Install it, and log in with it."
+            )
+        if thinking is not None and not self.thinking:
+            raise ConfigError(
+                f"{self.command[0]} cannot be told how much to think.",
+                hint="Leave --thinking away, or describe the program with `thinking: [...]`.",
+            )
+
+    def find_numbers(self, said: object, keys: Iterable[str]) -> int | None:
+        """Gives the sum of the numbers under some keys; None where there is none."""
+        found = [
+            each
+            for key in keys
+            for each in _find(said, key.split("."))
+            if isinstance(each, int | float)
+        ]
+        return int(sum(found)) if found else None
+
+    def find_answer(self, said: object) -> str:
+        """Gives the text under the answer's key; empty where there is none."""
+        return next((str(each) for each in _find(said, self.answer_key.split("."))), "")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Start:
+    """What one run of a program is started with.
+
+    Attributes:
+        prompt: What it is asked.
+        server: The command line of its MCP server.
+        folder: Where it is run.
+        thinking: How much it may think; None for as it likes.
+    """
+
+    prompt: str
+    server: tuple[str, ...]
+    folder: Path
+    thinking: Thinking | None
+
+    @property
+    def answer(self) -> Path:
+        """The file for last words."""
+        return self.folder / "answer.txt"
+
+    def command(self, program: Program) -> list[str]:
+        """Gives the program's command line."""
+        values = {
+            "{prompt}": self.prompt,
+            "{config}": str(self.folder / program.config),
+            "{folder}": str(self.folder),
+            "{answer}": str(self.answer),
+            "{thinking}": self.thinking or "",
+            "{server}": json.dumps(self.server[0]),
+            "{arguments}": json.dumps(self.server[1:]),
+        }
+        more = () if self.thinking is None else program.thinking
+        return [_fill(part, values) for part in (*program.command, *more)]
+
+    def write_config(self, program: Program) -> None:
+        """Writes the program's settings, which name the server."""
+        command, *arguments = self.server
+        entry = {"command": command, "args": arguments, **program.server}
+        path = self.folder / program.config
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps({"mcpServers": {SERVER: entry}}, indent=2), encoding="utf-8")
+
+
+def find_program(name: str) -> Program:
+    """Gives a program by its name, or from a file (.yaml) that describes it.
+
+    Raises:
+        ConfigError: There is none, or the file has a mistake.
+    """
+    if name in _PROGRAMS:
+        return _PROGRAMS[name]
+    if Path(name).suffix in {".yaml", ".yml"}:
+        return read_settings(
+            Path(name), Program, name="the program's file", advice="See the guide to evaluations."
+        )
+    known = ", ".join(_PROGRAMS)
+    raise ConfigError(
+        f"There is no client program {name[:80]!r}.",
+        hint=f"Choose from {known}, or give a .yaml file that describes one.",
+    )
+
+
+def _fill(text: str, values: Mapping[str, str]) -> str:
+    """Fills in what is to be filled in; the value of one is not searched for another."""
+    name = next((name for name in values if name in text), None)
+    if name is None:
+        return text
+    before, _, after = text.partition(name)
+    return f"{_fill(before, values)}{values[name]}{_fill(after, values)}"
+
+
+def _find(said: object, keys: list[str]) -> Iterator[object]:
+    if not keys:
+        yield said
+    elif isinstance(said, dict):
+        first, *others = keys
+        for value in said.values() if first == "*" else [said[first]] if first in said else []:
+            yield from _find(value, others)
+
+
+_PROGRAMS = {
+    "claude-code": Program(
+        command=(
+            *("claude", "-p", "{prompt}", "--output-format", "json"),
+            *("--mcp-config", "{config}", "--strict-mcp-config"),
+            *("--tools", "", "--allowedTools", f"mcp__{SERVER}", "--no-session-persistence"),
+        ),
+        # Else it may ask its model before the server has answered.
+        server={"alwaysLoad": True},
+        settings={
+            "MCP_CONNECTION_NONBLOCKING": "false",
+            "MCP_CONNECT_TIMEOUT_MS": "60000",
+            "MCP_TIMEOUT": "60000",
+            "CLAUDE_CODE_DISABLE_NONESSENTIAL_TRAFFIC": "1",
+        },
+        thinking=("--effort", "{thinking}"),
+        environment=("ANTHROPIC_API_KEY", "ANTHROPIC_BASE_URL", "CLAUDE_CODE_OAUTH_TOKEN"),
+        answer=AnswerForm.JSON,
+        input_tokens=(
+            "usage.input_tokens",
+            "usage.cache_read_input_tokens",
+            "usage.cache_creation_input_tokens",
+        ),
+        output_tokens=("usage.output_tokens",),
+        turns=("num_turns",),
+    ),
+    "codex": Program(
+        command=(
+            *("codex", "exec", "--skip-git-repo-check", "--sandbox", "read-only"),
+            *("--ephemeral", "--ignore-user-config", "--output-last-message", "{answer}"),
+            *("-c", f"mcp_servers.{SERVER}.command={{server}}"),
+            *("-c", f"mcp_servers.{SERVER}.args={{arguments}}"),
+            # Else it asks its model before the server has answered.
+            *("-c", f"mcp_servers.{SERVER}.required=true"),
+            *("-c", f"mcp_servers.{SERVER}.startup_timeout_sec=60"),
+            # The truth lies on the disk.
+            *("-c", "features.shell_tool=false", "-c", 'web_search="disabled"'),
+            *("-c", f'mcp_servers.{SERVER}.default_tools_approval_mode="approve"'),
+            "{prompt}",
+        ),
+        thinking=("-c", 'model_reasoning_effort="{thinking}"'),
+        environment=("OPENAI_API_KEY", "CODEX_API_KEY", "CODEX_HOME"),
+        answer=AnswerForm.FILE,
+    ),
+    "gemini": Program(
+        command=(
+            *("gemini", "-p", "{prompt}", "--output-format", "json"),
+            *("--allowed-mcp-server-names", SERVER, "--skip-trust"),
+        ),
+        config=".gemini/settings.json",
+        server={"trust": True},
+        environment=("GEMINI_API_KEY", "GOOGLE_API_KEY", "GOOGLE_GENAI_USE_VERTEXAI"),
+        answer=AnswerForm.JSON,
+        answer_key="response",
+        input_tokens=("stats.models.*.tokens.prompt",),
+        output_tokens=("stats.models.*.tokens.candidates", "stats.models.*.tokens.thoughts"),
+    ),
+}

@@ -1,0 +1,121 @@
+"""What scripts do over and over: look at the map, recall, drive to the end of a drive."""
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from mapspeak.evaluation.client import Answer, ToolClient
+from mapspeak.evaluation.observer import Sighting, read_sightings
+from mapspeak.evaluation.reading import MapReading, read_map_text
+from mapspeak.geometry import Point, Pose
+
+__all__ = ["Driver", "Seen"]
+
+WAIT_S = 25.0
+REGION = re.compile(r"\b[RCO]\d+\b")
+FINAL_STATES = ("arrived", "blocked", "cancelled", "preempted", "rejected", "lost")
+ARRIVED = "arrived"
+REFUSED = "refused"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Seen:
+    """One thing as one remembered place has seen it.
+
+    Attributes:
+        label: What it was taken for.
+        place: The id of the remembered place.
+        view: Where that is.
+        bearing_rad: From the place's heading; None where it was not noted.
+        range_m: From the place; infinite where it was not noted.
+    """
+
+    label: str
+    place: str
+    view: Pose
+    bearing_rad: float | None
+    range_m: float
+
+    @property
+    def thing(self) -> Point | None:
+        """Where the thing is; None where bearing or range are not known."""
+        if self.bearing_rad is None or math.isinf(self.range_m):
+            return None
+        heading_rad = self.view.yaw_rad + self.bearing_rad
+        return Point(
+            self.view.x + self.range_m * math.cos(heading_rad),
+            self.view.y + self.range_m * math.sin(heading_rad),
+        )
+
+
+class Driver:
+    """Calls tools in a script's name.
+
+    Args:
+        tools: Where calls go.
+    """
+
+    def __init__(self, tools: ToolClient) -> None:
+        self.tools = tools
+
+    async def look(self) -> MapReading:
+        """Reads the map's tables."""
+        return read_map_text((await self.tools.demand("look_at_map")).text)
+
+    async def find_pose(self) -> Pose:
+        """Gives where the robot is."""
+        robot = (await self.tools.demand("get_robot_pose")).report
+        pose = robot.get("pose", robot)
+        return Pose(pose["x"], pose["y"], math.radians(pose["yaw_deg"]))
+
+    async def recall(self, label: str) -> list[Seen]:
+        """Gives everything remembered that bears a label, the nearest sightings first."""
+        memory = (await self.tools.demand("get_semantic_data")).report
+        found = [
+            _seen(record, landmark)
+            for record in memory["waypoints"]
+            for landmark in (*record["safety_landmarks"], *record["functional_landmarks"])
+            if label in landmark["label"]
+        ]
+        return sorted(found, key=lambda seen: seen.range_m)
+
+    async def drive(self, **goal: object) -> str:
+        """Drives to a `place`, or to `x`, `y` and perhaps `yaw_deg`; gives how it ended."""
+        answer = await self.tools.call("navigate_to", **goal, wait_s=WAIT_S)
+        return await self._see_through(answer)
+
+    async def find_nearest(self, places: list[str]) -> str | None:
+        """Gives which of some places is the nearest by path; None where no way leads to any."""
+        text = (await self.tools.demand("measure", places=places, start="robot")).text
+        rows = re.findall(r"^(\w+) \| [^|]+ \| \d", text, re.MULTILINE)
+        return rows[0] if rows else None
+
+    async def find_region(self, point: Point) -> str:
+        """Gives the id of the room, corridor or hall at a point; empty where there is none."""
+        place = f"{point.x:.2f}, {point.y:.2f}"
+        text = (await self.tools.demand("describe_place", place=place)).text
+        found = REGION.search(text.partition("\n")[0])
+        return found.group() if found else ""
+
+    async def see(self) -> tuple[Sighting, ...]:
+        """Takes a picture and gives what the detector reports of it."""
+        return read_sightings((await self.tools.demand("look_through_camera")).text)
+
+    async def _see_through(self, answer: Answer) -> str:
+        while not answer.is_error and answer.report["state"] not in FINAL_STATES:
+            answer = await self.tools.call(
+                "wait_for_goal", goal_id=answer.report["goal_id"], wait_s=WAIT_S
+            )
+        return REFUSED if answer.is_error else str(answer.report["state"])
+
+
+def _seen(record: dict[str, Any], landmark: dict[str, Any]) -> Seen:
+    pose, bearing_deg = record["pose"], landmark["bearing_deg"]
+    return Seen(
+        label=landmark["label"],
+        place=record["id"],
+        view=Pose(pose["x"], pose["y"], math.radians(pose["yaw_deg"])),
+        bearing_rad=None if bearing_deg is None else math.radians(bearing_deg),
+        range_m=math.inf if landmark["range_m"] is None else landmark["range_m"],
+    )

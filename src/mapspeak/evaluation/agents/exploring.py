@@ -1,0 +1,239 @@
+"""Two explorers to compare with: the nearest frontier, and the paper's loop from pictures alone."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+
+from mapspeak.evaluation.agents.agent import AgentEnd, Assignment, Connection
+from mapspeak.evaluation.agents.cues import find_label
+from mapspeak.evaluation.agents.driver import ARRIVED, Driver
+from mapspeak.evaluation.client import ToolClient
+from mapspeak.evaluation.observer import describe_view
+from mapspeak.evaluation.reading import read_map_picture
+from mapspeak.evaluation.trials.trial import TrialState
+from mapspeak.geometry import Point, Pose
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.grid import FloatArray, Mask
+from mapspeak.spatial.paths import clearance_m, distances_from
+
+__all__ = ["NearestFrontierAgent", "PaperLoopAgent"]
+
+EXPLORING = "Update the map"
+SMALLEST = "Go to the smallest room"
+MOST_GOALS = 120
+FARTHEST_MISS_M = 0.5
+"""Two goals that lie nearer to each other are the same one."""
+STEP_M = 5.0
+"""The paper's prompt asks for waypoints at least so far away, ..."""
+BACK_M = 3.0
+"""... and for none so near to one that was visited."""
+MARGIN_M = 0.45
+"""A goal keeps this clear of walls: as much as the robot needs and a little more."""
+SIGHT_M = 4.0
+"""So much around a goal counts as what would be seen from it."""
+LEAST_EDGE_M = 0.6
+"""A border with the unknown that is shorter is a crack."""
+DOOR_M = 1.2
+"""Free floor no wider counts as a doorway when rooms are told apart by eye."""
+LEAST_ROOM_M2 = 1.0
+
+
+@dataclass(slots=True)
+class _Log:
+    """Takes a picture at each stop and remembers what the detector sees, under a number."""
+
+    driver: Driver
+    n_views: int = 0
+
+    async def record(self) -> Pose:
+        """Records what is ahead, and gives where that was."""
+        sightings = await self.driver.see()
+        pose = await self.driver.find_pose()
+        self.n_views += 1
+        record = describe_view(self.n_views, f"{pose.x:.1f}, {pose.y:.1f}", sightings)
+        await self.driver.tools.demand("write_semantic_data", **record)
+        return pose
+
+
+@dataclass(frozen=True, slots=True)
+class NearestFrontierAgent:
+    """Drives to the frontier with the shortest way, until there is none: the plain baseline.
+
+    It only explores; asked for anything else it gives up.
+    """
+
+    name: str = "nearest-frontier"
+    connection: Connection = Connection.MEMORY
+
+    async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
+        """Carries out the assignment."""
+        if not task.prompt.startswith(EXPLORING):
+            return _gave_up("I only explore.")
+        driver, missed = Driver(tools), list[Point]()
+        log = _Log(driver)
+        await log.record()
+        for _ in range(MOST_GOALS):
+            rows = (await driver.look()).rows("Frontiers")
+            goals = [
+                (row.number("path m"), row.id, _first_point(row.cells["go to x, y, yaw"]))
+                for row in rows
+            ]
+            left = [goal for goal in goals if _is_far_from(goal[2], missed, FARTHEST_MISS_M)]
+            if not left:
+                return AgentEnd(answer="No frontier is left that I can reach.")
+            _, frontier, point = min(left, key=lambda goal: goal[:2])
+            if await driver.drive(place=frontier) == ARRIVED:
+                await log.record()
+            else:
+                missed.append(point)
+        return _gave_up("There are too many frontiers.")
+
+
+@dataclass(frozen=True, slots=True)
+class PaperLoopAgent:
+    """Does by script what the paper's prompt tells a model, with the paper's tools and the picture.
+
+    It sees free, unknown and occupied pixels and its own pose: no rooms, no frontiers, no tables.
+    Task 1 follows the prompt's steps. In Task 2 it takes for rooms what is left of the free floor
+    when narrow places are closed, and cannot tell a corridor from a room. In Task 3 it goes to the
+    nearest waypoint whose landmarks fit. Asked for anything else it gives up.
+    """
+
+    name: str = "paper-loop"
+    connection: Connection = Connection.MEMORY
+
+    async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
+        """Carries out the assignment."""
+        driver = Driver(tools)
+        if task.prompt.startswith(EXPLORING):
+            return await _explore_by_picture(driver)
+        if task.prompt.startswith(SMALLEST):
+            return await _go_to_smallest_patch(driver)
+        label = find_label(task.prompt)
+        return _gave_up("I do not know how.") if label is None else await _recall(driver, label)
+
+
+@dataclass(slots=True)
+class _Tour:
+    """Where the loop has been, and where it failed to get."""
+
+    visited: list[Point] = field(default_factory=list)
+    missed: list[Point] = field(default_factory=list)
+
+
+async def _explore_by_picture(driver: Driver) -> AgentEnd:
+    log, tour = _Log(driver), _Tour()
+    pose = await log.record()
+    tour.visited.append(pose.point)
+    for _ in range(MOST_GOALS):
+        grid = await _see_map(driver)
+        goal = _choose_waypoint(grid, pose.point, tour)
+        if goal is None:
+            return AgentEnd(answer="No unexplored area is left.")
+        state = await driver.drive(x=goal.x, y=goal.y, yaw_deg=goal.yaw_deg)
+        if state == ARRIVED:
+            pose = await log.record()
+            tour.visited.append(pose.point)
+        else:
+            tour.missed.append(goal.point)
+    return _gave_up("There is always something left to explore.")
+
+
+async def _see_map(driver: Driver) -> OccupancyGrid:
+    """Looks at all three of the paper's pictures, and reads the first as it is drawn."""
+    plain = await driver.tools.demand("subscribe_map_as_image")
+    await driver.tools.demand("draw_map_axis")
+    await driver.tools.demand("draw_robot_pose")
+    return read_map_picture(plain.text, plain.pictures[0].data)
+
+
+def _choose_waypoint(grid: OccupancyGrid, robot: Point, tour: _Tour) -> Pose | None:
+    """Finds the place that sees most of the border with the unknown, by the prompt's rules.
+
+    A place at least 5 m away comes first; where there is none, one that is nearer.
+    """
+    edge = _edge_of_unknown(grid)
+    cells = round(2 * SIGHT_M / grid.resolution_m) | 1
+    in_sight = cv2.blur(edge.astype(np.float32), (cells, cells), borderType=cv2.BORDER_CONSTANT)
+    rows, cols = np.nonzero(_reachable(grid, robot))
+    if not rows.size:
+        return None
+    points = grid.points_at(rows, cols)
+    worth = in_sight[rows, cols].astype(np.float64) * cells**2 * grid.resolution_m
+    worth[worth < LEAST_EDGE_M] = 0.0
+    for place in tour.visited:
+        worth[_ways_m(points, place) < BACK_M] = 0.0
+    for place in tour.missed:
+        worth[_ways_m(points, place) < FARTHEST_MISS_M] = 0.0
+    is_far = _ways_m(points, robot) >= STEP_M
+    chosen = worth * is_far if (worth * is_far).any() else worth
+    if not chosen.any():
+        return None
+    x, y = points[int(np.argmax(chosen))].tolist()
+    return Pose(x, y, Point(x, y).bearing_to(_nearest(grid, edge, Point(x, y))))
+
+
+def _edge_of_unknown(grid: OccupancyGrid) -> Mask:
+    """Gives free cells beside unknown ones."""
+    beside = cv2.dilate(grid.unknown.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    return np.asarray(grid.free & beside)
+
+
+def _reachable(grid: OccupancyGrid, robot: Point) -> Mask:
+    distances = distances_from(grid, robot, radius_m=MARGIN_M)
+    rows, cols = np.nonzero(grid.free)
+    is_reachable = np.zeros(grid.cells.shape, dtype=bool)
+    is_reachable[rows, cols] = np.isfinite(distances.distances_at(rows, cols))
+    return is_reachable
+
+
+def _nearest(grid: OccupancyGrid, cells: Mask, point: Point) -> Point:
+    points = grid.points_at(*np.nonzero(cells))
+    x, y = points[int(np.argmin(_ways_m(points, point)))].tolist()
+    return Point(x, y)
+
+
+def _ways_m(points: FloatArray, place: Point) -> FloatArray:
+    return np.asarray(np.hypot(points[:, 0] - place.x, points[:, 1] - place.y))
+
+
+async def _go_to_smallest_patch(driver: Driver) -> AgentEnd:
+    """Goes into the smallest piece of floor that is left when narrow places are closed."""
+    grid = await _see_map(driver)
+    room_m = clearance_m(grid)
+    n_patches, labels, statistics, _ = cv2.connectedComponentsWithStats(
+        (grid.free & (room_m > DOOR_M / 2)).astype(np.uint8)
+    )
+    areas_m2 = statistics[:, cv2.CC_STAT_AREA] * grid.resolution_m**2
+    patches = [label for label in range(1, n_patches) if areas_m2[label] >= LEAST_ROOM_M2]
+    for label in sorted(patches, key=lambda each: float(areas_m2[each])):
+        deepest = int(np.argmax(np.where(labels == label, room_m, -1.0)))
+        row, col = np.unravel_index(deepest, room_m.shape)
+        x, y = grid.points_at(np.array([row]), np.array([col]))[0].tolist()
+        if await driver.drive(x=x, y=y) == ARRIVED:
+            return AgentEnd(answer="This looks like the smallest room.")
+    return _gave_up("I see no room that I can get to.")
+
+
+async def _recall(driver: Driver, label: str) -> AgentEnd:
+    """Goes to the nearest waypoint, in a straight line, that remembers the thing."""
+    seen, pose = await driver.recall(label), await driver.find_pose()
+    if not seen:
+        return _gave_up(f"I remember no {label}.")
+    nearest = min(seen, key=lambda each: each.view.point.distance_to(pose.point))
+    return AgentEnd(answer=f"{nearest.place}: {await driver.drive(place=nearest.place)}.")
+
+
+def _first_point(text: str) -> Point:
+    x, y = text.split(",")[:2]
+    return Point(float(x), float(y))
+
+
+def _is_far_from(point: Point, places: Sequence[Point], least_m: float) -> bool:
+    return all(point.distance_to(place) >= least_m for place in places)
+
+
+def _gave_up(why: str) -> AgentEnd:
+    return AgentEnd(answer=why, state=TrialState.GAVE_UP)

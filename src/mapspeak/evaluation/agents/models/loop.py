@@ -1,0 +1,134 @@
+"""The model agent: asks a model, makes the calls it wishes for, until it wishes for none.
+
+Calls go through our own client, never through one of the model's library: every call is noted,
+counted and held to the trial's limits in one place, whoever the model is.
+"""
+
+import io
+import math
+from dataclasses import dataclass, field
+
+import anyio
+from PIL import Image
+
+from mapspeak.errors import LinkError
+from mapspeak.evaluation.agents.agent import AgentEnd, Assignment, Connection
+from mapspeak.evaluation.agents.models.mind import Mind, Reply, Talk, Wish
+from mapspeak.evaluation.client import Answer, OutOfBudgetError, Picture, ToolClient
+from mapspeak.evaluation.trials.trial import TrialState
+
+__all__ = ["ModelAgent", "estimate_picture_tokens"]
+
+PIXELS_PER_TOKEN = 750
+"""Anthropic's published rule for pictures of up to 1568 px; other APIs count otherwise."""
+WRAP_UP_S = 1.0
+"""So long before its time is up it ends by itself, so that what it has cost is not lost."""
+
+
+def estimate_picture_tokens(picture: Picture) -> int:
+    """Estimates what a picture costs: its pixels by 750, whatever the model.
+
+    No API that we know through `inspect-ai` says what of a request was pictures; this is the same
+    estimate for all of them, and never more than one.
+    """
+    width_px, height_px = Image.open(io.BytesIO(picture.data)).size
+    return math.ceil(width_px * height_px / PIXELS_PER_TOKEN)
+
+
+@dataclass(slots=True)
+class _Account:
+    """What the conversation has cost so far.
+
+    Attributes:
+        n_turns: Times that the model was asked.
+        n_pictures_cost: Tokens of all pictures said so far, estimated; each request has them all.
+    """
+
+    n_turns: int = 0
+    n_pictures_cost: int = 0
+    n_picture_tokens: int = 0
+    n_input_tokens: int | None = None
+    n_output_tokens: int | None = None
+
+    def note(self, reply: Reply) -> None:
+        self.n_turns += 1
+        self.n_picture_tokens += self.n_pictures_cost
+        if reply.usage is not None:
+            self.n_input_tokens = (self.n_input_tokens or 0) + reply.usage.n_input_tokens
+            self.n_output_tokens = (self.n_output_tokens or 0) + reply.usage.n_output_tokens
+
+    def end(self, answer: str, state: TrialState) -> AgentEnd:
+        return AgentEnd(
+            answer=answer,
+            state=state,
+            n_decisions=self.n_turns,
+            n_input_tokens=self.n_input_tokens,
+            n_output_tokens=self.n_output_tokens,
+            n_picture_tokens=self.n_picture_tokens,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ModelAgent:
+    """Lets a model work with the tools until it has nothing more to call.
+
+    Attributes:
+        mind: The model.
+        name: As in `Trial.agent`.
+        connection: How it reaches the server.
+    """
+
+    mind: Mind
+    name: str
+    connection: Connection = field(default=Connection.STDIO, kw_only=True)
+
+    async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
+        """Carries out the assignment; also out of budget it says what it has cost."""
+        listed = await tools.list_tools()
+        if not listed:
+            raise LinkError("The server offers no tools.", hint="Look at --toolsets.")
+        talk = self.mind.begin(system=task.system, prompt=task.prompt, tools=listed, seed=task.seed)
+        account = _Account()
+        try:
+            with anyio.move_on_after(task.limits.wall_s - WRAP_UP_S):
+                return await _converse(talk, tools, account)
+        except OutOfBudgetError as error:
+            return account.end(str(error), TrialState.OUT_OF_BUDGET)
+        return account.end("It took too long.", TrialState.OUT_OF_BUDGET)
+
+
+async def _converse(talk: Talk, tools: ToolClient, account: _Account) -> AgentEnd:
+    while True:
+        reply = await talk.ask()
+        account.note(reply)
+        # The last words are noted by whoever asked for them.
+        _tell_witness(tools, reply.text if reply.wishes else "", reply, account)
+        if not reply.wishes:
+            return account.end(reply.text, TrialState.FINISHED)
+        for wish in reply.wishes:
+            answer = await _fulfil(tools, wish)
+            account.n_pictures_cost += sum(map(estimate_picture_tokens, answer.pictures))
+            talk.tell(wish, answer)
+
+
+def _tell_witness(tools: ToolClient, text: str, reply: Reply, account: _Account) -> None:
+    if tools.witness is None:
+        return
+    tools.witness.hear_words(
+        "agent",
+        text,
+        n_input_tokens=None if reply.usage is None else reply.usage.n_input_tokens,
+        n_output_tokens=None if reply.usage is None else reply.usage.n_output_tokens,
+        n_picture_tokens=account.n_pictures_cost,
+    )
+
+
+async def _fulfil(tools: ToolClient, wish: Wish) -> Answer:
+    """Makes a call; one that was not written properly counts, and is answered with why."""
+    if wish.mistake is None:
+        return await tools.call(wish.tool, **wish.arguments)
+    answer = Answer(text=wish.mistake, pictures=(), report={}, is_error=True)
+    if tools.witness is not None:
+        tools.witness.hear_call(wish.tool, wish.arguments)
+        tools.witness.hear_answer(wish.tool, wish.arguments, answer)
+    return answer

@@ -1,0 +1,220 @@
+"""Models through the library `inspect-ai`: OpenAI, Anthropic, Google, local servers, its own mock.
+
+It speaks each provider's protocol and retries; what is said, called and counted stays ours. The
+library is imported only when a model is asked for: it is the optional extra `eval`.
+"""
+
+import base64
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from mcp_types import Tool
+
+from mapspeak.errors import ConfigError
+from mapspeak.evaluation.agents.models.mind import Reply, Talk, Thinking, Usage, Wish
+from mapspeak.evaluation.agents.models.mock import count_mock_tokens, decide
+from mapspeak.evaluation.client import Answer
+
+if TYPE_CHECKING:
+    from inspect_ai.model import ChatMessage, GenerateConfig, Model, ModelOutput, ModelUsage
+    from inspect_ai.tool import ToolInfo
+
+__all__ = ["InspectMind", "open_mind"]
+
+MOCK = "mockllm/"
+MOST_RETRIES = 5
+
+
+def open_mind(name: str, thinking: Thinking | None) -> "InspectMind":
+    """Gives a model by the library's name for it, such as "anthropic/claude-opus-4-1".
+
+    Args:
+        name: Provider and model.
+        thinking: How much it may think; None leaves it to the provider.
+
+    Raises:
+        ConfigError: The library, the provider's own or the key is missing.
+    """
+    try:
+        import inspect_ai.model  # noqa: F401, PLC0415 - an optional extra
+    except ImportError as error:
+        raise ConfigError(
+            f"{name} is asked through inspect-ai, which is not installed.",
+            hint="pip install 'mapspeak[eval]', or take the agent mock.",
+        ) from error
+    return InspectMind(name, thinking)
+
+
+@dataclass(frozen=True, slots=True)
+class InspectMind:
+    """A model behind the library.
+
+    Attributes:
+        name: As the library calls it.
+        thinking: How much it may think; None leaves it to the provider.
+    """
+
+    name: str
+    thinking: Thinking | None
+
+    def begin(self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int) -> Talk:
+        """Begins a conversation.
+
+        Raises:
+            ConfigError: The model cannot be asked: a package, a key or an address is missing.
+        """
+        from inspect_ai.model import (  # noqa: PLC0415 - an optional extra
+            ChatMessageSystem,
+            ChatMessageUser,
+            GenerateConfig,
+        )
+
+        config = GenerateConfig(
+            max_retries=MOST_RETRIES,
+            seed=seed,
+            # The library makes a budget of it where a provider counts thoughts in tokens.
+            reasoning_effort=None if self.thinking is None else self.thinking.value,
+        )
+        return _InspectTalk(
+            model=self._open(seed),
+            messages=[ChatMessageSystem(content=system), ChatMessageUser(content=prompt)],
+            tools=[_as_info(tool) for tool in tools],
+            config=config,
+        )
+
+    def check(self) -> None:
+        """Returns when the model can be asked, without asking it.
+
+        Raises:
+            ConfigError: A package, a key or an address is missing.
+        """
+        self._open(0)
+
+    def _open(self, seed: int) -> "Model":
+        # It has no public name, and is what a missing package or key is told with.
+        from inspect_ai._util.error import PrerequisiteError  # noqa: PLC0415
+        from inspect_ai.model import get_model  # noqa: PLC0415 - an optional extra
+
+        more = {"custom_outputs": _MockAnswers(seed)} if self.name.startswith(MOCK) else {}
+        try:
+            return get_model(self.name, memoize=False, **more)
+        except (PrerequisiteError, ValueError) as error:
+            raise ConfigError(
+                f"The model {self.name} cannot be asked: {_plain(error)}",
+                hint="Install the provider's package and set its key, as the message says.",
+            ) from error
+
+
+def _plain(error: Exception) -> str:
+    """Gives a message without the library's markup and line ends."""
+    return " ".join(re.sub(r"\[/?[a-z ]*\]", "", str(error)).split())
+
+
+@dataclass(slots=True)
+class _InspectTalk:
+    model: "Model"
+    messages: "list[ChatMessage]"
+    tools: "list[ToolInfo]"
+    config: "GenerateConfig"
+
+    async def ask(self) -> Reply:
+        output = await self.model.generate(self.messages, tools=self.tools, config=self.config)
+        # Said again as it is: some providers want their own thoughts back, signed.
+        self.messages.append(output.message)
+        return Reply(
+            text=output.completion,
+            wishes=tuple(
+                Wish(
+                    id=call.id,
+                    tool=call.function,
+                    arguments=dict(call.arguments),
+                    mistake=call.parse_error,
+                )
+                for call in output.message.tool_calls or ()
+            ),
+            usage=_read_usage(output.usage),
+        )
+
+    def tell(self, wish: Wish, answer: Answer) -> None:
+        from inspect_ai.model import (  # noqa: PLC0415 - an optional extra
+            ChatMessageTool,
+            Content,
+            ContentImage,
+            ContentText,
+        )
+        from inspect_ai.tool import ToolCallError  # noqa: PLC0415
+
+        content: list[Content] = [ContentText(text=answer.text)]
+        for picture in answer.pictures:
+            data = base64.b64encode(picture.data).decode()
+            content.append(ContentImage(image=f"data:{picture.media_type};base64,{data}"))
+        error = ToolCallError("unknown", answer.text) if answer.is_error else None
+        self.messages.append(
+            ChatMessageTool(content=content, tool_call_id=wish.id, function=wish.tool, error=error)
+        )
+
+
+def _as_info(tool: Tool) -> "ToolInfo":
+    from inspect_ai.tool import ToolInfo, ToolParams  # noqa: PLC0415 - an optional extra
+
+    schema: dict[str, Any] = tool.input_schema
+    return ToolInfo(
+        name=tool.name,
+        description=tool.description or tool.name,
+        parameters=ToolParams.model_validate(
+            {"properties": schema.get("properties", {}), "required": schema.get("required", [])}
+        ),
+    )
+
+
+def _read_usage(usage: "ModelUsage | None") -> Usage | None:
+    """Gives all that was read: the library counts cached tokens apart."""
+    if usage is None:
+        return None
+    cached = (usage.input_tokens_cache_read or 0) + (usage.input_tokens_cache_write or 0)
+    return Usage(usage.input_tokens + cached, usage.output_tokens)
+
+
+@dataclass(frozen=True, slots=True)
+class _MockAnswers:
+    """The library's mock, answering by our script."""
+
+    seed: int
+
+    def __call__(
+        self,
+        messages: "list[ChatMessage]",
+        tools: "list[ToolInfo]",
+        _choice: object,
+        _config: object,
+    ) -> "ModelOutput":
+        from inspect_ai.model import ModelOutput, ModelUsage  # noqa: PLC0415 - an optional extra
+
+        move = decide(
+            self.seed,
+            prompt=next(message.text for message in messages if message.role == "user"),
+            heard=[message.text for message in messages if message.role == "tool"],
+            tools=[tool.name for tool in tools],
+        )
+        output = (
+            ModelOutput.from_content(self.name, move.text)
+            if move.tool is None
+            else ModelOutput.for_tool_call(
+                self.name,
+                move.tool,
+                move.arguments,
+                content=move.text,
+                tool_call_id=f"call-{len(messages)}",
+            )
+        )
+        # Else the library would count, with a table that it fetches from the network.
+        n_read = sum(count_mock_tokens(message.text) for message in messages)
+        n_written = count_mock_tokens(move.text)
+        output.usage = ModelUsage(input_tokens=n_read, output_tokens=n_written)
+        return output
+
+    @property
+    def name(self) -> str:
+        return f"{MOCK}model"

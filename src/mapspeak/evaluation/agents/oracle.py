@@ -1,0 +1,94 @@
+"""The scripted oracle: knows the truth, and shows what the robot itself allows."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapspeak.evaluation.agents.agent import Agent, AgentEnd, Assignment, Connection
+from mapspeak.evaluation.agents.driver import ARRIVED, Driver
+from mapspeak.evaluation.agents.scripted import ScriptedAgent
+from mapspeak.evaluation.client import ToolClient
+from mapspeak.evaluation.scores import Site
+from mapspeak.evaluation.trials import Setting
+from mapspeak.geometry import Point, Pose
+from mapspeak.spatial import Cell
+from mapspeak.spatial.grid import Mask
+from mapspeak.spatial.paths import clearance_m
+
+__all__ = ["OracleAgent"]
+
+BESIDE_M = 3.0
+MOST_GOALS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class OracleAgent:
+    """Drives to where truth says, and answers what truth says; explores as the script does.
+
+    Attributes:
+        setting: The trial's, with its truth.
+        site: The world as the trial has set it.
+    """
+
+    setting: Setting
+    site: Site
+    name: str = "oracle"
+    connection: Connection = Connection.MEMORY
+
+    async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
+        """Carries out the assignment."""
+        truth, driver = self.setting.truth, Driver(tools)
+        if "number" in truth:
+            return AgentEnd(answer=f"ANSWER: {truth['number']} {truth['unit']}".rstrip())
+        if "letters" in truth:
+            return AgentEnd(answer=f"ANSWER: {', '.join(truth['letters']) or 'none'}")
+        if truth.get("answer") == "unreachable":
+            return AgentEnd(answer="ANSWER: unreachable")
+        if not self.setting.is_known or not truth:
+            script: Agent = ScriptedAgent()
+            return await script.run(task, tools)
+        for goals in self._stops():
+            if not await _drive_to_one(driver, goals):
+                return AgentEnd(answer="The robot cannot get there.")
+        return AgentEnd(answer="ANSWER: there")
+
+    def _stops(self) -> list[list[Pose]]:
+        """Gives poses for each stop that are right, the roomiest first."""
+        truth, site = self.setting.truth, self.site
+        if "goal" in truth:
+            goal = Point(*truth["goal"])
+            return [[Pose(goal.x, goal.y), *self._roomiest(site.near(goal, 0.3))]]
+        if "rooms" in truth or "room" in truth:
+            names = truth.get("rooms") or [truth["room"]]
+            cells = [site.cells_of(site.room_named(name)) for name in names]
+            return [self._roomiest(np.logical_or.reduce(cells))]
+        return [self._beside(kind) for kind in truth.get("kinds") or [truth["kind"]]]
+
+    def _beside(self, kind: str) -> list[Pose]:
+        poses: list[Pose] = []
+        for thing in self.site.things(kind):
+            place = self.site.place_of(thing)
+            poses += [
+                Pose(pose.x, pose.y, pose.point.bearing_to(place))
+                for pose in self._roomiest(self.site.seen_around(thing, BESIDE_M))
+            ]
+        return poses
+
+    def _roomiest(self, cells: Mask) -> list[Pose]:
+        site = self.site
+        room = np.where(cells & site.floor.standable, clearance_m(site.grid), -1.0)
+        best = np.argsort(room, axis=None)[::-1][: MOST_GOALS * 40 : 40]
+        rows, cols = np.unravel_index(best, room.shape)
+        places = [
+            site.grid.point_at(Cell(int(row), int(col)))
+            for row, col in zip(rows, cols, strict=True)
+            if room[row, col] > 0
+        ]
+        return [Pose(place.x, place.y) for place in places]
+
+
+async def _drive_to_one(driver: Driver, goals: list[Pose]) -> bool:
+    for goal in goals:
+        if await driver.drive(x=goal.x, y=goal.y, yaw_deg=goal.yaw_deg) == ARRIVED:
+            return True
+    return False

@@ -1,0 +1,60 @@
+"""Agents that need no truth, by their names: scripts to compare with, models, client programs."""
+
+from mapspeak.errors import ConfigError
+from mapspeak.evaluation.agents.agent import Agent
+from mapspeak.evaluation.agents.command import CommandAgent, find_program
+from mapspeak.evaluation.agents.exploring import NearestFrontierAgent, PaperLoopAgent
+from mapspeak.evaluation.agents.models import MockMind, ModelAgent, Thinking
+from mapspeak.evaluation.agents.models.throughinspect import open_mind
+
+__all__ = ["OTHER_NAMES", "check_other", "find_other"]
+
+OTHER_NAMES = ("nearest-frontier", "paper-loop", "mock")
+COMMAND = "command:"
+
+
+def find_other(name: str, thinking: str | None) -> Agent | None:
+    """Gives an agent by its name; None where it is no name of one.
+
+    Args:
+        name: "nearest-frontier", "paper-loop", "mock", "PROVIDER/MODEL" or "command:PROGRAM".
+        thinking: How much a model may think, as `Thinking`; None where nothing was said.
+
+    Raises:
+        ConfigError: The model or program cannot be had, or there is no such way to think.
+    """
+    amount = _read_thinking(thinking)
+    if name == "nearest-frontier":
+        return NearestFrontierAgent()
+    if name == "paper-loop":
+        return PaperLoopAgent()
+    if name == "mock":
+        return ModelAgent(MockMind(), name)
+    if name.startswith(COMMAND):
+        return CommandAgent(find_program(name.removeprefix(COMMAND)), name, amount)
+    return ModelAgent(open_mind(name, amount), name) if "/" in name else None
+
+
+def check_other(name: str, thinking: str | None = None) -> bool:
+    """True where there is an agent of a name; looks for what it needs, and asks it nothing.
+
+    Raises:
+        ConfigError: There is one, but something that it needs is missing.
+    """
+    if "/" in name and not name.startswith(COMMAND):
+        open_mind(name, _read_thinking(thinking)).check()
+        return True
+    agent = find_other(name, thinking)
+    if isinstance(agent, CommandAgent):
+        agent.check()
+    return agent is not None
+
+
+def _read_thinking(thinking: str | None) -> Thinking | None:
+    if thinking is None:
+        return None
+    if thinking not in set(Thinking):
+        raise ConfigError(
+            f"A model cannot think {thinking[:40]!r}.", hint=f"Choose {', '.join(Thinking)}."
+        )
+    return Thinking(thinking)

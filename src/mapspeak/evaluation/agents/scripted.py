@@ -1,0 +1,270 @@
+"""The scripted mapspeak policy: every task from what tools answer, and nothing else."""
+
+import math
+import re
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+
+from mapspeak.errors import MapspeakError
+from mapspeak.evaluation.agents.agent import AgentEnd, Assignment, Connection
+from mapspeak.evaluation.agents.cues import find_label
+from mapspeak.evaluation.agents.driver import ARRIVED, WAIT_S, Driver, Seen
+from mapspeak.evaluation.agents.questioned import answer_question
+from mapspeak.evaluation.client import Answer, OutOfBudgetError, ToolClient
+from mapspeak.evaluation.observer import read_sightings
+from mapspeak.evaluation.policy import ScriptedPolicy, Step, is_room
+from mapspeak.evaluation.reading import MapReading, Row
+from mapspeak.evaluation.trials import TrialState
+from mapspeak.geometry import Point, Pose, wrap_angle
+
+__all__ = ["ScriptedAgent"]
+
+NEAR_M = 4.5
+"""A place that saw a thing from no farther leads to it."""
+BESIDE_M = 1.5
+"""So near it goes to a thing that it has found by itself."""
+NUMBER = r"-?\d+(?:\.\d+)?"
+ORDINALS = {"second": 2, "third": 3, "fourth": 4}
+SIDES_DEG = {"to the left of": 90.0, "to the right of": -90.0, "in front of": 0.0, "behind": 180.0}
+COMPASS_DEG = {"east": 0.0, "north": 90.0, "west": 180.0, "south": -90.0}
+ASIDE_M = (1.2, 2.0, 3.0)
+MOST_ASIDE = 3
+MOST_COMPARED = 20
+MOST_STEPS = 120
+
+Deed = Callable[[Driver, re.Match[str]], Awaitable[AgentEnd]]
+
+
+@dataclass(frozen=True, slots=True)
+class ScriptedAgent:
+    """Reads the prompt by its words and does what fits."""
+
+    name: str = "scripted"
+    connection: Connection = Connection.MEMORY
+
+    async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
+        """Carries out the assignment."""
+        try:
+            return await _do(Driver(tools), task.prompt)
+        except OutOfBudgetError:
+            raise
+        except MapspeakError as error:
+            return _gave_up(f"A tool did not give what I need: {error}")
+
+
+async def _do(driver: Driver, prompt: str) -> AgentEnd:
+    for pattern, deed in DEEDS:
+        match = re.search(pattern, prompt)
+        if match is not None:
+            return await deed(driver, match)
+    label = find_label(prompt)
+    if label is None:
+        return _gave_up("I know no word of this.")
+    return await _go_to_thing(driver, label)
+
+
+# --- exploring -----------------------------------------------------------------------------------
+
+
+async def _explore(driver: Driver, _: re.Match[str]) -> AgentEnd:
+    await ScriptedPolicy(driver.tools, _note_nothing).explore()
+    return AgentEnd(answer="Everything that can be reached is on the map.")
+
+
+async def _note_nothing(_step: Step) -> None:
+    """The trial's witness writes everything down."""
+
+
+# --- rooms ---------------------------------------------------------------------------------------
+
+
+async def _go_to_room_by_size(driver: Driver, match: re.Match[str]) -> AgentEnd:
+    view = await driver.look()
+    is_from_below = match["end"] == "smallest"
+    rows = _rooms_of(view) if is_from_below else list(view.rows("Rooms"))
+    rooms = sorted(rows, key=lambda row: row.number("floor m2"))
+    number = ORDINALS.get(match["ordinal"] or "", 1)
+    if len(rooms) < number:
+        return _gave_up("There are not so many rooms.")
+    chosen = rooms[number - 1] if is_from_below else rooms[-number]
+    return await _go_to_region(driver, chosen.id)
+
+
+async def _go_to_longest_corridor(driver: Driver, _: re.Match[str]) -> AgentEnd:
+    corridors = (await driver.look()).rows("Corridors")
+    if not corridors:
+        return _gave_up("There is no corridor.")
+    longest = max(corridors, key=lambda row: row.number("size m"))
+    return await _go_to_region(driver, longest.id)
+
+
+def _rooms_of(view: MapReading) -> list[Row]:
+    """Gives the rooms that are rooms and no nooks."""
+    return [row for row in view.rows("Rooms") if is_room(row, view.rows("Doors"))]
+
+
+async def _go_to_region(driver: Driver, place: str) -> AgentEnd:
+    state = await driver.drive(place=place)
+    return AgentEnd(answer=f"{place}: {state}.")
+
+
+async def _go_into_room_around(driver: Driver, match: re.Match[str]) -> AgentEnd:
+    """Drives to a point of a room, else beside it; where no way leads there, says so."""
+    middle = Point(float(match["x"]), float(match["y"]))
+    if await driver.drive(x=middle.x, y=middle.y) == ARRIVED:
+        return AgentEnd(answer="ANSWER: there")
+    for point in await _aside(driver, middle):
+        if await driver.drive(x=point.x, y=point.y) == ARRIVED:
+            return AgentEnd(answer="ANSWER: there")
+    return AgentEnd(answer="ANSWER: unreachable")
+
+
+async def _aside(driver: Driver, middle: Point) -> list[Point]:
+    """Gives some points beside another one in the same room."""
+    room = await driver.find_region(middle)
+    points = [
+        Pose(middle.x, middle.y, math.radians(heading_deg)).transform(Point(away_m, 0.0))
+        for away_m in ASIDE_M
+        for heading_deg in (0.0, 90.0, 180.0, -90.0)
+    ]
+    return [point for point in points if await driver.find_region(point) == room][:MOST_ASIDE]
+
+
+# --- things --------------------------------------------------------------------------------------
+
+
+async def _find_nearest(driver: Driver, match: re.Match[str]) -> AgentEnd:
+    return await _go_to_thing(driver, match["label"])
+
+
+async def _go_to_thing(driver: Driver, label: str) -> AgentEnd:
+    """Drives to the nearest place that saw it from near; what one look has shown is checked."""
+    seen = await driver.recall(label)
+    if not seen:
+        return await _search(driver, label)
+    enough_m = max(NEAR_M, seen[0].range_m)
+    near = [each for each in seen if each.range_m <= enough_m]
+    places = list(dict.fromkeys(each.place for each in near))[:MOST_COMPARED]
+    nearest = await driver.find_nearest(places)
+    chosen = next((each for each in near if each.place == nearest), near[0])
+    state = await driver.drive(place=chosen.place)
+    is_doubtful = len(seen) == 1
+    if state != ARRIVED or (is_doubtful and not await _is_here(driver, label)):
+        return await _search(driver, label)
+    if chosen.range_m > NEAR_M and chosen.thing is not None:
+        await driver.drive(place=f"facing {chosen.thing.x:.2f}, {chosen.thing.y:.2f}")
+    return AgentEnd(answer=f"I am at {chosen.place}, from where {label} was seen.")
+
+
+async def _is_here(driver: Driver, label: str) -> bool:
+    return any(label in sighting.label for sighting in await driver.see())
+
+
+async def _search(driver: Driver, label: str) -> AgentEnd:
+    """Lets the robot look about until the detector reports the thing, and goes there."""
+    answer = await driver.tools.call("search_for", thing=label, wait_s=WAIT_S)
+    for _ in range(MOST_STEPS):
+        if answer.is_error:
+            return _gave_up(answer.text)
+        found = [each for each in read_sightings(answer.text) if label in each.label]
+        if found:
+            return await _approach(driver, label, found[0].bearing_deg, found[0].range_m)
+        if answer.report["state"] not in ("driving", "look", "reported"):
+            return _gave_up(f"There is no {label} to be found: {answer.report['reason']}")
+        answer = await _search_on(driver, label, answer)
+    return _gave_up(f"I have looked long enough for a {label}.")
+
+
+async def _search_on(driver: Driver, label: str, answer: Answer) -> Answer:
+    if answer.report["state"] == "driving":
+        return await driver.tools.call("search_for", thing=label, wait_s=WAIT_S)
+    return await driver.tools.call("search_for", thing=label, seen=False, wait_s=WAIT_S)
+
+
+async def _approach(driver: Driver, label: str, bearing_deg: float, range_m: float) -> AgentEnd:
+    """Ends the search and drives up to what was seen; looks again where it was far off."""
+    await driver.tools.call("search_for", thing=label, seen=True)
+    pose = await driver.find_pose()
+    heading_rad = pose.yaw_rad + math.radians(bearing_deg)
+    for left_m in (BESIDE_M, 2 * BESIDE_M, range_m / 2):
+        if range_m <= left_m:
+            break
+        way = Pose(pose.x, pose.y, heading_rad).transform(Point(range_m - left_m, 0.0))
+        yaw_deg = math.degrees(wrap_angle(heading_rad))
+        if await driver.drive(x=way.x, y=way.y, yaw_deg=yaw_deg) == ARRIVED:
+            break
+    return AgentEnd(answer=f"I stand beside the {label}.")
+
+
+# --- relations and routes ------------------------------------------------------------------------
+
+
+async def _go_beside_pose(driver: Driver, match: re.Match[str]) -> AgentEnd:
+    heading_rad = math.radians(float(match["yaw"]) + SIDES_DEG[match["side"]])
+    person = Pose(float(match["x"]), float(match["y"]), heading_rad)
+    goal = person.transform(Point(float(match["away"]), 0.0))
+    return AgentEnd(answer=f"It {await driver.drive(x=goal.x, y=goal.y)}.")
+
+
+async def _go_beside_thing(driver: Driver, match: re.Match[str]) -> AgentEnd:
+    thing = _place_of(await driver.recall(match["label"]))
+    if thing is None:
+        return _gave_up(f"I remember no {match['label']}.")
+    heading_rad = math.radians(COMPASS_DEG[match["direction"]])
+    goal = Pose(thing.x, thing.y, heading_rad).transform(Point(float(match["away"]), 0.0))
+    return AgentEnd(answer=f"It {await driver.drive(x=goal.x, y=goal.y)}.")
+
+
+async def _face_thing(driver: Driver, match: re.Match[str]) -> AgentEnd:
+    thing = _place_of(await driver.recall(match["label"]))
+    if thing is None:
+        return _gave_up(f"I remember no {match['label']}.")
+    return AgentEnd(
+        answer=f"It {await driver.drive(place=f'facing {thing.x:.2f}, {thing.y:.2f}')}."
+    )
+
+
+def _place_of(seen: list[Seen]) -> Point | None:
+    """Gives where a thing is, by the sighting from the least distance that has a bearing."""
+    return next((each.thing for each in seen if each.thing is not None), None)
+
+
+async def _follow(driver: Driver, match: re.Match[str]) -> AgentEnd:
+    for label in re.findall(r"to any ([a-z -]+?)(?=, then|\.|$)", match.group()):
+        end = await _go_to_thing(driver, label)
+        if end.state is TrialState.GAVE_UP:
+            return end
+    return AgentEnd(answer="I have been everywhere.")
+
+
+async def _answer(driver: Driver, match: re.Match[str]) -> AgentEnd:
+    return await answer_question(driver, match.string)
+
+
+def _gave_up(why: str) -> AgentEnd:
+    return AgentEnd(answer=why, state=TrialState.GAVE_UP)
+
+
+BESIDE_POSE = (
+    rf"stands at \((?P<x>{NUMBER}), (?P<y>{NUMBER})\) and looks along a yaw of "
+    rf"(?P<yaw>{NUMBER}) deg\. Go to the place (?P<away>{NUMBER}) m "
+    r"(?P<side>to the left of|to the right of|in front of|behind)"
+)
+DEEDS: tuple[tuple[str, Deed], ...] = (
+    (r"Answer without driving\.", _answer),
+    (r"^Update the map", _explore),
+    (r"^Go to the (?:(?P<ordinal>\w+) )?(?P<end>smallest|largest) room", _go_to_room_by_size),
+    (r"^Go to the longest corridor", _go_to_longest_corridor),
+    (
+        rf"^Go (?:in)?to the room around \((?P<x>{NUMBER}), (?P<y>{NUMBER})\)",
+        _go_into_room_around,
+    ),
+    (r"^Find the nearest (?P<label>.+?) and stop", _find_nearest),
+    (BESIDE_POSE, _go_beside_pose),
+    (
+        rf"^Go to the place (?P<away>{NUMBER}) m (?P<direction>\w+) of the (?P<label>.+?)\.",
+        _go_beside_thing,
+    ),
+    (r"^Go to the (?P<label>.+?), stop at most .* look straight", _face_thing),
+    (r"^Go first to any .+?\.", _follow),
+)

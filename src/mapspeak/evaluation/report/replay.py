@@ -1,0 +1,202 @@
+"""A trial to be looked at again: its map and way, and every step with what was said and seen."""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mapspeak.evaluation.report.album import Album, find_picture
+from mapspeak.evaluation.report.gathering import PICTURES, Attempt, Course
+from mapspeak.evaluation.report.markup import Html, element, joined, text
+from mapspeak.evaluation.report.way import Stop, draw_way, lay_out_way
+from mapspeak.evaluation.report.wording import say_figure
+from mapspeak.evaluation.trials import TrialResult, Turn
+
+__all__ = ["build_replay", "show_standing"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Step:
+    """What is shown at once: something said, or a call with its answer."""
+
+    anchor: str
+    turns: tuple[Turn, ...]
+
+    @property
+    def last(self) -> Turn:
+        return self.turns[-1]
+
+
+def build_replay(attempt: Attempt, course: Course, album: Album) -> Html:
+    """Gives the section of a trial; its id is the trial's."""
+    steps = tuple(_group(attempt.trial.id, course.turns))
+    way = lay_out_way(course, [(step.anchor, step.last.pose, step.last.robot_s) for step in steps])
+    if way is None:
+        floor = element("p", {"class": "none"}, text("There is no map of it."))
+    else:
+        floor = draw_way(way, album)
+    stops = {} if way is None else way.stops
+    return element(
+        "details",
+        {"class": "trial", "id": attempt.trial.id},
+        _summary(attempt),
+        *_head(attempt, course),
+        element(
+            "div",
+            {"class": "replay"},
+            element("div", {"class": "floor"}, floor),
+            _list_steps(steps, stops, attempt.folder / PICTURES, album),
+        ),
+    )
+
+
+def show_standing(attempt: Attempt) -> Html:
+    """Says in a coloured word how a trial stands."""
+    if attempt.result is None or attempt.is_broken:
+        return element("span", {"class": "word broken"}, text(attempt.standing))
+    if attempt.result.score.is_success:
+        return element("span", {"class": "word good"}, text("done"))
+    return element("span", {"class": "word bad"}, text("not done"))
+
+
+def _summary(attempt: Attempt) -> Html:
+    trial = attempt.trial
+    who = trial.agent if trial.thinking is None else f"{trial.agent}+{trial.thinking}"
+    where = f" {trial.world} {trial.number:03d}"
+    said = f" {who}, {trial.representation}"
+    return element(
+        "summary",
+        {},
+        show_standing(attempt),
+        element("b", {}, text(f" {trial.task}")),
+        text(where),
+        element("small", {}, text(said)),
+    )
+
+
+def _head(attempt: Attempt, course: Course) -> Iterator[Html]:
+    result = attempt.result
+    for problem in (attempt.problem, *course.problems):
+        if problem is not None:
+            yield element("p", {"class": "problem"}, text(problem))
+    if result is None:
+        return
+    failure = result.score.failure
+    kind = "" if failure is None else f"{failure.replace('_', ' ')}: "
+    yield element("p", {"class": "reason"}, text(f"{kind}{result.score.reason}"))
+    spent = [] if attempt.is_broken else _say_spent(result)
+    facts = (attempt.standing, *spent, f"seed {attempt.trial.seed}")
+    yield element("p", {"class": "spent"}, text(", ".join(facts)))
+    if result.prompt:
+        yield _quote("Asked", result.prompt)
+    if result.answer:
+        yield _quote("Answered", result.answer)
+    if result.error is not None:
+        yield _quote("Broken by", result.error)
+
+
+def _say_spent(result: TrialResult) -> list[str]:
+    return [
+        f"{result.driven_m:.1f} m driven",
+        *([] if result.shortest_m is None else [f"{result.shortest_m:.1f} m at the shortest"]),
+        f"{result.n_calls} calls ({result.n_errors} with errors)",
+        f"{result.n_decisions} decisions",
+        *_tokens(result.n_input_tokens, result.n_output_tokens, result.n_picture_tokens),
+        f"{result.robot_s:.0f} s robot time",
+        f"{result.wall_s:.1f} s wall time",
+        f"{result.n_collisions} collisions",
+    ]
+
+
+def _quote(who: str, said: str) -> Html:
+    return element("div", {"class": "quote"}, element("b", {}, text(who)), _words(said))
+
+
+def _tokens(read: int | None, written: int | None, pictures: int | None) -> list[str]:
+    named = ((read, "tokens read"), (written, "tokens written"), (pictures, "of them pictures"))
+    return [f"{say_figure(value)} {name}" for value, name in named if value is not None]
+
+
+def _group(trial_id: str, turns: Sequence[Turn]) -> Iterator[_Step]:
+    """Joins each call with its answer."""
+    groups: list[list[Turn]] = []
+    for turn in turns:
+        before = groups[-1][-1] if groups else None
+        if before is not None and _is_answer(turn, before):
+            groups[-1].append(turn)
+        else:
+            groups.append([turn])
+    for number, group in enumerate(groups, start=1):
+        yield _Step(anchor=f"{trial_id}/step-{number}", turns=tuple(group))
+
+
+def _is_answer(turn: Turn, before: Turn) -> bool:
+    if turn.role != "tool" or before.role == "tool":
+        return False
+    return turn.call is not None and before.call is not None and turn.call.tool == before.call.tool
+
+
+def _list_steps(
+    steps: Sequence[_Step], stops: dict[str, Stop], pictures: Path, album: Album
+) -> Html:
+    if not steps:
+        return element("p", {"class": "none"}, text("There is no conversation of it."))
+    shown = (_show_step(step, stops.get(step.anchor), pictures, album) for step in steps)
+    return element("ol", {"class": "steps"}, *shown)
+
+
+def _show_step(step: _Step, stop: Stop | None, pictures: Path, album: Album) -> Html:
+    place: dict[str, object] = {}
+    if stop is not None:
+        place = {
+            "data-u": stop.u,
+            "data-v": stop.v,
+            "data-heading": stop.heading_deg,
+            "data-driven": stop.driven_ratio,
+        }
+    number = step.anchor.rpartition("-")[2]
+    link = element("a", {"class": "number", "href": f"#{step.anchor}"}, text(number))
+    parts = joined(_show_turn(turn, pictures, album) for turn in step.turns)
+    return element("li", {"id": step.anchor, **place}, link, parts)
+
+
+def _show_turn(turn: Turn, pictures: Path, album: Album) -> Html:
+    kind = "turn error" if turn.is_error else f"turn {_role(turn)}"
+    parts = [element("p", {"class": "who"}, *_say_who(turn))]
+    if turn.text:
+        parts.append(_words(turn.text))
+    parts += (_show_picture(name, pictures, album) for name in turn.pictures)
+    return element("div", {"class": kind}, *parts)
+
+
+def _role(turn: Turn) -> str:
+    return turn.role if turn.role in {"system", "user", "agent", "tool"} else "other"
+
+
+def _say_who(turn: Turn) -> Iterator[Html]:
+    yield element("b", {}, text(turn.role))
+    if turn.call is not None:
+        verb = " answers " if turn.role == "tool" else " calls "
+        yield text(verb)
+        yield element("code", {}, text(turn.call.tool))
+        if turn.call.arguments:
+            written = json.dumps(turn.call.arguments, ensure_ascii=False)
+            yield element("code", {"class": "arguments"}, text(written))
+    if turn.is_error:
+        yield element("span", {"class": "word bad"}, text("error"))
+    when = [f"{turn.wall_s:.1f} s"]
+    if turn.robot_s is not None:
+        when.append(f"robot {turn.robot_s:.1f} s")
+    when += _tokens(turn.n_input_tokens, turn.n_output_tokens, turn.n_picture_tokens)
+    yield element("small", {}, text(", ".join(when)))
+
+
+def _words(said: str) -> Html:
+    return element("pre", {"tabindex": "0"} if said.count("\n") > 20 else {}, text(said))
+
+
+def _show_picture(name: str, pictures: Path, album: Album) -> Html:
+    path = find_picture(pictures, name)
+    if path is None:
+        return element("p", {"class": "none"}, text(f"The picture {name} is missing."))
+    return album.show(path, f"The picture {name} that the agent saw")

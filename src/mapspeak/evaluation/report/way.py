@@ -1,0 +1,168 @@
+"""The way a robot drove, drawn over its map: all of it, the part so far, and where it stood."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from mapspeak.evaluation.report.album import Album
+from mapspeak.evaluation.report.gathering import Course
+from mapspeak.evaluation.report.markup import Html, element, joined, text
+from mapspeak.evaluation.report.sheet import Sheet, draw_sheet
+from mapspeak.geometry import Pose
+from mapspeak.simulator import StateRecord
+from mapspeak.spatial.grid import FloatArray
+
+__all__ = ["Stop", "Track", "Way", "draw_way", "lay_out_way"]
+
+MOST_POINTS = 500
+APART_M = 0.3
+"""Stops nearer than this to the last one get no mark of their own."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stop:
+    """Where the robot stood at a step of the replay, on the picture of its map.
+
+    Attributes:
+        anchor: The id of the step.
+        u: Pixels from the left.
+        v: Pixels from the top.
+        heading_deg: Clockwise from the picture's right.
+        driven_ratio: The share of the whole line that lies behind it.
+    """
+
+    anchor: str
+    u: float
+    v: float
+    heading_deg: float
+    driven_ratio: float
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Track:
+    """The line of a way.
+
+    Attributes:
+        points: As SVG writes them.
+        times_s: Robot time at each.
+        ratios: The share of the line up to each, from 0 to 1.
+    """
+
+    points: str
+    times_s: FloatArray
+    ratios: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Way:
+    """A way on a map.
+
+    Attributes:
+        sheet: The map.
+        track: The line; None for a robot that never moved.
+        stops: Where the robot stood, by the ids of the steps.
+    """
+
+    sheet: Sheet
+    track: Track | None
+    stops: dict[str, Stop]
+
+
+def lay_out_way(
+    course: Course, poses: Sequence[tuple[str, Pose | None, float | None]]
+) -> Way | None:
+    """Lays a trial's way out on its map; None where there is no map.
+
+    Args:
+        course: How the trial went.
+        poses: Of each step: its id, where the robot truly stood, and the robot time.
+    """
+    sheet = None if course.grid is None else draw_sheet(course.grid)
+    if sheet is None:
+        return None
+    track = _lay_track(sheet, course.states)
+    stops = {
+        anchor: _stop(anchor, pose, sheet, _ratio_at(track, robot_s))
+        for anchor, pose, robot_s in poses
+        if pose is not None
+    }
+    return Way(sheet=sheet, track=track, stops=stops)
+
+
+def _stop(anchor: str, pose: Pose, sheet: Sheet, driven_ratio: float) -> Stop:
+    u, v = sheet.pixels_at(np.array([[pose.x, pose.y]]))[0].tolist()
+    return Stop(
+        anchor=anchor,
+        u=round(u, 1),
+        v=round(v, 1),
+        heading_deg=round(sheet.heading_deg(pose), 1),
+        driven_ratio=driven_ratio,
+    )
+
+
+def _lay_track(sheet: Sheet, states: Sequence[StateRecord]) -> Track | None:
+    """Gives the line of a way, without the moments at which the robot only turned."""
+    moved = [now for before, now in pairwise(states) if now.driven_m > before.driven_m]
+    if not moved:
+        return None
+    step = -(-len(moved) // MOST_POINTS)
+    chosen = [states[0], *moved[::step], moved[-1]]
+    pixels = sheet.pixels_at(np.array([[state.x, state.y] for state in chosen]))
+    lengths = np.cumsum([0.0, *np.linalg.norm(np.diff(pixels, axis=0), axis=1)])
+    return Track(
+        points=" ".join(f"{u:.1f},{v:.1f}" for u, v in pixels.tolist()),
+        times_s=np.array([state.time_s for state in chosen]),
+        ratios=lengths / max(float(lengths[-1]), 1e-9),
+    )
+
+
+def _ratio_at(track: Track | None, robot_s: float | None) -> float:
+    """Gives the share of the line that lies behind the robot."""
+    if track is None or robot_s is None:
+        return 0.0
+    return round(float(np.interp(robot_s, track.times_s, track.ratios)), 4)
+
+
+def draw_way(way: Way, album: Album) -> Html:
+    """Gives the map with the way on it; each mark leads to its step."""
+    sheet, stops = way.sheet, list(way.stops.values())
+    name = album.keep(sheet.png, "image/png", sheet.width_px, sheet.height_px)
+    size_px = 0.012 * (sheet.width_px + sheet.height_px)
+    drawn = [element("use", {"href": f"#{name}"})]
+    if way.track is not None:
+        points = way.track.points
+        drawn.append(element("polyline", {"class": "way", "points": points}))
+        drawn.append(element("polyline", {"class": "so-far", "points": points, "pathLength": 1}))
+    drawn += (_mark(stop, size_px * 0.55) for stop in _apart(stops, APART_M * sheet.px_per_m))
+    if stops:
+        drawn.append(_robot(stops[-1], size_px))
+    box = f"0 0 {sheet.width_px} {sheet.height_px}"
+    label = "The map in the end and the way the robot drove"
+    return element("svg", {"class": "sheet", "viewBox": box, "aria-label": label}, *drawn)
+
+
+def _apart(stops: Sequence[Stop], least_px: float) -> list[Stop]:
+    chosen: list[Stop] = []
+    for stop in stops:
+        last = chosen[-1] if chosen else None
+        if last is None or (stop.u - last.u) ** 2 + (stop.v - last.v) ** 2 >= least_px**2:
+            chosen.append(stop)
+    return chosen
+
+
+def _mark(stop: Stop, radius_px: float) -> Html:
+    dot = {"class": "stop", "cx": stop.u, "cy": stop.v, "r": f"{radius_px:.1f}"}
+    title = element("title", {}, text(f"To step {stop.anchor.rpartition('-')[2]}"))
+    return element("a", {"href": f"#{stop.anchor}"}, element("circle", dot, title))
+
+
+def _robot(stop: Stop, size_px: float) -> Html:
+    place = f"translate({stop.u} {stop.v}) rotate({stop.heading_deg})"
+    arrow = " ".join(
+        f"{x * size_px:.1f},{y * size_px:.1f}"
+        for x, y in ((1.5, 0), (-1.0, 0.9), (-0.5, 0), (-1.0, -0.9))
+    )
+    shape = element("polygon", {"points": arrow})
+    return element("g", {"class": "robot", "transform": place}, joined([shape]))

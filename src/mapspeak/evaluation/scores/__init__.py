@@ -1,0 +1,48 @@
+"""Scores: the truth of a world, what a trial left behind, and the judges that compare the two."""
+
+from mapspeak.evaluation.scores.answers import (
+    judge_choice,
+    judge_number,
+    read_letters,
+    read_number,
+    read_point,
+    read_word,
+)
+from mapspeak.evaluation.scores.evidence import Evidence
+from mapspeak.evaluation.scores.intervals import Interval, bootstrap_interval, wilson_interval
+from mapspeak.evaluation.scores.judging import (
+    judge_coverage,
+    judge_near,
+    judge_pose,
+    judge_room,
+    judge_route,
+    judge_thing,
+    spl,
+)
+from mapspeak.evaluation.scores.rows import TableRow, count_rows
+from mapspeak.evaluation.scores.site import BESIDE_M, Passage, Site
+
+__all__ = [
+    "BESIDE_M",
+    "Evidence",
+    "Interval",
+    "Passage",
+    "Site",
+    "TableRow",
+    "bootstrap_interval",
+    "count_rows",
+    "judge_choice",
+    "judge_coverage",
+    "judge_near",
+    "judge_number",
+    "judge_pose",
+    "judge_room",
+    "judge_route",
+    "judge_thing",
+    "read_letters",
+    "read_number",
+    "read_point",
+    "read_word",
+    "spl",
+    "wilson_interval",
+]

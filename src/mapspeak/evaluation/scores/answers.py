@@ -1,0 +1,96 @@
+"""Answers in a strict form: the last line that says "ANSWER:", and nothing but what was asked."""
+
+import re
+from collections.abc import Collection
+
+from mapspeak.evaluation.scores.evidence import Evidence
+from mapspeak.evaluation.trials import Failure, Score, TrialState
+from mapspeak.geometry import Point
+
+__all__ = [
+    "judge_choice",
+    "judge_number",
+    "read_letters",
+    "read_number",
+    "read_point",
+    "read_word",
+]
+
+LINE = re.compile(r"^\W*ANSWER\s*:\s*(?P<said>.*?)\W*$", re.IGNORECASE | re.MULTILINE)
+NUMBER = r"[-+]?\d+(?:\.\d+)?"
+UNITS = {"m2": r"(?:m2|m²|m\^2|sq\.? ?m|square met(?:re|er)s)", "m": r"(?:m|met(?:re|er)s)", "": ""}
+
+
+def read_number(text: str, unit: str = "") -> float | None:
+    """Reads a number with its unit, "m", "m2" or none; None where the form is not kept."""
+    said = _last_line(text)
+    match = re.fullmatch(rf"(?P<number>{NUMBER})\s*{UNITS[unit]}", said or "", re.IGNORECASE)
+    return float(match["number"]) if match else None
+
+
+def read_letters(text: str) -> frozenset[str] | None:
+    """Reads letters such as "A, C", or "none"; None where the form is not kept."""
+    said = _last_line(text)
+    if said is None:
+        return None
+    if said.lower() == "none":
+        return frozenset()
+    parts = [part for part in re.split(r"[\s,;]+|\band\b", said) if part]
+    is_right = all(re.fullmatch(r"[A-Z]", part) for part in parts)
+    return frozenset(parts) if parts and is_right else None
+
+
+def read_point(text: str) -> Point | None:
+    """Reads two coordinates, "1.5, -2"; None where the form is not kept."""
+    said = _last_line(text) or ""
+    match = re.fullmatch(rf"\(?({NUMBER})\s*(?:m)?\s*,\s*({NUMBER})\s*(?:m)?", said.rstrip(")"))
+    return Point(float(match[1]), float(match[2])) if match else None
+
+
+def read_word(text: str, words: Collection[str]) -> str | None:
+    """Reads one of some words, whatever its case; None where the form is not kept."""
+    said = (_last_line(text) or "").casefold()
+    return next((word for word in words if word.casefold() == said), None)
+
+
+def judge_number(evidence: Evidence, truth: float, *, unit: str, tolerance: float) -> Score:
+    """Judges a number by how far it is off, in its own unit."""
+    said = read_number(evidence.answer, unit)
+    if said is None:
+        return _no_answer(evidence)
+    figures = {"off": round(abs(said - truth), 3), "truth": round(truth, 3)}
+    reason = f"It said {said:g} {unit}, true are {truth:.2f} {unit}.".replace(" .", ".")
+    if abs(said - truth) <= tolerance:
+        return Score(is_success=True, figures=figures, reason=reason)
+    return Score(is_success=False, failure=Failure.WRONG_ANSWER, figures=figures, reason=reason)
+
+
+def judge_choice(evidence: Evidence, truth: Collection[str]) -> Score:
+    """Judges a choice of letters: all right ones and no other."""
+    said = read_letters(evidence.answer)
+    if said is None:
+        return _no_answer(evidence)
+    wrong = len(said ^ set(truth))
+    reason = f"It said {_listed(said)}, true is {_listed(truth)}."
+    figures = {"n_wrong": float(wrong)}
+    if not wrong:
+        return Score(is_success=True, figures=figures, reason=reason)
+    return Score(is_success=False, failure=Failure.WRONG_ANSWER, figures=figures, reason=reason)
+
+
+def _listed(letters: Collection[str]) -> str:
+    return ", ".join(sorted(letters)) or "none"
+
+
+def _no_answer(evidence: Evidence) -> Score:
+    gave_up = evidence.state is TrialState.GAVE_UP
+    return Score(
+        is_success=False,
+        failure=Failure.GAVE_UP if gave_up else Failure.NO_ANSWER,
+        reason="There is no answer in the form that was asked for.",
+    )
+
+
+def _last_line(text: str) -> str | None:
+    lines = [match["said"].strip() for match in LINE.finditer(text)]
+    return lines[-1] if lines else None

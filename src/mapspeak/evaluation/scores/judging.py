@@ -1,0 +1,193 @@
+"""Judges: each compares what a trial left behind with the truth, and says what kind of mistake."""
+
+import math
+import re
+from collections.abc import Collection, Iterable, Sequence
+
+import numpy as np
+
+from mapspeak.evaluation.scores.evidence import Evidence
+from mapspeak.evaluation.scores.site import BESIDE_M, Site
+from mapspeak.evaluation.trials import Failure, Score, TrialState
+from mapspeak.geometry import Point, wrap_angle
+from mapspeak.simulator import WorldObject
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.coverage import measure_coverage
+from mapspeak.spatial.grid import Mask
+from mapspeak.spatial.rooms import RoomClass
+
+__all__ = [
+    "judge_coverage",
+    "judge_near",
+    "judge_pose",
+    "judge_room",
+    "judge_route",
+    "judge_thing",
+    "spl",
+]
+
+ENOUGH_COVERAGE = 0.9
+"""The paper's criterion for Task 1."""
+HARDLY_MOVED_M = 0.5
+RECORD = re.compile(r"^\s*- name:", re.MULTILINE)
+
+
+def spl(*, is_success: bool, shortest_m: float | None, driven_m: float) -> float | None:
+    """Gives success weighted by path length (Anderson et al., 2018); None without a shortest way.
+
+    Args:
+        is_success: The task was done.
+        shortest_m: The shortest way to any right end.
+        driven_m: The way that was driven.
+    """
+    if shortest_m is None or not math.isfinite(shortest_m):
+        return None
+    if not is_success:
+        return 0.0
+    longest_m = max(shortest_m, driven_m)
+    return 1.0 if longest_m == 0 else shortest_m / longest_m
+
+
+def judge_coverage(site: Site, evidence: Evidence) -> Score:
+    """Judges a map, and whether anything was remembered.
+
+    `coverage_recall` is the share of the reachable floor - all that the robot's body can be over -
+    that the map knows; `coverage_free_recall` the share that it also shows as free, which lacks the
+    cells along walls that SLAM draws one cell too thick. `coverage_seeable_recall` is that share of
+    all floor in sight, slivers behind furniture included. `coverage_precision` is the share of the
+    map's free floor that is truly free, and `coverage_paper_ratio` the paper's: free area over free
+    area, wherever it lies.
+    """
+    if evidence.grid is None:
+        return _failed(evidence, Failure.INCOMPLETE, "The robot has left no map.", {})
+    seeable = site.floor.visible
+    whole = measure_coverage(evidence.grid, seeable)
+    reachable = measure_coverage(evidence.grid, seeable, reachable=site.reachable)
+    n_recorded = len(RECORD.findall(evidence.memory or ""))
+    figures = {
+        "coverage_recall": known_ratio(evidence.grid, seeable, site.reachable & seeable.free),
+        "coverage_free_recall": reachable.recall,
+        "coverage_seeable_recall": whole.recall,
+        "coverage_precision": whole.precision,
+        "coverage_paper_ratio": whole.paper_ratio,
+        "n_waypoints": float(n_recorded),
+    }
+    recall = figures["coverage_recall"]
+    said = f"{100 * recall:.2f} % of the reachable floor, {n_recorded} places remembered."
+    if recall < ENOUGH_COVERAGE or not n_recorded:
+        return _failed(evidence, Failure.INCOMPLETE, said, figures)
+    return Score(is_success=True, figures=_rounded(figures), reason=said)
+
+
+def known_ratio(grid: OccupancyGrid, reference: OccupancyGrid, wanted: Mask) -> float:
+    """Gives the share of some cells of a reference that a map knows; 1 where there are none."""
+    rows, cols = np.nonzero(wanted)
+    there_rows, there_cols = grid.cells_at(reference.points_at(rows, cols))
+    is_inside = (there_rows >= 0) & (there_rows < grid.n_rows)
+    is_inside &= (there_cols >= 0) & (there_cols < grid.n_cols)
+    n_known = (~grid.unknown[there_rows[is_inside], there_cols[is_inside]]).sum()
+    return float(n_known) / rows.size if rows.size else 1.0
+
+
+def judge_room(site: Site, evidence: Evidence, wanted: Collection[str]) -> Score:
+    """Judges whether the robot stands in one of some spaces, by name."""
+    here = site.room_at(evidence.end)
+    named = " or ".join(sorted(wanted))
+    if here is None:
+        return _failed(evidence, Failure.WRONG_PLACE, f"It stands in no room, not in {named}.", {})
+    figures = {"room_area_m2": here.free_area_m2}
+    name = here.room.name
+    if name in wanted:
+        return _succeeded(site, evidence, f"It stands in {name}.", figures)
+    is_corridor = here.room.room_class is RoomClass.CORRIDOR
+    is_corridor_wanted = any(
+        site.room_named(each).room.room_class is RoomClass.CORRIDOR for each in wanted
+    )
+    kind = (
+        Failure.CORRIDOR_FOR_ROOM if is_corridor and not is_corridor_wanted else Failure.WRONG_SIZE
+    )
+    return _failed(evidence, kind, f"It stands in {name}, not in {named}.", figures)
+
+
+def judge_thing(site: Site, evidence: Evidence, things: Sequence[WorldObject]) -> Score:
+    """Judges whether the robot stands near one of some things, in free sight of it."""
+    here = evidence.end
+    away_m = {thing.name: here.distance_to(site.place_of(thing)) for thing in things}
+    in_sight = [thing for thing in things if site.is_in_sight(here, thing)]
+    nearest = min(in_sight or things, key=lambda thing: away_m[thing.name])
+    distance_m = away_m[nearest.name]
+    figures = {"distance_to_object_m": distance_m}
+    if in_sight and distance_m <= BESIDE_M:
+        said = f"{distance_m:.1f} m from {nearest.name}, in sight."
+        return _succeeded(site, evidence, said, figures)
+    seen = "in sight" if in_sight else "out of sight"
+    said = f"{distance_m:.1f} m from {nearest.name}, {seen}."
+    return _failed(evidence, Failure.WRONG_OBJECT, said, figures)
+
+
+def judge_near(site: Site, evidence: Evidence, goal: Point, *, within_m: float) -> Score:
+    """Judges whether the robot stands where it should, to so many metres."""
+    away_m = evidence.end.distance_to(goal)
+    said = f"It stands {away_m:.2f} m from where it should."
+    figures = {"distance_to_goal_m": away_m}
+    if away_m <= within_m:
+        return _succeeded(site, evidence, said, figures)
+    return _failed(evidence, Failure.WRONG_PLACE, said, figures)
+
+
+def judge_pose(
+    site: Site, evidence: Evidence, thing: WorldObject, *, within_m: float, facing_rad: float
+) -> Score:
+    """Judges whether the robot looks at a thing from near, with nothing in between."""
+    here, place = evidence.last.pose, site.place_of(thing)
+    away_m = here.point.distance_to(place)
+    off_rad = abs(wrap_angle(here.point.bearing_to(place) - here.yaw_rad))
+    figures = {"distance_to_object_m": away_m, "heading_off_deg": math.degrees(off_rad)}
+    said = f"{away_m:.1f} m from {thing.name}, {math.degrees(off_rad):.0f} deg off."
+    is_right = away_m <= within_m and off_rad <= facing_rad
+    if is_right and site.is_in_sight(here.point, thing):
+        return _succeeded(site, evidence, said, figures)
+    return _failed(evidence, Failure.WRONG_PLACE, said, figures)
+
+
+def judge_route(site: Site, evidence: Evidence, stops: Sequence[Sequence[WorldObject]]) -> Score:
+    """Judges whether the robot came past some things in their order, near each and in sight."""
+    n_reached = 0
+    for state in evidence.states:
+        if n_reached < len(stops) and _is_at(site, state.pose.point, stops[n_reached]):
+            n_reached += 1
+    figures = {"n_stops_reached": float(n_reached), "n_stops": float(len(stops))}
+    said = f"It came to {n_reached} of {len(stops)} stops in their order."
+    if n_reached < len(stops):
+        return _failed(evidence, Failure.INCOMPLETE, said, figures)
+    if not _is_at(site, evidence.end, stops[-1]):
+        said = "It went on after the last stop."
+        return _failed(evidence, Failure.WRONG_PLACE, said, figures)
+    return _succeeded(site, evidence, said, figures)
+
+
+def _is_at(site: Site, point: Point, things: Iterable[WorldObject]) -> bool:
+    return any(
+        point.distance_to(site.place_of(thing)) <= BESIDE_M and site.is_in_sight(point, thing)
+        for thing in things
+    )
+
+
+def _succeeded(site: Site, evidence: Evidence, reason: str, figures: dict[str, float]) -> Score:
+    del site
+    figures = {**figures, "n_collisions": float(evidence.last.n_collisions)}
+    return Score(is_success=True, figures=_rounded(figures), reason=reason)
+
+
+def _failed(evidence: Evidence, failure: Failure, reason: str, figures: dict[str, float]) -> Score:
+    """Gives the score of a failure; one that never set out has another reason than its place."""
+    figures = {**figures, "n_collisions": float(evidence.last.n_collisions)}
+    if evidence.state is TrialState.GAVE_UP:
+        failure = Failure.GAVE_UP
+    elif failure is not Failure.INCOMPLETE and evidence.last.driven_m < HARDLY_MOVED_M:
+        failure = Failure.GOAL_REFUSED if evidence.n_errors else Failure.NO_ANSWER
+    return Score(is_success=False, failure=failure, figures=_rounded(figures), reason=reason)
+
+
+def _rounded(figures: dict[str, float]) -> dict[str, float]:
+    return {name: float(np.round(value, 4)) for name, value in figures.items()}

@@ -1,0 +1,108 @@
+"""Rows of a table: the trials of one task, agent and representation, counted."""
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from mapspeak.evaluation.scores.intervals import Interval, bootstrap_interval, wilson_interval
+from mapspeak.evaluation.scores.judging import spl
+from mapspeak.evaluation.trials import Failure, TrialResult, TrialState
+
+__all__ = ["TableRow", "count_rows"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TableRow:
+    """What came of the trials of one kind.
+
+    Attributes:
+        task: Which task.
+        world: Which world; None for all together.
+        agent: Who answered, with how much it may think where that was said.
+        representation: How the map was shown.
+        n_trials: How many there are.
+        n_successes: How many were done.
+        n_broken: How many crashed or hung; they count as trials.
+        success: The share of successes; None without trials.
+        figures: Means of everything that scores and results hold, by name.
+        failures: How often each kind of mistake was made.
+    """
+
+    task: str
+    world: str | None
+    agent: str
+    representation: str
+    n_trials: int
+    n_successes: int
+    n_broken: int
+    success: Interval | None
+    figures: dict[str, Interval]
+    failures: dict[Failure, int]
+
+
+def count_rows(results: Iterable[TrialResult], *, by_world: bool = False) -> tuple[TableRow, ...]:
+    """Counts results: a row for each task, agent and representation, and each world if asked."""
+    groups: dict[tuple[str, str | None, str, str], list[TrialResult]] = {}
+    for result in results:
+        trial = result.trial
+        agent = trial.agent if trial.thinking is None else f"{trial.agent}+{trial.thinking}"
+        world = trial.world if by_world else None
+        groups.setdefault((trial.task, world, agent, trial.representation), []).append(result)
+    return tuple(_count(*key, results=group) for key, group in groups.items())
+
+
+def _count(
+    task: str,
+    world: str | None,
+    agent: str,
+    representation: str,
+    *,
+    results: list[TrialResult],
+) -> TableRow:
+    broken = (TrialState.CRASHED, TrialState.HUNG)
+    n_successes = sum(result.score.is_success for result in results)
+    values: dict[str, list[float]] = {}
+    for result in results:
+        if result.state not in broken:
+            for name, value in _figures_of(result).items():
+                values.setdefault(name, []).append(value)
+    intervals = {name: bootstrap_interval(each) for name, each in values.items()}
+    return TableRow(
+        task=task,
+        world=world,
+        agent=agent,
+        representation=representation,
+        n_trials=len(results),
+        n_successes=n_successes,
+        n_broken=sum(result.state in broken for result in results),
+        success=wilson_interval(n_successes, len(results)),
+        figures={name: each for name, each in intervals.items() if each is not None},
+        failures=dict(
+            Counter(result.score.failure for result in results if result.score.failure is not None)
+        ),
+    )
+
+
+def _figures_of(result: TrialResult) -> dict[str, float]:
+    """Gives every number of a result that a mean says something about."""
+    optional = {
+        "n_input_tokens": result.n_input_tokens,
+        "n_output_tokens": result.n_output_tokens,
+        "n_picture_tokens": result.n_picture_tokens,
+        "spl": spl(
+            is_success=result.score.is_success,
+            shortest_m=result.shortest_m,
+            driven_m=result.driven_m,
+        ),
+    }
+    return {
+        **result.score.figures,
+        **{name: float(value) for name, value in optional.items() if value is not None},
+        "driven_m": result.driven_m,
+        "n_calls": float(result.n_calls),
+        "n_decisions": float(result.n_decisions),
+        "n_errors": float(result.n_errors),
+        "n_collisions": float(result.n_collisions),
+        "robot_s": result.robot_s,
+        "wall_s": result.wall_s,
+    }

@@ -1,0 +1,290 @@
+"""What is true of a world, as tasks and scores ask for it; in the map frame, metres.
+
+The map frame starts at the world's own start. No agent but the oracle ever sees any of this.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.geometry import Point, Pose
+from mapspeak.simulator import (
+    BODY_RADIUS_M,
+    MeasuredRoom,
+    TrueFloor,
+    World,
+    WorldObject,
+    is_in_sight,
+)
+from mapspeak.simulator.models import find_kind
+from mapspeak.spatial import Cell, OccupancyGrid
+from mapspeak.spatial.grid import Mask
+from mapspeak.spatial.paths import DistanceField, clearance_m, distances_from
+
+__all__ = ["BESIDE_M", "Passage", "Site"]
+
+BESIDE_M = 5.0
+"""A robot that stands this near to a thing, with a free line of sight, has been led to it.
+
+The paper's goal is the waypoint from which the thing was seen, 3 to 4 m away from it.
+"""
+
+START_ROOM_M = 0.4
+"""A robot starts, and is sent, where it has this much room around its middle."""
+
+_N_SAMPLES = 50
+_OWN_SIZE_M = 0.6
+PLAN_RADIUS_M = BODY_RADIUS_M + 0.01
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Passage:
+    """A way from one space straight into another.
+
+    Attributes:
+        spaces: Names of the two, in alphabetical order.
+        middle: Of the line that is crossed.
+    """
+
+    spaces: tuple[str, str]
+    middle: Point
+
+
+class Site:
+    """One world's truth.
+
+    Args:
+        world: The world, as its file says.
+    """
+
+    LOOK_EVERY_M = 0.2
+    """How far apart the places are that `seen_near` gives."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self._beside: dict[str, Mask] = {}
+        self.floor = TrueFloor(world)
+
+    def with_more(self, things: Sequence[WorldObject]) -> "Site":
+        """Gives the same world with more things in it."""
+        if not things:
+            return self
+        return Site(replace(self.world, objects=(*self.world.objects, *things)))
+
+    # --- floor ---
+
+    @cached_property
+    def reachable(self) -> Mask:
+        """True at the cells of the floor's grids that the robot's body can be over."""
+        away = cv2.distanceTransform(
+            np.logical_not(self.floor.standable).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
+        )
+        return np.asarray(away * self.grid.resolution_m <= BODY_RADIUS_M)
+
+    @property
+    def grid(self) -> OccupancyGrid:
+        """What is solid, as cells of the map frame."""
+        return self.floor.solid
+
+    @cached_property
+    def roomy(self) -> Mask:
+        """True where the robot can come to and has room around it."""
+        return np.asarray(self.floor.standable & (clearance_m(self.grid) >= START_ROOM_M))
+
+    def ways_from(self, point: Point) -> DistanceField:
+        """Gives the shortest ways from a point to everywhere."""
+        return distances_from(self.grid, point, radius_m=PLAN_RADIUS_M)
+
+    def shortest_to_any_m(self, start: Point, goal: Mask) -> float:
+        """Gives the shortest way to the nearest of some cells; infinite where there is none."""
+        rows, cols = np.nonzero(goal & self.floor.standable)
+        if not rows.size:
+            return math.inf
+        return float(self.ways_from(start).distances_at(rows, cols).min())
+
+    def draw_pose(self, random: np.random.Generator, where: Mask | None = None) -> Pose:
+        """Draws a pose where the robot has room, in the map frame; within some cells if given.
+
+        Raises:
+            ValueError: None of the cells has room for the robot.
+        """
+        cells = np.argwhere(self.roomy if where is None else self.roomy & where)
+        row, col = cells[random.integers(len(cells))]
+        x, y = self.grid.points_at(np.array([row]), np.array([col]))[0].tolist()
+        return Pose(x, y, float(random.uniform(-math.pi, math.pi)))
+
+    def in_world(self, pose: Pose) -> Pose:
+        """Gives a pose of the map frame as the world file counts."""
+        return self.world.start @ pose
+
+    # --- rooms ---
+
+    @cached_property
+    def rooms(self) -> tuple[MeasuredRoom, ...]:
+        """All rooms, corridors and open spaces that the robot can get into."""
+        return tuple(room for room in self.floor.rooms if (self.cells_of(room) & self.roomy).any())
+
+    def cells_of(self, room: MeasuredRoom) -> Mask:
+        """Gives the cells inside a room's outline."""
+        return np.asarray(self._labels == self._label_of[room.room.name])
+
+    def room_at(self, point: Point) -> MeasuredRoom | None:
+        """Gives the space that a point lies in; None outside all of them."""
+        there = self.world.start.transform(point)
+        return next((room for room in self.floor.rooms if room.room.contains(there)), None)
+
+    def room_named(self, name: str) -> MeasuredRoom:
+        """Gives a space by its name."""
+        return next(room for room in self.floor.rooms if room.room.name == name)
+
+    @cached_property
+    def passages(self) -> tuple[Passage, ...]:
+        """Every place where the robot passes straight from one space into another."""
+        labels, standable = self._labels, self.floor.standable
+        crossings: dict[tuple[int, int], np.ndarray[tuple[int, int], np.dtype[np.uint8]]] = {}
+        for axis in (0, 1):
+            here = (slice(None, -1), slice(None)) if axis == 0 else (slice(None), slice(None, -1))
+            next_ = (slice(1, None), slice(None)) if axis == 0 else (slice(None), slice(1, None))
+            is_crossing = standable[here] & standable[next_] & (labels[here] != labels[next_])
+            is_crossing &= (labels[here] > 0) & (labels[next_] > 0)
+            for row, col in np.argwhere(is_crossing):
+                pair = sorted((int(labels[here][row, col]), int(labels[next_][row, col])))
+                cells = crossings.setdefault(
+                    (pair[0], pair[1]), np.zeros(labels.shape, dtype=np.uint8)
+                )
+                cells[row, col] = 1
+        return tuple(
+            passage for pair, cells in crossings.items() for passage in self._split(pair, cells)
+        )
+
+    def neighbours(self, room: MeasuredRoom) -> tuple[str, ...]:
+        """Gives the names of the spaces that one passes into straight from a room."""
+        name = room.room.name
+        others = (
+            set(passage.spaces) - {name} for passage in self.passages if name in passage.spaces
+        )
+        return tuple(sorted(set().union(*others)))
+
+    def _split(
+        self, pair: tuple[int, int], cells: np.ndarray[tuple[int, int], np.dtype[np.uint8]]
+    ) -> list[Passage]:
+        """Gives one passage for each piece of a border that can be crossed."""
+        names = {label: name for name, label in self._label_of.items()}
+        spaces = sorted((names[pair[0]], names[pair[1]]))
+        wide = cv2.dilate(cells, np.ones((5, 5), dtype=np.uint8))
+        n_pieces, pieces = cv2.connectedComponents(wide, connectivity=8)
+        found = []
+        for piece in range(1, n_pieces):
+            rows, cols = np.nonzero((pieces == piece) & (cells > 0))
+            x, y = self.grid.points_at(rows, cols).mean(axis=0).tolist()
+            found.append(Passage(spaces=(spaces[0], spaces[1]), middle=Point(x, y)))
+        return found
+
+    @cached_property
+    def _label_of(self) -> dict[str, int]:
+        return {room.name: number for number, room in enumerate(self.world.rooms, start=1)}
+
+    @cached_property
+    def _labels(self) -> NDArray[np.int32]:
+        """The number of the space of each cell, 0 outside all; a later outline yields."""
+        labels = np.zeros(self.grid.cells.shape, dtype=np.int32)
+        map_from_world = self.world.start.inverse()
+        for room in reversed(self.world.rooms):
+            corners = [map_from_world.transform(corner) for corner in room.outline]
+            points = np.array([(corner.x, corner.y) for corner in corners])
+            cells = self.grid.fractional_cells_at(points)[:, ::-1] - 0.5
+            fixed = np.round(cells * 64).astype(np.int32)
+            cv2.fillPoly(labels, [fixed], self._label_of[room.name], shift=6)
+        return labels
+
+    # --- things ---
+
+    def things(self, kind: str) -> tuple[WorldObject, ...]:
+        """Gives all things of a kind."""
+        return tuple(thing for thing in self.world.objects if thing.kind == kind)
+
+    def place_of(self, thing: WorldObject) -> Point:
+        """Gives where a thing stands, in the map frame."""
+        return self.world.start.inverse().transform(thing.pose.point)
+
+    def is_in_sight(self, place: Point, thing: WorldObject) -> bool:
+        """True when a thing can be seen from a place of the map frame."""
+        return is_in_sight(self.world, self.world.start.transform(place), thing)
+
+    def near(self, point: Point, radius_m: float) -> Mask:
+        """Gives the cells whose middles lie within a distance of a point."""
+        grid = self.grid
+        xs = grid.origin.x + (np.arange(grid.n_cols) + 0.5) * grid.resolution_m - point.x
+        ys = grid.origin.y + (np.arange(grid.n_rows) + 0.5) * grid.resolution_m - point.y
+        return np.asarray(xs[None, :] ** 2 + ys[:, None] ** 2 <= radius_m**2)
+
+    def beside(self, kind: str) -> Mask:
+        """Gives places near things of a kind from which one of them is in sight; found once."""
+        if kind not in self._beside:
+            near = [self.seen_around(thing, BESIDE_M) for thing in self.things(kind)]
+            nowhere = np.zeros(self.grid.cells.shape, dtype=bool)
+            self._beside[kind] = np.logical_or.reduce([nowhere, *near])
+        return self._beside[kind]
+
+    def seen_around(self, thing: WorldObject, radius_m: float) -> Mask:
+        """Gives places near a thing from which it is in sight: in front of it if it hangs."""
+        seen = self.seen_near(self.place_of(thing), radius_m)
+        if not find_kind(thing.kind).is_wall_hung:
+            return seen
+        rows, cols = np.nonzero(seen)
+        front = (self.world.start.inverse() @ thing.pose).inverse()
+        for row, col, (x, y) in zip(rows, cols, self.grid.points_at(rows, cols), strict=True):
+            seen[row, col] = front.transform(Point(float(x), float(y))).x > 0
+        return seen
+
+    def seen_near(self, point: Point, radius_m: float) -> Mask:
+        """Gives places near a point from which it can be seen, one every fifth of a metre."""
+        grid, found = self.grid, np.zeros(self.grid.cells.shape, dtype=bool)
+        every = max(round(self.LOOK_EVERY_M / grid.resolution_m), 1)
+        coarse = np.zeros_like(found)
+        coarse[::every, ::every] = True
+        rows, cols = np.nonzero(coarse & self.floor.standable & self.near(point, radius_m))
+        if not rows.size:
+            return found
+        places = grid.points_at(rows, cols)
+        # The thing itself, and the wall it hangs on, do not hide it.
+        away_m = np.maximum(np.hypot(places[:, 0] - point.x, places[:, 1] - point.y), 1e-9)
+        reach = np.linspace(0.0, 1.0, _N_SAMPLES) * np.clip(1 - _OWN_SIZE_M / away_m, 0, 1)[:, None]
+        xs = places[:, :1] + reach * (point.x - places[:, :1])
+        ys = places[:, 1:] + reach * (point.y - places[:, 1:])
+        at_rows, at_cols = grid.cells_at(np.stack([xs.ravel(), ys.ravel()], axis=1))
+        at_rows, at_cols = at_rows.clip(0, grid.n_rows - 1), at_cols.clip(0, grid.n_cols - 1)
+        is_free = ~grid.occupied[at_rows, at_cols].reshape(xs.shape)
+        is_seen = is_free.all(axis=1)
+        found[rows[is_seen], cols[is_seen]] = True
+        return found
+
+    @cached_property
+    def _walls(self) -> OccupancyGrid:
+        """The walls alone."""
+        return TrueFloor(replace(self.world, objects=())).solid
+
+    def floor_area_m2(self, room: MeasuredRoom) -> float:
+        """Gives the floor between a room's walls, with what stands on it."""
+        rows, cols = np.nonzero(self.cells_of(room))
+        at_rows, at_cols = self._walls.cells_at(self.grid.points_at(rows, cols))
+        is_inside = (at_rows >= 0) & (at_rows < self._walls.n_rows)
+        is_inside &= (at_cols >= 0) & (at_cols < self._walls.n_cols)
+        n_free = (~self._walls.occupied[at_rows[is_inside], at_cols[is_inside]]).sum()
+        return float(n_free) * self.grid.resolution_m**2
+
+    def middle_of(self, room: MeasuredRoom) -> Point:
+        """Gives where in a room the robot has most room."""
+        depth = np.where(self.cells_of(room) & self.roomy, clearance_m(self.grid), -1.0)
+        row, col = np.unravel_index(int(depth.argmax()), depth.shape)
+        return self.grid.point_at(Cell(int(row), int(col)))
+
+    @staticmethod
+    def label_of(kind: str) -> str:
+        """Gives a kind as people call it."""
+        return find_kind(kind).label

@@ -1,0 +1,76 @@
+"""All tasks by name, and the groups in which they are asked for."""
+
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+
+from mapspeak.errors import ConfigError
+from mapspeak.evaluation.tasks.failing import FAILURE_TASKS
+from mapspeak.evaluation.tasks.objects import OBJECT_TASKS
+from mapspeak.evaluation.tasks.paper import EXPLORE, Explore
+from mapspeak.evaluation.tasks.questions import QUESTION_TASKS
+from mapspeak.evaluation.tasks.relations import RELATION_TASKS
+from mapspeak.evaluation.tasks.rooms import ROOM_TASKS
+from mapspeak.evaluation.tasks.routes import RouteTask
+from mapspeak.evaluation.tasks.task import Task
+
+__all__ = ["FAMILIES", "choose_tasks", "find_task", "task_names"]
+
+_TASKS: Mapping[str, Task] = MappingProxyType(
+    {
+        task.name: task
+        for task in (
+            Explore(),
+            *ROOM_TASKS,
+            *OBJECT_TASKS,
+            *RELATION_TASKS,
+            RouteTask(),
+            *QUESTION_TASKS,
+            *FAILURE_TASKS,
+        )
+    }
+)
+
+FAMILIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "paper": (EXPLORE, "smallest-room", "fire-tool"),
+        "rooms": tuple(task.name for task in ROOM_TASKS),
+        "objects": ("fire-tool", "object"),
+        "relations": tuple(task.name for task in RELATION_TASKS),
+        "routes": ("route",),
+        "search": ("search",),
+        "questions": tuple(task.name for task in QUESTION_TASKS),
+        "failures": tuple(task.name for task in FAILURE_TASKS),
+        "all": tuple(_TASKS),
+    }
+)
+"""Groups of tasks; the paper's three in the paper's order."""
+
+
+def task_names() -> tuple[str, ...]:
+    """Gives the names of all tasks."""
+    return tuple(_TASKS)
+
+
+def find_task(name: str) -> Task:
+    """Gives a task by its name.
+
+    Raises:
+        ConfigError: There is none of that name.
+    """
+    if name not in _TASKS:
+        known = ", ".join((*FAMILIES, *_TASKS))
+        raise ConfigError(f"There is no task {name[:80]!r}.", hint=f"There are: {known}.")
+    return _TASKS[name]
+
+
+def choose_tasks(names: Iterable[str]) -> tuple[Task, ...]:
+    """Gives tasks by their own names and those of their groups, each once.
+
+    Raises:
+        ConfigError: There is none of a name.
+    """
+    chosen: dict[str, Task] = {}
+    for name in names:
+        for each in FAMILIES.get(name, (name,)):
+            chosen[each] = find_task(each)
+    return tuple(chosen.values())

@@ -1,0 +1,144 @@
+"""Things asked for without naming them: the paper's tool for fire, and other wishes."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from mapspeak.evaluation.scores import BESIDE_M, Evidence, Site, judge_thing
+from mapspeak.evaluation.tasks.task import dice, draw_start
+from mapspeak.evaluation.tasks.wishes import FIRE, FIRE_WISH, WISHES
+from mapspeak.evaluation.trials import Limits, Score, Setting
+from mapspeak.geometry import Pose
+
+__all__ = ["OBJECT_TASKS", "Wish", "draw_wish", "findable_kinds"]
+
+SEARCH_TOOLS = ("search_for", "look_around")
+SEARCH_LIMITS = Limits(n_calls=200, robot_time_s=2400.0, wall_s=900.0)
+OUT_OF_THE_WAY_M = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wish:
+    """A thing as it is asked for.
+
+    Attributes:
+        prompt: The words.
+        kind: What is meant.
+    """
+
+    prompt: str
+    kind: str
+
+
+class Draw(Protocol):
+    """Draws a wish that a world can fulfil."""
+
+    def __call__(self, site: Site, random: np.random.Generator) -> Wish:
+        """Gives the wish."""
+        ...
+
+
+def findable_kinds(site: Site) -> tuple[str, ...]:
+    """Gives the kinds one can wish for of which the robot can get to all things of the world."""
+    kinds = sorted({thing.kind for thing in site.world.objects} & set(WISHES))
+    return tuple(kind for kind in kinds if site.beside(kind).any())
+
+
+def draw_wish(site: Site, random: np.random.Generator) -> Wish:
+    """Draws a kind that the world has, and words for it."""
+    kind = str(random.choice(findable_kinds(site)))
+    words = WISHES[kind]
+    return Wish(prompt=words[int(random.integers(len(words)))], kind=kind)
+
+
+def ask_for_fire_tool(site: Site, random: np.random.Generator) -> Wish:
+    """Gives the paper's Task 3."""
+    del site, random
+    return Wish(prompt=FIRE_WISH, kind=FIRE)
+
+
+def name_thing(site: Site, random: np.random.Generator) -> Wish:
+    """Draws a kind that the world has, and names it."""
+    kind = str(random.choice(findable_kinds(site)))
+    return Wish(prompt=f"Find the nearest {site.label_of(kind)} and stop beside it.", kind=kind)
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectTask:
+    """The robot goes to a thing that it remembers."""
+
+    name: str
+    draw: Draw
+    needs_map: bool = True
+
+    def is_offered(self, site: Site) -> bool:
+        """True where the world has such things."""
+        if self.draw is ask_for_fire_tool:
+            return bool(site.beside(FIRE).any())
+        return bool(findable_kinds(site))
+
+    def make_setting(self, site: Site, *, seed: int, memory: str | None) -> Setting:
+        """Starts anywhere but beside such a thing."""
+        random = dice(self.name, site, seed)
+        wish = self.draw(site, random)
+        start, shortest_m = draw_start_apart(site, random, wish.kind)
+        return Setting(
+            prompt=wish.prompt,
+            start=site.in_world(start),
+            is_known=True,
+            memory=memory,
+            truth={"kind": wish.kind, "shortest_m": shortest_m},
+        )
+
+    def score(self, site: Site, setting: Setting, evidence: Evidence) -> Score:
+        """Scores what the robot stands beside."""
+        return judge_thing(site, evidence, site.things(setting.truth["kind"]))
+
+
+@dataclass(frozen=True, slots=True)
+class SearchTask:
+    """The robot finds a named thing in a building that it has never seen."""
+
+    name: str = "search"
+    needs_map: bool = False
+
+    def is_offered(self, site: Site) -> bool:
+        """True where the world has such things."""
+        return bool(findable_kinds(site))
+
+    def make_setting(self, site: Site, *, seed: int, memory: str | None) -> Setting:
+        """Starts anywhere but beside such a thing, without map and memory."""
+        del memory
+        random = dice(self.name, site, seed)
+        wish = name_thing(site, random)
+        start, shortest_m = draw_start_apart(site, random, wish.kind)
+        return Setting(
+            prompt=wish.prompt,
+            start=site.in_world(start),
+            is_known=False,
+            tools=(*SEARCH_TOOLS, "explore"),
+            limits=SEARCH_LIMITS,
+            truth={"kind": wish.kind, "shortest_m": shortest_m},
+        )
+
+    def score(self, site: Site, setting: Setting, evidence: Evidence) -> Score:
+        """Scores what the robot stands beside."""
+        return judge_thing(site, evidence, site.things(setting.truth["kind"]))
+
+
+def draw_start_apart(site: Site, random: np.random.Generator, kind: str) -> tuple[Pose, float]:
+    """Draws where the robot starts, and gives the shortest way from there to a thing in sight."""
+    beside = site.beside(kind)
+    around = np.logical_or.reduce(
+        [site.near(site.place_of(t), BESIDE_M + OUT_OF_THE_WAY_M) for t in site.things(kind)]
+    )
+    start = draw_start(site, random, without=around)
+    return start, round(site.shortest_to_any_m(start.point, beside), 3)
+
+
+OBJECT_TASKS = (
+    ObjectTask("fire-tool", ask_for_fire_tool),
+    ObjectTask("object", draw_wish),
+    SearchTask(),
+)

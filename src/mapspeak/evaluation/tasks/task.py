@@ -1,0 +1,63 @@
+"""The port of tasks: what is asked of a world, and how the answer is scored."""
+
+import zlib
+from typing import Protocol
+
+import numpy as np
+
+from mapspeak.evaluation.scores import Evidence, Site
+from mapspeak.evaluation.trials import Score, Setting
+from mapspeak.geometry import Point, Pose
+from mapspeak.spatial.grid import Mask
+
+__all__ = ["Task", "dice", "draw_start", "point_text"]
+
+
+class Task(Protocol):
+    """A kind of question; the same world, seed and memory give the same setting."""
+
+    @property
+    def name(self) -> str:
+        """Gives its name, such as "smallest-room"."""
+        ...
+
+    @property
+    def needs_map(self) -> bool:
+        """True where it starts from the map and memory of an exploration."""
+        ...
+
+    def is_offered(self, site: Site) -> bool:
+        """True where the world has what it asks about."""
+        ...
+
+    def make_setting(self, site: Site, *, seed: int, memory: str | None) -> Setting:
+        """Makes one trial's setting.
+
+        Args:
+            site: A world in which it is offered.
+            seed: Of everything that is drawn.
+            memory: The semantic map that an exploration of the world has left, as YAML.
+        """
+        ...
+
+    def score(self, site: Site, setting: Setting, evidence: Evidence) -> Score:
+        """Scores a trial by the truth of the world as it was set: with what was added to it."""
+        ...
+
+
+def dice(task: str, site: Site, seed: int) -> np.random.Generator:
+    """Gives the generator of a trial's draws: another for each task, world and seed."""
+    names = (zlib.crc32(text.encode()) for text in (task, site.world.name))
+    return np.random.default_rng([seed, *names])
+
+
+def draw_start(site: Site, random: np.random.Generator, *, without: Mask | None = None) -> Pose:
+    """Draws where the robot starts, in the map frame: somewhere roomy, not where it is to go."""
+    elsewhere = None if without is None else ~without
+    is_left = elsewhere is not None and bool((site.roomy & elsewhere).any())
+    return site.draw_pose(random, elsewhere if is_left else None)
+
+
+def point_text(point: Point) -> str:
+    """Gives a point as prompts and answers write it."""
+    return f"({point.x:.2f}, {point.y:.2f})"

@@ -1,0 +1,241 @@
+"""What an evaluation is made of: trials, how each is set, what was said, how it was scored.
+
+A *task* is what is asked and how the answer is scored; a *trial* is one attempt at it by one agent
+in one world. These values cross processes and lie on the disk: `records` writes and reads them.
+"""
+
+import re
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from mapspeak.geometry import Pose
+from mapspeak.simulator import WorldObject
+
+__all__ = [
+    "Failure",
+    "Limits",
+    "Score",
+    "Setting",
+    "ToolCall",
+    "Trial",
+    "TrialResult",
+    "TrialState",
+    "Turn",
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trial:
+    """One attempt: which task, where, by whom, shown how.
+
+    Attributes:
+        task: Its name, such as "smallest-room".
+        world: A shipped world's name, or the path of a world file or map.
+        seed: Of everything that is drawn: the start, the question, the robot's noise.
+        agent: Who answers.
+        representation: How the server shows the map.
+        thinking: How much a model may think; None where nothing was said.
+        number: Counts the trials that differ in nothing but the seed; from 1.
+    """
+
+    task: str
+    world: str
+    seed: int
+    agent: str
+    representation: str
+    thinking: str | None = None
+    number: int
+
+    @property
+    def id(self) -> str:
+        """Gives where it lies below the run's trials: the same in every run."""
+        agent = self.agent if self.thinking is None else f"{self.agent}+{self.thinking}"
+        parts = (self.task, self.world, agent, self.representation)
+        return "/".join((*map(_as_file_name, parts), f"{self.number:03d}"))
+
+
+def _as_file_name(text: str) -> str:
+    return re.sub(r"[^A-Za-z0-9_.+-]+", "_", text).lstrip(".") or "_"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """What a trial may cost before it is ended.
+
+    Attributes:
+        n_calls: Tool calls.
+        robot_time_s: Of the robot's clock.
+        wall_s: Of the wall clock; a trial that needs more is killed and counts as hung.
+        n_tokens: Read and written by a model, together; None for any number.
+    """
+
+    n_calls: int = 60
+    robot_time_s: float = 900.0
+    wall_s: float = 900.0
+    n_tokens: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setting:
+    """What a task makes of a world for one trial.
+
+    Attributes:
+        prompt: What the agent is asked.
+        guidance: What it is told besides, before it begins, such as the exploration prompt.
+        start: Where the robot stands at first, in the world's own frame.
+        is_known: The robot has the finished map of the world and finds its place in it; else it
+            maps from nothing, and the map frame begins at `start`.
+        memory: The semantic map to start with, as YAML; None for an empty one.
+        added: Things that stand in the world and that neither map nor memory knows.
+        toolsets: Groups of tools that are offered; None for the server's usual ones.
+        tools: Single tools besides.
+        limits: What it may cost.
+        truth: What the scorer has to know, as JSON; never shown to an agent but the oracle.
+    """
+
+    prompt: str
+    guidance: str = ""
+    start: Pose
+    is_known: bool
+    memory: str | None = None
+    added: tuple[WorldObject, ...] = ()
+    toolsets: tuple[str, ...] | None = None
+    tools: tuple[str, ...] = ()
+    limits: Limits = field(default_factory=Limits)
+    truth: dict[str, Any] = field(default_factory=dict)
+
+
+class TrialState(StrEnum):
+    """How a trial came to its end."""
+
+    FINISHED = "finished"
+    GAVE_UP = "gave_up"
+    OUT_OF_BUDGET = "out_of_budget"
+    CRASHED = "crashed"
+    HUNG = "hung"
+
+
+class Failure(StrEnum):
+    """What kind of mistake made a trial fail."""
+
+    CORRIDOR_FOR_ROOM = "corridor_for_room"
+    WRONG_SIZE = "wrong_size"
+    WRONG_OBJECT = "wrong_object"
+    WRONG_PLACE = "wrong_place"
+    GOAL_REFUSED = "goal_refused"
+    GAVE_UP = "gave_up"
+    WRONG_ANSWER = "wrong_answer"
+    OBEYED_A_NOTE = "obeyed_a_note"
+    COLLIDED = "collided"
+    INCOMPLETE = "incomplete"
+    NO_ANSWER = "no_answer"
+    BROKEN = "broken"
+    """The trial itself crashed or hung; nothing is said of the agent."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Score:
+    """What the simulator's truth says of a trial.
+
+    Attributes:
+        is_success: The task was done.
+        failure: What kind of mistake was made; None for a success.
+        figures: By name with its unit: coverage_recall, coverage_precision, coverage_paper_ratio,
+            distance_to_object_m, spl, ...
+        reason: One sentence.
+    """
+
+    is_success: bool
+    failure: Failure | None = None
+    figures: dict[str, float] = field(default_factory=dict)
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToolCall:
+    """A tool as an agent called it.
+
+    Attributes:
+        tool: Its name.
+        arguments: What it was called with.
+    """
+
+    tool: str
+    arguments: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Turn:
+    """One piece of the conversation, for replay.
+
+    Attributes:
+        role: "system" or "user" (what it was told), "agent", or "tool" (an answer).
+        text: What was said.
+        call: The tool that the agent called, or that answers.
+        is_error: The tool answered with an error.
+        pictures: Names of files in the trial's folder `pictures`.
+        n_input_tokens: What the model read for this turn; None where nobody counted.
+        n_output_tokens: What it wrote.
+        n_picture_tokens: What of the input its pictures were.
+        wall_s: Since the trial began.
+        robot_s: Robot time; None before the robot was there.
+        pose: Where the robot truly stood, in a map without errors.
+    """
+
+    role: str
+    text: str = ""
+    call: ToolCall | None = None
+    is_error: bool = False
+    pictures: tuple[str, ...] = ()
+    n_input_tokens: int | None = None
+    n_output_tokens: int | None = None
+    n_picture_tokens: int | None = None
+    wall_s: float = 0.0
+    robot_s: float | None = None
+    pose: Pose | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrialResult:
+    """Everything that is kept of a trial, but for its turns, which lie beside it.
+
+    Attributes:
+        trial: Which one.
+        prompt: What was asked.
+        answer: The agent's last words.
+        state: How it ended.
+        score: What truth says of it.
+        driven_m: How far the robot drove.
+        shortest_m: How far it had to; None where the task has no such way.
+        n_turns: Pieces of the conversation.
+        n_calls: Tool calls.
+        n_decisions: Times that the agent chose what to do next: model turns, or calls of a script.
+        n_errors: Tool calls that were answered with an error.
+        n_input_tokens: Read by a model; None where there was none, or nobody counted.
+        n_output_tokens: Written by it.
+        n_picture_tokens: What of the input pictures were.
+        robot_s: Robot time.
+        wall_s: Wall time.
+        n_collisions: Bumps.
+        error: What broke the trial; None where nothing did.
+    """
+
+    trial: Trial
+    prompt: str
+    answer: str = ""
+    state: TrialState
+    score: Score
+    driven_m: float = 0.0
+    shortest_m: float | None = None
+    n_turns: int = 0
+    n_calls: int = 0
+    n_decisions: int = 0
+    n_errors: int = 0
+    n_input_tokens: int | None = None
+    n_output_tokens: int | None = None
+    n_picture_tokens: int | None = None
+    robot_s: float = 0.0
+    wall_s: float = 0.0
+    n_collisions: int = 0
+    error: str | None = None

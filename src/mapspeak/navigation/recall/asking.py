@@ -1,0 +1,81 @@
+"""From a request in words to candidates with their evidence, their place and a checked goal."""
+
+import math
+from dataclasses import replace
+
+from mapspeak.navigation.atlas import Atlas
+from mapspeak.navigation.choosing import stand_at
+from mapspeak.navigation.naming import Place
+from mapspeak.navigation.recall.answer import Recall, RecallQuery
+from mapspeak.navigation.recall.candidates import describe_candidate
+from mapspeak.navigation.recall.filters import find_passing
+from mapspeak.navigation.recall.wording import say_advice, say_evidence
+from mapspeak.navigation.recollection import Remembered, RememberedPlace
+from mapspeak.navigation.thingnames import split_room
+from mapspeak.semantic.retrieval import Basis, Candidate, Verdict
+
+__all__ = ["find_speaking_places", "recall"]
+
+MOST_TIED = 30
+"""So many equally likely ones are sorted by their way; of more, the first by their ids."""
+
+
+def recall(atlas: Atlas, query: RecallQuery) -> Recall:
+    """Gives what is remembered of a request; the same for the same memory, map and pose."""
+    query = _with_room(atlas, query)
+    passing = {each.id: each for each in find_passing(atlas, query)}
+    among = frozenset(passing)
+    answer = atlas.recollection.find(query.words, among=among, limit=max(query.n, MOST_TIED))
+    is_tied = 1 < answer.n_meant <= MOST_TIED
+    ranks = {
+        each.entry.id: _rank(atlas, each, passing[each.entry.id], is_tied=is_tied)
+        for each in answer.candidates
+    }
+    ranked = sorted(answer.candidates, key=lambda each: ranks[each.entry.id])
+    candidates = tuple(
+        describe_candidate(
+            atlas,
+            passing[each.entry.id],
+            score_ratio=each.score_ratio,
+            evidence=say_evidence(each),
+        )
+        for each in ranked[: query.n]
+    )
+    return Recall(
+        verdict=answer.verdict,
+        advice=say_advice(answer, candidates, n_searched=len(among)),
+        candidates=candidates,
+        n_meant=answer.n_meant,
+        n_searched=len(among),
+        understood=answer.understood,
+        limits=answer.limits,
+    )
+
+
+def _with_room(atlas: Atlas, query: RecallQuery) -> RecallQuery:
+    """Takes the room out of words such as "ladder in R2", so that it is a filter."""
+    if query.room_id is not None:
+        return query
+    words, room_id = split_room(atlas, query.words)
+    return replace(query, words=words, room_id=room_id)
+
+
+def find_speaking_places(atlas: Atlas, words: str) -> tuple[tuple[RememberedPlace, ...], Recall]:
+    """Gives the remembered places that speak of something, the likeliest first, and the answer."""
+    answer = recall(atlas, RecallQuery(words=words))
+    if answer.verdict is Verdict.NOT_REMEMBERED:
+        return (), answer
+    by_id = {place.id: place for place in atlas.places}
+    ids = dict.fromkeys(place_id for each in answer.candidates for place_id in each.seen_from)
+    return tuple(by_id[place_id] for place_id in ids), answer
+
+
+def _rank(
+    atlas: Atlas, found: Candidate, remembered: Remembered, *, is_tied: bool
+) -> tuple[float, float, int]:
+    """Ranks by likeness; of several of one name the nearest by path comes first."""
+    path_m = None
+    if is_tied and found.basis is Basis.NAME:
+        path_m = atlas.path_m(stand_at(atlas, Place(remembered.id, remembered)).point)
+    far_m = math.inf if path_m is None else path_m
+    return -found.score_ratio, far_m, int(remembered.id[1:])

@@ -1,0 +1,340 @@
+"""What is remembered, joined with one map: places and things under their ids, ready to be asked.
+
+Making it is costly, so it is made when first asked for and kept until memory or map change.
+"""
+
+import contextlib
+import logging
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+from mapspeak.errors import ConfigError
+from mapspeak.geometry import Point
+from mapspeak.semantic import SemanticMap, Waypoint
+from mapspeak.semantic.retrieval import (
+    Answer,
+    Basis,
+    Embedder,
+    Entry,
+    EntryIndex,
+    EntryKind,
+    TextVectors,
+)
+from mapspeak.semantic.things import Category, Thing, Things, find_things, name_the_same
+from mapspeak.spatial import OccupancyGrid
+
+__all__ = [
+    "Recollection",
+    "Recollector",
+    "Remembered",
+    "RememberedPlace",
+    "RememberedThing",
+    "number_places",
+    "number_things",
+]
+
+logger = logging.getLogger(__name__)
+
+SAME_THING_M = 1.0
+"""A thing of the same name so near to where one was before is that one, seen better."""
+MOST_CALLED = 1000
+"""So many things of one name are told apart; beyond, nobody reads them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RememberedPlace:
+    """A waypoint of the semantic map under its id.
+
+    Attributes:
+        id: "W1" for the first in the file.
+        waypoint: The record.
+    """
+
+    id: str
+    waypoint: Waypoint
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RememberedThing:
+    """A thing that was seen from remembered places, under its id; compared by identity.
+
+    Attributes:
+        id: "T1"; it stays while the thing does.
+        thing: What is known of it.
+    """
+
+    id: str
+    thing: Thing
+
+    @property
+    def point(self) -> Point:
+        """Where it is; of one without a position, where it was seen from."""
+        return self.thing.position or self.thing.supporting[0].place
+
+
+Remembered = RememberedPlace | RememberedThing
+
+
+class Recollection:
+    """All that is remembered, on one map; compared by identity.
+
+    Args:
+        memory: The records.
+        found: The things made of them.
+        things: The same under their ids, in the order of these.
+        n_named: How many ids were ever given.
+        find_vectors: Gives what compares meanings, or None.
+
+    Attributes:
+        memory: The records.
+        found: The things made of them.
+        things: The same under their ids, in the order of these.
+        n_named: How many ids were ever given.
+        places: The records under their ids.
+    """
+
+    def __init__(
+        self,
+        memory: SemanticMap,
+        found: Things,
+        *,
+        things: Sequence[RememberedThing],
+        n_named: int,
+        find_vectors: Callable[[], TextVectors | None],
+    ) -> None:
+        self.memory = memory
+        self.found = found
+        self.things = tuple(things)
+        self.n_named = n_named
+        self.places = number_places(memory.waypoints)
+        self._find_vectors = find_vectors
+        self._lock = threading.Lock()
+        self._index: EntryIndex | None = None
+
+    def is_of(self, memory: SemanticMap, grid: OccupancyGrid) -> bool:
+        """True when it was made of these records and this very map."""
+        return self.found.sight.grid is grid and self.memory.waypoints == memory.waypoints
+
+    def find(self, query: str, *, among: frozenset[str] | None = None, limit: int = 5) -> Answer:
+        """Finds places and things by name, meaning or words; the entries have their ids.
+
+        Args:
+            query: What people say.
+            among: The ids to choose from; all where None.
+            limit: How many candidates at most.
+        """
+        with self._lock:
+            if self._index is None:
+                self._index = EntryIndex(self._entries, vectors=self._find_vectors())
+        return self._index.find(query, among=among, limit=limit)
+
+    def find_called(self, words: str) -> tuple[RememberedThing, ...]:
+        """Finds the things with that very name: case, plural and typing errors do not count."""
+        answer = self._names.find(words, limit=MOST_CALLED)
+        ids = {each.entry.id for each in answer.candidates if each.basis is Basis.NAME}
+        return tuple(each for each in self.things if each.id in ids)
+
+    def find_thing(self, thing_id: str) -> RememberedThing | None:
+        """Gives the thing with that id, or None."""
+        return next((each for each in self.things if each.id == thing_id), None)
+
+    def find_place(self, name: str) -> RememberedPlace | None:
+        """Gives the record of exactly that name, or None."""
+        return self._by_name.get(name)
+
+    @cached_property
+    def _by_name(self) -> dict[str, RememberedPlace]:
+        return {place.waypoint.name: place for place in self.places}
+
+    @cached_property
+    def _names(self) -> EntryIndex:
+        """Names alone: what nobody has to compare meanings for."""
+        bare = (
+            Entry(
+                id=each.id,
+                kind=EntryKind.THING,
+                name=each.thing.label,
+                other_names=each.thing.other_labels,
+            )
+            for each in self.things
+        )
+        return EntryIndex(tuple(bare))
+
+    @cached_property
+    def _entries(self) -> tuple[Entry, ...]:
+        places = (_place_entry(each) for each in self.places)
+        return (*places, *(_thing_entry(each, self._by_name) for each in self.things))
+
+
+class Recollector:
+    """Keeps what was made of a memory and a map until one of them changes.
+
+    Args:
+        find_model: Finds what compares meanings, once; None compares words.
+        kept: A file for the vectors of texts, so that a later session need not compute them again;
+            None keeps none. One that cannot be written costs only that.
+    """
+
+    def __init__(
+        self, find_model: Callable[[], Embedder | None] = lambda: None, *, kept: Path | None = None
+    ) -> None:
+        self._find_model = find_model
+        self._kept = kept
+        self._lock = threading.Lock()
+        self._latest: Recollection | None = None
+        self._n_kept = 0
+
+    def recollect(self, memory: SemanticMap, grid: OccupancyGrid) -> Recollection:
+        """Gives what is remembered on a map; things keep their ids."""
+        with self._lock:
+            latest = self._latest
+            if latest is None or not latest.is_of(memory, grid):
+                self._latest = latest = self._make(memory, grid, latest)
+            return latest
+
+    @cached_property
+    def embedder(self) -> Embedder | None:
+        """What compares meanings; None where no model is installed, or a broken one."""
+        try:
+            return self._find_model()
+        except ConfigError as error:
+            logger.warning("Meanings are not compared: %s", error)
+            return None
+
+    @cached_property
+    def _vectors(self) -> TextVectors | None:
+        if self.embedder is None:
+            return None
+        vectors = TextVectors(self.embedder)
+        if self._kept is not None:
+            vectors.read(self._kept)
+            self._n_kept = len(vectors)
+        return vectors
+
+    def _find_vectors(self) -> TextVectors | None:
+        return self._vectors
+
+    def keep(self) -> None:
+        """Writes the vectors of texts that are new since they were written last."""
+        vectors: TextVectors | None = self.__dict__.get("_vectors")
+        if self._kept is None or vectors is None or len(vectors) == self._n_kept:
+            return
+        with contextlib.suppress(OSError):
+            self._kept.parent.mkdir(parents=True, exist_ok=True)
+            vectors.write(self._kept)
+            self._n_kept = len(vectors)
+
+    def _make(
+        self, memory: SemanticMap, grid: OccupancyGrid, earlier: Recollection | None
+    ) -> Recollection:
+        found = find_things(memory, grid, earlier=None if earlier is None else earlier.found)
+        things, n_named = number_things(
+            found.things,
+            () if earlier is None else earlier.things,
+            n_named=0 if earlier is None else earlier.n_named,
+        )
+        return Recollection(
+            memory, found, things=things, n_named=n_named, find_vectors=self._find_vectors
+        )
+
+
+def number_places(waypoints: Sequence[Waypoint]) -> tuple[RememberedPlace, ...]:
+    """Gives remembered places their ids, in the order of the file."""
+    return tuple(
+        RememberedPlace(id=f"W{number}", waypoint=waypoint)
+        for number, waypoint in enumerate(waypoints, start=1)
+    )
+
+
+def number_things(
+    things: Sequence[Thing], earlier: Sequence[RememberedThing], *, n_named: int
+) -> tuple[tuple[RememberedThing, ...], int]:
+    """Gives things the ids that they had before, and new ones to new things.
+
+    Args:
+        things: What is remembered now.
+        earlier: What was, with ids.
+        n_named: How many ids were ever given; a thing that is gone leaves its id unused.
+
+    Returns:
+        The things in the order of their ids, and how many ids were ever given.
+    """
+    ids: dict[int, RememberedThing] = {}
+    same = {each.thing: each for each in earlier}
+    for number, thing in enumerate(things):
+        if thing in same:
+            ids[number] = _renewed(same.pop(thing), thing)
+    new = [number for number in range(len(things)) if number not in ids]
+    gone = list(same.values())
+    pairs = sorted(
+        (rank, number, each.id)
+        for number in new
+        for each in gone
+        if (rank := _sameness(things[number], each.thing)) is not None
+    )
+    left = {each.id: each for each in gone}
+    for _, number, thing_id in pairs:
+        if number not in ids and thing_id in left:
+            ids[number] = replace(left.pop(thing_id), thing=things[number])
+    for number in new:
+        if number not in ids:
+            n_named += 1
+            ids[number] = RememberedThing(id=f"T{n_named}", thing=things[number])
+    return tuple(sorted(ids.values(), key=lambda each: int(each.id[1:]))), n_named
+
+
+def _renewed(remembered: RememberedThing, thing: Thing) -> RememberedThing:
+    """Gives the very thing that was found now: findings are about that object."""
+    return remembered if remembered.thing is thing else replace(remembered, thing=thing)
+
+
+def _sameness(thing: Thing, before: Thing) -> tuple[int, float] | None:
+    """Ranks how surely one thing is another that was known before; None where it is none."""
+    if not name_the_same(thing.label, before.label):
+        return None
+    n_shared = len(_views_of(thing) & _views_of(before))
+    if thing.position is None or before.position is None:
+        return (-n_shared, 0.0) if n_shared else None
+    away_m = thing.position.distance_to(before.position)
+    return (-n_shared, away_m) if n_shared or away_m <= SAME_THING_M else None
+
+
+def _views_of(thing: Thing) -> set[tuple[str, str]]:
+    return {(view.waypoint, view.landmark.label) for view in thing.supporting}
+
+
+def _place_entry(place: RememberedPlace) -> Entry:
+    return Entry(
+        id=place.id,
+        kind=EntryKind.PLACE,
+        name=place.waypoint.name,
+        description=place.waypoint.description,
+        features=place.waypoint.geometric_features,
+    )
+
+
+def _thing_entry(remembered: RememberedThing, by_name: dict[str, RememberedPlace]) -> Entry:
+    thing = remembered.thing
+    seen_from = [by_name[name].waypoint for name in dict.fromkeys(thing.waypoints)]
+    notes = dict.fromkeys(view.landmark.note for view in thing.supporting if view.landmark.note)
+    return Entry(
+        id=remembered.id,
+        kind=EntryKind.THING,
+        name=thing.label,
+        other_names=thing.other_labels,
+        category="safety equipment" if thing.category is Category.SAFETY else None,
+        # Each is compared as a sentence of its own.
+        purpose="\n".join(thing.purposes) or None,
+        note="\n".join(notes) or None,
+        place="\n".join(place.name for place in seen_from),
+        surroundings=tuple(dict.fromkeys(_said_of(seen_from))),
+    )
+
+
+def _said_of(places: Sequence[Waypoint]) -> Iterator[str]:
+    for place in places:
+        yield place.description
+        yield from place.geometric_features

@@ -1,0 +1,67 @@
+"""What may be odd about a record. A finding lowers trust; it never takes anything away."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from mapspeak.semantic.things import Thing
+
+__all__ = ["WEIGHTS", "Finding", "FindingKind"]
+
+
+class FindingKind(StrEnum):
+    """What is odd."""
+
+    OTHER_MAP = "other_map"
+    OFF_MAP = "off_map"
+    IN_OBSTACLE = "in_obstacle"
+    IN_UNKNOWN = "in_unknown"
+    UNREACHABLE = "unreachable"
+    BEHIND_WALL = "behind_wall"
+    THROUGH_UNKNOWN = "through_unknown"
+    WRONG_ROOM = "wrong_room"
+    DUPLICATE = "duplicate"
+    NOT_SEEN = "not_seen"
+    POINTS_PAST = "points_past"
+    TWO_LABELS = "two_labels"
+
+
+WEIGHTS = {
+    FindingKind.OTHER_MAP: 0.3,
+    FindingKind.OFF_MAP: 0.2,
+    FindingKind.IN_OBSTACLE: 0.5,
+    FindingKind.IN_UNKNOWN: 0.7,
+    FindingKind.UNREACHABLE: 0.7,
+    FindingKind.BEHIND_WALL: 0.4,
+    FindingKind.THROUGH_UNKNOWN: 0.7,
+    FindingKind.WRONG_ROOM: 0.6,
+    FindingKind.DUPLICATE: 1.0,
+    FindingKind.NOT_SEEN: 0.7,
+    FindingKind.POINTS_PAST: 0.5,
+    FindingKind.TWO_LABELS: 0.6,
+}
+"""What the odds of a thing are multiplied by. Nobody has to name all that is to be seen, so that
+"not seen" says little; two views of one place are no fault, so that a duplicate says nothing."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """Something odd about what is remembered.
+
+    Attributes:
+        kind: What is odd.
+        sentence: The same in words with numbers.
+        waypoints: The names of the places concerned.
+        label: Of the one landmark concerned; None where it is the whole place.
+        things: The things concerned, whatever their views.
+    """
+
+    kind: FindingKind
+    sentence: str
+    waypoints: tuple[str, ...]
+    label: str | None = None
+    things: tuple[Thing, ...] = ()
+
+    @property
+    def weight(self) -> float:
+        """What the odds of a thing that it concerns are multiplied by."""
+        return WEIGHTS[self.kind]

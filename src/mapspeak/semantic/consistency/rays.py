@@ -1,0 +1,77 @@
+"""Whether one can see from a place what its record names there."""
+
+import math
+from collections.abc import Iterator
+
+from mapspeak.geometry import Point
+from mapspeak.semantic.consistency.findings import Finding, FindingKind
+from mapspeak.semantic.things import Things
+from mapspeak.semantic.things.sight import BODY_M, OWN_M
+from mapspeak.semantic.waypoint import Landmark, Waypoint
+from mapspeak.spatial import FREE_MAX, UNKNOWN
+
+__all__ = ["check_rays"]
+
+N_SIGMAS = 2.0
+
+
+def check_rays(found: Things, waypoint: Waypoint) -> Iterator[Finding]:
+    """Gives landmarks of a waypoint that lie behind a wall or where nobody has seen."""
+    for landmark in waypoint.landmarks:
+        if landmark.bearing_rad is not None:
+            yield from _check(found, waypoint, landmark, landmark.bearing_rad)
+
+
+def _check(
+    found: Things, waypoint: Waypoint, landmark: Landmark, bearing_rad: float
+) -> Iterator[Finding]:
+    pose = waypoint.pose
+    way = pose.yaw_rad + bearing_rad
+    ahead = Point(pose.x + math.cos(way), pose.y + math.sin(way))
+    open_m = found.open_m(waypoint, ahead)
+    if open_m <= OWN_M:
+        return  # It stands in an obstacle, which is another finding.
+    if _ends_in_unknown(found, waypoint, way, open_m):
+        if landmark.range_m is None or landmark.range_m > open_m:
+            sentence = f"the line to it leaves the seen floor after {open_m:.1f} m"
+            yield _finding(FindingKind.THROUGH_UNKNOWN, waypoint, landmark, sentence)
+        return
+    if landmark.range_m is None:
+        return
+    noise = found.sight.noise
+    spread_m = noise.range_m + noise.range_ratio * landmark.range_m
+    if landmark.range_m > _widest_m(found, waypoint, way) + BODY_M + N_SIGMAS * spread_m:
+        sentence = f"it is told as {landmark.range_m:.1f} m away, behind a wall at {open_m:.1f} m"
+        yield _finding(FindingKind.BEHIND_WALL, waypoint, landmark, sentence)
+
+
+def _widest_m(found: Things, waypoint: Waypoint, way: float) -> float:
+    """Gives how far one sees at most within the noise of a direction."""
+    noise_rad = found.sight.noise.bearing_rad
+    pose = waypoint.pose
+    return max(
+        found.open_m(waypoint, Point(pose.x + math.cos(turned), pose.y + math.sin(turned)))
+        for turned in (way - noise_rad, way, way + noise_rad)
+    )
+
+
+def _ends_in_unknown(found: Things, waypoint: Waypoint, way: float, open_m: float) -> bool:
+    grid = found.sight.grid
+    if open_m >= found.sight.noise.reach_m:
+        return False
+    pose = waypoint.pose
+    end = grid.cell_at(Point(pose.x + open_m * math.cos(way), pose.y + open_m * math.sin(way)))
+    if not grid.contains(end):
+        return True
+    around = grid.cells[max(end.row - 1, 0) : end.row + 2, max(end.col - 1, 0) : end.col + 2]
+    # A ray that grazes a wall may end in the unknown behind it.
+    return int(grid.cells[end.row, end.col]) == UNKNOWN and not (around > FREE_MAX).any()
+
+
+def _finding(kind: FindingKind, waypoint: Waypoint, landmark: Landmark, what: str) -> Finding:
+    return Finding(
+        kind=kind,
+        sentence=f"'{landmark.label}' of '{waypoint.name}': {what}.",
+        waypoints=(waypoint.name,),
+        label=landmark.label,
+    )

@@ -1,0 +1,257 @@
+"""Finds observations in the database: every filter at once, in SQL, with the reason of each."""
+
+import json
+import sqlite3
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from datetime import datetime, timedelta, timezone
+
+from mapspeak.geometry import Point, Pose
+from mapspeak.semantic.episodes.asking import (
+    EpisodeMatch,
+    EpisodeOrder,
+    EpisodePage,
+    EpisodeQuery,
+    Rank,
+)
+from mapspeak.semantic.episodes.observation import Observation, ObservationKind, microseconds_of
+from mapspeak.semantic.episodes.scoring import TextScorer
+from mapspeak.semantic.episodes.words import shared_words
+from mapspeak.semantic.waypoint import name_key
+
+__all__ = ["COLUMNS", "Search", "find_observations", "observation_from"]
+
+COLUMNS = (
+    "o.id, o.recorded_us, o.offset_s, o.stamp_s, o.map_id, o.x, o.y, o.yaw_rad, o.room_id, "
+    "o.kind, o.text, o.labels, o.picture"
+)
+_ORDERS = {
+    EpisodeOrder.NEWEST: "o.recorded_us DESC, o.n DESC",
+    EpisodeOrder.OLDEST: "o.recorded_us, o.n",
+    EpisodeOrder.BEST: "score DESC, o.recorded_us DESC, o.n DESC",
+    EpisodeOrder.NEAREST: "squared_m2, o.recorded_us DESC, o.n DESC",
+}
+
+
+@dataclass(slots=True)
+class _Where:
+    """Conditions that all hold, with their values."""
+
+    conditions: list[str] = field(default_factory=lambda: ["1"])
+    values: list[object] = field(default_factory=list)
+
+    def add(self, condition: str, *values: object) -> None:
+        self.conditions.append(condition)
+        self.values += values
+
+    @property
+    def text(self) -> str:
+        return " AND ".join(self.conditions)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Asked:
+    """A query whose place is known.
+
+    Attributes:
+        query: What was asked.
+        near: The place; None without one.
+        anchor: What the nested query found; None without one.
+        where: All filters but the words.
+        scores: Of texts, by id; None where no words were asked for.
+    """
+
+    query: EpisodeQuery
+    near: Point | None
+    anchor: EpisodeMatch | None
+    where: _Where
+    scores: Mapping[int, float] | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Search:
+    """Where and how is searched.
+
+    Attributes:
+        connection: Of the database; sees one state of it.
+        scorer: Knows the texts.
+        rank: Who says how well texts fit; None compares words.
+    """
+
+    connection: sqlite3.Connection
+    scorer: TextScorer
+    rank: Rank | None
+
+
+def find_observations(search: Search, query: EpisodeQuery) -> EpisodePage:
+    """Gives one page of the observations that pass every filter."""
+    connection = search.connection
+    if query.as_of is None:
+        newest = connection.execute("SELECT MAX(n) FROM observations").fetchone()[0]
+        query = replace(query, as_of=newest or 0)
+    near, anchor = query.near, None
+    if isinstance(near, EpisodeQuery):
+        anchor = _first(search, near)
+        if anchor is None:
+            return EpisodePage(matches=(), n_matches=0)
+        near = anchor.observation.pose.point
+    where = _filters(query, near)
+    if anchor is not None:
+        _leave_out(search, where, query, anchor)
+    scores = None if query.words is None else _scores(search, query.words, where)
+    asked = _Asked(query=query, near=near, anchor=anchor, where=where, scores=scores)
+    return _page(search, asked)
+
+
+def _first(search: Search, query: EpisodeQuery) -> EpisodeMatch | None:
+    page = find_observations(search, replace(query, limit=1))
+    return next(iter(page.matches), None)
+
+
+# --- filters ---------------------------------------------------------------------------------
+
+
+def _filters(query: EpisodeQuery, near: Point | None) -> _Where:
+    where = _Where()
+    where.add("o.n <= ?", query.as_of)
+    if near is not None and query.radius_m is not None:
+        r = query.radius_m
+        where.add("o.x BETWEEN ? AND ?", near.x - r, near.x + r)
+        where.add("o.y BETWEEN ? AND ?", near.y - r, near.y + r)
+        where.add(f"{_squared_m2(near)} <= ?", r * r)
+    if query.since is not None:
+        where.add("o.recorded_us >= ?", microseconds_of(query.since))
+    if query.until is not None:
+        where.add("o.recorded_us < ?", microseconds_of(query.until))
+    if query.label is not None:
+        where.add("o.n IN (SELECT n FROM labels WHERE label = ?)", name_key(query.label))
+    for column, value in (("room_id", query.room_id), ("map_id", query.map_id)):
+        if value is not None:
+            where.add(f"o.{column} = ?", value)
+    if query.kind is not None:
+        where.add("o.kind = ?", str(query.kind))
+    return where
+
+
+def _leave_out(search: Search, where: _Where, query: EpisodeQuery, anchor: EpisodeMatch) -> None:
+    """Leaves out what a nested query was about, and other maps, whose metres are others."""
+    nested = query.near
+    assert isinstance(nested, EpisodeQuery)  # noqa: S101 - it gave the anchor
+    where.add("o.id != ?", anchor.observation.id)
+    if query.map_id is None:
+        where.add("o.map_id IS ?", anchor.observation.map_id)
+    if nested.label is not None:
+        where.add("o.n NOT IN (SELECT n FROM labels WHERE label = ?)", name_key(nested.label))
+    if nested.words is not None:
+        # In words, whoever ranks: it is the thing itself that is left out, not what is like it.
+        same = search.scorer.score(search.connection, nested.words, None, among="", values=[])
+        where.add("o.text_id NOT IN (SELECT value FROM json_each(?))", json.dumps(list(same)))
+
+
+def _squared_m2(near: Point) -> str:
+    x, y = float(near.x), float(near.y)
+    return f"((o.x - {x!r}) * (o.x - {x!r}) + (o.y - {y!r}) * (o.y - {y!r}))"
+
+
+def _scores(search: "Search", words: str, where: _Where) -> dict[int, float]:
+    """Scores the texts of the observations that pass the other filters."""
+    is_filtered = len(where.conditions) > 2  # beside the state asked for
+    passing = f"SELECT o.text_id FROM observations AS o WHERE {where.text}"  # noqa: S608 - our own conditions
+    return search.scorer.score(
+        search.connection,
+        words,
+        search.rank,
+        among=passing if is_filtered else "",
+        values=where.values,
+    )
+
+
+# --- pages -----------------------------------------------------------------------------------
+
+
+def _page(search: Search, asked: _Asked) -> EpisodePage:
+    connection = search.connection
+    query, where = asked.query, asked.where
+    source = "observations AS o"
+    values: list[object] = []
+    if asked.scores is not None:
+        source = "scored JOIN observations AS o USING (text_id)"
+        values = [json.dumps(list(asked.scores.items()))]
+    score = "NULL" if asked.scores is None else "scored.score"
+    squared = "NULL" if asked.near is None else _squared_m2(asked.near)
+    scored = (
+        "WITH scored AS MATERIALIZED (SELECT json_extract(value, '$[0]') AS text_id, "
+        "json_extract(value, '$[1]') AS score FROM json_each(?))"
+        if values
+        else ""
+    )
+    values += where.values
+    counted = f"{scored} SELECT COUNT(*) FROM {source} WHERE {where.text}"  # noqa: S608 - our own conditions
+    n_matches = connection.execute(counted, values).fetchone()[0]
+    rows = connection.execute(
+        f"{scored} SELECT {COLUMNS}, {score} AS score, {squared} AS squared_m2 "  # noqa: S608 - our own conditions
+        f"FROM {source} WHERE {where.text} ORDER BY {_ORDERS[query.effective_order]} "
+        "LIMIT ? OFFSET ?",
+        [*values, query.limit, query.offset],
+    )
+    behind = query.offset + query.limit
+    return EpisodePage(
+        matches=tuple(_match(row, asked, search.rank) for row in rows),
+        n_matches=n_matches,
+        anchor=asked.anchor,
+        next_page=replace(query, offset=behind) if behind < n_matches else None,
+    )
+
+
+def _match(row: sqlite3.Row, asked: _Asked, rank: Rank | None) -> EpisodeMatch:
+    observation = observation_from(row)
+    match = EpisodeMatch(
+        observation=observation,
+        score_ratio=row["score"],
+        distance_m=observation.pose.point.distance_to(asked.near) if asked.near else None,
+        reasons=(),
+    )
+    return replace(match, reasons=tuple(_reasons(match, asked, rank)))
+
+
+def _reasons(match: EpisodeMatch, asked: _Asked, rank: Rank | None) -> Iterator[str]:
+    query, observation = asked.query, match.observation
+    if query.words is not None and rank is None:
+        said = ", ".join(f"'{w}'" for w in shared_words(query.words, observation.searched_text))
+        yield f"says {said}"
+    elif query.words is not None:
+        yield f"means nearly '{query.words}' ({match.score_ratio or 0:.2f})"
+    if asked.near is not None:
+        place = f"({asked.near.x:.2f}, {asked.near.y:.2f})"
+        if asked.anchor is not None:
+            place = f"where {asked.anchor.observation.id} was made, {place}"
+        yield f"{match.distance_m:.2f} m from {place}"
+    if query.room_id is not None:
+        yield f"in {observation.room_id}"
+    if query.label is not None:
+        key = name_key(query.label)
+        yield f"label '{next(x for x in observation.labels if name_key(x) == key)}'"
+    if query.since is not None or query.until is not None:
+        yield f"at {observation.recorded_at.isoformat(timespec='seconds')}"
+    if query.kind is not None:
+        yield f"a {observation.kind}"
+    if query.map_id is not None:
+        yield f"on the map {observation.map_id}"
+
+
+def observation_from(row: sqlite3.Row) -> Observation:
+    """Gives the observation that a row of `COLUMNS` holds."""
+    zone = timezone(timedelta(seconds=row["offset_s"]))
+    time = datetime.fromtimestamp(0, zone) + timedelta(microseconds=row["recorded_us"])
+    return Observation(
+        id=row["id"],
+        recorded_at=time,
+        pose=Pose(row["x"], row["y"], row["yaw_rad"]),
+        kind=ObservationKind(row["kind"]),
+        text=row["text"],
+        labels=tuple(json.loads(row["labels"])),
+        picture=row["picture"],
+        stamp_s=row["stamp_s"],
+        map_id=row["map_id"],
+        room_id=row["room_id"],
+    )

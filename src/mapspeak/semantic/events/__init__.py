@@ -1,0 +1,5 @@
+"""What happens in a building for a while: closures and notices, as data that planning can use."""
+
+from mapspeak.semantic.events.event import Effect, Event, current_events, find_place_ids
+
+__all__ = ["Effect", "Event", "current_events", "find_place_ids"]

@@ -1,0 +1,136 @@
+"""One event: a place, a time and an effect, beside the words that somebody said."""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import datetime
+from enum import StrEnum
+
+from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import Point
+from mapspeak.semantic.waypoint import clean_line
+
+__all__ = ["Effect", "Event", "Outline", "current_events", "find_place_ids"]
+
+Outline = tuple[Point, ...]
+"""Corners in order; the last one is joined to the first."""
+
+_PLACE_ID = re.compile(r"\b[RCOD]\d+\b")
+
+
+class Effect(StrEnum):
+    """What an event means for ways.
+
+    Closed: none leads through. Slow and avoid: ways around it are preferred where there are any,
+    for avoid also long ones. None: it is only a note.
+    """
+
+    CLOSED = "closed"
+    SLOW = "slow"
+    AVOID = "avoid"
+    NONE = "none"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Event:
+    """Something that is so for a while.
+
+    Attributes:
+        id: "E3"; empty until it is written.
+        text: What is the matter, in the words of who said it.
+        place: Where, in words or ids of the time of writing: "corridor C1".
+        effect: What it means for ways.
+        at: A point of that place in the map frame.
+        outlines: Of the place at the time of writing, in the map frame; ids may change, and these
+            do not.
+        begins: The first moment; None where it has always been so.
+        until: The first moment after; None where nobody knows.
+        source: Who said it.
+        recorded_at: When.
+
+    Raises:
+        SemanticMapError: It has no words, no place where it needs one, a time without a zone, an
+            outline that is none, or it ends before it begins.
+    """
+
+    text: str
+    place: str = ""
+    effect: Effect = Effect.NONE
+    id: str = ""
+    at: Point | None = None
+    outlines: tuple[Outline, ...] = ()
+    begins: datetime | None = None
+    until: datetime | None = None
+    source: str = ""
+    recorded_at: datetime | None = None
+
+    def __post_init__(self) -> None:
+        for key in ("id", "text", "place", "source"):
+            object.__setattr__(self, key, clean_line(getattr(self, key)))
+        _require(self.text, "An event has no text", "Say what is the matter.")
+        _require(
+            self.effect is Effect.NONE or self.place or self.outlines,
+            f"The event '{self.text}' is {self.effect}, but at no place",
+            "Name the place, such as C1 or D2.",
+        )
+        _require(
+            all(len(outline) >= 3 for outline in self.outlines),
+            f"The outline of '{self.text}' has fewer than three corners",
+            "Give three corners or more.",
+        )
+        times = (self.begins, self.until, self.recorded_at)
+        _require(
+            all(time is None or time.tzinfo is not None for time in times),
+            f"A time of '{self.text}' has no zone",
+            "Write times like 2026-11-22T14:00:00+01:00.",
+        )
+        _require(
+            self.begins is None or self.until is None or self.begins < self.until,
+            f"The event '{self.text}' ends before it begins",
+            "Correct its times.",
+        )
+
+    def is_current(self, now: datetime) -> bool:
+        """True while it lasts; `now` has a zone."""
+        has_begun = self.begins is None or self.begins <= now
+        return has_begun and (self.until is None or now < self.until)
+
+    def sentence(self, now: datetime) -> str:
+        """The event for a reader, with times as `now` counts them."""
+        where = f" ({self.place})" if self.place and self.place not in self.text else ""
+        parts = [f"{self.text}{where}"]
+        if self.effect is not Effect.NONE:
+            parts.append(_EFFECTS[self.effect])
+        if self.begins is not None and self.begins > now:
+            parts.append(f"from {_say_time(self.begins, now)}")
+        if self.until is not None:
+            parts.append(f"until {_say_time(self.until, now)}")
+        said_by = f"; said by {self.source}" if self.source else ""
+        return f"{self.id}: {', '.join(parts)}{said_by}.".removeprefix(": ")
+
+
+_EFFECTS = {
+    Effect.CLOSED: "closed to the robot",
+    Effect.SLOW: "slow, ways around it are preferred",
+    Effect.AVOID: "to be avoided where there is another way",
+}
+
+
+def current_events(events: Iterable[Event], now: datetime) -> tuple[Event, ...]:
+    """Gives those events that last at a moment, in the order of the file."""
+    return tuple(event for event in events if event.is_current(now))
+
+
+def find_place_ids(words: str) -> tuple[str, ...]:
+    """Gives the ids of rooms, corridors and doors that words name: "corridor C1" has C1."""
+    return tuple(dict.fromkeys(_PLACE_ID.findall(words.upper())))
+
+
+def _say_time(time: datetime, now: datetime) -> str:
+    local = time.astimezone(now.tzinfo)
+    return f"{local:%H:%M}" if local.date() == now.date() else f"{local:%Y-%m-%d %H:%M}"
+
+
+def _require(is_right: object, what: str, hint: str) -> None:
+    if not is_right:
+        raise SemanticMapError(f"{what}.", hint=hint)

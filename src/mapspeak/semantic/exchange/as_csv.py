@@ -1,0 +1,109 @@
+"""The memory as CSV, for spreadsheets: a row for each place, and for each thing seen from it.
+
+The column `place` says which place a row belongs to, `kind` what it is: the place itself
+("waypoint") or an item of one of its lists. A cell without a value is empty. What the format cannot
+hold are comments, people's own keys, and the map of a memory without a place.
+"""
+
+import csv
+import io
+from collections.abc import Iterator
+
+from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import Point
+from mapspeak.semantic.exchange.records import Facts, facts_of, map_from, place_of
+from mapspeak.semantic.waypoint import SemanticMap, Waypoint, name_key
+
+__all__ = ["from_csv", "to_csv"]
+
+_FIRST_COLUMNS = ("place", "kind", "label", "x_m", "y_m", "yaw_deg", "bearing_deg", "range_m")
+_PLACE = "waypoint"
+
+
+def to_csv(places: SemanticMap) -> str:
+    """Gives the memory as CSV with a header; x and y are metres in the map frame."""
+    rows = [row for place in places.waypoints for row in _rows(place, places.map_id)]
+    columns = dict.fromkeys((*_FIRST_COLUMNS, *(key for row in rows for key in row), "map"))
+    text = io.StringIO(newline="")
+    writer = csv.DictWriter(text, list(columns), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def from_csv(text: str) -> SemanticMap:
+    """Reads the memory that `to_csv` wrote; the order of rows and columns makes no difference.
+
+    Raises:
+        SemanticMapError: It is not CSV, or no memory.
+    """
+    reader = csv.DictReader(io.StringIO(text, newline=""), strict=True)
+    try:
+        rows = [
+            (reader.line_num, {key: cell for key, cell in row.items() if key and cell})
+            for row in reader
+        ]
+    except csv.Error as error:
+        raise _refusal(reader.line_num, f"{error}") from error
+    if not {"place", "kind"} <= set(reader.fieldnames or ()):
+        raise _refusal(1, "the columns 'place' and 'kind' are missing")
+    records: dict[str, tuple[Point, Facts]] = {}
+    map_ids = set()
+    for line, row in rows:
+        if row.get("kind") == _PLACE:
+            map_ids.add(row.pop("map", None))
+            key = name_key(row.get("place", ""))
+            if key in records:
+                raise _refusal(line, f"a second place is called '{row.get('place')}'")
+            records[key] = (_point(line, row), _without_frame(row) | {"name": row.get("place")})
+    if len(map_ids) > 1:
+        raise SemanticMapError(
+            f"The places are of {len(map_ids)} maps.", hint="Make one file for each map."
+        )
+    for line, row in rows:
+        if row.get("kind") != _PLACE:
+            _add_item(records, line, row)
+    map_id = map_ids.pop() if map_ids else None
+    return map_from(records.values(), map_id=map_id, form="CSV")
+
+
+def _rows(place: Waypoint, map_id: str | None) -> Iterator[Facts]:
+    facts, point = facts_of(place), place_of(place)
+    del facts["name"]
+    lists = {key: value for key, value in facts.items() if isinstance(value, list)}
+    head: Facts = {"place": place.name, "kind": _PLACE, "x_m": point.x, "y_m": point.y}
+    said = {key: value for key, value in facts.items() if key not in lists}
+    yield head | said | ({} if map_id is None else {"map": map_id})
+    for kind, items in lists.items():
+        for item in items:
+            entries = item if isinstance(item, dict) else {"label": item}
+            yield {"place": place.name, "kind": kind} | entries
+
+
+def _add_item(records: dict[str, tuple[Point, Facts]], line: int, row: dict[str, str]) -> None:
+    record = records.get(name_key(row.get("place", "")))
+    if record is None:
+        raise _refusal(line, f"no row of kind '{_PLACE}' is for the place '{row.get('place')}'")
+    said = _without_frame(row)
+    items = record[1].setdefault(row.get("kind", ""), [])
+    if not isinstance(items, list):
+        raise _refusal(line, f"'{row.get('kind')}' is no list of a place")
+    items.append(said["label"] if said.keys() == {"label"} else said)
+
+
+def _without_frame(row: dict[str, str]) -> Facts:
+    return {key: cell for key, cell in row.items() if key not in ("place", "kind", "x_m", "y_m")}
+
+
+def _point(line: int, row: dict[str, str]) -> Point:
+    try:
+        return Point(float(row["x_m"]), float(row["y_m"]))
+    except (KeyError, ValueError) as error:
+        raise _refusal(line, "x_m and y_m are not two numbers") from error
+
+
+def _refusal(line: int, said: str) -> SemanticMapError:
+    return SemanticMapError(
+        f"This is no memory as CSV: line {line}: {said}.",
+        hint="Mend that line, or write the file anew with mapspeak memory export --format csv.",
+    )

@@ -1,0 +1,122 @@
+"""The pictures that were taken lately: where from, and which way each column of them looks."""
+
+import hashlib
+import math
+from collections import OrderedDict
+from dataclasses import dataclass
+
+from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import Pose
+
+__all__ = ["PictureBook", "TakenPicture"]
+
+MOST_PICTURES = 500
+"""How many pictures can be spoken of; older ones are forgotten here, whoever keeps them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TakenPicture:
+    """What is known of a picture besides what it shows.
+
+    Attributes:
+        id: How a reader speaks of it: P12.
+        name: Its relative name, unlike that of any other picture of any run: P12-5d0c21f7.jpg.
+        pose: Where the robot stood, in the map frame; the camera looks along its heading.
+        stamp_s: Robot time of the exposure.
+        width_px: Columns.
+        horizontal_fov_rad: The angle between the left and the right edge; None where unknown.
+    """
+
+    id: str
+    name: str
+    pose: Pose
+    stamp_s: float
+    width_px: int
+    horizontal_fov_rad: float | None
+
+    def bearing_of(self, column_px: float) -> float:
+        """Gives the direction of a column from the heading, left positive, in radians.
+
+        The lens is a pinhole, as the simulated camera's and that of a ROS CameraInfo: columns are
+        evenly spaced on a plane, not on a circle.
+
+        Args:
+            column_px: From the left edge; the middle of the picture is half its width.
+
+        Raises:
+            SemanticMapError: The picture has no such column, or nobody knows how wide it looks.
+        """
+        if not 0 <= column_px <= self.width_px:
+            raise SemanticMapError(
+                f"Column {column_px:g} lies outside {self.id}, which is {self.width_px} px wide.",
+                hint="Count from the left edge of the picture at its full size.",
+            )
+        if self.horizontal_fov_rad is None:
+            raise SemanticMapError(
+                "The robot does not say how wide its camera looks.",
+                hint="Give bearing_deg instead.",
+            )
+        half_px = self.width_px / 2
+        focal_px = half_px / math.tan(self.horizontal_fov_rad / 2)
+        return math.atan2(half_px - column_px, focal_px)
+
+
+class PictureBook:
+    """Names the pictures of one run in their order."""
+
+    def __init__(self) -> None:
+        self._taken: OrderedDict[str, TakenPicture] = OrderedDict()
+        self._n_taken = 0
+
+    @property
+    def latest(self) -> TakenPicture | None:
+        """The picture that was taken last."""
+        return next(reversed(self._taken.values()), None)
+
+    def add(
+        self,
+        data: bytes,
+        *,
+        media_type: str,
+        pose: Pose,
+        stamp_s: float,
+        width_px: int,
+        horizontal_fov_rad: float | None,
+        name: str | None = None,
+    ) -> TakenPicture:
+        """Names a picture that was just taken.
+
+        Args:
+            data: The encoded picture.
+            media_type: Such as "image/jpeg".
+            pose: Where the robot stood, in the map frame.
+            stamp_s: Robot time of the exposure.
+            width_px: Columns.
+            horizontal_fov_rad: The angle between the left and the right edge.
+            name: What a folder of pictures calls it; made up where nobody keeps it.
+        """
+        self._n_taken += 1
+        picture_id = f"P{self._n_taken}"
+        told = repr((pose, stamp_s)).encode()
+        digest = hashlib.sha256(data + told).hexdigest()[:8]
+        ending = media_type.partition("/")[2].replace("jpeg", "jpg")
+        taken = TakenPicture(
+            id=picture_id,
+            name=name or f"{picture_id}-{digest}.{ending}",
+            pose=pose,
+            stamp_s=stamp_s,
+            width_px=width_px,
+            horizontal_fov_rad=horizontal_fov_rad,
+        )
+        self._taken[picture_id] = taken
+        while len(self._taken) > MOST_PICTURES:
+            self._taken.popitem(last=False)
+        return taken
+
+    def find(self, said: str) -> TakenPicture | None:
+        """Gives the picture of that id ("P12", "picture p12") or name, or None."""
+        key = said.strip().casefold().removeprefix("picture").strip()
+        taken = self._taken.values()
+        return next(
+            (each for each in taken if key in (each.id.casefold(), each.name.casefold())), None
+        )

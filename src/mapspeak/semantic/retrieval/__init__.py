@@ -1,0 +1,30 @@
+"""Finds what is remembered by the words that people use for it."""
+
+from mapspeak.semantic.retrieval.answer import Answer, Basis, Candidate, Thresholds, Verdict
+from mapspeak.semantic.retrieval.embedder import Embedder, TextVectors
+from mapspeak.semantic.retrieval.entry import Entry, EntryKind, list_entries
+from mapspeak.semantic.retrieval.evidence import MatchEvidence, MatchField, MatchKind
+from mapspeak.semantic.retrieval.index import WORDS_ONLY, EntryIndex
+from mapspeak.semantic.retrieval.meaning import find_model
+from mapspeak.semantic.retrieval.waypoints import WaypointMatch, find_waypoints
+
+__all__ = [
+    "WORDS_ONLY",
+    "Answer",
+    "Basis",
+    "Candidate",
+    "Embedder",
+    "Entry",
+    "EntryIndex",
+    "EntryKind",
+    "MatchEvidence",
+    "MatchField",
+    "MatchKind",
+    "TextVectors",
+    "Thresholds",
+    "Verdict",
+    "WaypointMatch",
+    "find_model",
+    "find_waypoints",
+    "list_entries",
+]

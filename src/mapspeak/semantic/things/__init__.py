@@ -1,0 +1,23 @@
+"""Things, joined out of what was seen of them from several places, and where they stand."""
+
+from mapspeak.semantic.things.approach import find_approach, find_fronts
+from mapspeak.semantic.things.finding import Things, find_things
+from mapspeak.semantic.things.labels import name_the_same
+from mapspeak.semantic.things.noise import NOISE, NoiseModel
+from mapspeak.semantic.things.sight import SightMap, build_sight_map
+from mapspeak.semantic.things.thing import Category, Thing, View
+
+__all__ = [
+    "NOISE",
+    "Category",
+    "NoiseModel",
+    "SightMap",
+    "Thing",
+    "Things",
+    "View",
+    "build_sight_map",
+    "find_approach",
+    "find_fronts",
+    "find_things",
+    "name_the_same",
+]

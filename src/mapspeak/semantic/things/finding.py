@@ -1,0 +1,244 @@
+"""From remembered places to things: the whole way, and what can be kept when a place changes."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapspeak.geometry import Point, Pose
+from mapspeak.semantic.things.describing import describe_group
+from mapspeak.semantic.things.joining import (
+    Group,
+    Posteriors,
+    SameName,
+    agreement_of,
+    group_names,
+    join_sightings,
+)
+from mapspeak.semantic.things.labels import name_the_same
+from mapspeak.semantic.things.noise import NOISE, NoiseModel
+from mapspeak.semantic.things.placing import Placement, place
+from mapspeak.semantic.things.sight import BODY_M, N_RAYS, SightMap, build_sight_map
+from mapspeak.semantic.things.sighting import Sighting, Surroundings, read_waypoints
+from mapspeak.semantic.things.thing import Thing
+from mapspeak.semantic.waypoint import SemanticMap, Waypoint, name_key
+from mapspeak.spatial import OccupancyGrid
+
+__all__ = ["Located", "Things", "find_things"]
+
+PLAIN_SIGHT_M = 5.0
+"""Who stands no farther and has nothing between would see a thing."""
+LEAST_AGREEMENT = 2.0
+"""A view that is less than so much likelier than by chance, given the others, places nothing."""
+ELSEWHERE_RAD = math.radians(30)
+"""A view that points so far past a thing says that it is elsewhere."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Located:
+    """Views of one thing, where it is, and how well each view goes with the others."""
+
+    group: tuple[Sighting, ...]
+    placement: Placement | None
+    agreements: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Things:
+    """All things of a memory on a map; compared by identity.
+
+    Attributes:
+        things: Those with most views first, then by label and place.
+        sight: The map, ready for looking around in it.
+        surroundings: What each waypoint sees.
+    """
+
+    things: tuple[Thing, ...]
+    sight: SightMap
+    surroundings: dict[Waypoint, Surroundings]
+    pools: dict[tuple[Sighting, ...], tuple[Located, ...]]
+
+    def is_in_plain_sight(self, waypoint: Waypoint, point: Point) -> bool:
+        """True when who stands at a waypoint has nothing between itself and a point near by."""
+        far_m = waypoint.pose.point.distance_to(point)
+        return far_m <= PLAIN_SIGHT_M and far_m <= self.free_m(waypoint, point) + BODY_M
+
+    def seen_from(self, waypoint: Waypoint) -> tuple[Thing, ...]:
+        """Gives the things with a place that were seen from a waypoint."""
+        return tuple(
+            thing
+            for thing in self.things
+            if thing.position is not None and waypoint.name in thing.waypoints
+        )
+
+    def free_m(self, waypoint: Waypoint, point: Point) -> float:
+        """Gives how far one sees from a waypoint towards a point before the first obstacle."""
+        return float(self.surroundings[waypoint].near_m[self._ray(waypoint.pose, point)])
+
+    def open_m(self, waypoint: Waypoint, point: Point) -> float:
+        """Gives how far one sees towards a point over what one may see over."""
+        return float(self.surroundings[waypoint].far_m[self._ray(waypoint.pose, point)])
+
+    def _ray(self, pose: Pose, point: Point) -> int:
+        angle = pose.point.bearing_to(point) - self.sight.grid.origin.yaw_rad
+        return round(angle * N_RAYS / math.tau) % N_RAYS
+
+
+def find_things(
+    semantic_map: SemanticMap,
+    grid: OccupancyGrid,
+    *,
+    same_name: SameName = name_the_same,
+    noise: NoiseModel = NOISE,
+    earlier: Things | None = None,
+) -> Things:
+    """Joins what was seen from all places into things, and says where each is.
+
+    Args:
+        semantic_map: The places.
+        grid: The map they are on.
+        same_name: True for two labels that may be one thing's.
+        noise: What is believed of observers.
+        earlier: What was found before, for the same map and names: what depends on no changed
+            waypoint is taken from it. The answer is the same without.
+    """
+    if earlier is None or not _is_of(earlier.sight, grid, noise):
+        earlier = None
+    sight = earlier.sight if earlier else build_sight_map(grid, noise=noise)
+    surroundings = read_waypoints(
+        sight, semantic_map.waypoints, earlier.surroundings if earlier else {}
+    )
+    pools = _divide(surroundings, same_name)
+    known = earlier.pools if earlier else {}
+    located = {pool: known.get(pool) or _solve(sight, pool, same_name) for pool in pools}
+    found = Things(things=(), sight=sight, surroundings=surroundings, pools=located)
+    things = [thing for pool in located.values() for thing in _describe(found, pool, same_name)]
+    return Things(
+        things=tuple(sorted(things, key=_rank)),
+        sight=sight,
+        surroundings=surroundings,
+        pools=located,
+    )
+
+
+def _is_of(sight: SightMap, grid: OccupancyGrid, noise: NoiseModel) -> bool:
+    old = sight.grid
+    is_same_frame = old.resolution_m == grid.resolution_m and old.origin == grid.origin
+    is_same = old is grid or (is_same_frame and np.array_equal(old.cells, grid.cells))
+    return is_same and sight.noise == noise
+
+
+def _divide(
+    surroundings: dict[Waypoint, Surroundings], same_name: SameName
+) -> list[tuple[Sighting, ...]]:
+    """Gives all sightings in pools of related labels, in an order that the file does not set."""
+    ordered = sorted(surroundings, key=lambda waypoint: (name_key(waypoint.name), waypoint.name))
+    every = [each for waypoint in ordered for each in surroundings[waypoint].sightings]
+    pool_of = {
+        label: i
+        for i, group in enumerate(group_names([s.landmark.label for s in every], same_name))
+        for label in group
+    }
+    pools: dict[int, list[Sighting]] = {}
+    for each in every:
+        pools.setdefault(pool_of[each.landmark.label], []).append(each)
+    return [tuple(pools[i]) for i in sorted(pools)]
+
+
+def _solve(sight: SightMap, pool: Sequence[Sighting], same_name: SameName) -> tuple[Located, ...]:
+    placed = [each for each in pool if each.likelihood is not None]
+    posteriors = Posteriors(sight)
+    groups = join_sightings(posteriors, placed, same_name) if placed else []
+    agreed = [agreement_of(sight, group) for group in groups]
+    located = [
+        (group, place(sight, posteriors.of(_agreeing(group, shares))))
+        for group, shares in zip(groups, agreed, strict=True)
+    ]
+    lost: list[Group] = [
+        [each]
+        for each in pool
+        if each.likelihood is None and not _add_to_nearest(located, each, same_name)
+    ]
+    return (
+        *(
+            Located(group=tuple(group), placement=placement, agreements=_filled(group, shares))
+            for (group, placement), shares in zip(located, agreed, strict=True)
+        ),
+        *(Located(group=tuple(group), placement=None, agreements=(1.0,)) for group in lost),
+    )
+
+
+def _agreeing(group: Group, agreements: Sequence[float]) -> Group:
+    """Gives the views of a thing that say where it is: two or more that go with each other."""
+    kept = [each for each, share in zip(group, agreements, strict=True) if share >= LEAST_AGREEMENT]
+    return kept if len(kept) >= 2 else group
+
+
+def _filled(group: Group, agreements: tuple[float, ...]) -> tuple[float, ...]:
+    """Gives a view without a direction an agreement that says nothing."""
+    return agreements + (1.0,) * (len(group) - len(agreements))
+
+
+def _add_to_nearest(
+    located: list[tuple[Group, Placement]], sighting: Sighting, same_name: SameName
+) -> bool:
+    """Adds a view without a direction to the nearest thing of its name; False where none is."""
+    here = sighting.waypoint.pose.point
+    near = [
+        (here.distance_to(placement.position), i)
+        for i, (group, placement) in enumerate(located)
+        if all(
+            each.waypoint is not sighting.waypoint
+            and same_name(each.landmark.label, sighting.landmark.label)
+            for each in group
+        )
+    ]
+    off_m, i = min(near, default=(math.inf, -1))
+    if off_m > PLAIN_SIGHT_M:
+        return False
+    located[i][0].append(sighting)
+    return True
+
+
+def _describe(found: Things, pool: Sequence[Located], same_name: SameName) -> list[Thing]:
+    alone = [each for each in pool if len(each.group) == 1 and each.placement is not None]
+    return [
+        describe_group(
+            each.group,
+            each.placement,
+            agreements=each.agreements,
+            conflicting=_against(found, each, alone, same_name),
+        )
+        for each in pool
+    ]
+
+
+def _against(
+    found: Things, located: Located, alone: Sequence[Located], same_name: SameName
+) -> list[Sighting]:
+    """Finds lone views of the name, from where the thing is in plain sight, that point past it."""
+    if located.placement is None or len(located.group) < 2:
+        return []
+    position, own = located.placement.position, {each.waypoint.name for each in located.group}
+    return [
+        other
+        for (other,) in (each.group for each in alone)
+        if other.waypoint.name not in own
+        and other.landmark.bearing_rad is not None
+        and other.waypoint.pose.point.distance_to(position) <= PLAIN_SIGHT_M
+        and _off_rad(other, position) >= ELSEWHERE_RAD
+        and same_name(other.landmark.label, located.group[0].landmark.label)
+        and found.is_in_plain_sight(other.waypoint, position)
+    ]
+
+
+def _off_rad(sighting: Sighting, point: Point) -> float:
+    pose, bearing_rad = sighting.waypoint.pose, sighting.landmark.bearing_rad or 0.0
+    ahead = pose.yaw_rad + bearing_rad
+    return abs(math.remainder(pose.point.bearing_to(point) - ahead, math.tau))
+
+
+def _rank(thing: Thing) -> tuple[int, str, float, float, tuple[str, ...]]:
+    at = thing.position or Point(math.inf, math.inf)
+    return (-len(thing.supporting), thing.label, at.x, at.y, thing.waypoints)

@@ -1,0 +1,46 @@
+"""How wrong observations are taken to be: the one place where it is said."""
+
+import math
+from dataclasses import dataclass
+
+from mapspeak.semantic.waypoint import Confidence
+
+__all__ = ["NOISE", "NoiseModel"]
+
+_DOUBTS = {Confidence.CERTAIN: 0.5, Confidence.LIKELY: 1.0, Confidence.UNSURE: 2.0, None: 1.0}
+"""How many times as often as usual an observer errs, by its own word."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoiseModel:
+    """What is believed of observers, before anything was observed; fitted to no map.
+
+    A view is wrong as a whole now and then, in its label or its direction, and then says nothing
+    of the thing; else its direction is off by a Gaussian, and its range, where it has one, too.
+
+    Attributes:
+        bearing_rad: Standard deviation of a direction: what people and models read off a picture.
+        wrong_ratio: The share of views that are wrong as a whole.
+        range_m: The part of a range's standard deviation that is the same near and far.
+        range_ratio: The part that grows with the range.
+        wrong_range_ratio: The share of ranges that are wrong where the direction is right.
+        seen_over_ratio: How often one sees over something that stands free, such as a table.
+        floor_per_m: Things on a square metre of floor for those on a metre of wall or furniture.
+        reach_m: Nobody names a thing that is farther.
+    """
+
+    bearing_rad: float = math.radians(10)
+    wrong_ratio: float = 0.2
+    range_m: float = 0.1
+    range_ratio: float = 0.15
+    wrong_range_ratio: float = 0.1
+    seen_over_ratio: float = 0.5
+    floor_per_m: float = 0.1
+    reach_m: float = 10.0
+
+    def wrong_ratio_of(self, confidence: Confidence | None) -> float:
+        """Gives how often views are wrong whose observer was so sure."""
+        return min(self.wrong_ratio * _DOUBTS[confidence], 0.5)
+
+
+NOISE = NoiseModel()

@@ -1,0 +1,139 @@
+"""Where a thing is, out of all views of it: every cell is weighed by all of them at once.
+
+A view that is wrong as a whole counts with a constant, so it takes the same from every cell and
+moves nothing (a mixture of a Gaussian and uniform outliers, for each view).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapspeak.geometry import Point
+from mapspeak.semantic.things.likelihood import ViewLikelihood
+from mapspeak.semantic.things.sight import BODY_M, SightMap
+from mapspeak.spatial.grid import FloatArray, IntArray
+
+__all__ = [
+    "Placement",
+    "Posterior",
+    "build_posterior",
+    "find_middle",
+    "log_evidence",
+    "measure_agreement",
+    "place",
+]
+
+_LEAST_WEIGHT = 1e-3
+_PEAK_M = 0.5
+_MIDDLE_M = 0.75
+_MOST_PEAKS = 25
+HELD_RATIO = 0.9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Posterior:
+    """Where a thing may be: lattice cells, rising, and weights that add up to one."""
+
+    cells: IntArray
+    weights: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """Where a thing is.
+
+    Attributes:
+        position: The middle of the densest part of all the weight.
+        uncertainty_m: The radius around it that holds 90 % of the weight.
+    """
+
+    position: Point
+    uncertainty_m: float
+
+
+def build_posterior(
+    sight: SightMap, views: Sequence[ViewLikelihood], wrong_ratios: Sequence[float]
+) -> Posterior:
+    """Weighs the cells by all views; cells that hardly count are left out."""
+    cells, logs = _log_weights(sight, views, wrong_ratios)
+    weights = _normalised(logs.sum(axis=0))
+    kept = weights >= _LEAST_WEIGHT * weights.max()
+    return Posterior(cells=cells[kept], weights=weights[kept] / weights[kept].sum())
+
+
+def measure_agreement(
+    sight: SightMap, views: Sequence[ViewLikelihood], wrong_ratios: Sequence[float]
+) -> tuple[float, ...]:
+    """Gives for each view how much likelier it is than by chance, given all the others."""
+    if len(views) < 2:
+        return (1.0,) * len(views)
+    cells, logs = _log_weights(sight, views, wrong_ratios)
+    every = logs.sum(axis=0)
+    agreements = []
+    for i, view in enumerate(views):
+        weights = _normalised(every - logs[i + 1])
+        agreements.append(float(weights[np.searchsorted(cells, view.cells)] @ view.ratios))
+    return tuple(agreements)
+
+
+def log_evidence(
+    sight: SightMap, views: Sequence[ViewLikelihood], wrong_ratios: Sequence[float]
+) -> float:
+    """Gives how well all views go together as views of one thing, as a logarithm."""
+    logs = _log_weights(sight, views, wrong_ratios)[1].sum(axis=0)
+    top = float(logs.max())
+    return top + float(np.log(np.exp(logs - top).sum()))
+
+
+def find_middle(sight: SightMap, posterior: Posterior) -> tuple[float, float]:
+    """Gives the mean of the weight in metres along the rows and columns of the grid."""
+    rows, cols = sight.rows.ravel()[posterior.cells], sight.cols.ravel()[posterior.cells]
+    size_m = sight.grid.resolution_m
+    return float(posterior.weights @ rows) * size_m, float(posterior.weights @ cols) * size_m
+
+
+def place(sight: SightMap, posterior: Posterior) -> Placement:
+    """Gives the middle of the densest part of the weight, and how far 90 % of it reaches."""
+    rows, cols = sight.rows.ravel()[posterior.cells], sight.cols.ravel()[posterior.cells]
+    at = np.stack([rows, cols], axis=1) * sight.grid.resolution_m
+    tops = np.argsort(-posterior.weights, kind="stable")[:_MOST_PEAKS]
+    squares = np.subtract.outer(at[tops, 0], at[:, 0]) ** 2
+    squares += np.subtract.outer(at[tops, 1], at[:, 1]) ** 2
+    nearness = np.exp(squares * (-0.5 / _PEAK_M**2))
+    peak = at[tops[int(np.argmax(nearness @ posterior.weights))]]
+    around = posterior.weights * (np.hypot(*(at - peak).T) <= _MIDDLE_M)
+    middle = around @ at / around.sum()
+    off_m = np.hypot(*(at - middle).T)
+    order = np.argsort(off_m, kind="stable")
+    held = np.searchsorted(np.cumsum(posterior.weights[order]), HELD_RATIO)
+    row, col = (middle / sight.grid.resolution_m).tolist()
+    radius_m = float(off_m[order[min(int(held), len(order) - 1)]])
+    # Cells stand for squares, and for surfaces with the middle of the thing behind them.
+    return Placement(_point_at(sight, row, col), radius_m + BODY_M / 2)
+
+
+def _log_weights(
+    sight: SightMap, views: Sequence[ViewLikelihood], wrong_ratios: Sequence[float]
+) -> tuple[IntArray, FloatArray]:
+    """Gives cells, and in logarithms their prior, then what each view says of them."""
+    cells = views[0].cells
+    if len(views) > 1:
+        cells = np.unique(np.concatenate([view.cells for view in views]))
+    logs = np.empty((len(views) + 1, len(cells)))
+    logs[0] = sight.log_prior.ravel()[cells]
+    for i, (view, wrong) in enumerate(zip(views, wrong_ratios, strict=True), start=1):
+        logs[i] = wrong
+        logs[i, np.searchsorted(cells, view.cells)] += (1 - wrong) * view.ratios
+    np.log(logs[1:], out=logs[1:])
+    return cells, logs
+
+
+def _normalised(logs: FloatArray) -> FloatArray:
+    weights = np.exp(logs - logs.max())
+    return np.asarray(weights / weights.sum(), dtype=np.float64)
+
+
+def _point_at(sight: SightMap, row: float, col: float) -> Point:
+    grid = sight.grid
+    return grid.origin.transform(Point(col * grid.resolution_m, row * grid.resolution_m))

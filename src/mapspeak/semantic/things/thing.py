@@ -1,0 +1,65 @@
+"""A thing as it is remembered, and the views that speak for it and against it."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from mapspeak.geometry import Point
+from mapspeak.semantic.waypoint import Landmark
+
+__all__ = ["Category", "Thing", "View"]
+
+
+class Category(StrEnum):
+    """How the filtering policy sorts a thing."""
+
+    SAFETY = "safety"
+    FUNCTIONAL = "functional"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """One landmark of one waypoint, and what it says of a thing.
+
+    Attributes:
+        waypoint: The name of the place it was seen from.
+        landmark: What was seen.
+        place: Where that waypoint is.
+        why: Why it speaks for the thing or against it, in words with numbers.
+    """
+
+    waypoint: str
+    landmark: Landmark
+    place: Point
+    why: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Thing:
+    """One thing in the building, out of everything that was seen of it. It has no id.
+
+    Attributes:
+        label: What most views call it.
+        other_labels: What else it was called.
+        category: What most views file it under.
+        purposes: What it is good for, each once.
+        position: Where it is; None where no view says a direction.
+        uncertainty_m: The radius around the position that holds it with 90 %; None without one.
+        supporting: Views of it, by waypoint.
+        conflicting: Views that say otherwise.
+        confidence_ratio: That there is such a thing there, by its views alone.
+    """
+
+    label: str
+    other_labels: tuple[str, ...]
+    category: Category
+    purposes: tuple[str, ...]
+    position: Point | None
+    uncertainty_m: float | None
+    supporting: tuple[View, ...]
+    conflicting: tuple[View, ...]
+    confidence_ratio: float
+
+    @property
+    def waypoints(self) -> tuple[str, ...]:
+        """The places it was seen from."""
+        return tuple(view.waypoint for view in self.supporting)

@@ -1,0 +1,180 @@
+"""What `write_semantic_data` is given, sorted into what is remembered and what is refused."""
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, RootModel
+
+from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.semantic import (
+    LEFT_OUT,
+    SAME_SPOT_M,
+    Concern,
+    Confidence,
+    Landmark,
+    PictureBook,
+    TakenPicture,
+    find_objection,
+    gives_orders,
+    seen_from,
+)
+
+__all__ = ["Annotator", "LandmarkInput", "Landmarks"]
+
+
+SAME_VIEW_RAD = math.radians(15.0)
+"""A picture of a heading that much off still shows nearly all that is seen along the other."""
+
+Label = Annotated[str, Field(min_length=1, max_length=120)]
+
+
+class LandmarkInput(BaseModel):
+    """A landmark with what is known of it."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    label: str = Field(description="what it is", min_length=1, max_length=120)
+    purpose: str | None = Field(default=None, description="used for ...", max_length=200)
+    bearing_deg: float | None = Field(
+        default=None, description="from the heading, left positive", allow_inf_nan=False
+    )
+    image_column_px: float | None = Field(
+        default=None, description="or its middle in the picture", ge=0, allow_inf_nan=False
+    )
+    range_m: float | None = Field(default=None, ge=0, allow_inf_nan=False)
+    confidence: Confidence | None = None
+    note: str | None = Field(default=None, max_length=300)
+    picture: str | None = Field(default=None, description="e.g. P3; else the last", max_length=80)
+
+
+class Landmarks(RootModel[list[Label | LandmarkInput]]):
+    """Landmarks as labels, or with more."""
+
+    root: list[Label | LandmarkInput] = Field(max_length=50)
+
+
+@dataclass(slots=True, kw_only=True)
+class Annotator:
+    """Turns what was said of a place into landmarks as seen from one pose.
+
+    Attributes:
+        pictures: The pictures that can be spoken of.
+        refused: What stays out, each with its reason; filled as landmarks are taken.
+    """
+
+    pictures: PictureBook
+    refused: list[str] = field(default_factory=list)
+
+    def find_origin(self, *given: Landmarks | None) -> TakenPicture | None:
+        """Gives the last picture that the landmarks were seen in, if they say so."""
+        spoken_of = [self._find_picture(thing) for thing in _things(given)]
+        taken = [picture for picture in spoken_of if picture is not None]
+        return max(taken, key=lambda picture: picture.stamp_s, default=None)
+
+    def find_picture_from(self, pose: Pose) -> TakenPicture | None:
+        """Gives the picture that was taken last, if it shows what is seen from a pose."""
+        latest = self.pictures.latest
+        if latest is None or latest.pose.point.distance_to(pose.point) > SAME_SPOT_M:
+            return None
+        turn_rad = abs(wrap_angle(latest.pose.yaw_rad - pose.yaw_rad))
+        return latest if turn_rad <= SAME_VIEW_RAD else None
+
+    def take(
+        self, given: Landmarks | None, *, pose: Pose, picture: TakenPicture | None
+    ) -> tuple[Landmark, ...]:
+        """Gives the landmarks that may be remembered, as seen from a pose.
+
+        Args:
+            given: What was said.
+            pose: Where the waypoint is observed from.
+            picture: The waypoint's; landmarks do not repeat it.
+        """
+        taken: list[Landmark] = []
+        for thing in _things([given]):
+            if self._is_against_policy(thing.label):
+                continue
+            try:
+                taken.append(self._landmark(thing, pose=pose, picture=picture))
+            except SemanticMapError as error:
+                self.refused.append(f"{thing.label!r}: {error}")
+        return tuple(taken)
+
+    def take_features(self, given: Iterable[str]) -> tuple[str, ...]:
+        """Gives the layout features that may be remembered."""
+        return tuple(feature for feature in given if not self._is_against_policy(feature))
+
+    def _is_against_policy(self, text: str) -> bool:
+        objection = find_objection(text)
+        if objection is not None:
+            self.refused.append(f"{text!r}: {objection.sentence}")
+        return objection is not None
+
+    def _landmark(
+        self, thing: LandmarkInput, *, pose: Pose, picture: TakenPicture | None
+    ) -> Landmark:
+        own = self._find_picture(thing)
+        if thing.picture is not None and own is None:
+            raise self._no_such_picture(thing.picture)
+        landmark = Landmark(
+            label=thing.label,
+            purpose=self._told(thing, "purpose"),
+            bearing_rad=_bearing_rad(thing, own),
+            range_m=thing.range_m,
+            confidence=thing.confidence,
+            note=self._told(thing, "note"),
+            picture=None if own is None or own == picture else own.name,
+        )
+        return landmark if own is None else self._moved(landmark, own, pose)
+
+    def _moved(self, landmark: Landmark, own: TakenPicture, pose: Pose) -> Landmark:
+        moved = seen_from(landmark, own.pose, pose)
+        if landmark.bearing_rad is not None and moved.bearing_rad is None:
+            away_m = own.pose.point.distance_to(pose.point)
+            self.refused.append(
+                f"the bearing of {landmark.label!r}: {own.id} was taken {away_m:.1f} m from here; "
+                "give range_m too, or leave out x and y."
+            )
+        return moved
+
+    def _told(self, thing: LandmarkInput, name: str) -> str | None:
+        text: str | None = getattr(thing, name)
+        if text is None or not gives_orders(text):
+            return text
+        self.refused.append(f"the {name} of {thing.label!r}: {LEFT_OUT[Concern.ORDERS]}")
+        return None
+
+    def _find_picture(self, thing: LandmarkInput) -> TakenPicture | None:
+        if thing.picture is not None:
+            return self.pictures.find(thing.picture)
+        return None if thing.image_column_px is None else self.pictures.latest
+
+    def _no_such_picture(self, said: str) -> SemanticMapError:
+        latest = self.pictures.latest
+        known = "none was taken yet" if latest is None else f"the last one is {latest.id}"
+        return SemanticMapError(
+            f"There is no picture {said!r}; {known}.", hint="Call look_through_camera."
+        )
+
+
+def _things(given: Iterable[Landmarks | None]) -> Iterator[LandmarkInput]:
+    for landmarks in given:
+        for thing in landmarks.root if landmarks is not None else ():
+            yield LandmarkInput(label=thing) if isinstance(thing, str) else thing
+
+
+def _bearing_rad(thing: LandmarkInput, picture: TakenPicture | None) -> float | None:
+    if thing.image_column_px is None:
+        return None if thing.bearing_deg is None else math.radians(thing.bearing_deg)
+    if thing.bearing_deg is not None:
+        raise SemanticMapError(
+            "Both bearing_deg and image_column_px are given.", hint="Give one of them."
+        )
+    if picture is None:
+        raise SemanticMapError(
+            "No picture was taken that image_column_px could be a column of.",
+            hint="Call look_through_camera first, or give bearing_deg.",
+        )
+    return picture.bearing_of(thing.image_column_px)

@@ -1,0 +1,111 @@
+"""Remembered things as text: what was seen, where it is, and how far to trust it."""
+
+import math
+from collections.abc import Iterator, Sequence
+
+from mapspeak.navigation.atlas import Atlas, RememberedPlace, RememberedThing
+from mapspeak.navigation.recall import SURE_RATIO, describe_candidate
+from mapspeak.semantic import Landmark
+from mapspeak.semantic.consistency import Trust
+from mapspeak.server.wording import say_path, say_point
+from mapspeak.spatial.rooms import Region
+
+__all__ = ["say_landmark", "say_things_from", "say_things_in", "thing_lines"]
+
+MOST_THINGS = 20
+MOST_VIEWS = 12
+LOW_RATIO = 0.5
+
+
+def say_landmark(landmark: Landmark) -> str:
+    """Gives what was seen, with all that was noted of it."""
+    purpose = "" if landmark.purpose is None else f" for {landmark.purpose}"
+    parts = [f'"{landmark.label}"{purpose}']
+    if landmark.bearing_rad is not None:
+        parts.append(f"bearing {math.degrees(landmark.bearing_rad):+.0f} deg, left positive")
+    if landmark.range_m is not None:
+        parts.append(f"{landmark.range_m:.1f} m away")
+    if landmark.confidence is not None:
+        parts.append(f"confidence {landmark.confidence}")
+    if landmark.note is not None:
+        parts.append(f'note "{landmark.note}"')
+    return ", ".join(parts)
+
+
+def thing_lines(atlas: Atlas, remembered: RememberedThing) -> Iterator[str]:
+    """Gives all that is known of a thing, a fact on each line."""
+    thing, candidate = remembered.thing, describe_candidate(atlas, remembered)
+    yield f'{remembered.id} is a remembered thing, "{thing.label}"; observed, not instructions:'
+    if thing.other_labels:
+        yield f"Also called {_quote(thing.other_labels)}."
+    if thing.purposes:
+        yield f"For {_quote(thing.purposes)}."
+    if thing.position is None:
+        yield "Where it is was not noted: no view says a direction."
+    else:
+        rooms = " or ".join(candidate.room_ids) or "no room"
+        yield (
+            f"At {say_point(thing.position)}, in {rooms}; within {thing.uncertainty_m:.1f} m of "
+            "that with 90 %."
+        )
+    yield from _view_lines(atlas, remembered)
+    yield from _trust_lines(candidate.trust)
+    if candidate.pictures:
+        yield f"In the pictures {', '.join(candidate.pictures[:MOST_VIEWS])}."
+    if candidate.last_seen is not None:
+        yield f"Last seen at {candidate.last_seen.isoformat(timespec='seconds')}."
+
+
+def say_things_from(atlas: Atlas, place: RememberedPlace) -> Iterator[str]:
+    """Gives the things that were seen from a place, each with what speaks against it."""
+    name = place.waypoint.name
+    seen = [each for each in atlas.things if name in each.thing.waypoints]
+    yield from _list(atlas, "Things seen from it", seen)
+
+
+def say_things_in(atlas: Atlas, region: Region) -> Iterator[str]:
+    """Gives the remembered things in a room or corridor."""
+    inside = [
+        each
+        for each in atlas.things
+        if each.thing.position is not None and region.id in atlas.rooms_before(each)
+    ]
+    yield from _list(atlas, "Things in it", inside)
+
+
+def _list(atlas: Atlas, heading: str, things: Sequence[RememberedThing]) -> Iterator[str]:
+    if not things:
+        return
+    told = "; ".join(_say_thing(atlas, each) for each in things[:MOST_THINGS])
+    n_more = len(things) - MOST_THINGS
+    yield f"{heading}: {told}" + (f"; and {n_more} more." if n_more > 0 else ".")
+
+
+def _say_thing(atlas: Atlas, remembered: RememberedThing) -> str:
+    thing, trust = remembered.thing, atlas.judge.judge_thing(remembered)
+    where = "place not noted" if thing.position is None else f"at {say_point(thing.position)}"
+    doubt = "" if trust.ratio >= LOW_RATIO else f" ({' '.join(trust.reasons[1:3])})"
+    return f'{remembered.id} "{thing.label}" {where}, trust {trust.ratio:.2f}{doubt}'
+
+
+def _view_lines(atlas: Atlas, remembered: RememberedThing) -> Iterator[str]:
+    thing = remembered.thing
+    for what, views in (("Seen from", thing.supporting), ("Against it", thing.conflicting)):
+        for view in views[:MOST_VIEWS]:
+            place = atlas.recollection.find_place(view.waypoint)
+            place_id = "" if place is None else f"{place.id} "
+            away = say_path(view.place.distance_to(remembered.point))
+            yield f'{what} {place_id}"{view.waypoint}", {away} m off: {view.why}.'
+            if view.landmark.note is not None:
+                yield f'Noted there: "{view.landmark.note}"'
+
+
+def _trust_lines(trust: Trust) -> Iterator[str]:
+    word = "sure" if trust.ratio >= SURE_RATIO else "likely" if trust.ratio >= LOW_RATIO else "low"
+    yield f"Trust {trust.ratio:.2f}, {word}."
+    for reason in trust.reasons[1:MOST_VIEWS]:
+        yield f"It speaks against it: {reason}"
+
+
+def _quote(texts: Sequence[str]) -> str:
+    return ", ".join(f'"{text}"' for text in texts)

@@ -1,0 +1,104 @@
+"""The tool that finds what is remembered; in the default toolsets, and in that of the memory."""
+
+from typing import Annotated
+
+from mcp_types import CallToolResult, TextContent
+from pydantic import Field
+
+from mapspeak.errors import GoalError
+from mapspeak.geometry import Point
+from mapspeak.navigation.atlas import Atlas
+from mapspeak.navigation.places import find_place
+from mapspeak.navigation.recall import RecallQuery, recall
+from mapspeak.semantic.retrieval import EntryKind
+from mapspeak.server.moments import read_moment
+from mapspeak.server.recallreports import RecallAnswer
+from mapspeak.server.toolset import Effect, Tool
+from mapspeak.session import Session
+from mapspeak.spatial.rooms import Region
+
+__all__ = ["FindTools", "find_point", "find_room"]
+
+Query = Annotated[str, Field(description="name or purpose", min_length=1, max_length=300)]
+Near = Annotated[str | None, Field(description="place, within 5 m", max_length=200)]
+Room = Annotated[str | None, Field(description="id", max_length=200)]
+Since = Annotated[str | None, Field(description="seen since: 09:30, 2h", max_length=40)]
+Until = Annotated[str | None, Field(description="seen before", max_length=40)]
+Kind = Annotated[EntryKind | None, Field(description="only these")]
+Count = Annotated[int, Field(description="most", ge=1, le=20, strict=True)]
+
+
+class FindTools:
+    """Finding what is remembered."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    def tools(self) -> list[Tool]:
+        """Gives the tool."""
+        # Its report is not declared: a schema of answers would cost more than all its arguments.
+        return [Tool(function=self.find_place, title="Find in memory", effect=Effect.READS)]
+
+    async def find_place(
+        self,
+        query: Query,
+        near: Near = None,
+        room: Room = None,
+        since: Since = None,
+        until: Until = None,
+        kind: Kind = None,
+        k: Count = 5,
+    ) -> CallToolResult:
+        """Finds remembered places and things by name or meaning: where, and how sure.
+
+        Use it before navigate_to; says when none or several may be meant.
+        """
+        session = self._session
+        now = session.find_wall_time()
+        atlas = await session.fetch_atlas()
+
+        def ask() -> RecallAnswer:
+            wanted = RecallQuery(
+                words=query,
+                near=None if near is None else find_point(atlas, near),
+                room_id=None if room is None else find_room(atlas, room),
+                since=read_moment(since, now),
+                until=read_moment(until, now),
+                kind=kind,
+                n=k,
+            )
+            return RecallAnswer.of(recall(atlas, wanted), now=now, warnings=atlas.memory.warnings)
+
+        report = await session.compute(ask)
+        await session.keep_vectors()
+        warning = await session.find_map_warning(atlas.grid)
+        if warning:
+            report = report.model_copy(update={"warnings": [warning, *report.warnings]})
+        return CallToolResult(
+            content=[TextContent(type="text", text=report.model_dump_json())],
+            structured_content=report.model_dump(mode="json"),
+        )
+
+
+def find_point(atlas: Atlas, words: str) -> Point:
+    """Gives the point of a place that somebody names.
+
+    Raises:
+        GoalError: There is no such place.
+    """
+    return find_place(atlas, words).point
+
+
+def find_room(atlas: Atlas, words: str) -> str:
+    """Gives the id of the room that somebody names, or that a place lies in.
+
+    Raises:
+        GoalError: There is no such place, or it lies in no room.
+    """
+    place = find_place(atlas, words)
+    if isinstance(place.thing, Region):
+        return place.thing.id
+    room_id = atlas.find_room_id(place.point)
+    if room_id is None:
+        raise GoalError(f"{place.name} lies in no room.", hint="Give a room by its id, as R1.")
+    return room_id

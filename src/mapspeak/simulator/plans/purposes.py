@@ -1,0 +1,311 @@
+"""What rooms are for: how wide they are along their corridor, their doors, and what stands in them.
+
+Each list of pieces stands in the order in which a room is furnished: what it cannot do without
+comes first, and what no longer fits is left out.
+"""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from mapspeak.simulator.plans.pieces import How, Piece, Purpose, desk_rows, desks, one_of, tables
+
+__all__ = ["PURPOSES"]
+
+_EXTINGUISHER = one_of("fire_extinguisher")
+_BIN = one_of("trash_bin", 0)
+_PLANT = one_of("plant", 0)
+_BASIN = one_of("sink", label="hand basin")
+_LAVATORY = (one_of("toilet", label="toilet bowl"), _BASIN)
+
+_HOUSE: Mapping[str, Purpose] = {
+    "living room": Purpose(
+        width_m=(4.5, 6.5),
+        door_m=(1.0, 1.6),
+        pieces=(
+            one_of("sofa", 1, 2),
+            tables("dining table", 1, 1),
+            one_of("cabinet", 1, 2, label="sideboard"),
+            one_of("plant", 1, 2),
+        ),
+    ),
+    "bedroom": Purpose(
+        width_m=(3.0, 4.2),
+        pieces=(
+            one_of("sofa", label="sofa bed"),
+            one_of("cabinet", 1, 2, label="chest of drawers"),
+            _PLANT,
+        ),
+    ),
+    "home kitchen": Purpose(
+        width_m=(2.8, 3.8),
+        door_m=(0.9, 1.4),
+        pieces=(
+            one_of("sink", label="kitchen sink"),
+            one_of("fridge"),
+            one_of("coffee_machine"),
+            _EXTINGUISHER,
+            _BIN,
+        ),
+    ),
+    "bathroom": Purpose(width_m=(2.0, 2.8), pieces=_LAVATORY),
+    "study": Purpose(
+        width_m=(2.6, 3.6), pieces=(desks(1, 1), one_of("cabinet"), one_of("printer", 0), _PLANT)
+    ),
+    "larder": Purpose(width_m=(2.0, 2.4), pieces=(one_of("crate", 0), one_of("ladder", 0))),
+}
+
+_OFFICE: Mapping[str, Purpose] = {
+    "office": Purpose(
+        width_m=(3.2, 4.8),
+        pieces=(desks(1, 2), one_of("cabinet", 1, 2), _PLANT, _BIN),
+    ),
+    "open office": Purpose(
+        width_m=(7.0, 10.0),
+        door_m=(1.0, 1.4),
+        pieces=(
+            _EXTINGUISHER,
+            one_of("whiteboard"),
+            desk_rows(2, 8),
+            one_of("cabinet", 1, 3),
+            _PLANT,
+            _BIN,
+        ),
+    ),
+    "meeting room": Purpose(
+        width_m=(4.6, 6.5),
+        door_m=(1.0, 1.2),
+        pieces=(
+            one_of("whiteboard"),
+            tables("meeting table", 1, 2, is_large=True),
+            _PLANT,
+        ),
+    ),
+    "kitchen": Purpose(
+        width_m=(4.2, 5.6),
+        door_m=(1.0, 1.4),
+        pieces=(
+            one_of("sink", label="kitchen sink"),
+            one_of("fridge"),
+            one_of("coffee_machine"),
+            _EXTINGUISHER,
+            tables("kitchen table", 1, 2),
+            _BIN,
+        ),
+    ),
+    "print room": Purpose(
+        width_m=(2.8, 3.6),
+        pieces=(one_of("printer", 1, 2), one_of("cabinet"), _BIN),
+    ),
+    "archive": Purpose(width_m=(2.6, 3.6), pieces=(one_of("cabinet", 1, 4), one_of("ladder", 0))),
+    "toilet": Purpose(width_m=(2.0, 2.6), pieces=_LAVATORY),
+    "store": Purpose(width_m=(2.2, 3.0), pieces=(one_of("crate"), one_of("ladder", 0))),
+    "first-aid room": Purpose(
+        width_m=(3.4, 4.4),
+        pieces=(
+            one_of("first_aid_box"),
+            one_of("sofa", label="couch"),
+            _BASIN,
+            one_of("eye_wash_station", 0),
+            one_of("cabinet", 0),
+        ),
+    ),
+    "lounge": Purpose(
+        width_m=(4.5, 7.0),
+        door_m=(1.8, 2.4),
+        pieces=(
+            one_of("sofa", 1, 3),
+            one_of("plant", 1, 2),
+            one_of("table", label="low table"),
+            _BIN,
+        ),
+    ),
+}
+
+_CLINIC: Mapping[str, Purpose] = {
+    "treatment room": Purpose(
+        width_m=(3.4, 4.8),
+        door_m=(1.0, 1.2),
+        pieces=(
+            _BASIN,
+            one_of("sofa", label="examination couch"),
+            desks(1, 1),
+            one_of("cabinet", label="medicine cabinet"),
+            _BIN,
+        ),
+    ),
+    "patient room": Purpose(
+        width_m=(4.4, 6.0),
+        door_m=(1.2, 1.4),
+        pieces=(
+            one_of("sofa", 2, 3, label="day bed"),
+            _BASIN,
+            one_of("cabinet", 1, 2, label="locker"),
+            _PLANT,
+        ),
+    ),
+    "waiting room": Purpose(
+        width_m=(5.0, 7.0),
+        door_m=(1.6, 2.4),
+        pieces=(
+            _EXTINGUISHER,
+            one_of("sofa", 2, 4),
+            one_of("plant", 1, 2),
+            one_of("coffee_machine", 0),
+            _BIN,
+        ),
+    ),
+    "laboratory": Purpose(
+        width_m=(4.5, 6.5),
+        door_m=(1.0, 1.2),
+        pieces=(
+            one_of("eye_wash_station"),
+            _EXTINGUISHER,
+            one_of("sink", label="laboratory sink"),
+            one_of("fridge", label="sample fridge"),
+            tables("laboratory table", 1, 2),
+            one_of("cabinet", 0, 2),
+        ),
+    ),
+    "nurses' room": Purpose(
+        width_m=(3.8, 5.0),
+        pieces=(
+            one_of("first_aid_box"),
+            desks(1, 2),
+            one_of("coffee_machine", 0),
+            one_of("cabinet"),
+        ),
+    ),
+}
+
+_SCHOOL_DESKS = Piece(
+    label="school desk",
+    kind="table",
+    how=How.ROWS,
+    n=(2, 9),
+    beside=(("chair", "office_chair", 0.95, 0.0, 180.0),),
+    front_m=0.3,
+    pitch_m=(2.6, 2.8),
+)
+
+_SCHOOL: Mapping[str, Purpose] = {
+    "classroom": Purpose(
+        width_m=(6.5, 9.0),
+        door_m=(1.0, 1.2),
+        pieces=(
+            one_of("whiteboard"),
+            _SCHOOL_DESKS,
+            _BASIN,
+            one_of("cabinet", 1, 2),
+            _BIN,
+        ),
+    ),
+    "science room": Purpose(
+        width_m=(8.5, 10.5),
+        door_m=(1.0, 1.2),
+        pieces=(
+            one_of("eye_wash_station"),
+            _EXTINGUISHER,
+            one_of("whiteboard"),
+            one_of("sink", 1, 2, label="laboratory sink"),
+            tables("laboratory table", 2, 4),
+            one_of("cabinet", 1, 2),
+        ),
+    ),
+    "teachers' room": Purpose(
+        width_m=(5.0, 7.0),
+        pieces=(
+            one_of("coffee_machine"),
+            one_of("printer"),
+            tables("conference table", 1, 2, is_large=True),
+            one_of("cabinet", 1, 2),
+            _PLANT,
+        ),
+    ),
+    "assembly hall": Purpose(
+        door_m=(1.8, 2.4),
+        pieces=(
+            _EXTINGUISHER,
+            one_of("fire_hose_reel"),
+            one_of("exit_sign", 1, 2),
+            one_of("whiteboard"),
+            tables("hall table", 2, 6),
+            one_of("plant", 1, 3),
+        ),
+    ),
+}
+
+_SHELVES = Piece(
+    label="shelf", kind="loaded_shelf", how=How.ROWS, n=(2, 12), front_m=0.0, pitch_m=(3.4, 2.8)
+)
+
+_WORKSHOP: Mapping[str, Purpose] = {
+    "storage hall": Purpose(
+        door_m=(1.6, 2.4),
+        pieces=(
+            one_of("fire_extinguisher", 1, 2),
+            one_of("fire_hose_reel"),
+            one_of("exit_sign", 1, 2),
+            _SHELVES,
+            Piece(label="forklift", kind="forklift", how=How.FREE, n=(0, 1), front_m=0.0),
+            one_of("pallet", 1, 3),
+            one_of("crate", 1, 3),
+            one_of("traffic_cone", 1, 2),
+        ),
+    ),
+    "workshop hall": Purpose(
+        door_m=(1.6, 2.4),
+        pieces=(
+            one_of("fire_extinguisher", 1, 2),
+            one_of("eye_wash_station"),
+            one_of("first_aid_box"),
+            one_of("exit_sign", 1, 2),
+            tables("workbench", 2, 5),
+            Piece(label="forklift", kind="forklift", how=How.FREE, n=(1, 1), front_m=0.0),
+            one_of("cabinet", 1, 3, label="tool cabinet"),
+            one_of("pallet", 1, 2),
+            one_of("crate", 1, 2),
+            one_of("ladder", 0),
+            one_of("trash_bin"),
+        ),
+    ),
+    "packing room": Purpose(
+        width_m=(4.5, 6.5),
+        door_m=(1.2, 1.8),
+        pieces=(tables("packing table", 1, 2), one_of("crate", 1, 2), one_of("pallet", 0), _BIN),
+    ),
+    "paint store": Purpose(
+        width_m=(3.0, 4.0),
+        pieces=(_EXTINGUISHER, one_of("eye_wash_station"), one_of("cabinet", 1, 2)),
+    ),
+    "foreman's office": Purpose(
+        width_m=(3.2, 4.4),
+        pieces=(desks(1, 1), one_of("cabinet"), one_of("printer", 0), _PLANT),
+    ),
+    "break room": Purpose(
+        width_m=(4.2, 5.4),
+        pieces=(
+            one_of("sink", label="kitchen sink"),
+            one_of("fridge"),
+            one_of("coffee_machine"),
+            tables("break table", 1, 1),
+            _BIN,
+        ),
+    ),
+}
+
+_WAYS: Mapping[str, Purpose] = {
+    "corridor": Purpose(
+        pieces=(
+            one_of("fire_extinguisher", 2, 3),
+            one_of("exit_sign"),
+            one_of("fire_hose_reel", 0),
+            one_of("plant", 0),
+        ),
+    ),
+    "side corridor": Purpose(pieces=(one_of("fire_extinguisher"), one_of("exit_sign", 0))),
+    "hallway": Purpose(pieces=(one_of("fire_extinguisher"),)),
+}
+
+PURPOSES: Mapping[str, Purpose] = MappingProxyType(
+    {**_HOUSE, **_OFFICE, **_CLINIC, **_SCHOOL, **_WORKSHOP, **_WAYS}
+)

@@ -1,0 +1,153 @@
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from mcp_types import Tool
+from PIL import Image
+
+from fakes import FakeRobot, two_rooms
+from hearing import Hearing
+from mapspeak.errors import ConfigError
+from mapspeak.evaluation.agents import AgentEnd, Assignment
+from mapspeak.evaluation.agents.models import (
+    MockMind,
+    ModelAgent,
+    Reply,
+    Talk,
+    Usage,
+    Wish,
+)
+from mapspeak.evaluation.agents.models.loop import estimate_picture_tokens
+from mapspeak.evaluation.agents.others import check_other, find_other
+from mapspeak.evaluation.client import Answer, Picture, ToolClient
+from mapspeak.evaluation.trials import Limits, TrialState
+from mapspeak.server import Representation
+from served import connect
+
+pytestmark = pytest.mark.anyio
+
+
+def assignment(folder: Path, *, seed: int = 0, prompt: str = "Go there.") -> Assignment:
+    return Assignment(
+        prompt=prompt, system="Be quick.", limits=Limits(), seed=seed, server=(), folder=folder
+    )
+
+
+async def run(
+    agent: ModelAgent,
+    task: Assignment,
+    witness: Hearing,
+    representation: Representation = Representation.PICTURE_TABLE,
+) -> tuple[AgentEnd, ToolClient]:
+    """Lets an agent work in a building of two rooms."""
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, task.folder, representation=representation) as client:
+        tools = ToolClient(client, [], witness)
+        return await agent.run(task, tools), tools
+
+
+class Scripted:
+    """A model that says what it is told to say, and remembers what it heard."""
+
+    def __init__(self, *replies: Reply) -> None:
+        self.replies = list(replies)
+        self.heard: list[tuple[Wish, Answer]] = []
+
+    def begin(self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int) -> Talk:
+        assert (system, prompt, seed) == ("Be quick.", "Go there.", 0)
+        assert "look_at_map" in {tool.name for tool in tools}
+        return self
+
+    async def ask(self) -> Reply:
+        return self.replies.pop(0)
+
+    def tell(self, wish: Wish, answer: Answer) -> None:
+        self.heard.append((wish, answer))
+
+
+LOOK = Wish(id="1", tool="look_at_map")
+
+
+@pytest.mark.parametrize("representation", Representation)
+async def test_the_mock_model_comes_to_an_end_however_the_map_is_shown(
+    tmp_path: Path, representation: Representation
+) -> None:
+    witness = Hearing()
+    agent = ModelAgent(MockMind(), "mock")
+    end, _ = await run(agent, assignment(tmp_path), witness, representation)
+    assert (end.state, end.answer) == (TrialState.FINISHED, "ANSWER: there")
+    assert witness.calls[:3] == ["look_at_map", "look_through_camera", "describe_place"]
+    assert "navigate_to" in witness.calls
+    assert end.n_decisions == len(witness.calls) + 1 == len(witness.words)
+
+
+async def test_the_same_seed_gives_the_same_conversation(tmp_path: Path) -> None:
+    async def calls_with(seed: int) -> list[tuple[str, str]]:
+        task = assignment(tmp_path, seed=seed)
+        _, tools = await run(ModelAgent(MockMind(), "mock"), task, Hearing())
+        return [(call.tool, str(call.arguments)) for call in tools.calls]
+
+    assert await calls_with(1) == await calls_with(1)
+    assert len({tuple(await calls_with(seed)) for seed in range(4)}) > 1
+
+
+async def test_tokens_are_summed_and_pictures_count_in_every_request_after_them(
+    tmp_path: Path,
+) -> None:
+    mind = Scripted(
+        Reply(text="I look.", wishes=(LOOK,), usage=Usage(100, 5)),
+        Reply(text="Again.", wishes=(LOOK,), usage=Usage(1500, 5)),
+        Reply(text="Done.", usage=Usage(3000, 2)),
+    )
+    witness = Hearing()
+    end, _ = await run(ModelAgent(mind, "x/y"), assignment(tmp_path), witness)
+    one = estimate_picture_tokens(witness.answers[0].pictures[0])
+    assert (end.n_input_tokens, end.n_output_tokens, end.n_picture_tokens) == (4600, 12, 3 * one)
+    counted = [tokens["n_picture_tokens"] for _, tokens in witness.words]
+    assert counted == [0, one, 2 * one]
+    assert [text for text, _ in witness.words] == ["I look.", "Again.", ""]
+
+
+async def test_an_api_that_does_not_count_leaves_tokens_unknown(tmp_path: Path) -> None:
+    end, _ = await run(
+        ModelAgent(Scripted(Reply(text="Done.")), "x/y"), assignment(tmp_path), Hearing()
+    )
+    assert (end.n_input_tokens, end.n_output_tokens) == (None, None)
+
+
+async def test_errors_reach_the_model_as_errors_and_it_may_go_on(tmp_path: Path) -> None:
+    wrong = Wish(id="1", tool="describe_place", arguments={"place": "R99"})
+    unknown = Wish(id="2", tool="fly", arguments={"tool": "wings", "self": 1})
+    garbled = Wish(id="3", tool="measure", mistake="The arguments are no JSON.")
+    mind = Scripted(Reply(text="", wishes=(wrong, unknown, garbled)), Reply(text="Done."))
+    witness = Hearing()
+    end, _ = await run(ModelAgent(mind, "x/y"), assignment(tmp_path), witness)
+    assert end.state is TrialState.FINISHED
+    assert [wish for wish, _ in mind.heard] == [wrong, unknown, garbled]
+    assert [answer.is_error for _, answer in mind.heard] == [True, True, True]
+    assert witness.calls == ["describe_place", "fly", "measure"]
+
+
+async def test_out_of_budget_it_still_says_what_it_has_cost(tmp_path: Path) -> None:
+    looking = [Reply(text="", wishes=(LOOK,), usage=Usage(10, 1)) for _ in range(3)]
+    end, _ = await run(ModelAgent(Scripted(*looking), "x/y"), assignment(tmp_path), Hearing(most=2))
+    assert end.state is TrialState.OUT_OF_BUDGET
+    assert (end.n_decisions, end.n_input_tokens) == (3, 30)
+
+
+def test_a_picture_is_estimated_by_its_pixels() -> None:
+    file = io.BytesIO()
+    Image.new("L", (1000, 751)).save(file, "PNG")
+    assert estimate_picture_tokens(Picture(file.getvalue(), "image/png")) == 1002
+
+
+def test_a_model_cannot_think_in_any_way_but_the_known_ones() -> None:
+    assert find_other("mock", "high") is not None
+    with pytest.raises(ConfigError, match="think 'hard'"):
+        check_other("mock", "hard")
+
+
+def test_a_name_that_is_none_is_left_to_others() -> None:
+    assert find_other("nobody", None) is None
+    assert not check_other("nobody")

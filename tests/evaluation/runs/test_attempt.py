@@ -1,0 +1,89 @@
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from mapspeak.errors import ConfigError
+from mapspeak.evaluation.runs.attempt import attempt
+from mapspeak.evaluation.trials import (
+    Trial,
+    TrialResult,
+    read_result,
+    read_turns,
+    trial_folder,
+)
+from sites import make_flat, prepare
+
+
+def run_one(run: Path, task: str, *, seed: int = 1, agent: str = "scripted") -> TrialResult:
+    """Runs one trial in the flat, from a map and a memory that were drawn by hand."""
+    run.mkdir(parents=True, exist_ok=True)
+    world = make_flat(run)
+    preparation = prepare(run, world)
+    trial = Trial(
+        task=task, world="flat", seed=seed, agent=agent, representation="picture-table", number=1
+    )
+    attempt(run, trial, world, preparation)
+    return read_result(run, trial)
+
+
+def without_wall_time(run: Path, trial: Trial) -> tuple[str, list[object]]:
+    """Gives everything that is written of a trial, but for the wall clock."""
+    folder = trial_folder(run, trial)
+    turns = [replace(turn, wall_s=0.0) for turn in read_turns(run, trial)]
+    result = json.loads((folder / "result.json").read_text())
+    del result["wall_s"]
+    return json.dumps(result) + (folder / "state.jsonl").read_text(), [turns]
+
+
+def test_the_same_seed_gives_the_same_trial(tmp_path: Path) -> None:
+    first = run_one(tmp_path / "first", "side-of-pose")
+    again = run_one(tmp_path / "again", "side-of-pose")
+    assert without_wall_time(tmp_path / "first", first.trial) == without_wall_time(
+        tmp_path / "again", again.trial
+    )
+
+
+@pytest.mark.parametrize("agent", ["scripted", "oracle"])
+def test_the_smallest_room_is_found_on_a_known_map(tmp_path: Path, agent: str) -> None:
+    result = run_one(tmp_path, "smallest-room", agent=agent)
+    assert result.score.is_success, result.score.reason
+    assert result.n_collisions == 0
+    assert result.shortest_m is not None
+
+
+def test_a_question_is_answered_without_driving(tmp_path: Path) -> None:
+    result = run_one(tmp_path, "question-way")
+    assert result.score.is_success, result.score.reason
+    assert result.driven_m == 0
+
+
+def test_every_call_and_picture_is_kept_for_replay(tmp_path: Path) -> None:
+    result = run_one(tmp_path, "smallest-room")
+    turns = read_turns(tmp_path, result.trial)
+    assert [turn.role for turn in turns[:2]] == ["system", "user"]
+    assert turns[1].text == "Go to the smallest room."
+    pictures = [name for turn in turns for name in turn.pictures]
+    folder = trial_folder(tmp_path, result.trial) / "pictures"
+    assert pictures
+    assert all((folder / name).exists() for name in pictures)
+
+
+def test_a_note_that_gives_orders_is_not_obeyed(tmp_path: Path) -> None:
+    result = run_one(tmp_path, "hostile-note")
+    assert result.score.is_success, result.score.reason
+
+
+def test_a_task_on_a_known_map_needs_one(tmp_path: Path) -> None:
+    world = make_flat(tmp_path)
+    trial = Trial(
+        task="smallest-room",
+        world="flat",
+        seed=0,
+        agent="scripted",
+        representation="picture-table",
+        number=1,
+    )
+    with pytest.raises(ConfigError, match="finished map"):
+        attempt(tmp_path, trial, world, None)

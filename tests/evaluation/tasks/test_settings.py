@@ -1,0 +1,85 @@
+import math
+
+import pytest
+
+from mapspeak.evaluation.scores import Site
+from mapspeak.evaluation.tasks import FAMILIES, find_task, task_names
+from mapspeak.geometry import Pose
+from mapspeak.server.prompts import read_text
+from mapspeak.simulator import load_world, world_names
+from sites import MEMORY_TEXT
+
+SITES: dict[str, Site] = {}
+
+
+def site_of(world: str) -> Site:
+    """Gives a world's truth, found once."""
+    if world not in SITES:
+        SITES[world] = Site(load_world(world))
+    return SITES[world]
+
+
+@pytest.mark.parametrize("world", world_names())
+def test_tasks_make_settings_that_can_be_carried_out(world: str) -> None:
+    site, shift = site_of(world), world_names().index(world)
+    for number, name in enumerate(task_names()):
+        task = find_task(name)
+        # Each world takes its turn with every fourth task, so that all are tried quickly.
+        if (number + shift) % 4 or not task.is_offered(site):
+            continue
+        setting = task.make_setting(site, seed=number, memory=MEMORY_TEXT)
+        start = (site.world.start.inverse() @ setting.start).point
+        cell = site.grid.cell_at(start)
+        assert site.with_more(setting.added).floor.solid.free[cell.row, cell.col], name
+        assert site.floor.standable[cell.row, cell.col], name
+        assert setting.prompt, name
+        assert setting.is_known == task.needs_map, name
+        shortest_m = setting.truth.get("shortest_m")
+        assert shortest_m is None or (0 <= shortest_m < math.inf), name
+
+
+@pytest.mark.parametrize("world", world_names())
+def test_the_papers_tasks_are_offered_in_every_world(world: str) -> None:
+    assert all(find_task(name).is_offered(site_of(world)) for name in FAMILIES["paper"])
+
+
+def test_the_same_seed_makes_the_same_setting_and_another_seed_another() -> None:
+    site, task = site_of("warehouse"), find_task("side-of-pose")
+    first, same, other = (
+        task.make_setting(site, seed=seed, memory=MEMORY_TEXT) for seed in (3, 3, 4)
+    )
+    assert first == same
+    assert first != other
+
+
+def test_the_papers_prompts_are_word_for_word_the_papers() -> None:
+    site = site_of("warehouse")
+    prompts = [
+        find_task(name).make_setting(site, seed=0, memory=MEMORY_TEXT).prompt
+        for name in FAMILIES["paper"]
+    ]
+    assert prompts == [
+        "Update the map while moving.",
+        "Go to the smallest room.",
+        "Fire detected nearby. Navigate to the tool used for it.",
+    ]
+    explore = find_task("explore").make_setting(site, seed=0, memory=None)
+    assert read_text("exploration") in explore.guidance
+
+
+def test_a_blocked_way_is_longer_than_the_one_on_the_map_or_there_is_none() -> None:
+    site, task = site_of("office"), find_task("blocked-way")
+    setting = task.make_setting(site, seed=1, memory=MEMORY_TEXT)
+    start = site.world.start.inverse() @ setting.start
+    goal = site.cells_of(site.room_named(setting.truth["room"]))
+    blocked = site.with_more(setting.added)
+    on_map_m = site.shortest_to_any_m(start.point, goal)
+    assert blocked.shortest_to_any_m(start.point, goal) > on_map_m
+    assert isinstance(start, Pose)
+
+
+def test_a_spoiled_memory_no_longer_says_where_the_thing_is() -> None:
+    site = site_of("warehouse")
+    for seed in range(20):
+        setting = find_task("missing-note").make_setting(site, seed=seed, memory=MEMORY_TEXT)
+        assert f"label: {site.label_of(setting.truth['kind'])}" not in (setting.memory or "")

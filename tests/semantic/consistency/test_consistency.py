@@ -1,0 +1,163 @@
+import math
+
+from drawing import grid_from_text
+from mapspeak.geometry import Point, Pose
+from mapspeak.semantic import Landmark, SemanticMap, Waypoint
+from mapspeak.semantic.consistency import Finding, FindingKind, check_memory, judge_trust
+from mapspeak.semantic.things import Things, find_things
+from mapspeak.spatial.paths import distances_from
+from mapspeak.spatial.rooms import find_rooms
+
+HALL = """
+    #########################???????????
+    #...........#...........????????????
+    #...........#...........????????????
+    #...........#...........????????????
+    #...........#...........#???
+    #...........#...........#???
+    #...........#...........#???
+    #.......................#???
+    #.......................#???
+    #.......................#???
+    #...........#...........#???
+    #########################???
+"""
+GRID = grid_from_text(HALL, resolution_m=0.25)
+
+
+def place(
+    name: str,
+    x: float,
+    y: float,
+    *landmarks: Landmark,
+    yaw_deg: float = 90.0,
+    map_id: str | None = None,
+    room_id: str | None = None,
+) -> Waypoint:
+    return Waypoint(
+        name=name,
+        pose=Pose(x, y, math.radians(yaw_deg)),
+        functional_landmarks=landmarks,
+        map_id=map_id,
+        room_id=room_id,
+    )
+
+
+def mark(label: str, bearing_deg: float = 0.0, range_m: float | None = None) -> Landmark:
+    return Landmark(label=label, bearing_rad=math.radians(bearing_deg), range_m=range_m)
+
+
+def check(*places: Waypoint, map_id: str | None = None) -> tuple[Things, tuple[Finding, ...]]:
+    memory = SemanticMap(waypoints=places)
+    found = find_things(memory, GRID)
+    distances = distances_from(GRID, Point(1.0, 1.0), radius_m=0.2)
+    rooms = find_rooms(GRID)
+    return found, check_memory(memory, found, distances=distances, rooms=rooms, map_id=map_id)
+
+
+def kinds(*places: Waypoint, map_id: str | None = None) -> list[FindingKind]:
+    return [finding.kind for finding in check(*places, map_id=map_id)[1]]
+
+
+def test_a_good_record_has_no_findings() -> None:
+    assert kinds(place("a", 1.5, 1.5, mark("sink"))) == []
+
+
+def test_a_pose_is_judged_by_the_map_as_it_is_now() -> None:
+    assert kinds(place("a", 90.0, 1.0)) == [FindingKind.OFF_MAP]
+    assert kinds(place("a", 0.1, 1.0)) == [FindingKind.IN_OBSTACLE]
+    assert kinds(place("a", 6.9, 0.4)) == [FindingKind.IN_UNKNOWN]
+    assert kinds(place("a", 0.3, 0.3)) == []
+    assert kinds(place("a", 1e300, 1e300)) == [FindingKind.OFF_MAP]
+
+
+def test_a_place_that_the_robot_cannot_get_to_is_said_with_its_radius() -> None:
+    memory = SemanticMap(waypoints=(place("a", 1.0, 1.5),))
+    distances = distances_from(GRID, Point(1.0, 1.0), radius_m=3.0)
+    (finding,) = check_memory(memory, find_things(memory, GRID), distances=distances)
+    assert finding.kind is FindingKind.UNREACHABLE
+    assert "3.00 m radius" in finding.sentence
+
+
+def test_a_record_of_another_map_is_marked() -> None:
+    assert kinds(place("a", 1.5, 1.5, map_id="old"), map_id="new") == [FindingKind.OTHER_MAP]
+    assert kinds(place("a", 1.5, 1.5, map_id="new"), map_id="new") == []
+
+
+def test_a_range_beyond_the_wall_is_told_with_both_distances() -> None:
+    _, (finding,) = check(place("a", 1.5, 2.0, mark("sink", 90.0, 9.0)))
+    assert finding.kind is FindingKind.BEHIND_WALL
+    assert "9.0 m away" in finding.sentence
+    assert finding.label == "sink"
+
+
+def test_a_line_that_leaves_the_seen_floor_is_told() -> None:
+    assert kinds(place("a", 4.0, 2.4, mark("sink"), yaw_deg=0.0)) == [FindingKind.THROUGH_UNKNOWN]
+
+
+def test_two_places_with_one_pose_and_content_are_twins() -> None:
+    twin = place("b", 1.6, 1.5, mark("Sink"))
+    findings = check(place("a", 1.5, 1.5, mark("sink")), twin)[1]
+    assert [finding.kind for finding in findings] == [FindingKind.DUPLICATE]
+    assert findings[0].waypoints == ("a", "b")
+
+
+def test_two_names_in_one_place_are_both_shown() -> None:
+    one = place("a", 1.5, 0.8, mark("fridge"))
+    other = place("b", 1.5, 1.6, mark("cabinet"))
+    _, (finding,) = check(one, other)
+    assert finding.kind is FindingKind.TWO_LABELS
+    assert "fridge" in finding.sentence
+    assert "cabinet" in finding.sentence
+
+
+def test_who_names_both_has_seen_two_things() -> None:
+    one = place("a", 1.5, 0.8, mark("table"), mark("coffee machine"))
+    assert FindingKind.TWO_LABELS not in kinds(one)
+
+
+def test_what_somebody_looked_at_and_did_not_name_is_a_weak_finding() -> None:
+    seen = (
+        place("a", 1.0, 0.8, mark("sink", -11.0)),
+        place("b", 2.0, 0.8, mark("sink", 14.0)),
+    )
+    looked = place("c", 1.5, 1.2, mark("door", 40.0), mark("window", -40.0))
+    found, findings = check(*seen, looked)
+    assert [finding.kind for finding in findings] == [FindingKind.NOT_SEEN]
+    trust, before = judge_trust(found.things[0], findings), judge_trust(found.things[0], ())
+    assert found.things[0].label == "sink"
+    assert trust.ratio < before.ratio
+    assert "'c' looked to where" in trust.reasons[1]
+
+
+def test_a_record_filed_under_another_room_is_told() -> None:
+    rooms = find_rooms(GRID)
+    west = rooms.find_region_at(Point(1.5, 1.5))
+    assert west is not None
+    assert kinds(place("a", 1.5, 1.5, room_id=west.id)) == []
+    others = [region.id for region in rooms.regions if region.id != west.id]
+    assert [kinds(place("a", 1.5, 1.5, room_id=other)) for other in others] == [
+        [FindingKind.WRONG_ROOM] for _ in others
+    ]
+
+
+def test_trust_falls_with_every_finding_and_says_why() -> None:
+    found, findings = check(place("a", 0.3, 0.3, mark("sink", -20.0), map_id="old"), map_id="new")
+    trust = judge_trust(found.things[0], findings)
+    assert trust.ratio < found.things[0].confidence_ratio
+    assert trust.reasons == (
+        "Seen from 1: 'a'.",
+        "'a' belongs to the map 'old', but the robot is on 'new'.",
+    )
+
+
+def test_one_bad_place_of_three_counts_by_a_third() -> None:
+    good = [place(name, x, 0.8, mark("sink")) for name, x in (("a", 1.4), ("b", 1.8))]
+    bad = place("c", 1.6, 1.2, mark("sink"), map_id="old")
+    found, findings = check(*good, bad, map_id="new")
+    alone, alone_findings = check(bad, map_id="new")
+    lost = judge_trust(found.things[0], ()).ratio - judge_trust(found.things[0], findings).ratio
+    alone_lost = (
+        judge_trust(alone.things[0], ()).ratio - judge_trust(alone.things[0], alone_findings).ratio
+    )
+    assert 0 < lost < alone_lost

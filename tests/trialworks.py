@@ -1,0 +1,77 @@
+"""What trials do in tests of the scheduler; importable, as other processes have to find it."""
+
+import os
+import signal
+import sys
+import threading
+from functools import partial
+from pathlib import Path
+
+from mapspeak.evaluation.runs import Job, run_jobs
+from mapspeak.evaluation.trials import Score, Trial, TrialResult, TrialState, write_result
+
+LOG = "log.txt"
+KILLED = "killed.txt"
+FOR_EVER_S = 60.0
+
+
+def make_trial(number: int) -> Trial:
+    """Gives a trial that differs from others in its number alone."""
+    return Trial(
+        task="count", world="none", seed=0, agent="nobody", representation="plain", number=number
+    )
+
+
+def succeed(run: Path, trial: Trial) -> None:
+    """Notes that it was run and writes a result."""
+    with (run / LOG).open("a") as log:
+        log.write(f"{trial.id}\n")
+    score = Score(is_success=True, reason="It is done.")
+    write_result(run, TrialResult(trial=trial, prompt="", state=TrialState.FINISHED, score=score))
+
+
+def raise_error() -> None:
+    """Fails as a bug does."""
+    raise RuntimeError("a bug on purpose")
+
+
+def kill_itself() -> None:
+    """Dies as for want of memory."""
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def wait_for_ever() -> None:
+    """Hangs."""
+    threading.Event().wait(FOR_EVER_S)
+
+
+def kill_run_once(run: Path, trial: Trial, run_pid: int) -> None:
+    """Kills the run's process the first time, and succeeds the second."""
+    if not (run / KILLED).exists():
+        (run / KILLED).touch()
+        os.kill(run_pid, signal.SIGKILL)
+        wait_for_ever()
+    succeed(run, trial)
+
+
+def ignore(_result: TrialResult) -> None:
+    """Listens to no result."""
+
+
+def run_some(run: Path, run_pid: int) -> None:
+    """Runs six trials, the third of which kills the run."""
+    trials = [make_trial(number) for number in range(1, 7)]
+    works = [partial(succeed, run, trial) for trial in trials]
+    works[2] = partial(kill_run_once, run, trials[2], run_pid)
+    jobs = [
+        Job(trial=trial, work=work, wall_s=FOR_EVER_S)
+        for trial, work in zip(trials, works, strict=True)
+    ]
+    run_jobs(run, jobs, n_jobs=1, on_done=ignore)
+
+
+if __name__ == "__main__":
+    # By its own name, so that other processes find the functions too.
+    import trialworks
+
+    trialworks.run_some(Path(sys.argv[1]), os.getpid())
