@@ -57,12 +57,13 @@ _LINES = _WORDS.filter(lambda text: any(c.isprintable() and c != " " for c in te
 _TEXTS = st.lists(st.one_of(_WORDS, st.just("")), max_size=3).map("\n".join)
 _NUMBERS = st.floats(-1e6, 1e6) | st.sampled_from([-0.0, -0.0004, 1e-9, 12.3456])
 _ANGLES = st.floats(-7.0, 7.0)
+_POSES = st.builds(Pose, _NUMBERS, _NUMBERS, _ANGLES)
 _ZONES = st.sampled_from([UTC, timezone(timedelta(hours=9)), timezone(-timedelta(hours=3.5))])
 _TIMES = st.datetimes(datetime(1, 1, 2), datetime(9999, 12, 30), timezones=_ZONES)  # noqa: DTZ001 - the bounds take no zone
 
 
-def landmarks() -> st.SearchStrategy[Landmark]:
-    """Gives any landmark, most of them with a label alone."""
+def landmarks(*, has_pose: bool = False) -> st.SearchStrategy[Landmark]:
+    """Gives any landmark, most of them with a label alone; perhaps with a pose of its own."""
     full = st.builds(
         Landmark,
         label=_LINES,
@@ -74,17 +75,18 @@ def landmarks() -> st.SearchStrategy[Landmark]:
         picture=st.none() | _WORDS,
         stamp_s=st.none() | st.floats(0, 2e9),
         recorded_at=st.none() | _TIMES,
+        pose=st.none() | _POSES if has_pose else st.none(),
     )
     return st.builds(Landmark, label=_LINES) | full
 
 
-def waypoints() -> st.SearchStrategy[Waypoint]:
-    """Gives any waypoint."""
-    few_landmarks = st.lists(landmarks(), max_size=3).map(tuple)
+def waypoints(*, has_poses: bool = False) -> st.SearchStrategy[Waypoint]:
+    """Gives any waypoint; perhaps with landmarks that were seen from elsewhere."""
+    few_landmarks = st.lists(landmarks(has_pose=has_poses), max_size=3).map(tuple)
     return st.builds(
         Waypoint,
         name=_LINES,
-        pose=st.builds(Pose, _NUMBERS, _NUMBERS, _ANGLES),
+        pose=_POSES,
         description=_TEXTS,
         safety_landmarks=few_landmarks,
         functional_landmarks=few_landmarks,

@@ -2,7 +2,9 @@
 
 import math
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from functools import cache
 
 import click
 import cv2
@@ -11,16 +13,22 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.figure import Figure
-from benchmarks.memory.asking import Finder, Outcome, Verdict, ask, by_label, choose, open_library
+from benchmarks.memory.asking import FindModel, open_atlas
+from benchmarks.memory.judging import Facing, Fault, Judged, Outcome, choose, judge_all
 from benchmarks.memory.observer import observe
 from benchmarks.memory.places import PlaceError, measure_places
-from benchmarks.memory.sites import Site, build_sites
-from mapspeak.semantic.things import find_things
+from benchmarks.memory.sites import Site, build_held_out, build_sites
+from mapspeak.evaluation.scores import wilson_interval
+from mapspeak.semantic.retrieval import Embedder, find_model
 
 __all__ = ["main", "measure"]
 
 N_REQUESTS = 300
 SEEDS = (1, 2)
+GROUPS: dict[str, Callable[[], Iterator[Site]]] = {
+    "used": build_sites,
+    "held out": build_held_out,
+}
 RULES: dict[str, Callable[[PlaceError], float]] = {
     "ours": lambda error: error.ours_m,
     "observer's own pose": lambda error: error.own_pose_m,
@@ -29,36 +37,61 @@ RULES: dict[str, Callable[[PlaceError], float]] = {
 }
 
 
-class Trial:
-    """One building, observed once."""
+@cache
+def _the_model() -> Embedder | None:
+    return find_model()
 
-    def __init__(self, site: Site, *, seed: int, has_ranges: bool, finder: Finder) -> None:
+
+def _no_model() -> None:
+    return None
+
+
+WAYS: dict[str, FindModel] = {"with model": _the_model, "words alone": _no_model}
+
+
+class Trial:
+    """One building, observed once.
+
+    Args:
+        site: The building.
+        seed: Of all noise.
+        has_ranges: Observers tell ranges, too.
+        ways: How requests are understood.
+    """
+
+    def __init__(
+        self, site: Site, *, seed: int, has_ranges: bool, ways: Sequence[str] = tuple(WAYS)
+    ) -> None:
         memory = observe(site, seed=seed, has_ranges=has_ranges)
+        atlases = {way: open_atlas(site, memory.places, WAYS[way]) for way in ways}
         started_s = time.process_time()
-        found = find_things(memory.places, site.grid)
+        found = atlases[ways[0]].recollection.found
         self.took_s = time.process_time() - started_s
+        self.site = site
         self.n_waypoints = len(memory.places.waypoints)
         self.errors = list(measure_places(site, memory, found))
-        library = open_library(site, memory.places, found)
-        self.verdicts = list(ask(site, library, memory.annotated, finder))
+        self.judged = {way: list(judge_all(site, memory, atlas)) for way, atlas in atlases.items()}
 
 
-def measure(finder: Finder = by_label) -> Iterator[Figure]:
-    """Gives errors of places with and without ranges, and how requests came out."""
+def measure() -> Iterator[Figure]:
+    """Gives errors of places and how requests came out, each with ranges and without."""
     cv2.setNumThreads(1)
-    sites = list(build_sites())
-    for has_ranges in (False, True):
-        trials = [
-            Trial(site, seed=seed, has_ranges=has_ranges, finder=finder)
-            for seed in SEEDS
-            for site in sites
-        ]
-        kind = "bearings and ranges" if has_ranges else "bearings alone"
-        yield from _measure_errors(kind, [e for trial in trials for e in trial.errors])
-        every = [verdict for trial in trials for verdict in trial.verdicts]
-        yield from _measure_verdicts(kind, choose(every, n=N_REQUESTS, seed=9))
-        took_ms = 1e3 * sum(t.took_s for t in trials) / sum(t.n_waypoints for t in trials)
-        yield Figure(name=f"{kind}: CPU for one waypoint", value=took_ms, unit="ms")
+    for group, build in GROUPS.items():
+        sites = list(build())
+        for has_ranges in (False, True):
+            kind = f"{group}, {'bearings and ranges' if has_ranges else 'bearings alone'}"
+            trials = [
+                Trial(site, seed=seed, has_ranges=has_ranges) for seed in SEEDS for site in sites
+            ]
+            yield from _measure_errors(kind, [e for trial in trials for e in trial.errors])
+            for way in WAYS:
+                every = [each for trial in trials for each in trial.judged[way]]
+                drawn = choose(every, n=N_REQUESTS, seed=9)
+                yield from _measure_answers(f"{kind}, {way}: {len(drawn)} requests", drawn)
+                yield from _measure_answers(f"{kind}, {way}: all {len(every)} requests", every)
+                yield from _measure_causes(f"{kind}, {way}: all {len(every)} requests", every)
+            took_ms = 1e3 * sum(t.took_s for t in trials) / sum(t.n_waypoints for t in trials)
+            yield Figure(name=f"{kind}: CPU for one waypoint", value=took_ms, unit="ms")
 
 
 def _measure_errors(kind: str, errors: Sequence[PlaceError]) -> Iterator[Figure]:
@@ -77,43 +110,88 @@ def _measure_errors(kind: str, errors: Sequence[PlaceError]) -> Iterator[Figure]
         name = f"{kind}: ours, median where {n_wrong} of three are wrong ({len(some)})"
         yield Figure(name=name, value=float(np.median(some or [0.0])), unit="m")
     held = [error.is_held for error in errors if math.isfinite(error.ours_m)]
-    yield Figure(
-        name=f"{kind}: within the radius that holds 90 %", value=100 * _mean(held), unit="%"
-    )
+    yield _share(f"{kind}: within the radius that holds 90 %", held)
 
 
-def _measure_verdicts(kind: str, verdicts: Sequence[Verdict]) -> Iterator[Figure]:
-    yield Figure(name=f"{kind}: requests", value=len(verdicts), unit="")
+def _measure_answers(kind: str, judged: Sequence[Judged]) -> Iterator[Figure]:
     for outcome in Outcome:
-        share = _mean([verdict.outcome is outcome for verdict in verdicts])
-        yield Figure(name=f"{kind}: {outcome}", value=100 * share, unit="%")
-    written = [each.outcome is Outcome.RIGHT for each in verdicts if each.was_annotated]
-    yield Figure(
-        name=f"{kind}: right thing, of those written down", value=100 * _mean(written), unit="%"
+        yield _share(f"{kind}, {outcome}", [each.outcome is outcome for each in judged])
+    is_good = [each.outcome is not Outcome.WRONG for each in judged]
+    yield _share(f"{kind}, right or honest", is_good)
+    unsaid = [each.outcome is Outcome.WRONG and not each.is_told_unsure for each in judged]
+    yield _share(f"{kind}, wrong and not even called likely or doubtful", unsaid)
+    written = [each for each in judged if each.was_annotated]
+    right = [each.outcome is Outcome.RIGHT for each in written]
+    yield _share(f"{kind}, right thing, of those written down", right)
+    listed = [each.is_listed for each in written]
+    yield _share(f"{kind}, right thing among the candidates, of those written down", listed)
+    found = [each for each in judged if each.facing is not None]
+    faces = [each.facing is Facing.FACES for each in found]
+    yield _share(f"{kind}, goal {Facing.FACES}", faces)
+    sure = [each.facing is Facing.FACES for each in found if not each.is_told_unsure]
+    yield _share(f"{kind}, goal {Facing.FACES}, of those told without doubt", sure)
+
+
+def _measure_causes(kind: str, judged: Sequence[Judged]) -> Iterator[Figure]:
+    """Gives what the wrong answers were, and why goals do not face what was found."""
+    for fault in Fault:
+        n = sum(each.fault is fault for each in judged)
+        yield Figure(name=f"{kind}, wrong: {fault}", value=n, unit="answers")
+    for facing in Facing:
+        n = sum(each.facing is facing for each in judged)
+        yield Figure(name=f"{kind}, goal {facing}", value=n, unit="answers")
+
+
+def _share(name: str, values: Sequence[bool]) -> Figure:
+    interval = wilson_interval(sum(values), len(values))
+    if interval is None:
+        return Figure(name=f"{name} (of none)", value=0.0, unit="%")
+    ends = f"{100 * interval.low:.1f} to {100 * interval.high:.1f}"
+    return Figure(
+        name=f"{name} ({sum(values)} of {len(values)}, {ends})",
+        value=100 * interval.value,
+        unit="%",
     )
-    faces = [verdict.faces for verdict in verdicts if verdict.faces is not None]
-    yield Figure(name=f"{kind}: pose faces it from 1.5 m", value=100 * _mean(faces), unit="%")
-
-
-def _mean(values: Sequence[bool]) -> float:
-    return sum(values) / max(len(values), 1)
 
 
 @click.command()
 @click.option("--seed", default=SEEDS[0], show_default=True, help="Of all noise.")
 @click.option("--ranges", "has_ranges", is_flag=True, help="Observers tell ranges, too.")
-def main(*, seed: int, has_ranges: bool) -> None:
+@click.option("--group", type=click.Choice(list(GROUPS)), default="used", show_default=True)
+@click.option("--way", type=click.Choice(list(WAYS)), default="with model", show_default=True)
+@click.option("--wrong", "shows_wrong", is_flag=True, help="Lists the confident wrong answers.")
+def main(*, seed: int, has_ranges: bool, group: str, way: str, shows_wrong: bool) -> None:
     """Shows every building: errors of places in metres, and answers."""
     cv2.setNumThreads(1)
+    console = Console(width=150)
     table = Table("building", "things", *(f"{rule}, m" for rule in RULES), *Outcome, "faces it")
-    for site in build_sites():
-        trial = Trial(site, seed=seed, has_ranges=has_ranges, finder=by_label)
-        medians = [
-            float(np.median([error_of(error) for error in trial.errors]))
-            for error_of in RULES.values()
-        ]
-        counts = [sum(v.outcome is outcome for v in trial.verdicts) for outcome in Outcome]
-        faces = [verdict.faces for verdict in trial.verdicts if verdict.faces is not None]
-        told = [f"{each:.2f}" for each in medians] + [str(n) for n in counts]
-        table.add_row(site.name, str(len(site.things)), *told, f"{100 * _mean(faces):.0f} %")
-    Console().print(table)
+    wrong: list[Judged] = []
+    for site in GROUPS[group]():
+        trial = Trial(site, seed=seed, has_ranges=has_ranges, ways=(way,))
+        judged = trial.judged[way]
+        table.add_row(site.name, str(len(site.things)), *_columns(trial.errors, judged))
+        wrong += [each for each in judged if each.outcome is Outcome.WRONG]
+    console.print(table)
+    for fault, n in Counter(each.fault for each in wrong).most_common() if shows_wrong else ():
+        console.print(f"{n} x {fault}")
+    for each in wrong if shows_wrong else ():
+        console.print(_say_wrong(each), markup=False, soft_wrap=True)
+
+
+def _columns(errors: Sequence[PlaceError], judged: Sequence[Judged]) -> Iterator[str]:
+    for error_of in RULES.values():
+        yield f"{np.median([error_of(error) for error in errors]):.2f}"
+    for outcome in Outcome:
+        yield str(sum(each.outcome is outcome for each in judged))
+    faces = [each.facing is Facing.FACES for each in judged if each.facing is not None]
+    yield f"{100 * sum(faces) / max(len(faces), 1):.0f} %"
+
+
+def _say_wrong(judged: Judged) -> str:
+    first = judged.answer.candidates[0]
+    return (
+        f'{judged.site}: "{judged.request.words}" got {first.id} "{first.name}" in '
+        f"{' or '.join(first.room_ids)}, {len(first.seen_from)} views, trust "
+        f"{first.trust.ratio:.3f}, good to {first.uncertainty_m or 0.0:.1f} m, score "
+        f"{first.score_ratio:.2f}, {judged.off_m:.1f} m from the nearest: {judged.fault}"
+    )

@@ -1,4 +1,8 @@
-"""Buildings with things in them: shipped, drawn by a seeded generator, and real maps furnished."""
+"""Buildings with things in them: shipped, drawn by a seeded generator, and real maps furnished.
+
+What the memory believes of observers was chosen on `build_sites`; `build_held_out` was not looked
+at for that, and must not be.
+"""
 
 import dataclasses
 import math
@@ -14,21 +18,23 @@ from numpy.typing import NDArray
 
 from benchmarks.search import build_worlds
 from mapspeak.geometry import Point, Pose
+from mapspeak.navigation.revision import MapRevision
 from mapspeak.simulator import (
     BODY_RADIUS_M,
     TrueFloor,
     World,
     WorldObject,
     load_world,
+    world_names,
 )
 from mapspeak.simulator.models import Category, find_kind, footprint
 from mapspeak.simulator.sight import EYE_BAND_M, OWN_SIZE_M, SIDEWAYS_M
 from mapspeak.simulator.slices import slice_world
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import clearance_m
-from mapspeak.spatial.rooms import RoomMap, find_rooms
+from mapspeak.spatial.rooms import RoomMap
 
-__all__ = ["Site", "TrueThing", "build_sites"]
+__all__ = ["Site", "TrueThing", "build_held_out", "build_sites"]
 
 MAPS = Path(__file__).parents[2] / "tests" / "maps"
 REAL_MAPS = (MAPS / "aws_small_house" / "map.yaml", MAPS / "freiburg79" / "whole.yaml")
@@ -37,6 +43,8 @@ HUNG = ("fire_extinguisher", "whiteboard", "first_aid_box", "exit_sign", "sink",
 STANDING = ("cabinet", "printer", "plant", "trash_bin", "fridge", "sofa", "ladder", "crate")
 APART_M = 1.2
 BODY_HEIGHT_M = 2.0
+RADIUS_M = BODY_RADIUS_M + 0.03
+USED_FOR_CHOOSING = ("office", "warehouse")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,9 +109,14 @@ class Site:
         return self.grid.points_at(*np.nonzero(self._standable))
 
     @cached_property
+    def revision(self) -> MapRevision:
+        """The map as the robot keeps it."""
+        return MapRevision(self.grid, radius_m=RADIUS_M)
+
+    @property
     def rooms(self) -> RoomMap:
         """The rooms that are found on the map."""
-        return find_rooms(self.grid)
+        return self.revision.rooms
 
     def room_of(self, thing: TrueThing) -> str | None:
         """Gives the room a thing faces."""
@@ -141,8 +154,15 @@ def _free_m(edges: NDArray[np.float64], start: Point, end: Point) -> float:
     return float(ray[is_hit].min(initial=np.inf))
 
 
+def build_held_out() -> Iterator[Site]:
+    """Gives the shipped buildings that nothing was chosen on."""
+    for name in world_names():
+        if name not in USED_FOR_CHOOSING:
+            yield Site(load_world(name))
+
+
 def build_sites() -> Iterator[Site]:
-    """Gives all buildings."""
+    """Gives the buildings that were at hand when the memory was made."""
     with TemporaryDirectory() as folder:
         for world in build_worlds(Path(folder)):
             yield Site(world)

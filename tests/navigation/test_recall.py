@@ -45,6 +45,22 @@ def test_a_thing_seen_from_several_places_is_one_candidate_with_position_and_goa
     assert f"navigate_to takes {first.id}" in answer.advice
 
 
+def test_a_thing_that_one_view_alone_speaks_of_is_likely_and_not_found() -> None:
+    answer = recall(atlas_of(LOOKS[0]), RecallQuery(words="fire extinguisher"))
+    assert answer.verdict is Verdict.LIKELY
+    assert "no two good views of it agree" in answer.advice
+    assert f"navigate_to takes {answer.candidates[0].id}" in answer.advice
+
+
+def test_a_thing_whose_direction_nobody_noted_is_likely_where_it_was_seen() -> None:
+    place = Waypoint(
+        name="hall", pose=ROBOT, functional_landmarks=(Landmark(label="fire extinguisher"),)
+    )
+    answer = recall(atlas_of(place), RecallQuery(words="fire extinguisher"))
+    assert answer.verdict is Verdict.LIKELY
+    assert "was not noted" in answer.advice
+
+
 def test_what_is_not_remembered_is_said_with_what_to_do_next() -> None:
     answer = recall(atlas_of(*LOOKS), RecallQuery(words="a helicopter"))
     assert answer.verdict is Verdict.NOT_REMEMBERED

@@ -6,7 +6,14 @@ import pytest
 from hypothesis import given, settings
 
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.semantic import Confidence, Landmark, Waypoint, merge_waypoint, seen_from
+from mapspeak.semantic import (
+    Confidence,
+    Landmark,
+    Waypoint,
+    group_views,
+    merge_waypoint,
+    seen_from,
+)
 from waypoints import waypoints
 
 HERE = Pose(1.0, 2.0, 0.5)
@@ -50,7 +57,8 @@ def test_the_same_label_near_the_same_bearing_is_the_same_thing() -> None:
     assert sign.bearing_rad == pytest.approx(math.radians(35))
     assert sign.range_m == 3.0
     assert len(merge.merged) == 1
-    assert merge.new == merge.kept == ()
+    assert not merge.new
+    assert not merge.kept
 
 
 def test_the_same_label_elsewhere_is_another_thing() -> None:
@@ -114,7 +122,7 @@ def test_what_is_not_named_is_kept_with_the_time_it_was_last_seen() -> None:
     tap, hose = merge.waypoint.landmarks
     assert (tap.label, tap.stamp_s) == ("tap", None)
     assert (hose.stamp_s, hose.recorded_at, hose.picture) == (5.0, monday, "P1.jpg")
-    assert merge.kept == (hose,)
+    assert merge.kept == ((hose,),)
 
 
 def test_what_is_said_to_be_gone_is_taken_out_unless_it_is_seen_again() -> None:
@@ -168,7 +176,7 @@ def test_a_bearing_alone_turns_with_the_robot_and_is_left_out_when_it_has_moved(
 def test_telling_the_same_again_changes_nothing_but_the_time(waypoint: Waypoint) -> None:
     merge = merge_waypoint(waypoint, waypoint)
 
-    assert merge.new == merge.kept == merge.gone == ()
+    assert [*merge.new, *merge.kept, *merge.gone] == []
     assert [each.label for each in merge.waypoint.landmarks] == [
         each.label for each in waypoint.landmarks
     ]
@@ -180,11 +188,82 @@ def test_telling_the_same_again_changes_nothing_but_the_time(waypoint: Waypoint)
 def test_no_label_is_ever_lost_or_doubled(before: Waypoint, now: Waypoint) -> None:
     merge = merge_waypoint(before, replace(now, name=before.name))
 
+    n_kept = sum(len(views) for views in merge.kept)
+    n_further = sum(len(reunion.further) for reunion in merge.merged)
     n_after = len(merge.waypoint.landmarks)
-    assert n_after == len(now.landmarks) + len(merge.kept)
-    assert n_after == len(before.landmarks) + len(merge.new)
-    assert len(merge.merged) + len(merge.kept) == len(before.landmarks)
+    assert n_after == len(now.landmarks) + n_further + n_kept
+    assert n_after == len(before.landmarks) + len(merge.new) + n_further
+    assert len(merge.merged) + n_kept == len(before.landmarks)
     assert merge.waypoint.pose == now.pose
+
+
+ELSEWHERE = Pose(2.2, 2.0, -1.0)
+
+
+def test_what_is_not_named_from_elsewhere_keeps_its_bearing_and_the_pose_it_was_seen_from() -> None:
+    merge = merge_waypoint(dock(thing("tap", 40)), dock(thing("rack"), pose=ELSEWHERE))
+
+    _, tap = merge.waypoint.landmarks
+    assert tap.bearing_rad == pytest.approx(math.radians(40))
+    assert merge.waypoint.pose_of(tap) == HERE
+
+
+def test_a_look_from_elsewhere_is_a_further_view_of_the_thing() -> None:
+    merge = merge_waypoint(dock(thing("tap", 40)), dock(thing("tap", -20), pose=ELSEWHERE))
+
+    latest, earlier = merge.waypoint.landmarks
+    assert latest.bearing_rad == pytest.approx(math.radians(-20))
+    assert earlier.bearing_rad == pytest.approx(math.radians(40))
+    assert (latest.pose, earlier.pose) == (None, HERE)
+    assert [len(reunion.further) for reunion in merge.merged] == [1]
+    assert not merge.new
+    assert not merge.kept
+
+
+def test_a_look_from_near_by_takes_the_place_of_the_view_from_there() -> None:
+    seen = merge_waypoint(dock(thing("tap", 40)), dock(thing("tap", -20), pose=ELSEWHERE)).waypoint
+    near = Pose(HERE.x + 0.2, HERE.y, HERE.yaw_rad)
+
+    merge = merge_waypoint(seen, dock(thing("tap", 45), pose=near))
+
+    assert [merge.waypoint.pose_of(each) for each in merge.waypoint.landmarks] == [near, ELSEWHERE]
+
+
+def test_a_thing_has_no_more_views_than_count_and_those_are_apart() -> None:
+    place = dock(thing("tap", 0), pose=Pose(0.0, 0.0, 0.0))
+    for x in (0.6, 1.2, 6.0, 9.0, 9.6):
+        place = merge_waypoint(place, dock(thing("tap", 0), pose=Pose(x, 0.0, 0.0))).waypoint
+
+    assert [place.pose_of(each).x for each in place.landmarks] == [9.6, 6.0, 1.2, 0.0]
+
+
+def test_two_of_one_label_from_one_spot_stay_two_things_with_their_own_views() -> None:
+    before = dock(thing("sign", 60, 4.0), thing("sign", -60, 4.0))
+    there = Pose(2.0, 2.5, 0.5)
+    now = [seen_from(each, HERE, there) for each in before.landmarks]
+
+    merge = merge_waypoint(before, dock(*now, pose=there))
+
+    assert [len(views) for views in group_views(merge.waypoint)] == [2, 2]
+    assert not merge.new
+    assert not merge.kept
+
+
+def test_a_label_alone_from_elsewhere_leaves_the_view_as_it_was() -> None:
+    merge = merge_waypoint(dock(thing("tap", 40)), dock(thing("tap"), pose=ELSEWHERE))
+
+    (tap,) = merge.waypoint.landmarks
+    assert tap.bearing_rad == pytest.approx(math.radians(40))
+    assert tap.pose == HERE
+
+
+def test_a_thing_with_several_views_is_gone_as_a_whole() -> None:
+    seen = merge_waypoint(dock(thing("tap", 40)), dock(thing("tap", -20), pose=ELSEWHERE)).waypoint
+
+    merge = merge_waypoint(seen, dock(thing("rack")), gone=["tap"])
+
+    assert [each.label for each in merge.waypoint.landmarks] == ["rack"]
+    assert [each.label for each in merge.gone] == ["tap"]
 
 
 @settings(max_examples=60, deadline=None)

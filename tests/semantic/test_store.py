@@ -126,7 +126,7 @@ def test_what_is_remembered_of_a_place_joins_what_was(store: SemanticMapStore) -
 
     receipt, merge = store.remember(replace(place("Dock"), functional_landmarks=(tap,)))
 
-    assert [each.label for each in merge.kept] == ["hose"]
+    assert [views[0].label for views in merge.kept] == ["hose"]
     assert receipt.waypoint.landmarks == store.read().waypoints[0].landmarks == (hose, tap)
     assert receipt.previous is not None
     assert receipt.previous.landmarks == (hose,)

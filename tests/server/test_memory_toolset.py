@@ -1,6 +1,7 @@
 """The tools of the memory, through a client in memory."""
 
 import math
+import re
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
@@ -254,3 +255,81 @@ async def test_find_place_stays_small_in_the_list(tmp_path: Path) -> None:
         tools = (await client.list_tools()).tools
     (found,) = (tool for tool in tools if tool.name == "find_place")
     assert len(found.model_dump_json(by_alias=True, exclude_none=True)) <= 750
+
+
+@pytest.mark.parametrize("mode", MODES)
+async def test_what_stood_nearest_to_a_thing_goes_by_where_things_are(
+    tmp_path: Path, mode: str
+) -> None:
+    other = record("west", 2.0, 1.0, "potted plant", bearing_deg=140.5)
+    both = seen("a", 4.5, 0.6, "potted plant")
+    fridge = seen("a", 4.5, 0.6, "fridge")["functional_landmarks"][0]
+    both["functional_landmarks"].append({**fridge, "bearing_deg": fridge["bearing_deg"] + 25})
+    sofa = record("c", 4.5, 1.6, "sofa")
+    guard = make_guard(tmp_path)
+    async with connect(
+        FakeRobot(two_rooms()), tmp_path, mode=mode, toolsets=TOOLSETS, guard=guard
+    ) as client:
+        await remember(client, both, seen("b", 5.5, 2.2, "potted plant"), other, sofa)
+
+        async def recall(words: str) -> str:
+            return text_of(await client.call_tool("recall_episodes", {"near_seen": words}))
+
+        plants, by_room = await recall("potted plant"), await recall("potted plant in R2")
+        by_id, never = await recall("T1"), await recall("T0")
+        wanted = {"query": "fridge", "near": "T1"}
+        found = report_of(await client.call_tool("find_place", wanted))
+    first, things, heading, count, *rows = plants.splitlines()
+    assert first.startswith('Nearest to T1 "potted plant" in R1, at ')
+    assert re.search(
+        r'It was seen last of 2 called so; the others are T\d "potted plant" in R2', first
+    )
+    assert re.match(r'Things nearest to it: T\d "fridge" in R1, [12]\.\d m; T\d ', things)
+    assert heading.startswith("Observations without it")
+    assert count.startswith("1 observation")
+    assert '"sofa"' in " ".join(rows)
+    assert re.match(r'Nearest to T\d "potted plant" in R2, at ', by_room)
+    assert by_id.startswith('Nearest to T1 "potted plant" in R1, at ')
+    assert "There is no place called 'T0'" in never
+    assert re.search(r"called \"fridge\"; [12]\.\d m from \(7", found["candidates"][0]["why"])
+
+
+@pytest.mark.parametrize("mode", MODES)
+async def test_events_are_kept_as_notes_and_end_once(tmp_path: Path, mode: str) -> None:
+    guard = make_guard(tmp_path)
+    async with connect(
+        FakeRobot(two_rooms()), tmp_path, mode=mode, toolsets=TOOLSETS, guard=guard
+    ) as client:
+        wet = {"text": "wet floor", "place": "R1", "effect": "closed", "ends": "in 2h"}
+        await client.call_tool("note_event", wet)
+        ended = await client.call_tool("end_event", {"event": "E1"})
+        again = await client.call_tool("end_event", {"event": "E1"})
+        notes = text_of(await client.call_tool("recall_episodes", {"kind": "note"}))
+    assert not ended.is_error
+    assert again.is_error
+    assert "E1 had already ended" in text_of(again)
+    assert notes.startswith("2 observations")
+    assert '"Noted E1: wet floor (R1), closed to the robot, until 14:00."' in notes
+    assert '"Ended E1: wet floor (R1)' in notes
+
+
+@pytest.mark.parametrize("mode", MODES)
+async def test_a_closed_door_and_what_lies_behind_name_the_event(tmp_path: Path, mode: str) -> None:
+    guard = make_guard(tmp_path)
+    async with connect(
+        FakeRobot(two_rooms()), tmp_path, mode=mode, toolsets=TOOLSETS, guard=guard
+    ) as client:
+        await remember(client, record("a", 6.0, 1.2, "sofa"))
+        closed = {"text": "locked", "place": "D1", "effect": "closed", "ends": "in 2h"}
+        noted = text_of(await client.call_tool("note_event", closed))
+        checked = report_of(await client.call_tool("check_goal", {"place": "R1"}))
+        door = text_of(await client.call_tool("describe_place", {"place": "D1"}))
+        memory = text_of(await client.call_tool("check_memory", {}))
+        inside = await client.call_tool("note_event", {**closed, "place": "R2"})
+    assert "cannot get to R1 from where it is" in noted
+    assert "closed by event E1 until 14:00" in checked["reason"]
+    assert "as wide as the robot" not in checked["reason"]
+    assert "closed by event E1 until 14:00: no way for the robot" in door
+    assert "Nothing is odd." in memory
+    assert inside.is_error
+    assert "Drive out first" in text_of(inside)

@@ -216,8 +216,10 @@ class Atlas:
         """Says how far what is remembered may be trusted, and what is odd about it."""
         known = self._reminders
         if known.judge is None:
+            # What is closed for now says nothing against a record of what lies behind it.
+            distances = self.map.open.distances_from(self.robot.point)
             findings = check_memory(
-                self.memory, self.recollection.found, distances=self.distances, rooms=self.rooms
+                self.memory, self.recollection.found, distances=distances, rooms=self.rooms
             )
             known.judge = Judge(findings)
         return known.judge

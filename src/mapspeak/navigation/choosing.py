@@ -85,7 +85,7 @@ def check_place(atlas: Atlas, place: Place, *, yaw_deg: float | None = None) -> 
     pose = stand_at(atlas, place)
     if yaw_deg is not None:
         pose = Pose(pose.x, pose.y, wrap_angle(math.radians(yaw_deg)))
-    check = check_goal(atlas.grid, atlas.distances, pose)
+    check = check_goal(atlas.grid, atlas.distances, pose, opened=atlas.map.open.distances_from)
     return CheckedGoal(place.name, pose, check, place.reason)
 
 

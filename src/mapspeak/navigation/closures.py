@@ -45,6 +45,7 @@ class ClosedArea:
             number of all outlines is outside.
         until: When it opens again, as people read it; empty where it never does.
         reason: Why it is closed, in the operator's words; may be empty.
+        event_id: Of the event that closes it; empty where the policy does.
     """
 
     name: str
@@ -52,6 +53,7 @@ class ClosedArea:
     further_outlines: tuple[Outline, ...] = ()
     until: str = ""
     reason: str = ""
+    event_id: str = ""
     _sides: FloatArray = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -72,8 +74,15 @@ class ClosedArea:
     @property
     def title(self) -> str:
         """The area in words."""
-        kind = f"area {self.name!r}, closed until {self.until}"
-        return kind if self.until else f"keep-out area {self.name!r}"
+        if self.until or self.event_id:
+            return f"area {self.name!r}, {self.closing}"
+        return f"keep-out area {self.name!r}"
+
+    @property
+    def closing(self) -> str:
+        """What closes it and until when: "closed by event E2 until 05:30"."""
+        by = f" by event {self.event_id}" if self.event_id else ""
+        return f"closed{by} until {self.until}" if self.until else f"closed{by}"
 
     @property
     def bounds(self) -> tuple[Point, Point]:
@@ -120,6 +129,11 @@ class ClosedFloor(OccupancyGrid):
     """
 
     areas: tuple[ClosedArea, ...]
+
+    def find_areas_along(self, points: Sequence[Point], *, within_m: float) -> list[ClosedArea]:
+        """Finds the closed areas that reach nearer than that to a way, in the order of the way."""
+        found = (self.find_area(point, within_m=within_m) for point in points)
+        return list(dict.fromkeys(area for area in found if area is not None))
 
     def find_area(self, point: Point, *, within_m: float) -> ClosedArea | None:
         """Finds the nearest closed area that reaches nearer to a point than that."""

@@ -97,6 +97,29 @@ class Diary:
             keeping = self._write(observation, None)
         return keeping
 
+    def keep_note(
+        self, text: str, *, pose: Pose, room_id: str | None = None, map_id: str | None = None
+    ) -> Keeping:
+        """Keeps words alone, such as that an event was noted or ended.
+
+        Args:
+            text: The words.
+            pose: Where the robot stood, in the map frame.
+            room_id: Where that is.
+            map_id: Which map the pose belongs to.
+        """
+        if not self._is_open or self._wall_clock is None:
+            return Keeping()
+        observation = Observation(
+            recorded_at=self._wall_clock(),
+            pose=pose,
+            kind=ObservationKind.NOTE,
+            text=text,
+            room_id=room_id,
+            map_id=map_id,
+        )
+        return self._write(observation, None)
+
     def _write(self, observation: Observation, picture: bytes | None) -> Keeping:
         try:
             kept = self.store.write(observation, picture=picture)

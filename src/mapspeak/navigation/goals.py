@@ -1,6 +1,7 @@
 """Is this goal sensible? Why not? What instead?"""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -13,6 +14,8 @@ from mapspeak.spatial.grid import FloatArray, Mask
 from mapspeak.spatial.paths import DistanceField, clearance_m, distances_from
 
 __all__ = ["GoalCheck", "GoalVerdict", "check_goal", "judge_goal"]
+
+Opened = Callable[[Point], DistanceField]
 
 
 class GoalVerdict(StrEnum):
@@ -62,21 +65,27 @@ WALL_SIDES_M = 0.15
 """A goal in a wall belongs to the nearer side; to both where they differ by no more than this."""
 
 
-def check_goal(grid: OccupancyGrid, distances: DistanceField, goal: Pose) -> GoalCheck:
+def check_goal(
+    grid: OccupancyGrid, distances: DistanceField, goal: Pose, *, opened: Opened | None = None
+) -> GoalCheck:
     """Judges a goal before driving, and finds the nearest pose that would work.
 
     Args:
         grid: The map.
         distances: From the robot, on that map or on its floor without closed areas.
         goal: Where to stand.
+        opened: Gives the distances from a point on the map itself, where somebody keeps them; to
+            say which closed area cuts a goal off.
     """
-    check = judge_goal(grid, distances, goal)
+    check = judge_goal(grid, distances, goal, opened=opened)
     if check.is_ok or check.verdict is GoalVerdict.NOT_FINITE:
         return check
     return replace(check, nearest=_find_nearest(grid, distances, goal))
 
 
-def judge_goal(grid: OccupancyGrid, distances: DistanceField, goal: Pose) -> GoalCheck:
+def judge_goal(
+    grid: OccupancyGrid, distances: DistanceField, goal: Pose, *, opened: Opened | None = None
+) -> GoalCheck:
     """Judges a goal as `check_goal`, without looking for another where it does not work."""
     if not goal.is_finite() or max(abs(goal.x), abs(goal.y)) > FARTHEST_M:
         sentence = f"({goal.x:g}, {goal.y:g}) is no place: a goal is two numbers of metres."
@@ -85,6 +94,8 @@ def judge_goal(grid: OccupancyGrid, distances: DistanceField, goal: Pose) -> Goa
     path_m = distances.distance_to(goal.point)
     closed = _say_closed(distances, goal, is_reachable=path_m is not None)
     verdict, sentence = closed or _judge(grid, distances, goal, clear_m, path_m)
+    if verdict is GoalVerdict.UNREACHABLE:
+        sentence = _say_cut_off(grid, distances, goal, opened) or sentence
     return GoalCheck(verdict=verdict, sentence=sentence, clearance_m=clear_m, path_m=path_m)
 
 
@@ -115,6 +126,24 @@ def _judge(
     return GoalVerdict.UNREACHABLE, sentence
 
 
+def _say_cut_off(
+    grid: OccupancyGrid, distances: DistanceField, goal: Pose, opened: Opened | None
+) -> str:
+    """Says which closed areas cut a goal off; nothing where walls do."""
+    floor, radius_m = distances.lattice.grid, distances.radius_m
+    if not isinstance(floor, ClosedFloor):
+        return ""
+    start = distances.start
+    field = opened(start) if opened else distances_from(grid, start, radius_m=radius_m)
+    way = field.way_to(goal.point)
+    reach_m = radius_m + MARGIN_M + 2 * floor.resolution_m
+    areas = [] if way is None else floor.find_areas_along(way, within_m=reach_m)
+    if not areas:
+        return ""
+    titles = " and the ".join(area.title for area in areas)
+    return f"every known way to {_say(goal)} is closed; the shortest leads over the {titles}."
+
+
 def _say_closed(
     distances: DistanceField, goal: Pose, *, is_reachable: bool
 ) -> tuple[GoalVerdict, str] | None:
@@ -133,7 +162,8 @@ def _say_closed(
     around = None if is_reachable else floor.find_area(distances.start, within_m=0.0)
     if around is None:
         return None
-    sentence = f"the robot itself stands in the {around.title}; a person has to lead it out."
+    ended = f", or end_event ends {around.event_id} where it is over" if around.event_id else ""
+    sentence = f"the robot itself stands in the {around.title}; a person has to lead it out{ended}."
     return GoalVerdict.CLOSED, sentence
 
 

@@ -177,9 +177,9 @@ def _what_became_of(atlas: Atlas, place: str) -> str:
         return f"{gone.id} is no longer found: its floor is now {' and '.join(gone.became)}."
     if gone is not None:
         return f"{gone.id} is no longer found on the map."
-    if re.fullmatch(r"[Ff]\d+", place) and int(place[1:]) <= atlas.frontiers.n_named:
+    if re.fullmatch(r"[Ff]\d+", place) and 1 <= int(place[1:]) <= atlas.frontiers.n_named:
         return f"Frontier {place.upper()} is gone: what lay behind it has been seen or refused."
-    if re.fullmatch(r"[Tt]\d+", place) and int(place[1:]) <= atlas.recollection.n_named:
+    if re.fullmatch(r"[Tt]\d+", place) and 1 <= int(place[1:]) <= atlas.recollection.n_named:
         return f"The thing {place.upper()} is no longer remembered."
     return f"There is no place called {place[:80]!r}."
 

@@ -1,17 +1,21 @@
 """Events of the semantic map where ways are planned: what they close, and what they make slow."""
 
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from datetime import datetime
 
+import numpy as np
+
 from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import Point
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.closures import ClosedArea, Outline
 from mapspeak.navigation.footprints import outline_around, outline_of_door, outlines_of_region
 from mapspeak.navigation.hindrances import Hindrance
-from mapspeak.navigation.places import Place, find_place
+from mapspeak.navigation.places import Place, Spot, find_place
 from mapspeak.navigation.revision import MapRevision
-from mapspeak.semantic import SemanticMapStore
+from mapspeak.semantic import LEFT_OUT, Concern, SemanticMapStore, tells_what_to_do
 from mapspeak.semantic.events import Effect, Event, current_events, find_place_ids
 from mapspeak.spatial.rooms import Door, Region, RoomMap
 
@@ -20,12 +24,20 @@ __all__ = [
     "end_event",
     "find_hindrances",
     "note_event",
+    "say_consequences",
     "say_events",
     "say_unplaced",
 ]
 
+_WAYS = re.compile(
+    r"^ *(?:please )?(?:avoid|keep|stay|slow|(?:do not|don't) (?:enter|use|cross|pass|block))\b",
+    re.IGNORECASE,
+)
+"""How people tell others of a way that is closed or slow: that is what an event is for."""
 SPOT_RADIUS_M = 0.5
 """An event at a point takes this much floor around it."""
+REST_RATIO = 0.1
+"""A room is cut off when no more of what was reached of it is left: a few cells at its door."""
 AVOID_FACTOR, AVOID_EXTRA_M = 10.0, 20.0
 SLOW_FACTOR, SLOW_EXTRA_M = 2.0, 5.0
 """What a way counts that leads through: so many times its length there, at least so much more."""
@@ -51,25 +63,25 @@ def note_event(
         text: What is the matter.
         effect: What it means for ways.
         now: The operator's time.
-        place: An id, a remembered name, coordinates, or words as for a goal; a mere note needs
-            none.
+        place: An id, a name, coordinates, or words as for a goal; a mere note needs none.
         begins: The first moment; None for now.
         until: The first moment after; None where nobody knows.
         source: Who said it.
 
     Raises:
         GoalError: There is no such place.
-        SemanticMapError: It is over already, or cannot be written.
+        SemanticMapError: It is over, closes the floor below the robot, or cannot be written.
     """
     if until is not None and until <= now:
         raise SemanticMapError(
             f"The event '{text}' was over at {until.isoformat(timespec='minutes')}.",
             hint="Give a time that is still to come, with its zone.",
         )
+    _require_no_orders(text)
     found = None if place is None else find_place(atlas, place)
     event = Event(
         text=text,
-        place="" if found is None else _name_of(found, place or ""),
+        place="" if found is None else _name_of(found, place or "", effect),
         effect=effect,
         at=None if found is None else found.point,
         outlines=() if found is None or effect is Effect.NONE else _outlines_of(atlas.rooms, found),
@@ -78,14 +90,73 @@ def note_event(
         source=source,
         recorded_at=now,
     )
+    _require_robot_outside(atlas, event, now)
     return store.write_event(event)
+
+
+def _require_no_orders(text: str) -> None:
+    if tells_what_to_do(_WAYS.sub("", text)):
+        raise SemanticMapError(
+            f"The event '{text[:80]}' gives orders: {LEFT_OUT[Concern.ORDERS]}",
+            hint="Say what is the matter, such as 'C1 is closed'; effect says what it means for "
+            "ways.",
+        )
+
+
+def say_consequences(atlas: Atlas, event: Event, now: datetime) -> tuple[str, ...]:
+    """Gives what an event that closes floor means for the robot, where it stands now.
+
+    Args:
+        atlas: The map before the event.
+        event: As it was written.
+        now: The operator's time.
+    """
+    if event.effect is not Effect.CLOSED:
+        return ()
+    area = _area_of(event, atlas.map, now)
+    if area is None:
+        return ()
+    if area.contains(atlas.robot.point):
+        return ("The robot stands inside: it has to drive out before that begins.",)
+    cut_off = _find_cut_off(atlas, area)
+    if not cut_off:
+        return ()
+    return (f"While it lasts the robot cannot get to {', '.join(cut_off)} from where it is.",)
+
+
+def _require_robot_outside(atlas: Atlas, event: Event, now: datetime) -> None:
+    """Refuses what would close the floor below the robot: it could drive nowhere any more."""
+    if event.effect is not Effect.CLOSED or not event.is_current(now):
+        return
+    area = _area_of(event, atlas.map, now)
+    if area is not None and area.contains(atlas.robot.point):
+        raise SemanticMapError(
+            f"The robot itself stands in {event.place or 'what is to be closed'}; closed, it could "
+            "not drive out. Nothing was noted.",
+            hint="Drive out first, then note it again; or note it with the effect avoid.",
+        )
+
+
+def _find_cut_off(atlas: Atlas, area: ClosedArea) -> list[str]:
+    """Gives the rooms beside a closed area that the robot gets to only while it is open."""
+    before = atlas.distances.build_reachable_mask()
+    closed = atlas.map.with_areas((*atlas.map.areas, area), atlas.map.hindrances)
+    after = closed.distances_from(atlas.robot.point).build_reachable_mask()
+    labels = atlas.rooms.labels
+    return [
+        region.id
+        for region in atlas.rooms.regions
+        if not area.contains(region.widest)
+        and np.count_nonzero(after & (labels == region.index))
+        < REST_RATIO * np.count_nonzero(before & (labels == region.index))
+    ]
 
 
 def end_event(store: SemanticMapStore, event_id: str, *, now: datetime) -> Event:
     """Ends an event at once; its record stays, as something that was.
 
     Raises:
-        SemanticMapError: There is none of that id, or it cannot be written.
+        SemanticMapError: There is none of that id, it is over already, or it cannot be written.
     """
     events = {event.id.upper(): event for event in store.read_events()}
     event = events.get(event_id.strip().upper())
@@ -93,6 +164,11 @@ def end_event(store: SemanticMapStore, event_id: str, *, now: datetime) -> Event
         known = ", ".join(each.id for each in current_events(events.values(), now)) or "none"
         raise SemanticMapError(
             f"There is no event '{event_id}'.", hint=f"Events that last now: {known}."
+        )
+    if event.until is not None and event.until <= now:
+        raise SemanticMapError(
+            f"{event.id} had already ended, at {event.until.isoformat(timespec='minutes')}.",
+            hint="Nothing was changed.",
         )
     begins = None if event.begins is not None and event.begins >= now else event.begins
     return store.write_event(replace(event, begins=begins, until=now))
@@ -107,7 +183,7 @@ def say_events(events: Iterable[Event], now: datetime) -> tuple[str, ...]:
 def say_unplaced(events: Iterable[Event], revision: MapRevision, now: datetime) -> tuple[str, ...]:
     """Gives the events that should change ways, but name no place on this map."""
     return tuple(
-        f"The event {event.id} names no place on this map, so it changes no way: {event.text}."
+        f"The event {event.id} names no place on this map, so it changes no way: '{event.text}'."
         for event in current_events(events, now)
         if event.effect is not Effect.NONE and not _find_outlines(event, revision)
     )
@@ -154,6 +230,7 @@ def _area_of(event: Event, revision: MapRevision, now: datetime) -> ClosedArea |
         further_outlines=outlines[1:],
         until=until,
         reason=event.text,
+        event_id=event.id,
     )
 
 
@@ -186,7 +263,23 @@ def _outlines_of(rooms: RoomMap, place: Place) -> tuple[Outline, ...]:
             return (outline_around(place.point, radius_m=SPOT_RADIUS_M),)
 
 
-def _name_of(place: Place, words: str) -> str:
-    """Gives the id with the words that were used for it, where these are others."""
+def _name_of(place: Place, words: str, effect: Effect) -> str:
+    """Gives the id with the words that were used for it, where these are others.
+
+    What has no extent of its own tells how much floor is taken around it.
+    """
     said = words.strip()
-    return said if place.name.casefold() in said.casefold() else f"{said} ({place.name})"
+    if isinstance(place.thing, Spot) and not place.reason:
+        said = name = _say_point(place.point)
+    else:
+        name = place.name
+    named = said if name.casefold() in said.casefold() else f"{said} ({name})"
+    if effect is Effect.NONE or isinstance(place.thing, (Region, Door)):
+        return named
+    at = "" if name == named == _say_point(place.point) else f" at {_say_point(place.point)}"
+    return f"{SPOT_RADIUS_M} m around {named}{at}"
+
+
+def _say_point(point: Point) -> str:
+    """Gives a point as it is written for a goal."""
+    return f"{point.x:.2f}, {point.y:.2f}"

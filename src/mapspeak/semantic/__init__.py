@@ -1,7 +1,22 @@
 """What is where, in words: remembered places and the file that holds them."""
 
-from mapspeak.semantic.filtering import LEFT_OUT, Concern, Objection, find_objection, gives_orders
-from mapspeak.semantic.merging import SAME_SPOT_M, Merge, Reunion, merge_waypoint, seen_from
+from mapspeak.semantic.filtering import (
+    LEFT_OUT,
+    Concern,
+    Objection,
+    find_objection,
+    gives_orders,
+    tells_what_to_do,
+)
+from mapspeak.semantic.merging import (
+    SAME_SPOT_M,
+    Merge,
+    Reunion,
+    group_views,
+    merge_waypoint,
+    noted_at,
+    seen_from,
+)
 from mapspeak.semantic.pictures import PictureBook, TakenPicture
 from mapspeak.semantic.retrieval import (
     MatchEvidence,
@@ -35,7 +50,10 @@ __all__ = [
     "find_objection",
     "find_waypoints",
     "gives_orders",
+    "group_views",
     "merge_waypoint",
     "name_key",
+    "noted_at",
     "seen_from",
+    "tells_what_to_do",
 ]

@@ -7,7 +7,8 @@ language passes, which costs no more than a record too many.
 
 A label is judged by its head, the word that says what the thing is: "fuse box" and "letter box" are
 equipment and a "cardboard box" is not, a "personnel lift" is a lift, and a "person beside the lift"
-is a person. What is quoted, or follows "sign:", is read off the thing and not judged.
+is a person. What is quoted, or follows "sign:", is read off the thing and not judged; yet what is
+addressed to a robot stands in quotes or not at all.
 """
 
 import re
@@ -17,6 +18,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from mapspeak.semantic.vocabulary import (
+    ADDRESSED,
     ANIMALS,
     CARRIERS,
     COUNTED_BY,
@@ -39,7 +41,7 @@ from mapspeak.semantic.vocabulary import (
     VEHICLES,
 )
 
-__all__ = ["LEFT_OUT", "Concern", "Objection", "find_objection", "gives_orders"]
+__all__ = ["LEFT_OUT", "Concern", "Objection", "find_objection", "gives_orders", "tells_what_to_do"]
 
 
 class Concern(StrEnum):
@@ -108,6 +110,8 @@ _NAMES_A_CARRIER = re.compile(
 )
 _DOUBT = re.compile("|".join(rf"\b(?:{words})\b" for words in DOUBTS) + r"|\?")
 _ORDER = re.compile("|".join(ORDERS))
+_ADDRESSED = re.compile(ADDRESSED)
+_SENTENCE_END = re.compile(r"[.!?]+(?=\s|$)|\n")
 
 
 def find_objection(label: str) -> Objection | None:
@@ -129,10 +133,21 @@ def find_objection(label: str) -> Objection | None:
 def gives_orders(text: str) -> bool:
     """True for a text that tells its reader what to do and names no thing that it stands on."""
     plain = _QUOTED.sub(" ", _plain(text)).strip()
+    if _ADDRESSED.search(plain):
+        return True
     order = _ORDER.search(plain)
     if order is None or _NAMES_A_CARRIER.fullmatch(plain):
         return False
     return not _IS_CARRIED.search(plain[: order.start()])
+
+
+def tells_what_to_do(text: str) -> bool:
+    """True for a text of one or more sentences of which one gives orders."""
+    return any(gives_orders(part) for part in _SENTENCE_END.split(_unquoted(text)))
+
+
+def _unquoted(text: str) -> str:
+    return _QUOTED.sub(" ", text.translate(_STRAIGHT))
 
 
 def _plain(text: str) -> str:

@@ -4,14 +4,17 @@ import hashlib
 import math
 from collections import OrderedDict
 from dataclasses import dataclass
+from datetime import datetime
 
 from mapspeak.errors import SemanticMapError
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Pose, wrap_angle
 
 __all__ = ["PictureBook", "TakenPicture"]
 
 MOST_PICTURES = 500
 """How many pictures can be spoken of; older ones are forgotten here, whoever keeps them."""
+BESIDE_RAD = math.radians(10.0)
+"""The middle of a thing that the edge cuts lies beside the picture, and is read off roughly."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,6 +28,7 @@ class TakenPicture:
         stamp_s: Robot time of the exposure.
         width_px: Columns.
         horizontal_fov_rad: The angle between the left and the right edge; None where unknown.
+        recorded_at: When it was taken, by the calendar; None where nobody knew.
     """
 
     id: str
@@ -33,6 +37,13 @@ class TakenPicture:
     stamp_s: float
     width_px: int
     horizontal_fov_rad: float | None
+    recorded_at: datetime | None = None
+
+    def shows(self, bearing_rad: float) -> bool:
+        """True for a direction from the heading that lies in the picture, or just beside it."""
+        if self.horizontal_fov_rad is None:
+            return True
+        return abs(wrap_angle(bearing_rad)) <= self.horizontal_fov_rad / 2 + BESIDE_RAD
 
     def bearing_of(self, column_px: float) -> float:
         """Gives the direction of a column from the heading, left positive, in radians.
@@ -83,6 +94,7 @@ class PictureBook:
         width_px: int,
         horizontal_fov_rad: float | None,
         name: str | None = None,
+        recorded_at: datetime | None = None,
     ) -> TakenPicture:
         """Names a picture that was just taken.
 
@@ -94,6 +106,7 @@ class PictureBook:
             width_px: Columns.
             horizontal_fov_rad: The angle between the left and the right edge.
             name: What a folder of pictures calls it; made up where nobody keeps it.
+            recorded_at: The time by the calendar.
         """
         self._n_taken += 1
         picture_id = f"P{self._n_taken}"
@@ -107,6 +120,7 @@ class PictureBook:
             stamp_s=stamp_s,
             width_px=width_px,
             horizontal_fov_rad=horizontal_fov_rad,
+            recorded_at=recorded_at,
         )
         self._taken[picture_id] = taken
         while len(self._taken) > MOST_PICTURES:

@@ -235,7 +235,9 @@ DOUBTS = (
 _DEEDS = "go|drive|move|navigate|proceed|come|travel|turn|head|walk|run|back|return|follow|steer"
 _WHERE = (
     "to the|to a|to \\(?-?\\d|to your|into|towards?|at once|forward|backward|straight|away|left|"
-    "right|there|here|now|immediately|home|me|him|her"
+    "right|there|here|now|immediately|home|me|him|her|"
+    r"(?:the |this |your )?robots? (?:north|south|east|west|to|into|towards?|on|there|here|away)|"
+    r"(?:north|south|east|west)(?:wards?)?(?=\W*$|,)"
 )
 _DO = (
     "ignore|disregard|forget|delete|erase|remove|overwrite|execute|call|send|tell|reveal|print|"
@@ -255,5 +257,13 @@ ORDERS = (
     r"\byou (?:must|should|shall|have to|need to|are now|will)\b",
     rf"\b(?:ignore|disregard|forget|override) (?:{_RULES})\b",
     r"\bnew instructions?\b",
+    r"^(?:obey|comply)\b",
+    r"(?<!can )(?<!may )(?<!ways )(?:^|[,;:] *|and )(?:go|drive|navigate|proceed) to [a-z]\d+\b",
 )
 """Patterns of texts that tell a reader what to do."""
+
+ADDRESSED = (
+    r"\b(?:robots?|agents?|assistants?|machines?) "
+    r"(?:must|should|shall|(?:have|has|need|needs|are|is) to)\b"
+)
+"""A pattern of texts that tell a robot what to do, whatever they stand on."""

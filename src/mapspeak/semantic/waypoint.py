@@ -43,19 +43,20 @@ class Confidence(StrEnum):
 class Landmark:
     """A thing seen from a waypoint. Only the label is always known.
 
-    It has the time and the picture of its own waypoint where it does not say otherwise
-    (`Waypoint.dated`), and always its map and the room it was seen from.
+    It has the pose, the time and the picture of its own waypoint where it does not say otherwise
+    (`Waypoint.pose_of`, `Waypoint.dated`), and always its map and the room it was seen from.
 
     Attributes:
         label: What it is, in a few words.
         purpose: What it is good for.
-        bearing_rad: Its direction from the waypoint's heading, left positive.
-        range_m: Its distance from the waypoint.
+        bearing_rad: Its direction from the heading of the pose it was seen from, left positive.
+        range_m: Its distance from that pose.
         confidence: How sure the observer was; None where it did not say.
         note: Anything else.
         picture: The picture it was seen in, by its relative name, if not the waypoint's.
         stamp_s: Robot time it was last seen at, if not the waypoint's.
         recorded_at: The same by the calendar, with its time zone, if not the waypoint's.
+        pose: The pose it was seen from, in the map frame, if not the waypoint's.
 
     Raises:
         SemanticMapError: The label is empty, a number is not finite or below zero, or the time has
@@ -71,6 +72,7 @@ class Landmark:
     picture: str | None = None
     stamp_s: float | None = None
     recorded_at: datetime | None = None
+    pose: Pose | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "label", _required_line(self.label, "A landmark's label"))
@@ -81,6 +83,9 @@ class Landmark:
         if self.range_m is not None:
             is_distance = math.isfinite(self.range_m) and self.range_m >= 0
             _require(is_distance, f"The range of {self.label!r}", "0 m or more")
+        if self.pose is not None:
+            is_finite = self.pose.is_finite()
+            _require(is_finite, f"The pose of {self.label!r}", "three finite numbers")
         _require_time(self.stamp_s, self.recorded_at, self.label)
 
 
@@ -131,6 +136,45 @@ class Waypoint:
         """The safety landmarks, then the functional ones."""
         return self.safety_landmarks + self.functional_landmarks
 
+    @property
+    def standpoints(self) -> tuple["Waypoint", ...]:
+        """The place once for each pose it was observed from, with what was seen from there.
+
+        Its own pose comes first, also where nothing was seen from it.
+        """
+        poses = dict.fromkeys((self.pose, *map(self.pose_of, self.landmarks)))
+        if len(poses) == 1:
+            return (self,)
+        return tuple(
+            replace(
+                self,
+                pose=pose,
+                safety_landmarks=self._seen_from(pose, self.safety_landmarks),
+                functional_landmarks=self._seen_from(pose, self.functional_landmarks),
+            )
+            for pose in poses
+        )
+
+    def pose_of(self, landmark: Landmark) -> Pose:
+        """Gives the pose that one of its landmarks was seen from, in the map frame."""
+        return landmark.pose or self.pose
+
+    def moved(self, motion: Pose) -> "Waypoint":
+        """Gives it with all its poses in another frame.
+
+        Args:
+            motion: From the frame of its poses to the new one.
+        """
+        return replace(
+            self,
+            pose=motion @ self.pose,
+            safety_landmarks=tuple(_moved(each, motion) for each in self.safety_landmarks),
+            functional_landmarks=tuple(_moved(each, motion) for each in self.functional_landmarks),
+        )
+
+    def _seen_from(self, pose: Pose, landmarks: tuple[Landmark, ...]) -> tuple[Landmark, ...]:
+        return tuple(each for each in landmarks if self.pose_of(each) == pose)
+
     def dated(self, landmark: Landmark) -> Landmark:
         """Gives one of its landmarks with the time and picture that it has from this waypoint.
 
@@ -165,6 +209,10 @@ class SemanticMap:
         """Gives the place of that name, whatever its case, or None."""
         key = name_key(name)
         return next((place for place in self.waypoints if name_key(place.name) == key), None)
+
+
+def _moved(landmark: Landmark, motion: Pose) -> Landmark:
+    return landmark if landmark.pose is None else replace(landmark, pose=motion @ landmark.pose)
 
 
 def _clean_lines(value: Landmark | Waypoint, *names: str) -> None:

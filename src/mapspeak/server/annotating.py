@@ -17,9 +17,10 @@ from mapspeak.semantic import (
     Landmark,
     PictureBook,
     TakenPicture,
+    Waypoint,
     find_objection,
-    gives_orders,
-    seen_from,
+    noted_at,
+    tells_what_to_do,
 )
 
 __all__ = ["Annotator", "LandmarkInput", "Landmarks"]
@@ -27,6 +28,9 @@ __all__ = ["Annotator", "LandmarkInput", "Landmarks"]
 
 SAME_VIEW_RAD = math.radians(15.0)
 """A picture of a heading that much off still shows nearly all that is seen along the other."""
+
+FARTHEST_SEEN_M = 100.0
+"""No camera on a robot tells what a thing is from farther away."""
 
 Label = Annotated[str, Field(min_length=1, max_length=120)]
 
@@ -106,6 +110,40 @@ class Annotator:
         """Gives the layout features that may be remembered."""
         return tuple(feature for feature in given if not self._is_against_policy(feature))
 
+    def take_name(self, name: str) -> str:
+        """Gives a place's name.
+
+        Raises:
+            SemanticMapError: It gives orders.
+        """
+        if tells_what_to_do(name):
+            raise SemanticMapError(
+                f"{name[:80]!r} is no name: {LEFT_OUT[Concern.ORDERS]}",
+                hint="Give a name in words, such as 'dock corner'.",
+            )
+        return name
+
+    def take_description(self, text: str) -> str:
+        """Gives the description; none where it gives orders."""
+        if not tells_what_to_do(text):
+            return text
+        self.refused.append(f"the description: {LEFT_OUT[Concern.ORDERS]}")
+        return ""
+
+    def require_content(self, waypoint: Waypoint) -> None:
+        """Refuses a place of which nothing is left.
+
+        Raises:
+            SemanticMapError: All that was said of it is refused.
+        """
+        says = waypoint.landmarks or waypoint.description or waypoint.geometric_features
+        if self.refused and not says:
+            raise SemanticMapError(
+                f"Nothing of {waypoint.name!r} can be remembered, so nothing was written. "
+                f"{' '.join(self.refused)}",
+                hint="Give a description, or a landmark that lasts.",
+            )
+
     def _is_against_policy(self, text: str) -> bool:
         objection = find_objection(text)
         if objection is not None:
@@ -118,6 +156,9 @@ class Annotator:
         own = self._find_picture(thing)
         if thing.picture is not None and own is None:
             raise self._no_such_picture(thing.picture)
+        _require_possible(thing, own)
+        # What the waypoint says of its picture holds for the landmark, too.
+        other = None if own == picture else own
         landmark = Landmark(
             label=thing.label,
             purpose=self._told(thing, "purpose"),
@@ -125,23 +166,15 @@ class Annotator:
             range_m=thing.range_m,
             confidence=thing.confidence,
             note=self._told(thing, "note"),
-            picture=None if own is None or own == picture else own.name,
+            picture=None if other is None else other.name,
+            stamp_s=None if other is None else other.stamp_s,
+            recorded_at=None if other is None else other.recorded_at,
         )
-        return landmark if own is None else self._moved(landmark, own, pose)
-
-    def _moved(self, landmark: Landmark, own: TakenPicture, pose: Pose) -> Landmark:
-        moved = seen_from(landmark, own.pose, pose)
-        if landmark.bearing_rad is not None and moved.bearing_rad is None:
-            away_m = own.pose.point.distance_to(pose.point)
-            self.refused.append(
-                f"the bearing of {landmark.label!r}: {own.id} was taken {away_m:.1f} m from here; "
-                "give range_m too, or leave out x and y."
-            )
-        return moved
+        return landmark if own is None else noted_at(landmark, own.pose, pose)
 
     def _told(self, thing: LandmarkInput, name: str) -> str | None:
         text: str | None = getattr(thing, name)
-        if text is None or not gives_orders(text):
+        if text is None or not tells_what_to_do(text):
             return text
         self.refused.append(f"the {name} of {thing.label!r}: {LEFT_OUT[Concern.ORDERS]}")
         return None
@@ -178,3 +211,21 @@ def _bearing_rad(thing: LandmarkInput, picture: TakenPicture | None) -> float | 
             hint="Call look_through_camera first, or give bearing_deg.",
         )
     return picture.bearing_of(thing.image_column_px)
+
+
+def _require_possible(thing: LandmarkInput, picture: TakenPicture | None) -> None:
+    """Refuses numbers that no look can give."""
+    if thing.range_m is not None and thing.range_m > FARTHEST_SEEN_M:
+        raise SemanticMapError(
+            f"{thing.range_m:g} m is farther than anything is seen from, {FARTHEST_SEEN_M:g} m.",
+            hint="Give range_m in metres, or leave it out.",
+        )
+    if thing.bearing_deg is None or picture is None:
+        return
+    if not picture.shows(math.radians(thing.bearing_deg)):
+        half_deg = math.degrees(picture.horizontal_fov_rad or 0.0) / 2
+        raise SemanticMapError(
+            f"{thing.bearing_deg:g} deg lies outside {picture.id}, which shows {half_deg:.0f} deg "
+            "to either side of the heading it was taken along.",
+            hint="Give the bearing from the picture's heading, or image_column_px.",
+        )

@@ -7,6 +7,7 @@ from mapspeak.navigation.atlas import Atlas, RememberedPlace, RememberedThing
 from mapspeak.navigation.choosing import CheckedGoal, check_place
 from mapspeak.navigation.places import Place
 from mapspeak.navigation.ways import standing_point
+from mapspeak.semantic import group_views
 from mapspeak.server.roomtables import say_walk
 from mapspeak.server.thingtexts import say_landmark, say_things_from, say_things_in, thing_lines
 from mapspeak.server.wording import (
@@ -149,8 +150,9 @@ def _remembered_lines(atlas: Atlas, remembered: RememberedPlace) -> Iterator[str
     )
     if waypoint.description:
         yield f'Description: "{" ".join(waypoint.description.split())}"'
-    for landmark in waypoint.landmarks:
-        yield f"Landmark: {say_landmark(landmark)}."
+    for views in group_views(waypoint):
+        number = f"; {len(views)} views of it" if len(views) > 1 else ""
+        yield f"Landmark: {say_landmark(views[0])}{number}."
     for feature in waypoint.geometric_features:
         yield f'Layout: "{feature}"'
     yield from say_things_from(atlas, remembered)

@@ -20,7 +20,8 @@ NEXT_STEP = {
     ExplorationState.BOUND_REACHED: "Call explore again for more.",
     ExplorationState.NOTHING_LEFT: "The map is complete; call look_at_map.",
     ExplorationState.REST_UNREACHABLE: (
-        "All that can be reached is known. Open what is in the way, then call explore again."
+        "All that can be reached is known. Open what is in the way, or wait until it is no longer "
+        "closed, then call explore again."
     ),
     ExplorationState.NOTHING_KNOWN: "Start SLAM, or wait until the first map has floor on it.",
     ExplorationState.INTERRUPTED: "The robot was stopped or sent elsewhere. Call explore to go on.",

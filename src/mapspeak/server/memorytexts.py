@@ -3,16 +3,18 @@
 from collections.abc import Iterator
 from datetime import datetime
 
-from mapspeak.navigation.atlas import Atlas
+from mapspeak.navigation.atlas import Atlas, RememberedThing
+from mapspeak.navigation.recall import Nearby
 from mapspeak.semantic.consistency import Finding
 from mapspeak.semantic.episodes import EpisodeMatch, EpisodePage
 from mapspeak.server.moments import say_age
-from mapspeak.server.wording import say_count, say_pose
+from mapspeak.server.wording import say_count, say_point, say_pose
 
-__all__ = ["describe_check", "describe_episodes", "say_episode"]
+__all__ = ["describe_check", "describe_episodes", "describe_nearby", "say_episode"]
 
 MOST_LISTED = 30
 LONGEST_TEXT = 300
+MOST_THINGS = 8
 TO_MEND = (
     "To mend one: look again from there and call write_semantic_data, with gone for what is no "
     "longer there."
@@ -88,6 +90,31 @@ def describe_episodes(page: EpisodePage, *, now: datetime | None) -> str:
     if not page.matches:
         lines.append("Nothing observed passes all of these; leave something out.")
     return "\n".join(lines)
+
+
+def describe_nearby(atlas: Atlas, nearby: Nearby) -> str:
+    """Gives which thing was taken for the one that is meant, and the things nearest to it."""
+    thing = nearby.thing
+    where = say_point(thing.point)
+    if thing.thing.position is None:
+        where = f"a place not noted, seen from {where}"
+    lines = [f"Nearest to {_say_thing(atlas, thing)}, at {where}."]
+    if nearby.others:
+        others = "; ".join(_say_thing(atlas, each) for each in nearby.others[:MOST_THINGS])
+        lines[0] += (
+            f" It was seen last of {len(nearby.others) + 1} called so; the others are {others}: "
+            "give near_seen the id of the one that is meant."
+        )
+    nearest = nearby.nearest[:MOST_THINGS]
+    told = [f"{_say_thing(atlas, each)}, {away_m:.1f} m" for each, away_m in nearest]
+    lines.append(f"Things nearest to it: {'; '.join(told) or 'none whose position is known'}.")
+    lines.append("Observations without it, by how near to it they were made:")
+    return "\n".join(lines)
+
+
+def _say_thing(atlas: Atlas, remembered: RememberedThing) -> str:
+    rooms = " or ".join(atlas.rooms_before(remembered)) or "no room"
+    return f'{remembered.id} "{remembered.thing.label}" in {rooms}'
 
 
 def say_episode(match: EpisodeMatch, *, now: datetime | None) -> str:

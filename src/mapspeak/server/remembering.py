@@ -1,15 +1,17 @@
 """What a write changed in the memory, in words."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from mapspeak.geometry import wrap_angle
 from mapspeak.semantic import Confidence, Landmark, Merge, Reunion, Waypoint
 from mapspeak.server.wording import say_pose, shorten
 
-__all__ = ["say_landmarks", "say_replaced"]
+__all__ = ["say_far", "say_landmarks", "say_replaced"]
 
 MOVED_M = 0.05
+FAR_M = 5.0
+"""Looks at one place are taken from no farther apart."""
 TURNED_RAD = math.radians(2.0)
 """A pose that differs by less is the same pose, estimated again."""
 
@@ -21,8 +23,9 @@ def say_landmarks(merge: Merge) -> Iterator[str]:
     for reunion in merge.merged:
         after = reunion.after
         yield f"merged {after.label}: {_say_change(reunion)}{_say_doubt(after)}"
-    for landmark in merge.kept:
-        yield f"kept {', '.join([landmark.label, *_measures(landmark)])}: not named this time"
+    for views in merge.kept:
+        said = ", ".join([views[0].label, *_measures(views[0]), *_say_number(views)])
+        yield f"kept {said}: not named this time"
     for landmark in merge.gone:
         yield f"gone {landmark.label}"
 
@@ -42,17 +45,41 @@ def say_replaced(previous: Waypoint | None, now: Waypoint) -> Iterator[str]:
         yield f"layout {shorten('; '.join(previous.geometric_features))!r}"
 
 
+def say_far(previous: Waypoint | None, now: Waypoint, *, rooms: Sequence[str | None]) -> list[str]:
+    """Warns where a name was noted so far from before that another place may be meant.
+
+    Args:
+        previous: As it was remembered.
+        now: As it is from now on.
+        rooms: The rooms that the earlier and the later pose lie in, by id.
+    """
+    if previous is None:
+        return []
+    before, after = (room or "no room" for room in rooms)
+    away_m = previous.pose.point.distance_to(now.pose.point)
+    if before == after and away_m <= FAR_M:
+        return []
+    said = f"{now.name!r} was noted from {after} now, from {before} before, {away_m:.1f} m away."
+    return [f"{said} If that is another place, write it under a name of its own."]
+
+
 def _say_change(reunion: Reunion) -> str:
     before, after = reunion.before, reunion.after
     was, now = _measures(before), _measures(after)
     news = []
     if was != now:
-        news.append(f"now {', '.join(now)}, was {', '.join(was) or 'a label alone'}")
+        unknown = "seen from elsewhere" if reunion.further else "a label alone"
+        news.append(f"now {', '.join(now)}, was {', '.join(was) or unknown}")
+    news += _say_number((after, *reunion.further))
     for name in ("purpose", "note"):
         old, new = getattr(before, name), getattr(after, name)
         if old != new:
             news.append(f"{name} now {new!r}" + ("" if old is None else f", was {old!r}"))
     return "; ".join(news) or "as before"
+
+
+def _say_number(views: Sequence[Landmark]) -> list[str]:
+    return [f"{len(views)} views of it"] if len(views) > 1 else []
 
 
 def _say_doubt(landmark: Landmark) -> str:
@@ -69,4 +96,6 @@ def _measures(landmark: Landmark) -> list[str]:
         parts.append(f"{landmark.range_m:.1f} m")
     if landmark.confidence is not None:
         parts.append(str(landmark.confidence))
+    if landmark.pose is not None:
+        parts.append(f"seen from {say_pose(landmark.pose)}")
     return parts

@@ -172,11 +172,12 @@ class LandmarkReport(Report):
     range_m: float | None = None
     confidence: str | None = None
     note: str | None = None
+    seen_from: str = Field("", description="if not the pose")
 
     @classmethod
     def of(cls, landmark: Landmark) -> Self:
         """Makes the report of a landmark."""
-        bearing_rad = landmark.bearing_rad
+        bearing_rad, pose = landmark.bearing_rad, landmark.pose
         return cls(
             label=landmark.label,
             purpose=landmark.purpose,
@@ -184,6 +185,7 @@ class LandmarkReport(Report):
             range_m=None if landmark.range_m is None else round(landmark.range_m, 2),
             confidence=landmark.confidence,
             note=landmark.note,
+            seen_from="" if pose is None else say_pose(pose),
         )
 
 

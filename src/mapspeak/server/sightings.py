@@ -53,6 +53,7 @@ async def look_ahead(session: Session) -> Sighting:
         width_px=picture.width_px,
         horizontal_fov_rad=picture.horizontal_fov_rad,
         name=kept.picture,
+        recorded_at=session.find_wall_time(),
     )
     lines = [_say_picture(taken.id, picture)]
     lines += [] if detector is None else _say_detections(detector, detections)

@@ -7,7 +7,7 @@ from mapspeak.navigation.atlas import Atlas, RememberedPlace, RememberedThing
 from mapspeak.navigation.recall import SURE_RATIO, describe_candidate
 from mapspeak.semantic import Landmark
 from mapspeak.semantic.consistency import Trust
-from mapspeak.server.wording import say_path, say_point
+from mapspeak.server.wording import say_path, say_point, say_pose
 from mapspeak.spatial.rooms import Region
 
 __all__ = ["say_landmark", "say_things_from", "say_things_in", "thing_lines"]
@@ -27,6 +27,8 @@ def say_landmark(landmark: Landmark) -> str:
         parts.append(f"{landmark.range_m:.1f} m away")
     if landmark.confidence is not None:
         parts.append(f"confidence {landmark.confidence}")
+    if landmark.pose is not None:
+        parts.append(f"seen from {say_pose(landmark.pose)}")
     if landmark.note is not None:
         parts.append(f'note "{landmark.note}"')
     return ", ".join(parts)

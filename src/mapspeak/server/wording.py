@@ -6,6 +6,7 @@ from typing import TypeVar
 
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.navigation.atlas import Atlas
+from mapspeak.navigation.closures import ClosedFloor
 from mapspeak.navigation.standing import find_standing_point
 from mapspeak.spatial.rooms import Door, Region
 
@@ -82,6 +83,11 @@ def say_obstruction(atlas: Atlas, door: Door) -> str:
     """Gives why the robot does not get through a door, in a word or two."""
     if door.width_m < 2 * atlas.radius_m:
         return "too narrow"
+    floor = atlas.map.floor
+    if isinstance(floor, ClosedFloor):
+        closed = floor.find_area(door.place, within_m=atlas.radius_m)
+        if closed is not None:
+            return closed.closing
     sides = (atlas.rooms.region(region_id) for region_id in door.region_ids)
     is_any_reached = any(find_standing_point(atlas, region) for region in sides)
     return "blocked" if is_any_reached else "out of reach"

@@ -121,7 +121,8 @@ async def test_a_goal_whose_only_way_is_closed_is_refused(tmp_path: Path) -> Non
     door = rectangle("door", (3.2, 0.0), (3.6, 2.75))
     fake = FakeRobot(two_rooms())
     said = await refusal_of(guarded(fake, tmp_path, Policy(areas=(door,))), FAR)
-    assert "no known way" in said
+    assert "every known way to" in said
+    assert "leads over the keep-out area 'door'" in said
     assert not fake.goals
 
 

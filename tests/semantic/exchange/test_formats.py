@@ -42,7 +42,9 @@ ANCHOR = MapAnchor(lat_deg=48.0, lon_deg=7.8, yaw_rad=0.3)
 
 
 def memories() -> st.SearchStrategy[SemanticMap]:
-    places = st.lists(waypoints(), min_size=1, max_size=4, unique_by=lambda w: name_key(w.name))
+    places = st.lists(
+        waypoints(has_poses=True), min_size=1, max_size=4, unique_by=lambda w: name_key(w.name)
+    )
     map_ids = st.sampled_from([None, "hall", "101", "a;b"])
     return st.builds(SemanticMap, map_id=map_ids, waypoints=places.map(tuple))
 

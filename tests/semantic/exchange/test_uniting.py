@@ -103,7 +103,9 @@ SIMILAR = st.builds(
         max_size=3,
     ).map(tuple),
 )
-PLACES = st.lists(SIMILAR | waypoints(), max_size=4, unique_by=lambda place: name_key(place.name))
+PLACES = st.lists(
+    SIMILAR | waypoints(has_poses=True), max_size=4, unique_by=lambda place: name_key(place.name)
+)
 MEMORIES = PLACES.map(lambda places: memory(*places))
 
 

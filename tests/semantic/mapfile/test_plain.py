@@ -65,7 +65,7 @@ def test_what_is_more_than_plain_is_left_to_the_yaml_parser(line: str) -> None:
 
 
 @settings(max_examples=40, deadline=None)
-@given(waypoints())
+@given(waypoints(has_poses=True))
 def test_any_record_of_mapspeak_is_read_as_by_the_yaml_parser(waypoint: Waypoint) -> None:
     block = record_text(record_data(waypoint), indent=2)
 

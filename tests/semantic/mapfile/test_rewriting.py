@@ -1,3 +1,4 @@
+import math
 import re
 from collections import Counter
 
@@ -10,6 +11,7 @@ from mapspeak.semantic import Landmark, Waypoint, name_key
 from mapspeak.semantic.mapfile import (
     MapDocument,
     bound_to,
+    moved,
     parse_document,
     with_waypoint,
     without_waypoint,
@@ -254,7 +256,7 @@ def test_the_map_is_named_without_moving_anything_else() -> None:
 
 
 @settings(max_examples=40, deadline=None)
-@given(waypoints())
+@given(waypoints(has_poses=True))
 def test_any_waypoint_is_read_back_as_it_was_written(waypoint: Waypoint) -> None:
     document_ = with_waypoint(document(""), waypoint)
 
@@ -268,7 +270,7 @@ def test_any_waypoint_is_read_back_as_it_was_written(waypoint: Waypoint) -> None
 
 
 @settings(max_examples=25, deadline=None)
-@given(waypoints(), waypoints())
+@given(waypoints(has_poses=True), waypoints(has_poses=True))
 def test_any_update_keeps_comments_and_own_keys(first: Waypoint, second: Waypoint) -> None:
     changed = HAND_WRITTEN
     for update in (first, second):
@@ -281,7 +283,7 @@ def test_any_update_keeps_comments_and_own_keys(first: Waypoint, second: Waypoin
 
 
 @settings(max_examples=25, deadline=None)
-@given(waypoints(), waypoints())
+@given(waypoints(has_poses=True), waypoints(has_poses=True))
 def test_what_mapspeak_wrote_can_be_updated_to_anything(first: Waypoint, second: Waypoint) -> None:
     once = with_waypoint(document(""), first)
     data = {name: getattr(second, name) for name in Waypoint.__slots__ if name != "name"}
@@ -289,3 +291,24 @@ def test_what_mapspeak_wrote_can_be_updated_to_anything(first: Waypoint, second:
     (back,) = with_waypoint(once, Waypoint(name=first.name, **data)).to_map().waypoints
 
     assert record_data(back) == {**record_data(second), "name": first.name}
+
+
+def test_the_poses_of_views_move_with_their_place_and_back() -> None:
+    motion = Pose(2.0, -1.0, math.pi / 2)
+    tap = Landmark(label="tap", bearing_rad=0.5, pose=Pose(1.0, 2.0, 0.0))
+    dock = Waypoint(name="dock", pose=Pose(3.0, 0.0, 0.0), functional_landmarks=(tap,))
+    before = with_waypoint(document(""), dock)
+
+    after = moved(before, motion, entries={})
+
+    assert "seen_from: {x: 1.00, y: 2.00, yaw_deg: 0.0}" in before.text
+    assert "seen_from: {x: 0.00, y: 0.00, yaw_deg: 90.0}" in after.text
+    assert moved(after, motion.inverse(), entries={}).text == before.text
+
+
+def test_a_pose_that_is_the_places_own_is_not_repeated() -> None:
+    pose = Pose(3.0, 0.0, 0.0)
+    tap = Landmark(label="tap", bearing_rad=0.5, pose=pose)
+    dock = Waypoint(name="dock", pose=pose, functional_landmarks=(tap,))
+
+    assert "seen_from" not in written("", dock)

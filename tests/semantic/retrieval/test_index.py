@@ -195,6 +195,17 @@ def test_only_what_may_be_chosen_is_found() -> None:
     assert answer.verdict is Verdict.FOUND
 
 
+def test_leaving_the_likeliest_out_makes_the_next_no_surer() -> None:
+    names = ("sink", "wash ladder", "wash ladder fire aid")
+    entries = [Entry(id=name, kind=EntryKind.THING, name=name) for name in names]
+    index = EntryIndex(entries, vectors=TextVectors(ConceptEmbedder()))
+
+    answer = index.find("thirsty", among=set(names[1:]))
+
+    assert ids(answer) == list(names[1:])
+    assert answer.verdict is Verdict.AMBIGUOUS
+
+
 @pytest.mark.parametrize("query", ["", "?!", "the", "where is it", "swimming pool"])
 @pytest.mark.parametrize("find", [by_words, by_meaning])
 def test_what_is_not_remembered_is_said(query: str, find: Callable[[str], Answer]) -> None:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose
-from mapspeak.semantic import Landmark, SemanticMap, Waypoint
+from mapspeak.semantic import Landmark, SemanticMap, Waypoint, merge_waypoint
 from mapspeak.semantic.things import (
     Category,
     Thing,
@@ -329,3 +329,32 @@ def test_nobody_is_sent_to_where_the_robot_cannot_get_to() -> None:
     distances = distances_from(closed, Point(1.0, 1.0), radius_m=0.2)
     target, viewer = Point(6.0, 1.5), Point(4.5, 1.5)
     assert find_approach(build_sight_map(closed), distances, target, [viewer]) is None
+
+
+def test_views_of_one_place_from_two_poses_meet_as_those_of_two_places_do() -> None:
+    west = look("desk", 1.5, 0.8, ("printer", ON_NORTH_WALL))
+    east = look("desk", 5.0, 1.0, ("printer", ON_NORTH_WALL))
+    (printer,) = things_of(merge_waypoint(west, east).waypoint)
+    (apart,) = things_of(west, replace(east, name="shelf"))
+    assert off_m(printer, ON_NORTH_WALL) < 0.3
+    assert printer.position == apart.position
+    assert printer.confidence_ratio == pytest.approx(apart.confidence_ratio)
+    assert len(printer.supporting) == 2
+    assert printer.waypoints == ("desk",)
+
+
+def test_what_a_place_keeps_stays_where_it_is_when_the_place_is_noted_from_elsewhere() -> None:
+    before = look("desk", 3.1, 0.8, ("printer", ON_NORTH_WALL))
+    now = look("desk", 5.0, 0.8, ("sink", Point(5.0, 2.6)))
+    (there,) = things_of(before)
+    after = {thing.label: thing for thing in things_of(merge_waypoint(before, now).waypoint)}
+    assert after["printer"].position == there.position
+
+
+def test_what_is_known_of_a_place_with_several_poses_changes_no_answer() -> None:
+    west = look("desk", 1.5, 0.8, ("printer", ON_NORTH_WALL))
+    both = merge_waypoint(west, look("desk", 5.0, 1.0, ("printer", ON_NORTH_WALL))).waypoint
+    grid = drawn(ROOM)
+    places = SemanticMap(waypoints=(both,))
+    earlier = find_things(SemanticMap(waypoints=(west,)), grid)
+    assert find_things(places, grid, earlier=earlier).things == find_things(places, grid).things

@@ -1,10 +1,13 @@
 """How an exploration stands, as a value."""
 
+import math
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
-from mapspeak.geometry import Pose
+import numpy as np
+
+from mapspeak.geometry import Point, Pose
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.exploration.blocked import BlockedPlace
 from mapspeak.navigation.exploration.trips import Trip
@@ -15,9 +18,14 @@ from mapspeak.spatial.frontiers import (
     RefusalReason,
     RefusedFrontier,
 )
+from mapspeak.spatial.paths import DistanceField
 
 __all__ = ["ExplorationState", "Progress", "find_unreachable", "judge_end", "known_ratio"]
 
+MOST_NAMED = 3
+CLOSED_OFF = "behind what is closed: no way while it is"
+NEAR_M = 0.5
+"""A border is looked at from the floor that is so much more than the robot's radius around it."""
 OUT_OF_REACH = frozenset({RefusalReason.NO_WAY, RefusalReason.TOO_NARROW})
 
 
@@ -86,8 +94,30 @@ def known_area_m2(atlas: Atlas) -> float:
 
 
 def find_unreachable(atlas: Atlas) -> tuple[RefusedFrontier, ...]:
-    """Gives the borders with the unknown that the robot cannot get to."""
-    return tuple(each for each in atlas.frontiers.refused if each.reason in OUT_OF_REACH)
+    """Gives the borders with the unknown that the robot cannot get to, those closed off as such."""
+    return tuple(
+        replace(each, sentence=CLOSED_OFF) if _is_closed_off(atlas, each) else each
+        for each in atlas.frontiers.refused
+        if each.reason in OUT_OF_REACH
+    )
+
+
+def _is_closed_off(atlas: Atlas, border: RefusedFrontier) -> bool:
+    """True where the robot would get near to a border if no area were closed."""
+    if not atlas.map.areas:
+        return False
+    opened = atlas.map.open.distances_from(atlas.robot.point)
+    is_near = _is_reached_near(opened, border.anchor)
+    return is_near and not _is_reached_near(atlas.distances, border.anchor)
+
+
+def _is_reached_near(distances: DistanceField, point: Point) -> bool:
+    grid = distances.lattice.grid
+    reach = math.ceil((distances.radius_m + NEAR_M) / grid.resolution_m)
+    cell = grid.cell_at(point)
+    rows = np.arange(max(cell.row - reach, 0), min(cell.row + reach + 1, grid.n_rows))
+    cols = np.arange(max(cell.col - reach, 0), min(cell.col + reach + 1, grid.n_cols))
+    return bool(np.isfinite(distances.distances_at(rows[:, np.newaxis], cols)).any())
 
 
 def judge_end(atlas: Atlas, blocked: tuple[BlockedPlace, ...]) -> tuple[ExplorationState, str]:
@@ -98,7 +128,8 @@ def judge_end(atlas: Atlas, blocked: tuple[BlockedPlace, ...]) -> tuple[Explorat
     unreachable = find_unreachable(atlas)
     if not unreachable and not blocked:
         return ExplorationState.NOTHING_LEFT, f"Nothing is left to explore{_say_dull(report)}."
-    parts = [f"{n} {words}" for n, words in _count(unreachable, blocked) if n]
+    closing = " and ".join(f"the {area.title}" for area in atlas.map.areas[:MOST_NAMED])
+    parts = [f"{n} {words}" for n, words in _count(unreachable, blocked, closing) if n]
     left_m = sum(each.length_m for each in unreachable)
     sentence = (
         f"What is left cannot be reached: {', '.join(parts)}; "
@@ -122,10 +153,12 @@ def _is_dull(border: RefusedFrontier) -> bool:
 
 
 def _count(
-    unreachable: tuple[RefusedFrontier, ...], blocked: tuple[BlockedPlace, ...]
+    unreachable: tuple[RefusedFrontier, ...], blocked: tuple[BlockedPlace, ...], closing: str
 ) -> tuple[tuple[int, str], ...]:
-    reasons = Counter(each.reason for each in unreachable)
+    n_closed_off = sum(each.sentence == CLOSED_OFF for each in unreachable)
+    reasons = Counter(each.reason for each in unreachable if each.sentence != CLOSED_OFF)
     return (
+        (n_closed_off, f"behind what is closed ({closing})"),
         (reasons[RefusalReason.TOO_NARROW], "behind gaps too narrow for the robot"),
         (reasons[RefusalReason.NO_WAY], "behind walls"),
         (len(blocked), "where driving there failed"),

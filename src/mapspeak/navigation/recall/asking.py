@@ -1,15 +1,16 @@
 """From a request in words to candidates with their evidence, their place and a checked goal."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.choosing import stand_at
-from mapspeak.navigation.naming import Place
+from mapspeak.navigation.naming import Place, say_spot
 from mapspeak.navigation.recall.answer import Recall, RecallQuery
 from mapspeak.navigation.recall.candidates import describe_candidate
-from mapspeak.navigation.recall.filters import find_passing
-from mapspeak.navigation.recall.wording import say_advice, say_evidence
+from mapspeak.navigation.recall.filters import find_passing, point_of
+from mapspeak.navigation.recall.wording import find_doubt, say_advice, say_evidence
 from mapspeak.navigation.recollection import Remembered, RememberedPlace
 from mapspeak.navigation.thingnames import split_room
 from mapspeak.semantic.retrieval import Basis, Candidate, Verdict
@@ -37,19 +38,28 @@ def recall(atlas: Atlas, query: RecallQuery) -> Recall:
             atlas,
             passing[each.entry.id],
             score_ratio=each.score_ratio,
-            evidence=say_evidence(each),
+            evidence="; ".join(_say_why(query, each, passing[each.entry.id])),
         )
         for each in ranked[: query.n]
     )
+    doubt = ""
+    if answer.verdict is Verdict.FOUND:
+        doubt = find_doubt(candidates[0], room_id=query.room_id)
     return Recall(
-        verdict=answer.verdict,
-        advice=say_advice(answer, candidates, n_searched=len(among)),
+        verdict=Verdict.LIKELY if doubt else answer.verdict,
+        advice=say_advice(answer, candidates, n_searched=len(among), doubt=doubt),
         candidates=candidates,
         n_meant=answer.n_meant,
         n_searched=len(among),
         understood=answer.understood,
         limits=answer.limits,
     )
+
+
+def _say_why(query: RecallQuery, found: Candidate, remembered: Remembered) -> Iterator[str]:
+    yield say_evidence(found)
+    if query.near is not None:
+        yield f"{point_of(remembered).distance_to(query.near):.1f} m from {say_spot(query.near)}"
 
 
 def _with_room(atlas: Atlas, query: RecallQuery) -> RecallQuery:

@@ -33,7 +33,7 @@ def _describe_place(
 ) -> RecallCandidate:
     waypoint = remembered.waypoint
     pose = stand_at(atlas, Place(remembered.id, remembered))
-    check = judge_goal(atlas.grid, atlas.distances, pose)
+    check = judge_goal(atlas.grid, atlas.distances, pose, opened=atlas.map.open.distances_from)
     return RecallCandidate(
         id=remembered.id,
         kind=EntryKind.PLACE,
@@ -59,7 +59,7 @@ def _describe_thing(
 ) -> RecallCandidate:
     thing = remembered.thing
     pose = stand_at(atlas, Place(remembered.id, remembered))
-    check = judge_goal(atlas.grid, atlas.distances, pose)
+    check = judge_goal(atlas.grid, atlas.distances, pose, opened=atlas.map.open.distances_from)
     views = list(list_views(atlas, remembered))
     pictures = (view.picture for _, view in views)
     return RecallCandidate(

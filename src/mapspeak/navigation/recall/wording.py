@@ -12,11 +12,13 @@ from mapspeak.semantic.retrieval import (
     Verdict,
 )
 
-__all__ = ["SURE_RATIO", "say_advice", "say_evidence"]
+__all__ = ["SURE_RATIO", "find_doubt", "say_advice", "say_evidence"]
 
 SURE_RATIO = 0.98
 """A thing that two good views agree on is surer than that, and one view alone is not."""
 DOUBTFUL_RATIO = 0.5
+LARGEST_OFF_M = 1.2
+"""A thing whose place is known no better is not sure to be ahead of who goes there."""
 LONGEST_QUOTE = 120
 
 
@@ -47,13 +49,16 @@ def _quote(text: str) -> str:
     return f'"{line[:LONGEST_QUOTE]}"'
 
 
-def say_advice(answer: Answer, candidates: Sequence[RecallCandidate], *, n_searched: int) -> str:
+def say_advice(
+    answer: Answer, candidates: Sequence[RecallCandidate], *, n_searched: int, doubt: str
+) -> str:
     """Gives the verdict in words, with what to do next.
 
     Args:
         answer: What the search says.
         candidates: Those that are shown, the likeliest first.
         n_searched: How many places and things were searched.
+        doubt: Why the first may still be wrong; empty where nothing speaks for that.
     """
     if not n_searched:
         return (
@@ -69,24 +74,50 @@ def say_advice(answer: Answer, candidates: Sequence[RecallCandidate], *, n_searc
             )
         case Verdict.AMBIGUOUS:
             return _say_ambiguous(answer, candidates)
-        case Verdict.FOUND:
-            return _say_found(candidates[0])
+        case Verdict.FOUND | Verdict.LIKELY:
+            return _say_found(candidates[0], doubt)
 
 
-def _say_found(first: RecallCandidate) -> str:
-    said = f"Found: {_name(first)}."
+def find_doubt(first: RecallCandidate, *, room_id: str | None) -> str:
+    """Gives why what was found may still be wrong, in words; empty where nothing speaks for that.
+
+    Args:
+        first: The only one that is meant.
+        room_id: Where it was asked for.
+    """
+    doubts = _doubt_thing(first, room_id) if first.kind is EntryKind.THING else _doubt_place(first)
+    return next(doubts, "")
+
+
+def _doubt_place(first: RecallCandidate) -> Iterator[str]:
+    if first.trust.ratio < DOUBTFUL_RATIO:
+        yield "its record is doubtful"
+
+
+def _doubt_thing(first: RecallCandidate, room_id: str | None) -> Iterator[str]:
+    if first.position is None or first.uncertainty_m is None:
+        yield "where it is was not noted"
+        return
+    if first.trust.ratio < DOUBTFUL_RATIO:
+        yield "what was noted of it does not go together"
+    if first.trust.ratio < SURE_RATIO:
+        yield "no two good views of it agree so far"
+    if first.uncertainty_m > LARGEST_OFF_M:
+        yield f"its place is known to within {first.uncertainty_m:.1f} m only"
+    if room_id is not None and set(first.room_ids) != {room_id}:
+        yield f"it may be in {' or '.join(first.room_ids) or 'no room'}"
+    if not first.is_faced and not first.problem:
+        yield "no place is known from which it would be in sight near by"
+
+
+def _say_found(first: RecallCandidate, doubt: str) -> str:
+    said = f"Likely {_name(first)}, not sure: {doubt}." if doubt else f"Found: {_name(first)}."
     if first.problem:
         return f"{said} But the robot cannot go there: {first.problem}"
-    if first.trust.ratio < DOUBTFUL_RATIO:
-        return f"{said} It is doubtful: look before you rely on it. navigate_to takes {first.id}."
-    if first.kind is EntryKind.THING and first.position is None:
-        return f"{said} Where it is was not noted; navigate_to {first.id} goes where it was seen."
-    if first.kind is EntryKind.THING and first.trust.ratio < SURE_RATIO:
-        return (
-            f"{said} Likely, not sure: it was not seen from several sides. navigate_to takes "
-            f"{first.id}."
-        )
-    return f"{said} navigate_to takes {first.id}."
+    if doubt and first.position is None:
+        return f"{said} navigate_to {first.id} goes where it was seen."
+    look = "; look before you rely on it" if doubt else ""
+    return f"{said} navigate_to takes {first.id}{look}."
 
 
 def _say_ambiguous(answer: Answer, candidates: Sequence[RecallCandidate]) -> str:

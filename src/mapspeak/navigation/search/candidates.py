@@ -126,7 +126,9 @@ def unseen_area_m2(atlas: Atlas, pose: Pose, *, seen: SeenFloor) -> float:
 
 def _remembered(atlas: Atlas, place: RememberedPlace) -> Candidate | None:
     """Gives a remembered place, or the nearest pose to it that works; None where none does."""
-    check = check_goal(atlas.grid, atlas.distances, place.waypoint.pose)
+    check = check_goal(
+        atlas.grid, atlas.distances, place.waypoint.pose, opened=atlas.map.open.distances_from
+    )
     pose = place.waypoint.pose if check.is_ok else check.nearest
     path_m = None if pose is None else atlas.path_m(pose.point)
     if pose is None or path_m is None:

@@ -76,7 +76,8 @@ def _not_seen(
     found: Things, waypoint: Waypoint, placed: Sequence[Thing], at: FloatArray
 ) -> Iterator[Finding]:
     """Gives things in plain sight between what a waypoint names, which it does not name."""
-    bearings = [each.bearing_rad for each in waypoint.landmarks if each.bearing_rad is not None]
+    seen = waypoint.standpoints[0].landmarks
+    bearings = [each.bearing_rad for each in seen if each.bearing_rad is not None]
     if len(bearings) < 2:
         return
     low, high = min(bearings) - CONE_MARGIN_RAD, max(bearings) + CONE_MARGIN_RAD

@@ -17,9 +17,10 @@ N_SIGMAS = 2.0
 
 def check_rays(found: Things, waypoint: Waypoint) -> Iterator[Finding]:
     """Gives landmarks of a waypoint that lie behind a wall or where nobody has seen."""
-    for landmark in waypoint.landmarks:
-        if landmark.bearing_rad is not None:
-            yield from _check(found, waypoint, landmark, landmark.bearing_rad)
+    for stand in waypoint.standpoints:
+        for landmark in stand.landmarks:
+            if landmark.bearing_rad is not None:
+                yield from _check(found, stand, landmark, landmark.bearing_rad)
 
 
 def _check(

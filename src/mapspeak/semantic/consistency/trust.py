@@ -51,4 +51,6 @@ def _share(thing: Thing, finding: Finding) -> float:
 
 def _say_views(thing: Thing) -> str:
     names = ", ".join(f"'{name}'" for name in thing.waypoints)
-    return f"Seen from {len(thing.supporting)}: {names}."
+    n_views = len(thing.supporting)
+    views = "" if n_views == len(thing.waypoints) else f" in {n_views} views"
+    return f"Seen from {len(thing.waypoints)}{views}: {names}."

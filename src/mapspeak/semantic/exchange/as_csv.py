@@ -77,14 +77,35 @@ def _rows(place: Waypoint, map_id: str | None) -> Iterator[Facts]:
     for kind, items in lists.items():
         for item in items:
             entries = item if isinstance(item, dict) else {"label": item}
-            yield {"place": place.name, "kind": kind} | entries
+            yield {"place": place.name, "kind": kind} | _flat(entries)
+
+
+def _flat(entries: Facts) -> Facts:
+    """Gives a cell for each value: `seen_from:x` where the file has one mapping in another."""
+    cells: Facts = {}
+    for key, value in entries.items():
+        parts = value if isinstance(value, dict) else {"": value}
+        cells |= {f"{key}:{name}" if name else key: part for name, part in parts.items()}
+    return cells
+
+
+def _nested(cells: Facts) -> Facts:
+    entries: Facts = {}
+    for name, cell in cells.items():
+        key, _, part = name.partition(":")
+        branch = entries.setdefault(key, {}) if part else None
+        if isinstance(branch, dict):
+            branch[part] = cell
+        else:
+            entries[key] = cell
+    return entries
 
 
 def _add_item(records: dict[str, tuple[Point, Facts]], line: int, row: dict[str, str]) -> None:
     record = records.get(name_key(row.get("place", "")))
     if record is None:
         raise _refusal(line, f"no row of kind '{_PLACE}' is for the place '{row.get('place')}'")
-    said = _without_frame(row)
+    said = _nested(_without_frame(row))
     items = record[1].setdefault(row.get("kind", ""), [])
     if not isinstance(items, list):
         raise _refusal(line, f"'{row.get('kind')}' is no list of a place")

@@ -21,6 +21,7 @@ Facts = dict[str, object]
 
 _PLACE_DECIMALS = 3
 _NUMBERS = ("_m", "_s", "_deg")
+_COORDINATES = ("x", "y")
 
 
 def facts_of(waypoint: Waypoint) -> Facts:
@@ -83,4 +84,5 @@ def _plain(key: str, value: object) -> object:
         return [_plain("", item) for item in value]
     if isinstance(value, dict):
         return {name: _plain(name, item) for name, item in value.items()}
-    return float(value) if isinstance(value, str) and key.endswith(_NUMBERS) else value
+    is_number = key.endswith(_NUMBERS) or key in _COORDINATES
+    return float(value) if isinstance(value, str) and is_number else value

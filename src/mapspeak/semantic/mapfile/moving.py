@@ -39,7 +39,7 @@ def _with_moved_records(document: MapDocument, motion: Pose) -> str:
     pieces, end = [], 0
     for record in sorted(document.records.values(), key=lambda each: each.start):
         waypoint = record.reading.waypoint
-        new = replace(waypoint, pose=motion @ waypoint.pose)
+        new = waypoint.moved(motion)
         block = document.text[record.start : record.end]
         changed = edited_record(block, old=record_data(waypoint), new=record_data(new))
         pieces += [document.text[end : record.start], changed]

@@ -72,6 +72,7 @@ class _LandmarkEntry(BaseModel):
     picture: str | None = None
     stamp_s: FiniteFloat | None = None
     recorded_at: _Time = None
+    seen_from: _PoseEntry | None = None
 
     def to_landmark(self) -> Landmark:
         bearing_rad = None if self.bearing_deg is None else math.radians(self.bearing_deg)
@@ -85,6 +86,7 @@ class _LandmarkEntry(BaseModel):
             picture=self.picture,
             stamp_s=self.stamp_s,
             recorded_at=self.recorded_at,
+            pose=None if self.seen_from is None else self.seen_from.to_pose(),
         )
 
 
@@ -151,6 +153,7 @@ _EXAMPLES = {
     "room_id": "room_id: R3",
     "picture": "picture: P12.jpg",
     "confidence": "confidence: likely",
+    "seen_from": "seen_from: {x: 1.20, y: -3.40, yaw_deg: 90.0}",
 }
 _EXPECTED = {
     "missing": "is missing",
@@ -189,13 +192,14 @@ def map_id_from(data: Data) -> str | None:
 
 def record_data(waypoint: Waypoint) -> dict[str, Data]:
     """Gives what a record says of a waypoint: millimetres and hundredths of a degree."""
-    pose = waypoint.pose
+    pose = _pose_data(waypoint.pose)
+    safety, functional = waypoint.safety_landmarks, waypoint.functional_landmarks
     return {
         "name": waypoint.name,
         "description": waypoint.description,
-        "pose": {"x": _length(pose.x), "y": _length(pose.y), "yaw_deg": _angle(pose.yaw_rad)},
-        "safety_landmarks": [_landmark_data(thing) for thing in waypoint.safety_landmarks],
-        "functional_landmarks": [_landmark_data(thing) for thing in waypoint.functional_landmarks],
+        "pose": pose,
+        "safety_landmarks": [_landmark_data(thing, pose) for thing in safety],
+        "functional_landmarks": [_landmark_data(thing, pose) for thing in functional],
         "geometric_features": list(waypoint.geometric_features),
         "stamp_s": _length_if_any(waypoint.stamp_s),
         "recorded_at": _time(waypoint.recorded_at),
@@ -256,7 +260,12 @@ def _lookalikes(data: Data, known_keys: frozenset[str]) -> Iterator[tuple[str, s
                 yield key, known
 
 
-def _landmark_data(landmark: Landmark) -> Data:
+def _pose_data(pose: Pose) -> dict[str, Data]:
+    return {"x": _length(pose.x), "y": _length(pose.y), "yaw_deg": _angle(pose.yaw_rad)}
+
+
+def _landmark_data(landmark: Landmark, pose: dict[str, Data]) -> Data:
+    seen_from = None if landmark.pose is None else _pose_data(landmark.pose)
     entries: dict[str, Data] = {
         "label": landmark.label,
         "bearing_deg": None if landmark.bearing_rad is None else _angle(landmark.bearing_rad),
@@ -267,6 +276,7 @@ def _landmark_data(landmark: Landmark) -> Data:
         "picture": landmark.picture,
         "stamp_s": _length_if_any(landmark.stamp_s),
         "recorded_at": _time(landmark.recorded_at),
+        "seen_from": None if seen_from == pose else seen_from,
     }
     said = [key for key, value in entries.items() if value is not None]
     return landmark.label if said == ["label"] else {key: entries[key] for key in said}

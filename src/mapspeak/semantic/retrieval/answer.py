@@ -11,9 +11,14 @@ __all__ = ["Answer", "Basis", "Candidate", "Thresholds", "Verdict"]
 
 
 class Verdict(StrEnum):
-    """How far an answer may be trusted."""
+    """How far an answer may be trusted.
+
+    Likely: one fits, but what is remembered of it is not sure. A search of words alone never says
+    that; who knows the views of a thing does.
+    """
 
     FOUND = "found"
+    LIKELY = "likely"
     AMBIGUOUS = "ambiguous"
     NOT_REMEMBERED = "not_remembered"
 

@@ -137,19 +137,23 @@ class EntryIndex:
         if not order:
             return Verdict.NOT_REMEMBERED
         if asked.basis(order[0]) is not Basis.NAME:
-            sureness = asked.ratios[order[0]] + self._lead_ratio(asked.ratios, order)
+            sureness = asked.ratios[order[0]] + self._lead_ratio(asked.ratios, order[0])
             if sureness < self._thresholds.least_ratio:
                 return Verdict.NOT_REMEMBERED
             if sureness < self._thresholds.sure_ratio:
                 return Verdict.AMBIGUOUS
         return Verdict.FOUND if n_meant == 1 else Verdict.AMBIGUOUS
 
-    def _lead_ratio(self, ratios: NDArray[np.float64], order: list[int]) -> float:
-        """Says how far the first is ahead of the next that is called otherwise."""
-        name = name_key(self._entries[order[0]].name)
-        others = (n for n in order if name_key(self._entries[n].name) != name)
-        other = next(others, None)
-        return 0.0 if other is None else float(ratios[order[0]] - ratios[other])
+    def _lead_ratio(self, ratios: NDArray[np.float64], first: int) -> float:
+        """Says how far one is ahead of the next of all that is remembered and called otherwise.
+
+        Of all, also where only some may be chosen: that a sink stands in another room makes a
+        toilet in this one no likelier to be meant.
+        """
+        name = name_key(self._entries[first].name)
+        is_other = np.ones(len(ratios), dtype=bool)
+        is_other[self._of_key[name]] = False
+        return float(ratios[first] - ratios[is_other].max()) if is_other.any() else 0.0
 
     def _candidate(self, number: int, asked: _Asked) -> Candidate:
         entry, evidence = self._entries[number], self._words.explain(asked.words, number)

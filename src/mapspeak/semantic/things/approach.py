@@ -7,7 +7,8 @@ import numpy as np
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.semantic.things.sight import BODY_M, SightMap
-from mapspeak.spatial.grid import FloatArray
+from mapspeak.spatial import UNKNOWN, OccupancyGrid
+from mapspeak.spatial.grid import FREE_MAX, FloatArray
 from mapspeak.spatial.paths import DistanceField, clearance_m
 
 __all__ = ["find_approach", "find_fronts"]
@@ -74,7 +75,10 @@ def _reachable_near(
 
 
 def find_fronts(sight: SightMap, target: Point, seen_from: Sequence[Point]) -> list[Point]:
-    """Gives, for each who saw the thing, the last floor before it on the line there."""
+    """Gives, for each who saw the thing, the last floor before it on the line there.
+
+    Its middle may lie deep in its own body, where nobody can look.
+    """
     if not seen_from:
         return [target]
     starts = np.array([(place.x, place.y) for place in seen_from])
@@ -86,9 +90,23 @@ def find_fronts(sight: SightMap, target: Point, seen_from: Sequence[Point]) -> l
     is_over = near_m < far_m - BODY_M
     until_m = np.where(is_over, far_m, np.minimum(near_m, far_m)) - _STEP_BACK_M
     return [
-        Point(x + far * math.cos(way), y + far * math.sin(way))
+        _last_floor(
+            sight.grid, Point(x, y), Point(x + far * math.cos(way), y + far * math.sin(way))
+        )
         for (x, y), far, way in zip(starts.tolist(), until_m.tolist(), ways.tolist(), strict=True)
     ]
+
+
+def _last_floor(grid: OccupancyGrid, start: Point, end: Point) -> Point:
+    """Finds the last floor on the line from one point to another; the end where there is none."""
+    n_steps = max(math.ceil(start.distance_to(end) / grid.resolution_m), 1)
+    shares = np.linspace(1.0, 0.0, n_steps + 1)[:, None]
+    points = np.array([[end.x, end.y]]) * shares + np.array([[start.x, start.y]]) * (1.0 - shares)
+    rows, cols = grid.cells_at(points)
+    is_inside = (rows >= 0) & (rows < grid.n_rows) & (cols >= 0) & (cols < grid.n_cols)
+    values = np.where(is_inside, grid.cells[rows * is_inside, cols * is_inside], UNKNOWN)
+    floor = np.flatnonzero((values >= 0) & (values <= FREE_MAX))
+    return Point(*points[floor[0]].tolist()) if floor.size else end
 
 
 def _sees(sight: SightMap, front: Point, points: FloatArray) -> FloatArray:

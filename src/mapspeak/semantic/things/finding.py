@@ -51,7 +51,7 @@ class Things:
     Attributes:
         things: Those with most views first, then by label and place.
         sight: The map, ready for looking around in it.
-        surroundings: What each waypoint sees.
+        surroundings: What each waypoint, and each of its standpoints, sees.
     """
 
     things: tuple[Thing, ...]
@@ -133,7 +133,7 @@ def _divide(
     surroundings: dict[Waypoint, Surroundings], same_name: SameName
 ) -> list[tuple[Sighting, ...]]:
     """Gives all sightings in pools of related labels, in an order that the file does not set."""
-    ordered = sorted(surroundings, key=lambda waypoint: (name_key(waypoint.name), waypoint.name))
+    ordered = sorted(surroundings, key=_order)
     every = [each for waypoint in ordered for each in surroundings[waypoint].sightings]
     pool_of = {
         label: i
@@ -144,6 +144,11 @@ def _divide(
     for each in every:
         pools.setdefault(pool_of[each.landmark.label], []).append(each)
     return [tuple(pools[i]) for i in sorted(pools)]
+
+
+def _order(waypoint: Waypoint) -> tuple[str, str, float, float, float]:
+    pose = waypoint.pose
+    return name_key(waypoint.name), waypoint.name, pose.x, pose.y, pose.yaw_rad
 
 
 def _solve(sight: SightMap, pool: Sequence[Sighting], same_name: SameName) -> tuple[Located, ...]:
@@ -220,11 +225,11 @@ def _against(
     """Finds lone views of the name, from where the thing is in plain sight, that point past it."""
     if located.placement is None or len(located.group) < 2:
         return []
-    position, own = located.placement.position, {each.waypoint.name for each in located.group}
+    position, own = located.placement.position, [each.waypoint for each in located.group]
     return [
         other
         for (other,) in (each.group for each in alone)
-        if other.waypoint.name not in own
+        if other.waypoint not in own
         and other.landmark.bearing_rad is not None
         and other.waypoint.pose.point.distance_to(position) <= PLAIN_SIGHT_M
         and _off_rad(other, position) >= ELSEWHERE_RAD

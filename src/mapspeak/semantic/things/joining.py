@@ -1,7 +1,7 @@
 """Which views are of one thing: they may share a label and can meet at one place.
 
 Votes of all views with one name are added up over the map. The place with most votes is a thing;
-the views that speak of it are taken out, at most one from each waypoint, since who names two sees
+the views that speak of it are taken out, at most one from each pose, since who names two sees
 two. What is left votes again. Then every view may change to the thing that explains it best, and
 things that are better explained as one are joined.
 """
@@ -194,7 +194,7 @@ def _around(sight: SightMap, ballot: _Ballot, index: int) -> IntArray:
 
 
 def _choose(sightings: Sequence[Sighting], ratios: FloatArray, same_name: SameName) -> list[int]:
-    """Gives the views that speak of a place, the strongest first, one from each waypoint."""
+    """Gives the views that speak of a place, the strongest first, one from each pose."""
     chosen: list[int] = []
     for i in np.argsort(-ratios, kind="stable").tolist():
         if ratios[i] < LEAST_RATIO:

@@ -19,7 +19,7 @@ class Sighting:
     """One landmark of one waypoint; compared by identity.
 
     Attributes:
-        waypoint: From where it was seen.
+        waypoint: From where it was seen: the standpoint, whose pose is the one it was seen from.
         landmark: What was seen.
         category: What it is filed under.
         wrong_ratio: How likely it is wrong as a whole.
@@ -40,7 +40,7 @@ class Surroundings:
     Attributes:
         near_m: To the first obstacle, by ray of the grid's frame.
         far_m: To the first wall.
-        sightings: Of all its landmarks.
+        sightings: Of all its landmarks; none where its standpoints have them.
     """
 
     near_m: FloatArray
@@ -51,19 +51,26 @@ class Surroundings:
 def read_waypoints(
     sight: SightMap, waypoints: Sequence[Waypoint], known: Mapping[Waypoint, Surroundings]
 ) -> dict[Waypoint, Surroundings]:
-    """Gives what every waypoint sees; what is known of an equal one is taken as it is."""
-    new = [waypoint for waypoint in dict.fromkeys(waypoints) if waypoint not in known]
+    """Gives what every waypoint sees, and what was seen from each of its standpoints.
+
+    What is known of an equal one is taken as it is.
+    """
+    stands = [stand for waypoint in waypoints for stand in waypoint.standpoints]
+    every = dict.fromkeys((*waypoints, *stands))
+    new = [waypoint for waypoint in every if waypoint not in known]
     near_m, far_m = look_around(sight, [waypoint.pose for waypoint in new])
     read = {
         waypoint: _read(sight, waypoint, near, far)
         for waypoint, near, far in zip(new, near_m, far_m, strict=True)
     }
-    return {waypoint: known.get(waypoint) or read[waypoint] for waypoint in waypoints}
+    return {waypoint: known.get(waypoint) or read[waypoint] for waypoint in every}
 
 
 def _read(
     sight: SightMap, waypoint: Waypoint, near_m: FloatArray, far_m: FloatArray
 ) -> Surroundings:
+    if waypoint.standpoints != (waypoint,):
+        return Surroundings(near_m=near_m, far_m=far_m, sightings=())
     outlook = build_outlook(sight, waypoint.pose, near_m, far_m)
     sorted_in = (
         (Category.SAFETY, waypoint.safety_landmarks),

@@ -18,12 +18,12 @@ class Category(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """One landmark of one waypoint, and what it says of a thing.
+    """One landmark, as it was seen from one pose, and what it says of a thing.
 
     Attributes:
         waypoint: The name of the place it was seen from.
         landmark: What was seen.
-        place: Where that waypoint is.
+        place: Where it was seen from: that waypoint's place, or the view's own.
         why: Why it speaks for the thing or against it, in words with numbers.
     """
 
@@ -44,7 +44,7 @@ class Thing:
         purposes: What it is good for, each once.
         position: Where it is; None where no view says a direction.
         uncertainty_m: The radius around the position that holds it with 90 %; None without one.
-        supporting: Views of it, by waypoint.
+        supporting: Views of it, by waypoint; one waypoint may have several, each from its pose.
         conflicting: Views that say otherwise.
         confidence_ratio: That there is such a thing there, by its views alone.
     """
@@ -61,5 +61,5 @@ class Thing:
 
     @property
     def waypoints(self) -> tuple[str, ...]:
-        """The places it was seen from."""
-        return tuple(view.waypoint for view in self.supporting)
+        """The places it was seen from, each once."""
+        return tuple(dict.fromkeys(view.waypoint for view in self.supporting))

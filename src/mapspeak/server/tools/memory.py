@@ -1,17 +1,33 @@
 """The tools of the memory besides finding: its faults, what was observed, what is the matter."""
 
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import datetime
 from typing import Annotated
 
 from mcp.server.mcpserver import Image
 from pydantic import Field
 
-from mapspeak.errors import SemanticMapError
-from mapspeak.geometry import Point
+from mapspeak.errors import LinkError, MapError, SemanticMapError
 from mapspeak.navigation import notices
-from mapspeak.semantic.episodes import EpisodeMatch, EpisodeQuery, ObservationKind
+from mapspeak.navigation.atlas import Atlas
+from mapspeak.navigation.recall import find_nearby
+from mapspeak.semantic.episodes import (
+    EpisodeMatch,
+    EpisodeOrder,
+    EpisodePage,
+    EpisodeQuery,
+    ObservationKind,
+)
 from mapspeak.semantic.events import Effect as EventEffect
-from mapspeak.server.memorytexts import describe_check, describe_episodes, say_episode
-from mapspeak.server.moments import read_moment
+from mapspeak.semantic.things import name_the_same
+from mapspeak.server.memorytexts import (
+    describe_check,
+    describe_episodes,
+    describe_nearby,
+    say_episode,
+)
+from mapspeak.server.moments import AHEAD, PAST, read_moment
 from mapspeak.server.tools.finding import FindTools, find_point, find_room
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.session import Session
@@ -19,6 +35,7 @@ from mapspeak.session import Session
 __all__ = ["MemoryTools"]
 
 MOST_EPISODES = 20
+MOST_COMPARED = 1000
 
 FromRow = Annotated[int, Field(description="go on from this row", ge=0, le=1_000_000, strict=True)]
 Words = Annotated[str | None, Field(description="what they are about", max_length=300)]
@@ -28,7 +45,7 @@ Near = Annotated[
 NearSeen = Annotated[
     str | None,
     Field(
-        description="or nearest to where this was seen, as 'ladder', and without it",
+        description="or nearest to where this was seen: 'ladder', 'ladder in R2', T3",
         max_length=300,
     ),
 ]
@@ -37,9 +54,7 @@ RadiusM = Annotated[
     Field(description="only so many metres around it", gt=0, le=10_000, allow_inf_nan=False),
 ]
 Room = Annotated[str | None, Field(description="made in it", max_length=200)]
-Since = Annotated[
-    str | None, Field(description="2026-11-20, 2026-11-20T09:30, 09:30, 2h", max_length=40)
-]
+Since = Annotated[str | None, Field(description=PAST, max_length=40)]
 Until = Annotated[str | None, Field(description="before; likewise", max_length=40)]
 Label = Annotated[str | None, Field(description="a thing seen, by its label", max_length=120)]
 Kind = Annotated[ObservationKind | None, Field(description="what they came from")]
@@ -55,9 +70,7 @@ Where = Annotated[
 ForWays = Annotated[
     EventEffect, Field(description="for ways: closed, slow, to avoid if possible, or none")
 ]
-Begins = Annotated[
-    str | None, Field(description="2026-11-20T09:30, 09:30, in 2h; else now", max_length=40)
-]
+Begins = Annotated[str | None, Field(description=f"{AHEAD}; else now", max_length=40)]
 Ends = Annotated[str | None, Field(description="likewise; open-ended when left out", max_length=40)]
 Source = Annotated[str, Field(description="who or what said so", max_length=120)]
 EventId = Annotated[str, Field(description="such as E3", max_length=20)]
@@ -119,19 +132,8 @@ class MemoryTools:
             raise SemanticMapError("Both near and near_seen were given.", hint="Give one of them.")
         now = self._session.find_wall_time()
         begin, end = read_moment(since, now), read_moment(until, now)
-        place: Point | EpisodeQuery | None = None
-        room_id = None
-        if near_seen is not None:
-            place = EpisodeQuery(words=near_seen, since=begin, until=end)
-        if near is not None or room is not None:
-            atlas = await self._session.fetch_atlas()
-            place = place if near is None else find_point(atlas, near)
-            room_id = None if room is None else find_room(atlas, room)
-        query = EpisodeQuery(
+        wanted = EpisodeQuery(
             words=words,
-            near=place,
-            radius_m=radius_m,
-            room_id=room_id,
             since=begin,
             until=end,
             label=label,
@@ -139,8 +141,42 @@ class MemoryTools:
             limit=MOST_EPISODES,
             offset=from_row,
         )
-        page = await self._session.compute(lambda: self._session.find_episodes(query))
-        return [describe_episodes(page, now=now)]
+        if near is None and near_seen is None and room is None and radius_m is None:
+            page = await self._session.compute(lambda: self._session.find_episodes(wanted))
+            return [describe_episodes(page, now=now)]
+        atlas = await self._session.fetch_atlas()
+
+        def ask() -> str:
+            room_id = None if room is None else find_room(atlas, room)
+            query = replace(wanted, room_id=room_id)
+            if near_seen is not None:
+                return self._recall_near_seen(atlas, near_seen, radius_m, query, now)
+            point = None if near is None else find_point(atlas, near)
+            query = replace(query, near=point, radius_m=radius_m)
+            return describe_episodes(self._session.find_episodes(query), now=now)
+
+        return [await self._session.compute(ask)]
+
+    def _recall_near_seen(
+        self,
+        atlas: Atlas,
+        words: str,
+        radius_m: float | None,
+        query: EpisodeQuery,
+        now: datetime | None,
+    ) -> str:
+        """Gives what is near to where something was seen: to the thing, else to its picture."""
+        nearby = find_nearby(atlas, words, radius_m=radius_m, room_id=query.room_id)
+        if nearby is None:
+            seen = EpisodeQuery(words=words, since=query.since, until=query.until)
+            query = replace(query, near=seen, radius_m=radius_m)
+            return describe_episodes(self._session.find_episodes(query), now=now)
+        query = replace(
+            query, near=nearby.thing.point, radius_m=radius_m, order=EpisodeOrder.NEAREST
+        )
+        label = nearby.thing.thing.label
+        page = _without(label, query, self._session.find_episodes)
+        return f"{describe_nearby(atlas, nearby)}\n{describe_episodes(page, now=now)}"
 
     async def note_event(
         self,
@@ -165,8 +201,9 @@ class MemoryTools:
         start = read_moment(begins, now, is_ahead=True)
         end = read_moment(ends, now, is_ahead=True)
         atlas = await session.fetch_atlas()
-        event = await session.compute(
-            lambda: notices.note_event(
+
+        def note() -> str:
+            event = notices.note_event(
                 atlas,
                 session.memory,
                 text=text,
@@ -177,8 +214,12 @@ class MemoryTools:
                 until=end,
                 source=source,
             )
-        )
-        return f"Noted as {event.sentence(now)}"
+            said = event.sentence(now)
+            fault = self._keep_note(atlas, f"Noted {said}")
+            told = (said, *notices.say_consequences(atlas, event, now), fault)
+            return " ".join(filter(None, told))
+
+        return f"Noted as {await session.compute(note)}"
 
     async def end_event(self, event: EventId) -> str:
         """Ends an event at once; ways lead through its place again.
@@ -192,7 +233,14 @@ class MemoryTools:
                 "The time by the calendar is not known here.", hint="Nothing was changed."
             )
         ended = await session.compute(lambda: notices.end_event(session.memory, event, now=now))
-        return f"Ended: {ended.sentence(now)}"
+        said = ended.sentence(now)
+        try:
+            atlas = await session.fetch_atlas()
+        except (LinkError, MapError):
+            # It has ended all the same; only where the robot stood then is not known.
+            return f"Ended: {said}"
+        fault = await session.compute(lambda: self._keep_note(atlas, f"Ended {said}"))
+        return " ".join(filter(None, (f"Ended: {said}", fault)))
 
     async def realign_memory(self) -> str:
         """Moves all remembered poses to the present map, where it is sure how; all or none.
@@ -205,6 +253,14 @@ class MemoryTools:
         receipt = await session.compute(lambda: session.keeper.realign(grid))
         certainty = "" if receipt.certainty is None else f" Certainty: {receipt.certainty}."
         return f"{receipt.sentence}{certainty}"
+
+    def _keep_note(self, atlas: Atlas, text: str) -> str:
+        """Keeps an event as an episode too; gives why it could not, else nothing."""
+        here = atlas.robot
+        keeping = self._session.diary.keep_note(
+            text, pose=here, room_id=atlas.find_room_id(here.point), map_id=atlas.memory.map_id
+        )
+        return keeping.fault
 
     async def _show(self, observation_id: str) -> list[str | Image]:
         store = self._session.diary.store
@@ -222,3 +278,21 @@ class MemoryTools:
         data = await self._session.compute(path.read_bytes)
         kind = "png" if path.suffix == ".png" else "jpeg"
         return [said, Image(data=data, format=kind)]
+
+
+def _without(
+    label: str, query: EpisodeQuery, find: Callable[[EpisodeQuery], EpisodePage]
+) -> EpisodePage:
+    """Gives a page of what passes a query and shows nothing of that label."""
+    every = find(replace(query, limit=MOST_COMPARED, offset=0))
+    left = tuple(
+        match
+        for match in every.matches
+        if not any(name_the_same(each, label) for each in match.observation.labels)
+    )
+    end = query.offset + query.limit
+    return EpisodePage(
+        matches=left[query.offset : end],
+        n_matches=len(left),
+        next_page=replace(query, offset=end) if end < len(left) else None,
+    )

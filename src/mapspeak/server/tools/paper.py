@@ -11,9 +11,10 @@ from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.navigation.goals import FARTHEST_M
 from mapspeak.navigation.places import is_taken_name
 from mapspeak.navigation.recall import find_speaking_places
-from mapspeak.semantic import Waypoint
+from mapspeak.semantic import Waypoint, WriteReceipt
 from mapspeak.server.annotating import Annotator, Landmarks
 from mapspeak.server.captions import say_axes, say_plain
+from mapspeak.server.remembering import say_far
 from mapspeak.server.reports import MemoryAnswer, WriteAnswer
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.server.wording import say_pose
@@ -139,25 +140,29 @@ class PaperTools:
         origin = annotator.find_origin(safety_landmarks, functional_landmarks)
         here = (await self._session.robot.fetch_pose()).pose
         pose = _observation_pose(here if origin is None else origin.pose, x, y, yaw_deg)
+        if x is not None:
+            await self._require_on_map(pose)
         picture = annotator.find_picture_from(pose)
         waypoint = Waypoint(
-            name=name,
-            description=description,
+            name=annotator.take_name(name),
+            description=annotator.take_description(description),
             pose=pose,
             safety_landmarks=annotator.take(safety_landmarks, pose=pose, picture=picture),
             functional_landmarks=annotator.take(functional_landmarks, pose=pose, picture=picture),
             geometric_features=annotator.take_features(geometric_features or ()),
             stamp_s=self._session.robot.now_s if picture is None else picture.stamp_s,
-            recorded_at=self._session.find_wall_time(),
+            recorded_at=self._session.find_wall_time() if picture is None else picture.recorded_at,
             room_id=await self._find_room_id(pose),
             picture=None if picture is None else picture.name,
         )
+        annotator.require_content(waypoint)
         memory = self._session.memory
         receipt, merge = await self._session.compute(
             lambda: memory.remember(waypoint, gone=gone or ())
         )
         kept = await self._session.compute(lambda: self._session.diary.keep_record(waypoint))
-        warnings = filter(None, (kept.fault, await self._session.keep_map()))
+        far = await self._say_far(receipt)
+        warnings = filter(None, (*far, kept.fault, await self._session.keep_map()))
         places = await self._session.compute(memory.read)
         return WriteAnswer.of(
             receipt, places, merge=merge, refused=annotator.refused, warnings=tuple(warnings)
@@ -180,6 +185,26 @@ class PaperTools:
         atlas = await self._session.fetch_atlas()
         shown, answer = await self._session.compute(lambda: find_speaking_places(atlas, query))
         return MemoryAnswer.of_places(atlas.memory, shown, advice=[answer.advice])
+
+    async def _say_far(self, receipt: WriteReceipt) -> list[str]:
+        previous, now = receipt.previous, receipt.waypoint
+        if previous is None:
+            return []
+        rooms = [await self._find_room_id(each.pose) for each in (previous, now)]
+        return say_far(previous, now, rooms=rooms)
+
+    async def _require_on_map(self, pose: Pose) -> None:
+        try:
+            grid = await self._session.robot.fetch_map()
+        except LinkError:
+            return
+        if not grid.contains(grid.cell_at(pose.point)):
+            low, high = grid.bounds()
+            raise SemanticMapError(
+                f"({pose.x:g}, {pose.y:g}) lies off the map, which spans x {low.x:.1f} to "
+                f"{high.x:.1f}, y {low.y:.1f} to {high.y:.1f}.",
+                hint="Give metres in the map frame, or leave x and y out for the robot's own pose.",
+            )
 
     async def _find_room_id(self, pose: Pose) -> str | None:
         try:
