@@ -129,8 +129,9 @@ def _say_ambiguous(answer: Answer, candidates: Sequence[RecallCandidate]) -> str
             "meant, then navigate_to its id."
         )
     return (
-        f"Ambiguous: nothing is called so; the likeliest is {_name(first)}. Look at why each is "
-        "listed, and navigate_to an id only if it fits; else say it in other words."
+        f"Ambiguous: nothing is called so, and it may not be remembered; {_name(first)} is the "
+        "nearest. See why each is listed, and navigate_to an id only if it fits; else say it in "
+        "other words, or search_for it."
     )
 
 
