@@ -12,9 +12,9 @@ from benchmarks.figure import Figure
 from mapspeak.geometry import Pose
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.semantic import SemanticMap
-from mapspeak.server.drawing import draw_atlas
-from mapspeak.server.tables import describe_atlas
-from mapspeak.server.views import MapLook, view_of
+from mapspeak.server.mapview.drawing import draw_atlas
+from mapspeak.server.mapview.tables import describe_atlas
+from mapspeak.server.mapview.views import MapLook, view_of
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 
 __all__ = ["draw_building", "measure"]

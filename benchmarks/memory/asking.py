@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from benchmarks.memory.sites import RADIUS_M, Site
 from mapspeak.geometry import Pose
 from mapspeak.navigation.atlas import Atlas
+from mapspeak.navigation.memory.recollection import Recollector
 from mapspeak.navigation.recall import RecallQuery, recall
 from mapspeak.navigation.recall.answer import Recall
-from mapspeak.navigation.recollection import Recollector
 from mapspeak.semantic import SemanticMap
 from mapspeak.semantic.retrieval import Embedder
 

@@ -14,10 +14,10 @@ from mapspeak.errors import LinkError, MapError, MapspeakError, SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.choosing import CheckedGoal, choose_goal
-from mapspeak.navigation.diary import Diary, Keeping
 from mapspeak.navigation.drive import DriveBook
 from mapspeak.navigation.lease import Lease
-from mapspeak.navigation.recollection import Recollector
+from mapspeak.navigation.memory.diary import Diary, Keeping
+from mapspeak.navigation.memory.recollection import Recollector
 from mapspeak.navigation.revision import MapRevision
 from mapspeak.navigation.safety import Guard, GuardedConnection, GuardedRobot, Surveyor, WhenBusy
 from mapspeak.robot import CameraPicture, Robot

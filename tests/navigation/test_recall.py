@@ -10,10 +10,10 @@ from mapspeak.errors import ConfigError, GoalError
 from mapspeak.geometry import Point
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.choosing import check_place
+from mapspeak.navigation.memory.recollection import Recollector
 from mapspeak.navigation.naming import AmbiguousPlaceError
 from mapspeak.navigation.places import find_place
 from mapspeak.navigation.recall import RecallQuery, recall
-from mapspeak.navigation.recollection import Recollector
 from mapspeak.semantic import Landmark, SemanticMap, Waypoint
 from mapspeak.semantic.retrieval import EntryKind, Verdict
 from remembering import EXTINGUISHER, LADDER, ROBOT, atlas_of, look, looks_at

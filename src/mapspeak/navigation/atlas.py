@@ -11,8 +11,8 @@ from functools import cached_property
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.navigation.doorways import find_crossing
-from mapspeak.navigation.judging import Judge
-from mapspeak.navigation.recollection import (
+from mapspeak.navigation.memory.judging import Judge
+from mapspeak.navigation.memory.recollection import (
     Recollection,
     Recollector,
     RememberedPlace,

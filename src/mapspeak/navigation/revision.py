@@ -10,7 +10,7 @@ import numpy as np
 
 from mapspeak.geometry import Point
 from mapspeak.navigation.closures import ClosedArea, close_floor
-from mapspeak.navigation.hindrances import Hindrance, weigh_floor
+from mapspeak.navigation.events.hindrances import Hindrance, weigh_floor
 from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.paths import DistanceField, Path, clearance_m, distances_from
 from mapspeak.spatial.paths.clearance import Clearance

@@ -18,8 +18,8 @@ from mapspeak.navigation.safety import ApprovalNeededError, Caller, calling
 from mapspeak.server.asking import Asking
 from mapspeak.server.calllog import CallLog
 from mapspeak.server.leanness import lean_input, lean_output
+from mapspeak.server.mapview.representations import Representation
 from mapspeak.server.prompts import add_prompts, read_text
-from mapspeak.server.representations import Representation
 from mapspeak.server.tools import build_toolsets
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.server.visible import show_controls, show_controls_of

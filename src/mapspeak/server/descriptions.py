@@ -8,8 +8,8 @@ from mapspeak.navigation.choosing import CheckedGoal, check_place
 from mapspeak.navigation.places import Place
 from mapspeak.navigation.ways import standing_point
 from mapspeak.semantic import group_views
-from mapspeak.server.roomtables import say_walk
-from mapspeak.server.thingtexts import say_landmark, say_things_from, say_things_in, thing_lines
+from mapspeak.server.mapview.roomtables import say_walk
+from mapspeak.server.memory.things import say_landmark, say_things_from, say_things_in, thing_lines
 from mapspeak.server.wording import (
     join_words,
     say_direction,

@@ -9,7 +9,7 @@ from mapspeak.navigation.choosing import check_place
 from mapspeak.navigation.goals import GoalVerdict
 from mapspeak.navigation.places import Place, Spot, find_place
 from mapspeak.navigation.ways import Way, find_way, measure_path, standing_point
-from mapspeak.server.roomtables import say_sizes
+from mapspeak.server.mapview.roomtables import say_sizes
 from mapspeak.server.wording import build_table, join_words, say_kind, say_path, say_point
 from mapspeak.spatial.rooms import Door, Region
 

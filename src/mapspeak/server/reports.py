@@ -14,7 +14,7 @@ from mapspeak.navigation.drive import DriveReport
 from mapspeak.navigation.goals import GoalVerdict
 from mapspeak.robot import GoalState, StampedPose
 from mapspeak.semantic import Landmark, Merge, SemanticMap, WriteReceipt, name_key
-from mapspeak.server.remembering import say_landmarks, say_replaced
+from mapspeak.server.memory.remembering import say_landmarks, say_replaced
 from mapspeak.server.wording import say_pose
 
 __all__ = [

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.choosing import stand_at
+from mapspeak.navigation.memory.recollection import Remembered, RememberedPlace
 from mapspeak.navigation.naming import Place, say_spot
 from mapspeak.navigation.recall.answer import Recall, RecallQuery
 from mapspeak.navigation.recall.candidates import describe_candidate
 from mapspeak.navigation.recall.filters import find_passing, point_of
 from mapspeak.navigation.recall.wording import find_doubt, say_advice, say_evidence
-from mapspeak.navigation.recollection import Remembered, RememberedPlace
 from mapspeak.navigation.thingnames import split_room
 from mapspeak.semantic.retrieval import Basis, Candidate, Verdict
 

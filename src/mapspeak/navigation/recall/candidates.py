@@ -3,10 +3,10 @@
 from mapspeak.navigation.atlas import Atlas, RememberedPlace, RememberedThing
 from mapspeak.navigation.choosing import stand_at
 from mapspeak.navigation.goals import judge_goal
+from mapspeak.navigation.memory.recollection import Remembered
 from mapspeak.navigation.naming import Place
 from mapspeak.navigation.recall.answer import RecallCandidate
 from mapspeak.navigation.recall.filters import find_rooms, last_seen, list_views
-from mapspeak.navigation.recollection import Remembered
 from mapspeak.semantic.retrieval import EntryKind
 
 __all__ = ["describe_candidate"]

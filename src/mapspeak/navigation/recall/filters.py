@@ -5,8 +5,8 @@ from datetime import datetime
 
 from mapspeak.geometry import Point
 from mapspeak.navigation.atlas import Atlas
+from mapspeak.navigation.memory.recollection import Remembered, RememberedPlace
 from mapspeak.navigation.recall.answer import RecallQuery
-from mapspeak.navigation.recollection import Remembered, RememberedPlace
 from mapspeak.semantic import Landmark
 from mapspeak.semantic.retrieval import EntryKind
 

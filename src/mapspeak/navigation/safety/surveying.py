@@ -7,8 +7,13 @@ import anyio
 import anyio.to_thread
 
 from mapspeak.navigation.closures import ClosedArea, Outline
-from mapspeak.navigation.footprints import outlines_of_region
-from mapspeak.navigation.notices import close_floor_of, find_hindrances, say_events, say_unplaced
+from mapspeak.navigation.events.footprints import outlines_of_region
+from mapspeak.navigation.events.notices import (
+    close_floor_of,
+    find_hindrances,
+    say_events,
+    say_unplaced,
+)
 from mapspeak.navigation.revision import MapRevision
 from mapspeak.navigation.safety.policy import AreaRule
 from mapspeak.semantic.events import Effect, Event

@@ -8,10 +8,10 @@ import numpy as np
 from PIL import Image
 
 from mapspeak.errors import ConfigError
-from mapspeak.server.drawing import draw_rooms
-from mapspeak.server.facts import MapFacts, RegionFacts
 from mapspeak.server.mapcommand.jobs import MapJob, Output
 from mapspeak.server.mapcommand.selection import is_description
+from mapspeak.server.mapview.drawing import draw_rooms
+from mapspeak.server.mapview.facts import MapFacts, RegionFacts
 from mapspeak.spatial.areagraph import (
     AreaGraph,
     MapAnchor,

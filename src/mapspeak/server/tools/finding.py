@@ -11,8 +11,8 @@ from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.places import find_place
 from mapspeak.navigation.recall import RecallQuery, recall
 from mapspeak.semantic.retrieval import EntryKind
-from mapspeak.server.moments import read_moment
-from mapspeak.server.recallreports import RecallAnswer
+from mapspeak.server.memory.moments import read_moment
+from mapspeak.server.memory.reports import RecallAnswer
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.session import Session
 from mapspeak.spatial.rooms import Region

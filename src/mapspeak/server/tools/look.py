@@ -6,11 +6,11 @@ from mcp.server.mcpserver import Image
 from pydantic import Field
 
 from mapspeak.errors import LinkError, MapError
+from mapspeak.server.mapview.representations import Representation, show
+from mapspeak.server.mapview.views import Layer, Up, look_at, view_of
 from mapspeak.server.reports import PoseAnswer
-from mapspeak.server.representations import Representation, show
 from mapspeak.server.sightings import look_ahead
 from mapspeak.server.toolset import Effect, Tool
-from mapspeak.server.views import Layer, Up, look_at, view_of
 from mapspeak.session import Session
 
 __all__ = ["LookTools"]

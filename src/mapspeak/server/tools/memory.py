@@ -9,8 +9,8 @@ from mcp.server.mcpserver import Image
 from pydantic import Field
 
 from mapspeak.errors import LinkError, MapError, SemanticMapError
-from mapspeak.navigation import notices
 from mapspeak.navigation.atlas import Atlas
+from mapspeak.navigation.events import notices
 from mapspeak.navigation.recall import find_nearby
 from mapspeak.semantic.episodes import (
     EpisodeMatch,
@@ -21,13 +21,13 @@ from mapspeak.semantic.episodes import (
 )
 from mapspeak.semantic.events import Effect as EventEffect
 from mapspeak.semantic.things import name_the_same
-from mapspeak.server.memorytexts import (
+from mapspeak.server.memory.moments import AHEAD, PAST, read_moment
+from mapspeak.server.memory.texts import (
     describe_check,
     describe_episodes,
     describe_nearby,
     say_episode,
 )
-from mapspeak.server.moments import AHEAD, PAST, read_moment
 from mapspeak.server.tools.finding import FindTools, find_point, find_room
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.session import Session

@@ -12,9 +12,9 @@ from mapspeak.navigation.goals import FARTHEST_M
 from mapspeak.navigation.places import is_taken_name
 from mapspeak.navigation.recall import find_speaking_places
 from mapspeak.semantic import Waypoint, WriteReceipt
-from mapspeak.server.annotating import Annotator, Landmarks
-from mapspeak.server.captions import say_axes, say_plain
-from mapspeak.server.remembering import say_far
+from mapspeak.server.mapview.captions import say_axes, say_plain
+from mapspeak.server.memory.annotating import Annotator, Landmarks
+from mapspeak.server.memory.remembering import say_far
 from mapspeak.server.reports import MemoryAnswer, WriteAnswer
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.server.wording import say_pose

@@ -1,6 +1,6 @@
 """Every toolset by its name."""
 
-from mapspeak.server.representations import Representation
+from mapspeak.server.mapview.representations import Representation
 from mapspeak.server.tools.drive import DriveTools
 from mapspeak.server.tools.explore import ExploreTools
 from mapspeak.server.tools.look import LookTools

@@ -11,8 +11,12 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.closures import ClosedArea, Outline
-from mapspeak.navigation.footprints import outline_around, outline_of_door, outlines_of_region
-from mapspeak.navigation.hindrances import Hindrance
+from mapspeak.navigation.events.footprints import (
+    outline_around,
+    outline_of_door,
+    outlines_of_region,
+)
+from mapspeak.navigation.events.hindrances import Hindrance
 from mapspeak.navigation.places import Place, Spot, find_place
 from mapspeak.navigation.revision import MapRevision
 from mapspeak.semantic import LEFT_OUT, Concern, SemanticMapStore, tells_what_to_do

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mapspeak.cli.guarding import wall_clock
-from mapspeak.cli.memory_files import JSON_OPTION, MEMORY_OPTION, find_memory
+from mapspeak.cli.memory.files import JSON_OPTION, MEMORY_OPTION, find_memory
 
 if TYPE_CHECKING:
     from mapspeak.semantic.episodes import EpisodeMatch, EpisodeQuery, EpisodeStore, Rank

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from mapspeak.navigation.recall import Recall, RecallCandidate
 from mapspeak.semantic.retrieval import Verdict
-from mapspeak.server.moments import say_age
+from mapspeak.server.memory.moments import say_age
 from mapspeak.server.reports import PoseReport, Report
 
 __all__ = ["CandidateReport", "RecallAnswer"]

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.standing import find_standing_point
-from mapspeak.server.views import MapView, Part
+from mapspeak.server.mapview.views import MapView, Part
 from mapspeak.server.wording import (
     build_table,
     list_some,

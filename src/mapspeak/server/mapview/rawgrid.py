@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.errors import MapError
-from mapspeak.server.views import MapView
+from mapspeak.server.mapview.views import MapView
 from mapspeak.spatial import FREE_MAX, UNKNOWN, OccupancyGrid
 from mapspeak.spatial.picture import Zoom
 

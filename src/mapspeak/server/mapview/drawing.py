@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapspeak.navigation.atlas import Atlas
-from mapspeak.server.views import Layer, MapLook, MapView
+from mapspeak.server.mapview.views import Layer, MapLook, MapView
 from mapspeak.server.wording import list_some, shorten
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.picture import (

@@ -8,11 +8,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-from mapspeak.server.captions import say_axes
-from mapspeak.server.drawing import draw_atlas
-from mapspeak.server.rawgrid import describe_raw_grid
-from mapspeak.server.tables import describe_atlas
-from mapspeak.server.views import MapView
+from mapspeak.server.mapview.captions import say_axes
+from mapspeak.server.mapview.drawing import draw_atlas
+from mapspeak.server.mapview.rawgrid import describe_raw_grid
+from mapspeak.server.mapview.tables import describe_atlas
+from mapspeak.server.mapview.views import MapView
 from mapspeak.server.wording import say_pose
 from mapspeak.spatial.picture import NORTH_UP_RAD, draw_robot_pose
 

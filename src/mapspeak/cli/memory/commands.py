@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mapspeak.cli.memory_episodes import episodes
-from mapspeak.cli.memory_exchange import export, import_, merge
-from mapspeak.cli.memory_files import JSON_OPTION, MEMORY_OPTION, open_memory, read_places
+from mapspeak.cli.memory.episodes import episodes
+from mapspeak.cli.memory.exchange import export, import_, merge
+from mapspeak.cli.memory.files import JSON_OPTION, MEMORY_OPTION, open_memory, read_places
 from mapspeak.cli.options import FILE
 from mapspeak.errors import SemanticMapError
 

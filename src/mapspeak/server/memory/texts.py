@@ -7,7 +7,7 @@ from mapspeak.navigation.atlas import Atlas, RememberedThing
 from mapspeak.navigation.recall import Nearby
 from mapspeak.semantic.consistency import Finding
 from mapspeak.semantic.episodes import EpisodeMatch, EpisodePage
-from mapspeak.server.moments import say_age
+from mapspeak.server.memory.moments import say_age
 from mapspeak.server.wording import say_count, say_point, say_pose
 
 __all__ = ["describe_check", "describe_episodes", "describe_nearby", "say_episode"]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mapspeak.cli.memory_files import (
+from mapspeak.cli.memory.files import (
     MEMORY_OPTION,
     find_memory,
     open_memory,

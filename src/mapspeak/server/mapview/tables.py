@@ -5,8 +5,8 @@ from itertools import groupby
 
 from mapspeak.navigation.atlas import Atlas, RememberedPlace
 from mapspeak.navigation.closures import ClosedArea
-from mapspeak.server.roomtables import room_tables, say_walk
-from mapspeak.server.views import Layer, MapLook, MapView
+from mapspeak.server.mapview.roomtables import room_tables, say_walk
+from mapspeak.server.mapview.views import Layer, MapLook, MapView
 from mapspeak.server.wording import (
     build_table,
     join_words,

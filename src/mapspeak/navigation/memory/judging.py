@@ -3,7 +3,7 @@
 from collections import defaultdict
 from collections.abc import Iterable
 
-from mapspeak.navigation.recollection import RememberedPlace, RememberedThing
+from mapspeak.navigation.memory.recollection import RememberedPlace, RememberedThing
 from mapspeak.semantic.consistency import Finding, Trust, judge_trust
 
 __all__ = ["Judge"]
