@@ -18,7 +18,7 @@ PAPER_TOOLS = {
     "write_semantic_data",
     "get_semantic_data",
 }
-MOST_BYTES = 12_900
+MOST_BYTES = 12_000
 
 
 @pytest.mark.parametrize("mode", MODES)

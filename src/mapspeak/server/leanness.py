@@ -23,9 +23,14 @@ def lean_input(schema: Schema) -> Schema:
 
 
 def lean_output(schema: Schema) -> Schema:
-    """Gives the schema of a report: names carry units, and every field is always there."""
+    """Gives the schema of a report: names carry units, and every field is always there.
+
+    What stands in a list is promised its type only: its fields have their names in every answer.
+    """
+    if schema is None:
+        return None
     lean = _rewrite(schema, _without(("title", "description", "required", "default")))
-    return _inline(_rewrite(lean, _short_nullable))
+    return _inline(_prune(_rewrite(_plain_items(lean), _short_nullable)))
 
 
 def _rewrite(schema: Schema, change: Callable[[dict[str, Schema]], dict[str, Schema]]) -> Schema:
@@ -62,6 +67,36 @@ def _short_nullable(schema: dict[str, Schema]) -> dict[str, Schema]:
         return schema
     rest = {key: value for key, value in schema.items() if key != "anyOf"}
     return {**options[0], **rest, "type": [options[0]["type"], "null"]}
+
+
+def _plain_items(schema: Schema) -> Schema:
+    """Writes lists of reports as lists of objects."""
+    reports = {
+        f"{REF}{name}"
+        for name, part in schema.get("$defs", {}).items()
+        if part.get("type") == "object"
+    }
+
+    def plain(part: dict[str, Schema]) -> dict[str, Schema]:
+        is_of_reports = part.get("items", {}).get("$ref") in reports
+        return {**part, "items": {"type": "object"}} if is_of_reports else part
+
+    return _rewrite(schema, plain)
+
+
+def _prune(schema: Schema) -> Schema:
+    """Drops the definitions that nothing leads to."""
+    definitions = schema.get("$defs", {})
+    body = _without(("$defs",))(schema)
+    used: dict[str, Schema] = {}
+    left = [body]
+    while left:
+        text = json.dumps(left.pop())
+        for name, part in definitions.items():
+            if name not in used and f'"{REF}{name}"' in text:
+                used[name] = part
+                left.append(part)
+    return {**body, "$defs": used} if used else body
 
 
 def _inline(schema: Schema) -> Schema:

@@ -54,7 +54,7 @@ class LookTools:
             ),
             Tool(
                 function=self.look_through_camera,
-                title="Look through the robot's camera",
+                title="Look through the camera",
                 effect=Effect.READS,
                 is_entry=True,
             ),
@@ -76,8 +76,8 @@ class LookTools:
         """Shows the robot's map: an annotated picture and the same facts as text tables.
 
         Use it first, and again after every drive: rooms (R), corridors (C), doors (D), frontiers to
-        the unknown (F) and remembered places (W) with areas, poses and path distances. Any id goes
-        straight into navigate_to, describe_place and measure.
+        the unknown (F) and remembered places (W) with areas, poses and path distances. Any id is a
+        place for the other tools.
         """
         atlas = await self._session.fetch_atlas()
         view = await self._session.compute(

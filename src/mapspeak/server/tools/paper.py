@@ -62,17 +62,17 @@ class PaperTools:
         return [
             Tool(
                 function=self.subscribe_map_as_image,
-                title="The map as a grey picture (paper)",
+                title="Map as a grey picture (paper)",
                 effect=Effect.READS,
             ),
             Tool(
                 function=self.draw_map_axis,
-                title="The map with axes and grid (paper)",
+                title="Map with axes and grid (paper)",
                 effect=Effect.READS,
             ),
             Tool(
                 function=self.draw_robot_pose,
-                title="The map with the robot's pose (paper)",
+                title="Map with the robot's pose (paper)",
                 effect=Effect.READS,
             ),
             Tool(

@@ -45,7 +45,7 @@ class PlaceTools:
             Tool(function=self.measure, title="Measure ways and sizes", effect=Effect.READS),
             Tool(
                 function=self.check_goal,
-                title="Check a goal before driving",
+                title="Check a goal",
                 effect=Effect.READS,
                 has_report=True,
             ),
@@ -55,7 +55,7 @@ class PlaceTools:
         """Describes one room, corridor, door, frontier, remembered place or point of the map.
 
         Use it for shape, doors in their order along a corridor, what was seen there, how to get
-        there; look_at_map around it shows it.
+        there.
         """
         atlas = await self._session.fetch_atlas()
         return await self._session.compute(lambda: describe_place(atlas, find_place(atlas, place)))
