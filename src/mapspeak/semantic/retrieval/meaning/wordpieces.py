@@ -1,7 +1,7 @@
 """The words and pieces of words that BERT-like models know.
 
-The list beside this file, one piece a line, is the vocabulary of BERT base uncased (Google, Apache
-License 2.0). It is also the list of words that are not misspelt.
+The list beside this file, one piece a line, is the vocabulary of BERT base uncased (Google; its
+licence stands beside it). It is also the list of words that are not misspelt.
 """
 
 from functools import cache
