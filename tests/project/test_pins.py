@@ -11,7 +11,7 @@ from packaging.markers import Marker
 from benchmarks.footprint import find_sizes_mb
 
 CHECKOUT = Path(__file__).parents[2]
-PINS = ("build", "dev", "runtime")
+PINS = ("build", "dev", "eval", "runtime")
 PIN = re.compile(
     r"^([\w.-]+)==(\S+)(?: ; (.+?))? \\\n((?:    --hash=sha256:\w{64}(?: \\)?\n)+)", re.MULTILINE
 )

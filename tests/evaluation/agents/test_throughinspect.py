@@ -16,7 +16,7 @@ from mapspeak.evaluation.trials import Limits, TrialState
 from served import connect
 
 HAS_INSPECT = importlib.util.find_spec("inspect_ai") is not None
-needs_inspect = pytest.mark.skipif(not HAS_INSPECT, reason="needs the extra eval")
+needs_inspect = pytest.mark.skipif(not HAS_INSPECT, reason="needs the extra eval: ./run test-eval")
 # What the library itself warns of is not ours to mend.
 pytestmark = [pytest.mark.anyio, pytest.mark.filterwarnings("default")]
 
