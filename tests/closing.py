@@ -60,10 +60,10 @@ def event(effect: Effect, **more: object) -> Event:
     return Event(effect=effect, **{**given, **more})  # type: ignore[arg-type]
 
 
-def revision_with(*events: Event) -> MapRevision:
+def revision_with(*events: Event, now: datetime = NOW) -> MapRevision:
     bare = MapRevision(office(), radius_m=RADIUS_M)
     return bare.with_areas(
-        tuple(close_floor_of(events, bare, NOW)), tuple(find_hindrances(events, bare, NOW))
+        tuple(close_floor_of(events, bare, now)), tuple(find_hindrances(events, bare, now))
     )
 
 

@@ -15,6 +15,7 @@ from mapspeak.geometry import Point
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.choosing import CheckedGoal, choose_goal
 from mapspeak.navigation.drive import DriveBook
+from mapspeak.navigation.events.learning import learn_from_drive
 from mapspeak.navigation.lease import Lease
 from mapspeak.navigation.memory.diary import Diary, Keeping
 from mapspeak.navigation.memory.recollection import Recollector
@@ -108,6 +109,7 @@ class Session:
         self.drives = DriveBook(self.robot, when_busy=when_busy)
         self._lease = Lease(lease_s)
         self._atlas: Atlas | None = None
+        self._learned_from = ""
         self._surveying = anyio.Lock()
 
     def client_is_heard(self) -> AbstractContextManager[None]:
@@ -142,6 +144,8 @@ class Session:
             stamped = await self.robot.fetch_pose()
             memory = await self.compute(self._recall)
             revision, warnings = await self._survey(grid)
+            if revision is not None and await self._learn(revision, stamped.pose.point):
+                revision, warnings = await self._survey(grid)
             self._atlas = Atlas(
                 grid,
                 stamped.pose,
@@ -237,6 +241,31 @@ class Session:
             return None, ()
         revision = await surveyor.survey(grid, radius_m=self.robot.description.radius_m)
         return revision, await self.compute(lambda: surveyor.describe(revision))
+
+    async def _learn(self, revision: MapRevision, robot: Point) -> bool:
+        """Remembers what the last drive tells of doors; true when that changes ways."""
+        drive, wall_time = self.drives.last_ended, self.find_wall_time()
+        is_new = drive is not None and drive.goal_id != self._learned_from
+        if drive is None or not is_new or wall_time is None or self.drives.is_busy:
+            return False
+        self._learned_from = drive.goal_id
+        begun = robot if self._atlas is None else self._atlas.robot.point
+        try:
+            return bool(
+                await self.compute(
+                    lambda: learn_from_drive(
+                        drive,
+                        self.memory,
+                        revision=revision,
+                        begun=begun,
+                        robot=robot,
+                        now=wall_time,
+                    )
+                )
+            )
+        except SemanticMapError as error:
+            logger.warning("What the drive tells of doors is not remembered: %s", error)
+            return False
 
     def _recall_events(self) -> tuple[Event, ...]:
         """Gives the events that are remembered; of a broken file those that were read before."""

@@ -107,6 +107,11 @@ class DriveBook:
         return next((each for each in self._open() if each.robot_goal_id is not None), None)
 
     @property
+    def last_ended(self) -> Drive | None:
+        """The drive that was started last of those that have ended, as far as anyone has asked."""
+        return next((each for each in reversed(self._drives.values()) if each.final), None)
+
+    @property
     def frontiers_tried(self) -> tuple[Point, ...]:
         """Where the robot has arrived, or lately could not get to, when sent to a frontier.
 
