@@ -1,7 +1,7 @@
 """Ways and sizes compared, as text."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from mapspeak.errors import GoalError
 from mapspeak.navigation.atlas import Atlas
@@ -17,6 +17,7 @@ __all__ = ["describe_measures"]
 
 MOST_WAYS = 30
 MOST_SIZES = 60
+MOST_REASONS = 6
 
 
 def describe_measures(atlas: Atlas, *, start: str, places: Sequence[str] | None) -> str:
@@ -64,7 +65,19 @@ def _way_table(atlas: Atlas, start: Place, ends: Sequence[Place]) -> str:
         n_all=len(nearest_first),
     )
     is_there = begin.check.is_ok or start.point == atlas.robot.point
-    return table if is_there else f"{table}\nNo way begins there: {begin.check.sentence}"
+    said = [] if is_there else [f"No way begins there: {begin.check.sentence}"]
+    if is_there and atlas.map.areas:
+        said = list(_say_closed(atlas, nearest_first[:MOST_WAYS], lengths_m))
+    return "\n".join([table, *said])
+
+
+def _say_closed(
+    atlas: Atlas, ends: Sequence[Place], lengths_m: Mapping[str, float | None]
+) -> Iterator[str]:
+    """Says why there is no way to some places, where it may be that something is closed."""
+    without_way = [end for end in ends if lengths_m[end.name] is None]
+    sentences = (check_place(atlas, end).check.sentence for end in without_way[:MOST_REASONS])
+    yield from dict.fromkeys(sentences)
 
 
 def _way_row(atlas: Atlas, way: Way) -> Sequence[str]:

@@ -24,6 +24,9 @@ from mapspeak.navigation.revision import MapRevision
 from mapspeak.navigation.safety import Policy, Surveyor
 from mapspeak.semantic import SemanticMap, SemanticMapStore, Waypoint
 from mapspeak.semantic.events import Effect
+from mapspeak.server.mapview.tables import describe_atlas
+from mapspeak.server.mapview.views import MapLook, view_of
+from mapspeak.server.measures import describe_measures
 from mapspeak.session import Session
 from mapspeak.spatial import UNKNOWN
 
@@ -89,6 +92,21 @@ def test_what_nobody_saw_behind_a_closure_is_told_as_closed_off() -> None:
     assert "behind what is closed (the area 'C1', closed by event E2 until 14:00" in sentence
     assert "behind walls" not in sentence
     assert {each.sentence for each in find_unreachable(atlas_on(closed))} == {CLOSED_OFF}
+    assert CLOSED_OFF in describe_atlas(view_of(atlas_on(closed), MapLook()))
+
+
+def test_a_way_that_is_closed_is_measured_as_none_with_what_closes_it() -> None:
+    south = corners((8.5, 1.0), (15.5, 3.5))
+    atlas = atlas_on(
+        revision_with(event(Effect.CLOSED, id="E2"), event(Effect.CLOSED, outlines=(south,)))
+    )
+    there = atlas.rooms.find_region_at(EAST)
+    assert there is not None
+
+    told = describe_measures(atlas, start="robot", places=None)
+
+    assert f"{there.id} | 19.98, 6.48 | no way (unreachable)" in told
+    assert "the shortest leads over the area 'C1', closed by event E2 until 14:00" in told
 
 
 async def test_an_event_closes_and_opens_again_by_itself_and_the_policy_stays() -> None:

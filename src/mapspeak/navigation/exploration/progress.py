@@ -20,7 +20,14 @@ from mapspeak.spatial.frontiers import (
 )
 from mapspeak.spatial.paths import DistanceField
 
-__all__ = ["ExplorationState", "Progress", "find_unreachable", "judge_end", "known_ratio"]
+__all__ = [
+    "ExplorationState",
+    "Progress",
+    "find_refused",
+    "find_unreachable",
+    "judge_end",
+    "known_ratio",
+]
 
 MOST_NAMED = 3
 CLOSED_OFF = "behind what is closed: no way while it is"
@@ -95,10 +102,16 @@ def known_area_m2(atlas: Atlas) -> float:
 
 def find_unreachable(atlas: Atlas) -> tuple[RefusedFrontier, ...]:
     """Gives the borders with the unknown that the robot cannot get to, those closed off as such."""
+    return tuple(each for each in find_refused(atlas) if each.reason in OUT_OF_REACH)
+
+
+def find_refused(atlas: Atlas) -> tuple[RefusedFrontier, ...]:
+    """Gives the borders with the unknown that are no place to go, those closed off as such."""
     return tuple(
-        replace(each, sentence=CLOSED_OFF) if _is_closed_off(atlas, each) else each
+        replace(each, sentence=CLOSED_OFF)
+        if each.reason in OUT_OF_REACH and _is_closed_off(atlas, each)
+        else each
         for each in atlas.frontiers.refused
-        if each.reason in OUT_OF_REACH
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from mapspeak.geometry import Point
 from mapspeak.navigation.atlas import Atlas, RememberedPlace
 from mapspeak.navigation.closures import ClosedArea
+from mapspeak.navigation.exploration.progress import find_refused
 from mapspeak.navigation.places import Place, find_place
 from mapspeak.spatial.frontiers import Frontier, RefusedFrontier
 from mapspeak.spatial.picture import NORTH_UP_RAD, Zoom
@@ -169,7 +170,7 @@ def view_of(atlas: Atlas, look: MapLook) -> MapView:
             look.some_of(atlas.frontiers.frontiers, lambda each: each.pose.point), MOST_FRONTIERS
         ),
         refused=Part.first(
-            look.some_of(atlas.frontiers.refused, lambda border: border.anchor), MOST_REFUSED
+            look.some_of(find_refused(atlas), lambda border: border.anchor), MOST_REFUSED
         ),
         places=Part.first(
             sorted(places, key=lambda place: path_or_far(place.waypoint.pose.point)), MOST_PLACES
