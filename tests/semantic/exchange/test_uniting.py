@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.semantic import Landmark, SemanticMap, SemanticMapStore, Waypoint, name_key
+from mapspeak.semantic.events import Effect, Event
 from mapspeak.semantic.exchange import merge_files, merge_into, unite
 from waypoints import waypoints
 
@@ -168,3 +169,20 @@ def test_an_import_is_all_of_it_or_nothing(tmp_path: Path) -> None:
     with pytest.raises(SemanticMapError, match="line 1"):
         merge_into(store, memory(dock()))
     assert (tmp_path / "a.yaml").read_text() == "waypoints: 3\n"
+
+
+def test_events_of_both_files_are_there_once_each_under_an_id_of_its_own(tmp_path: Path) -> None:
+    first, second, out = (tmp_path / f"{name}.yaml" for name in "abc")
+    wet = Event(text="the floor is wet", place="C1", effect=Effect.SLOW)
+    for path, more in ((first, "painters"), (second, "the lift is out of order")):
+        store = SemanticMapStore(path)
+        store.write_event(Event(text=more))
+        store.write_event(wet)
+
+    merge_files(first, second, out=out)
+
+    assert [(each.id, each.text) for each in SemanticMapStore(out).read_events()] == [
+        ("E1", "painters"),
+        ("E2", "the floor is wet"),
+        ("E3", "the lift is out of order"),
+    ]

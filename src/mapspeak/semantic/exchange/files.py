@@ -1,16 +1,24 @@
 """Memories in files: each format by its name, and two semantic map files as one."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.semantic.durable import DurableFile
+from mapspeak.semantic.events import Event
 from mapspeak.semantic.exchange.as_csv import from_csv, to_csv
 from mapspeak.semantic.exchange.as_geojson import from_geojson, to_geojson
 from mapspeak.semantic.exchange.as_osm import from_osm, to_osm
 from mapspeak.semantic.exchange.uniting import Union, unite
-from mapspeak.semantic.mapfile import MapDocument, bound_to, parse_document, with_waypoint
+from mapspeak.semantic.mapfile import (
+    MapDocument,
+    bound_to,
+    parse_document,
+    with_event,
+    with_waypoint,
+)
 from mapspeak.semantic.store import SemanticMapStore
 from mapspeak.semantic.waypoint import SemanticMap, Waypoint
 from mapspeak.spatial.areagraph import MapAnchor
@@ -84,6 +92,8 @@ def merge_into(store: SemanticMapStore, second: SemanticMap) -> Union:
 def merge_files(first: Path, second: Path, *, out: Path) -> Union:
     """Writes two semantic map files as one: the first with its comments, and what it lacks.
 
+    Events of the second one get ids of their own; what is in both is there once.
+
     Raises:
         SemanticMapError: One cannot be read, the maps differ, or the new file is there already.
     """
@@ -94,8 +104,18 @@ def merge_files(first: Path, second: Path, *, out: Path) -> Union:
     union = unite(document.to_map(), other.to_map())
     # All that the first file says besides places stays: comments, people's own keys.
     whole = _with_waypoints(document, union.changed, union.places.map_id)
+    whole = _with_events(whole, [record.event for record in other.events.values()])
     SemanticMapStore(out).rewrite(lambda _: whole)
     return union
+
+
+def _with_events(document: MapDocument, events: Iterable[Event]) -> MapDocument:
+    """Adds the events that are not there, whatever their ids are: those are given anew."""
+    for event in events:
+        nameless = replace(event, id="")
+        if nameless not in (replace(each.event, id="") for each in document.events.values()):
+            document, _ = with_event(document, nameless)
+    return document
 
 
 def _with_waypoints(
