@@ -1,10 +1,12 @@
 """The one stateful object: a robot, its latest atlas, its memory, its drives, its clients."""
 
 import logging
+import threading
 from collections.abc import Awaitable, Callable, Generator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import replace
 from datetime import datetime
+from functools import partial
 from typing import TypeVar
 
 import anyio
@@ -43,6 +45,8 @@ LOOK_S = 0.05
 """Wall time between two looks for a hold, and at where a drive leads."""
 WATCH_S = 0.5
 """Wall time between two looks at the clients and at how a drive stands."""
+
+ANY_EPISODE = EpisodeQuery(words="anything", limit=1)
 
 T = TypeVar("T")
 
@@ -88,7 +92,11 @@ class Session:
         when_busy = WhenBusy.REPLACE
         if guard is not None:
             self._surveyor = Surveyor(
-                guard.policy.areas, wall_clock=guard.wall_clock, read_events=self._recall_events
+                guard.policy.areas,
+                wall_clock=guard.wall_clock,
+                read_events=self._recall_events,
+                # A clearance that somebody has set is kept to the millimetre.
+                leaves_pockets=not guard.policy.clearance_m,
             )
             self._guarded = GuardedRobot(robot, guard=guard, surveyor=self._surveyor)
             when_busy = guard.policy.when_busy
@@ -105,6 +113,7 @@ class Session:
         self.diary = Diary(episodes, wall_clock=None if guard is None else guard.wall_clock)
         self.keeper = MapKeeper(memory)
         self._rank: VectorRank | None = None
+        self._ranking = threading.Lock()
         self.recollector = Recollector(find_model, kept=folder / "vectors.npz")
         self.drives = DriveBook(self.robot, when_busy=when_busy)
         self._lease = Lease(lease_s)
@@ -196,10 +205,27 @@ class Session:
 
     def find_episodes(self, query: EpisodeQuery) -> EpisodePage:
         """Gives the observations that pass a query, compared by meaning where that is possible."""
-        embedder = self.recollector.embedder
-        if self._rank is None and embedder is not None:
-            self._rank = VectorRank(self.diary.store.database, embedder)
-        return self.diary.store.find(query, rank=self._rank)
+        with self._ranking:
+            embedder = self.recollector.embedder
+            if self._rank is None and embedder is not None:
+                self._rank = VectorRank(self.diary.store.database, embedder)
+            # One at a time: a rank learns the texts that it has not met.
+            return self.diary.store.find(query, rank=self._rank)
+
+    async def warm_memory(self) -> None:
+        """Loads what the first question would wait for: the model, the index of the memory.
+
+        Meanwhile everything else is answered. What cannot be read now is told who asks for it.
+        """
+        # Whoever ends the server does not wait for it.
+        in_thread = partial(anyio.to_thread.run_sync, abandon_on_cancel=True)
+        with suppress(MapspeakError):
+            await in_thread(lambda: self.recollector.warm(self.memory.read()))
+            atlas = await self.fetch_atlas()
+            # All of it in the thread: what is remembered is joined with the map there.
+            await in_thread(partial(_prepare, atlas))
+            if self.recollector.embedder is not None:
+                await in_thread(partial(self.find_episodes, ANY_EPISODE))
 
     async def keep_vectors(self) -> None:
         """Keeps the vectors of remembered texts, so that a later session need not make them."""
@@ -306,6 +332,7 @@ class Session:
                 tasks.start_soon(self._again_and_again, self._guarded.watch, LOOK_S)
                 tasks.start_soon(self._again_and_again, self._guarded.watch_map, LOOK_S)
             tasks.start_soon(self._again_and_again, self._watch, WATCH_S)
+            tasks.start_soon(self.warm_memory)
 
     async def _again_and_again(self, look: Callable[[], Awaitable[None]], every_s: float) -> None:
         while True:
@@ -328,6 +355,10 @@ class Session:
         with anyio.CancelScope(shield=True):
             if self.drives.is_busy:
                 await self.drives.stop("The server ended.")
+
+
+def _prepare(atlas: Atlas) -> None:
+    atlas.recollection.prepare()
 
 
 def _said_of(compare: Callable[[OccupancyGrid], MapComparison | None], grid: OccupancyGrid) -> str:

@@ -32,6 +32,7 @@ class MapRevision:
         previous: The state before, whose rooms give theirs their ids.
         areas: What is closed of the floor: no way leads over it.
         hindrances: What ways lead round where that is not too far.
+        leaves_pockets: A gap that lacks less than a cell is open to a robot that is shut in by it.
 
     Attributes:
         grid: The map.
@@ -48,11 +49,13 @@ class MapRevision:
         previous: "MapRevision | None" = None,
         areas: Sequence[ClosedArea] = (),
         hindrances: Sequence[Hindrance] = (),
+        leaves_pockets: bool = False,
     ) -> None:
         self.grid = grid
         self.radius_m = radius_m
         self.areas = tuple(areas)
         self.hindrances = tuple(hindrances)
+        self._leaves_pockets = leaves_pockets
         self._open: MapRevision | None = None
         self._earlier_rooms = None if previous is None else previous.latest_rooms
         self._fields: dict[Cell, DistanceField] = {}
@@ -76,6 +79,7 @@ class MapRevision:
             previous=self,
             areas=areas,
             hindrances=hindrances,
+            leaves_pockets=self._leaves_pockets,
         )
         other._open = self.open
         if "rooms" in self.__dict__:
@@ -88,7 +92,12 @@ class MapRevision:
         if not (self.areas or self.hindrances):
             return self
         if self._open is None:
-            self._open = MapRevision(self.grid, radius_m=self.radius_m, previous=self)
+            self._open = MapRevision(
+                self.grid,
+                radius_m=self.radius_m,
+                previous=self,
+                leaves_pockets=self._leaves_pockets,
+            )
         return self._open
 
     @cached_property
@@ -142,7 +151,12 @@ class MapRevision:
         if cell not in self._fields:
             known = next(iter(self._fields.values()), None)
             field = (
-                distances_from(self.floor, point, radius_m=self.radius_m)
+                distances_from(
+                    self.floor,
+                    point,
+                    radius_m=self.radius_m,
+                    leaves_pockets=self._leaves_pockets,
+                )
                 if known is None
                 else known.from_elsewhere(point)
             )

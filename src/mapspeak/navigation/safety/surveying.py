@@ -30,6 +30,7 @@ class Surveyor:
         wall_clock: The operator's.
         read_events: Gives the events that are remembered. They close what they say, and never
             open what a rule closes.
+        leaves_pockets: A gap that lacks less than a cell is open to a robot that is shut in by it.
     """
 
     def __init__(
@@ -38,10 +39,12 @@ class Surveyor:
         *,
         wall_clock: Callable[[], datetime],
         read_events: Callable[[], Sequence[Event]] = tuple,
+        leaves_pockets: bool = False,
     ) -> None:
         self._rules = tuple(rules)
         self._read_events = read_events
         self._wall_clock = wall_clock
+        self._leaves_pockets = leaves_pockets
         self._turn = anyio.Lock()
         self._latest: MapRevision | None = None
 
@@ -78,7 +81,9 @@ class Surveyor:
         revision = (
             before
             if before is not None and is_known
-            else MapRevision(grid, radius_m=radius_m, previous=before)
+            else MapRevision(
+                grid, radius_m=radius_m, previous=before, leaves_pockets=self._leaves_pockets
+            )
         )
         events, now = self._read_events(), self._wall_clock()
         areas = (*self._find_closed(revision), *close_floor_of(events, revision, now))

@@ -9,6 +9,7 @@ from mapspeak.geometry import Point
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask, OccupancyGrid
 from mapspeak.spatial.paths.lattice import Lattice, build_coarse_lattice
 from mapspeak.spatial.paths.path import Path
+from mapspeak.spatial.paths.pocket import POCKET_M2, open_pocket
 from mapspeak.spatial.paths.search import find_path_near
 from mapspeak.spatial.paths.start import find_seeds
 from mapspeak.spatial.paths.trace import descend
@@ -29,12 +30,14 @@ class DistanceField:
         radius_m: Of the robot.
         lattice: The cells that the distances belong to.
         costs: The distances in lattice cells, flat; infinite where the robot cannot go.
+        leaves_pockets: A gap that lacks less than a cell is open to a robot that is shut in by it.
     """
 
     start: Point
     radius_m: float
     lattice: Lattice
     costs: Costs
+    leaves_pockets: bool = False
 
     def distance_to(self, point: Point) -> float | None:
         """Gives the metres to a point by path; None where the robot cannot get to."""
@@ -86,7 +89,9 @@ class DistanceField:
 
     def from_elsewhere(self, start: Point) -> "DistanceField":
         """Gives the distances from another place on the same map, for the same robot."""
-        return _distances_over(self.lattice, start, radius_m=self.radius_m)
+        return _distances_over(
+            self.lattice, start, radius_m=self.radius_m, leaves_pockets=self.leaves_pockets
+        )
 
     def build_reachable_mask(self) -> Mask:
         """Gives where on the map the robot can drive to, as a mask."""
@@ -103,18 +108,44 @@ class DistanceField:
         return np.where(self.lattice.passable[rows, cols], metres, np.inf)
 
 
-def distances_from(grid: OccupancyGrid, start: Point, *, radius_m: float) -> DistanceField:
+def distances_from(
+    grid: OccupancyGrid, start: Point, *, radius_m: float, leaves_pockets: bool = False
+) -> DistanceField:
     """Gives the path distance from the start to every place on the map.
 
     On large maps it works on cells of twice the size, with the same connections.
+
+    Args:
+        grid: The map.
+        start: Where the robot is.
+        radius_m: Of the robot.
+        leaves_pockets: See `open_pocket`; not for a radius that must be kept to the millimetre.
     """
-    return _distances_over(build_coarse_lattice(grid, radius_m), start, radius_m=radius_m)
+    lattice = build_coarse_lattice(grid, radius_m)
+    return _distances_over(lattice, start, radius_m=radius_m, leaves_pockets=leaves_pockets)
 
 
-def _distances_over(lattice: Lattice, start: Point, *, radius_m: float) -> DistanceField:
-    seeds = find_seeds(lattice, start, radius_m=radius_m)
-    costs = np.full(lattice.moves.size, np.inf, dtype=np.float32)
-    if seeds is not None:
-        costs = spread(lattice.moves, None, seeds)
+def _distances_over(
+    lattice: Lattice, start: Point, *, radius_m: float, leaves_pockets: bool
+) -> DistanceField:
+    costs = _spread_from(lattice, start, radius_m)
+    reached_m2 = np.count_nonzero(np.isfinite(costs)) * lattice.cell_size_m**2
+    if leaves_pockets and reached_m2 < POCKET_M2:
+        opened = open_pocket(lattice, costs, start, radius_m=radius_m)
+        if opened is not lattice:
+            lattice, costs = opened, _spread_from(opened, start, radius_m)
     costs.setflags(write=False)
-    return DistanceField(start=start, radius_m=radius_m, lattice=lattice, costs=costs)
+    return DistanceField(
+        start=start,
+        radius_m=radius_m,
+        lattice=lattice,
+        costs=costs,
+        leaves_pockets=leaves_pockets,
+    )
+
+
+def _spread_from(lattice: Lattice, start: Point, radius_m: float) -> Costs:
+    seeds = find_seeds(lattice, start, radius_m=radius_m)
+    if seeds is None:
+        return np.full(lattice.moves.size, np.inf, dtype=np.float32)
+    return spread(lattice.moves, None, seeds)

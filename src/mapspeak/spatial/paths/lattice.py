@@ -17,7 +17,15 @@ from mapspeak.spatial.grid import IntArray, Mask, OccupancyGrid
 from mapspeak.spatial.paths.clearance import Clearance, clearance_m
 from mapspeak.spatial.paths.wavefront import BITS, Costs, Moves
 
-__all__ = ["Lattice", "build_coarse_lattice", "build_fine_lattice", "moves_within", "restrict"]
+__all__ = [
+    "Lattice",
+    "build_coarse_lattice",
+    "build_fine_lattice",
+    "build_narrow_lattice",
+    "moves_within",
+    "restrict",
+    "with_passable",
+]
 
 Number = TypeVar("Number", np.bool_, np.float32)
 
@@ -80,16 +88,7 @@ class Lattice:
 def build_fine_lattice(grid: OccupancyGrid, radius_m: float) -> Lattice:
     """Gives the lattice with one cell for each cell of the map."""
     clearance = clearance_m(grid)
-    passable = grid.free & (clearance >= radius_m)
-    return Lattice(
-        grid=grid,
-        passable=passable,
-        factor=1,
-        moves=moves_within(passable),
-        is_open=passable,
-        clearance_m=clearance,
-        fine_clearance_m=clearance,
-    )
+    return _fine(grid, clearance, grid.free & (clearance >= radius_m))
 
 
 def build_coarse_lattice(grid: OccupancyGrid, radius_m: float) -> Lattice:
@@ -98,6 +97,18 @@ def build_coarse_lattice(grid: OccupancyGrid, radius_m: float) -> Lattice:
         return build_fine_lattice(grid, radius_m)
     clearance = clearance_m(grid)
     return _halve(grid, clearance, grid.free & (clearance >= radius_m))
+
+
+def build_narrow_lattice(lattice: Lattice, radius_m: float) -> Lattice:
+    """Gives the fine lattice of the same map for a robot of another radius."""
+    passable = lattice.grid.free & (lattice.fine_clearance_m >= radius_m)
+    return _fine(lattice.grid, lattice.fine_clearance_m, passable)
+
+
+def with_passable(lattice: Lattice, passable: Mask) -> Lattice:
+    """Gives the lattice with other cells passable; a mask of the shape of the map."""
+    build = _fine if lattice.factor == 1 else _halve
+    return build(lattice.grid, lattice.fine_clearance_m, passable)
 
 
 def restrict(lattice: Lattice, mask: Mask) -> Lattice:
@@ -109,6 +120,18 @@ def restrict(lattice: Lattice, mask: Mask) -> Lattice:
 def moves_within(mask: Mask) -> Moves:
     """Gives the moves between neighbouring cells of the mask."""
     return _moves(mask[:, :-1] & mask[:, 1:], mask[:-1] & mask[1:])
+
+
+def _fine(grid: OccupancyGrid, clearance: Clearance, passable: Mask) -> Lattice:
+    return Lattice(
+        grid=grid,
+        passable=passable,
+        factor=1,
+        moves=moves_within(passable),
+        is_open=passable,
+        clearance_m=clearance,
+        fine_clearance_m=clearance,
+    )
 
 
 def _halve(grid: OccupancyGrid, clearance: Clearance, passable: Mask) -> Lattice:

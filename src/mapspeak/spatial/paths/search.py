@@ -10,6 +10,7 @@ from mapspeak.spatial.paths.lattice import (
     build_coarse_lattice,
     build_fine_lattice,
     restrict,
+    with_passable,
 )
 from mapspeak.spatial.paths.path import Path
 from mapspeak.spatial.paths.start import find_seeds
@@ -105,4 +106,7 @@ def _build_corridor(
     window = (slice(top, top + near.shape[0]), slice(left, left + near.shape[1]))
     crop = lattice.grid.crop(*window)
     n_rows, n_cols = crop.cells.shape
-    return restrict(build_fine_lattice(crop, radius_m), near[:n_rows, :n_cols]), window
+    fine = build_fine_lattice(crop, radius_m)
+    # What was opened on the whole map, for a robot in a pocket, stays open on this part.
+    opened = with_passable(fine, fine.passable | lattice.passable[window])
+    return restrict(opened, near[:n_rows, :n_cols]), window
