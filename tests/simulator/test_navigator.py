@@ -220,3 +220,26 @@ def test_the_distance_left_shrinks_to_nothing() -> None:
     assert distances[0] == pytest.approx(7.5, abs=0.3)
     assert distances[-1] < 0.2
     assert distances == sorted(distances, reverse=True)
+
+
+NOOK = """
+    ###############
+    #....#........#
+    #.............#
+    #.............#
+    #....#........#
+    ###############
+"""
+
+
+@pytest.mark.parametrize(("n_cells", "state"), [(10, DriveState.ARRIVED), (6, DriveState.BLOCKED)])
+def test_a_robot_gets_out_of_a_nook_by_a_gap_that_its_map_shows_a_cell_too_narrow(
+    n_cells: int, state: DriveState
+) -> None:
+    course = Course(NOOK, Pose(1.5, 1.5))
+    cells = course.grid.cells.copy()
+    cells[20 : 30 - n_cells // 2, 50:60] = cells[30 + n_cells // 2 : 40, 50:60] = 100
+    course.grid = OccupancyGrid(cells=cells, resolution_m=0.05)
+
+    assert course.drive_to(Pose(5.0, 1.5)).state is state
+    assert course.body.n_collisions == 0

@@ -112,7 +112,7 @@ class Atlas:
         self.map: MapRevision = revision or (
             before
             if before is not None and is_unchanged
-            else MapRevision(grid, radius_m=radius_m, previous=before)
+            else MapRevision(grid, radius_m=radius_m, previous=before, leaves_pockets=True)
         )
         self.robot = robot
         self.memory = memory

@@ -14,7 +14,7 @@ from mapspeak.simulator.avoidance import Obstacles
 from mapspeak.simulator.follower import PathFollower
 from mapspeak.simulator.motion import BODY_RADIUS_M, STANDING, Velocity
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.spatial.paths import Path, clearance_m, find_path
+from mapspeak.spatial.paths import Path, clearance_m, distances_from, find_path
 
 __all__ = ["DriveState", "DriveStatus", "Navigator", "Senses"]
 
@@ -182,7 +182,11 @@ class Navigator:
             if path is not None:
                 self._planning_radius_m = radius
                 return path
-        return None
+        # The gap by which it came in may lack a cell in the map's next state.
+        ways = distances_from(
+            senses.map, senses.pose.point, radius_m=_PLANNING_RADII_M[-1], leaves_pockets=True
+        )
+        return ways.path_to(goal.point)
 
     def _has_good_path(self, senses: Senses) -> bool:
         """Looks about once a second whether the map still shows the path as free."""
