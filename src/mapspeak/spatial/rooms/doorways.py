@@ -62,7 +62,7 @@ def find_doorways(raster: Raster, floor: Floor, settings: RoomSettings) -> list[
     if not floor.directions_deg:
         return []
     jamb = floor.wall | floor.obstacle
-    pictures = [jamb, floor.wall, 1 - raster.free, floor.floor & (1 - jamb)]
+    pictures = [jamb, floor.wall, floor.solid, floor.floor & (1 - jamb)]
     margin = round(max(settings.stub_m, settings.tip_m) / raster.cell_size_m) + 2
     turned, back = _turn(pictures, floor.directions_deg[0], margin)
     sideways = [np.asarray(cv2.transpose(picture), np.uint8) for picture in turned]

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from mapspeak.spatial.rooms.furniture import find_blocks
 from mapspeak.spatial.rooms.raster import Picture, Raster, find_cells
 from mapspeak.spatial.rooms.settings import RoomSettings
 from mapspeak.spatial.rooms.walls import find_wall_directions, find_walls
@@ -19,6 +20,7 @@ class Floor:
         floor: 1 on floor, furniture and small unseen pockets, else 0.
         wall: 1 on wall, else 0.
         obstacle: 1 on what stands and cannot be walked around, wall or not, else 0.
+        solid: 1 where nothing is free, furniture left out, else 0.
         directions_deg: The main directions of the walls, from 0 to 90 degrees.
         clearance_m: How far each floor cell is from what is not floor.
     """
@@ -26,6 +28,7 @@ class Floor:
     floor: Picture
     wall: Picture
     obstacle: Picture
+    solid: Picture
     directions_deg: list[float]
     clearance_m: NDArray[np.float32]
 
@@ -34,13 +37,18 @@ def build_floor(raster: Raster, settings: RoomSettings) -> Floor:
     """Gives the floor with its furniture cleared away."""
     directions = find_wall_directions(raster.occupied, least_ratio=settings.direction_ratio)
     wall, obstacle = find_walls(raster, directions, settings)
-    floor = raster.free | (raster.occupied & (1 - wall))
+    block, behind = find_blocks(raster, directions[0] if directions else 0.0, settings)
+    wall, obstacle = (part & (1 - block) | behind for part in (wall, obstacle))
+    free = raster.free | block
+    occupied = (raster.occupied & (1 - block)) | behind
+    floor = free | (occupied & (1 - wall))
     floor |= _find_pockets(floor, wall, settings.pocket_area_m2 / raster.cell_area_m2)
     floor = _drop_crumbs(floor, settings.room_area_m2 / raster.cell_area_m2)
     return Floor(
         floor=floor,
         wall=wall,
         obstacle=obstacle,
+        solid=1 - free,
         directions_deg=directions,
         clearance_m=_clearance(floor, raster.cell_size_m),
     )

@@ -15,7 +15,11 @@ class RoomSettings:
         wall_piece_m: The shortest run that can be such a piece.
         wall_thickness_m: Where an obstacle is this thick, it is no such piece.
         island_size_m: An obstacle that can be walked around is wall only if it is larger.
-        direction_ratio: A main direction has at least this share of the strongest one's edges.
+        block_depth_m: Furniture is at least so deep.
+    block_ratio: And with the wall behind it so many times as thick as the map's walls are.
+    block_thickness_m: One of its sides is at most so long.
+    block_length_m: The floor around it is at most this far, along the walls and square to them.
+    direction_ratio: A main direction has at least this share of the strongest one's edges.
         pocket_area_m2: Unseen areas up to this size inside a room count as floor.
         smoothing_m: Standard deviation of the smoothing of clearances.
         same_width_ratio: Neighbouring places whose clearances differ less are one place.
@@ -45,6 +49,10 @@ class RoomSettings:
     wall_piece_m: float = 0.2
     wall_thickness_m: float = 0.5
     island_size_m: float = 2.0
+    block_depth_m: float = 0.35
+    block_ratio: float = 2.0
+    block_thickness_m: float = 1.3
+    block_length_m: float = 3.0
     direction_ratio: float = 0.2
     pocket_area_m2: float = 2.0
     smoothing_m: float = 0.1

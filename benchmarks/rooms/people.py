@@ -1,9 +1,4 @@
-"""How long it takes to divide a map into rooms, in one thread, and how well it agrees with people.
-
-The agreement is measured on maps that people have divided: those of the folder that the
-environment variable MAPSPEAK_LABELLED_MAPS names, else of `../shared/maps` beside the checkout.
-Where there is neither, the times are all there is. `python -m benchmarks.rooms MAPS` shows the
-scores as a table, beside those of published methods.
+"""How well the division of a map agrees with people.
 
 MAPS holds folders of maps; each map is a folder with `map.png` (0 occupied, 205 unknown, 254
 free), `rooms.png` (16-bit region numbers, 0 for none) and `meta.json` (the resolution; per region
@@ -32,11 +27,18 @@ from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import load_picture
 from mapspeak.spatial.rooms import RoomClass, RoomMap, find_rooms
 
-__all__ = ["find_labelled_maps", "list_labelled_maps", "main", "measure"]
+__all__ = [
+    "Numbers",
+    "find_agreement",
+    "find_labelled_maps",
+    "find_overlap",
+    "list_labelled_maps",
+    "score_figures",
+    "score_map",
+    "show_maps",
+    "timed_rooms",
+]
 
-N_RUNS = 3
-ROOM_CELLS = 120
-RESOLUTION_M = 0.05
 RANKS = {"smallest": 0, "second": 1, "largest": -1}
 
 PUBLISHED = {
@@ -62,23 +64,10 @@ Numbers = NDArray[np.intp]
 Ratios = NDArray[np.float64]
 
 
-def measure() -> Iterator[Figure]:
-    """Gives the median CPU time for drawn buildings of three sizes, and the scores if it can."""
-    cv2.setNumThreads(1)
-    for n_cells in (1000, 2000, 4000):
-        grid = _building(n_cells)
-        times_ms = [_timed(grid)[1] for _ in range(N_RUNS)]
-        name = f"{n_cells} x {n_cells}, {len(find_rooms(grid).regions)} rooms"
-        yield Figure(name=name, value=statistics.median(times_ms), unit="ms")
-    maps = find_labelled_maps()
-    if maps is not None:
-        yield from _score_figures([score_map(folder) for folder in list_labelled_maps(maps)])
-
-
 def find_labelled_maps() -> Path | None:
     """Gives the folder of maps that people have divided, or None where there is none."""
     named = os.environ.get("MAPSPEAK_LABELLED_MAPS")
-    folder = Path(named) if named else Path(__file__).parents[2] / "shared" / "maps"
+    folder = Path(named) if named else Path(__file__).parents[3] / "shared" / "maps"
     return folder if folder.is_dir() else None
 
 
@@ -87,7 +76,8 @@ def list_labelled_maps(maps: Path) -> list[Path]:
     return [found.parent for found in sorted(maps.glob("*/*/rooms.png"))]
 
 
-def _score_figures(scores: Sequence["Score"]) -> Iterator[Figure]:
+def score_figures(scores: Sequence["Score"]) -> Iterator[Figure]:
+    """Gives the means of groups of maps, and how often the questions are answered rightly."""
     for group, own in _by_group(scores).items():
         f1_50 = statistics.mean(score.f1_50 for score in own)
         f1_75 = statistics.mean(score.f1_75 for score in own)
@@ -106,21 +96,8 @@ def _by_group(scores: Sequence["Score"]) -> dict[str, list["Score"]]:
     return groups
 
 
-def _building(n_cells: int) -> OccupancyGrid:
-    """Gives rooms of 6 x 6 m, each with a door to the next, and scattered furniture."""
-    generator = np.random.default_rng(n_cells)
-    cells = np.zeros((n_cells, n_cells), dtype=np.int8)
-    cells[generator.random(cells.shape) < 0.002] = 100
-    for wall in range(0, n_cells, ROOM_CELLS):
-        cells[wall : wall + 3, :] = cells[:, wall : wall + 3] = 100
-    for wall in range(ROOM_CELLS, n_cells, ROOM_CELLS):
-        for room in range(0, n_cells, ROOM_CELLS):
-            door = slice(room + ROOM_CELLS // 2 - 9, room + ROOM_CELLS // 2 + 9)
-            cells[wall : wall + 3, door] = cells[door, wall : wall + 3] = 0
-    return OccupancyGrid(cells=cells, resolution_m=RESOLUTION_M)
-
-
-def _timed(grid: OccupancyGrid) -> tuple[RoomMap, float]:
+def timed_rooms(grid: OccupancyGrid) -> tuple[RoomMap, float]:
+    """Divides a map; gives also the milliseconds of CPU time that it took."""
     started_s = time.process_time()
     rooms = find_rooms(grid)
     return rooms, (time.process_time() - started_s) * 1e3
@@ -159,11 +136,11 @@ def score_map(folder: Path) -> Score:
     """Divides one map and compares it with what people drew."""
     meta = json.loads((folder / "meta.json").read_text())
     loaded = load_picture(folder / "map.png", resolution_m=meta["resolution"])
-    rooms, time_ms = _timed(loaded.grid)
+    rooms, time_ms = timed_rooms(loaded.grid)
     picture = cv2.imread(str(folder / "rooms.png"), cv2.IMREAD_UNCHANGED)
     truth = np.asarray(picture, np.intp)[::-1]
-    overlap = _overlap(rooms.labels.astype(np.intp), truth, loaded.grid.free & (truth > 0))
-    agreement = _agreement(overlap)
+    overlap = find_overlap(rooms.labels.astype(np.intp), truth, loaded.grid.free & (truth > 0))
+    agreement = find_agreement(overlap)
     classes = {room["id"]: room["class"] for room in meta["rooms"] if "class" in room}
     pairs = [(int(i), int(j)) for i, j in np.argwhere(agreement >= 0.5)]
     return Score(
@@ -180,14 +157,14 @@ def score_map(folder: Path) -> Score:
     )
 
 
-def _overlap(found: Numbers, truth: Numbers, counted: NDArray[np.bool_]) -> Numbers:
+def find_overlap(found: Numbers, truth: Numbers, counted: NDArray[np.bool_]) -> Numbers:
     """Gives the number of shared cells; row by region found, column by region drawn."""
     shape = (int(found.max(initial=0)) + 1, int(truth.max(initial=0)) + 1)
     flat = found[counted] * shape[1] + truth[counted]
     return np.bincount(flat, minlength=shape[0] * shape[1]).reshape(shape)
 
 
-def _agreement(overlap: Numbers) -> Ratios:
+def find_agreement(overlap: Numbers) -> Ratios:
     """Gives the intersection over union; above 0.5 it pairs regions one to one."""
     union = overlap.sum(axis=1, keepdims=True) + overlap.sum(axis=0, keepdims=True) - overlap
     ratios: Ratios = overlap / np.maximum(union, 1)
@@ -239,12 +216,8 @@ def _ranks_right(
     }
 
 
-@click.command()
-@click.argument("maps", type=click.Path(exists=True, file_okay=False, path_type=Path))
-@click.option("--json", "as_json", is_flag=True, help="The scores of every map as JSON.")
-def main(maps: Path, *, as_json: bool) -> None:
-    """Scores the division of every map in MAPS that people have divided."""
-    cv2.setNumThreads(1)
+def show_maps(maps: Path, *, as_json: bool) -> None:
+    """Writes the scores of a folder of maps."""
     scores = [score_map(folder) for folder in list_labelled_maps(maps)]
     if as_json:
         click.echo(json.dumps([asdict(score) for score in scores], indent=2))
@@ -289,7 +262,3 @@ def _hallway_f1(scores: Sequence[Score]) -> str:
         return "-"
     right, wrong, missed = (sum(column) for column in zip(*counts, strict=True))
     return f"{2 * right / max(2 * right + wrong + missed, 1):.3f}"
-
-
-if __name__ == "__main__":
-    main()

@@ -1,0 +1,264 @@
+"""Furniture told apart from walls by what it is: thicker than they are, and short.
+
+A block is what stands free, or with its back to a wall, with floor at its other sides. Where a
+wall runs on in line behind a block, it is wall, and the block ends there.
+"""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.spatial.rooms.raster import Picture, Raster
+from mapspeak.spatial.rooms.settings import RoomSettings
+from mapspeak.spatial.rooms.solids import (
+    Truths,
+    drop_small,
+    drop_specks,
+    find_fixed,
+    is_near,
+    is_short,
+    last_place,
+    line_along,
+    open_box,
+    places,
+    run_lengths,
+    turn_back,
+    turn_upright,
+    widen,
+)
+
+_SPECK_M2 = 0.5
+"""Free places up to this size in or beside a block are none."""
+_RIM_M = 0.15
+"""Crumbs so near to a block are its own: the rim of a plant, the legs of a chair."""
+_CRUMB_M = 1.0
+"""What is left of an obstacle without its blocks is a crumb if it is smaller across."""
+_SEEN_RATIO = 0.5
+"""So much of a block's border to the floor has been seen as an obstacle."""
+_FILLED_RATIO = 0.7
+"""A block at a wall fills so much of the rectangle around it, square to the walls."""
+_WHOLE_RATIO = 0.85
+"""A block at a wall that is nearly as long as is looked for may go on: it is none."""
+
+Counts = NDArray[np.intp]
+Numbers = NDArray[np.int32]
+
+
+def find_blocks(
+    raster: Raster, angle_deg: float, settings: RoomSettings
+) -> tuple[Picture, Picture]:
+    """Gives 1 on furniture with its inside, and 1 on the walls behind it.
+
+    Args:
+        raster: The map.
+        angle_deg: The direction of its walls.
+        settings: The lengths.
+    """
+    free, occupied = turn_upright(raster.free, raster.occupied, angle_deg)
+    solid = 1 - drop_specks(free, _SPECK_M2 / raster.cell_area_m2)
+    found = _find_blocks(solid, occupied, _Sizes(solid, raster.cell_size_m, settings))
+    shape = raster.free.shape[0], raster.free.shape[1]
+    block, behind = (turn_back(picture, shape, angle_deg) for picture in found)
+    return block, behind & (1 - block)
+
+
+class _Sizes:
+    """Lengths in raster cells.
+
+    Attributes:
+        thin: What is thinner is no block, wall behind it included.
+        depth: Nor is what is thinner without that wall.
+        thick: Nor is what is thicker than this both ways.
+        long: How far the floor beside a block may be.
+        stub: The shortest end of a wall.
+        tip: A wall has floor so near to its middle.
+        gap: The widest door whose wall runs on in line.
+        rim: See above.
+        crumb: See above.
+    """
+
+    def __init__(self, solid: Picture, cell_size_m: float, settings: RoomSettings) -> None:
+        self.depth = round(settings.block_depth_m / cell_size_m) | 1
+        self.thick = round(settings.block_thickness_m / cell_size_m) | 1
+        wall = settings.block_ratio * _find_wall_thickness(
+            solid, self.thick, 2 * settings.oblique_length_m / cell_size_m
+        )
+        self.thin = max(round(settings.block_depth_m / cell_size_m) + 2, round(wall)) | 1
+        self.long = round(settings.block_length_m / cell_size_m)
+        self.stub = round(settings.stub_m / cell_size_m) | 1
+        self.tip = round(settings.tip_m / cell_size_m)
+        self.gap = round(settings.wall_length_m / cell_size_m)
+        self.rim = round(_RIM_M / cell_size_m)
+        self.crumb = _CRUMB_M / cell_size_m
+
+
+def _find_wall_thickness(solid: Picture, most: int, least: float) -> float:
+    """Gives how thick, in cells, what has floor on two sides and hangs on the outside mostly is."""
+    fixed = find_fixed(solid)
+    found = []
+    for axis in (0, 1):
+        first, length = run_lengths(solid, axis)
+        is_fixed = np.ascontiguousarray(fixed.T if axis == 0 else fixed).ravel()[first] > 0
+        found.append(length[is_fixed & (length <= most)])
+    all_of_them = np.concatenate(found)
+    # So little may be furniture alone, in a room without inner walls.
+    return float(np.median(all_of_them)) if all_of_them.size >= least else 0.0
+
+
+def _find_blocks(solid: Picture, occupied: Picture, cells: _Sizes) -> tuple[Picture, Picture]:
+    if cells.thin >= cells.thick:
+        return np.zeros_like(solid), np.zeros_like(solid)
+    bump = open_box(_find_bumps(solid, cells), cells.thin, cells.thin)
+    wall = _continue_walls(solid, bump, cells)
+    piece = open_box(bump & (1 - wall), cells.depth, cells.depth)
+    rest = solid & (1 - piece)
+    fixed = drop_small(rest, cells.crumb)
+    block = _choose_blocks(piece, fixed, occupied, cells)
+    crumb = rest & (1 - fixed)
+    block |= _find_touching(crumb & (1 - find_fixed(solid)), block)
+    block |= widen(block, cells.rim) & crumb
+    return block, wall & widen(block, cells.tip)
+
+
+def _find_bumps(solid: Picture, cells: _Sizes) -> Picture:
+    """Gives 1 where the floor is near along the row and along the column, or on both sides."""
+    floor = 1 - solid
+    bump = is_near(floor, cells.long, 0) & is_near(floor, cells.long, 1)
+    for axis in (0, 1):
+        bump |= is_short(solid, cells.thick, axis)
+    return np.asarray(bump, np.uint8) & solid
+
+
+# --- walls behind ----------------------------------------------------------------------------
+
+
+def _continue_walls(solid: Picture, bump: Picture, cells: _Sizes) -> Picture:
+    """Gives 1 in bumps where walls that end at them run on in line."""
+    stubs = [_find_stubs(solid, bump, axis, cells) for axis in (0, 1)]
+    wall = np.zeros_like(solid)
+    for axis, stub in enumerate(stubs):
+        (before, _), (behind, _) = _reach(stub, solid, axis, cells)
+        is_at_floor = is_near(1 - solid, cells.tip, 1 - axis)
+        is_wall = (before & behind) | ((before | behind) & is_at_floor)
+        wall |= bump & is_wall.astype(np.uint8)
+    inner = bump & (1 - wall)
+    for axis, stub in enumerate(stubs):
+        (before, over), (behind, back_over) = _reach(stub, inner, axis, cells)
+        # A wall goes on behind a door if it has something there to end at.
+        ends_back, ends = _find_ends(solid, inner, axis)
+        is_wall = before | behind | (over & ends) | (back_over & ends_back)
+        wall |= is_wall.astype(np.uint8)
+    return wall
+
+
+def _find_stubs(solid: Picture, bump: Picture, axis: int, cells: _Sizes) -> Picture:
+    """Gives pieces of thin wall along an axis."""
+    long = open_box(solid & (1 - bump), *line_along(cells.stub, axis).shape)
+    return long & is_short(solid, cells.thin, 1 - axis).astype(np.uint8)
+
+
+def _reach(
+    stub: Picture, through: Picture, axis: int, cells: _Sizes
+) -> list[tuple[Truths, Truths]]:
+    """Gives where a stub comes before a cell and no gap, and where a gap like a door or none.
+
+    First for those that come before it along an axis, then for those that come behind. What may
+    lie between is `through`.
+    """
+    found = []
+    for flipped in (False, True):
+        s, t = (np.flip(part, axis) if flipped else part for part in (stub > 0, through > 0))
+        n = s.shape[axis]
+        to_stub = last_place(s, axis, none=-2 * n)
+        gap = last_place(~(s | t), axis, none=-n) - to_stub
+        is_near_by = t & (places(s.shape, axis) - to_stub <= cells.long + cells.gap)
+        # Without a gap, the last of what may not lie between comes before the stub.
+        straight = is_near_by & (gap <= 0) & (places(s.shape, axis) - to_stub <= cells.long)
+        over = is_near_by & (gap <= cells.gap)
+        found.append(tuple(np.flip(part, axis) if flipped else part for part in (straight, over)))
+    return [(straight, over) for straight, over in found]
+
+
+def _find_ends(solid: Picture, inner: Picture, axis: int) -> list[Truths]:
+    """Gives where the way back, and the way on, leads out of a bump into what is solid."""
+    found = []
+    is_end = (solid > 0) & (inner == 0)
+    for flipped in (False, True):
+        i, end = (np.flip(part, axis) if flipped else part for part in (inner > 0, is_end))
+        last = last_place(~i, axis, none=-1)
+        at_end = np.take_along_axis(end, np.maximum(last, 0).astype(np.intp), axis)
+        leads = i & at_end & (last >= 0)
+        found.append(np.flip(leads, axis) if flipped else leads)
+    return found
+
+
+# --- choice ----------------------------------------------------------------------------------
+
+
+def _choose_blocks(piece: Picture, fixed: Picture, occupied: Picture, cells: _Sizes) -> Picture:
+    """Gives the pieces that are furniture."""
+    n, label = cv2.connectedComponents(piece, connectivity=4)
+    numbers = np.asarray(label, np.int32)
+    floor = 1 - (fixed | piece)
+    around = _number_around(numbers)
+    n_contact = np.bincount(around[fixed > 0], minlength=n)
+    is_at_wall = _fills_rectangle(numbers, n, cells) & (n_contact >= cells.depth)
+    is_block = (n_contact == 0) | is_at_wall
+    is_block &= _count_sides(around, n, floor, piece, cells) == 1
+    is_block &= _seen_ratio(numbers, n, floor, occupied) >= _SEEN_RATIO
+    is_block[np.unique(numbers[open_box(piece, cells.thick, cells.thick) > 0])] = False
+    is_block[0] = False
+    return np.asarray(is_block[numbers], np.uint8)
+
+
+def _number_around(label: Numbers) -> Numbers:
+    """Gives the cells in and beside each piece its number."""
+    around = cv2.dilate(label.astype(np.float32), np.ones((3, 3), np.uint8))
+    return np.asarray(around, np.int32)
+
+
+def _count_sides(around: Numbers, n: int, floor: Picture, piece: Picture, cells: _Sizes) -> Counts:
+    """Gives how many stretches of floor that do not hang together near by each piece borders on.
+
+    A piece with two of them divides them, as walls do.
+    """
+    near = widen(piece, cells.tip) & floor
+    _, stretch = cv2.connectedComponents(near, connectivity=4)
+    here = (near > 0) & (around > 0)
+    pairs, counts = np.unique(np.stack([around[here], stretch[here]]), axis=1, return_counts=True)
+    least = max(cells.rim, 1)
+    return np.bincount(pairs[0][counts >= least], minlength=n)
+
+
+def _seen_ratio(label: Numbers, n: int, floor: Picture, occupied: Picture) -> NDArray[np.float64]:
+    """Gives the share of each piece's border to the floor at which something was seen."""
+    edge = (widen(floor, 1) > 0) & (label > 0)
+    n_edge = np.bincount(label[edge], minlength=n)
+    n_seen = np.bincount(label[edge & (widen(occupied, 1) > 0)], minlength=n)
+    ratio: NDArray[np.float64] = n_seen / np.maximum(n_edge, 1)
+    return ratio
+
+
+def _fills_rectangle(label: Numbers, n: int, cells: _Sizes) -> Truths:
+    """True for each piece that fills the rectangle around it and is not too long."""
+    inside = np.flatnonzero(label)
+    rows, cols = np.divmod(inside, label.shape[1])
+    number = label.ravel()[inside]
+    spans = []
+    for place in (rows, cols):
+        low, high = np.full(n, max(label.shape)), np.zeros(n, np.intp)
+        np.minimum.at(low, number, place)
+        np.maximum.at(high, number, place)
+        spans.append(high - low + 1)
+    is_whole = np.maximum(*spans) < _WHOLE_RATIO * cells.long
+    filled = np.bincount(number, minlength=n) >= _FILLED_RATIO * spans[0] * spans[1]
+    return np.asarray(is_whole & filled)
+
+
+def _find_touching(crumbs: Picture, block: Picture) -> Picture:
+    """Gives the crumbs that touch a block."""
+    n, label = cv2.connectedComponents(crumbs, connectivity=8)
+    touches = np.zeros(n, np.uint8)
+    touches[np.unique(label[widen(block, 1) > 0])] = 1
+    touches[0] = 0
+    return np.asarray(touches[label], np.uint8)

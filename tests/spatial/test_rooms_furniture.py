@@ -1,0 +1,139 @@
+"""Furniture divides no room, and walls behind it still do."""
+
+import numpy as np
+import pytest
+
+from drawing import grid_from_text
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.rooms import RoomClass, find_rooms
+
+CELL_M = 0.25
+
+TABLE_IN_THE_MIDDLE = """
+    ##############################
+    #............................#
+    #............................#
+    #............................#
+    #............................#
+    #............####............#
+    #............####............#
+    #............####............#
+    #............####............#
+    #............####............#
+    #............####............#
+    #............####............#
+    #............####............#
+    #............................#
+    #............................#
+    #............................#
+    #............................#
+    ##############################
+"""
+
+CUPBOARDS_FACE_TO_FACE = """
+    ##############################
+    #............####............#
+    #............####............#
+    #............####............#
+    #............####............#
+    #............####............#
+    #............................#
+    #............................#
+    #............................#
+    #............................#
+    #............................#
+    #............####............#
+    #............####............#
+    #............####............#
+    #............####............#
+    ##############################
+"""
+
+UNSEEN_INSIDE = CUPBOARDS_FACE_TO_FACE.replace("####....", "#??#....").replace("##.#", "####")
+
+CUPBOARD_AT_A_WALL_BETWEEN_ROOMS = """
+    ##############################
+    #..............#.............#
+    #..............#.............#
+    #..............#.............#
+    #..............#.............#
+    #..............####..........#
+    #..............####..........#
+    #..............####..........#
+    #..............####..........#
+    #..............####..........#
+    #..............####..........#
+    #..............#.............#
+    #............................#
+    #............................#
+    #............................#
+    #..............#.............#
+    ##############################
+"""
+
+SHELVES_IN_ROWS = """
+    ##################################
+    #................................#
+    #................................#
+    #................................#
+    #......####......####......####..#
+    #......####......####......####..#
+    #......####......####......####..#
+    #......####......####......####..#
+    #......####......####......####..#
+    #......####......####......####..#
+    #......####......####......####..#
+    #......####......####......####..#
+    #......####......####......####..#
+    #......####......####......####..#
+    #................................#
+    #................................#
+    ##################################
+"""
+
+
+def _grid(text: str) -> OccupancyGrid:
+    return grid_from_text(text, resolution_m=CELL_M)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [TABLE_IN_THE_MIDDLE, CUPBOARDS_FACE_TO_FACE, UNSEEN_INSIDE, SHELVES_IN_ROWS],
+    ids=["table", "cupboards", "cupboards of unseen inside", "shelves"],
+)
+def test_furniture_divides_no_room(text: str) -> None:
+    (room,) = find_rooms(_grid(text)).regions
+
+    assert room.room_class is not RoomClass.CORRIDOR
+
+
+def test_the_floor_of_a_room_includes_what_stands_in_it() -> None:
+    grid = _grid(TABLE_IN_THE_MIDDLE)
+    (room,) = find_rooms(grid).regions
+
+    assert room.floor_area_m2 - room.free_area_m2 == pytest.approx(4 * 8 * CELL_M**2)
+
+
+def test_a_wall_goes_on_behind_a_cupboard() -> None:
+    rooms = find_rooms(_grid(CUPBOARD_AT_A_WALL_BETWEEN_ROOMS))
+
+    assert len(rooms.regions) == 2
+    (door,) = rooms.doors
+    assert door.width_m == pytest.approx(0.75, abs=0.2)
+
+
+def test_furniture_is_told_from_walls_however_the_map_is_turned() -> None:
+    upright = _grid(CUPBOARDS_FACE_TO_FACE)
+    mirrored = OccupancyGrid(cells=np.transpose(upright.cells), resolution_m=CELL_M)
+
+    assert len(find_rooms(mirrored).regions) == 1
+
+
+def test_walls_as_thick_as_furniture_are_walls() -> None:
+    """Two rooms whose walls are all 0.75 m thick, with a door of a metre between them."""
+    cells = np.full((60, 100), 100, np.int8)
+    cells[6:54, 6:46] = cells[6:54, 52:94] = 0
+    cells[26:33, 46:52] = 0
+    grid = OccupancyGrid(cells=cells, resolution_m=0.125)
+
+    assert len(find_rooms(grid).regions) == 2
