@@ -79,3 +79,18 @@ def test_cells_are_filled_where_half_of_them_lies_inside() -> None:
         ".##.",
         "....",
     ]
+
+
+@pytest.mark.parametrize("shift", [(0.0, 0.0), (-0.7, 0.3), (0.9, 0.9), (-3.0, 0.0), (0.2, 5.0)])
+def test_a_mask_is_a_part_of_any_larger_mask(shift: tuple[float, float]) -> None:
+    outlines = [UNIT_SQUARE + shift, UNIT_SQUARE @ [[0.6, -0.8], [0.8, 0.6]] + shift]
+
+    small = fill_outlines(outlines, shape=(5, 4), origin=Point(-0.5, -0.5), cell_size_m=0.25)
+    large = fill_outlines(outlines, shape=(80, 80), origin=Point(-10.5, -10.5), cell_size_m=0.25)
+
+    assert (small == large[40:45, 40:44]).all()
+    assert large.sum() * 0.25**2 == pytest.approx(2.0 - 0.4, abs=0.4)
+
+
+def test_where_nothing_is_solid_no_cell_is() -> None:
+    assert not fill_outlines([], shape=(3, 3), origin=Point(0, 0), cell_size_m=0.5).any()

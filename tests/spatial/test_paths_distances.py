@@ -175,3 +175,14 @@ def test_a_way_to_draw_leads_over_free_floor_and_is_as_long_as_the_distance_says
     length_m = sum(one.distance_to(other) for one, other in itertools.pairwise(way))
     assert length_m == pytest.approx(distances.distance_to(Point(9.5, 0.5)), abs=0.01)
     assert distances.way_to(Point(4.5, 2.5)) is None
+
+
+def test_a_wall_that_costs_thousands_is_crossed_where_no_other_way_is() -> None:
+    weights = np.ones((7, 9), dtype=np.float32)
+    weights[:, 4] = 3267.0
+    seeds = Seeds(np.array([0]), np.zeros(1, dtype=np.float32))
+    costs = spread(moves_within(np.ones(weights.shape, dtype=bool)), weights, seeds)
+    there = costs.reshape(weights.shape)
+    assert there[0, 3] == 3.0
+    assert there[0, 8] == pytest.approx(6 + 3268.0)
+    assert there[6, 8] == pytest.approx(there[0, 8] + 6 * math.sqrt(2) - 6, abs=0.01)

@@ -53,8 +53,8 @@ STATE_OF_DRIVE = {
 class SimulatedRobot:
     """A `Robot` whose world is computed here. Time passes only while somebody waits.
 
-    Every touch of the simulation happens in a worker thread, one at a time, so that the event loop
-    stays free to answer a stop.
+    One touch of the simulation happens at a time. What has to be computed is, in a worker thread,
+    so that the event loop stays free to answer a stop; what is at hand is read where it is asked.
     """
 
     def __init__(
@@ -98,9 +98,8 @@ class SimulatedRobot:
 
     async def fetch_pose(self) -> StampedPose:
         """Gives the pose that the simulated SLAM believes in."""
-        return await self._run(
-            lambda: StampedPose(self._simulation.pose_in_map, self._simulation.time_s)
-        )
+        async with self._turn:
+            return StampedPose(self._simulation.pose_in_map, self._simulation.time_s)
 
     async def fetch_picture(self) -> CameraPicture:
         """Draws what the front camera sees."""
@@ -121,11 +120,13 @@ class SimulatedRobot:
 
     async def send_goal(self, goal: Pose) -> str:
         """Starts a drive in the simulated navigation."""
-        return str(await self._run(lambda: self._simulation.start_goal(goal)))
+        async with self._turn:
+            return str(self._simulation.start_goal(goal))
 
     async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
         """Gives how a drive stands."""
-        return await self._run(lambda: self._goal_status(robot_goal_id))
+        async with self._turn:
+            return self._goal_status(robot_goal_id)
 
     async def cancel_goal(self, robot_goal_id: str) -> None:
         """Ends a drive."""

@@ -4,6 +4,7 @@ Everything is in the robot's own frame, so no error of the map or of the pose co
 """
 
 import math
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +51,12 @@ class Obstacles:
     @property
     def room_m(self) -> float:
         """How much room the body's edge has to the nearest point."""
-        return self._distance_from(Point(0.0, 0.0)) - BODY_RADIUS_M
+        return self._nearest_m - BODY_RADIUS_M
+
+    @cached_property
+    def _nearest_m(self) -> float:
+        """How far the nearest point is from the body's centre."""
+        return self._distance_from(Point(0.0, 0.0))
 
     def is_way_free(self, target: Point) -> bool:
         """True when the body can move straight to a point without coming too near to anything."""
@@ -98,7 +104,7 @@ class Obstacles:
 
     def _nearest_allowed(self) -> float:
         """Gives how near to a point the body's centre may come."""
-        here = self._distance_from(Point(0.0, 0.0))
+        here = self._nearest_m
         if here >= BODY_RADIUS_M + _KEEP_OFF_M:
             return BODY_RADIUS_M + _KEEP_OFF_M
         # Who stands too near already may pass and leave, but not touch.

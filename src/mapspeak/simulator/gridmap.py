@@ -19,6 +19,7 @@ __all__ = ["CELL_SIZE_M", "LogOddsMap"]
 
 FloatArray = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Window = tuple[slice, slice]
 
 CELL_SIZE_M = 0.05
 _GROWTH_CELLS = 64
@@ -46,6 +47,8 @@ class LogOddsMap:
         self._hit_rows = np.zeros(self._log_odds.shape)
         self._row_of_zero = _GROWTH_CELLS
         self._col_of_zero = _GROWTH_CELLS
+        self._published = np.full(self._log_odds.shape, UNKNOWN, dtype=np.int8)
+        self._changed: Window | None = None
 
     @classmethod
     def of(cls, known: OccupancyGrid) -> Self:
@@ -78,6 +81,8 @@ class LogOddsMap:
         made._hit_cols = made._n_hits / 2
         made._hit_rows = made._n_hits / 2
         made._col_of_zero, made._row_of_zero = (margin - np.rint(shift)).astype(int).tolist()
+        made._published = np.full(cells.shape, UNKNOWN, dtype=np.int8)
+        made._changed = (slice(0, cells.shape[0]), slice(0, cells.shape[1]))
         return made
 
     @property
@@ -98,10 +103,11 @@ class LogOddsMap:
         self, rows: NDArray[np.intp], cols: NDArray[np.intp]
     ) -> tuple[FloatArray, FloatArray]:
         """Gives where the returns of occupied cells lie on average: col and row as real numbers."""
-        n_hits = np.maximum(self._n_hits[rows, cols], 1.0)
+        flat = rows * self._n_hits.shape[1] + cols
+        n_hits = np.maximum(self._n_hits.take(flat), 1.0)
         return (
-            cols + self._hit_cols[rows, cols] / n_hits,
-            rows + self._hit_rows[rows, cols] / n_hits,
+            cols + self._hit_cols.take(flat) / n_hits,
+            rows + self._hit_rows.take(flat) / n_hits,
         )
 
     def insert(self, ends_in_map: FloatArray, is_return: Mask) -> None:
@@ -113,20 +119,27 @@ class LogOddsMap:
             is_return: True for the beams that ended at something, shape (n,).
         """
         self._grow_to_hold(ends_in_map)
-        is_hit = self._add_surface(_join_returns(ends_in_map, is_return))
-        is_free = self._seen_through(self.fractional_cells(ends_in_map), is_return) & ~is_hit
-        self._log_odds[is_free] += _MISS
-        self._log_odds[is_hit] += _HIT
-        np.clip(self._log_odds, -_CERTAIN, _CERTAIN, out=self._log_odds)
-        self._is_seen |= is_free | is_hit
+        ends = self.fractional_cells(ends_in_map)
+        window = self._window_around(ends)
+        is_hit = self._add_surface(_join_returns(ends_in_map, is_return), window)
+        is_free = _seen_through(ends, is_return, window) & ~is_hit
+        log_odds = self._log_odds[window]
+        log_odds[is_free] += _MISS
+        log_odds[is_hit] += _HIT
+        np.clip(log_odds, -_CERTAIN, _CERTAIN, out=log_odds)
+        self._is_seen[window] |= is_free | is_hit
+        self._changed = window if self._changed is None else _join(self._changed, window)
 
     def publish(self, *, stamp_s: float) -> OccupancyGrid:
         """Gives the map as ROS knows it."""
-        percent = np.rint(100.0 / (1.0 + np.exp(-self._log_odds)))
-        cells = np.where(self._is_seen, percent, UNKNOWN).astype(np.int8)
+        if self._changed is not None:
+            percent = np.rint(100.0 / (1.0 + np.exp(-self._log_odds[self._changed])))
+            is_seen = self._is_seen[self._changed]
+            self._published[self._changed] = np.where(is_seen, percent, UNKNOWN)
+            self._changed = None
         rows, cols = _extent(self._is_seen)
         return OccupancyGrid(
-            cells=cells[rows, cols],
+            cells=self._published[rows, cols],
             resolution_m=CELL_SIZE_M,
             origin=Pose(
                 (cols.start - self._col_of_zero) * CELL_SIZE_M,
@@ -135,31 +148,28 @@ class LogOddsMap:
             stamp_s=stamp_s,
         )
 
-    def _add_surface(self, points_in_map: FloatArray) -> Mask:
-        """Adds points of surfaces to the means of their cells and gives those cells."""
+    def _add_surface(self, points_in_map: FloatArray, window: Window) -> Mask:
+        """Adds points of surfaces to the means of their cells, which a window of the map holds.
+
+        Gives those cells of the window.
+        """
         places = self.fractional_cells(points_in_map)
         corners = np.floor(places)
         cols, rows = corners.astype(np.intp).T
         np.add.at(self._n_hits, (rows, cols), 1.0)
         np.add.at(self._hit_cols, (rows, cols), places[:, 0] - corners[:, 0])
         np.add.at(self._hit_rows, (rows, cols), places[:, 1] - corners[:, 1])
-        is_hit = np.zeros(self._log_odds.shape, dtype=bool)
-        is_hit[rows, cols] = True
+        is_hit = np.zeros(_shape_of(window), dtype=bool)
+        is_hit[rows - window[0].start, cols - window[1].start] = True
         return is_hit
 
-    def _seen_through(self, ends: FloatArray, is_return: Mask) -> Mask:
-        """Gives the inside of the star of beams.
-
-        The line from one return to the next is left out: where beams graze a wall it runs along
-        the wall, which no beam has shown to be free.
-        """
-        picture = np.zeros(self._log_odds.shape, dtype=np.uint8)
-        corners = _fixed(ends)
-        cv2.fillPoly(picture, [corners], 1, shift=_SUBCELL_BITS)
-        sides = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
-        between_returns = list(sides[is_return & np.roll(is_return, -1)])
-        cv2.polylines(picture, between_returns, isClosed=False, color=0, shift=_SUBCELL_BITS)
-        return picture.astype(bool)
+    def _window_around(self, ends: FloatArray) -> Window:
+        """Gives the part of the map that holds a scan, as fractional cells, and a cell more."""
+        low = np.maximum(np.floor(ends.min(axis=0)).astype(int) - 1, 0)
+        high = np.floor(ends.max(axis=0)).astype(int) + 2
+        (left, below), (right, above) = low.tolist(), high.tolist()
+        n_rows, n_cols = self._log_odds.shape
+        return slice(below, min(above, n_rows)), slice(left, min(right, n_cols))
 
     def _grow_to_hold(self, ends_in_map: FloatArray) -> None:
         cells = self.fractional_cells(ends_in_map)
@@ -176,8 +186,45 @@ class LogOddsMap:
         self._n_hits = np.pad(self._n_hits, widths)
         self._hit_cols = np.pad(self._hit_cols, widths)
         self._hit_rows = np.pad(self._hit_rows, widths)
+        self._published = np.pad(self._published, widths, constant_values=UNKNOWN)
+        if self._changed is not None:
+            rows, cols = self._changed
+            self._changed = (
+                slice(rows.start + int(below), rows.stop + int(below)),
+                slice(cols.start + int(left), cols.stop + int(left)),
+            )
         self._row_of_zero += int(below)
         self._col_of_zero += int(left)
+
+
+def _seen_through(ends: FloatArray, is_return: Mask, window: Window) -> Mask:
+    """Gives the cells of a window inside the star of beams, whose ends are fractional cells.
+
+    The line from one return to the next is left out: where beams graze a wall it runs along
+    the wall, which no beam has shown to be free.
+    """
+    picture = np.zeros(_shape_of(window), dtype=np.uint8)
+    corner = np.array([window[1].start, window[0].start], dtype=np.int32) << _SUBCELL_BITS
+    corners = _fixed(ends) - corner
+    cv2.fillPoly(picture, [corners], 1, shift=_SUBCELL_BITS)
+    sides = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+    between_returns = list(sides[is_return & np.roll(is_return, -1)])
+    cv2.polylines(picture, between_returns, isClosed=False, color=0, shift=_SUBCELL_BITS)
+    return picture.astype(bool)
+
+
+def _shape_of(window: Window) -> tuple[int, int]:
+    rows, cols = window
+    return rows.stop - rows.start, cols.stop - cols.start
+
+
+def _join(one: Window, other: Window) -> Window:
+    """Gives the least window that holds two."""
+    rows, cols = (
+        slice(min(mine.start, its.start), max(mine.stop, its.stop))
+        for mine, its in zip(one, other, strict=True)
+    )
+    return rows, cols
 
 
 def _join_returns(ends_in_map: FloatArray, is_return: Mask) -> FloatArray:

@@ -38,6 +38,7 @@ BEAM_ANGLES_RAD = -math.pi + _STEP_RAD * np.arange(N_BEAMS)
 BEAM_ANGLES_RAD.setflags(write=False)
 BEAM_DIRECTIONS = np.stack([np.cos(BEAM_ANGLES_RAD), np.sin(BEAM_ANGLES_RAD)], axis=1)
 BEAM_DIRECTIONS.setflags(write=False)
+BEAM_X, BEAM_Y = np.ascontiguousarray(BEAM_DIRECTIONS.T)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,11 +105,10 @@ def measure_ranges(edges: FloatArray, world_from_base: Pose) -> FloatArray:
     ranges = np.full(N_BEAMS, np.inf)
     starts, along = _edges_in_base(edges, world_from_base)
     edge, beam = _pair_edges_with_beams(starts, along)
-    directions = BEAM_DIRECTIONS[beam]
-    across = _cross(directions, along[edge])
+    across = BEAM_X[beam] * along[edge, 1] - BEAM_Y[beam] * along[edge, 0]
     # A beam in line with an edge meets one of its ends, which belongs to a neighbour as well.
     across[np.abs(across) < 1e-12] = np.inf
-    distance = _cross(starts[edge], along[edge]) / across
+    distance = _cross(starts, along)[edge] / across
     distance[distance <= 0] = np.inf
     np.minimum.at(ranges, beam, distance)
     return ranges

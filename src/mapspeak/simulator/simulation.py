@@ -222,12 +222,13 @@ class Simulation:
             now_s=self.time_s,
             pose=self.pose_in_map,
             speed_mps=self._body.velocity.speed_mps,
-            obstacles=Obstacles.seen_from(self._scan.points_in_base, now_from_scan),
+            obstacles=Obstacles.seen_from(self._points_in_base, now_from_scan),
             map=self._mapper.planning_map or self.map(),
         )
 
     def _measure(self) -> None:
         self._scan = self._lidar.scan(self._body.world_from_base, stamp_s=self.time_s)
+        self._points_in_base = self._scan.points_in_base
         self._odom_at_scan = self._odometry.odom_from_base
         self._mapper.add_scan(self._scan)
 

@@ -18,11 +18,14 @@ from mapspeak.simulator.world import Wall, World, WorldObject
 __all__ = ["Slice", "fill_outlines", "slice_world"]
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
 
 _SUBCELL_BITS = 6
 """Binary places of a pixel that OpenCV keeps when it fills an outline."""
 _FINER = 4
 """Outlines are filled on so many times finer pixels: OpenCV fills each pixel that it touches."""
+_CELL_BITS = _SUBCELL_BITS + 2
+"""Binary places of a cell: those of a pixel, and two for the `_FINER` pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,23 +39,27 @@ class Slice:
 
     outlines: tuple[FloatArray, ...]
     edges: FloatArray = field(init=False)
+    _along: FloatArray = field(init=False)
+    _squared: FloatArray = field(init=False)
 
     def __post_init__(self) -> None:
         sides = [np.hstack([corners, np.roll(corners, -1, axis=0)]) for corners in self.outlines]
         edges = np.concatenate(sides) if sides else np.empty((0, 4))
         edges.setflags(write=False)
         object.__setattr__(self, "edges", edges)
+        # A driving robot asks at every step how near it has come.
+        along = edges[:, 2:] - edges[:, :2]
+        object.__setattr__(self, "_along", along)
+        squared = np.maximum(np.einsum("ij,ij->i", along, along), 1e-12)
+        object.__setattr__(self, "_squared", squared)
 
     def distance_to(self, point: Point) -> float:
         """Gives how far a point is from the nearest side; infinite where nothing is solid."""
         if not len(self.edges):
             return math.inf
-        start, end = self.edges[:, :2], self.edges[:, 2:]
-        along = end - start
-        to_point = np.array([point.x, point.y]) - start
-        squared = np.maximum(np.einsum("ij,ij->i", along, along), 1e-12)
-        share = np.clip(np.einsum("ij,ij->i", to_point, along) / squared, 0.0, 1.0)
-        gap = to_point - share[:, None] * along
+        to_point = np.array([point.x, point.y]) - self.edges[:, :2]
+        share = np.clip(np.einsum("ij,ij->i", to_point, self._along) / self._squared, 0.0, 1.0)
+        gap = to_point - share[:, None] * self._along
         return float(np.sqrt(np.einsum("ij,ij->i", gap, gap).min()))
 
     def is_solid_at(self, point: Point) -> bool:
@@ -93,16 +100,42 @@ def fill_outlines(
         cell_size_m: The side of a cell.
         least_ratio: How much of a cell is enough.
     """
-    n_rows, n_cols = shape
+    scale = _FINER * (1 << _SUBCELL_BITS) / cell_size_m
+    half = (1 << _SUBCELL_BITS) / 2
+    # OpenCV puts whole numbers at the middle of a pixel, we at its corner.
+    placed = [
+        np.round((corners - (origin.x, origin.y)) * scale - half).astype(np.int32)
+        for corners in outlines
+    ]
+    mask = np.zeros(shape, dtype=bool)
+    rows, cols = _cells_around(placed, shape)
+    if rows.start < rows.stop and cols.start < cols.stop:
+        mask[rows, cols] = _shares_inside(placed, rows, cols) >= least_ratio * _FINER**2
+    return mask
+
+
+def _cells_around(placed: Sequence[IntArray], shape: tuple[int, int]) -> tuple[slice, slice]:
+    """Gives the rows and columns of the cells that outlines on finer pixels may touch."""
+    if not placed:
+        return slice(0, 0), slice(0, 0)
+    low = np.min([corners.min(axis=0) for corners in placed], axis=0) >> _CELL_BITS
+    high = (np.max([corners.max(axis=0) for corners in placed], axis=0) >> _CELL_BITS) + 2
+    (first_col, first_row), (end_col, end_row) = (low - 1).tolist(), high.tolist()
+    return (
+        slice(max(first_row, 0), min(end_row, shape[0])),
+        slice(max(first_col, 0), min(end_col, shape[1])),
+    )
+
+
+def _shares_inside(placed: Sequence[IntArray], rows: slice, cols: slice) -> NDArray[np.uint8]:
+    """Gives how many of the finer pixels of some cells lie inside outlines."""
+    n_rows, n_cols = rows.stop - rows.start, cols.stop - cols.start
     picture = np.zeros((n_rows * _FINER, n_cols * _FINER), dtype=np.uint8)
-    scale = _FINER / cell_size_m
-    for corners in outlines:
-        # OpenCV puts whole numbers at the middle of a pixel, we at its corner.
-        placed = (corners - (origin.x, origin.y)) * scale - 0.5
-        fixed = np.round(placed * (1 << _SUBCELL_BITS)).astype(np.int32)
-        cv2.fillPoly(picture, [fixed], 1, shift=_SUBCELL_BITS)
-    shares = picture.reshape(n_rows, _FINER, n_cols, _FINER).mean(axis=(1, 3))
-    return np.asarray(shares >= least_ratio)
+    corner = np.array([cols.start, rows.start], dtype=np.int32) << _CELL_BITS
+    for corners in placed:
+        cv2.fillPoly(picture, [corners - corner], 1, shift=_SUBCELL_BITS)
+    down = picture.reshape(n_rows, _FINER, -1).sum(axis=1, dtype=np.uint8)
+    return np.asarray(down.reshape(n_rows, n_cols, _FINER).sum(axis=2, dtype=np.uint8))
 
 
 def _outline_wall(wall: Wall) -> FloatArray:

@@ -78,14 +78,14 @@ class SurfaceField:
     def _find_nearest(self, points_in_map: FloatArray) -> tuple[IntArray, IntArray, Mask]:
         """Gives the nearest occupied cell for each point, and whether there is one in reach."""
         rows, cols = self._cells(points_in_map, margin=_REACH_CELLS)
-        around_rows = rows[:, None] + _BY_DISTANCE[:, 0]
-        around_cols = cols[:, None] + _BY_DISTANCE[:, 1]
-        is_occupied = self._occupied[around_rows, around_cols]
+        n_cols = self._occupied.shape[1]
+        steps = _BY_DISTANCE[:, 0] * n_cols + _BY_DISTANCE[:, 1]
+        is_occupied = self._occupied.take((rows * n_cols + cols)[:, None] + steps)
         first = is_occupied.argmax(axis=1)
         point = np.arange(len(rows))
         return (
-            around_rows[point, first],
-            around_cols[point, first],
+            rows + _BY_DISTANCE[first, 0],
+            cols + _BY_DISTANCE[first, 1],
             is_occupied[point, first],
         )
 
@@ -96,7 +96,8 @@ class SurfaceField:
         """
         around_rows = rows.clip(1, self._occupied.shape[0] - 2)[:, None] + _NEIGHBOURS[:, 0]
         around_cols = cols.clip(1, self._occupied.shape[1] - 2)[:, None] + _NEIGHBOURS[:, 1]
-        weights = self._occupied[around_rows, around_cols].astype(np.float64)
+        at = around_rows * self._occupied.shape[1] + around_cols
+        weights = self._occupied.take(at).astype(np.float64)
         x, y = self._map.surface_at(around_rows, around_cols)
         totals = np.maximum(weights.sum(axis=1), 1.0)
         middle_x = (weights * x).sum(axis=1) / totals

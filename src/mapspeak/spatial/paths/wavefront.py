@@ -24,6 +24,8 @@ BITS = (1 << np.arange(8)).astype(np.uint8)
 north-east, north-west, south-west, south-east. North is the next row."""
 STEPS = np.array([1.0] * 4 + [math.sqrt(2.0)] * 4, dtype=np.float32)
 """The length of a move in each direction, in cells."""
+FEW_BUCKETS = 8
+"""So many are looked through one by one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,10 +118,15 @@ class _Front:
             return
         buckets = costs.astype(np.intp)
         first, last = int(buckets.min()), int(buckets.max())
-        for bucket in range(first, last + 1):
-            chosen = cells if first == last else cells[buckets == bucket]
+        if first == last:
+            self._waiting.setdefault(first, []).append(cells)
+            return
+        # Where a wall costs thousands, almost all buckets between two costs are empty.
+        filled = range(first, last + 1) if last - first < FEW_BUCKETS else np.unique(buckets)
+        for bucket in filled:
+            chosen = cells[buckets == bucket]
             if chosen.size:
-                self._waiting.setdefault(bucket, []).append(chosen)
+                self._waiting.setdefault(int(bucket), []).append(chosen)
 
     def _unique(self, cells: IntArray) -> IntArray:
         order = np.arange(cells.size, dtype=np.int32)
