@@ -1,4 +1,4 @@
-"""An MCP client that keeps account: every call, its answer, and the pictures in it."""
+"""An MCP client of a trial: every call goes past a witness, who hears the answer too."""
 
 import base64
 import time
@@ -10,7 +10,15 @@ from mcp_types import CallToolResult, ImageContent, TextContent, Tool
 
 from mapspeak.errors import LinkError, MapspeakError
 
-__all__ = ["Answer", "CallRecord", "OutOfBudgetError", "Picture", "ToolClient", "Witness"]
+__all__ = [
+    "Answer",
+    "CallRecord",
+    "Ledger",
+    "OutOfBudgetError",
+    "Picture",
+    "ToolClient",
+    "Witness",
+]
 
 
 class OutOfBudgetError(MapspeakError):
@@ -100,17 +108,55 @@ class Witness(Protocol):
 
 
 @dataclass(slots=True)
+class Ledger:
+    """A witness that remembers every call, and refuses none.
+
+    Attributes:
+        calls: All that were answered so far.
+    """
+
+    calls: list[CallRecord] = field(default_factory=list)
+    _begun_s: float = 0.0
+
+    def hear_call(self, tool: str, arguments: dict[str, Any]) -> None:
+        """Notes when a call begins."""
+        del tool, arguments
+        self._begun_s = time.perf_counter()
+
+    def hear_answer(self, tool: str, arguments: dict[str, Any], answer: Answer) -> None:
+        """Remembers a call and what was answered."""
+        self.calls.append(
+            CallRecord(
+                tool=tool,
+                arguments=arguments,
+                text=answer.text,
+                is_error=answer.is_error,
+                wall_s=time.perf_counter() - self._begun_s,
+            )
+        )
+
+    def hear_words(
+        self,
+        role: str,
+        text: str,
+        *,
+        n_input_tokens: int | None = None,
+        n_output_tokens: int | None = None,
+        n_picture_tokens: int | None = None,
+    ) -> None:
+        """Forgets what was said besides calls."""
+
+
+@dataclass(frozen=True, slots=True)
 class ToolClient:
-    """Calls tools over MCP and remembers every call.
+    """Calls tools over MCP.
 
     Attributes:
         client: The connected MCP client; None where the agent reaches the server by itself.
-        calls: Every call so far.
-        witness: Hears them too; None where nobody does.
+        witness: Hears every call and answer; None where nobody does.
     """
 
     client: Client | None
-    calls: list[CallRecord] = field(default_factory=list)
     witness: Witness | None = None
 
     async def call(self, tool: str, /, **arguments: object) -> Answer:
@@ -123,18 +169,7 @@ class ToolClient:
         client = self._connected()
         if self.witness is not None:
             self.witness.hear_call(tool, arguments)
-        begun_s = time.perf_counter()
-        result = await client.call_tool(tool, arguments)
-        answer = _read(result)
-        self.calls.append(
-            CallRecord(
-                tool=tool,
-                arguments=arguments,
-                text=answer.text,
-                is_error=answer.is_error,
-                wall_s=time.perf_counter() - begun_s,
-            )
-        )
+        answer = _read(await client.call_tool(tool, arguments))
         if self.witness is not None:
             self.witness.hear_answer(tool, arguments, answer)
         return answer

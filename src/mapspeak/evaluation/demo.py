@@ -11,7 +11,7 @@ from mcp.client.stdio import StdioServerParameters
 from mcp.shared.exceptions import MCPError
 
 from mapspeak.errors import LinkError
-from mapspeak.evaluation.client import ToolClient
+from mapspeak.evaluation.client import Ledger, ToolClient
 from mapspeak.evaluation.page import Moment
 from mapspeak.evaluation.policy import PolicyResult, ScriptedPolicy
 from mapspeak.evaluation.recorder import Recorder, prepare_folder
@@ -48,28 +48,26 @@ async def run_demo(options: DemoOptions, on_progress: Callable[[Moment], None]) 
     for leftover in (state_log, folder / "semantic_map.yaml"):
         leftover.unlink(missing_ok=True)
     recorder = Recorder(folder, state_log, Scorer(world), on_progress)
-    tools: ToolClient | None = None
+    ledger = Ledger()
     result: PolicyResult | None = None
     try:
         async with Client(_server(options), read_timeout_seconds=ANSWER_WITHIN_S) as client:
-            tools = ToolClient(client)
-            policy = ScriptedPolicy(tools, recorder.take)
+            policy = ScriptedPolicy(ToolClient(client, ledger), recorder.take)
             result = await policy.run()
     except* MCPError as group:
         raise LinkError(
             "The server ended before the demo did.", hint="Its last words stand above."
         ) from group
     finally:
-        calls = [] if tools is None else tools.calls
         report = DemoReport.of(
             options.world,
             options.seed,
             recorder=recorder,
-            calls=calls,
+            calls=ledger.calls,
             result=result,
             wall_time_s=time.perf_counter() - begun_s,
         )
-        write_results(report, recorder, calls)
+        write_results(report, recorder, ledger.calls)
     return report
 
 

@@ -40,7 +40,8 @@ class Moment:
         picture: What was seen; None where nothing was.
         is_map: The picture is a map.
         driven_m: Metres driven by then, by the simulator's truth.
-        coverage_recall: Share of the reachable free floor on the map by then; None between maps.
+        coverage_recall: Share of the floor in sight that the map shows as free by then; None
+            between maps.
     """
 
     stage: str

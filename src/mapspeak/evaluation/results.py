@@ -197,7 +197,7 @@ def _verdict(report: DemoReport) -> str:
 
 def _figures(report: DemoReport) -> list[tuple[str, str]]:
     return [
-        ("of the reachable free floor mapped", _percent(report.coverage_recall)),
+        ("of the floor in sight shown as free", _percent(report.coverage_recall)),
         ("coverage by the paper's ratio", _percent(report.coverage_paper_ratio)),
         ("of the mapped free floor truly free", _percent(report.coverage_precision)),
         ("driven", f"{report.path_length_m:.1f} m"),
@@ -216,7 +216,7 @@ def _tasks(report: DemoReport) -> list[tuple[int, str, str, str]]:
     tool, distance_m = report.task3.nearest_object, report.task3.distance_to_object_m
     covered = (
         f"{_percent(report.coverage_paper_ratio)} by the paper's ratio, "
-        f"{_percent(report.coverage_recall)} of the reachable free floor"
+        f"{_percent(report.coverage_recall)} of the floor in sight shown as free"
     )
     return [
         (1, "Update the map while moving.", covered, "97.83 %; 99.78 %"),

@@ -1,28 +1,17 @@
-"""Scores from the simulator's truth: the world file and the state log, never the model's words."""
+"""The demo's scores from the simulator's truth: the world file and the state log, never words."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from mapspeak.geometry import Point, Pose
-from mapspeak.simulator import (
-    MeasuredRoom,
-    StateRecord,
-    TrueFloor,
-    World,
-    is_in_sight,
-)
+from mapspeak.evaluation.scores import BESIDE_M, Site
+from mapspeak.geometry import Pose
+from mapspeak.simulator import StateRecord, World
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.coverage import Coverage, measure_coverage
 from mapspeak.spatial.rooms import RoomClass
 
 __all__ = ["FireToolScore", "RoomScore", "Scorer"]
-
-BESIDE_M = 5.0
-"""A robot that stands this near to a thing, with a free line of sight, has been led to it.
-
-The paper's goal is the waypoint from which the thing was seen, 3 to 4 m away from it.
-"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,18 +52,17 @@ class Scorer:
     """Knows one world's truth."""
 
     def __init__(self, world: World) -> None:
-        self._world = world
-        self._floor = TrueFloor(world)
+        self._site = Site(world)
 
     def score_map(self, grid: OccupancyGrid) -> Coverage:
         """Compares a robot's map with what a perfect robot could have mapped."""
-        return measure_coverage(grid, self._floor.visible)
+        return measure_coverage(grid, self._site.floor.visible)
 
     def score_smallest_room(self, pose: Pose) -> RoomScore:
         """Scores the paper's Task 2 from where the robot truly stands."""
-        rooms = [room for room in self._floor.rooms if room.room.room_class is RoomClass.ROOM]
+        rooms = [each for each in self._site.floor.rooms if each.room.room_class is RoomClass.ROOM]
         smallest = min(rooms, key=lambda room: room.free_area_m2, default=None)
-        here = self._find_room(pose.point)
+        here = self._site.room_at(pose.point)
         return RoomScore(
             is_success=here is not None and here is smallest,
             chosen_room=None if here is None else here.room.name,
@@ -85,24 +73,17 @@ class Scorer:
 
     def score_fire_tool(self, pose: Pose) -> FireToolScore:
         """Scores the paper's Task 3 from where the robot truly stands."""
-        here = self._world.start.transform(pose.point)
-        tools = [thing for thing in self._world.objects if thing.kind == "fire_extinguisher"]
+        site, here = self._site, pose.point
+        tools = site.things("fire_extinguisher")
         if not tools:
             return FireToolScore(is_success=False, nearest=None, distance_m=None)
-        in_sight = [tool for tool in tools if is_in_sight(self._world, here, tool)]
-        nearest = min(in_sight or tools, key=lambda tool: here.distance_to(tool.pose.point))
-        distance_m = here.distance_to(nearest.pose.point)
+        in_sight = [tool for tool in tools if site.is_in_sight(here, tool)]
+        nearest = min(in_sight or tools, key=lambda tool: here.distance_to(site.place_of(tool)))
+        distance_m = here.distance_to(site.place_of(nearest))
         return FireToolScore(
             is_success=bool(in_sight) and distance_m <= BESIDE_M,
             nearest=nearest.name if in_sight else None,
             distance_m=distance_m,
-        )
-
-    def _find_room(self, point_in_map: Point) -> MeasuredRoom | None:
-        point = self._world.start.transform(point_in_map)
-        return next(
-            (room for room in self._floor.rooms if room.room.contains(point)),
-            None,
         )
 
 

@@ -12,6 +12,7 @@ from mapspeak.evaluation.agents import Assignment
 from mapspeak.evaluation.agents.command import AnswerForm, CommandAgent, Program, find_program
 from mapspeak.evaluation.agents.command.program import Start
 from mapspeak.evaluation.agents.models import Thinking
+from mapspeak.evaluation.agents.others import find_versions
 from mapspeak.evaluation.client import ToolClient
 from mapspeak.evaluation.trials import Limits, TrialState
 
@@ -62,7 +63,7 @@ def written_in(folder: Path) -> str:
 async def test_a_programs_calls_are_heard_with_their_answers_and_pictures(tmp_path: Path) -> None:
     witness = Hearing()
     end = await CommandAgent(CLIENT, "command:test").run(
-        assignment(tmp_path, "look around"), ToolClient(None, [], witness)
+        assignment(tmp_path, "look around"), ToolClient(None, witness)
     )
     assert end.state is TrialState.FINISHED
     assert end.answer == "ANSWER: kept, the key is [TEST_KEY]"
@@ -79,7 +80,7 @@ async def test_a_program_that_fails_breaks_the_trial_without_telling_its_secrets
 ) -> None:
     with pytest.raises(LinkError, match=r"status 3: cannot log in with \[TEST_KEY\]"):
         await CommandAgent(CLIENT, "command:test").run(
-            assignment(tmp_path, "crash"), ToolClient(None, [], Hearing())
+            assignment(tmp_path, "crash"), ToolClient(None, Hearing())
         )
     assert KEY not in written_in(tmp_path)
 
@@ -87,13 +88,13 @@ async def test_a_program_that_fails_breaks_the_trial_without_telling_its_secrets
 async def test_a_program_that_calls_nothing_says_nothing_of_its_model(tmp_path: Path) -> None:
     with pytest.raises(LinkError, match="called no tool"):
         await CommandAgent(CLIENT, "command:test").run(
-            assignment(tmp_path, "do nothing"), ToolClient(None, [], Hearing())
+            assignment(tmp_path, "do nothing"), ToolClient(None, Hearing())
         )
 
 
 async def test_a_program_that_calls_too_much_is_ended_with_its_server(tmp_path: Path) -> None:
     end = await CommandAgent(CLIENT, "command:test").run(
-        assignment(tmp_path, "look and wait"), ToolClient(None, [], Hearing(most=1))
+        assignment(tmp_path, "look and wait"), ToolClient(None, Hearing(most=1))
     )
     assert end.state is TrialState.OUT_OF_BUDGET
     assert "More than 1 calls" in end.answer
@@ -102,7 +103,7 @@ async def test_a_program_that_calls_too_much_is_ended_with_its_server(tmp_path: 
 
 async def test_a_program_whose_time_is_up_is_ended(tmp_path: Path) -> None:
     end = await CommandAgent(CLIENT, "command:test").run(
-        assignment(tmp_path, "wait", wall_s=10.5), ToolClient(None, [], Hearing())
+        assignment(tmp_path, "wait", wall_s=10.5), ToolClient(None, Hearing())
     )
     assert end.state is TrialState.OUT_OF_BUDGET
     assert processes_with(str(tmp_path)) == []
@@ -143,6 +144,26 @@ def test_how_much_to_think_is_said_only_when_asked(tmp_path: Path) -> None:
     assert 'model_reasoning_effort="low"' in asked.command(program)
     with pytest.raises(ConfigError, match="how much to think"):
         CLIENT.check(Thinking.LOW)
+
+
+def test_the_version_of_a_program_is_the_first_line_it_says() -> None:
+    said = CLIENT.find_version()
+    assert said is not None
+    assert said.startswith("Python 3.")
+    assert CLIENT.model_copy(update={"version": ()}).find_version() is None
+    assert Program(command=("no-such-program",)).find_version() is None
+
+
+def test_a_version_is_short_however_much_a_program_says() -> None:
+    chatty = CLIENT.model_copy(update={"version": ("-c", "print('a' * 5000); print('b')")})
+    assert chatty.find_version() == "a" * 80
+
+
+def test_what_stands_behind_an_agent_is_named_with_its_version(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(f'command: ["{sys.executable}", "{{prompt}}"]\n')
+    versions = find_versions(["scripted", f"command:{file}"])
+    assert list(versions) == [f"command:{file}"]
 
 
 def test_a_program_is_read_from_a_file(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from mapspeak.evaluation.agents.models import (
 )
 from mapspeak.evaluation.agents.models.loop import estimate_picture_tokens
 from mapspeak.evaluation.agents.others import check_other, find_other
-from mapspeak.evaluation.client import Answer, Picture, ToolClient
+from mapspeak.evaluation.client import Answer, Ledger, Picture, ToolClient, Witness
 from mapspeak.evaluation.trials import Limits, TrialState
 from mapspeak.server import Representation
 from served import connect
@@ -37,13 +37,13 @@ def assignment(folder: Path, *, seed: int = 0, prompt: str = "Go there.") -> Ass
 async def run(
     agent: ModelAgent,
     task: Assignment,
-    witness: Hearing,
+    witness: Witness,
     representation: Representation = Representation.PICTURE_TABLE,
 ) -> tuple[AgentEnd, ToolClient]:
     """Lets an agent work in a building of two rooms."""
     robot = FakeRobot(two_rooms())
     async with connect(robot, task.folder, representation=representation) as client:
-        tools = ToolClient(client, [], witness)
+        tools = ToolClient(client, witness)
         return await agent.run(task, tools), tools
 
 
@@ -85,8 +85,9 @@ async def test_the_mock_model_comes_to_an_end_however_the_map_is_shown(
 async def test_the_same_seed_gives_the_same_conversation(tmp_path: Path) -> None:
     async def calls_with(seed: int) -> list[tuple[str, str]]:
         task = assignment(tmp_path, seed=seed)
-        _, tools = await run(ModelAgent(MockMind(), "mock"), task, Hearing())
-        return [(call.tool, str(call.arguments)) for call in tools.calls]
+        ledger = Ledger()
+        await run(ModelAgent(MockMind(), "mock"), task, ledger)
+        return [(call.tool, str(call.arguments)) for call in ledger.calls]
 
     assert await calls_with(1) == await calls_with(1)
     assert len({tuple(await calls_with(seed)) for seed in range(4)}) > 1

@@ -30,7 +30,7 @@ async def run(name: str, folder: Path, witness: Hearing, thinking: str | None = 
         prompt="Go there.", system="Be quick.", limits=Limits(), seed=1, server=(), folder=folder
     )
     async with connect(FakeRobot(two_rooms()), folder) as client:
-        return await agent.run(task, ToolClient(client, [], witness))
+        return await agent.run(task, ToolClient(client, witness))
 
 
 @pytest.mark.skipif(HAS_INSPECT, reason="needs to be without the extra eval")

@@ -13,6 +13,9 @@ from mapspeak.evaluation.trials import (
     read_turns,
     trial_folder,
 )
+from mapspeak.navigation.safety import read_audit
+from mapspeak.simulator import load_world
+from mapspeak.spatial.mapfiles import load_map
 from sites import make_flat, prepare
 
 
@@ -33,7 +36,7 @@ def without_wall_time(run: Path, trial: Trial) -> tuple[str, list[object]]:
     folder = trial_folder(run, trial)
     turns = [replace(turn, wall_s=0.0) for turn in read_turns(run, trial)]
     result = json.loads((folder / "result.json").read_text())
-    del result["wall_s"]
+    del result["wall_s"], result["cpu_s"]
     return json.dumps(result) + (folder / "state.jsonl").read_text(), [turns]
 
 
@@ -68,6 +71,37 @@ def test_every_call_and_picture_is_kept_for_replay(tmp_path: Path) -> None:
     folder = trial_folder(tmp_path, result.trial) / "pictures"
     assert pictures
     assert all((folder / name).exists() for name in pictures)
+
+
+def test_a_script_drives_under_the_guard_that_a_served_robot_has(tmp_path: Path) -> None:
+    result = run_one(tmp_path, "side-of-pose")
+    lines = list(read_audit(trial_folder(tmp_path, result.trial) / "audit.jsonl"))
+    drives = [line for line in lines if line.event == "decision" and line.kind == "drive"]
+    assert drives
+    assert {line.verdict for line in drives} == {"allowed"}
+
+
+def test_the_clock_of_a_trial_is_its_robots(tmp_path: Path) -> None:
+    result = run_one(tmp_path, "side-of-pose")
+    lines = list(read_audit(trial_folder(tmp_path, result.trial) / "audit.jsonl"))
+    assert all(line.wall_time.startswith("2000-01-01T00:0") for line in lines)
+
+
+def test_what_a_trial_computed_is_kept(tmp_path: Path) -> None:
+    result = run_one(tmp_path, "question-way")
+    assert result.cpu_s > 0
+
+
+def test_a_server_of_its_own_leaves_the_robots_map_when_it_ends(tmp_path: Path) -> None:
+    world = load_world("flat_1")
+    preparation = prepare(tmp_path, world)
+    trial = replace(preparation, task="question-way", agent="mock")
+    attempt(tmp_path, trial, world, preparation)
+    assert read_result(tmp_path, trial).n_calls > 0
+    given, left = (
+        load_map(trial_folder(tmp_path, each) / "map.yaml").grid for each in (preparation, trial)
+    )
+    assert (left.cells == given.cells).all()
 
 
 def test_a_note_that_gives_orders_is_not_obeyed(tmp_path: Path) -> None:

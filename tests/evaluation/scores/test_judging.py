@@ -17,6 +17,7 @@ from mapspeak.evaluation.scores import (
 from mapspeak.evaluation.trials import Failure, TrialState
 from mapspeak.geometry import Point
 from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.coverage import measure_coverage
 from sites import CORRIDOR, HALL, LARGE_ROOM, SMALL_ROOM, ended_at, make_flat
 
 MEMORY = "waypoints:\n  - name: view 1\n"
@@ -102,6 +103,28 @@ def test_a_perfect_map_recalls_everything_and_an_unremembered_one_is_incomplete(
     assert score.figures["coverage_recall"] == score.figures["coverage_paper_ratio"] == 1.0
     without_memory = replace(perfect, memory=None)
     assert judge_coverage(flat, without_memory).failure is Failure.INCOMPLETE
+
+
+def test_floor_that_a_map_knows_as_solid_is_known_and_not_recalled(flat: Site) -> None:
+    whole = flat.floor.visible
+    cells = whole.cells.copy()
+    cells[:, : whole.n_cols // 2] = 100
+    walled = OccupancyGrid(cells=cells, resolution_m=whole.resolution_m, origin=whole.origin)
+    score = judge_coverage(flat, ended_at(HALL, grid=walled, memory=MEMORY))
+    assert score.failure is Failure.INCOMPLETE
+    assert score.figures["coverage_known_ratio"] == 1.0
+    assert score.figures["coverage_recall"] == pytest.approx(0.5, abs=0.05)
+    assert score.figures["coverage_reachable_recall"] == pytest.approx(0.5, abs=0.05)
+
+
+def test_recall_is_what_the_demo_calls_so(flat: Site) -> None:
+    whole = flat.floor.visible
+    cells = whole.cells.copy()
+    cells[: whole.n_rows // 3] = -1
+    part = OccupancyGrid(cells=cells, resolution_m=whole.resolution_m, origin=whole.origin)
+    score = judge_coverage(flat, ended_at(HALL, grid=part, memory=MEMORY))
+    demo = measure_coverage(part, whole)
+    assert score.figures["coverage_recall"] == pytest.approx(demo.recall, abs=1e-4)
 
 
 def test_half_a_map_recalls_half(flat: Site) -> None:

@@ -1,5 +1,9 @@
 """Agents that need no truth, by their names: scripts to compare with, models, client programs."""
 
+from collections.abc import Iterable
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
+
 from mapspeak.errors import ConfigError
 from mapspeak.evaluation.agents.agent import Agent
 from mapspeak.evaluation.agents.command import CommandAgent, find_program
@@ -7,10 +11,11 @@ from mapspeak.evaluation.agents.exploring import NearestFrontierAgent, PaperLoop
 from mapspeak.evaluation.agents.models import MockMind, ModelAgent, Thinking
 from mapspeak.evaluation.agents.models.throughinspect import open_mind
 
-__all__ = ["OTHER_NAMES", "check_other", "find_other"]
+__all__ = ["OTHER_NAMES", "check_other", "find_other", "find_versions"]
 
 OTHER_NAMES = ("nearest-frontier", "paper-loop", "mock")
 COMMAND = "command:"
+INSPECT = "inspect-ai"
 
 
 def find_other(name: str, thinking: str | None) -> Agent | None:
@@ -48,6 +53,24 @@ def check_other(name: str, thinking: str | None = None) -> bool:
     if isinstance(agent, CommandAgent):
         agent.check()
     return agent is not None
+
+
+def find_versions(names: Iterable[str]) -> dict[str, str]:
+    """Gives the versions of what stands behind some agents, each by its own name.
+
+    It is `inspect-ai` behind models, and a client program behind "command:PROGRAM"; what does not
+    say its version is left out.
+    """
+    versions: dict[str, str] = {}
+    for name in names:
+        if name.startswith(COMMAND):
+            said = find_program(name.removeprefix(COMMAND)).find_version()
+            if said is not None:
+                versions[name] = said
+        elif "/" in name:
+            with suppress(PackageNotFoundError):
+                versions[INSPECT] = version(INSPECT)
+    return versions
 
 
 def _read_thinking(thinking: str | None) -> Thinking | None:

@@ -9,6 +9,7 @@ from mapspeak.errors import MapspeakError
 from mapspeak.evaluation.agents.agent import AgentEnd, Assignment, Connection
 from mapspeak.evaluation.agents.cues import find_label
 from mapspeak.evaluation.agents.driver import ARRIVED, WAIT_S, Driver, Seen
+from mapspeak.evaluation.agents.inspecting import diagnose
 from mapspeak.evaluation.agents.questioned import answer_question
 from mapspeak.evaluation.client import Answer, OutOfBudgetError, ToolClient
 from mapspeak.evaluation.observer import read_sightings
@@ -237,6 +238,10 @@ async def _follow(driver: Driver, match: re.Match[str]) -> AgentEnd:
     return AgentEnd(answer="I have been everywhere.")
 
 
+async def _inspect(driver: Driver, match: re.Match[str]) -> AgentEnd:
+    return await diagnose(driver.tools, match.string)
+
+
 async def _answer(driver: Driver, match: re.Match[str]) -> AgentEnd:
     return await answer_question(driver, match.string)
 
@@ -251,6 +256,7 @@ BESIDE_POSE = (
     r"(?P<side>to the left of|to the right of|in front of|behind)"
 )
 DEEDS: tuple[tuple[str, Deed], ...] = (
+    (r"^Inspect the robot's ROS\.", _inspect),
     (r"Answer without driving\.", _answer),
     (r"^Update the map", _explore),
     (r"^Go to the (?:(?P<ordinal>\w+) )?(?P<end>smallest|largest) room", _go_to_room_by_size),

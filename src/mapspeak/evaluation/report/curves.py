@@ -60,7 +60,7 @@ def trace_coverage(result: TrialResult, course: Course) -> Curve | None:
     return Curve(
         trial_id=trial.id,
         world=trial.world,
-        agent=trial.agent if trial.thinking is None else f"{trial.agent}+{trial.thinking}",
+        agent=trial.answerer,
         representation=trial.representation,
         points=(
             *_looks(course, ratio, last_m=result.driven_m),

@@ -188,11 +188,6 @@ def build_report(run: Run) -> Report:
     )
 
 
-def agent_name(trial: Trial) -> str:
-    """Gives who answered, with how much it may think where that was said."""
-    return trial.agent if trial.thinking is None else f"{trial.agent}+{trial.thinking}"
-
-
 def say_kind(agent: str) -> str:
     """Says what an agent is, so that no script is taken for a model."""
     if agent in SCRIPTS:
@@ -218,7 +213,7 @@ def _count(run: Run) -> Counts:
 def _list_agents(run: Run) -> tuple[AgentRow, ...]:
     groups: dict[str, list[Attempt]] = {}
     for each in run.attempts:
-        groups.setdefault(agent_name(each.trial), []).append(each)
+        groups.setdefault(each.trial.answerer, []).append(each)
     return tuple(
         AgentRow(
             agent=agent,
@@ -269,7 +264,7 @@ def _with_costs(row: TableRow, run: Run) -> ReportRow:
 
 
 def _is_of(trial: Trial, row: TableRow) -> bool:
-    key = (trial.task, agent_name(trial), trial.representation)
+    key = (trial.task, trial.answerer, trial.representation)
     return key == (row.task, row.agent, row.representation)
 
 

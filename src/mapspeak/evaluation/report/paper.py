@@ -14,8 +14,9 @@ PAPER_NOTE = (
     "Tasks 2 and 3 thirty times each, Claude Sonnet 4.6 and GPT-5.5. They were not measured here, "
     "and another simulator, other worlds and another robot stand behind ours. Its coverage is the "
     "free area of the map over the free area of the building, wherever it lies; ours is given by "
-    "that ratio too, and as recall: the share of the reachable floor that the map knows. The "
-    "intervals of its counts are ours, after Wilson."
+    "that ratio too, and as recall: the share of the floor in sight that the map shows as free. "
+    "What is known is the share of the reachable floor that the map knows, be it as free or as "
+    "solid. The intervals of its counts are ours, after Wilson."
 )
 
 

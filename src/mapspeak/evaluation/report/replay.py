@@ -61,7 +61,7 @@ def show_standing(attempt: Attempt) -> Html:
 
 def _summary(attempt: Attempt) -> Html:
     trial = attempt.trial
-    who = trial.agent if trial.thinking is None else f"{trial.agent}+{trial.thinking}"
+    who = trial.answerer
     where = f" {trial.world} {trial.number:03d}"
     said = f" {who}, {trial.representation}"
     return element(

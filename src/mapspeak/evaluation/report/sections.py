@@ -130,11 +130,14 @@ def _our_row(row: OurPaperRow, kind: str) -> list[Html]:
 def _coverage_cell(row: TableRow | None) -> Html:
     if row is None:
         return cell("not run", kind="none")
-    ratio, recall = (row.figures.get(f"coverage_{name}") for name in ("paper_ratio", "recall"))
+    names = ("paper_ratio", "recall", "known_ratio")
+    ratio, recall, known = (row.figures.get(f"coverage_{name}") for name in names)
     done = f"{row.n_successes}/{row.n_trials} explorations done"
     if ratio is None or recall is None:
         return cell(done)
     said = f"{say_percent(ratio.value)} by the paper's ratio, {say_percent(recall.value)} recall"
+    if known is not None:
+        said = f"{said}, {say_percent(known.value)} known"
     span = f"{say_percent(recall.low)} to {say_percent(recall.high)} recall; "
     span = done if recall.low == recall.high else f"{span}{done}"
     return element("td", {}, text(said), element("small", {}, text(span)))
@@ -290,7 +293,7 @@ def _show_worlds(rows: Sequence[TableRow]) -> Iterator[Html]:
     if len({row.world for row in rows}) < 2:
         return
     yield _heading("worlds", "World by world")
-    heading = ("task", "world", "agent", "map shown as", "done", "coverage recall", "SPL")
+    heading = ("task", "world", "agent", "map shown as", "done", "coverage recall", "known", "SPL")
     lines = (
         [
             cell(row.task),
@@ -299,6 +302,7 @@ def _show_worlds(rows: Sequence[TableRow]) -> Iterator[Html]:
             cell(row.representation),
             share_cell(row),
             figure_cell(row.figures.get("coverage_recall"), is_ratio=True),
+            figure_cell(row.figures.get("coverage_known_ratio"), is_ratio=True),
             figure_cell(row.figures.get("spl")),
         ]
         for row in rows

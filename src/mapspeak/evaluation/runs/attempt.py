@@ -8,7 +8,7 @@ import anyio
 import cv2
 
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.agents import Agent, AgentEnd, Assignment, Connection, find_agent
+from mapspeak.evaluation.agents import Agent, AgentEnd, Assignment, find_agent
 from mapspeak.evaluation.client import OutOfBudgetError, ToolClient
 from mapspeak.evaluation.runs.transcript import Transcript
 from mapspeak.evaluation.runs.workplace import MAP, MEMORY, STATES, Workshop, open_workplace
@@ -48,6 +48,7 @@ def attempt(run: Path, trial: Trial, world: World, preparation: Trial | None) ->
         world: Its world.
         preparation: The trial whose map and memory this one starts from; None where there is none.
     """
+    begun_s = time.process_time()
     # Trials share the machine: one thread each costs least.
     cv2.setNumThreads(1)
     folder = trial_folder(run, trial)
@@ -70,7 +71,8 @@ def attempt(run: Path, trial: Trial, world: World, preparation: Trial | None) ->
     as_set = _as_set(site, setting)
     agent = find_agent(trial, setting, as_set)
     course = anyio.run(_work, shop, agent)
-    write_result(run, _judge(trial, setting, task, as_set, course))
+    result = _judge(trial, setting, task, as_set, course)
+    write_result(run, replace(result, cpu_s=round(time.process_time() - begun_s, 3)))
 
 
 def _as_set(site: Site, setting: Setting) -> Site:
@@ -91,13 +93,13 @@ async def _work(shop: Workshop, agent: Agent) -> _Course:
             system=system,
             limits=setting.limits,
             seed=shop.trial.seed,
-            server=shop.command() if agent.connection is Connection.COMMAND else (),
+            server=place.command,
             folder=shop.folder,
         )
         transcript.hear_words("system", system)
         transcript.hear_words("user", setting.prompt)
         try:
-            end = await _run_agent(agent, assignment, ToolClient(place.client, [], transcript))
+            end = await _run_agent(agent, assignment, ToolClient(place.client, transcript))
             transcript.hear_words("agent", end.answer)
         finally:
             transcript.close()

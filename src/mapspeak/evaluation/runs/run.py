@@ -12,6 +12,7 @@ from filelock import FileLock, Timeout
 
 from mapspeak import __version__
 from mapspeak.errors import ConfigError
+from mapspeak.evaluation.agents.others import find_versions
 from mapspeak.evaluation.runs.attempt import attempt
 from mapspeak.evaluation.runs.schedule import Job, run_jobs
 from mapspeak.evaluation.scores import Site
@@ -20,7 +21,15 @@ from mapspeak.evaluation.trials import RunPlan, Trial, TrialResult, read_plan, w
 from mapspeak.server import Representation
 from mapspeak.simulator import World, load_world, world_names
 
-__all__ = ["ALL_WORLDS", "PLAIN", "SCRIPTED", "RunOptions", "plan_run", "run_evaluation"]
+__all__ = [
+    "ALL_WORLDS",
+    "PLAIN",
+    "SCRIPTED",
+    "RunOptions",
+    "make_jobs",
+    "plan_run",
+    "run_evaluation",
+]
 
 ALL_WORLDS = "all"
 PLAIN = str(Representation.PICTURE_TABLE)
@@ -112,6 +121,7 @@ def plan_run(options: RunOptions, worlds: Mapping[str, World]) -> RunPlan:
             "mapspeak": __version__,
             "python": platform.python_version(),
             "numpy": np.__version__,
+            **find_versions(options.agents),
         },
         options={
             "agents": list(options.agents),
@@ -177,7 +187,7 @@ def run_evaluation(
     with _alone_in(options.folder):
         write_plan(options.folder, plan)
         on_plan(plan)
-        jobs = _make_jobs(options, plan, worlds)
+        jobs = make_jobs(options, plan, worlds)
         run_jobs(options.folder, jobs, n_jobs=options.n_jobs, on_done=on_done)
     return plan
 
@@ -199,6 +209,13 @@ def _alone_in(folder: Path) -> Generator[None]:
         lock.release()
 
 
+def _floor_m2(world: World) -> float:
+    """Gives about how large a world is: the box around its walls."""
+    ends = [end for wall in world.walls for end in (wall.start, wall.end)]
+    xs, ys = [end.x for end in ends], [end.y for end in ends]
+    return (max(xs) - min(xs)) * (max(ys) - min(ys)) if ends else 0.0
+
+
 def _check_folder(options: RunOptions) -> None:
     if not (options.folder / "run.json").exists():
         return
@@ -210,12 +227,19 @@ def _check_folder(options: RunOptions) -> None:
         )
 
 
-def _make_jobs(options: RunOptions, plan: RunPlan, worlds: Mapping[str, World]) -> Iterable[Job]:
-    """Gives what is to be done: first all that others wait for."""
+def make_jobs(options: RunOptions, plan: RunPlan, worlds: Mapping[str, World]) -> Iterable[Job]:
+    """Gives what is to be done: first all that others wait for, the largest world first.
+
+    Exploring takes longest, and longest in the largest world: begun last, it would keep one
+    process busy while the others have nothing left to do.
+    """
     tasks = {task.name: task for task in choose_tasks((*options.tasks, EXPLORE))}
     first = [trial for trial in plan.trials if trial.task == EXPLORE]
     others = [trial for trial in plan.trials if trial.task != EXPLORE]
-    for trial in (*plan.preparations, *first, *others):
+    exploring = sorted(
+        (*plan.preparations, *first), key=lambda trial: -_floor_m2(worlds[trial.world])
+    )
+    for trial in (*exploring, *others):
         before = _preparation(options, trial.world) if tasks[trial.task].needs_map else None
         work = partial(attempt, options.folder, trial, worlds[trial.world], before)
         yield Job(trial=trial, work=work, after=before, wall_s=options.hang_s)

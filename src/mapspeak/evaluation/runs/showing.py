@@ -21,7 +21,7 @@ from mapspeak.evaluation.trials import RunPlan, TrialResult, TrialState
 
 __all__ = ["RunBar", "build_table", "show_run"]
 
-SHOWN = ("coverage_recall", "spl", "driven_m", "n_calls", "wall_s")
+SHOWN = ("coverage_recall", "coverage_known_ratio", "spl", "driven_m", "n_calls", "wall_s")
 
 
 @dataclass(slots=True)

@@ -7,14 +7,19 @@ import sys
 from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from mcp.client import Client
 from mcp.client.stdio import StdioServerParameters
 
 from mapspeak.evaluation.agents import Connection
+from mapspeak.evaluation.inspected import InspectedSystem
+from mapspeak.evaluation.runs.inspecting import open_inspection
+from mapspeak.evaluation.scores.evidence import NOWHERE
 from mapspeak.evaluation.trials import Setting, Trial
 from mapspeak.links.simulated import SimulatedRobot
+from mapspeak.navigation.safety import Approvals, AuditLog, Guard, Hold, Policy, WaitingRoom
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server import DEFAULT_TOOLSETS, Representation, build_server
 from mapspeak.session import Session
@@ -27,13 +32,14 @@ __all__ = ["Workplace", "Workshop", "open_workplace"]
 
 ANSWER_WITHIN_S = 120.0
 STATES = "state.jsonl"
+AUDIT = "audit.jsonl"
+CONTROL = "control"
 MEMORY = "semantic_map.yaml"
 MAP = "map.yaml"
+CLOCK_ZERO = datetime(2000, 1, 1, tzinfo=UTC)
+"""What the clock on the wall shows when a robot of a trial in memory begins."""
 LINE_BYTES = 2000
 """More than the last line of a state log has."""
-NOWHERE = StateRecord(
-    time_s=0.0, x=0.0, y=0.0, yaw_rad=0.0, slam_error_m=0.0, driven_m=0.0, n_collisions=0
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,8 +87,8 @@ class Workshop:
             *("--semantic-map", str(self.folder / MEMORY)),
             *("--state-log", str(self.folder / STATES)),
             *("--final-map", str(self.folder / MAP)),
-            *("--audit", str(self.folder / "audit.jsonl")),
-            *("--control", str(self.folder / "control")),
+            *("--audit", str(self.folder / AUDIT)),
+            *("--control", str(self.folder / CONTROL)),
         )
 
 
@@ -94,21 +100,25 @@ class Workplace:
         client: To its server; None where the agent brings its own.
         instructions: What the server tells any model first.
         look: Gives how the simulation truly stands.
+        command: Starts its server, for agents that do so themselves.
     """
 
     client: Client | None
     instructions: str
     look: Callable[[], StateRecord]
+    command: tuple[str, ...] = ()
 
 
 @asynccontextmanager
 async def open_workplace(shop: Workshop, connection: Connection) -> AsyncGenerator[Workplace]:
     """Starts robot and server and connects; in the end the robot's map lies in the folder."""
-    for leftover in (STATES, MEMORY, MAP):
+    for leftover in (STATES, MEMORY, MAP, AUDIT):
         (shop.folder / leftover).unlink(missing_ok=True)
     if shop.setting.memory is not None:
         (shop.folder / MEMORY).write_text(shop.setting.memory, encoding="utf-8")
-    if connection is Connection.MEMORY:
+    if shop.setting.inspected is not None:
+        opened = _open_inspected(shop, shop.setting.inspected, connection)
+    elif connection is Connection.MEMORY:
         opened = _open_in_memory(shop)
     elif connection is Connection.STDIO:
         opened = _open_over_stdio(shop)
@@ -127,7 +137,7 @@ async def _open_in_memory(shop: Workshop) -> AsyncGenerator[Workplace]:
     log = StateLog(simulation, shop.folder / STATES)
     robot = SimulatedRobot(simulation, has_detector=True, after_step=log.note)
     memory = SemanticMapStore(shop.folder / MEMORY, map_id=world.name)
-    session = Session(robot, memory, lease_s=math.inf)
+    session = Session(robot, memory, lease_s=math.inf, guard=_build_guard(shop, robot))
     server = build_server(
         session,
         toolsets=shop.toolsets,
@@ -144,6 +154,27 @@ async def _open_in_memory(shop: Workshop) -> AsyncGenerator[Workplace]:
     finally:
         log.close()
         write_map(simulation.map(), shop.folder / MAP, mode=MapMode.RAW)
+
+
+def _build_guard(shop: Workshop, robot: SimulatedRobot) -> Guard:
+    """Gives the guard that a served robot has when nobody wrote a policy.
+
+    Its clock is the robot's, so that a trial is the same whenever it is run. Nothing watches
+    between calls: nobody can hold a trial's robot, no area is closed, and no time passes then.
+    """
+
+    def robot_clock() -> datetime:
+        return CLOCK_ZERO + timedelta(seconds=robot.now_s)
+
+    control, name = shop.folder / CONTROL, f"sim:{shop.world.name}"
+    return Guard(
+        policy=Policy(),
+        audit=AuditLog(shop.folder / AUDIT, wall_clock=robot_clock, robot=name),
+        hold=Hold(control),
+        approvals=Approvals(WaitingRoom(control / "approvals"), lambda: robot.now_s),
+        wall_clock=robot_clock,
+        robot=name,
+    )
 
 
 def _read_known(path: Path | None) -> OccupancyGrid | None:
@@ -165,7 +196,28 @@ async def _open_over_stdio(shop: Workshop) -> AsyncGenerator[Workplace]:
 @asynccontextmanager
 async def _open_for_another(shop: Workshop) -> AsyncGenerator[Workplace]:
     """Leaves it to the agent to start the server."""
-    yield Workplace(client=None, instructions="", look=lambda: _last_state(shop.folder / STATES))
+    yield Workplace(
+        client=None,
+        instructions="",
+        look=lambda: _last_state(shop.folder / STATES),
+        command=shop.command(),
+    )
+
+
+@asynccontextmanager
+async def _open_inspected(
+    shop: Workshop, system: InspectedSystem, connection: Connection
+) -> AsyncGenerator[Workplace]:
+    """There is no simulated robot here, and nobody drives."""
+    async with open_inspection(
+        system, connection, toolsets=shop.toolsets, folder=shop.folder
+    ) as opened:
+        yield Workplace(
+            client=opened.client,
+            instructions=opened.instructions,
+            look=lambda: NOWHERE,
+            command=opened.command,
+        )
 
 
 def _last_state(log: Path) -> StateRecord:

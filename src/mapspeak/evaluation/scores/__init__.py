@@ -6,6 +6,7 @@ from mapspeak.evaluation.scores.answers import (
     read_letters,
     read_number,
     read_point,
+    read_said,
     read_word,
 )
 from mapspeak.evaluation.scores.evidence import Evidence
@@ -42,6 +43,7 @@ __all__ = [
     "read_letters",
     "read_number",
     "read_point",
+    "read_said",
     "read_word",
     "spl",
     "wilson_interval",

@@ -13,6 +13,7 @@ __all__ = [
     "read_letters",
     "read_number",
     "read_point",
+    "read_said",
     "read_word",
 ]
 
@@ -23,14 +24,14 @@ UNITS = {"m2": r"(?:m2|m²|m\^2|sq\.? ?m|square met(?:re|er)s)", "m": r"(?:m|met
 
 def read_number(text: str, unit: str = "") -> float | None:
     """Reads a number with its unit, "m", "m2" or none; None where the form is not kept."""
-    said = _last_line(text)
+    said = read_said(text)
     match = re.fullmatch(rf"(?P<number>{NUMBER})\s*{UNITS[unit]}", said or "", re.IGNORECASE)
     return float(match["number"]) if match else None
 
 
 def read_letters(text: str) -> frozenset[str] | None:
     """Reads letters such as "A, C", or "none"; None where the form is not kept."""
-    said = _last_line(text)
+    said = read_said(text)
     if said is None:
         return None
     if said.lower() == "none":
@@ -42,14 +43,14 @@ def read_letters(text: str) -> frozenset[str] | None:
 
 def read_point(text: str) -> Point | None:
     """Reads two coordinates, "1.5, -2"; None where the form is not kept."""
-    said = _last_line(text) or ""
+    said = read_said(text) or ""
     match = re.fullmatch(rf"\(?({NUMBER})\s*(?:m)?\s*,\s*({NUMBER})\s*(?:m)?", said.rstrip(")"))
     return Point(float(match[1]), float(match[2])) if match else None
 
 
 def read_word(text: str, words: Collection[str]) -> str | None:
     """Reads one of some words, whatever its case; None where the form is not kept."""
-    said = (_last_line(text) or "").casefold()
+    said = (read_said(text) or "").casefold()
     return next((word for word in words if word.casefold() == said), None)
 
 
@@ -91,6 +92,7 @@ def _no_answer(evidence: Evidence) -> Score:
     )
 
 
-def _last_line(text: str) -> str | None:
+def read_said(text: str) -> str | None:
+    """Reads what the last line of the form says; None where there is none."""
     lines = [match["said"].strip() for match in LINE.finditer(text)]
     return lines[-1] if lines else None

@@ -45,9 +45,10 @@ def count_rows(results: Iterable[TrialResult], *, by_world: bool = False) -> tup
     groups: dict[tuple[str, str | None, str, str], list[TrialResult]] = {}
     for result in results:
         trial = result.trial
-        agent = trial.agent if trial.thinking is None else f"{trial.agent}+{trial.thinking}"
         world = trial.world if by_world else None
-        groups.setdefault((trial.task, world, agent, trial.representation), []).append(result)
+        groups.setdefault((trial.task, world, trial.answerer, trial.representation), []).append(
+            result
+        )
     return tuple(_count(*key, results=group) for key, group in groups.items())
 
 
@@ -105,4 +106,5 @@ def _figures_of(result: TrialResult) -> dict[str, float]:
         "n_collisions": float(result.n_collisions),
         "robot_s": result.robot_s,
         "wall_s": result.wall_s,
+        "cpu_s": result.cpu_s,
     }

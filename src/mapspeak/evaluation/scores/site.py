@@ -271,12 +271,22 @@ class Site:
 
     def floor_area_m2(self, room: MeasuredRoom) -> float:
         """Gives the floor between a room's walls, with what stands on it."""
-        rows, cols = np.nonzero(self.cells_of(room))
+        return self._floor_areas_m2[room.room.name]
+
+    @cached_property
+    def _floor_areas_m2(self) -> dict[str, float]:
+        """The floor between the walls of every space, by its name."""
+        rows, cols = np.nonzero(self._labels)
         at_rows, at_cols = self._walls.cells_at(self.grid.points_at(rows, cols))
         is_inside = (at_rows >= 0) & (at_rows < self._walls.n_rows)
         is_inside &= (at_cols >= 0) & (at_cols < self._walls.n_cols)
-        n_free = (~self._walls.occupied[at_rows[is_inside], at_cols[is_inside]]).sum()
-        return float(n_free) * self.grid.resolution_m**2
+        is_free = ~self._walls.occupied[at_rows[is_inside], at_cols[is_inside]]
+        labels = self._labels[rows[is_inside], cols[is_inside]][is_free]
+        n_free = np.bincount(labels, minlength=len(self._label_of) + 1)
+        return {
+            name: float(n_free[label]) * self.grid.resolution_m**2
+            for name, label in self._label_of.items()
+        }
 
     def middle_of(self, room: MeasuredRoom) -> Point:
         """Gives where in a room the robot has most room."""

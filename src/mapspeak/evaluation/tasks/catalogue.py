@@ -5,6 +5,7 @@ from types import MappingProxyType
 
 from mapspeak.errors import ConfigError
 from mapspeak.evaluation.tasks.failing import FAILURE_TASKS
+from mapspeak.evaluation.tasks.inspection import INSPECTION_TASKS
 from mapspeak.evaluation.tasks.objects import OBJECT_TASKS
 from mapspeak.evaluation.tasks.paper import EXPLORE, Explore
 from mapspeak.evaluation.tasks.questions import QUESTION_TASKS
@@ -26,6 +27,7 @@ _TASKS: Mapping[str, Task] = MappingProxyType(
             RouteTask(),
             *QUESTION_TASKS,
             *FAILURE_TASKS,
+            *INSPECTION_TASKS,
         )
     }
 )
@@ -40,6 +42,7 @@ FAMILIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "search": ("search",),
         "questions": tuple(task.name for task in QUESTION_TASKS),
         "failures": tuple(task.name for task in FAILURE_TASKS),
+        "inspection": tuple(task.name for task in INSPECTION_TASKS),
         "all": tuple(_TASKS),
     }
 )

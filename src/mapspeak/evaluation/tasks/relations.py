@@ -1,13 +1,14 @@
 """Places by relation: beside a pose, in a direction of a thing, in front of it and facing it."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from mapspeak.evaluation.scores import Evidence, Site, judge_near, judge_pose
 from mapspeak.evaluation.tasks.objects import findable_kinds
-from mapspeak.evaluation.tasks.task import dice, draw_start, point_text
+from mapspeak.evaluation.tasks.task import dice, draw_start, drive_setting, point_text
 from mapspeak.evaluation.trials import Score, Setting
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.simulator import WorldObject
@@ -34,65 +35,85 @@ NORTH_IS_UP = "On the map +y is north."
 
 
 @dataclass(frozen=True, slots=True)
-class SideTask:
-    """The robot goes to one side of a pose that is given by numbers."""
+class Aim:
+    """A place as it is asked for.
 
-    name: str = "side-of-pose"
+    Attributes:
+        prompt: The words.
+        goal: Where it is, in the map frame.
+    """
+
+    prompt: str
+    goal: Point
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlaceTask:
+    """The robot goes to a place that is told by what it lies beside.
+
+    Attributes:
+        name: Of the task.
+        draw: Draws the place.
+        is_offered_in: True for worlds that have such places.
+        within_m: How far from it the robot may stand.
+        needs_map: It does.
+    """
+
+    name: str
+    draw: Callable[[Site, np.random.Generator], Aim]
+    is_offered_in: Callable[[Site], bool]
+    within_m: float
     needs_map: bool = True
 
     def is_offered(self, site: Site) -> bool:
-        """Every world has poses with room beside them."""
-        del site
-        return True
+        """True where the world has such places."""
+        return self.is_offered_in(site)
 
     def make_setting(self, site: Site, *, seed: int, memory: str | None) -> Setting:
-        """Draws the pose, the side and the distance."""
+        """Draws the place, and starts away from it."""
         random = dice(self.name, site, seed)
-        goal, prompt = Point(0.0, 0.0), ""
-        for _ in range(MOST_TRIES):
-            pose = site.draw_pose(random)
-            yaw_deg = float(random.integers(-17, 19) * 10)
-            side = str(random.choice(list(SIDES)))
-            away_m = float(random.choice(DISTANCES_M))
-            goal = _step(pose.point, math.radians(yaw_deg + SIDES[side]), away_m)
-            prompt = (
-                f"Think of somebody who stands at {point_text(pose.point)} and looks along a yaw "
-                f"of {yaw_deg:.0f} deg. Go to the place {away_m:g} m {SIDE_WORDS[side]} them."
-            )
-            if _is_roomy(site, goal) and _is_open(site, pose.point, goal):
-                break
-        return _setting(site, random, prompt, goal, memory)
+        aim = self.draw(site, random)
+        start = draw_start(site, random, without=site.near(aim.goal, 3 * THING_TOLERANCE_M))
+        return drive_setting(
+            site,
+            prompt=aim.prompt,
+            start=start,
+            right=site.near(aim.goal, POSE_TOLERANCE_M),
+            memory=memory,
+            goal=[round(aim.goal.x, 3), round(aim.goal.y, 3)],
+        )
 
     def score(self, site: Site, setting: Setting, evidence: Evidence) -> Score:
         """Scores how far the robot stands from there."""
         goal = Point(*setting.truth["goal"])
-        return judge_near(site, evidence, goal, within_m=POSE_TOLERANCE_M)
+        return judge_near(site, evidence, goal, within_m=self.within_m)
 
 
-@dataclass(frozen=True, slots=True)
-class DirectionTask:
-    """The robot goes so far in a direction of the map from the only thing of its kind."""
+def _aim_beside_pose(site: Site, random: np.random.Generator) -> Aim:
+    """Draws a pose that is given by numbers, a side of it and a distance."""
+    aim = Aim("", Point(0.0, 0.0))
+    for _ in range(MOST_TRIES):
+        pose = site.draw_pose(random)
+        yaw_deg = float(random.integers(-17, 19) * 10)
+        side = str(random.choice(list(SIDES)))
+        away_m = float(random.choice(DISTANCES_M))
+        goal = _step(pose.point, math.radians(yaw_deg + SIDES[side]), away_m)
+        prompt = (
+            f"Think of somebody who stands at {point_text(pose.point)} and looks along a yaw "
+            f"of {yaw_deg:.0f} deg. Go to the place {away_m:g} m {SIDE_WORDS[side]} them."
+        )
+        aim = Aim(prompt, goal)
+        if _is_roomy(site, goal) and _is_open(site, pose.point, goal):
+            break
+    return aim
 
-    name: str = "side-of-thing"
-    needs_map: bool = True
 
-    def is_offered(self, site: Site) -> bool:
-        """True where the world has a single thing with room beside it."""
-        return bool(_places_beside(site))
-
-    def make_setting(self, site: Site, *, seed: int, memory: str | None) -> Setting:
-        """Draws the thing, the direction and the distance."""
-        random = dice(self.name, site, seed)
-        places = _places_beside(site)
-        thing, direction, away_m, goal = places[int(random.integers(len(places)))]
-        label = site.label_of(thing.kind)
-        prompt = f"Go to the place {away_m:g} m {direction} of the {label}. {NORTH_IS_UP}"
-        return _setting(site, random, prompt, goal, memory)
-
-    def score(self, site: Site, setting: Setting, evidence: Evidence) -> Score:
-        """Scores how far the robot stands from there."""
-        goal = Point(*setting.truth["goal"])
-        return judge_near(site, evidence, goal, within_m=THING_TOLERANCE_M)
+def _aim_beside_thing(site: Site, random: np.random.Generator) -> Aim:
+    """Draws the only thing of its kind, a direction of the map and a distance."""
+    places = _places_beside(site)
+    thing, direction, away_m, goal = places[int(random.integers(len(places)))]
+    label = site.label_of(thing.kind)
+    return Aim(f"Go to the place {away_m:g} m {direction} of the {label}. {NORTH_IS_UP}", goal)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,39 +134,20 @@ class FacingTask:
         thing = things[int(random.integers(len(things)))]
         near = site.seen_around(thing, FACING_WITHIN_M)
         start = draw_start(site, random, without=near)
-        return Setting(
+        return drive_setting(
+            site,
             prompt=f"Go to the {site.label_of(thing.kind)}, stop at most {FACING_WITHIN_M:g} m "
             "from it and look straight at it.",
-            start=site.in_world(start),
-            is_known=True,
+            start=start,
+            right=near,
             memory=memory,
-            truth={
-                "kind": thing.kind,
-                "shortest_m": round(site.shortest_to_any_m(start.point, near), 3),
-            },
+            kind=thing.kind,
         )
 
     def score(self, site: Site, setting: Setting, evidence: Evidence) -> Score:
         """Scores distance, heading and sight."""
         (thing,) = site.things(setting.truth["kind"])
         return judge_pose(site, evidence, thing, within_m=FACING_WITHIN_M, facing_rad=FACING_RAD)
-
-
-def _setting(
-    site: Site, random: np.random.Generator, prompt: str, goal: Point, memory: str | None
-) -> Setting:
-    near = site.near(goal, POSE_TOLERANCE_M)
-    start = draw_start(site, random, without=site.near(goal, 3 * THING_TOLERANCE_M))
-    return Setting(
-        prompt=prompt,
-        start=site.in_world(start),
-        is_known=True,
-        memory=memory,
-        truth={
-            "goal": [round(goal.x, 3), round(goal.y, 3)],
-            "shortest_m": round(site.shortest_to_any_m(start.point, near), 3),
-        },
-    )
 
 
 def _single_things(site: Site) -> list[WorldObject]:
@@ -181,4 +183,26 @@ def _is_open(site: Site, one: Point, other: Point) -> bool:
     return bool(site.floor.standable[site.grid.cells_at(way)].all())
 
 
-RELATION_TASKS = (SideTask(), DirectionTask(), FacingTask())
+def _always(site: Site) -> bool:
+    return bool(site.roomy.any())
+
+
+def _has_places_beside(site: Site) -> bool:
+    return bool(_places_beside(site))
+
+
+RELATION_TASKS = (
+    PlaceTask(
+        name="side-of-pose",
+        draw=_aim_beside_pose,
+        is_offered_in=_always,
+        within_m=POSE_TOLERANCE_M,
+    ),
+    PlaceTask(
+        name="side-of-thing",
+        draw=_aim_beside_thing,
+        is_offered_in=_has_places_beside,
+        within_m=THING_TOLERANCE_M,
+    ),
+    FacingTask(),
+)

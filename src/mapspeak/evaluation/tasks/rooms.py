@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapspeak.evaluation.scores import Evidence, Site, judge_room
-from mapspeak.evaluation.tasks.task import dice, draw_start
+from mapspeak.evaluation.tasks.task import dice, draw_start, drive_setting
 from mapspeak.evaluation.trials import Score, Setting
 from mapspeak.simulator import MeasuredRoom
 from mapspeak.spatial.rooms import RoomClass
@@ -63,15 +63,13 @@ class RoomTask:
             raise AssertionError("the task is offered here")
         goal = np.logical_or.reduce([site.cells_of(room) for room in choice.rooms])
         start = draw_start(site, random, without=goal)
-        return Setting(
+        return drive_setting(
+            site,
             prompt=choice.prompt,
-            start=site.in_world(start),
-            is_known=True,
+            start=start,
+            right=goal,
             memory=memory,
-            truth={
-                "rooms": [room.room.name for room in choice.rooms],
-                "shortest_m": round(site.shortest_to_any_m(start.point, goal), 3),
-            },
+            rooms=[room.room.name for room in choice.rooms],
         )
 
     def score(self, site: Site, setting: Setting, evidence: Evidence) -> Score:

@@ -10,7 +10,7 @@ from mapspeak.evaluation.trials import Score, Setting
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial.grid import Mask
 
-__all__ = ["Task", "dice", "draw_start", "point_text"]
+__all__ = ["Task", "dice", "draw_start", "drive_setting", "point_text"]
 
 
 class Task(Protocol):
@@ -56,6 +56,29 @@ def draw_start(site: Site, random: np.random.Generator, *, without: Mask | None 
     elsewhere = None if without is None else ~without
     is_left = elsewhere is not None and bool((site.roomy & elsewhere).any())
     return site.draw_pose(random, elsewhere if is_left else None)
+
+
+def drive_setting(
+    site: Site, *, prompt: str, start: Pose, right: Mask, memory: str | None, **truth: object
+) -> Setting:
+    """Gives the setting of a drive on a finished map.
+
+    Args:
+        site: The world.
+        prompt: What is asked.
+        start: Where the robot stands, in the map frame.
+        right: Cells of the map any of which will do; `shortest_m` is the way to the nearest.
+        memory: What the robot remembers.
+        truth: What else the scorer has to know.
+    """
+    shortest_m = round(site.shortest_to_any_m(start.point, right), 3)
+    return Setting(
+        prompt=prompt,
+        start=site.in_world(start),
+        is_known=True,
+        memory=memory,
+        truth={**truth, "shortest_m": shortest_m},
+    )
 
 
 def point_text(point: Point) -> str:

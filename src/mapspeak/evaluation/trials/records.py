@@ -44,7 +44,8 @@ class RunPlan:
         trials: All of them, in their order; preparations are not among them.
         preparations: Trials that were not asked for but that others start from: the scripted
             exploration whose map and memory they are given.
-        versions: Of mapspeak, Python and numpy, by name.
+        versions: Of mapspeak, Python and numpy, of `inspect-ai` behind models and of client
+            programs, by name.
         options: As on the command line.
     """
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
+from mapspeak.evaluation.inspected import InspectedSystem
 from mapspeak.geometry import Pose
 from mapspeak.simulator import WorldObject
 
@@ -48,10 +49,14 @@ class Trial:
     number: int
 
     @property
+    def answerer(self) -> str:
+        """Gives who answers, with how much it may think where that was said."""
+        return self.agent if self.thinking is None else f"{self.agent}+{self.thinking}"
+
+    @property
     def id(self) -> str:
         """Gives where it lies below the run's trials: the same in every run."""
-        agent = self.agent if self.thinking is None else f"{self.agent}+{self.thinking}"
-        parts = (self.task, self.world, agent, self.representation)
+        parts = (self.task, self.world, self.answerer, self.representation)
         return "/".join((*map(_as_file_name, parts), f"{self.number:03d}"))
 
 
@@ -91,6 +96,8 @@ class Setting:
         toolsets: Groups of tools that are offered; None for the server's usual ones.
         tools: Single tools besides.
         limits: What it may cost.
+        inspected: The ROS that is asked about instead of the simulated robot, which then is not
+            there; None for the simulated robot.
         truth: What the scorer has to know, as JSON; never shown to an agent but the oracle.
     """
 
@@ -103,6 +110,7 @@ class Setting:
     toolsets: tuple[str, ...] | None = None
     tools: tuple[str, ...] = ()
     limits: Limits = field(default_factory=Limits)
+    inspected: InspectedSystem | None = None
     truth: dict[str, Any] = field(default_factory=dict)
 
 
@@ -141,8 +149,8 @@ class Score:
     Attributes:
         is_success: The task was done.
         failure: What kind of mistake was made; None for a success.
-        figures: By name with its unit: coverage_recall, coverage_precision, coverage_paper_ratio,
-            distance_to_object_m, spl, ...
+        figures: By name with its unit: coverage_recall, coverage_known_ratio, coverage_precision,
+            coverage_paper_ratio, distance_to_object_m, spl, ...
         reason: One sentence.
     """
 
@@ -217,6 +225,8 @@ class TrialResult:
         n_picture_tokens: What of the input pictures were.
         robot_s: Robot time.
         wall_s: Wall time.
+        cpu_s: What this machine computed for it, on all cores together, in the trial's own process;
+            a server or a client program that runs as another process is not in it.
         n_collisions: Bumps.
         error: What broke the trial; None where nothing did.
     """
@@ -237,5 +247,6 @@ class TrialResult:
     n_picture_tokens: int | None = None
     robot_s: float = 0.0
     wall_s: float = 0.0
+    cpu_s: float = 0.0
     n_collisions: int = 0
     error: str | None = None

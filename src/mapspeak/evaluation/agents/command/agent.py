@@ -4,7 +4,8 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -26,6 +27,8 @@ MOST_BYTES = 4_000_000
 """Of what a program writes; only the last of it is kept."""
 WRAP_UP_S = 10.0
 """So long before its time is up a program is ended, so that its server can write the map."""
+CONTROL, SERVED = "control", "served"
+"""Where in a trial's folder servers write down that they serve."""
 GRACE_S = 5.0
 LAST_WORDS = 500
 LEAST_SECRET = 6
@@ -162,7 +165,10 @@ async def _run(
                 tasks.cancel_scope.cancel()
     finally:
         with anyio.CancelScope(shield=True):
+            # It forgets itself before it has ended, so it is looked for first.
+            servers = _find_servers(start.folder.parent)
             await _end_group(process)
+            await _await_end(servers)
             await _take_rest(process, course)
             _hear_rest(listener, course)
 
@@ -198,11 +204,40 @@ async def _take_rest(process: Process, course: _Course) -> None:
     await process.aclose()
 
 
-async def _end_group(process: Process) -> None:
-    """Ends a program, and then whatever is left of it and of its server, by their own group.
+def _find_servers(folder: Path) -> tuple[int, ...]:
+    """Gives the processes of the servers that serve a trial's robot.
 
-    A server that has lost its client ends by itself once it has written what it has to write.
+    A client program often starts its server as a group of its own.
     """
+    numbers = []
+    for path in (folder / CONTROL / SERVED).glob("*.json"):
+        with suppress(OSError, ValueError, KeyError):
+            numbers.append(int(json.loads(path.read_text(encoding="utf-8"))["process"]))
+    return tuple(numbers)
+
+
+async def _await_end(servers: Collection[int]) -> None:
+    """Returns when servers have ended, or when it has waited long enough.
+
+    One that has lost its client ends by itself, once it has written what it has to write. It is not
+    killed: its number was only read from a file.
+    """
+    with anyio.move_on_after(WRAP_UP_S):
+        # Nothing tells when processes that are not our children end.
+        while any(map(_is_running, servers)):  # noqa: ASYNC110 - as said
+            await anyio.sleep(0.02)
+
+
+def _is_running(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except OSError:
+        return False
+    return True
+
+
+async def _end_group(process: Process) -> None:
+    """Ends a program, and then whatever is left of it, by its own group."""
     if process.returncode is None:
         process.terminate()
     with anyio.move_on_after(GRACE_S):

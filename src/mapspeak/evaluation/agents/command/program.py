@@ -1,7 +1,9 @@
 """Client programs as data: how each is started, told of the server, and read."""
 
 import json
+import os
 import shutil
+import subprocess
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
@@ -20,6 +22,9 @@ SERVER = "robot"
 """What the server is called in the programs' own settings."""
 ALWAYS = ("PATH", "HOME", "USER", "LANG", "TMPDIR")
 """Variables every program gets: they hold no secrets, and logins are found by them."""
+VERSION_WITHIN_S = 20.0
+LONGEST_VERSION = 80
+"""Characters of a version that are kept."""
 
 
 class AnswerForm(StrEnum):
@@ -51,6 +56,7 @@ class Program(BaseModel):
         input_tokens: Keys whose numbers together are the tokens read, for JSON.
         output_tokens: The same for those written.
         turns: The same for times that the model was asked.
+        version: What it is called with to say its version; empty where it has no such option.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -66,6 +72,28 @@ class Program(BaseModel):
     input_tokens: tuple[str, ...] = ()
     output_tokens: tuple[str, ...] = ()
     turns: tuple[str, ...] = ()
+    version: tuple[str, ...] = ("--version",)
+
+    def find_version(self) -> str | None:
+        """Gives the first line that it says of its version; None where it says none in time."""
+        path = shutil.which(self.command[0]) if self.command and self.version else None
+        if path is None:
+            return None
+        variables = {name: os.environ[name] for name in ALWAYS if name in os.environ}
+        try:
+            said = subprocess.run(  # noqa: S603 - the user's own
+                [path, *self.version],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                env=variables,
+                timeout=VERSION_WITHIN_S,
+                check=False,
+            ).stdout
+        except (OSError, subprocess.TimeoutExpired):
+            return None
+        lines = said.decode("utf-8", "replace").strip().splitlines()
+        return lines[0][:LONGEST_VERSION] if lines else None
 
     def check(self, thinking: Thinking | None) -> None:
         """Returns when the program is there and can be told how much to think.

@@ -56,6 +56,9 @@ def decide(seed: int, *, prompt: str, heard: Sequence[str], tools: Collection[st
         Move(text="I look at the map.", tool="look_at_map"),
         Move(text="I look ahead.", tool="look_through_camera"),
         Move(text="I ask for what is not there.", tool="describe_place", arguments={"place": "R0"}),
+        Move(text="I look at the ROS.", tool="ros_overview"),
+        Move(text="I read a topic.", tool="ros_read", arguments={"topic": "/tf"}),
+        Move(text="I read what is not there.", tool="ros_topic", arguments={"topic": "/none"}),
     ]
     driving = [_drive(random, heard)] * n_drives
     plan = [move for move in (*opening, *driving) if move.tool in tools]

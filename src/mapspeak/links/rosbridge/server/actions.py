@@ -19,7 +19,7 @@ from mapspeak.links.rosbridge.server.nav2 import (
 )
 from mapspeak.links.rosbridge.server.outbox import Outbox
 from mapspeak.links.rosbridge.server.publication import answer_frame
-from mapspeak.links.rosbridge.server.stack import RosStack, refusal
+from mapspeak.links.rosbridge.server.system import RosSystem, refusal
 from mapspeak.ros.messages import bare_type
 
 __all__ = ["GoalOperations"]
@@ -31,7 +31,7 @@ FEEDBACK_DEPTH = 5
 class GoalOperations:
     """One client's goals; the ids of all clients' goals share one dictionary, as in rosbridge."""
 
-    def __init__(self, stack: RosStack, outbox: Outbox, tasks: TaskGroup, *, blocks: bool) -> None:
+    def __init__(self, stack: RosSystem, outbox: Outbox, tasks: TaskGroup, *, blocks: bool) -> None:
         self._stack = stack
         self._outbox = outbox
         self._tasks = tasks
@@ -47,9 +47,8 @@ class GoalOperations:
     async def cancel(self, operation: Operation) -> None:
         """Carries out `cancel_action_goal`; nothing is ever answered."""
         nav2 = self._stack.nav2
-        drive = nav2.by_operation.get(str(operation.get("id"))) if nav2 else None
-        if drive is not None:
-            await self._stack.drives.cancel(drive)
+        if nav2 is not None:
+            await nav2.cancel_operation(str(operation.get("id")))
 
     async def _carry_out(self, operation: Operation) -> None:
         action, action_type = operation.get("action"), operation.get("action_type")

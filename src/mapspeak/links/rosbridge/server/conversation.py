@@ -17,7 +17,7 @@ from mapspeak.links.rosbridge.server.publication import (
     Publication,
     answer_frame,
 )
-from mapspeak.links.rosbridge.server.stack import RosStack, refusal
+from mapspeak.links.rosbridge.server.system import RosSystem, refusal
 from mapspeak.ros.messages import Dialect, bare_type
 
 __all__ = ["Conversation"]
@@ -60,7 +60,7 @@ class Conversation:
         blocks: A goal holds up the client's further operations until it has ended.
     """
 
-    def __init__(self, stack: RosStack, outbox: Outbox, tasks: TaskGroup, *, blocks: bool) -> None:
+    def __init__(self, stack: RosSystem, outbox: Outbox, tasks: TaskGroup, *, blocks: bool) -> None:
         self._stack = stack
         self._outbox = outbox
         self._subscriptions: dict[str, Subscription] = {}

@@ -1,6 +1,7 @@
 """Message types as one ROS knows them: described, filled in, and what does not fit refused."""
 
 from collections.abc import Awaitable, Callable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -25,15 +26,21 @@ KIND_OF_GENERATED = {
     **dict.fromkeys(("Goal", "Result", "Feedback", "FeedbackMessage"), "action"),
 }
 
+NO_MORE: Mapping[str, str] = MappingProxyType({})
 Answer = Callable[[dict[str, Any]], Awaitable[dict[str, Any]]]
 
 
 class Interfaces:
-    """The message types of one dialect."""
+    """The message types of one dialect.
 
-    def __init__(self, dialect: Dialect) -> None:
+    Args:
+        dialect: Which.
+        more: The texts of types besides those that come with mapspeak, by "package/Type".
+    """
+
+    def __init__(self, dialect: Dialect, *, more: Mapping[str, str] = NO_MORE) -> None:
         self._dialect = dialect
-        self._book = TypeBook(known_definitions(dialect))
+        self._book = TypeBook({**known_definitions(dialect), **more})
         self._fixed_arrays: dict[str, bool] = {}
 
     @property

@@ -57,6 +57,12 @@ class Nav2:
         drives.listeners.append(self._tell)
         hub.publish(f"{ACTION}/_action/status", {"status_list": []})
 
+    async def cancel_operation(self, operation_id: str) -> None:
+        """Asks the drive of one of rosbridge's operations to end, if it is under way."""
+        drive = self.by_operation.get(operation_id)
+        if drive is not None:
+            await self._drives.cancel(drive)
+
     async def navigate(self, args: dict[str, Any]) -> Drive | str:
         """Starts a drive for a goal of the action; gives a text where the goal is aborted at once.
 

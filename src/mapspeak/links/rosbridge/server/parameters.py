@@ -32,19 +32,11 @@ class Parameters:
 
     Args:
         dialect: Whose names are used: "/node/name" on ROS 1, "/node:name" on ROS 2.
-        radius_m: The robot's.
+        by_node: Values by the names of nodes and their own.
     """
 
-    def __init__(self, dialect: Dialect, *, radius_m: float) -> None:
+    def __init__(self, dialect: Dialect, by_node: Mapping[str, Values]) -> None:
         self._mark = "/" if dialect is Dialect.ROS1 else ":"
-        frames = {"map_frame": "map", "odom_frame": "odom", "base_frame": BASE_FRAME}
-        by_node: dict[str, Values] = {
-            SLAM_NODES[dialect]: frames,
-            navigator_of(dialect): {"global_frame": "map", "robot_base_frame": BASE_FRAME},
-            BASE_NODE: {"robot_radius": radius_m},
-        }
-        costmap, prefix = COSTMAP_OF[dialect]
-        by_node.setdefault(costmap, {})[f"{prefix}robot_radius"] = radius_m
         self._values: Values = {}
         for node, values in by_node.items():
             for name, value in values.items():
@@ -53,6 +45,19 @@ class Parameters:
                 self.put(f"{node}:use_sim_time", value=True)
         if dialect is Dialect.ROS1:
             self._values |= {"/use_sim_time": True, "/rosdistro": ROS1_DISTRIBUTION}
+
+    @classmethod
+    def of_robot(cls, dialect: Dialect, *, radius_m: float) -> "Parameters":
+        """Gives those of a robot with SLAM and navigation."""
+        frames = {"map_frame": "map", "odom_frame": "odom", "base_frame": BASE_FRAME}
+        by_node: dict[str, Values] = {
+            SLAM_NODES[dialect]: frames,
+            navigator_of(dialect): {"global_frame": "map", "robot_base_frame": BASE_FRAME},
+            BASE_NODE: {"robot_radius": radius_m},
+        }
+        costmap, prefix = COSTMAP_OF[dialect]
+        by_node.setdefault(costmap, {})[f"{prefix}robot_radius"] = radius_m
+        return cls(dialect, by_node)
 
     @property
     def names(self) -> list[str]:

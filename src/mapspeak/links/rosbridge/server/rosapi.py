@@ -8,11 +8,10 @@ from typing import Any
 
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge.server.graph import ROSAPI_NODE
-from mapspeak.links.rosbridge.server.hub import ROSBRIDGE_NODE, Hub, Topic
-from mapspeak.links.rosbridge.server.interfaces import Interfaces
+from mapspeak.links.rosbridge.server.hub import ROSBRIDGE_NODE, Topic
 from mapspeak.links.rosbridge.server.parameters import Parameters
-from mapspeak.links.rosbridge.server.services import Service, Services
-from mapspeak.robot import Robot
+from mapspeak.links.rosbridge.server.services import Service
+from mapspeak.links.rosbridge.server.system import RosSystem
 from mapspeak.ros.messages import Dialect, bare_type, write_stamp
 
 __all__ = ["add_rosapi"]
@@ -23,20 +22,18 @@ ROS2_DISTRIBUTION = "jazzy"
 HIDDEN = "/_action/"
 
 
-def add_rosapi(
-    services: Services,
-    hub: Hub,
-    interfaces: Interfaces,
-    parameters: Parameters,
-    robot: Robot,
-    *,
-    dialect: Dialect,
-) -> None:
-    """Adds rosapi's services to those there are."""
-    questions = Questions(services, hub, interfaces, parameters, robot, dialect=dialect)
-    package = "rosapi" if dialect is Dialect.ROS1 else "rosapi_msgs"
-    for name, (last, answer) in _answers(questions, dialect).items():
-        services.add(
+def add_rosapi(system: RosSystem, parameters: Parameters, clock: Callable[[], float]) -> None:
+    """Adds rosapi's services to those there are.
+
+    Args:
+        system: What they tell of, and where they are added.
+        parameters: Its nodes'.
+        clock: Gives robot time, in seconds.
+    """
+    questions = Questions(system, parameters, clock)
+    package = "rosapi" if system.dialect is Dialect.ROS1 else "rosapi_msgs"
+    for name, (last, answer) in _answers(questions, system.dialect).items():
+        system.services.add(
             Service(
                 name=f"/rosapi/{name}",
                 type=f"{package}/{last}",
@@ -88,21 +85,14 @@ class Questions:
     """The answers, one method each; named as rosapi names its services."""
 
     def __init__(
-        self,
-        services: Services,
-        hub: Hub,
-        interfaces: Interfaces,
-        parameters: Parameters,
-        robot: Robot,
-        *,
-        dialect: Dialect,
+        self, system: RosSystem, parameters: Parameters, clock: Callable[[], float]
     ) -> None:
-        self._services = services
-        self._hub = hub
-        self._interfaces = interfaces
-        self._robot = robot
-        self._dialect = dialect
+        self._services = system.services
+        self._hub = system.hub
+        self._interfaces = system.interfaces
+        self._dialect = system.dialect
         self._parameters = parameters
+        self._clock = clock
 
     # --- topics ---
 
@@ -222,7 +212,7 @@ class Questions:
 
     def get_time(self, _args: Values) -> Values:
         """Robot time."""
-        return {"time": write_stamp(self._robot.now_s, dialect=self._dialect)}
+        return {"time": write_stamp(self._clock(), dialect=self._dialect)}
 
     def get_ros_version(self, _args: Values) -> Values:
         """Which ROS 2 it is."""

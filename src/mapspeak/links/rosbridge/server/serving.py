@@ -4,9 +4,10 @@ import logging
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import anyio
-from anyio.abc import ByteStream, SocketAttribute
+from anyio.abc import ByteStream, Listener, SocketAttribute
 from anyio.streams.memory import MemoryObjectReceiveStream
 
 from mapspeak.errors import ConfigError
@@ -14,11 +15,12 @@ from mapspeak.links.rosbridge.server.conversation import Conversation
 from mapspeak.links.rosbridge.server.outbox import Outbox
 from mapspeak.links.rosbridge.server.publication import Frame, fragments_of
 from mapspeak.links.rosbridge.server.stack import RosStack
+from mapspeak.links.rosbridge.server.system import RosSystem
 from mapspeak.links.rosbridge.server.websocket import WebSocket
 from mapspeak.robot import Robot
 from mapspeak.ros.messages import Dialect
 
-__all__ = ["RosbridgeServer", "open_rosbridge_server"]
+__all__ = ["RosbridgeServer", "open_rosbridge_server", "serve_system"]
 
 LONGEST_FRAME = 10_000_000
 """rosbridge's `max_message_size`: on ROS 2 longer text is cut in pieces, longer CBOR is lost."""
@@ -75,16 +77,39 @@ async def open_rosbridge_server(
         await tasks.start(stack.keep_going)
         reception = Reception(stack, goals_in_new_thread=goals_in_new_thread)
         tasks.start_soon(listener.serve, reception.receive)
-        bound_port = listener.extra(SocketAttribute.local_port)  # noqa: S610 - anyio's, not Django's
-        name = f"[{host}]" if ":" in host else host
-        yield RosbridgeServer(url=f"ws://{name}:{bound_port}", port=bound_port)
+        yield _describe(listener, host)
         tasks.cancel_scope.cancel()
+
+
+@asynccontextmanager
+async def serve_system(
+    system: RosSystem, *, host: str = "127.0.0.1", port: int = 0
+) -> AsyncGenerator[RosbridgeServer]:
+    """Offers a ROS that stands for itself, with no robot behind it, while the context lasts.
+
+    Args:
+        system: What clients find; whoever made it publishes on its topics.
+        host: Where to listen.
+        port: Where to listen; 0 takes any that is free.
+    """
+    listener = await anyio.create_tcp_listener(local_host=host, local_port=port)
+    async with listener, anyio.create_task_group() as tasks:
+        reception = Reception(system, goals_in_new_thread=True)
+        tasks.start_soon(listener.serve, reception.receive)
+        yield _describe(listener, host)
+        tasks.cancel_scope.cancel()
+
+
+def _describe(listener: Listener[Any], host: str) -> RosbridgeServer:
+    port = listener.extra(SocketAttribute.local_port)  # noqa: S610 - anyio's, not Django's
+    name = f"[{host}]" if ":" in host else host
+    return RosbridgeServer(url=f"ws://{name}:{port}", port=port)
 
 
 class Reception:
     """Takes clients in; what one does or does not do is no matter to the others."""
 
-    def __init__(self, stack: RosStack, *, goals_in_new_thread: bool) -> None:
+    def __init__(self, stack: RosSystem, *, goals_in_new_thread: bool) -> None:
         self._stack = stack
         self._blocks = not goals_in_new_thread
 

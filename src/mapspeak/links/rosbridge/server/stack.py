@@ -7,7 +7,7 @@ import anyio
 import anyio.lowlevel
 from anyio.abc import TaskGroup
 
-from mapspeak.errors import LinkError, MapspeakError
+from mapspeak.errors import MapspeakError
 from mapspeak.links.rosbridge.server.drives import Drives
 from mapspeak.links.rosbridge.server.graph import SLAM_NODES, navigator_of, topics_of
 from mapspeak.links.rosbridge.server.hub import Hub
@@ -17,8 +17,9 @@ from mapspeak.links.rosbridge.server.nav2 import ACTION, Nav2
 from mapspeak.links.rosbridge.server.parameters import Parameters, add_parameter_services
 from mapspeak.links.rosbridge.server.publication import Publication
 from mapspeak.links.rosbridge.server.rosapi import add_rosapi
-from mapspeak.links.rosbridge.server.services import Service, Services
+from mapspeak.links.rosbridge.server.services import Service
 from mapspeak.links.rosbridge.server.sources import TICK_S, Sources
+from mapspeak.links.rosbridge.server.system import RosSystem
 from mapspeak.robot import Robot
 from mapspeak.ros.messages import Dialect, read_twist, write_grid
 
@@ -26,21 +27,13 @@ __all__ = ["RosStack"]
 
 STATUS_PERIOD_S = 0.2
 FEEDBACK_PERIOD_S = 0.1
-LONGEST_COMPLAINT = 1000
-LOGGED_ERROR = 8
-"""rosgraph_msgs/Log.ERROR."""
 
 
-class RosStack:
+class RosStack(RosSystem):
     """What a robot and its ROS would be.
 
     Attributes:
-        dialect: Which ROS.
-        hub: Its topics.
-        services: Its services.
-        interfaces: Its message types.
         drives: The goals it was given.
-        nav2: The navigation of ROS 2; None on ROS 1.
 
     Args:
         robot: Any robot; its `sleep` must give way to other tasks.
@@ -49,12 +42,9 @@ class RosStack:
     """
 
     def __init__(self, robot: Robot, *, dialect: Dialect, tasks: TaskGroup) -> None:
-        self.dialect = dialect
-        self.hub = Hub(topics_of(dialect, has_camera=robot.description.has_camera))
-        self.services = Services()
-        self.interfaces = Interfaces(dialect)
+        hub = Hub(topics_of(dialect, has_camera=robot.description.has_camera))
+        super().__init__(hub, Interfaces(dialect), dialect=dialect)
         self.drives = Drives(robot)
-        self.nav2: Nav2 | None = None
         self._robot = robot
         self._tasks = tasks
         self._sources = Sources(robot, self.hub, dialect=dialect)
@@ -66,10 +56,10 @@ class RosStack:
         else:
             self._add_move_base()
         self._add_map_service()
-        parameters = Parameters(dialect, radius_m=robot.description.radius_m)
+        parameters = Parameters.of_robot(dialect, radius_m=robot.description.radius_m)
         if dialect is Dialect.ROS2:
             add_parameter_services(self.services, parameters, self.interfaces)
-        add_rosapi(self.services, self.hub, self.interfaces, parameters, robot, dialect=dialect)
+        add_rosapi(self, parameters, lambda: robot.now_s)
 
     async def keep_going(self, *, task_status: anyio.abc.TaskStatus[None]) -> None:
         """Publishes and watches the drives as robot time passes, until cancelled."""
@@ -81,13 +71,6 @@ class RosStack:
             await anyio.lowlevel.checkpoint()
             await self._sources.publish_due(self._tasks)
             await self._watch_drives()
-
-    def complain(self, text: str) -> None:
-        """Says what was wrong with an operation where rosbridge says it: on ROS 1, to /rosout."""
-        if self.dialect is Dialect.ROS1:
-            said = text[:LONGEST_COMPLAINT].encode(errors="replace").decode()
-            entry = {"level": LOGGED_ERROR, "name": "/rosbridge_websocket", "msg": said}
-            self.hub.publish("/rosout", self.interfaces.fill("rosgraph_msgs/Log", entry))
 
     async def _watch_drives(self) -> None:
         now_s = self._robot.now_s
@@ -157,8 +140,3 @@ class RosStack:
                 answer=self.interfaces.filled("nav_msgs/GetMap_Request", give_map),
             )
         )
-
-
-def refusal(error: MapspeakError) -> str:
-    """Gives the text of an error as rosbridge answers it."""
-    return error.message if isinstance(error, LinkError) else str(error)

@@ -1,0 +1,204 @@
+"""The scripted policy's diagnoses of a ROS, each from what the ros tools answer."""
+
+import re
+from collections.abc import Awaitable, Callable
+from itertools import pairwise
+
+from mapspeak.evaluation.agents.agent import AgentEnd
+from mapspeak.evaluation.agents.rosreading import RosReader
+from mapspeak.evaluation.client import ToolClient
+from mapspeak.evaluation.trials import TrialState
+
+__all__ = ["diagnose"]
+
+RATE_OVER_S = 5.0
+SILENT_AFTER_S = 3.0
+"""The slowest of the robot's sensors comes twice a second."""
+TRANSFORMS_OVER_S = 1.5
+N_TRANSFORMS = 10
+LATE_S = 5.0
+NAME = r"/[\w/]*\w"
+SERVICE_WORDS = {
+    "odometry": "odom",
+    "motors": "motor",
+    "costmap": "costmap",
+    "the map": "map",
+    "inertial": "imu",
+}
+"""A word of the question, and one of the services' names; the first that fits counts."""
+
+Diagnosis = Callable[[RosReader, str], Awaitable[str | None]]
+
+
+async def diagnose(tools: ToolClient, question: str) -> AgentEnd:
+    """Answers a question about the robot's ROS in the form that it asks for."""
+    reader = RosReader(tools)
+    for pattern, find_out in DIAGNOSES:
+        if re.search(pattern, question):
+            said = await find_out(reader, question)
+            if said is not None:
+                return AgentEnd(answer=f"ANSWER: {said}")
+    return AgentEnd(answer="I found nothing out of order.", state=TrialState.GAVE_UP)
+
+
+# --- who does what ---------------------------------------------------------------------------
+
+
+async def _say_velocity(reader: RosReader, question: str) -> str | None:
+    topic = await reader.fetch_topic(_first(rf"velocities on ({NAME})", question))
+    return ", ".join((*topic.publishers[:1], *topic.hearers[:1]))
+
+
+async def _say_fight(reader: RosReader, _question: str) -> str | None:
+    for name in await reader.list_topics("Twist"):
+        topic = await reader.fetch_topic(name)
+        if len(topic.publishers) > 1:
+            return ", ".join(topic.publishers)
+    return None
+
+
+async def _say_unheard(reader: RosReader, _question: str) -> str | None:
+    for name in await reader.list_topics():
+        topic = await reader.fetch_topic(name)
+        if topic.publishers and not topic.hearers:
+            return name
+    return None
+
+
+async def _say_missing(reader: RosReader, question: str) -> str | None:
+    launched = _names(_first(r"starts the nodes (.+?)\. One", question))
+    running = await reader.list_nodes()
+    missing = [node for node in launched if node not in running]
+    for name in await reader.list_topics():
+        topic = await reader.fetch_topic(name)
+        if missing and topic.hearers and not topic.publishers:
+            return f"{missing[0]}, {name}"
+    return None
+
+
+async def _say_remap(reader: RosReader, question: str) -> str | None:
+    node = _first(rf"yet ({NAME}) gets no scans", question)
+    heard = await reader.fetch_heard(node)
+    scans = [await reader.fetch_topic(name) for name in await reader.list_topics("LaserScan")]
+    waits = next((each for each in scans if each.name in heard and not each.publishers), None)
+    comes = next((each for each in scans if each.publishers), None)
+    return None if waits is None or comes is None else f"{waits.name}, {comes.name}"
+
+
+async def _say_parameter(reader: RosReader, question: str) -> str | None:
+    node = _first(rf"the parameters of ({NAME}) are", question)
+    sheet = re.findall(r"(\w+) ([\d.]+\d|\d)(?=,|\.)", _first(r"are: (.+?\.) One", question))
+    values = await reader.fetch_parameters(node)
+    for name, right in sheet:
+        value = float(values.get(name, right))
+        if abs(value - float(right)) > 1e-3 * abs(value):
+            return f"{name}, {value:g}"
+    return None
+
+
+async def _say_service(reader: RosReader, question: str) -> str | None:
+    word = next(there for here, there in SERVICE_WORDS.items() if here in question)
+    for name in await reader.list_services(word):
+        last = name[1:].partition("/")[2]
+        is_other = word == "map" and "costmap" in last
+        if word in last and not is_other and "parameter" not in last:
+            return f"{name}, {await reader.fetch_service_type(name)}"
+    return None
+
+
+async def _say_type(reader: RosReader, question: str) -> str | None:
+    topic = await reader.fetch_topic(_first(rf"messages on ({NAME})", question))
+    kind = _first(r"of the type (\w+)\?", question)
+    return ", ".join(name for name, each in topic.fields.items() if each == kind) or None
+
+
+# --- what is published -----------------------------------------------------------------------
+
+
+async def _say_map(reader: RosReader, _question: str) -> str | None:
+    found: list[tuple[float, str]] = []
+    for name in await reader.list_topics("OccupancyGrid"):
+        text = await reader.read(name)
+        match = re.search(r"Grid of (\d+) x (\d+) cells of ([\d.]+) m", text or "")
+        if match is not None:
+            n_cols, n_rows, resolution_m = int(match[1]), int(match[2]), float(match[3])
+            said = f"{name}, {n_cols} x {n_rows}, {resolution_m:g} m"
+            found.append((n_cols * n_rows * resolution_m**2, said))
+    return max(found)[1] if found else None
+
+
+async def _say_rate(reader: RosReader, _question: str) -> str | None:
+    for name in await reader.list_topics("LaserScan"):
+        text = await reader.read(name, duration_s=RATE_OVER_S)
+        match = re.search(r"(\d+) messages in ([\d.]+) s", text or "")
+        if match is not None:
+            return f"{name}, {int(match[1]) / float(match[2]):.2f} Hz"
+    return None
+
+
+async def _say_silent(reader: RosReader, question: str) -> str | None:
+    for name in _names(_first(r"publish on (.+?)\. Which", question)):
+        if await reader.read(name, wait_s=SILENT_AFTER_S) is None:
+            return name
+    return None
+
+
+async def _say_battery(reader: RosReader, question: str) -> str | None:
+    least = float(_first(r"below (\d+) %", question))
+    for name in await reader.list_topics("BatteryState"):
+        match = re.search(r"^percentage: ([\d.]+)", await reader.read(name) or "", re.MULTILINE)
+        if match is not None:
+            charge = 100 * float(match[1])
+            return f"{charge:.0f} %, {'charge' if charge < least else 'stay'}"
+    return None
+
+
+async def _say_clock(reader: RosReader, question: str) -> str | None:
+    lags: list[tuple[float, str]] = []
+    for name in _names(_first(r"publish on (.+?)\. On which", question)):
+        match = re.search(r"stamp: ([\d.]+) s", await reader.read(name) or "")
+        if match is not None:
+            lags.append((await reader.fetch_time_s() - float(match[1]), name))
+    return f"{max(lags)[1]}, {max(lags)[0]:.1f} s" if lags else None
+
+
+async def _say_transform(reader: RosReader, question: str) -> str | None:
+    chain = _first(r": ([\w, ]+)\. Is the chain", question).split(", ")
+    moving = await reader.read("/tf", n=N_TRANSFORMS, duration_s=TRANSFORMS_OVER_S) or ""
+    now_s = await reader.fetch_time_s()
+    fixed = await reader.read("/tf_static") or ""
+    for parent, child in pairwise(chain):
+        link = rf"^{parent} -> {child}: .*\(([\d.]+) s\)$"
+        stamps = [float(stamp) for stamp in re.findall(link, moving, re.MULTILINE)]
+        if stamps and now_s - max(stamps) > LATE_S:
+            return f"{parent} -> {child}, late"
+        if not stamps and not re.search(link, fixed, re.MULTILINE):
+            return f"{parent} -> {child}, missing"
+    return "whole"
+
+
+def _names(text: str) -> list[str]:
+    return [match.group() for match in re.finditer(NAME, text)]
+
+
+def _first(pattern: str, text: str) -> str:
+    match = re.search(pattern, text)
+    return "" if match is None else match[1]
+
+
+DIAGNOSES: tuple[tuple[str, Diagnosis], ...] = (
+    (r"Which node sends velocities on", _say_velocity),
+    (r"Which two nodes both send", _say_fight),
+    (r"published and no node hears it", _say_unheard),
+    (r"launch file starts the nodes", _say_missing),
+    (r"gets no scans", _say_remap),
+    (r"By the robot's data sheet", _say_parameter),
+    (r"Which service", _say_service),
+    (r"Which fields of the messages", _say_type),
+    (r"carries the map", _say_map),
+    (r"how many scans a second", _say_rate),
+    (r"nothing comes from it", _say_silent),
+    (r"How full is the battery", _say_battery),
+    (r"The clock of one sensor", _say_clock),
+    (r"Transforms should lead", _say_transform),
+)

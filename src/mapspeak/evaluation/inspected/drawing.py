@@ -1,0 +1,295 @@
+"""A robot's ROS in good order, of which all names and figures are drawn."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from mapspeak.evaluation.inspected.contents import Beams, Cells, Fields, Transform, Transforms
+from mapspeak.evaluation.inspected.system import (
+    Hearing,
+    InspectedSystem,
+    OfferedService,
+    Stream,
+)
+from mapspeak.geometry import Pose
+from mapspeak.ros.messages import Dialect
+from mapspeak.spatial import OccupancyGrid
+
+__all__ = ["Names", "draw_names", "draw_system"]
+
+SCAN, IMU, ODOMETRY = "sensor_msgs/LaserScan", "sensor_msgs/Imu", "nav_msgs/Odometry"
+SONAR, BATTERY, JOINTS = "sensor_msgs/Range", "sensor_msgs/BatteryState", "sensor_msgs/JointState"
+GRID, TWIST, TRANSFORMS = "nav_msgs/OccupancyGrid", "geometry_msgs/Twist", "tf2_msgs/TFMessage"
+PATH, JOY = "nav_msgs/Path", "sensor_msgs/Joy"
+FIRST_S, LAST_S = 1_700_000_000, 1_760_000_000
+"""Robots that run by the time of day have such clocks."""
+LOCAL_CELLS = 60
+SLOWEST_HZ, FASTER = 3.0, 8.0
+"""Of laser scanners, and how many times as fast the fastest is."""
+N_BEAMS = 90
+PLAIN_KINDS = ("float32", "float64", "int16", "int32", "uint8", "bool", "string")
+MEASURED = (
+    "height", "force", "load", "current", "angle", "speed", "heat", "pressure", "offset", "torque",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Names:
+    """What the parts of one robot's ROS are called: nodes, topics, frames, and a type of its own.
+
+    Attributes:
+        laser: The node of the laser scanner; others likewise.
+        motors: Drives the wheels and tells the odometry.
+        locator: Finds the robot's place on the map.
+        smoother: Hands velocities on to the motors.
+        watcher: Looks after sensors and battery.
+        device: What the robot carries; its type is `device_type`.
+        scan: The topic of the scans; others likewise.
+        velocity: The topic that the motors listen to.
+        wish: The topic of the velocities that navigation wants.
+        base_frame: The robot's frame on the floor.
+        laser_frame: The scanner's.
+    """
+
+    laser: str
+    motors: str
+    imu: str
+    sonar: str
+    battery: str
+    joints: str
+    map_server: str
+    locator: str
+    navigator: str
+    smoother: str
+    joystick: str
+    describer: str
+    watcher: str
+    device: str
+    scan: str
+    imu_data: str
+    range: str
+    charge: str
+    joint_states: str
+    map: str
+    velocity: str
+    wish: str
+    status: str
+    device_type: str
+    base_frame: str
+    laser_frame: str
+
+
+CHOICES: Mapping[str, Sequence[str]] = {
+    "laser": ("/rplidar_node", "/sick_tim", "/hokuyo_node", "/ydlidar_driver", "/urg_node"),
+    "motors": ("/kobuki_node", "/wheel_driver", "/husky_base", "/chassis", "/motor_bridge"),
+    "imu": ("/imu_driver", "/bno055", "/xsens_driver", "/phidgets_imu"),
+    "sonar": ("/sonar_node", "/ultrasound_driver", "/range_board"),
+    "battery": ("/battery_monitor", "/bms", "/power_board"),
+    "joints": ("/arm_driver", "/joint_publisher", "/gripper_driver"),
+    "map_server": ("/map_server", "/map_keeper", "/floor_plan"),
+    "locator": ("/amcl", "/localizer", "/cartographer_node", "/slam_toolbox"),
+    "navigator": ("/controller_server", "/local_planner", "/path_follower", "/pilot"),
+    "smoother": ("/velocity_smoother", "/twist_mux", "/collision_monitor", "/speed_limiter"),
+    "joystick": ("/teleop_node", "/gamepad", "/joy_teleop", "/remote_control"),
+    "describer": ("/robot_state_publisher",),
+    "watcher": ("/health_monitor", "/watchdog", "/diagnostics_collector"),
+    "device": ("/lift_node", "/docking_agent", "/conveyor_node", "/tray_node"),
+    "scan": ("/scan", "/front_scan", "/lidar/scan", "/base_scan"),
+    "imu_data": ("/imu/data", "/imu", "/imu/raw"),
+    "range": ("/sonar", "/range/front", "/ultrasound"),
+    "charge": ("/battery_state", "/battery", "/power/battery"),
+    "joint_states": ("/joint_states", "/arm/joint_states"),
+    "map": ("/map", "/floor_map", "/building/map", "/static_map"),
+    "velocity": ("/cmd_vel", "/base/cmd_vel", "/mobile_base/velocity"),
+    "wish": ("/nav_vel", "/cmd_vel_raw", "/planner/cmd_vel"),
+    "status": ("/device/status", "/load/state", "/payload"),
+    "device_type": ("lift_msgs/LiftStatus", "tray_msgs/TrayState", "dock_msgs/DockReport"),
+    "base_frame": ("base_footprint", "base_link", "chassis_link"),
+    "laser_frame": ("laser", "laser_link", "lidar_frame"),
+}
+
+
+def draw_names(random: np.random.Generator) -> Names:
+    """Draws what everything is called."""
+    return Names(**{each.name: _one(random, CHOICES[each.name]) for each in fields(Names)})
+
+
+def draw_system(
+    random: np.random.Generator, names: Names, grid: OccupancyGrid, *, dialect: Dialect
+) -> InspectedSystem:
+    """Draws a system in which everything is as it should be.
+
+    Args:
+        random: Of the figures.
+        names: Of its parts.
+        grid: The map that it carries.
+        dialect: Which ROS it is.
+    """
+    bare = InspectedSystem(
+        dialect=dialect,
+        started_s=float(random.integers(FIRST_S, LAST_S)),
+        streams=(*_sensors(random, names), *_maps(names, grid), *_motion(names)),
+        hearings=_hearings(names),
+        services=_services(random, names),
+        types={names.device_type: _draw_type(random)},
+    )
+    parameters: dict[str, dict[str, Any]] = {node: {} for node in bare.nodes}
+    parameters[names.navigator] = _navigation(random)
+    parameters[names.laser] = {"frame_id": names.laser_frame, "angle_compensate": True}
+    return replace(bare, parameters=parameters)
+
+
+def _sensors(random: np.random.Generator, names: Names) -> tuple[Stream, ...]:
+    # Evenly on a logarithmic scale, so that no one figure is near to most of them.
+    laser_hz = round(2 * SLOWEST_HZ * FASTER ** random.random()) / 2
+    walls_m = round(float(random.uniform(1.0, 6.0)), 2)
+    said = _figures(random, names)
+    return tuple(
+        Stream(node=node, topic=topic, type=kind, content=content, rate_hz=rate_hz)
+        for node, topic, kind, content, rate_hz in (
+            (names.laser, names.scan, SCAN, Beams(names.laser_frame, N_BEAMS, walls_m), laser_hz),
+            (names.motors, "/odom", ODOMETRY, Fields(said["odometry"], "odom"), 10.0),
+            (names.imu, names.imu_data, IMU, Fields(said["imu"], "imu_link"), 20.0),
+            (names.sonar, names.range, SONAR, Fields(said["sonar"], "sonar_link"), 5.0),
+            (names.battery, names.charge, BATTERY, Fields(said["battery"], names.base_frame), 2.0),
+            (names.joints, names.joint_states, JOINTS, Fields(said["joints"], ""), 10.0),
+            (names.device, names.status, names.device_type, Fields(), 2.0),
+        )
+    )
+
+
+def _figures(random: np.random.Generator, names: Names) -> dict[str, dict[str, Any]]:
+    """Draws what the sensors say besides their stamps."""
+    charge = round(float(random.uniform(0.06, 0.96)), 2)
+    upright = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+    place = {"x": 1.5, "y": 0.7, "z": 0.0}
+    return {
+        "odometry": {
+            "child_frame_id": names.base_frame,
+            "pose": {"pose": {"position": place, "orientation": upright}},
+        },
+        "imu": {
+            "orientation": upright,
+            "linear_acceleration": {"x": 0.0, "y": 0.0, "z": 9.81},
+        },
+        "sonar": {
+            "field_of_view": 0.5,
+            "min_range": 0.05,
+            "max_range": 4.0,
+            "range": round(float(random.uniform(0.3, 3.0)), 2),
+        },
+        "battery": {
+            "voltage": round(22.0 + 4.0 * charge, 2),
+            "current": -1.8,
+            "capacity": 10.0,
+            "design_capacity": 10.0,
+            "percentage": charge,
+            "power_supply_status": 2,
+            "power_supply_health": 1,
+            "present": True,
+        },
+        "joints": {"name": ["shoulder", "elbow"], "position": [0.1, -0.4]},
+    }
+
+
+def _maps(names: Names, grid: OccupancyGrid) -> tuple[Stream, ...]:
+    around = OccupancyGrid(
+        cells=np.zeros((LOCAL_CELLS, LOCAL_CELLS), dtype=np.int8), resolution_m=0.05
+    )
+    local = f"{names.navigator}/local_costmap"
+    return (
+        Stream(node=names.map_server, topic=names.map, type=GRID, content=Cells(grid),
+               rate_hz=None),
+        Stream(node=names.navigator, topic=local, type=GRID, content=Cells(around), rate_hz=2.0),
+    )  # fmt: skip
+
+
+def _motion(names: Names) -> tuple[Stream, ...]:
+    place = Transforms((Transform("map", "odom", Pose(0.4, -0.2, 0.1)),))
+    wheels = Transforms((Transform("odom", names.base_frame, Pose(1.5, 0.7, 0.4)),))
+    fixed = Transforms(
+        (
+            Transform(names.base_frame, "body", Pose(0.0, 0.0)),
+            Transform("body", names.laser_frame, Pose(0.2, 0.0)),
+        )
+    )
+    still = Fields()
+    return tuple(
+        Stream(node=node, topic=topic, type=kind, content=content, rate_hz=rate_hz)
+        for node, topic, kind, content, rate_hz in (
+            (names.locator, "/tf", TRANSFORMS, place, 10.0),
+            (names.motors, "/tf", TRANSFORMS, wheels, 20.0),
+            (names.describer, "/tf_static", TRANSFORMS, fixed, None),
+            (names.navigator, names.wish, TWIST, still, 10.0),
+            (names.smoother, names.velocity, TWIST, still, 10.0),
+            (names.joystick, "/joy", JOY, Fields({"axes": [0.0, 0.0]}, ""), 5.0),
+            (names.navigator, "/plan", PATH, Fields({}, "map"), 1.0),
+        )
+    )
+
+
+def _hearings(names: Names) -> tuple[Hearing, ...]:
+    heard: dict[str, tuple[tuple[str, str], ...]] = {
+        names.locator: ((names.map, GRID), (names.scan, SCAN), ("/tf_static", TRANSFORMS)),
+        names.navigator: (
+            (names.map, GRID), (names.scan, SCAN), ("/odom", ODOMETRY), ("/tf", TRANSFORMS),
+        ),
+        names.smoother: ((names.wish, TWIST), ("/joy", JOY)),
+        names.motors: ((names.velocity, TWIST),),
+        names.describer: ((names.joint_states, JOINTS),),
+        names.watcher: (
+            (names.imu_data, IMU), (names.range, SONAR), (names.charge, BATTERY),
+            (names.status, names.device_type), ("/plan", PATH),
+            (f"{names.navigator}/local_costmap", GRID),
+        ),
+    }  # fmt: skip
+    return tuple(
+        Hearing(node=node, topic=topic, type=kind)
+        for node, topics in heard.items()
+        for topic, kind in topics
+    )
+
+
+def _services(random: np.random.Generator, names: Names) -> tuple[OfferedService, ...]:
+    """Draws the names and the types: what a service does says neither."""
+    simple = ("std_srvs/Trigger", "std_srvs/Empty")
+    offered = (
+        (names.motors, ("reset_odometry", "zero_odometry", "odometry/reset"), simple),
+        (names.motors, ("motors/enable", "switch_motors"), ("std_srvs/SetBool", *simple)),
+        (names.navigator, ("clear_costmap", "costmap/clear"), simple),
+        (names.map_server, ("save_map", "map/save"), simple),
+        (names.imu, ("calibrate_imu", "imu/calibrate"), simple),
+    )
+    return tuple(
+        OfferedService(node=node, service=f"{node}/{_one(random, last)}", type=_one(random, types))
+        for node, last, types in offered
+    )
+
+
+def _navigation(random: np.random.Generator) -> dict[str, Any]:
+    return {
+        "max_speed": round(float(random.uniform(0.3, 1.2)), 2),
+        "max_turn_rate": round(float(random.uniform(0.5, 2.0)), 2),
+        "inflation_radius": round(float(random.uniform(0.3, 0.8)), 2),
+        "robot_radius": round(float(random.uniform(0.15, 0.35)), 2),
+        "goal_tolerance": round(float(random.uniform(0.05, 0.4)), 2),
+        "controller_frequency": float(random.integers(5, 31)),
+        "obstacle_range": round(float(random.uniform(1.5, 5.0)), 1),
+        "transform_tolerance": round(float(random.uniform(0.1, 0.9)), 1),
+        "global_frame": "map",
+    }
+
+
+def _draw_type(random: np.random.Generator) -> str:
+    """Draws the text of a message type: five fields, of which two are of one kind."""
+    fields_drawn = [MEASURED[at] for at in random.permutation(len(MEASURED))[:5].tolist()]
+    kinds = [PLAIN_KINDS[at] for at in random.permutation(len(PLAIN_KINDS))[:4].tolist()]
+    return "\n".join(
+        f"{kind} {name}" for kind, name in zip((*kinds, kinds[0]), fields_drawn, strict=True)
+    )
+
+
+def _one(random: np.random.Generator, choices: Sequence[str]) -> str:
+    return choices[int(random.integers(len(choices)))]

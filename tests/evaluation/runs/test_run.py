@@ -1,0 +1,26 @@
+from pathlib import Path
+
+import pytest
+
+from mapspeak.errors import ConfigError
+from mapspeak.evaluation.runs import RunOptions, plan_run
+from mapspeak.evaluation.runs.run import make_jobs
+
+
+def test_the_largest_world_is_explored_first_and_before_all_else(tmp_path: Path) -> None:
+    options = RunOptions(worlds=("flat_1", "office", "flat_2"), n_trials=2, folder=tmp_path)
+    worlds = options.load_worlds()
+    jobs = list(make_jobs(options, plan_run(options, worlds), worlds))
+    assert [job.trial.task for job in jobs[:4]] == ["explore"] * 3 + ["smallest-room"]
+    assert [job.trial.world for job in jobs[:3]] == ["office", "flat_2", "flat_1"]
+
+
+def test_a_plan_names_the_versions_it_was_made_with(tmp_path: Path) -> None:
+    options = RunOptions(worlds=("flat_1",), n_trials=1, folder=tmp_path)
+    plan = plan_run(options, options.load_worlds())
+    assert list(plan.versions) == ["mapspeak", "python", "numpy"]
+
+
+def test_a_representation_that_is_none_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="no representation 'poem'"):
+        RunOptions(folder=tmp_path, representations=("poem",))
