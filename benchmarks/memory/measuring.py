@@ -17,7 +17,7 @@ from benchmarks.memory.asking import FindModel, open_atlas
 from benchmarks.memory.judging import Facing, Fault, Judged, Outcome, choose, judge_all
 from benchmarks.memory.observer import observe
 from benchmarks.memory.places import PlaceError, measure_places
-from benchmarks.memory.sites import Site, build_held_out, build_sites
+from benchmarks.memory.sites import Site, build_drawn, build_held_out, build_sites
 from mapspeak.evaluation.scores import wilson_interval
 from mapspeak.semantic.retrieval import Embedder, find_model
 
@@ -27,8 +27,11 @@ N_REQUESTS = 300
 SEEDS = (1, 2)
 GROUPS: dict[str, Callable[[], Iterator[Site]]] = {
     "used": build_sites,
+    "drawn": build_drawn,
     "held out": build_held_out,
 }
+MEASURED = ("used", "held out")
+"""The others are for choosing alone."""
 RULES: dict[str, Callable[[PlaceError], float]] = {
     "ours": lambda error: error.ours_m,
     "observer's own pose": lambda error: error.own_pose_m,
@@ -76,8 +79,8 @@ class Trial:
 def measure() -> Iterator[Figure]:
     """Gives errors of places and how requests came out, each with ranges and without."""
     cv2.setNumThreads(1)
-    for group, build in GROUPS.items():
-        sites = list(build())
+    for group in MEASURED:
+        sites = list(GROUPS[group]())
         for has_ranges in (False, True):
             kind = f"{group}, {'bearings and ranges' if has_ranges else 'bearings alone'}"
             trials = [
@@ -111,6 +114,8 @@ def _measure_errors(kind: str, errors: Sequence[PlaceError]) -> Iterator[Figure]
         yield Figure(name=name, value=float(np.median(some or [0.0])), unit="m")
     held = [error.is_held for error in errors if math.isfinite(error.ours_m)]
     yield _share(f"{kind}: within the radius that holds 90 %", held)
+    radius_m = float(np.median([error.radius_m for error in errors]))
+    yield Figure(name=f"{kind}: that radius, median", value=radius_m, unit="m")
 
 
 def _measure_answers(kind: str, judged: Sequence[Judged]) -> Iterator[Figure]:

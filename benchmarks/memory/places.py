@@ -28,6 +28,7 @@ class PlaceError:
         n_wrong: How many of its views are wrong.
         ours_m: As remembered; infinite where no thing was made of the views.
         is_held: Whether it lies within the radius that holds 90 %.
+        radius_m: That radius; infinite where no thing was made of the views.
         own_pose_m: Where the observer stood, mean of the three.
         intersection_m: The point nearest to the three lines of sight.
         first_wall_m: The first obstacle along one direction, mean of the three.
@@ -38,6 +39,7 @@ class PlaceError:
     n_wrong: int
     ours_m: float
     is_held: bool
+    radius_m: float
     own_pose_m: float
     intersection_m: float
     first_wall_m: float
@@ -75,6 +77,7 @@ def measure_places(site: Site, memory: Memory, found: Things) -> Iterator[PlaceE
             n_wrong=sum((waypoint.name, mark) in memory.wrong for waypoint, mark in views),
             ours_m=ours_m,
             is_held=ours is not None and ours_m <= (ours.uncertainty_m or 0.0),
+            radius_m=math.inf if ours is None else ours.uncertainty_m or math.inf,
             own_pose_m=_mean_off(truth, [waypoint.pose.point for waypoint, _ in views]),
             intersection_m=crossing.distance_to(truth.point),
             first_wall_m=_mean_off(truth, walls),

@@ -1,7 +1,8 @@
 """Buildings with things in them: shipped, drawn by a seeded generator, and real maps furnished.
 
-What the memory believes of observers was chosen on `build_sites`; `build_held_out` was not looked
-at for that, and must not be.
+What the memory believes of observers was chosen on `build_sites` and, of the styles that are held
+out, on buildings of other seeds, `build_drawn`; `build_held_out` was not looked at for that, and
+must not be.
 """
 
 import dataclasses
@@ -28,13 +29,14 @@ from mapspeak.simulator import (
     world_names,
 )
 from mapspeak.simulator.models import Category, find_kind, footprint
+from mapspeak.simulator.plans import draw_plan, style_names
 from mapspeak.simulator.sight import EYE_BAND_M, OWN_SIZE_M, SIDEWAYS_M
 from mapspeak.simulator.slices import slice_world
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import clearance_m
 from mapspeak.spatial.rooms import RoomMap
 
-__all__ = ["Site", "TrueThing", "build_held_out", "build_sites"]
+__all__ = ["Site", "TrueThing", "build_drawn", "build_held_out", "build_sites"]
 
 MAPS = Path(__file__).parents[2] / "tests" / "maps"
 REAL_MAPS = (MAPS / "aws_small_house" / "map.yaml", MAPS / "freiburg79" / "whole.yaml")
@@ -45,6 +47,8 @@ APART_M = 1.2
 BODY_HEIGHT_M = 2.0
 RADIUS_M = BODY_RADIUS_M + 0.03
 USED_FOR_CHOOSING = ("office", "warehouse")
+DRAWN_SEEDS = (101, 102)
+"""A small and a large building of each style; none of them is shipped."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,6 +163,16 @@ def build_held_out() -> Iterator[Site]:
     for name in world_names():
         if name not in USED_FOR_CHOOSING:
             yield Site(load_world(name))
+
+
+def build_drawn() -> Iterator[Site]:
+    """Gives buildings in the styles of those held out, for choosing."""
+    with TemporaryDirectory() as folder:
+        for style in style_names():
+            for seed in DRAWN_SEEDS:
+                path = Path(folder) / f"{style}_{seed}.yaml"
+                path.write_text(draw_plan(style, seed=seed), encoding="utf-8")
+                yield Site(load_world(path))
 
 
 def build_sites() -> Iterator[Site]:

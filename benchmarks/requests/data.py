@@ -15,7 +15,7 @@ __all__ = ["HELD_OUT", "NOTHING", "TUNING", "Request", "read_maps", "read_reques
 
 _FOLDER = Path(__file__).parent
 HELD_OUT = (_FOLDER / "held_out.yaml",)
-TUNING = (_FOLDER / "tuning.yaml", _FOLDER / "tuning_more.yaml")
+TUNING = tuple(_FOLDER / name for name in ("tuning.yaml", "tuning_more.yaml", "tuning_absent.yaml"))
 NOTHING = "nothing"
 """The kind of a request for what is not remembered."""
 

@@ -205,12 +205,16 @@ class Session:
 
     def find_episodes(self, query: EpisodeQuery) -> EpisodePage:
         """Gives the observations that pass a query, compared by meaning where that is possible."""
+        find = self.diary.store.find
+        compares_words = query.words or isinstance(query.near, EpisodeQuery)
+        embedder = self.recollector.embedder if compares_words else None
+        if embedder is None:
+            return find(query)
+        # One at a time: a rank learns the texts that it has not met.
         with self._ranking:
-            embedder = self.recollector.embedder
-            if self._rank is None and embedder is not None:
+            if self._rank is None:
                 self._rank = VectorRank(self.diary.store.database, embedder)
-            # One at a time: a rank learns the texts that it has not met.
-            return self.diary.store.find(query, rank=self._rank)
+            return find(query, rank=self._rank)
 
     async def warm_memory(self) -> None:
         """Loads what the first question would wait for: the model, the index of the memory.
@@ -358,7 +362,9 @@ class Session:
 
 
 def _prepare(atlas: Atlas) -> None:
+    """Makes what the first question would: things, their index, what speaks against them."""
     atlas.recollection.prepare()
+    _ = atlas.judge
 
 
 def _said_of(compare: Callable[[OccupancyGrid], MapComparison | None], grid: OccupancyGrid) -> str:

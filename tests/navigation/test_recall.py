@@ -82,6 +82,27 @@ def test_several_of_one_name_are_ambiguous_and_the_nearest_by_path_comes_first()
     assert "Choose by room" in answer.advice
 
 
+def test_the_one_of_several_that_three_views_agree_on_is_found_and_the_others_are_told() -> None:
+    third = look("east c", 4.8, 1.5, ("fire extinguisher", EXTINGUISHER), range_m=2.6)
+    near = look("near", 2.0, 1.0, ("fire extinguisher", LADDER), yaw_deg=180)
+    answer = recall(atlas_of(*LOOKS, third, near), RecallQuery(words="fire extinguisher"))
+    assert answer.verdict is Verdict.FOUND
+    assert answer.n_meant == 2
+    assert answer.candidates[0].room_ids == ("R1",)
+    assert [each.name for each in answer.candidates[:2]] == ["fire extinguisher"] * 2
+    assert "1 other is called so" in answer.advice
+
+
+def test_two_of_one_name_that_three_views_each_agree_on_stay_ambiguous() -> None:
+    third = look("east c", 4.8, 1.5, ("fire extinguisher", EXTINGUISHER), range_m=2.6)
+    west = [
+        look(f"west {i}", x, y, ("fire extinguisher", LADDER), yaw_deg=180, range_m=range_m)
+        for i, (x, y, range_m) in enumerate([(2.0, 1.0, 2.2), (2.6, 2.4, 2.3), (1.0, 0.6, 1.9)])
+    ]
+    answer = recall(atlas_of(*LOOKS, third, *west), RecallQuery(words="fire extinguisher"))
+    assert answer.verdict is Verdict.AMBIGUOUS
+
+
 def test_filters_apply_before_ranking() -> None:
     near = look("near", 2.0, 1.0, ("fire extinguisher", LADDER), yaw_deg=180)
     atlas = atlas_of(*LOOKS, near)
@@ -187,6 +208,46 @@ def test_a_likeness_in_meaning_is_told_and_never_driven_to() -> None:
     assert "like it in meaning" in answer.candidates[0].evidence
     with pytest.raises(GoalError, match="nearest in meaning: T1"):
         find_place(atlas, "burning flames")
+
+
+def test_a_warm_memory_embeds_nothing_but_the_first_question() -> None:
+    embedder = ConceptEmbedder()
+    recollector = Recollector(lambda: embedder)
+    memory = SemanticMap(waypoints=LOOKS)
+
+    recollector.warm(memory)
+    n_before = len(embedder.asked)
+    recall(
+        Atlas(two_rooms(), ROBOT, memory, radius_m=0.2, recollector=recollector),
+        RecallQuery(words="burning flames"),
+    )
+
+    assert embedder.asked[n_before:] == ["burning flames"]
+
+
+def test_warming_changes_no_answer() -> None:
+    memory, query = SemanticMap(waypoints=LOOKS), RecallQuery(words="burning flames")
+    cold, warm = Recollector(ConceptEmbedder), Recollector(ConceptEmbedder)
+    warm.warm(memory)
+
+    answers = [
+        recall(Atlas(two_rooms(), ROBOT, memory, radius_m=0.2, recollector=each), query)
+        for each in (cold, warm)
+    ]
+
+    assert answers[0] == answers[1]
+
+
+def test_warming_without_a_model_does_nothing() -> None:
+    recollector = Recollector()
+    recollector.warm(SemanticMap(waypoints=LOOKS))
+    assert recollector.embedder is None
+
+
+def test_what_is_missing_is_told_with_the_verdict() -> None:
+    answer = recall(atlas_of(*LOOKS), RecallQuery(words="a piano"))
+    assert answer.verdict is Verdict.NOT_REMEMBERED
+    assert 'it sounds like "piano", and none is' in answer.advice
 
 
 def test_a_broken_model_costs_no_more_than_the_meanings() -> None:

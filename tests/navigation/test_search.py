@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 
 from drawing import grid_from_text
+from embedding import ConceptEmbedder
 from mapspeak.geometry import Point, Pose
 from mapspeak.navigation.drive import DriveReport
 from mapspeak.navigation.search import (
@@ -22,7 +23,8 @@ from mapspeak.navigation.search import (
 from mapspeak.navigation.search.candidates import find_candidates
 from mapspeak.navigation.search.opinions import weight_of
 from mapspeak.robot import Detection
-from mapspeak.semantic import Waypoint
+from mapspeak.semantic import Landmark, SemanticMapStore, Waypoint
+from mapspeak.session import Session
 from mapspeak.simulator import World, load_world
 from roaming import RoamingRobot, session_of
 
@@ -140,6 +142,64 @@ async def test_a_remembered_place_that_speaks_of_the_thing_comes_first(
     assert first.here is not None
     assert first.here.kind is CandidateKind.REMEMBERED
     assert first.pose.point.distance_to(Point(7.0, 0.0)) < 0.3
+
+
+async def test_a_remembered_thing_is_looked_at_from_where_the_robot_faces_it(
+    tmp_path: Path, flat: World
+) -> None:
+    robot = RoamingRobot(flat, has_detector=True)
+    session = session_of(robot, tmp_path)
+    fridge = Landmark(label="blue fridge", bearing_rad=0.0, range_m=3.0)
+    session.memory.write(
+        Waypoint(name="far end", pose=Pose(0.5, 0.0, 0.0), functional_landmarks=(fridge,))
+    )
+    first = await _step(robot, Searcher(session), "fridge", Judgement())
+    assert first.here is not None
+    assert (first.here.kind, first.here.id) == (CandidateKind.REMEMBERED, "T1")
+    assert first.pose.point.distance_to(Point(3.5, 0.0)) < 1.6
+
+
+async def test_each_place_that_names_the_thing_is_looked_at_once(
+    tmp_path: Path, flat: World
+) -> None:
+    robot = RoamingRobot(flat, has_detector=True)
+    session = session_of(robot, tmp_path)
+    for x in (4.0, 7.0):
+        place = Waypoint(name=f"at {x}", pose=Pose(x, 0.0), description="The forklift parks here.")
+        session.memory.write(place)
+    standings = await _search(robot, Searcher(session), "forklift")
+    looked = [each.here.id for each in standings if each.state is SearchState.LOOK and each.here]
+    assert looked[:2] == ["W1", "W2"]
+    assert not {"W1", "W2"} & {*looked[2:]}
+
+
+async def test_what_only_resembles_the_thing_makes_its_surroundings_likelier(
+    tmp_path: Path, flat: World
+) -> None:
+    memory = SemanticMapStore(tmp_path / "semantic_map.yaml")
+    session = Session(RoamingRobot(flat), memory, lease_s=60.0, find_model=ConceptEmbedder)
+    for name, x in (("sink ladder", 6.5), ("cooler shelf", 6.0)):
+        session.memory.write(Waypoint(name=name, pose=Pose(x, 2.5)))
+    atlas = await session.fetch_atlas()
+    found = find_candidates(
+        atlas, "wash", seen=SeenFloor(), opinions=Opinions(), visited=frozenset()
+    )
+    assert CandidateKind.REMEMBERED not in {each.kind for each in found}
+    assert max(each.score for each in found) == 0.8
+
+
+async def test_a_session_that_was_warmed_embeds_nothing_but_the_first_question(
+    tmp_path: Path, flat: World
+) -> None:
+    embedder = ConceptEmbedder()
+    memory = SemanticMapStore(tmp_path / "semantic_map.yaml")
+    session = Session(RoamingRobot(flat), memory, lease_s=60.0, find_model=lambda: embedder)
+    memory.write(Waypoint(name="sink ladder", pose=Pose(6.5, 2.5)))
+    await session.warm_memory()
+    n_before = len(embedder.asked)
+    atlas = await session.fetch_atlas()
+    atlas.recollection.find("thirsty")
+    assert embedder.asked[n_before:] == ["thirsty"]
 
 
 async def test_the_models_scores_lead_the_search(tmp_path: Path, flat: World) -> None:

@@ -207,7 +207,7 @@ async def test_a_thing_found_by_a_phrase_drives_under_its_own_id(tmp_path: Path)
 
 
 async def test_an_ambiguous_phrase_is_answered_with_the_candidates(tmp_path: Path) -> None:
-    seen = {"label": "chair", "bearing_deg": 90, "range_m": 0.5}
+    seen = {"label": "chair", "bearing_deg": 0, "range_m": 0.5}
     async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=TOOLSETS) as client:
         for name, x in (("west", 1.5), ("east", 5.0)):
             record = {"name": name, "description": "", "functional_landmarks": [seen]}

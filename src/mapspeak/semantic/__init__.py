@@ -17,14 +17,7 @@ from mapspeak.semantic.merging import (
     noted_at,
     seen_from,
 )
-from mapspeak.semantic.pictures import PictureBook, TakenPicture
-from mapspeak.semantic.retrieval import (
-    MatchEvidence,
-    MatchField,
-    MatchKind,
-    WaypointMatch,
-    find_waypoints,
-)
+from mapspeak.semantic.pictures import PictureBook, Reading, TakenPicture
 from mapspeak.semantic.store import SemanticMapStore, WriteReceipt
 from mapspeak.semantic.waypoint import Confidence, Landmark, SemanticMap, Waypoint, name_key
 
@@ -34,21 +27,17 @@ __all__ = [
     "Concern",
     "Confidence",
     "Landmark",
-    "MatchEvidence",
-    "MatchField",
-    "MatchKind",
     "Merge",
     "Objection",
     "PictureBook",
+    "Reading",
     "Reunion",
     "SemanticMap",
     "SemanticMapStore",
     "TakenPicture",
     "Waypoint",
-    "WaypointMatch",
     "WriteReceipt",
     "find_objection",
-    "find_waypoints",
     "gives_orders",
     "group_views",
     "merge_waypoint",

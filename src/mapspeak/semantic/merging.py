@@ -138,7 +138,8 @@ def seen_from(landmark: Landmark, old: Pose, new: Pose) -> Landmark:
         bearing_rad = range_m = None
     elif bearing_rad is not None:
         bearing_rad += old.yaw_rad - new.yaw_rad
-    return replace(landmark, bearing_rad=bearing_rad, range_m=range_m)
+    range_from = None if range_m is None else landmark.range_from
+    return replace(landmark, bearing_rad=bearing_rad, range_m=range_m, range_from=range_from)
 
 
 def noted_at(landmark: Landmark, seen: Pose, pose: Pose) -> Landmark:
@@ -283,6 +284,7 @@ def _joined(before: Landmark, now: Landmark) -> Landmark:
         purpose=now.purpose or before.purpose,
         bearing_rad=filling.bearing_rad if base.bearing_rad is None else base.bearing_rad,
         range_m=filling.range_m if base.range_m is None else base.range_m,
+        range_from=filling.range_from if base.range_m is None else base.range_from,
         confidence=surer.confidence or (other.confidence if is_equal else None),
         note=now.note or before.note,
         pose=base.pose,

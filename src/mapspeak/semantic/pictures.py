@@ -9,12 +9,29 @@ from datetime import datetime
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
 
-__all__ = ["PictureBook", "TakenPicture"]
+__all__ = ["PictureBook", "Reading", "TakenPicture"]
 
 MOST_PICTURES = 500
 """How many pictures can be spoken of; older ones are forgotten here, whoever keeps them."""
 BESIDE_RAD = math.radians(10.0)
 """The middle of a thing that the edge cuts lies beside the picture, and is read off roughly."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reading:
+    """How far the robot's own sensors measured something in a picture to be.
+
+    Attributes:
+        label: What they take it for.
+        bearing_rad: From the heading the picture was taken along, left positive.
+        range_m: From where it was taken.
+        source: What measured it.
+    """
+
+    label: str
+    bearing_rad: float
+    range_m: float
+    source: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,6 +46,7 @@ class TakenPicture:
         width_px: Columns.
         horizontal_fov_rad: The angle between the left and the right edge; None where unknown.
         recorded_at: When it was taken, by the calendar; None where nobody knew.
+        readings: What the robot measured in it.
     """
 
     id: str
@@ -38,6 +56,7 @@ class TakenPicture:
     width_px: int
     horizontal_fov_rad: float | None
     recorded_at: datetime | None = None
+    readings: tuple[Reading, ...] = ()
 
     def shows(self, bearing_rad: float) -> bool:
         """True for a direction from the heading that lies in the picture, or just beside it."""
@@ -95,6 +114,7 @@ class PictureBook:
         horizontal_fov_rad: float | None,
         name: str | None = None,
         recorded_at: datetime | None = None,
+        readings: tuple[Reading, ...] = (),
     ) -> TakenPicture:
         """Names a picture that was just taken.
 
@@ -107,6 +127,7 @@ class PictureBook:
             horizontal_fov_rad: The angle between the left and the right edge.
             name: What a folder of pictures calls it; made up where nobody keeps it.
             recorded_at: The time by the calendar.
+            readings: What the robot measured in it.
         """
         self._n_taken += 1
         picture_id = f"P{self._n_taken}"
@@ -121,6 +142,7 @@ class PictureBook:
             width_px=width_px,
             horizontal_fov_rad=horizontal_fov_rad,
             recorded_at=recorded_at,
+            readings=readings,
         )
         self._taken[picture_id] = taken
         while len(self._taken) > MOST_PICTURES:

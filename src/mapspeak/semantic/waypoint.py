@@ -51,6 +51,7 @@ class Landmark:
         purpose: What it is good for.
         bearing_rad: Its direction from the heading of the pose it was seen from, left positive.
         range_m: Its distance from that pose.
+        range_from: What measured that; None where the observer judged it.
         confidence: How sure the observer was; None where it did not say.
         note: Anything else.
         picture: The picture it was seen in, by its relative name, if not the waypoint's.
@@ -73,10 +74,11 @@ class Landmark:
     stamp_s: float | None = None
     recorded_at: datetime | None = None
     pose: Pose | None = None
+    range_from: str | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "label", _required_line(self.label, "A landmark's label"))
-        _clean_lines(self, "purpose", "note", "picture")
+        _clean_lines(self, "purpose", "note", "picture", "range_from")
         if self.bearing_rad is not None:
             _require(math.isfinite(self.bearing_rad), f"The bearing of {self.label!r}", "an angle")
             object.__setattr__(self, "bearing_rad", wrap_angle(self.bearing_rad))

@@ -1,11 +1,13 @@
 """What the robot's camera shows now: the picture, with its caption as text."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from mcp.server.mcpserver import Image
 
 from mapspeak.robot import CameraPicture, Detection
+from mapspeak.semantic import Reading
 from mapspeak.server.wording import say_pose
 from mapspeak.session import Session
 
@@ -54,11 +56,24 @@ async def look_ahead(session: Session) -> Sighting:
         horizontal_fov_rad=picture.horizontal_fov_rad,
         name=kept.picture,
         recorded_at=session.find_wall_time(),
+        readings=tuple(_read(detector, detections)),
     )
     lines = [_say_picture(taken.id, picture)]
     lines += [] if detector is None else _say_detections(detector, detections)
     lines += [kept.fault] if kept.fault else []
     return Sighting(text="\n".join(lines), picture=picture, detections=detections)
+
+
+def _read(detector: str | None, detections: tuple[Detection, ...]) -> Iterator[Reading]:
+    """Gives what was measured, for the records that may be made of the picture."""
+    for seen in detections:
+        if detector is not None and seen.range_m is not None:
+            yield Reading(
+                label=seen.label,
+                bearing_rad=seen.bearing_rad,
+                range_m=seen.range_m,
+                source=detector,
+            )
 
 
 def _say_picture(picture_id: str, picture: CameraPicture) -> str:

@@ -111,6 +111,39 @@ def test_two_names_in_one_place_are_both_shown() -> None:
     assert "cabinet" in finding.sentence
 
 
+def test_an_invented_second_label_costs_both_their_trust_and_the_finding_names_both() -> None:
+    fridge = [place(name, x, 0.8, mark("fridge", deg)) for name, x, deg in (("a", 1.0, -14.0),)]
+    fridge += [place("b", 2.0, 0.8, mark("fridge", 14.0))]
+    ghost = [
+        place("c", 1.2, 1.0, mark("wardrobe", -9.0)),
+        place("d", 1.8, 1.0, mark("wardrobe", 9)),
+    ]
+    found, findings = check(*fridge, *ghost)
+    (finding,) = (each for each in findings if each.kind is FindingKind.TWO_LABELS)
+    assert {thing.label for thing in finding.things} == {"fridge", "wardrobe"}
+    for thing in found.things:
+        assert thing.confidence_ratio > 0.95
+        trust = judge_trust(thing, findings)
+        assert trust.ratio < 0.85
+        assert any("'fridge'" in reason and "'wardrobe'" in reason for reason in trust.reasons)
+
+
+def test_views_that_outweigh_an_invented_label_leave_their_thing_its_trust() -> None:
+    seen = [
+        place(name, x, y, mark("fridge", deg))
+        for name, x, y, deg in (
+            ("a", 1.0, 0.8, -14.0),
+            ("b", 2.0, 0.8, 14.0),
+            ("c", 1.5, 0.6, 0.0),
+            ("d", 0.8, 1.2, -24.0),
+        )
+    ]
+    found, findings = check(*seen, place("e", 1.5, 1.2, mark("wardrobe")))
+    trust = {thing.label: judge_trust(thing, findings).ratio for thing in found.things}
+    assert trust["fridge"] > 0.95
+    assert trust["wardrobe"] < 0.3
+
+
 def test_who_names_both_has_seen_two_things() -> None:
     one = place("a", 1.5, 0.8, mark("table"), mark("coffee machine"))
     assert FindingKind.TWO_LABELS not in kinds(one)
@@ -149,6 +182,19 @@ def test_trust_falls_with_every_finding_and_says_why() -> None:
         "Seen from 1: 'a'.",
         "'a' belongs to the map 'old', but the robot is on 'new'.",
     )
+
+
+def test_however_many_views_agree_a_little_doubt_is_left() -> None:
+    sink = Point(1.5, 2.7)
+    spots = [Point(0.5 + 0.35 * (i % 6), 0.5 + 0.4 * (i // 6)) for i in range(18)]
+    looks = [(at, math.degrees(at.bearing_to(sink))) for at in spots]
+    places = [
+        place(f"v{i}", at.x, at.y, mark("sink", degrees - 90, at.distance_to(sink)))
+        for i, (at, degrees) in enumerate(looks)
+    ]
+    found, findings = check(*places)
+    assert len(found.things[0].supporting) > 10
+    assert 0.999 < judge_trust(found.things[0], findings).ratio < 1.0
 
 
 def test_one_bad_place_of_three_counts_by_a_third() -> None:

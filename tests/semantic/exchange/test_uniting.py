@@ -74,14 +74,14 @@ def test_without_times_what_differs_stays_twice_and_what_completes_is_joined() -
     assert (place.description, place.landmarks) == ("By the gate.", (TAP,))
 
 
-def test_a_landmark_whose_bearing_would_be_lost_keeps_its_own_place() -> None:
+def test_a_landmark_of_the_older_record_keeps_its_bearing_and_the_pose_it_was_seen_from() -> None:
     ahead = Landmark(label="tap", bearing_rad=0.0)
-    old, new = dock(at=MONDAY, functional_landmarks=(ahead,)), dock(0.8, at=TUESDAY)
-    union = unite(memory(new), memory(old))
-    assert names(union.places) == ["dock", "dock (2)"]
-    assert union.places.waypoints[1].landmarks == (ahead,)
-    near = dock(0.1, at=TUESDAY)
-    assert names(unite(memory(near), memory(old)).places) == ["dock"]
+    old = dock(at=MONDAY, functional_landmarks=(ahead,))
+    for new in (dock(0.8, at=TUESDAY), dock(0.1, at=TUESDAY)):
+        (place,) = unite(memory(new), memory(old)).places.waypoints
+        (tap,) = place.landmarks
+        assert (place.name, place.pose) == ("dock", new.pose)
+        assert (tap.bearing_rad, place.pose_of(tap)) == (0.0, old.pose)
 
 
 def test_memories_of_different_maps_are_refused() -> None:

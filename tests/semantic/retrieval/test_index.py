@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 
@@ -120,12 +121,73 @@ def test_a_misspelt_request_counts_as_the_name_that_it_looks_like(
 
 
 def test_a_request_in_words_of_the_language_does_not_count_as_a_name_that_looks_like_it() -> None:
+    ladder = Entry(id="l", kind=EntryKind.THING, name="light ladder")
+
+    answer = EntryIndex([ladder]).find("night ladder")
+
+    assert answer.understood == "night ladder"
+    assert answer.verdict is Verdict.AMBIGUOUS
+
+
+def test_a_kind_of_thing_that_is_not_remembered_is_said_to_be_missing() -> None:
     dryer = Entry(id="d", kind=EntryKind.THING, name="hand dryer")
 
-    answer = EntryIndex([dryer]).find("hair dryer")
+    answer = EntryIndex([dryer]).find("a hair dryer")
 
-    assert answer.understood == "hair dryer"
+    assert (answer.verdict, answer.missing) == (Verdict.NOT_REMEMBERED, "hair dryer")
+    assert ids(answer) == ["d"]
+
+
+def test_a_kind_of_thing_that_only_a_description_names_is_remembered() -> None:
+    kitchen = Entry(
+        id="k", kind=EntryKind.PLACE, name="far end", description="A fridge hums there."
+    )
+
+    answer = EntryIndex([kitchen]).find("fridge")
+
+    assert answer.verdict is not Verdict.NOT_REMEMBERED
+    assert answer.missing is None
+
+
+def test_what_is_more_like_a_thing_that_is_not_remembered_is_said_not_to_be() -> None:
+    embedder = ConceptEmbedder()
+    embedder.thresholds = replace(embedder.thresholds, absent_ratio=0.2)
+    blend = Entry(id="b", kind=EntryKind.PLACE, name="shelf sink")
+
+    answer = EntryIndex([blend], vectors=TextVectors(embedder)).find("thirsty")
+
+    assert answer.verdict is Verdict.NOT_REMEMBERED
+    assert answer.missing is not None
+
+
+@pytest.mark.parametrize("find", [by_words, by_meaning])
+def test_a_thing_is_found_by_another_name_for_such_things(find: Callable[[str], Answer]) -> None:
+    answer = find("stepladder")
+
+    assert ids(answer)[0] == "workshop / ladder"
+    assert answer.verdict is not Verdict.NOT_REMEMBERED
+
+
+def test_a_thing_is_found_by_its_usual_use_and_says_so() -> None:
+    answer = by_words("changing a light bulb")
+
+    assert ids(answer)[0] == "workshop / ladder"
+    assert answer.candidates[0].field is MatchField.USE
+
+
+def test_what_is_commonly_known_makes_no_answer_sure() -> None:
+    answer = by_words("changing a light bulb")
+
+    assert not answer.is_sure
     assert answer.verdict is Verdict.AMBIGUOUS
+
+
+def test_who_says_much_of_a_request_or_is_surely_meant_speaks_of_it() -> None:
+    answer = by_words("ladder for the racks")
+
+    assert [each.entry.id for each in answer.find_speaking(least_said_ratio=0.5)] == [
+        "workshop / ladder"
+    ]
 
 
 def test_a_word_of_the_language_is_not_taken_for_a_misspelt_one() -> None:
@@ -162,9 +224,11 @@ def test_without_a_model_only_words_are_found_and_the_answer_says_so() -> None:
 
 
 def test_a_word_is_found_in_a_longer_one() -> None:
-    answer = by_words("dirty dishes")
+    lighthouse = Entry(id="l", kind=EntryKind.THING, name="lighthouse")
 
-    assert ids(answer) == ["kitchen / dishwasher"]
+    answer = EntryIndex([*ENTRIES, lighthouse]).find("a house")
+
+    assert ids(answer) == ["l"]
     assert answer.candidates[0].evidence[0].kind is MatchKind.PART
 
 
@@ -179,8 +243,10 @@ def test_things_of_one_name_are_ambiguous_and_one_kind() -> None:
 def test_things_of_like_meaning_are_ambiguous_and_of_several_kinds() -> None:
     blanket = Entry(id="b", kind=EntryKind.THING, name="blanket")
     vectors = TextVectors(ConceptEmbedder())
+    # Anybody knows that a first aid box is good for burns, too.
+    others = [entry for entry in ENTRIES if entry.name != "first aid box"]
 
-    answer = EntryIndex([*ENTRIES, blanket], vectors=vectors).find("flames")
+    answer = EntryIndex([*others, blanket], vectors=vectors).find("flames")
 
     assert answer.verdict is Verdict.AMBIGUOUS
     assert (answer.n_meant, answer.is_one_kind) == (3, False)

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapspeak.semantic.retrieval import MatchKind
-from mapspeak.semantic.retrieval.spelling import Vocabulary
+from mapspeak.semantic.retrieval.spelling import LookAlikes, Vocabulary
 from mapspeak.semantic.retrieval.words import content_words
 
 WORDS = Vocabulary(["charger", "charging", "dishwasher", "kitchen", "sink", "vegetable"])
@@ -29,12 +29,6 @@ def test_a_word_counts_as_those_of_its_stem_or_part_or_else_as_those_like_it(
     assert WORDS.find_spellings(word) == spellings
 
 
-def test_only_the_kinds_that_are_accepted_count() -> None:
-    words = Vocabulary(["dishwasher"], accepted=(MatchKind.SAME, MatchKind.FORM))
-
-    assert words.find_spellings("dish") == {}
-
-
 def test_a_known_word_is_not_misspelt() -> None:
     assert Vocabulary(["leather"]).find_spellings("lether") == {"leather": MatchKind.MISSPELT}
     assert Vocabulary(["leather"], is_known="lether".__eq__).find_spellings("lether") == {}
@@ -43,10 +37,9 @@ def test_a_known_word_is_not_misspelt() -> None:
 @settings(deadline=None)
 @given(st.lists(st.text("abcäö소", min_size=1), max_size=8), st.text("abcdäö소", min_size=4))
 def test_no_likeness_is_lost_by_counting_letters_first(words: list[str], word: str) -> None:
-    found = Vocabulary(words, accepted=(MatchKind.MISSPELT,)).find_spellings(word)
+    found = LookAlikes(words).find(word, least_ratio=0.8, limit=3)
 
-    like = difflib.get_close_matches(word, sorted(set(words)), n=3, cutoff=0.8)
-    assert MatchKind.MISSPELT not in found.values() or list(found) == like
+    assert found == difflib.get_close_matches(word, sorted(set(words)), n=3, cutoff=0.8)
 
 
 @pytest.mark.parametrize(

@@ -47,6 +47,19 @@ TWO_ROOMS = """
     #...........#...........#
     #########################
 """
+LOW_TABLE = """
+    #########################
+    #.......................#
+    #.......................#
+    #.......................#
+    #.......................#
+    #..........####.........#
+    #.......................#
+    #.......................#
+    #.......................#
+    #.......................#
+    #########################
+"""
 CELL_M = 0.25
 ON_NORTH_WALL = Point(3.1, 2.6)
 
@@ -160,6 +173,75 @@ def test_two_equal_things_seen_from_one_place_stay_two() -> None:
     assert [thing.waypoints for thing in found] == [("a", "b"), ("a", "b")]
     assert off_m(found[0], left) < 0.4
     assert off_m(found[1], right) < 0.4
+
+
+def test_told_ranges_weigh_more_than_lines_of_sight_that_happen_to_cross() -> None:
+    mark = Landmark(label="chair", bearing_rad=0.0, range_m=0.5)
+    along = [
+        Waypoint(name=name, pose=Pose(x, 1.4, 0.0), functional_landmarks=(mark,))
+        for name, x in (("a", 0.8), ("b", 4.3))
+    ]
+    found = sorted(things_of(*along), key=lambda thing: thing.waypoints)
+    assert [thing.waypoints for thing in found] == [("a",), ("b",)]
+    assert off_m(found[0], Point(1.3, 1.4)) < 0.4
+    assert off_m(found[1], Point(4.8, 1.4)) < 0.4
+
+
+def test_ranges_that_differ_by_less_than_their_noise_are_of_one_thing() -> None:
+    at = Point(3.1, 1.6)
+    a, b, c = (
+        look(name, x, y, ("table", at), has_range=True)
+        for name, x, y in (("a", 1.0, 1.2), ("b", 5.0, 1.2), ("c", 3.0, 0.4))
+    )
+    (mark,) = b.functional_landmarks
+    far = replace(mark, range_m=(mark.range_m or 0.0) * 1.25)
+    (table,) = things_of(a, replace(b, functional_landmarks=(far,)), c)
+    assert table.waypoints == ("a", "b", "c")
+
+
+@pytest.mark.parametrize("has_range", [True, False])
+def test_two_equal_things_a_metre_apart_stay_two_when_every_view_names_both(
+    *, has_range: bool
+) -> None:
+    left, right = Point(2.6, 2.6), Point(3.6, 2.6)
+    pair = (("chair", left), ("chair", right))
+    found = things_of(
+        *(
+            look(name, x, y, *pair, off_deg=off_deg, has_range=has_range)
+            for name, x, y, off_deg in (("a", 1.5, 0.8, 5), ("b", 3.4, 0.6, -5), ("c", 5.0, 1.0, 5))
+        )
+    )
+    assert [len(thing.supporting) for thing in found] == [3, 3]
+    for at in (left, right):
+        assert min(off_m(thing, at) for thing in found) < 0.4
+
+
+def test_two_of_a_kind_that_one_place_names_stay_two_though_its_pose_was_estimated_anew() -> None:
+    left, right = Point(2.8, 2.6), Point(3.4, 2.6)
+    here = look("desk", 3.1, 0.8, ("chair", left))
+    moved = replace(here.pose, x=here.pose.x + 0.02)
+    bearing_rad = moved.point.bearing_to(right) - moved.yaw_rad
+    second = Landmark(label="chair", bearing_rad=bearing_rad, pose=moved)
+    both = replace(here, functional_landmarks=(*here.functional_landmarks, second))
+    assert len(things_of(both)) == 2
+
+
+def test_three_views_that_agree_from_three_places_are_counted() -> None:
+    (printer,) = things_of(*three_looks())
+    assert printer.n_agreeing == 3
+    (lone,) = things_of(look("a", 3.1, 0.8, ("printer", ON_NORTH_WALL)))
+    assert lone.n_agreeing == 0
+
+
+def test_a_range_says_that_a_thing_was_seen_over_low_furniture() -> None:
+    poster = Point(3.1, 2.6)
+    mark = ("poster", poster)
+    (before,) = things_of(look("a", 3.1, 0.5, mark), text=LOW_TABLE)
+    (behind,) = things_of(look("a", 3.1, 0.5, mark, has_range=True), text=LOW_TABLE)
+    assert before.uncertainty_m is not None
+    assert behind.uncertainty_m is not None
+    assert behind.uncertainty_m < 0.8 * before.uncertainty_m
+    assert off_m(behind, poster) < 0.4
 
 
 def test_things_on_both_sides_of_a_wall_stay_two() -> None:

@@ -11,6 +11,7 @@ from mcp.client import Client
 from fakes import START, FakeRobot, two_rooms
 from guarding import MONDAY_NOON, WallClock, make_guard
 from mapspeak.geometry import Pose
+from mapspeak.robot import Detection
 from mapspeak.semantic import LEFT_OUT, Concern, SemanticMapStore, Waypoint
 from served import MODES, connect, report_of, text_of
 
@@ -372,3 +373,58 @@ async def test_a_place_noted_from_another_room_is_warned_of(
         await write(client, "sink")
         answer = await write(client, "tap", x=x, y=1.4)
     assert [warning in said for said in answer["warnings"]] == ([True] if warning else [])
+
+
+def seen_by_the_robot(*detections: tuple[str, float, float | None]) -> FakeRobot:
+    robot = FakeRobot(two_rooms())
+    robot.detections = tuple(
+        Detection(
+            label=label,
+            bearing_rad=math.radians(bearing_deg),
+            range_m=range_m,
+            confidence_ratio=0.9,
+        )
+        for label, bearing_deg, range_m in detections
+    )
+    return robot
+
+
+async def test_the_range_that_the_robot_measured_along_the_line_is_kept_with_its_source(
+    tmp_path: Path,
+) -> None:
+    robot = seen_by_the_robot(("sink", 12.0, 1.8), ("sink", -30.0, 0.9), ("ladder", 21.0, 0.7))
+    async with connect(robot, tmp_path) as client:
+        await look(client)
+        answer = await write(client, {"label": "white sink", "bearing_deg": 20})
+    (sink,) = stored(tmp_path).landmarks
+    assert sink.range_m == pytest.approx(1.8)
+    assert sink.range_from == "fake detector"
+    assert degrees(sink.bearing_rad) == pytest.approx(20.0)
+    assert "1.8 m by the fake detector" in str(answer)
+
+
+async def test_a_range_that_is_told_otherwise_or_measured_elsewhere_stays_as_it_is_told(
+    tmp_path: Path,
+) -> None:
+    robot = seen_by_the_robot(("sink", 20.0, 1.8), ("ladder", -20.0, None))
+    async with connect(robot, tmp_path) as client:
+        await look(client)
+        await write(
+            client,
+            {"label": "sink", "bearing_deg": 20, "range_m": 0.9},
+            {"label": "sink", "bearing_deg": -15},
+            {"label": "ladder", "bearing_deg": -20},
+        )
+    told, away, unknown = stored(tmp_path).landmarks
+    assert (told.range_m, told.range_from) == (0.9, None)
+    assert (away.range_m, unknown.range_m) == (None, None)
+
+
+async def test_a_range_that_was_read_off_the_caption_is_the_one_that_was_measured(
+    tmp_path: Path,
+) -> None:
+    async with connect(seen_by_the_robot(("sink", 20.0, 1.83)), tmp_path) as client:
+        await look(client)
+        await write(client, {"label": "sink", "bearing_deg": 18, "range_m": 1.8})
+    (sink,) = stored(tmp_path).landmarks
+    assert sink.range_from == "fake detector"

@@ -22,6 +22,7 @@ from mapspeak.semantic.retrieval import (
     EntryIndex,
     EntryKind,
     TextVectors,
+    list_entries,
 )
 from mapspeak.semantic.things import Category, Thing, Things, find_things, name_the_same
 from mapspeak.spatial import OccupancyGrid
@@ -118,6 +119,17 @@ class Recollection:
         """True when it was made of these records and this very map."""
         return self.found.sight.grid is grid and self.memory.waypoints == memory.waypoints
 
+    @property
+    def everything(self) -> tuple[Remembered, ...]:
+        """The places, then the things."""
+        return (*self.places, *self.things)
+
+    def prepare(self) -> None:
+        """Builds the index that questions are answered from; who asks meanwhile waits for it."""
+        with self._lock:
+            if self._index is None:
+                self._index = EntryIndex(self._entries, vectors=self._find_vectors())
+
     def find(self, query: str, *, among: frozenset[str] | None = None, limit: int = 5) -> Answer:
         """Finds places and things by name, meaning or words; the entries have their ids.
 
@@ -126,9 +138,8 @@ class Recollection:
             among: The ids to choose from; all where None.
             limit: How many candidates at most.
         """
-        with self._lock:
-            if self._index is None:
-                self._index = EntryIndex(self._entries, vectors=self._find_vectors())
+        self.prepare()
+        assert self._index is not None  # noqa: S101 - it was just prepared
         return self._index.find(query, among=among, limit=limit)
 
     def find_called(self, words: str) -> tuple[RememberedThing, ...]:
@@ -184,6 +195,8 @@ class Recollector:
         self._find_model = find_model
         self._kept = kept
         self._lock = threading.Lock()
+        # Held while the model is loaded: by whoever needs it first, or ahead of the first question.
+        self._loading = threading.RLock()
         self._latest: Recollection | None = None
         self._n_kept = 0
 
@@ -195,9 +208,23 @@ class Recollector:
                 self._latest = latest = self._make(memory, grid, latest)
             return latest
 
-    @cached_property
+    def warm(self, memory: SemanticMap) -> None:
+        """Loads the model and makes the vectors of a memory's texts, so that no question need.
+
+        A question that comes meanwhile waits for it; without a model there is nothing to do.
+        """
+        with self._loading:
+            if self._vectors is not None:
+                EntryIndex(list_entries(memory), vectors=self._vectors)
+
+    @property
     def embedder(self) -> Embedder | None:
         """What compares meanings; None where no model is installed, or a broken one."""
+        with self._loading:
+            return self._embedder
+
+    @cached_property
+    def _embedder(self) -> Embedder | None:
         try:
             return self._find_model()
         except ConfigError as error:
@@ -206,16 +233,17 @@ class Recollector:
 
     @cached_property
     def _vectors(self) -> TextVectors | None:
-        if self.embedder is None:
+        if self._embedder is None:
             return None
-        vectors = TextVectors(self.embedder)
+        vectors = TextVectors(self._embedder)
         if self._kept is not None:
             vectors.read(self._kept)
             self._n_kept = len(vectors)
         return vectors
 
     def _find_vectors(self) -> TextVectors | None:
-        return self._vectors
+        with self._loading:
+            return self._vectors
 
     def keep(self) -> None:
         """Writes the vectors of texts that are new since they were written last."""

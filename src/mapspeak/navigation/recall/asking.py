@@ -1,7 +1,7 @@
 """From a request in words to candidates with their evidence, their place and a checked goal."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from mapspeak.navigation.atlas import Atlas
@@ -11,9 +11,10 @@ from mapspeak.navigation.naming import Place, say_spot
 from mapspeak.navigation.recall.answer import Recall, RecallQuery
 from mapspeak.navigation.recall.candidates import describe_candidate
 from mapspeak.navigation.recall.filters import find_passing, point_of
+from mapspeak.navigation.recall.preferring import find_best_known
 from mapspeak.navigation.recall.wording import find_doubt, say_advice, say_evidence
 from mapspeak.navigation.thingnames import split_room
-from mapspeak.semantic.retrieval import Basis, Candidate, Verdict
+from mapspeak.semantic.retrieval import Answer, Basis, Candidate, Verdict
 
 __all__ = ["find_speaking_places", "recall"]
 
@@ -28,11 +29,16 @@ def recall(atlas: Atlas, query: RecallQuery) -> Recall:
     among = frozenset(passing)
     answer = atlas.recollection.find(query.words, among=among, limit=max(query.n, MOST_TIED))
     is_tied = 1 < answer.n_meant <= MOST_TIED
+    best = _find_best(atlas, answer, passing, room_id=query.room_id) if is_tied else None
+    if best is not None:
+        answer = replace(answer, verdict=Verdict.FOUND)
     ranks = {
         each.entry.id: _rank(atlas, each, passing[each.entry.id], is_tied=is_tied)
         for each in answer.candidates
     }
-    ranked = sorted(answer.candidates, key=lambda each: ranks[each.entry.id])
+    ranked = sorted(
+        answer.candidates, key=lambda each: (each.entry.id != best, ranks[each.entry.id])
+    )
     candidates = tuple(
         describe_candidate(
             atlas,
@@ -54,6 +60,17 @@ def recall(atlas: Atlas, query: RecallQuery) -> Recall:
         understood=answer.understood,
         limits=answer.limits,
     )
+
+
+def _find_best(
+    atlas: Atlas, answer: Answer, passing: Mapping[str, Remembered], *, room_id: str | None
+) -> str | None:
+    """Gives the id of the one that is known best of all that are called so; None where none is."""
+    meant = answer.candidates[: answer.n_meant]
+    if any(each.basis is not Basis.NAME for each in meant):
+        return None
+    best = find_best_known(atlas, [passing[each.entry.id] for each in meant], room_id=room_id)
+    return None if best is None else best.id
 
 
 def _say_why(query: RecallQuery, found: Candidate, remembered: Remembered) -> Iterator[str]:

@@ -67,15 +67,18 @@ def say_advice(
         )
     match answer.verdict:
         case Verdict.NOT_REMEMBERED:
-            nearest = f"; the nearest is {_name(candidates[0])}" if candidates else ""
+            missing = answer.missing
+            kind = f' (it sounds like "{missing}", and none is)' if missing else ""
+            first = _name(candidates[0]) if candidates else ""
+            nearest = f"; the nearest is {first}, which is probably not meant" if first else ""
             return (
-                f"Not remembered{nearest}, which is probably not meant. Say it in other words, or "
-                "look for it with search_for."
+                f"Not remembered{kind}{nearest}. Say it in other words, or look for it with "
+                "search_for."
             )
         case Verdict.AMBIGUOUS:
             return _say_ambiguous(answer, candidates)
         case Verdict.FOUND | Verdict.LIKELY:
-            return _say_found(candidates[0], doubt)
+            return _say_found(candidates[0], doubt) + _say_others(answer.n_meant - 1)
 
 
 def find_doubt(first: RecallCandidate, *, room_id: str | None) -> str:
@@ -120,6 +123,14 @@ def _say_found(first: RecallCandidate, doubt: str) -> str:
     return f"{said} navigate_to takes {first.id}{look}."
 
 
+def _say_others(n_others: int) -> str:
+    """Gives a sentence for things of the name that fewer views speak for; nothing for none."""
+    if not n_others:
+        return ""
+    are = "others are" if n_others > 1 else "other is"
+    return f" {n_others} {are} called so, of which fewer views agree."
+
+
 def _say_ambiguous(answer: Answer, candidates: Sequence[RecallCandidate]) -> str:
     first = candidates[0]
     if answer.candidates[0].basis is Basis.NAME:
@@ -128,10 +139,11 @@ def _say_ambiguous(answer: Answer, candidates: Sequence[RecallCandidate]) -> str
             f"Ambiguous: {answer.n_meant} are called so{nearest}. Choose by room, or ask which is "
             "meant, then navigate_to its id."
         )
+    kind = f' (it is more like "{answer.missing}")' if answer.missing else ""
     return (
-        f"Ambiguous: nothing is called so, and it may not be remembered; {_name(first)} is the "
-        "nearest. See why each is listed, and navigate_to an id only if it fits; else say it in "
-        "other words, or search_for it."
+        f"Ambiguous: nothing is called so, and it may not be remembered{kind}; {_name(first)} is "
+        "the nearest. See why each is listed, and navigate_to an id only if it fits; else say it "
+        "in other words, or search_for it."
     )
 
 

@@ -10,15 +10,14 @@ from mapspeak.navigation.choosing import CheckedGoal, check_place
 from mapspeak.navigation.naming import AmbiguousPlaceError, Place
 from mapspeak.navigation.places import find_place
 from mapspeak.navigation.relations import Nearest, find_all_near, parse_relation
-from mapspeak.semantic import SemanticMap, find_waypoints
 
 __all__ = ["MOST_CANDIDATES", "Candidate", "find_candidates"]
 
 MOST_CANDIDATES = 12
-LEAST_SCORE_RATIO = 0.75
-"""Of words that are no name, so much must be found in what was remembered of a place."""
-SAME_SCORE_RATIO = 0.9
-"""Places that fit so nearly as well as the best one may be meant too."""
+LEAST_SAID_RATIO = 0.75
+"""Of words that are no name, so much must be said of what they are taken for."""
+SAME_SAID_RATIO = 0.9
+"""What says so nearly as much of them as the best may be meant too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,12 +89,11 @@ def _find_meanings(atlas: Atlas, words: str, error: AmbiguousPlaceError) -> Iter
 
 
 def _find_remembered(atlas: Atlas, words: str) -> Iterator[Place]:
-    """Gives the remembered places that speak of what the words say, all that fit as well."""
-    waypoints = tuple(place.waypoint for place in atlas.places)
-    matches = find_waypoints(SemanticMap(waypoints=waypoints), words, limit=MOST_CANDIDATES)
-    if not matches or matches[0].score_ratio < LEAST_SCORE_RATIO:
-        return
-    for match in matches:
-        if match.score_ratio >= SAME_SCORE_RATIO * matches[0].score_ratio:
-            place = next(each for each in atlas.places if each.waypoint is match.waypoint)
-            yield Place(place.id, place)
+    """Gives what is surely meant or says the words; nobody is driven to what is only like them."""
+    answer = atlas.recollection.find(words, limit=MOST_CANDIDATES)
+    speaking = answer.find_speaking(least_said_ratio=LEAST_SAID_RATIO)
+    most_said = max((each.said_ratio for each in speaking), default=0.0)
+    by_id = {each.id: each for each in atlas.recollection.everything}
+    for each in speaking:
+        if each.said_ratio >= SAME_SAID_RATIO * most_said:
+            yield Place(each.entry.id, by_id[each.entry.id])

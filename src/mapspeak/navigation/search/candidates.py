@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.navigation.atlas import Atlas, RememberedPlace
-from mapspeak.navigation.goals import check_goal
+from mapspeak.navigation.choosing import check_place
+from mapspeak.navigation.naming import Place
 from mapspeak.navigation.search.opinions import Opinions, weight_of
 from mapspeak.navigation.search.seenfloor import REACH_M, SeenFloor
 from mapspeak.navigation.search.sightlines import cast_sight_lines
-from mapspeak.semantic import SemanticMap, find_waypoints
+from mapspeak.semantic.retrieval import Verdict
 from mapspeak.spatial.frontiers import Frontier
 
 __all__ = ["Candidate", "CandidateKind", "find_candidates", "unseen_area_m2"]
@@ -33,7 +34,10 @@ UNKNOWN_WEIGHT = 0.5
 """A square metre that is only expected counts as this much of one that is known and unseen."""
 NEAR_M = 5.0
 MAY_BE_NEAR = 0.8
-"""The score of what lies near a remembered place that speaks of the thing."""
+"""The score of what lies near something remembered that speaks of the thing, or is like it."""
+LEAST_SAID_RATIO = 0.5
+"""Of the words for the thing, a record says at least so much that speaks of it."""
+MOST_REMEMBERED = 12
 
 FloatArray = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -53,14 +57,14 @@ class Candidate:
 
     Attributes:
         kind: What makes it worth a look.
-        id: W2 or F3; for unseen floor its coordinates.
+        id: W2, T1 or F3; for unseen floor its coordinates.
         pose: Where to stand and where to look.
         area_m2: Floor that is to come into view for the first time, as far as can be told.
         path_m: From the robot.
         score: How likely the thing is there, 0.5 where nobody knows.
         rate: What speaks for it: square metres by their likelihood, for each metre of way.
         frontier: The frontier it is; None where it is none.
-        name: Of a remembered place.
+        name: What something remembered is known by during the search.
     """
 
     kind: CandidateKind
@@ -77,7 +81,8 @@ class Candidate:
     def reason(self) -> str:
         """Why there, in words with numbers."""
         if self.kind is CandidateKind.REMEMBERED:
-            return f"a remembered place speaks of it, {self.path_m:.1f} m away"
+            what = "thing that is remembered" if self.id.startswith("T") else "remembered place"
+            return f"a {what} speaks of it, {self.path_m:.1f} m away"
         what = "unknown or unseen floor" if self.frontier else "floor not looked at yet"
         liking = "" if self.score == 0.5 else f", score {self.score:.2f}"
         return f"{self.area_m2:.1f} m2 of {what}, {self.path_m:.1f} m away{liking}"
@@ -86,26 +91,23 @@ class Candidate:
 def find_candidates(
     atlas: Atlas, thing: str, *, seen: SeenFloor, opinions: Opinions, visited: Collection[str]
 ) -> list[Candidate]:
-    """Finds where to look next, best first; remembered places come before all others.
+    """Finds where to look next, best first; what is remembered comes before all else.
 
     Args:
         atlas: The map.
         thing: What is looked for.
         seen: What was looked at already.
         opinions: What the model thinks.
-        visited: Names of remembered places that were looked at already.
+        visited: The names of candidates of what is remembered that were looked at already.
     """
-    memory = SemanticMap(waypoints=tuple(place.waypoint for place in atlas.places))
-    speaking = [match.waypoint for match in find_waypoints(memory, thing)]
-    places = [place for place in atlas.places if place.waypoint in speaking]
+    speaking, alike = _find_remembered(atlas, thing)
     remembered = [
         candidate
-        for place in places
-        if place.waypoint.name not in visited
-        and (candidate := _remembered(atlas, place)) is not None
+        for each in speaking
+        if _key(each) not in visited and (candidate := _remembered(atlas, each)) is not None
     ]
     seen_mask = seen.mask_on(atlas.grid)
-    near = [place.waypoint.pose.point for place in places]
+    near = [each.point for each in (*speaking, *alike)]
     others = [
         *_frontiers(atlas, seen_mask, seen.half_view_rad, opinions, near),
         *_unseen(atlas, seen_mask, seen.half_view_rad, opinions, near),
@@ -124,24 +126,41 @@ def unseen_area_m2(atlas: Atlas, pose: Pose, *, seen: SeenFloor) -> float:
     return float(areas_m2[0, _heading_index(pose.yaw_rad)])
 
 
-def _remembered(atlas: Atlas, place: RememberedPlace) -> Candidate | None:
-    """Gives a remembered place, or the nearest pose to it that works; None where none does."""
-    check = check_goal(
-        atlas.grid, atlas.distances, place.waypoint.pose, opened=atlas.map.open.distances_from
+def _find_remembered(atlas: Atlas, thing: str) -> tuple[list[Place], list[Place]]:
+    """Gives what speaks of the thing, and what may be it by its likeness alone."""
+    by_id = {each.id: Place(each.id, each) for each in atlas.recollection.everything}
+    answer = atlas.recollection.find(thing, limit=MOST_REMEMBERED)
+    speaking = answer.find_speaking(least_said_ratio=LEAST_SAID_RATIO)
+    is_ambiguous = answer.verdict is Verdict.AMBIGUOUS
+    meant = answer.candidates[: answer.n_meant] if is_ambiguous else ()
+    return (
+        [by_id[each.entry.id] for each in speaking],
+        [by_id[each.entry.id] for each in meant if each not in speaking],
     )
-    pose = place.waypoint.pose if check.is_ok else check.nearest
+
+
+def _key(place: Place) -> str:
+    """Gives what it is known by as long as a search lasts; ids of waypoints change in between."""
+    remembered = place.thing
+    return remembered.waypoint.name if isinstance(remembered, RememberedPlace) else place.name
+
+
+def _remembered(atlas: Atlas, place: Place) -> Candidate | None:
+    """Gives where to stand for it, or the nearest pose that works; None where none does."""
+    goal = check_place(atlas, place)
+    pose = goal.pose if goal.check.is_ok else goal.check.nearest
     path_m = None if pose is None else atlas.path_m(pose.point)
     if pose is None or path_m is None:
         return None
     return Candidate(
         kind=CandidateKind.REMEMBERED,
-        id=place.id,
+        id=place.name,
         pose=pose,
         area_m2=0.0,
         path_m=path_m,
         score=1.0,
         rate=math.inf,
-        name=place.waypoint.name,
+        name=_key(place),
     )
 
 

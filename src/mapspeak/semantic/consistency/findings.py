@@ -37,10 +37,12 @@ WEIGHTS = {
     FindingKind.DUPLICATE: 1.0,
     FindingKind.NOT_SEEN: 0.7,
     FindingKind.POINTS_PAST: 0.5,
-    FindingKind.TWO_LABELS: 0.6,
+    FindingKind.TWO_LABELS: 0.02,
 }
 """What the odds of a thing are multiplied by. Nobody has to name all that is to be seen, so that
-"not seen" says little; two views of one place are no fault, so that a duplicate says nothing."""
+"not seen" says little; two views of one place are no fault, so that a duplicate says nothing.
+Of two labels in one place that nobody names together, both are right one time in fifty; how much
+either loses depends on how well the other is seen."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,5 +65,21 @@ class Finding:
 
     @property
     def weight(self) -> float:
-        """What the odds of a thing that it concerns are multiplied by."""
+        """What the odds of a thing that it concerns are multiplied by, at the most."""
         return WEIGHTS[self.kind]
+
+    def weight_for(self, thing: Thing) -> float:
+        """What the odds of one of the things that it concerns are multiplied by.
+
+        Two labels in one place hardly are both right, so that each is as much less likely as the
+        other is likely. Few views against many change little.
+        """
+        weight = self.weight
+        if self.kind is not FindingKind.TWO_LABELS:
+            return weight
+        product = 1.0
+        for rival in self.things:
+            if rival is not thing and rival != thing:
+                odds = rival.confidence_ratio / (1 - rival.confidence_ratio)
+                product *= (1 + weight * odds) / (1 + odds)
+        return product

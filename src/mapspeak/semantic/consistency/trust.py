@@ -32,7 +32,7 @@ def judge_trust(thing: Thing, findings: Iterable[Finding]) -> Trust:
     for finding in findings:
         share = _share(thing, finding)
         if share and finding.weight < 1.0:
-            odds *= finding.weight**share
+            odds *= finding.weight_for(thing) ** share
             reasons.append(finding.sentence)
     return Trust(odds / (1 + odds), tuple(reasons))
 

@@ -22,6 +22,13 @@ SCHEMA_VERSION = 1
 INDEX_VERSION = "1"
 """Changes with how texts become words; an index of another version is built anew."""
 
+_MOST_PAGES_IN_LOG = 4_000
+"""The log is folded into the file when it has so many pages of 4 kB, by the write that fills it.
+
+An observation changes about fifteen. At SQLite's own 1,000, one write in seventy has 1.5 MB to
+write instead of 0.13.
+"""
+
 _SCHEMA = """
 CREATE TABLE observations (
     n INTEGER PRIMARY KEY AUTOINCREMENT,
@@ -112,6 +119,7 @@ class EpisodeDatabase:
         try:
             connection.execute("PRAGMA synchronous = FULL")
             connection.execute("PRAGMA temp_store = MEMORY")
+            connection.execute(f"PRAGMA wal_autocheckpoint = {_MOST_PAGES_IN_LOG}")
             self._require_readable(connection.execute("PRAGMA user_version").fetchone()[0])
         except BaseException:
             connection.close()

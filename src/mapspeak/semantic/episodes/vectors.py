@@ -53,16 +53,20 @@ class VectorRank:
         if not texts:
             return
         kept = self._read()
-        missing = [text for text in texts if text_hash(text) not in kept]
-        made = {}
+        hashes = [text_hash(text) for text in texts]
+        missing = [(key, text) for key, text in zip(hashes, texts, strict=True) if key not in kept]
         for start in range(0, len(missing), _BATCH):
             batch = missing[start : start + _BATCH]
-            for text, vector in zip(batch, self._embedder.embed(batch), strict=True):
-                made[text_hash(text)] = np.asarray(vector, np.float16).tobytes()
-        self._write(made)
-        kept |= made
-        rows = [np.frombuffer(kept.pop(text_hash(text)), np.float16) for text in texts]
-        new = np.stack(rows).astype(np.float32)
+            vectors = self._embedder.embed([text for _, text in batch])
+            made = {
+                key: np.asarray(vector, np.float16).tobytes()
+                for (key, _), vector in zip(batch, vectors, strict=True)
+            }
+            # At once: whoever is stopped amid many texts need not begin anew.
+            self._write(made)
+            kept |= made
+        rows = np.frombuffer(b"".join(map(kept.pop, hashes)), np.float16)
+        new = rows.reshape(len(texts), -1).astype(np.float32)
         self._vectors = np.vstack([self._vectors, new]) if self._row_of else new
         self._row_of |= {text: len(self._row_of) + i for i, text in enumerate(texts)}
 
@@ -73,8 +77,8 @@ class VectorRank:
             if self._database.exists():
                 selection = "SELECT hash, vector FROM vectors WHERE embedder = ?"
                 with self._database.reading() as connection:
-                    rows = connection.execute(selection, [self._embedder.name])
-                    self._kept = {row[0]: row[1] for row in rows}
+                    connection.row_factory = None
+                    self._kept = dict(connection.execute(selection, [self._embedder.name]))
         return self._kept
 
     def _write(self, made: dict[bytes, bytes]) -> None:

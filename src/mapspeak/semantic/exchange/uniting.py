@@ -6,7 +6,7 @@ from itertools import count
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.semantic.mapfile.schema import record_data
-from mapspeak.semantic.merging import merge_waypoint, seen_from
+from mapspeak.semantic.merging import merge_waypoint
 from mapspeak.semantic.waypoint import SemanticMap, Waypoint, name_key
 
 __all__ = ["Union", "unite"]
@@ -84,8 +84,6 @@ def _join(mine: Waypoint, theirs: Waypoint) -> tuple[Waypoint | None, str]:
     if mine.recorded_at and theirs.recorded_at and mine.recorded_at != theirs.recorded_at:
         is_mine_older = mine.recorded_at < theirs.recorded_at
         older, newer = (mine, theirs) if is_mine_older else (theirs, mine)
-        if _loses_a_bearing(older, newer):
-            return None, "a landmark's bearing would be lost"
         at = max(mine.recorded_at, theirs.recorded_at).isoformat(timespec="seconds")
         # The first one's spelling of the name stays.
         return replace(_joined(older, newer), name=mine.name), f"joined, the record of {at} decides"
@@ -110,17 +108,6 @@ def _joined(older: Waypoint, newer: Waypoint) -> Waypoint:
         recorded_at=dated.recorded_at,
         room_id=newer.room_id or (older.room_id if is_same_pose else None),
         picture=newer.picture or (older.picture if is_same_pose else None),
-    )
-
-
-def _loses_a_bearing(older: Waypoint, newer: Waypoint) -> bool:
-    """True when something that only the older one has cannot be pointed at from the newer pose."""
-    named = {name_key(landmark.label) for landmark in newer.landmarks}
-    return any(
-        landmark.bearing_rad is not None
-        and seen_from(landmark, older.pose, newer.pose).bearing_rad is None
-        for landmark in older.landmarks
-        if name_key(landmark.label) not in named
     )
 
 

@@ -16,7 +16,7 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.semantic.events.event import Event
 from mapspeak.semantic.mapfile import plain
 from mapspeak.semantic.mapfile.eventschema import read_events
-from mapspeak.semantic.mapfile.layout import Layout, find_records, whole
+from mapspeak.semantic.mapfile.layout import Layout, find_changed_records, find_records, whole
 from mapspeak.semantic.mapfile.schema import (
     fault_in,
     find_misspelt_keys,
@@ -186,7 +186,10 @@ def _at_its_place(fault: TextError, source: str, text: str) -> SemanticMapError:
 
 
 def _cut(text: str, previous: MapDocument | None) -> tuple[Layout, MappingNode | None]:
-    layout = find_records(text)
+    if previous is not None and previous.layout.spans:
+        layout = find_changed_records(text, before=previous.text, layout=previous.layout)
+    else:
+        layout = find_records(text)
     root = _known_root(text, layout, previous) or _root(text, layout)
     if layout.spans and _list_items(root):
         # A part of the list stands where its dashes do not show it.

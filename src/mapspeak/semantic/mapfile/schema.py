@@ -67,6 +67,7 @@ class _LandmarkEntry(BaseModel):
     purpose: str | None = None
     bearing_deg: FiniteFloat | None = None
     range_m: Annotated[FiniteFloat, Field(ge=0)] | None = None
+    range_from: str | None = None
     confidence: Confidence | None = None
     note: str | None = None
     picture: str | None = None
@@ -81,6 +82,7 @@ class _LandmarkEntry(BaseModel):
             purpose=self.purpose,
             bearing_rad=bearing_rad,
             range_m=self.range_m,
+            range_from=self.range_from,
             confidence=self.confidence,
             note=self.note,
             picture=self.picture,
@@ -270,6 +272,7 @@ def _landmark_data(landmark: Landmark, pose: dict[str, Data]) -> Data:
         "label": landmark.label,
         "bearing_deg": None if landmark.bearing_rad is None else _angle(landmark.bearing_rad),
         "range_m": _length_if_any(landmark.range_m),
+        "range_from": landmark.range_from,
         "purpose": landmark.purpose,
         "confidence": landmark.confidence and str(landmark.confidence),
         "note": landmark.note,

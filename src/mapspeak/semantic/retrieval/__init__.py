@@ -6,7 +6,6 @@ from mapspeak.semantic.retrieval.entry import Entry, EntryKind, list_entries
 from mapspeak.semantic.retrieval.evidence import MatchEvidence, MatchField, MatchKind
 from mapspeak.semantic.retrieval.index import WORDS_ONLY, EntryIndex
 from mapspeak.semantic.retrieval.meaning import find_model
-from mapspeak.semantic.retrieval.waypoints import WaypointMatch, find_waypoints
 
 __all__ = [
     "WORDS_ONLY",
@@ -23,8 +22,6 @@ __all__ = [
     "TextVectors",
     "Thresholds",
     "Verdict",
-    "WaypointMatch",
     "find_model",
-    "find_waypoints",
     "list_entries",
 ]

@@ -1,5 +1,6 @@
 """What a search says: candidates with their evidence, and how far to trust the first."""
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -35,18 +36,21 @@ class Basis(StrEnum):
 class Thresholds:
     """How likenesses are judged; each way of comparing has a scale of its own.
 
-    How sure an answer is, is the first candidate's score, plus how far it is ahead of the first
-    that is called otherwise.
+    How sure an answer is, is how alike the request and what is said of the first candidate are,
+    plus how far that is ahead of the first that is called otherwise.
 
     Attributes:
         least_ratio: Surer than that something may be meant; else it is not remembered.
         sure_ratio: As sure as that the first candidate's kind is the one meant.
         same_ratio: Scores no further apart are as good as equal.
+        absent_ratio: Where a kind of thing that is not remembered is so much more like a request
+            than anything that is, that kind is meant; never where infinite.
     """
 
     least_ratio: float
     sure_ratio: float
     same_ratio: float
+    absent_ratio: float = math.inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,6 +64,8 @@ class Candidate:
         field: Which part of the record is most like the request.
         text: What stands there.
         evidence: The words of the request that the record says.
+        said_ratio: How much of the request the record says word for word; rare words and names
+            count more, parts of words nothing.
     """
 
     entry: Entry
@@ -68,6 +74,7 @@ class Candidate:
     field: MatchField
     text: str
     evidence: tuple[MatchEvidence, ...]
+    said_ratio: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,7 +88,10 @@ class Answer:
             are only the nearest things, and probably none of them is meant.
         candidates: The likeliest first.
         n_meant: How many, of all that is remembered, fit as well as the first.
+        is_sure: Whether what is meant is called as the first is, however many of it there are.
         limits: What the search could not do, in words; None where nothing was missing.
+        missing: A kind of thing that is not remembered and more like the request than anything
+            that is; None where there is none, or no model to compare them.
     """
 
     query: str
@@ -89,7 +99,18 @@ class Answer:
     verdict: Verdict
     candidates: tuple[Candidate, ...]
     n_meant: int
+    is_sure: bool
     limits: str | None = None
+    missing: str | None = None
+
+    def find_speaking(self, *, least_said_ratio: float) -> tuple[Candidate, ...]:
+        """Gives the candidates that are surely meant, or that say enough of the request."""
+        n_sure = self.n_meant if self.is_sure else 0
+        return tuple(
+            each
+            for number, each in enumerate(self.candidates)
+            if number < n_sure or each.said_ratio >= least_said_ratio
+        )
 
     @property
     def is_one_kind(self) -> bool:

@@ -7,7 +7,7 @@ __all__ = ["FIELD_WEIGHTS", "KIND_WEIGHTS", "MatchEvidence", "MatchField", "Matc
 
 
 class MatchField(StrEnum):
-    """Where in a record a word was found."""
+    """Where in a record a word was found, or where in what is commonly known of such a thing."""
 
     NAME = "name"
     LABEL = "label"
@@ -17,6 +17,8 @@ class MatchField(StrEnum):
     NOTE = "note"
     DESCRIPTION = "description"
     PLACE = "place"
+    OTHER_NAME = "other name"
+    USE = "usual use"
 
 
 class MatchKind(StrEnum):
@@ -40,6 +42,8 @@ FIELD_WEIGHTS = {
     MatchField.NOTE: 0.6,
     MatchField.DESCRIPTION: 0.6,
     MatchField.PLACE: 0.4,
+    MatchField.OTHER_NAME: 0.7,
+    MatchField.USE: 0.4,
 }
 KIND_WEIGHTS = {
     MatchKind.SAME: 1.0,

@@ -1,9 +1,12 @@
 """Finds remembered places and things by their names, by what they mean, or by the words used.
 
 A name comes first. For all else meanings are compared where there is a model, and only words where
-there is none: mixing the two found less than the model alone.
+there is none: mixing the two found less than the model alone. Compared is what is said of a thing
+and, counting a little less, what is commonly known of such things. Only what is said makes an
+answer sure, and a kind of thing that is not remembered may be what is meant instead.
 """
 
+import math
 import re
 from collections import defaultdict
 from collections.abc import Container, Iterable, Sequence
@@ -16,11 +19,13 @@ from numpy.typing import NDArray
 from mapspeak.semantic.retrieval.answer import Answer, Basis, Candidate, Thresholds, Verdict
 from mapspeak.semantic.retrieval.embedder import TextVectors
 from mapspeak.semantic.retrieval.entry import Entry
+from mapspeak.semantic.retrieval.evidence import MatchEvidence
+from mapspeak.semantic.retrieval.kindindex import KindIndex, Missing
 from mapspeak.semantic.retrieval.meaning import is_word
 from mapspeak.semantic.retrieval.meaningindex import Likeness, MeaningIndex
 from mapspeak.semantic.retrieval.spelling import LookAlikes
 from mapspeak.semantic.retrieval.wordindex import Asked, WordIndex
-from mapspeak.semantic.retrieval.words import content_words, stem
+from mapspeak.semantic.retrieval.words import content_stems, content_words, stem
 from mapspeak.semantic.waypoint import name_key
 
 _Key = TypeVar("_Key")
@@ -29,7 +34,7 @@ __all__ = ["WORDS_ONLY", "EntryIndex"]
 
 WORDS_ONLY = "The search compares words only; install mapspeak[semantic] to compare meanings."
 
-WORD_THRESHOLDS = Thresholds(least_ratio=0.05, sure_ratio=1.1, same_ratio=0.02)
+WORD_THRESHOLDS = Thresholds(least_ratio=0.05, sure_ratio=1.1, same_ratio=0.02, absent_ratio=0.3)
 """Chosen on the requests for tuning; benchmarks/requests/README.md says by which rule."""
 
 _SAME_NAME, _SAME_WORDS, _SAME_WORDS_MISSPELT = 1.0, 0.99, 0.98
@@ -46,11 +51,23 @@ with unknown words at most .69 like any.
 
 @dataclass(frozen=True, slots=True)
 class _Asked:
-    """A request, and how alike each entry is to it; the likeness where meanings were compared."""
+    """A request, and how alike each entry is to it.
+
+    Attributes:
+        words: Its words.
+        common: The same, as they stand in what is commonly known.
+        ratios: By all that is said and commonly known of the entry.
+        said_ratios: By what is said of it alone.
+        likeness: Where meanings were compared.
+        missing: What else may be meant.
+    """
 
     words: tuple[Asked, ...]
+    common: tuple[Asked, ...]
     ratios: NDArray[np.float64]
+    said_ratios: NDArray[np.float64]
     likeness: Likeness | None
+    missing: Missing | None
 
     def basis(self, number: int) -> Basis:
         if self.ratios[number] > _MOST_WITHOUT_NAME:
@@ -69,14 +86,24 @@ class EntryIndex:
 
     def __init__(self, entries: Sequence[Entry], *, vectors: TextVectors | None = None) -> None:
         self._entries = sorted(entries, key=lambda entry: entry.id)
-        self._words = WordIndex([entry.texts for entry in self._entries], is_known=is_word)
-        self._meanings = None if vectors is None else MeaningIndex(self._entries, vectors)
+        self._vectors = vectors
+        said = [entry.texts for entry in self._entries]
+        self._kinds = KindIndex(self._entries, said, vectors)
+        common = [self._kinds.say_of(entry) for entry in self._entries]
+        self._words = WordIndex(said, is_known=is_word)
+        # A model compares meanings of what is commonly known, and needs no words of it.
+        self._common_words = WordIndex(common if vectors is None else (), is_known=is_word)
+        self._meanings = (
+            None if vectors is None else MeaningIndex(self._entries, said, common, vectors)
+        )
         self._thresholds = WORD_THRESHOLDS if vectors is None else vectors.embedder.thresholds
         names = [entry.names for entry in self._entries]
-        self._of_key = _numbers_by({name_key(name) for name in each} for each in names)
-        self._of_stems = _numbers_by({_stems(name) for name in each} for each in names)
-        plain = {_plain(name) for each in names for name in each}
-        self._look_alikes = LookAlikes(plain - {""})
+        words_of = {name: _words_of(name) for each in names for name in each}
+        keys = {name: name_key(name) for name in words_of}
+        stems = {name: tuple(map(stem, words)) for name, words in words_of.items()}
+        self._of_key = _numbers_by({keys[name] for name in each} for each in names)
+        self._of_stems = _numbers_by({stems[name] for name in each} for each in names)
+        self._look_alikes = LookAlikes({" ".join(words) for words in words_of.values()} - {""})
 
     def find(self, query: str, *, among: Container[str] | None = None, limit: int = 5) -> Answer:
         """Finds what a request may mean.
@@ -91,33 +118,50 @@ class EntryIndex:
         asked = self._compare(query, understood, words)
         order = self._order(asked.ratios, among)
         n_meant = self._count_meant(asked, order)
+        verdict, is_sure = self._judge(asked, order, n_meant)
+        said = self._words.said_ratios(words)
         return Answer(
             query=query,
             understood=understood,
-            verdict=self._judge(asked, order, n_meant),
-            candidates=tuple(self._candidate(number, asked) for number in order[:limit]),
+            verdict=verdict,
+            candidates=tuple(self._candidate(number, asked, said) for number in order[:limit]),
             n_meant=n_meant,
+            is_sure=is_sure,
+            missing=_find_missing(asked, order),
             limits=WORDS_ONLY if self._meanings is None else None,
         )
 
     def _understand(self, query: str, words: tuple[Asked, ...]) -> str:
         """Gives the request with its words put right, or the name that it looks like."""
         put_right = _put_right(query, words)
-        if _stems(put_right) in self._of_stems or not any(word.is_doubtful for word in words):
+        if content_stems(put_right) in self._of_stems or not any(
+            word.is_doubtful for word in words
+        ):
             return put_right
-        likest = self._look_alikes.find(_plain(query), least_ratio=_LEAST_NAME_LIKENESS, limit=1)
+        likest = self._look_alikes.find(
+            " ".join(_words_of(query)), least_ratio=_LEAST_NAME_LIKENESS, limit=1
+        )
         return likest[0] if likest else put_right
 
     def _compare(self, query: str, understood: str, words: tuple[Asked, ...]) -> _Asked:
-        likeness = None
-        if self._meanings is not None and _is_in_latin_letters(understood):
-            likeness = self._meanings.compare(understood)
-        ratios = self._words.score_ratios(words) if likeness is None else likeness.ratios
+        common: tuple[Asked, ...] = ()
+        likeness, missing = None, None
+        if self._vectors is None or self._meanings is None or not _is_in_latin_letters(understood):
+            said_ratios = self._words.score_ratios(words)
+            ratios = said_ratios
+            if self._vectors is None:
+                common = self._common_words.ask(understood)
+                ratios = np.maximum(said_ratios, self._common_words.said_ratios(common))
+                missing = self._kinds.find_missing_called(understood)
+        else:
+            vector = self._vectors.embedder.embed([understood])[0].astype(np.float64)
+            likeness, missing = self._meanings.compare(vector), self._kinds.find_missing(vector)
+            ratios, said_ratios = likeness.ratios, likeness.said_ratios
         ratios = np.clip(ratios, 0.0, _MOST_WITHOUT_NAME)
-        ratios[self._of_stems.get(_stems(understood), [])] = _SAME_WORDS_MISSPELT
-        ratios[self._of_stems.get(_stems(query), [])] = _SAME_WORDS
+        ratios[self._of_stems.get(content_stems(understood), [])] = _SAME_WORDS_MISSPELT
+        ratios[self._of_stems.get(content_stems(query), [])] = _SAME_WORDS
         ratios[self._of_key.get(name_key(query), [])] = _SAME_NAME
-        return _Asked(words, ratios, likeness)
+        return _Asked(words, common, ratios, said_ratios, likeness, missing)
 
     def _order(self, ratios: NDArray[np.float64], among: Container[str] | None) -> list[int]:
         """Gives the numbers of the entries that say anything of it, the likeliest first."""
@@ -133,16 +177,22 @@ class EntryIndex:
         margin = 0.0 if asked.basis(order[0]) is Basis.NAME else self._thresholds.same_ratio
         return int(np.count_nonzero(asked.ratios[order] >= asked.ratios[order[0]] - margin))
 
-    def _judge(self, asked: _Asked, order: list[int], n_meant: int) -> Verdict:
+    def _judge(self, asked: _Asked, order: list[int], n_meant: int) -> tuple[Verdict, bool]:
+        """Says how far to trust the likeliest, and whether what is meant is surely called so."""
         if not order:
-            return Verdict.NOT_REMEMBERED
-        if asked.basis(order[0]) is not Basis.NAME:
-            sureness = asked.ratios[order[0]] + self._lead_ratio(asked.ratios, order[0])
-            if sureness < self._thresholds.least_ratio:
-                return Verdict.NOT_REMEMBERED
-            if sureness < self._thresholds.sure_ratio:
-                return Verdict.AMBIGUOUS
-        return Verdict.FOUND if n_meant == 1 else Verdict.AMBIGUOUS
+            return Verdict.NOT_REMEMBERED, False
+        first, thresholds = order[0], self._thresholds
+        is_sure = asked.basis(first) is Basis.NAME
+        if not is_sure:
+            lead = self._lead_ratio(asked.ratios, first)
+            missing = _missing_ratio(asked, order)
+            is_sure = missing <= 0 and asked.said_ratios[first] + lead >= thresholds.sure_ratio
+            if (
+                missing > thresholds.absent_ratio
+                or asked.ratios[first] + lead < thresholds.least_ratio
+            ):
+                return Verdict.NOT_REMEMBERED, False
+        return Verdict.FOUND if is_sure and n_meant == 1 else Verdict.AMBIGUOUS, is_sure
 
     def _lead_ratio(self, ratios: NDArray[np.float64], first: int) -> float:
         """Says how far one is ahead of the next of all that is remembered and called otherwise.
@@ -155,13 +205,13 @@ class EntryIndex:
         is_other[self._of_key[name]] = False
         return float(ratios[first] - ratios[is_other].max()) if is_other.any() else 0.0
 
-    def _candidate(self, number: int, asked: _Asked) -> Candidate:
-        entry, evidence = self._entries[number], self._words.explain(asked.words, number)
-        basis = asked.basis(number)
+    def _candidate(self, number: int, asked: _Asked, said: NDArray[np.float64]) -> Candidate:
+        entry, basis = self._entries[number], asked.basis(number)
+        evidence = self._explain(asked, number)
         field, text = entry.texts[0]
         if basis is Basis.MEANING and asked.likeness is not None:
             field, text = asked.likeness.nearest_text(number)
-        elif basis is Basis.WORDS and evidence:
+        elif basis is Basis.WORDS:
             best = max(evidence, key=lambda each: each.weight)
             field, text = best.field, best.text
         return Candidate(
@@ -171,7 +221,29 @@ class EntryIndex:
             field=field,
             text=text,
             evidence=evidence,
+            said_ratio=float(said[number]),
         )
+
+    def _explain(self, asked: _Asked, number: int) -> tuple[MatchEvidence, ...]:
+        """Gives which words the record says; where it says none, what is commonly known does."""
+        said = self._words.explain(asked.words, number)
+        return said or self._common_words.explain(asked.common, number)
+
+
+def _missing_ratio(asked: _Asked, order: list[int]) -> float:
+    """Says how far something that is not remembered is ahead of the likeliest that is."""
+    if asked.missing is None or (order and asked.basis(order[0]) is Basis.NAME):
+        return -math.inf
+    if not order:
+        return math.inf
+    return asked.missing.ratio - float(asked.ratios[order[0]])
+
+
+def _find_missing(asked: _Asked, order: list[int]) -> str | None:
+    """Gives the name of what is more like the request than anything that is remembered."""
+    if asked.missing is None or _missing_ratio(asked, order) <= 0:
+        return None
+    return asked.missing.name
 
 
 def _numbers_by(keys: Iterable[Iterable[_Key]]) -> dict[_Key, list[int]]:
@@ -190,12 +262,8 @@ def _put_right(query: str, words: Iterable[Asked]) -> str:
     return query
 
 
-def _plain(text: str) -> str:
-    return " ".join(word for _, word in content_words(text))
-
-
-def _stems(text: str) -> tuple[str, ...]:
-    return tuple(stem(word) for _, word in content_words(text))
+def _words_of(text: str) -> list[str]:
+    return [word for _, word in content_words(text)]
 
 
 def _is_in_latin_letters(text: str) -> bool:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mapspeak.semantic.retrieval.embedder import TextVectors
 from mapspeak.semantic.retrieval.entry import Entry
 from mapspeak.semantic.retrieval.evidence import MatchField
+from mapspeak.semantic.retrieval.wordindex import Texts
 
 __all__ = ["Likeness", "MeaningIndex"]
 
@@ -20,14 +21,17 @@ _COMPARED = (
     MatchField.FEATURE,
     MatchField.PLACE,
 )
+_COMMON = (MatchField.OTHER_NAME, MatchField.USE)
+_LESS_FOR_COMMON = 0.05
+"""What is commonly known of a thing counts so much less than what is said of it."""
+_BETWEEN_SENTENCES = re.compile(r"(?<=[.!?])\s+|\n+")
 _AT_ONCE = 4096
 _LEAST_LENGTH = 1e-3
 
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class _Part:
+class _Part(NamedTuple):
     """Something said of an entry: its name alone, or its name with one sentence more."""
 
     name: str
@@ -39,23 +43,42 @@ class Likeness:
     """How alike some entries and a phrase are.
 
     Args:
-        parts: What is said of the entries, one after another.
-        starts: Where each entry's first part stands.
+        parts: What is said of all entries.
+        numbers: Which of these are said of the first entry, then of the next, and so on.
+        starts: Where each entry's first number stands.
         part_ratios: How alike each part and the phrase are, from -1 to 1.
+        is_common: Which parts are what is commonly known of such a thing.
+
+    Attributes:
+        ratios: How alike each entry and the phrase are.
+        said_ratios: The same by what is said of it alone, not by what is commonly known.
     """
 
     def __init__(
-        self, parts: Sequence[_Part], starts: NDArray[np.int64], part_ratios: Floats
+        self,
+        parts: Sequence[_Part],
+        numbers: NDArray[np.int64],
+        starts: NDArray[np.int64],
+        part_ratios: Floats,
+        is_common: NDArray[np.bool_],
     ) -> None:
-        self._parts, self._starts, self._part_ratios = parts, starts, part_ratios
-        self.ratios = np.maximum.reduceat(part_ratios, starts) if len(starts) else part_ratios
+        self._parts, self._numbers, self._starts = parts, numbers, starts
+        self._part_ratios = np.where(is_common, part_ratios - _LESS_FOR_COMMON, part_ratios)
+        self.ratios = self._most_by_entry(self._part_ratios)
+        self.said_ratios = self._most_by_entry(np.where(is_common, -1.0, part_ratios))
 
     def nearest_text(self, number: int) -> tuple[MatchField, str]:
         """Gives the text of an entry that is most like the phrase, and which part it is."""
         following = self._starts[number + 1 :]
-        own = slice(self._starts[number], following[0] if len(following) else None)
-        part = self._parts[own][int(self._part_ratios[own].argmax())]
+        own = self._numbers[self._starts[number] : following[0] if len(following) else None]
+        part = self._parts[own[int(self._part_ratios[own].argmax())]]
         return part.field, part.text
+
+    def _most_by_entry(self, part_ratios: Floats) -> Floats:
+        if not len(self._starts):
+            return part_ratios
+        most: Floats = np.maximum.reduceat(part_ratios[self._numbers], self._starts)
+        return most
 
 
 class MeaningIndex:
@@ -64,28 +87,49 @@ class MeaningIndex:
     The vector of "ladder: for reaching the top" is the sum of those of its two halves, which count
     the same. It finds as much as that of the whole would, and each text need be embedded only once,
     however many things are called a ladder or stand in one place.
+
+    Args:
+        entries: What is remembered.
+        said: The texts of each.
+        common: What is commonly known of each.
+        vectors: What compares meanings.
     """
 
-    def __init__(self, entries: Sequence[Entry], vectors: TextVectors) -> None:
-        self._vectors = vectors
-        parts = [list(_parts(entry)) for entry in entries]
-        self._parts = [part for own in parts for part in own]
-        self._starts = np.cumsum([0, *map(len, parts)])[:-1]
+    def __init__(
+        self,
+        entries: Sequence[Entry],
+        said: Sequence[Texts],
+        common: Sequence[Texts],
+        vectors: TextVectors,
+    ) -> None:
+        number_of: dict[_Part, int] = {}
+        numbers = [
+            [number_of.setdefault(part, len(number_of)) for part in _all_parts(*each)]
+            for each in zip(entries, said, common, strict=True)
+        ]
+        self._parts = list(number_of)
+        self._numbers = np.array([number for own in numbers for number in own], dtype=np.int64)
+        self._starts = np.cumsum([0, *map(len, numbers)])[:-1]
         texts = sorted({text for part in self._parts for text in (part.name, part.text)})
-        number_of = {text: number for number, text in enumerate(texts)}
+        row_of = {text: row for row, text in enumerate(texts)}
         self._texts = vectors.find(texts).astype(np.float64)
-        self._names = np.array([number_of[part.name] for part in self._parts], dtype=int)
-        self._contexts = np.array([number_of[part.text] for part in self._parts], dtype=int)
+        self._names = np.array([row_of[part.name] for part in self._parts], dtype=int)
+        self._contexts = np.array([row_of[part.text] for part in self._parts], dtype=int)
+        self._is_common = np.array([part.field in _COMMON for part in self._parts], dtype=bool)
         # Never 0: halves may be unknown words, or say the very opposite.
         self._lengths = np.maximum(self._lengths_of_sums(), _LEAST_LENGTH)
 
-    def compare(self, phrase: str) -> Likeness:
-        """Gives how alike each entry and a phrase are: as its part that is most like the phrase."""
-        vector = self._vectors.embedder.embed([phrase])[0].astype(np.float64)
+    def compare(self, vector: Floats) -> Likeness:
+        """Gives how alike each entry and a phrase are: as its part that is most like the phrase.
+
+        Args:
+            vector: The phrase's.
+        """
         likeness = self._texts @ vector
         ratios = likeness[self._names] + likeness[self._contexts]
         # Rounded, since the order of the rows may change the last digit of a product.
-        return Likeness(self._parts, self._starts, np.round(ratios / self._lengths, 6))
+        ratios = np.round(ratios / self._lengths, 6)
+        return Likeness(self._parts, self._numbers, self._starts, ratios, self._is_common)
 
     def _lengths_of_sums(self) -> Floats:
         lengths = np.empty(len(self._parts))
@@ -96,14 +140,26 @@ class MeaningIndex:
         return lengths
 
 
-def _parts(entry: Entry) -> Iterator[_Part]:
-    for field, text in entry.texts[: len(entry.names)]:
+def _all_parts(entry: Entry, said: Texts, common: Texts) -> Iterator[_Part]:
+    yield from _parts(entry, said)
+    yield from _common_parts(entry, common)
+
+
+def _parts(entry: Entry, texts: Texts) -> Iterator[_Part]:
+    for field, text in texts[: len(entry.names)]:
         yield _Part(text, field, text)
-    for field, text in entry.texts[len(entry.names) :]:
+    for field, text in texts[len(entry.names) :]:
         if field in _COMPARED and text not in entry.surroundings:
             for sentence in _sentences(text):
                 yield _Part(entry.name, field, sentence)
 
 
+def _common_parts(entry: Entry, texts: Texts) -> Iterator[_Part]:
+    for field, text in texts:
+        yield _Part(text, field, text)
+        if field is MatchField.USE:
+            yield _Part(entry.name, field, text)
+
+
 def _sentences(text: str) -> list[str]:
-    return [part for part in re.split(r"(?<=[.!?])\s+|\n+", text) if part]
+    return [part for part in _BETWEEN_SENTENCES.split(text) if part]

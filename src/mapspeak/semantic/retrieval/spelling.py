@@ -1,8 +1,10 @@
 """Which words of a vocabulary count as a word that was asked for, and which texts look like one."""
 
 import difflib
+from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,23 +46,19 @@ class Vocabulary:
     Args:
         words: As they are compared.
         is_known: Whether it is a word of the language, and so not a misspelt one.
-        accepted: How a word may be the same as another.
     """
 
     def __init__(
-        self,
-        words: Iterable[str],
-        *,
-        is_known: Callable[[str], bool] = lambda _: False,
-        accepted: Collection[MatchKind] = tuple(MatchKind),
+        self, words: Iterable[str], *, is_known: Callable[[str], bool] = lambda _: False
     ) -> None:
         self._words = sorted(set(words))
         self._look_alikes = LookAlikes(self._words)
         self._is_known = is_known
-        self._accepted = accepted
         self._of_stem: dict[str, list[str]] = defaultdict(list)
         for word in self._words:
             self._of_stem[stem(word)].append(word)
+        self._stems = sorted(self._of_stem)
+        self._stems_backwards = sorted(own[::-1] for own in self._stems)
 
     def is_doubtful(self, word: str) -> bool:
         """Whether a word is neither one of these nor a known one, and so perhaps misspelt."""
@@ -72,27 +70,31 @@ class Vocabulary:
         found = dict.fromkeys(self._of_stem.get(stem(word), ()), MatchKind.FORM)
         if word in found:
             found[word] = MatchKind.SAME
-        if MatchKind.PART in self._accepted:
-            found = dict.fromkeys(self._parts(stem(word)), MatchKind.PART) | found
+        found = dict.fromkeys(self._parts(stem(word)), MatchKind.PART) | found
         return found or dict.fromkeys(self._misspelt(word), MatchKind.MISSPELT)
 
     def _parts(self, asked: str) -> list[str]:
         """Gives the words that begin or end with this stem, or that it begins or ends with."""
-        if len(asked) < _MIN_LETTERS:
+        n = len(asked)
+        if n < _MIN_LETTERS:
             return []
-        return [
-            word
-            for own, words in self._of_stem.items()
-            if own.startswith(asked)
-            or own.endswith(asked)
-            or (len(own) >= _MIN_LETTERS and (asked.startswith(own) or asked.endswith(own)))
-            for word in words
-        ]
+        begins = {asked[:end] for end in range(_MIN_LETTERS, n + 1)}
+        ends = {asked[start:] for start in range(n - _MIN_LETTERS + 1)}
+        stems = {own for own in begins | ends if own in self._of_stem}
+        stems.update(_beginning_with(self._stems, asked))
+        stems.update(own[::-1] for own in _beginning_with(self._stems_backwards, asked[::-1]))
+        return sorted(word for own in stems for word in self._of_stem[own])
 
     def _misspelt(self, word: str) -> list[str]:
         if len(word) < _MIN_LETTERS or self._is_known(word):
             return []
         return self._look_alikes.find(word, least_ratio=_MIN_LIKENESS_RATIO, limit=_MOST_MISSPELT)
+
+
+def _beginning_with(words: Sequence[str], start: str) -> Iterator[str]:
+    """Gives the words that begin so, of words in order."""
+    behind = (words[number] for number in range(bisect_left(words, start), len(words)))
+    return takewhile(lambda word: word.startswith(start), behind)
 
 
 def _letters(word: str) -> NDArray[np.int64]:

@@ -2,7 +2,7 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,28 +53,27 @@ class WordIndex:
     Args:
         records: What each record says.
         is_known: Whether it is a word of the language, and so not a misspelt one.
-        accepted: How a word may be the same as another.
     """
 
     def __init__(
-        self,
-        records: Sequence[Texts],
-        *,
-        is_known: Callable[[str], bool] = lambda _: False,
-        accepted: Collection[MatchKind] = tuple(MatchKind),
+        self, records: Sequence[Texts], *, is_known: Callable[[str], bool] = lambda _: False
     ) -> None:
         self._records = records
         weights: dict[str, dict[int, float]] = defaultdict(dict)
+        # Many records say the same.
+        words_of: dict[str, list[str]] = {}
         for number, texts in enumerate(records):
             for field, text in texts:
-                for _, word in split_words(text):
+                if text not in words_of:
+                    words_of[text] = [word for _, word in split_words(text)]
+                for word in words_of[text]:
                     least = weights[word].get(number, 0.0)
                     weights[word][number] = max(least, FIELD_WEIGHTS[field])
         self._postings = {
             word: (np.array(list(found)), np.array(list(found.values())))
             for word, found in weights.items()
         }
-        self._vocabulary = Vocabulary(self._postings, is_known=is_known, accepted=accepted)
+        self._vocabulary = Vocabulary(self._postings, is_known=is_known)
 
     def ask(self, phrase: str) -> tuple[Asked, ...]:
         """Gives the words of a phrase that say what is meant, and what the records have of them."""
@@ -89,12 +88,21 @@ class WordIndex:
 
     def score_ratios(self, asked: Sequence[Asked]) -> NDArray[np.float64]:
         """Gives, for each record, how much of a phrase it says; rare words count more."""
+        return self._score_ratios(asked, KIND_WEIGHTS)
+
+    def said_ratios(self, asked: Sequence[Asked]) -> NDArray[np.float64]:
+        """Gives the same where a part of a longer word counts as nothing."""
+        return self._score_ratios(asked, KIND_WEIGHTS | {MatchKind.PART: 0.0})
+
+    def _score_ratios(
+        self, asked: Sequence[Asked], kind_weights: Mapping[MatchKind, float]
+    ) -> NDArray[np.float64]:
         found = np.zeros(len(self._records))
         for word in asked:
             best = np.zeros(len(self._records))
             for spelling, kind in word.spellings.items():
                 numbers, weights = self._postings[spelling]
-                best[numbers] = np.maximum(best[numbers], weights * KIND_WEIGHTS[kind])
+                best[numbers] = np.maximum(best[numbers], weights * kind_weights[kind])
             found += word.weight * best
         return found / max(sum(word.weight for word in asked), 1e-9)
 

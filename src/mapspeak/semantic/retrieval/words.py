@@ -4,7 +4,7 @@ import re
 import unicodedata
 from collections.abc import Iterator
 
-__all__ = ["content_words", "split_words", "stem"]
+__all__ = ["content_stems", "content_words", "split_words", "stem"]
 
 _FILLERS = """
     a an and any are at by can closest could drive find for from get go goto here i in is it its me
@@ -20,8 +20,12 @@ _ENDING = re.compile(r"(?<=\w)['\u2019](?:d|ll|m|re|s|t|ve)\b", re.IGNORECASE)
 def split_words(text: str) -> Iterator[tuple[str, str]]:
     """Gives each word as it stands and as it is compared: small letters without accents."""
     for shown in re.findall(r"\w+", text):
-        letters = unicodedata.normalize("NFKD", shown.casefold())
-        yield shown, "".join(c for c in letters if not unicodedata.combining(c))
+        yield shown, shown.lower() if shown.isascii() else _without_accents(shown)
+
+
+def _without_accents(word: str) -> str:
+    letters = unicodedata.normalize("NFKD", word.casefold())
+    return "".join(letter for letter in letters if not unicodedata.combining(letter))
 
 
 def content_words(text: str) -> Iterator[tuple[str, str]]:
@@ -32,6 +36,11 @@ def content_words(text: str) -> Iterator[tuple[str, str]]:
         tells_apart = len(word) == 1 and 1 < number == len(words)
         if tells_apart or word not in _FILLERS:
             yield shown, word
+
+
+def content_stems(text: str) -> tuple[str, ...]:
+    """Gives the stems of the words that say what is meant."""
+    return tuple(stem(word) for _, word in content_words(text))
 
 
 def stem(word: str) -> str:

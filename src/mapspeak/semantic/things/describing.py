@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from mapspeak.geometry import Point
 from mapspeak.semantic.things.placing import Placement
@@ -10,8 +10,13 @@ from mapspeak.semantic.things.sighting import Sighting
 from mapspeak.semantic.things.thing import Category, Thing, View
 from mapspeak.semantic.waypoint import name_key
 
-__all__ = ["describe_group"]
+__all__ = ["LEAST_AGREEMENT", "describe_group"]
 
+LEAST_AGREEMENT = 2.0
+"""A view that is less than so much likelier than by chance, given the others, places nothing."""
+
+_BEST_ODDS = 1e6
+"""However many views agree: they may all be of a map that is wrong."""
 _SAME_PLACE_M = 0.3
 """Views from nearer to each other share their mistakes and count once."""
 
@@ -44,6 +49,7 @@ def describe_group(
         supporting=tuple(_view(each, _say_support(each, position)) for each in ordered),
         conflicting=tuple(_view(each, _say_conflict(each, position)) for each in conflicting),
         confidence_ratio=_confidence(group, agreements),
+        n_agreeing=_count_agreeing(group, agreements),
     )
 
 
@@ -88,11 +94,27 @@ def _confidence(group: Sequence[Sighting], agreements: Sequence[float]) -> float
 
     The first view may be wrong in any way; a further one must be wrong and agree by chance.
     """
-    odds, places = 1.0, list[Point]()
+    odds = 1.0
+    for i, (each, agreement) in enumerate(_from_different_places(group, agreements)):
+        odds *= (1 - each.wrong_ratio) / each.wrong_ratio * (agreement if i else 1.0)
+    odds = min(odds, _BEST_ODDS)
+    return odds / (1 + odds)
+
+
+def _count_agreeing(group: Sequence[Sighting], agreements: Sequence[float]) -> int:
+    agreeing = [
+        agreement >= LEAST_AGREEMENT for _, agreement in _from_different_places(group, agreements)
+    ]
+    return sum(agreeing)
+
+
+def _from_different_places(
+    group: Sequence[Sighting], agreements: Sequence[float]
+) -> Iterator[tuple[Sighting, float]]:
+    """Gives the first view from each place, with its agreement."""
+    places = list[Point]()
     for each, agreement in zip(group, agreements, strict=True):
         here = each.waypoint.pose.point
-        if any(here.distance_to(other) < _SAME_PLACE_M for other in places):
-            continue
-        odds *= (1 - each.wrong_ratio) / each.wrong_ratio * (agreement if places else 1.0)
-        places.append(here)
-    return odds / (1 + odds)
+        if all(here.distance_to(other) >= _SAME_PLACE_M for other in places):
+            places.append(here)
+            yield each, agreement

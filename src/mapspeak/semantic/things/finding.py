@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.semantic.things.describing import describe_group
+from mapspeak.semantic.things.describing import LEAST_AGREEMENT, describe_group
 from mapspeak.semantic.things.joining import (
     Group,
     Posteriors,
@@ -29,8 +29,6 @@ __all__ = ["Located", "Things", "find_things"]
 
 PLAIN_SIGHT_M = 5.0
 """Who stands no farther and has nothing between would see a thing."""
-LEAST_AGREEMENT = 2.0
-"""A view that is less than so much likelier than by chance, given the others, places nothing."""
 ELSEWHERE_RAD = math.radians(30)
 """A view that points so far past a thing says that it is elsewhere."""
 
@@ -157,7 +155,7 @@ def _solve(sight: SightMap, pool: Sequence[Sighting], same_name: SameName) -> tu
     groups = join_sightings(posteriors, placed, same_name) if placed else []
     agreed = [agreement_of(sight, group) for group in groups]
     located = [
-        (group, place(sight, posteriors.of(_agreeing(group, shares))))
+        (group, _place(posteriors, _agreeing(group, shares)))
         for group, shares in zip(groups, agreed, strict=True)
     ]
     lost: list[Group] = [
@@ -172,6 +170,11 @@ def _solve(sight: SightMap, pool: Sequence[Sighting], same_name: SameName) -> tu
         ),
         *(Located(group=tuple(group), placement=None, agreements=(1.0,)) for group in lost),
     )
+
+
+def _place(posteriors: Posteriors, group: Group) -> Placement:
+    seen_from = [each.waypoint.pose.point for each in group]
+    return place(posteriors.sight, posteriors.of(group), seen_from)
 
 
 def _agreeing(group: Group, agreements: Sequence[float]) -> Group:

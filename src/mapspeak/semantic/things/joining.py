@@ -2,8 +2,8 @@
 
 Votes of all views with one name are added up over the map. The place with most votes is a thing;
 the views that speak of it are taken out, at most one from each pose, since who names two sees
-two. What is left votes again. Then every view may change to the thing that explains it best, and
-things that are better explained as one are joined.
+two, and none whose range puts it elsewhere. What is left votes again. Then every view may change
+to the thing that explains it best, and things that are better explained as one are joined.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mapspeak.semantic.merging import SAME_SPOT_M
 from mapspeak.semantic.things.likelihood import ViewLikelihood
 from mapspeak.semantic.things.placing import (
     Posterior,
@@ -21,6 +22,8 @@ from mapspeak.semantic.things.placing import (
 )
 from mapspeak.semantic.things.sight import SightMap
 from mapspeak.semantic.things.sighting import Sighting
+from mapspeak.semantic.things.spots import are_apart
+from mapspeak.semantic.waypoint import Waypoint
 from mapspeak.spatial.grid import FloatArray, IntArray
 
 __all__ = [
@@ -206,10 +209,19 @@ def _choose(sightings: Sequence[Sighting], ratios: FloatArray, same_name: SameNa
 
 def _fits(sighting: Sighting, members: Iterator[Sighting], same_name: SameName) -> bool:
     return all(
-        sighting.waypoint is not other.waypoint
+        not _are_of_one_look(sighting.waypoint, other.waypoint)
+        and not are_apart(sighting.spot, other.spot)
         and same_name(sighting.landmark.label, other.landmark.label)
         for other in members
     )
+
+
+def _are_of_one_look(one: Waypoint, other: Waypoint) -> bool:
+    """True for views of one place from one spot: who names two of a kind there sees two."""
+    if one is other:
+        return True
+    is_same_spot = one.pose.point.distance_to(other.pose.point) < SAME_SPOT_M
+    return one.name == other.name and is_same_spot
 
 
 def _sweep(

@@ -33,7 +33,7 @@ class NoiseModel:
     wrong_ratio: float = 0.2
     range_m: float = 0.1
     range_ratio: float = 0.15
-    wrong_range_ratio: float = 0.1
+    wrong_range_ratio: float = 0.02
     seen_over_ratio: float = 0.5
     floor_per_m: float = 0.1
     reach_m: float = 10.0

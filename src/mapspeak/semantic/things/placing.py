@@ -4,6 +4,7 @@ A view that is wrong as a whole counts with a constant, so it takes the same fro
 moves nothing (a mixture of a Gaussian and uniform outliers, for each view).
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -24,11 +25,20 @@ __all__ = [
     "place",
 ]
 
-_LEAST_WEIGHT = 1e-3
+_LEAST_WEIGHT = 1e-4
 _PEAK_M = 0.5
 _MIDDLE_M = 0.75
 _MOST_PEAKS = 25
 HELD_RATIO = 0.9
+MISJOINED_RATIO = 0.07
+"""Of things, so many have a view of another one among theirs; half of these lie within all the
+same. The weight knows nothing of that, so that a little more of it has to be held."""
+_HELD_WEIGHT_RATIO = (HELD_RATIO - MISJOINED_RATIO / 2) / (1 - MISJOINED_RATIO)
+POSE_M = 0.1
+"""Standard deviation of where the map has a wall, as seen from where an observer was."""
+_NINETY_SIGMAS = math.sqrt(-2 * math.log(1 - HELD_RATIO))
+_SPREAD_M = _NINETY_SIGMAS * math.hypot(BODY_M / 2, POSE_M)
+"""What the weight of cells leaves out: how deep a thing is, and what map and pose are good to."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,7 +55,7 @@ class Placement:
 
     Attributes:
         position: The middle of the densest part of all the weight.
-        uncertainty_m: The radius around it that holds 90 % of the weight.
+        uncertainty_m: The radius around it that holds the thing with 90 %.
     """
 
     position: Point
@@ -93,8 +103,14 @@ def find_middle(sight: SightMap, posterior: Posterior) -> tuple[float, float]:
     return float(posterior.weights @ rows) * size_m, float(posterior.weights @ cols) * size_m
 
 
-def place(sight: SightMap, posterior: Posterior) -> Placement:
-    """Gives the middle of the densest part of the weight, and how far 90 % of it reaches."""
+def place(sight: SightMap, posterior: Posterior, seen_from: Sequence[Point]) -> Placement:
+    """Gives the middle of the densest part of the weight, and how far 90 % of it reaches.
+
+    Args:
+        sight: The map.
+        posterior: Where the thing may be, by the cells that the robot has met of it.
+        seen_from: The places of those who saw it: its middle lies behind what they met.
+    """
     rows, cols = sight.rows.ravel()[posterior.cells], sight.cols.ravel()[posterior.cells]
     at = np.stack([rows, cols], axis=1) * sight.grid.resolution_m
     tops = np.argsort(-posterior.weights, kind="stable")[:_MOST_PEAKS]
@@ -106,11 +122,20 @@ def place(sight: SightMap, posterior: Posterior) -> Placement:
     middle = around @ at / around.sum()
     off_m = np.hypot(*(at - middle).T)
     order = np.argsort(off_m, kind="stable")
-    held = np.searchsorted(np.cumsum(posterior.weights[order]), HELD_RATIO)
+    held = np.searchsorted(np.cumsum(posterior.weights[order]), _HELD_WEIGHT_RATIO)
     row, col = (middle / sight.grid.resolution_m).tolist()
     radius_m = float(off_m[order[min(int(held), len(order) - 1)]])
-    # Cells stand for squares, and for surfaces with the middle of the thing behind them.
-    return Placement(_point_at(sight, row, col), radius_m + BODY_M / 2)
+    surface = _point_at(sight, row, col)
+    return Placement(_behind(surface, seen_from), math.hypot(radius_m, _SPREAD_M))
+
+
+def _behind(surface: Point, seen_from: Sequence[Point]) -> Point:
+    """Gives the middle of a thing whose surface was met; of one seen from all sides that itself."""
+    ways = [place.bearing_to(surface) for place in seen_from]
+    share = BODY_M / 2 / max(len(ways), 1)
+    return Point(
+        surface.x + share * sum(map(math.cos, ways)), surface.y + share * sum(map(math.sin, ways))
+    )
 
 
 def _log_weights(

@@ -7,6 +7,7 @@ import numpy as np
 
 from mapspeak.semantic.things.likelihood import ViewLikelihood, build_outlook, weigh_view
 from mapspeak.semantic.things.sight import SightMap, look_around
+from mapspeak.semantic.things.spots import Spot, find_spot
 from mapspeak.semantic.things.thing import Category
 from mapspeak.semantic.waypoint import Landmark, Waypoint
 from mapspeak.spatial.grid import FloatArray
@@ -24,6 +25,7 @@ class Sighting:
         category: What it is filed under.
         wrong_ratio: How likely it is wrong as a whole.
         likelihood: Where it may be; None where nothing says.
+        spot: Where its direction and range together say that it is; None without both.
     """
 
     waypoint: Waypoint
@@ -31,6 +33,7 @@ class Sighting:
     category: Category
     wrong_ratio: float
     likelihood: ViewLikelihood | None
+    spot: Spot | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -87,6 +90,7 @@ def _read(
                     category=category,
                     wrong_ratio=sight.noise.wrong_ratio_of(landmark.confidence),
                     likelihood=likelihood if likelihood and np.any(likelihood.ratios) else None,
+                    spot=find_spot(waypoint.pose, landmark, sight.noise),
                 )
             )
     return Surroundings(near_m=near_m, far_m=far_m, sightings=tuple(sightings))

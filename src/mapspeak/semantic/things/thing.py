@@ -47,6 +47,7 @@ class Thing:
         supporting: Views of it, by waypoint; one waypoint may have several, each from its pose.
         conflicting: Views that say otherwise.
         confidence_ratio: That there is such a thing there, by its views alone.
+        n_agreeing: From how many different places it was seen by views that agree on where it is.
     """
 
     label: str
@@ -58,6 +59,7 @@ class Thing:
     supporting: tuple[View, ...]
     conflicting: tuple[View, ...]
     confidence_ratio: float
+    n_agreeing: int
 
     @property
     def waypoints(self) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, RootModel
 
 from mapspeak.errors import SemanticMapError
-from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.semantic import (
     LEFT_OUT,
     SAME_SPOT_M,
@@ -16,18 +16,26 @@ from mapspeak.semantic import (
     Confidence,
     Landmark,
     PictureBook,
+    Reading,
     TakenPicture,
     Waypoint,
     find_objection,
     noted_at,
     tells_what_to_do,
 )
+from mapspeak.semantic.things import name_the_same
 
 __all__ = ["Annotator", "LandmarkInput", "Landmarks"]
 
 
 SAME_VIEW_RAD = math.radians(15.0)
 """A picture of a heading that much off still shows nearly all that is seen along the other."""
+
+SAME_BEARING_RAD = math.radians(20.0)
+"""A direction read off a picture and one that was measured differ by less 19 times in 20."""
+
+SAME_RANGE_M = 0.1
+"""Who tells a range to that has read off what was measured."""
 
 FARTHEST_SEEN_M = 100.0
 """No camera on a robot tells what a thing is from farther away."""
@@ -159,11 +167,15 @@ class Annotator:
         _require_possible(thing, own)
         # What the waypoint says of its picture holds for the landmark, too.
         other = None if own == picture else own
+        bearing_rad = _bearing_rad(thing, own)
+        stood = pose if own is None else own.pose
+        range_m, range_from = _range_of(thing, bearing_rad, stood, own or picture)
         landmark = Landmark(
             label=thing.label,
             purpose=self._told(thing, "purpose"),
-            bearing_rad=_bearing_rad(thing, own),
-            range_m=thing.range_m,
+            bearing_rad=bearing_rad,
+            range_m=range_m,
+            range_from=range_from,
             confidence=thing.confidence,
             note=self._told(thing, "note"),
             picture=None if other is None else other.name,
@@ -211,6 +223,46 @@ def _bearing_rad(thing: LandmarkInput, picture: TakenPicture | None) -> float | 
             hint="Call look_through_camera first, or give bearing_deg.",
         )
     return picture.bearing_of(thing.image_column_px)
+
+
+def _range_of(
+    thing: LandmarkInput, bearing_rad: float | None, stood: Pose, picture: TakenPicture | None
+) -> tuple[float | None, str | None]:
+    """Gives how far a landmark is, and what measured that where nobody judged it.
+
+    What the robot measured along the line to it, of something called so, is taken over.
+
+    Args:
+        thing: What was said of it.
+        bearing_rad: Its direction from the pose.
+        stood: The pose it was seen from.
+        picture: The one it was seen in.
+    """
+    reading = None
+    if picture is not None and bearing_rad is not None:
+        reading = _find_reading(thing.label, stood.yaw_rad + bearing_rad, picture)
+    if picture is None or reading is None:
+        return thing.range_m, None
+    ahead = Point(
+        reading.range_m * math.cos(reading.bearing_rad),
+        reading.range_m * math.sin(reading.bearing_rad),
+    )
+    measured_m = stood.point.distance_to(picture.pose.transform(ahead))
+    if thing.range_m is not None and abs(thing.range_m - measured_m) > SAME_RANGE_M:
+        return thing.range_m, None
+    return measured_m, reading.source
+
+
+def _find_reading(label: str, way_rad: float, picture: TakenPicture) -> Reading | None:
+    """Gives what was measured of a thing of that name in a direction of the map frame."""
+    found = [
+        (off_rad, number)
+        for number, reading in enumerate(picture.readings)
+        if name_the_same(reading.label, label)
+        and (off_rad := abs(wrap_angle(picture.pose.yaw_rad + reading.bearing_rad - way_rad)))
+        <= SAME_BEARING_RAD
+    ]
+    return picture.readings[min(found)[1]] if found else None
 
 
 def _require_possible(thing: LandmarkInput, picture: TakenPicture | None) -> None:

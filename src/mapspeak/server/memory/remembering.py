@@ -93,7 +93,8 @@ def _measures(landmark: Landmark) -> list[str]:
     if landmark.bearing_rad is not None:
         parts.append(f"{math.degrees(landmark.bearing_rad):+.0f} deg")
     if landmark.range_m is not None:
-        parts.append(f"{landmark.range_m:.1f} m")
+        by = f" by the {landmark.range_from}" if landmark.range_from else ""
+        parts.append(f"{landmark.range_m:.1f} m{by}")
     if landmark.confidence is not None:
         parts.append(str(landmark.confidence))
     if landmark.pose is not None:

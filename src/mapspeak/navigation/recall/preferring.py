@@ -1,0 +1,48 @@
+"""Which of several things of one name is known so much better that it is the answer."""
+
+from collections.abc import Sequence
+
+from mapspeak.navigation.atlas import Atlas, RememberedThing
+from mapspeak.navigation.memory.recollection import Remembered
+from mapspeak.navigation.recall.candidates import describe_candidate
+from mapspeak.navigation.recall.wording import find_doubt
+
+__all__ = ["find_best_known"]
+
+LEAST_VIEWS = 3
+"""Two views of wrong things meet somewhere now and then; three hardly ever do."""
+LARGEST_OFF_M = 1.0
+"""A place that is known no better may be that of the next one of the name."""
+APART_M = 2.0
+"""Of things of one name that stand nearer to each other, views may have been mixed up."""
+
+
+def find_best_known(
+    atlas: Atlas, meant: Sequence[Remembered], *, room_id: str | None
+) -> RememberedThing | None:
+    """Finds the one thing that views from three places agree on, with no other of its name near.
+
+    Args:
+        atlas: The map with the memory.
+        meant: Of one name.
+        room_id: Where it was asked for.
+
+    Returns:
+        None where there is none, or several, or where anything else speaks against it.
+    """
+    things = [each for each in meant if isinstance(each, RememberedThing)]
+    known = [each for each in things if _is_well_known(each)]
+    sure = [
+        each for each in known if not find_doubt(describe_candidate(atlas, each), room_id=room_id)
+    ]
+    if len(things) < len(meant) or len(sure) != 1:
+        return None
+    (best,) = sure
+    near = [each for each in things if each.point.distance_to(best.point) < APART_M]
+    return best if near == [best] else None
+
+
+def _is_well_known(remembered: RememberedThing) -> bool:
+    off_m = remembered.thing.uncertainty_m
+    is_placed = off_m is not None and off_m <= LARGEST_OFF_M
+    return is_placed and remembered.thing.n_agreeing >= LEAST_VIEWS

@@ -1,0 +1,40 @@
+from collections import Counter
+
+import pytest
+
+from mapspeak.semantic.retrieval.knowledge import find_kinds, find_named_kinds, read_kinds
+
+
+@pytest.mark.parametrize(
+    ("label", "name"),
+    [
+        ("fire extinguisher", "fire extinguisher"),
+        ("CO2 fire extinguishers", "fire extinguisher"),
+        ("the red couch", "sofa"),
+        ("robot docking station", "charging station"),
+    ],
+)
+def test_a_label_is_of_the_kind_that_its_end_names(label: str, name: str) -> None:
+    assert [kind.names[0] for kind in find_kinds(label)] == [name]
+
+
+@pytest.mark.parametrize("label", ["", "the", "sink of the unicorn", "zyzzyva"])
+def test_a_label_that_ends_with_no_known_name_is_of_no_kind(label: str) -> None:
+    assert find_kinds(label) == ()
+
+
+def test_a_text_names_every_kind_that_stands_in_it() -> None:
+    named = {kind.names[0] for kind in find_named_kinds("A sink beside two fridges and a wall.")}
+    assert named == {"sink", "fridge"}
+
+
+def test_every_kind_says_what_it_is_for_and_says_nothing_twice() -> None:
+    for kind in read_kinds():
+        assert all(kind.names)
+        assert all(kind.uses)
+        assert max(Counter(kind.names + kind.uses).values()) == 1, kind.names[0]
+
+
+def test_no_kind_is_listed_twice() -> None:
+    firsts = Counter(kind.names[0] for kind in read_kinds())
+    assert max(firsts.values()) == 1
