@@ -111,7 +111,7 @@ class Session:
         folder = memory_folder(memory.path)
         episodes = EpisodeStore(folder, named_pictures=lambda: named_pictures(memory.read()))
         self.diary = Diary(episodes, wall_clock=None if guard is None else guard.wall_clock)
-        self.keeper = MapKeeper(memory)
+        self.keeper = MapKeeper(memory, episodes)
         self._rank: VectorRank | None = None
         self._ranking = threading.Lock()
         self.recollector = Recollector(find_model, kept=folder / "vectors.npz")
@@ -224,6 +224,8 @@ class Session:
         # Whoever ends the server does not wait for it.
         in_thread = partial(anyio.to_thread.run_sync, abandon_on_cancel=True)
         with suppress(MapspeakError):
+            if self.diary.is_kept:
+                await in_thread(self.keeper.finish_move)
             await in_thread(lambda: self.recollector.warm(self.memory.read()))
             atlas = await self.fetch_atlas()
             # All of it in the thread: what is remembered is joined with the map there.

@@ -162,7 +162,7 @@ class Waypoint:
         return landmark.pose or self.pose
 
     def moved(self, motion: Pose) -> "Waypoint":
-        """Gives it with all its poses in another frame.
+        """Gives it with all its poses in another frame; ids of rooms mean nothing there.
 
         Args:
             motion: From the frame of its poses to the new one.
@@ -170,6 +170,7 @@ class Waypoint:
         return replace(
             self,
             pose=motion @ self.pose,
+            room_id=None,
             safety_landmarks=tuple(_moved(each, motion) for each in self.safety_landmarks),
             functional_landmarks=tuple(_moved(each, motion) for each in self.functional_landmarks),
         )

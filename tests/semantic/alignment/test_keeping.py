@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -10,6 +11,13 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point, Pose
 from mapspeak.semantic import Landmark, SemanticMapStore, Waypoint
 from mapspeak.semantic.alignment import Certainty, MapKeeper, MapRelation
+from mapspeak.semantic.alignment.snapshot import FIRST_NAME
+from mapspeak.semantic.episodes import (
+    EpisodeStore,
+    Observation,
+    ObservationKind,
+    memory_folder,
+)
 from mapspeak.semantic.events import Effect, Event
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map
@@ -29,6 +37,13 @@ WET = Event(
     outlines=((Point(0.0, 0.0), Point(2.0, 0.0), Point(2.0, 2.0)),),
     until=datetime(2026, 11, 22, 14, 0, tzinfo=UTC),
 )
+SEEN = Observation(
+    recorded_at=datetime(2026, 11, 22, 9, 0, tzinfo=UTC),
+    pose=Pose(5.0, 2.0, 3.0),
+    kind=ObservationKind.NOTE,
+    text="a ladder",
+    room_id="R1",
+)
 
 
 @pytest.fixture
@@ -37,6 +52,11 @@ def store(tmp_path: Path) -> SemanticMapStore:
     store.write(DOCK)
     store.write(SINK)
     return store
+
+
+@pytest.fixture
+def episodes(store: SemanticMapStore) -> EpisodeStore:
+    return EpisodeStore(memory_folder(store.path))
 
 
 @pytest.fixture
@@ -129,7 +149,7 @@ def test_records_move_with_their_map(keeper: MapKeeper, store: SemanticMapStore)
 
     assert receipt.certainty is Certainty.SURE
     assert (receipt.n_waypoints, receipt.n_events) == (2, 1)
-    assert "2 waypoints and 1 events were moved: turned by 40.0 degrees" in receipt.sentence
+    assert "2 waypoints, 1 events and 0 observations were moved: turned by 40.0" in receipt.sentence
     dock, sink = store.read().waypoints
     for waypoint, before in ((dock, DOCK), (sink, SINK)):
         truth = MOTION @ before.pose
@@ -140,6 +160,76 @@ def test_records_move_with_their_map(keeper: MapKeeper, store: SemanticMapStore)
     assert wet.at is not None
     assert wet.at.distance_to(MOTION.transform(Point(1.0, 1.0))) < 0.1
     assert wet.outlines[0][1].distance_to(MOTION.transform(Point(2.0, 0.0))) < 0.1
+
+
+def test_rooms_of_the_old_map_are_left_away(store: SemanticMapStore) -> None:
+    store.write(replace(DOCK, room_id="R3"))
+    keeper = MapKeeper(store)
+    keeper.keep(fine(HOUSE))
+
+    keeper.realign(moved(fine(HOUSE), MOTION))
+
+    assert [each.room_id for each in store.read().waypoints] == [None, None]
+
+
+def test_observations_move_with_their_map(store: SemanticMapStore, episodes: EpisodeStore) -> None:
+    keeper = MapKeeper(store, episodes)
+    keeper.keep(fine(HOUSE))
+    seen = episodes.write(SEEN)
+
+    receipt = keeper.realign(moved(fine(HOUSE), MOTION))
+
+    assert receipt.n_observations == 1
+    assert "1 observations were moved" in receipt.sentence
+    _assert_moved(episodes.get(seen.id))
+
+
+def test_observations_follow_their_records_also_after_a_crash_between(
+    store: SemanticMapStore, episodes: EpisodeStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    keeper = MapKeeper(store, episodes)
+    keeper.keep(fine(HOUSE))
+    seen = episodes.write(SEEN)
+    with monkeypatch.context() as crashing:
+        crashing.setattr(episodes, "finish_move", _crash)
+        with pytest.raises(KeyboardInterrupt):
+            keeper.realign(moved(fine(HOUSE), MOTION))
+
+    again = MapKeeper(SemanticMapStore(store.path), EpisodeStore(episodes.folder))
+    assert again.finish_move() == 1
+    assert again.finish_move() == 0
+
+    _assert_moved(episodes.get(seen.id))
+
+
+def test_a_move_that_did_not_come_about_moves_no_observation(
+    store: SemanticMapStore, episodes: EpisodeStore
+) -> None:
+    keeper = MapKeeper(store, episodes)
+    keeper.keep(fine(HOUSE))
+    seen = episodes.write(SEEN)
+    episodes.plan_move(MOTION, to="map-2.yaml")
+
+    assert keeper.finish_move() == 0
+    assert episodes.get(seen.id) == seen
+    episodes.plan_move(MOTION, to="map-3.yaml")
+    assert keeper.realign(fine(HOUSE)).motion is None
+    assert episodes.get(seen.id) == seen
+
+
+def _crash(*, at: str) -> int:
+    """Dies once the records have moved."""
+    if at == FIRST_NAME:
+        return 0
+    raise KeyboardInterrupt
+
+
+def _assert_moved(seen: Observation | None) -> None:
+    assert seen is not None
+    truth = MOTION @ SEEN.pose
+    assert seen.pose.point.distance_to(truth.point) < 0.1
+    assert math.isclose(seen.pose.yaw_rad, truth.yaw_rad, abs_tol=0.01)
+    assert seen.room_id is None
 
 
 def test_the_file_as_it_was_is_kept(keeper: MapKeeper, store: SemanticMapStore) -> None:

@@ -15,6 +15,7 @@ from mapspeak.semantic.alignment.comparing import (
 from mapspeak.semantic.alignment.fitting import Certainty
 from mapspeak.semantic.alignment.snapshot import FIRST_NAME, SnapshotFolder
 from mapspeak.semantic.alignment.surfaces import MapSurfaces
+from mapspeak.semantic.episodes import EpisodeStore
 from mapspeak.semantic.mapfile import MapDocument, moved
 from mapspeak.semantic.store import SemanticMapStore
 from mapspeak.spatial import OccupancyGrid
@@ -36,6 +37,7 @@ class RealignReceipt:
         certainty: How sure it is; None where nothing had to move.
         n_waypoints: How many were moved.
         n_events: Likewise.
+        n_observations: Likewise.
         undo_path: The file as it was before.
         sentence: All this in words.
     """
@@ -45,6 +47,7 @@ class RealignReceipt:
     certainty: Certainty | None
     n_waypoints: int
     n_events: int
+    n_observations: int
     undo_path: Path | None
     sentence: str
 
@@ -54,10 +57,12 @@ class MapKeeper:
 
     Args:
         store: The records.
+        episodes: What was observed on the way, with poses on the same map.
     """
 
-    def __init__(self, store: SemanticMapStore) -> None:
+    def __init__(self, store: SemanticMapStore, episodes: EpisodeStore | None = None) -> None:
         self._store = store
+        self._episodes = episodes
         self._folder = SnapshotFolder(store.path)
         self._loaded: tuple[str, OccupancyGrid] | None = None
         self._compared: tuple[OccupancyGrid, OccupancyGrid, MapComparison] | None = None
@@ -104,8 +109,8 @@ class MapKeeper:
             SemanticMapError: No map was kept, or the maps do not tell surely enough how one lies
                 on the other. Nothing was changed.
         """
-        old_name = self._name()
-        kept = self._load(old_name)
+        self.finish_move()
+        kept = self._load(self._name())
         if kept is None:
             raise SemanticMapError(
                 "No map was kept with these records: where they belong cannot be found out.",
@@ -122,6 +127,14 @@ class MapKeeper:
                 "for this map.",
             )
         return self._move(grid, comparison, fit.new_from_old, fit.certainty)
+
+    def finish_move(self) -> int:
+        """Moves the observations where a crash has kept them from following their records.
+
+        Returns:
+            How many were moved.
+        """
+        return 0 if self._episodes is None else self._episodes.finish_move(at=self._name())
 
     # --- inside ---
 
@@ -147,13 +160,16 @@ class MapKeeper:
             self._folder.note(undo_path.name, document.content)
             return moved(document, motion, entries=entries)
 
+        if self._episodes is not None:
+            self._episodes.plan_move(motion, to=new_name)
         _, after = self._store.rewrite(change)
         self._loaded = None
+        n_observations = self.finish_move()
         turn_deg = math.degrees(motion.yaw_rad)
         said = (
-            f"{len(after.records)} waypoints and {len(after.events)} events were moved: turned by "
-            f"{turn_deg:.1f} degrees about the old map's origin, which lies at "
-            f"({motion.x:.2f}, {motion.y:.2f}) now. {comparison.sentence} "
+            f"{len(after.records)} waypoints, {len(after.events)} events and {n_observations} "
+            f"observations were moved: turned by {turn_deg:.1f} degrees about the old map's "
+            f"origin, which lies at ({motion.x:.2f}, {motion.y:.2f}) now. {comparison.sentence} "
             f"The file as it was: {undo_path}."
         )
         return RealignReceipt(
@@ -162,6 +178,7 @@ class MapKeeper:
             certainty=certainty,
             n_waypoints=len(after.records),
             n_events=len(after.events),
+            n_observations=n_observations,
             undo_path=undo_path,
             sentence=said,
         )
@@ -196,6 +213,7 @@ def _nothing_moved(comparison: MapComparison) -> RealignReceipt:
         certainty=None,
         n_waypoints=0,
         n_events=0,
+        n_observations=0,
         undo_path=None,
         sentence=f"Nothing had to be moved. {comparison.sentence}",
     )

@@ -16,6 +16,7 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.semantic.episodes.asking import EpisodePage, EpisodeQuery, Rank
 from mapspeak.semantic.episodes.database import INDEX_VERSION, EpisodeDatabase
+from mapspeak.semantic.episodes.moving import finish_move, plan_move
 from mapspeak.semantic.episodes.observation import Observation, microseconds_of
 from mapspeak.semantic.episodes.pictures import PictureFolder, picture_name
 from mapspeak.semantic.episodes.scoring import TextScorer
@@ -139,6 +140,16 @@ class EpisodeStore:
         """Gives the file of an observation's picture; None without one."""
         path = self._pictures.path / (observation.picture or "")
         return path if observation.picture and path.is_file() else None
+
+    # --- moving with the map ----------------------------------------------------------------
+
+    def plan_move(self, motion: Pose, *, to: str) -> None:
+        """Notes how poses move if the kept map becomes another one (see `moving`)."""
+        plan_move(self.database, motion, to=to)
+
+    def finish_move(self, *, at: str) -> int:
+        """Moves all poses if that was planned for the map that is kept now; gives how many."""
+        return finish_move(self.database, at=at)
 
     # --- keeping order -----------------------------------------------------------------------
 
