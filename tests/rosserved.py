@@ -1,16 +1,17 @@
 """The ROS tools over a ROS that a test has in its hands, with a client connected in memory."""
 
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
 import anyio
+import anyio.lowlevel
 from mcp.client import Client
 
 from bridging import SteppedRobot
 from fakes import FakeRobot, two_rooms
-from mapspeak.links.rosbridge.client import RobotAddress, Timing, open_client
+from mapspeak.links.rosbridge.client import RobotAddress, RosbridgeClient, Timing, open_client
 from mapspeak.links.rosbridge.server import open_rosbridge_server
 from mapspeak.navigation.safety import Guard
 from mapspeak.ros import RosConnection
@@ -91,6 +92,42 @@ async def on_script(
         served(FakeRobot(two_rooms()), client, folder, guard=guard) as caller,
     ):
         yield caller
+
+
+@asynccontextmanager
+async def at_time(
+    scripted: ScriptedRobot, folder: Path, now_s: float
+) -> AsyncGenerator[tuple[RosbridgeClient, Caller]]:
+    """Serves a scripted robot whose time stands still."""
+    robot = FakeRobot(two_rooms())
+    await robot.sleep(now_s)
+    async with (
+        running(scripted.server) as server,
+        open_client(RobotAddress(url=server.url), timing=QUICK) as client,
+        served(robot, client, folder) as caller,
+    ):
+        yield client, caller
+
+
+@asynccontextmanager
+async def publishing(
+    scripted: ScriptedRobot, topic: str, *each: Mapping[str, Any]
+) -> AsyncGenerator[None]:
+    """Publishes messages again and again while the context lasts."""
+
+    async def go_on() -> None:
+        await scripted.until(
+            lambda: any(ask["topic"] == topic for ask in scripted.server.asked("subscribe"))
+        )
+        while True:
+            for message in each:
+                await scripted.publish(topic, message)
+            await anyio.lowlevel.checkpoint()
+
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(go_on)
+        yield
+        tasks.cancel_scope.cancel()
 
 
 @asynccontextmanager

@@ -1,3 +1,4 @@
+import math
 from pathlib import Path
 
 import pytest
@@ -100,6 +101,15 @@ async def test_looking_around_gives_a_picture_at_each_heading(tmp_path: Path) ->
         result = await client.call_tool("look_around", {"n_pictures": 3})
     assert len(pictures_of(result)) == 3
     assert [round(goal.yaw_deg) for goal in robot.goals.values()] == [120, -120]
+
+
+async def test_looking_around_leaves_no_gap_between_pictures(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        result = await client.call_tool("look_around", {})
+    fov_rad = (await robot.fetch_picture()).horizontal_fov_rad
+    assert fov_rad is not None
+    assert len(pictures_of(result)) * fov_rad > math.tau
 
 
 async def test_looking_around_without_a_camera_moves_nothing(tmp_path: Path) -> None:

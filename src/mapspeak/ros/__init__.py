@@ -5,7 +5,7 @@ works with any ROS robot is written against it. Messages are mappings as rosbrid
 """
 
 from mapspeak.ros.definitions import split_definition
-from mapspeak.ros.graph import NodeLinks, RosGraph
+from mapspeak.ros.graph import NodeLinks, OwnEnds, RosGraph
 from mapspeak.ros.names import NAME, TYPE, find_nearest, new_id
 from mapspeak.ros.port import ActionEnd, ActionGoal, Listener, RosConnection, Subscription
 
@@ -16,6 +16,7 @@ __all__ = [
     "ActionGoal",
     "Listener",
     "NodeLinks",
+    "OwnEnds",
     "RosConnection",
     "RosGraph",
     "Subscription",

@@ -40,3 +40,19 @@ class NodeLinks:
     publishes: tuple[str, ...] = ()
     subscribes: tuple[str, ...] = ()
     serves: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OwnEnds:
+    """What of a ROS system is our own doing.
+
+    Attributes:
+        node: The last part of the name of the node that speaks and listens for us; empty where no
+            node is told that does.
+        publishes: Topics that it publishes for us.
+        hears: Topics that it listens to for us.
+    """
+
+    node: str = ""
+    publishes: frozenset[str] = frozenset()
+    hears: frozenset[str] = frozenset()

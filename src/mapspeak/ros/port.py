@@ -4,7 +4,7 @@ from collections.abc import Callable, Coroutine, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from mapspeak.ros.graph import NodeLinks, RosGraph
+from mapspeak.ros.graph import NodeLinks, OwnEnds, RosGraph
 from mapspeak.ros.messages import Message
 
 Listener = Callable[[Message], None]
@@ -41,6 +41,11 @@ class Subscription(Protocol):
     @property
     def n_received(self) -> int:
         """Since the subscription began, over all connections."""
+        ...
+
+    @property
+    def begun_s(self) -> float:
+        """Since when we have listened, by the event loop's clock."""
         ...
 
     @property
@@ -126,6 +131,11 @@ class RosConnection(Protocol):
         """Since when the connection has been lost, in wall time; None while there is one."""
         ...
 
+    @property
+    def own_ends(self) -> OwnEnds:
+        """What of the system is our own doing: answers about it do not take it for others'."""
+        ...
+
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Runs something in the background until the connection is closed."""
         ...
@@ -166,6 +176,21 @@ class RosConnection(Protocol):
 
     def unadvertise(self, topic: str) -> None:
         """Takes back what `advertise` said; does nothing for what was not advertised."""
+        ...
+
+    def advertise_late(self) -> None:
+        """Tells the robot of what is advertised from now on only with the first message there.
+
+        For one that is only watched: it should not look as if we drove it. A stop is then said for
+        a second, until the robot has noticed who speaks.
+        """
+        ...
+
+    def advertise_early(self) -> None:
+        """Tells the robot at once of all that is advertised, now and from now on.
+
+        For whoever may move it, so that a stop is heard at once; so it is from the beginning.
+        """
         ...
 
     async def publish(self, topic: str, message: Message) -> None:

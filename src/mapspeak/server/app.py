@@ -1,7 +1,7 @@
 """The MCP server around a session: chosen tools, readable errors, lean schemas."""
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 from mcp.server import MCPServer
@@ -19,7 +19,8 @@ from mapspeak.server.asking import Asking
 from mapspeak.server.calllog import CallLog
 from mapspeak.server.leanness import lean_input, lean_output
 from mapspeak.server.mapview.representations import Representation
-from mapspeak.server.prompts import add_prompts, read_text
+from mapspeak.server.offering import keep_offered, write_instructions
+from mapspeak.server.prompts import add_prompts
 from mapspeak.server.tools import build_toolsets
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.server.visible import show_controls, show_controls_of
@@ -35,13 +36,21 @@ MOST_BYTES = 1_000_000
 
 
 class MapspeakServer(MCPServer[Any]):
-    """An MCP server whose every call passes one door: the client is heard, errors are readable."""
+    """An MCP server whose every call passes one door: the client is heard, errors are readable.
 
-    def __init__(self, session: Session, *, call_log: CallLog | None = None) -> None:
+    Args:
+        session: What the tools work on.
+        instructions: What a model reads before its first call.
+        call_log: Where every call is noted; None for nowhere.
+    """
+
+    def __init__(
+        self, session: Session, *, instructions: str, call_log: CallLog | None = None
+    ) -> None:
         super().__init__(
             "mapspeak",
             title="mapspeak: a robot's map, eyes and memory of places",
-            instructions=read_text("instructions"),
+            instructions=instructions,
             version=__version__,
             log_level="WARNING",
         )
@@ -50,6 +59,11 @@ class MapspeakServer(MCPServer[Any]):
         self._arguments: dict[str, frozenset[str]] = {}
         self._numbers: dict[str, frozenset[str]] = {}
         self._remembering: set[str] = set()
+
+    @property
+    def n_tools(self) -> int:
+        """How many tools it offers."""
+        return len(self._arguments)
 
     async def call_tool(
         self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None = None
@@ -113,8 +127,13 @@ class MapspeakServer(MCPServer[Any]):
             guard.approvals.grant(needed.wish_id)
         return await super().call_tool(name, arguments, context)
 
-    def offer(self, tool: Tool) -> None:
-        """Adds a tool to those that can be called."""
+    def offer(self, tool: Tool, *, missing: Collection[str] = ()) -> None:
+        """Adds a tool to those that can be called.
+
+        Args:
+            tool: Of which nothing is told that leads to others that are missing.
+            missing: The names of tools that are not offered.
+        """
         self._arguments[tool.name] = tool.arguments
         self._numbers[tool.name] = tool.numbers
         if tool.effect is Effect.REMEMBERS:
@@ -122,7 +141,7 @@ class MapspeakServer(MCPServer[Any]):
         self.add_tool(
             tool.function,
             title=tool.title,
-            description=tool.description,
+            description=keep_offered(tool.description, missing),
             annotations=tool.annotations,
             meta=tool.meta,
             structured_output=tool.has_report,
@@ -210,13 +229,20 @@ def build_server(
     Raises:
         ConfigError: There is no such toolset or tool.
     """
-    server = MapspeakServer(session, call_log=call_log)
     is_read_only = is_read_only or (session.guard is not None and session.guard.policy.is_read_only)
     if is_read_only:
         session.diary.close()
+    elif session.ros is not None:
+        session.ros.advertise_early()
     known = build_toolsets(session, representation)
-    for tool in choose_tools(known, toolsets=toolsets, tools=tools, is_read_only=is_read_only):
-        server.offer(tool)
+    chosen = choose_tools(known, toolsets=toolsets, tools=tools, is_read_only=is_read_only)
+    names = {tool.name for group in known.values() for tool in group}
+    offered = {tool.name for tool in chosen}
+    moves = any(tool.effect is Effect.MOVES for tool in chosen)
+    instructions = write_instructions(offered, known=names, moves=moves)
+    server = MapspeakServer(session, instructions=instructions, call_log=call_log)
+    for tool in chosen:
+        server.offer(tool, missing=names - offered)
     add_prompts(server)
     return server
 

@@ -17,7 +17,7 @@ from mcp_types import Tool as ListedTool
 from mapspeak import __version__
 from mapspeak.errors import ConfigError
 from mapspeak.server.app import MapspeakServer
-from mapspeak.server.prompts import add_prompts, read_text
+from mapspeak.server.prompts import add_prompts
 
 __all__ = ["FleetServer"]
 
@@ -40,10 +40,12 @@ class FleetServer(MCPServer[Any]):
         if not servers:
             raise ConfigError("There is no robot to serve.", hint="Name one with --robot.")
         names = ", ".join(servers)
+        # All have the same toolsets; a policy may leave some of one robot's tools out.
+        fullest = max(servers.values(), key=lambda server: server.n_tools)
         super().__init__(
             "mapspeak",
             title="mapspeak: robots' maps, eyes and memories of places",
-            instructions=f"{read_text('instructions')}\nThere are {len(servers)} robots: {names}. "
+            instructions=f"{fullest.instructions}\nThere are {len(servers)} robots: {names}. "
             f"Each has its own map, memory and ids; every tool takes `{ARGUMENT}`.",
             version=__version__,
             log_level="WARNING",

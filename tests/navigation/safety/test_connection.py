@@ -21,6 +21,7 @@ READING = {
     "is_open",
     "connected_for_s",
     "lost_for_s",
+    "own_ends",
     "start_soon",
     "wait_until_connected",
     "subscribe",
@@ -28,6 +29,8 @@ READING = {
     "renew",
     "advertise",
     "unadvertise",
+    "advertise_late",
+    "advertise_early",
 }
 ENDING = {"cancel_goal", "give_up_goal", "clear_the_way"}
 

@@ -96,5 +96,6 @@ class RosReader:
 
 def _nodes(what: str, text: str) -> tuple[str, ...]:
     match = re.search(rf"^{what}: (.*)$", text, re.MULTILINE)
-    named = match[1].split(", ") if match else []
+    # What a node does for us is marked behind its name.
+    named = [each.partition(" ")[0] for each in match[1].split(", ")] if match else []
     return tuple(each for each in named if each.startswith("/") and each != OURSELVES)

@@ -9,6 +9,7 @@ from mapspeak.links.ros.discovery import (
 from mapspeak.links.ros.driving import DrivingPatience
 from mapspeak.links.ros.errors import plain_errors
 from mapspeak.links.ros.goal import PursuedGoal
+from mapspeak.links.ros.late import NOTICE_S, Announcements, say_again
 from mapspeak.links.ros.native import NativeConnection, NativeTopics, check_name, wrong_type
 from mapspeak.links.ros.parameters import NodeParameters
 from mapspeak.links.ros.poses import describe_pose_source
@@ -16,6 +17,8 @@ from mapspeak.links.ros.robot import RosRobot, build_ros_robot
 from mapspeak.links.ros.subscription import TopicSubscription
 
 __all__ = [
+    "NOTICE_S",
+    "Announcements",
     "DrivingPatience",
     "NativeConnection",
     "NativeTopics",
@@ -31,5 +34,6 @@ __all__ = [
     "describe_profile",
     "load_robot_file",
     "plain_errors",
+    "say_again",
     "wrong_type",
 ]

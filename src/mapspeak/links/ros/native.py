@@ -1,11 +1,14 @@
 """What connections have in common that are in the robot's own network: rclpy, and DDS itself."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Coroutine
+from functools import partial
 from typing import Any, Generic, Protocol, TypeVar
 
 from mapspeak.errors import LinkError
+from mapspeak.links.ros.late import Announcements, say_again
 from mapspeak.links.ros.subscription import TopicSubscription
-from mapspeak.ros import NAME, Subscription
+from mapspeak.ros import NAME, OwnEnds, Subscription
 from mapspeak.ros.messages import Message, bare_type
 
 
@@ -26,6 +29,10 @@ class NativeTopics(ABC, Generic[Request]):
 
     def __init__(self) -> None:
         self.requests: dict[str, Request] = {}
+        self.announcements = Announcements(self._announce, self.unadvertise)
+
+    def _announce(self, topic: str, type_name: str) -> None:
+        self.advertise(topic, type_name=type_name)
 
     def subscribe(
         self, topic: str, *, type_name: str | None, is_bulky: bool, throttle_ms: int
@@ -131,21 +138,43 @@ class NativeConnection(ABC):
         """Reads a topic anew: latched messages come again."""
         self.topics.renew(subscription.topic)
 
+    @property
+    def own_ends(self) -> OwnEnds:
+        """Nothing: what such a connection tells of the system leaves our own node out."""
+        return OwnEnds()
+
+    @abstractmethod
+    def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        """Runs something in the background until the connection is closed."""
+
     def advertise(self, topic: str, *, type_name: str) -> None:
         """Says that we will publish."""
-        self.topics.advertise(topic, type_name=type_name)
+        self.topics.check(topic, type_name)
+        self.topics.announcements.advertise(topic, type_name)
 
     def unadvertise(self, topic: str) -> None:
         """Takes back what `advertise` said."""
-        self.topics.unadvertise(topic)
+        self.topics.announcements.unadvertise(topic)
+
+    def advertise_late(self) -> None:
+        """Tells the robot of what is advertised from now on only with the first message there."""
+        self.topics.announcements.be_late()
+
+    def advertise_early(self) -> None:
+        """Tells the robot at once of all that is advertised, now and from now on."""
+        self.topics.announcements.be_early()
 
     async def publish(self, topic: str, message: Message) -> None:
         """Publishes on an advertised topic, once known listeners are connected to it."""
+        self.topics.announcements.use(topic)
         await self.topics.publish(topic, message)
 
     def publish_everywhere(self, topic: str, message: Message) -> int:
         """Publishes at once, for a stop; there is one way, so it gives 1."""
-        self.topics.publish_at_once(topic, message)
+        say = partial(self.topics.publish_at_once, topic, message)
+        if self.topics.announcements.use(topic):
+            self.start_soon(partial(say_again, say))
+        say()
         return 1
 
     def clear_the_way(self) -> None:  # noqa: B027 - nothing is to be done, by anybody

@@ -144,6 +144,8 @@ class RosRobot:
         """Starts a drive; returns when navigation has taken or refused it."""
         await self.connection.wait_until_connected()
         await self._look_until(lambda: self._driver is not None)
+        # Whoever drives may have to stop before long.
+        self.connection.advertise_early()
         record = await self._wanted_driver().send(goal)
         self._goals[record.goal_id] = record
         while len(self._goals) > MOST_GOALS_KEPT:
@@ -290,6 +292,8 @@ async def build_ros_robot(
     Raises:
         LinkError: The robot does not say what it offers.
     """
+    # Whether it is to be driven or only watched, whoever uses it says.
+    connection.advertise_late()
     frames = FrameListener(connection)
     clock = RobotClock(connection)
     profile = await _discover_soon(

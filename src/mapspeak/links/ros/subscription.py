@@ -15,6 +15,7 @@ class TopicSubscription:
         type_name: As asked for; None left it to the robot.
         latest: The newest message; None as long as none has come.
         n_received: Since the subscription began, over all connections.
+        begun_s: Since when we have listened, by the event loop's clock.
         arrived_s: When the newest came, by the event loop's clock.
         n_users: How many have subscribed and not unsubscribed.
     """
@@ -24,6 +25,7 @@ class TopicSubscription:
         self.type_name = type_name
         self.latest: Message | None = None
         self.n_received = 0
+        self.begun_s = anyio.current_time()
         self.arrived_s = float("-inf")
         self.n_users = 0
         self._listeners: list[Listener] = []

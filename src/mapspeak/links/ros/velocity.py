@@ -16,7 +16,7 @@ STAND = Twist(forward_mps=0.0, left_mps=0.0, turn_radps=0.0)
 
 
 class Brake:
-    """Publishes zero velocity; says at once that it will, so that the robot listens in time.
+    """Publishes zero velocity; says beforehand that it will, so that the robot listens in time.
 
     Args:
         connection: Connected to the robot.

@@ -8,7 +8,7 @@ from mapspeak.navigation.safety.commands import Act, Call, Command, Publish, Set
 from mapspeak.navigation.safety.deciding import find_speeds, is_name_denied
 from mapspeak.navigation.safety.guard import Guard
 from mapspeak.navigation.safety.velocities import HandDriving, stand_of
-from mapspeak.ros import ActionGoal, NodeLinks, RosConnection, RosGraph, Subscription
+from mapspeak.ros import ActionGoal, NodeLinks, OwnEnds, RosConnection, RosGraph, Subscription
 from mapspeak.ros.messages import Message
 
 __all__ = ["GuardedConnection"]
@@ -207,6 +207,11 @@ class GuardedConnection:
         """Since when the connection has been lost, in wall time; None while there is one."""
         return self._connection.lost_for_s
 
+    @property
+    def own_ends(self) -> OwnEnds:
+        """What of the system is our own doing."""
+        return self._connection.own_ends
+
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Runs something in the background until the connection is closed."""
         self._connection.start_soon(work)
@@ -249,6 +254,14 @@ class GuardedConnection:
     def unadvertise(self, topic: str) -> None:
         """Takes back what `advertise` said; does nothing for what was not advertised."""
         self._connection.unadvertise(topic)
+
+    def advertise_late(self) -> None:
+        """Tells the robot of what is advertised from now on only with the first message there."""
+        self._connection.advertise_late()
+
+    def advertise_early(self) -> None:
+        """Tells the robot at once of all that is advertised, now and from now on."""
+        self._connection.advertise_early()
 
     async def fetch_graph(self) -> RosGraph:
         """Gives the topics and actions there are."""

@@ -34,7 +34,7 @@ Degrees = Annotated[
 Wait = Annotated[
     float, Field(description="seconds to wait for the end of the drive", ge=0, le=LONGEST_WAIT_S)
 ]
-GoalId = Annotated[str | None, Field(description="from navigate_to; the latest when left out")]
+GoalId = Annotated[str | None, Field(description="such as G1; the latest when left out")]
 
 
 class DriveTools:

@@ -20,7 +20,7 @@ from mapspeak.navigation.exploration import (
 )
 from mapspeak.navigation.safety import Errand, on_errand
 from mapspeak.navigation.search import Budget, Judgement, Searcher
-from mapspeak.robot import GoalState
+from mapspeak.robot import CameraPicture, GoalState
 from mapspeak.server.callers import client_of, tell_progress
 from mapspeak.server.explorereports import ExploreAnswer, SearchAnswer
 from mapspeak.server.reports import DriveAnswer, Report
@@ -33,6 +33,9 @@ __all__ = ["ExploreTools"]
 
 LONGEST_WAIT_S = 25.0
 LEAST_TURN_S = 0.5
+MOST_PICTURES = 12
+OVERLAP_RATIO = 1.1
+"""A thing at the edge of one picture is whole in the next."""
 USUAL_DRIVES = 50
 USUAL_DURATION_S = 600.0
 """So far a person's word goes where a call has no bound of its own, in robot time."""
@@ -48,7 +51,11 @@ KnownPercent = Annotated[
     Field(description="end when so much of the floor to be expected is known", gt=0, le=100),
 ]
 StopsAtGoals = Annotated[
-    bool, Field(description="pause with a camera picture wherever the robot arrives")
+    bool,
+    Field(
+        description="pause with a camera picture wherever the robot arrives, or has seen from afar "
+        "what it was sent to see"
+    ),
 ]
 Wait = Annotated[
     float,
@@ -80,7 +87,15 @@ Scores = Annotated[
 ]
 MostLooks = Annotated[int, Field(description="end after so many pictures", ge=1, le=500)]
 MostMetres = Annotated[float, Field(description="end after so many metres", gt=0, le=10_000)]
-NPictures = Annotated[int, Field(description="evenly spread all around", ge=2, le=8, strict=True)]
+NPictures = Annotated[
+    int | None,
+    Field(
+        description="evenly spread all around; as many as leave no gap when left out",
+        ge=2,
+        le=12,
+        strict=True,
+    ),
+]
 
 
 class ExploreTools:
@@ -194,7 +209,9 @@ class ExploreTools:
             yaw_rad = here.yaw_rad + math.radians(by_deg)
         return DriveAnswer.of(await self._turn(context, yaw_rad, LONGEST_WAIT_S))
 
-    async def look_around(self, context: Context, n_pictures: NPictures = 4) -> list[str | Image]:
+    async def look_around(
+        self, context: Context, n_pictures: NPictures = None
+    ) -> list[str | Image]:
         """Turns the robot where it stands and takes a camera picture at each of several headings.
 
         Use it to see a whole room; look_through_camera takes one picture without moving. What is
@@ -202,9 +219,10 @@ class ExploreTools:
         """
         robot = self._session.robot
         deadline_s = robot.now_s + LONGEST_WAIT_S
+        first = await look_ahead(self._session)
+        n_pictures = n_pictures or _count_all_around(first.picture)
         what = f"turn in place for {n_pictures} pictures"
         errand = Errand(what=what, n_drives=n_pictures - 1, duration_s=LONGEST_WAIT_S)
-        first = await look_ahead(self._session)
         shown: list[str | Image] = [first.text, first.image]
         for yaw_rad in spread_headings(first.picture.pose.yaw_rad, n_pictures)[1:]:
             left_s = deadline_s - robot.now_s
@@ -253,6 +271,15 @@ def _exploring(n_goals: int | None, duration_s: float | None) -> Errand:
 def _searching(thing: str, max_looks: int, max_m: float) -> Errand:
     what = f"search for {shorten(thing)!r}, up to {max_m:g} m"
     return Errand(what=what, n_drives=max_looks, duration_s=USUAL_DURATION_S)
+
+
+def _count_all_around(picture: CameraPicture) -> int:
+    """Gives how many pictures overlap all around; four where the camera's width is not known."""
+    if picture.horizontal_fov_rad is None:
+        return 4
+    return min(
+        max(math.ceil(OVERLAP_RATIO * math.tau / picture.horizontal_fov_rad), 2), MOST_PICTURES
+    )
 
 
 def _answer(report: Report, sighting: Sighting | None) -> CallToolResult:

@@ -3,22 +3,29 @@
 from collections import deque
 from collections.abc import AsyncGenerator, Callable, Coroutine, Mapping
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import anyio
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError
-from mapspeak.links.ros import PursuedGoal, TopicSubscription, plain_errors
+from mapspeak.links.ros import (
+    NOTICE_S,
+    Announcements,
+    PursuedGoal,
+    TopicSubscription,
+    plain_errors,
+    say_again,
+)
 from mapspeak.links.rosbridge import protocol
 from mapspeak.links.rosbridge.client.address import RobotAddress
 from mapspeak.links.rosbridge.client.calling import ServiceCaller
 from mapspeak.links.rosbridge.client.channel import Channel
+from mapspeak.links.rosbridge.client.requests import TopicRequest
 from mapspeak.links.rosbridge.client.rosapi import Rosapi
 from mapspeak.links.rosbridge.client.timing import Timing
 from mapspeak.links.rosbridge.protocol import (
-    Encoding,
     Event,
     FrameRefused,
     GoalEnded,
@@ -26,44 +33,13 @@ from mapspeak.links.rosbridge.protocol import (
     Published,
     StatusNoted,
 )
-from mapspeak.ros import ActionEnd, ActionGoal, Subscription, new_id
+from mapspeak.ros import ActionEnd, ActionGoal, OwnEnds, Subscription, new_id
 from mapspeak.ros.messages import Message
 
 N_REMARKS_KEPT = 50
+NODE = "rosbridge_websocket"
+"""What rosbridge's node is called, whatever its namespace."""
 USUAL_TIMING = Timing()
-ENCODINGS = (Encoding.CBOR, Encoding.CBOR, Encoding.JSON)
-"""Of bulky messages: asked for so first, and again, and again.
-
-Where CBOR is beyond the server's size limit it is dropped in silence, while JSON comes in pieces.
-"""
-
-
-@dataclass(slots=True, eq=False)
-class _Request:
-    """How a topic was asked for.
-
-    Attributes:
-        subscription: Of the topic.
-        is_bulky: See `ENCODINGS`.
-        throttle_ms: The least time between two messages.
-        n_renewals: How often it was asked for anew.
-        operation_id: Under which the server knows it.
-        channel: Over which it was asked for.
-    """
-
-    subscription: TopicSubscription
-    is_bulky: bool
-    throttle_ms: int
-    n_renewals: int = 0
-    operation_id: str = ""
-    channel: Channel | None = None
-
-    @property
-    def encoding(self) -> Encoding:
-        """How the server is to write the messages."""
-        if not self.is_bulky:
-            return Encoding.JSON
-        return ENCODINGS[min(self.n_renewals, len(ENCODINGS) - 1)]
 
 
 class RosbridgeClient(Rosapi):
@@ -85,8 +61,8 @@ class RosbridgeClient(Rosapi):
         self._control = self._channel()
         self._urgent = self._channel()
         self._caller = ServiceCaller(self._free_for_calls)
-        self._requests: dict[str, _Request] = {}
-        self._advertised: dict[str, str] = {}
+        self._requests: dict[str, TopicRequest] = {}
+        self._announcements = Announcements(self._announce, self._take_back)
         self._goals: dict[str, tuple[PursuedGoal, Channel]] = {}
         self._tasks: TaskGroup | None = None
         self._published_s = float("-inf")
@@ -120,6 +96,13 @@ class RosbridgeClient(Rosapi):
         In wall time.
         """
         return self._control.lost_for_s
+
+    @property
+    def own_ends(self) -> OwnEnds:
+        """What rosbridge's node does for us; it may do the like for its other clients."""
+        return OwnEnds(
+            node=NODE, publishes=self._announcements.told, hears=frozenset(self._requests)
+        )
 
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Runs something in the background until the client is closed."""
@@ -168,7 +151,7 @@ class RosbridgeClient(Rosapi):
         request = self._requests.get(topic)
         if request is None:
             subscription = TopicSubscription(topic, type_name=type_name)
-            request = _Request(subscription, is_bulky, throttle_ms)
+            request = TopicRequest(subscription, is_bulky, throttle_ms)
             self._begin(request)
             self._requests[topic] = request
         request.subscription.n_users += 1
@@ -198,22 +181,25 @@ class RosbridgeClient(Rosapi):
         Raises:
             LinkError: The topic was advertised with another type, or its name is none.
         """
-        known = self._advertised.setdefault(topic, type_name)
+        known = self._announcements.type_of(topic) or type_name
         if known != type_name:
             raise LinkError(
                 f"{topic} was advertised as {known}, not as {type_name}.",
                 hint="A topic has one type: look it up on the robot.",
             )
-        for channel in (self._control, self._urgent):
-            text = protocol.advertise(topic, operation_id=f"advertise:{topic}", type_name=type_name)
-            channel.keep_standing(f"advertise:{topic}", text)
+        self._announcements.advertise(topic, type_name)
 
     def unadvertise(self, topic: str) -> None:
         """Takes back what `advertise` said."""
-        if self._advertised.pop(topic, None) is not None:
-            text = protocol.unadvertise(topic, operation_id=f"advertise:{topic}")
-            for channel in (self._control, self._urgent):
-                channel.end_standing(f"advertise:{topic}", text)
+        self._announcements.unadvertise(topic)
+
+    def advertise_late(self) -> None:
+        """Tells the robot of what is advertised from now on only with the first message there."""
+        self._announcements.be_late()
+
+    def advertise_early(self) -> None:
+        """Tells the robot at once of all that is advertised, now and from now on."""
+        self._announcements.be_early()
 
     async def publish(self, topic: str, message: Message) -> None:
         """Publishes on an advertised topic.
@@ -222,12 +208,19 @@ class RosbridgeClient(Rosapi):
             LinkError: There is no connection, or the message cannot be sent.
         """
         text = protocol.publish(topic, message)
+        if self._announcements.use(topic):
+            await anyio.sleep(NOTICE_S)
         await self._free_for_topics().send(text, timeout_s=self.timing.answer_s)
         self._published_s = anyio.current_time()
 
     def publish_everywhere(self, topic: str, message: Message) -> int:
         """Publishes over every open socket, and gives over how many: for a stop."""
         text = protocol.publish(topic, message)
+        if self._announcements.use(topic):
+            self.start_soon(partial(say_again, partial(self._send_everywhere, text)))
+        return self._send_everywhere(text)
+
+    def _send_everywhere(self, text: bytes) -> int:
         open_channels = [channel for channel in (self._urgent, self._control) if channel.is_up]
         for channel in open_channels:
             channel.send_if_up(text)
@@ -296,6 +289,16 @@ class RosbridgeClient(Rosapi):
         if self._carries_goal(self._free_for_calls()) or self._free_for_calls().is_waiting:
             self._free_for_calls().replace()
 
+    def _announce(self, topic: str, type_name: str) -> None:
+        for channel in (self._control, self._urgent):
+            text = protocol.advertise(topic, operation_id=f"advertise:{topic}", type_name=type_name)
+            channel.keep_standing(f"advertise:{topic}", text)
+
+    def _take_back(self, topic: str) -> None:
+        text = protocol.unadvertise(topic, operation_id=f"advertise:{topic}")
+        for channel in (self._control, self._urgent):
+            channel.end_standing(f"advertise:{topic}", text)
+
     def _channel(self) -> Channel:
         return Channel(
             self.address, on_event=self._take, on_loss=self._lose_goals, timing=self.timing
@@ -312,7 +315,7 @@ class RosbridgeClient(Rosapi):
         is_free = self._carries_goal(self._control) or not self._carries_goal(self._urgent)
         return self._urgent if is_free else self._control
 
-    def _begin(self, request: _Request) -> None:
+    def _begin(self, request: TopicRequest) -> None:
         subscription = request.subscription
         request.operation_id = new_id()
         text = protocol.subscribe(
@@ -325,7 +328,7 @@ class RosbridgeClient(Rosapi):
         request.channel = self._free_for_topics()
         request.channel.keep_standing(request.operation_id, text)
 
-    def _end(self, request: _Request) -> None:
+    def _end(self, request: TopicRequest) -> None:
         text = protocol.unsubscribe(request.subscription.topic, operation_id=request.operation_id)
         if request.channel is not None:
             request.channel.end_standing(request.operation_id, text)

@@ -37,9 +37,9 @@ ActionType = Annotated[
 ]
 Wait = Annotated[float, Field(description="seconds to wait for its end", ge=0, le=LONGEST_WAIT_S)]
 Handle = Annotated[
-    str | None, Field(description="from ros_send_goal; the latest when left out", max_length=40)
+    str | None, Field(description="such as A1; the latest when left out", max_length=40)
 ]
-CancelHandle = Annotated[str | None, Field(description="from ros_send_goal", max_length=40)]
+CancelHandle = Annotated[str | None, Field(description="such as A1", max_length=40)]
 
 NEXT_STEP = {
     ActionState.SUCCEEDED: "",
@@ -124,7 +124,7 @@ class ActionTools:
     async def ros_goal_status(
         self, goal_id: Handle = None, wait_s: Wait = 0.0, action: AnyAction = None
     ) -> str:
-        """Says how a goal of ros_send_goal stands: state, feedback, result, also long after.
+        """Says how a ROS goal stands: state, feedback, result, also long after.
 
         Use it to wait for the end; with an action it lists the goals its server knows.
         """

@@ -11,6 +11,7 @@ from mapspeak.navigation.safety import SetParameter
 from mapspeak.ros import RosGraph, find_nearest
 from mapspeak.ros.messages import Dialect
 from mapspeak.server.rosreports import cut, show_value
+from mapspeak.server.tools.ros.census import mark_ours
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.inquiry import RosInquiry, full_name
 from mapspeak.server.tools.ros.lists import PAGE_SIZE, Filter, Page, choose, say_page
@@ -98,9 +99,13 @@ class NodeTools:
         name = full_name(node)
         await self._inquiry.check_node(name)
         links = await self._inquiry.connection.fetch_node(name)
+        own = self._inquiry.connection.own_ends
+        is_ours = bool(own.node) and name.endswith(f"/{own.node}")
+        published = mark_ours(links.publishes, own.publishes if is_ours else ())
+        heard = mark_ours(links.subscribes, own.hears if is_ours else ())
         return cut(
-            f"{name}\npublishes: {list_some(links.publishes, most=MOST_NAMED) or 'nothing'}\n"
-            f"hears: {list_some(links.subscribes, most=MOST_NAMED) or 'nothing'}\n"
+            f"{name}\npublishes: {list_some(published, most=MOST_NAMED) or 'nothing'}\n"
+            f"hears: {list_some(heard, most=MOST_NAMED) or 'nothing'}\n"
             f"serves: {list_some(links.serves, most=MOST_NAMED) or 'nothing'}"
         )
 

@@ -9,28 +9,53 @@ from mapspeak.errors import LinkError
 from mapspeak.ros import RosConnection, Subscription
 from mapspeak.ros.messages import Message
 
-__all__ = ["Heard", "hear"]
+__all__ = ["Heard", "hear", "say_rate"]
 
 RENEW_S = (2.0, 3.0)
 """For a first message, in wall time, before a topic is asked for anew: a latched one may have been
 missed, and a large one may come only when it is asked for otherwise."""
+SILENT_PERIODS = 3.0
+LEAST_SILENCE_S = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Heard:
-    """What came on a topic.
+    """What came on a topic; all times in wall time.
 
     Attributes:
         messages: The latest, in their order.
         n_received: All that came while we listened; 0 when the latest had come before.
         listened_s: How long we listened.
-        age_s: Since the latest came.
+        age_s: Since the latest came; infinite where none ever did.
+        known_for_s: Since the topic is listened to, by whomever of us.
+        period_s: Between two messages; None where fewer than two came.
     """
 
     messages: tuple[Message, ...]
     n_received: int
     listened_s: float
     age_s: float
+    known_for_s: float
+    period_s: float | None
+
+    @property
+    def rate_hz(self) -> float:
+        """Messages a second, by the times between them; where there are none, by their number."""
+        if self.period_s is None:
+            return self.n_received / self.listened_s
+        return 1.0 / self.period_s
+
+    @property
+    def has_stopped(self) -> bool:
+        """True when the latest is longer ago than the times between them explain."""
+        if self.period_s is None:
+            return False
+        return self.age_s > max(SILENT_PERIODS * self.period_s, LEAST_SILENCE_S)
+
+
+def say_rate(rate_hz: float) -> str:
+    """Gives a rate with three digits: 13.5 Hz is no 14 Hz."""
+    return f"{rate_hz:.0f} Hz" if rate_hz >= 1000.0 else f"{f'{rate_hz:#.3g}'.rstrip('.')} Hz"
 
 
 async def hear(
@@ -68,12 +93,7 @@ async def hear(
         with anyio.move_on_after(limit_s):
             await _wait_for_first(connection, subscription, collector, renew_s)
             await collector.collect(until)
-        return Heard(
-            messages=tuple(collector.messages),
-            n_received=subscription.n_received - collector.n_before,
-            listened_s=anyio.current_time() - started_s,
-            age_s=anyio.current_time() - subscription.arrived_s,
-        )
+        return collector.result(started_s)
     finally:
         connection.unsubscribe(subscription)
 
@@ -81,8 +101,8 @@ async def hear(
 class _Collector:
     def __init__(self, subscription: Subscription, n: int) -> None:
         self._subscription = subscription
-        self._n_seen = subscription.n_received
-        self.n_before = subscription.n_received
+        self._n_seen = self._n_before = subscription.n_received
+        self._first: tuple[int, float] | None = None
         self.messages: deque[Message] = deque(maxlen=n)
 
     def take_known(self) -> None:
@@ -102,8 +122,30 @@ class _Collector:
         except LinkError:
             return False
         self._n_seen = self._subscription.n_received
+        if self._first is None:
+            self._first = (self._n_seen, self._subscription.arrived_s)
         self.messages.append(message)
         return True
+
+    def result(self, started_s: float) -> Heard:
+        """Gives what came since a moment of the event loop's clock."""
+        now_s, known = anyio.current_time(), self._subscription
+        return Heard(
+            messages=tuple(self.messages),
+            n_received=known.n_received - self._n_before,
+            listened_s=now_s - started_s,
+            age_s=now_s - known.arrived_s,
+            known_for_s=now_s - known.begun_s,
+            period_s=self._find_period(),
+        )
+
+    def _find_period(self) -> float | None:
+        """Gives the mean time between messages: by those that came, else by all ever heard."""
+        known = self._subscription
+        n_first, first_s = self._first or (0, known.begun_s)
+        n_between, passed_s = known.n_received - n_first, known.arrived_s - first_s
+        is_told = n_between >= (1 if self._first else 2) and passed_s > 0.0
+        return passed_s / n_between if is_told else None
 
 
 async def _wait_for_first(

@@ -1,5 +1,7 @@
 """The tools about services: what there is, what it takes and gives, calling it."""
 
+import re
+from collections.abc import Sequence
 from functools import partial
 from typing import Annotated, Any
 
@@ -9,9 +11,11 @@ from pydantic import Field
 from mapspeak.navigation.safety import Call
 from mapspeak.ros.definitions import check_message
 from mapspeak.server.rosreports import cut, show_message
+from mapspeak.server.tools.ros.census import find_server
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.inquiry import Described, RosInquiry, full_name
 from mapspeak.server.tools.ros.lists import Filter, Page, choose, say_page
+from mapspeak.server.tools.ros.stamps import say_stamp
 from mapspeak.server.tools.ros.views import VIEWED, view_message
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.session import Session
@@ -24,6 +28,18 @@ Arguments = Annotated[
     Field(description="the request's fields as ros_service shows them; those left out: defaults"),
 ]
 Timeout = Annotated[float, Field(description="seconds to wait for the answer", ge=0.1, le=25)]
+
+
+FOLDED = {
+    "parameters": (
+        "parameter",
+        r".+/(?:(?:describe|get|list|set)_parameters|get_parameter_types|set_parameters_atomically)",
+    ),
+    "types": ("type_description", r".+/get_type_description"),
+    "loggers": ("logger", r".+/(?:get_loggers|set_logger_level|[gs]et_logger_levels)"),
+    "rosapi": ("rosapi", r".*/rosapi(?:_params)?/\w+"),
+}
+"""Services that every node has, and rosapi's: what is said of them, the filter that shows them."""
 
 
 class ServiceTools:
@@ -45,21 +61,27 @@ class ServiceTools:
     async def ros_services(self, filter: Filter = None, page: Page = 1) -> str:  # noqa: A002
         """Lists the robot's ROS services.
 
-        Use it to find one; ros_service tells its type and fields, ros_call calls it.
+        Use it to find one; ros_service tells its type, fields and node; ros_call calls it.
         """
         services = await self._inquiry.connection.fetch_services()
         chosen = choose(services, filter, texts=lambda name: [name])
-        return say_page("services", chosen, page, line=lambda name: name, n_all=len(services))
+        folded: list[str] = []
+        if not filter:
+            chosen, folded = _fold(services)
+        text = say_page("services", chosen, page, line=lambda name: name, n_all=len(services))
+        return "\n".join([text, *folded])
 
     async def ros_service(self, service: Service) -> str:
-        """Tells a ROS service's type, and the fields of its request and its response.
+        """Tells a ROS service's type, which node offers it, and the fields that it takes and gives.
 
         Use it before ros_call.
         """
         name = full_name(service)
         type_name = await self._inquiry.fetch_service_type(name)
         said = await self._inquiry.said(type_name, kind="srv")
-        return cut(f"{name} {said}\n{(await self._inquiry.describe(said)).say()}")
+        node = await find_server(self._inquiry.connection, name) or "(no node tells)"
+        fields = (await self._inquiry.describe(said)).say()
+        return cut(f"{name} {said}\noffered by: {node}\n{fields}")
 
     async def ros_call(
         self, service: Service, arguments: Arguments = None, timeout_s: Timeout = 5.0
@@ -90,8 +112,25 @@ class ServiceTools:
             value = answer.get(name)
             if isinstance(value, dict):
                 view = await self._session.compute(partial(view_message, kind, value))
-                parts.append(f"{name}: {view.text}")
+                stamp = say_stamp(value, now_s=self._session.robot.now_s)
+                parts += [f"{name}: {view.text}", *([stamp] if stamp else [])]
                 pictures += [] if view.picture is None else [view.picture]
         if plain or not seen:
             parts.append(show_message(plain))
         return [cut("\n".join(parts)), *pictures]
+
+
+def _fold(services: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Gives the services that are worth a line each, and a line for each kind of the others."""
+    kinds = {name: _find_kind(name) for name in services}
+    folded = [
+        f'{n} more of {what}: ask with filter "{word}"'
+        for what, (word, _) in FOLDED.items()
+        if (n := sum(kind == what for kind in kinds.values()))
+    ]
+    return [name for name, kind in kinds.items() if kind is None], folded
+
+
+def _find_kind(service: str) -> str | None:
+    fitting = (what for what, (_, form) in FOLDED.items() if re.fullmatch(form, service))
+    return next(fitting, None)

@@ -4,6 +4,7 @@ from mapspeak.server.tools.ros.actions import ActionTools
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.goals import ActionBook
 from mapspeak.server.tools.ros.inquiry import RosInquiry
+from mapspeak.server.tools.ros.measuring import MeasuringTools
 from mapspeak.server.tools.ros.nodes import NodeTools
 from mapspeak.server.tools.ros.services import ServiceTools
 from mapspeak.server.tools.ros.topics import TopicTools
@@ -25,6 +26,7 @@ class RosTools:
         commands = RosCommands(lambda: inquiry.connection)
         self._nodes = NodeTools(inquiry, commands)
         self._topics = TopicTools(session, inquiry, commands)
+        self._measuring = MeasuringTools(session, inquiry)
         self._services = ServiceTools(session, inquiry, commands)
         self._actions = ActionTools(inquiry, commands, ActionBook(inquiry, commands))
 
@@ -38,6 +40,7 @@ class RosTools:
                 is_entry=True,
             ),
             *self._topics.tools(),
+            *self._measuring.tools(),
             *self._services.tools(),
             *self._actions.tools(),
             *self._nodes.tools(),

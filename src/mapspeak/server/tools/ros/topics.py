@@ -1,5 +1,7 @@
 """The tools about topics: what there is, what it looks like, listening, publishing."""
 
+from collections.abc import Sequence
+from functools import partial
 from typing import Annotated, Any
 
 import anyio
@@ -11,12 +13,15 @@ from mapspeak.navigation.safety import Publish
 from mapspeak.ros.definitions import check_message
 from mapspeak.ros.messages import Message, bare_type
 from mapspeak.server.rosreports import cut
+from mapspeak.server.tools.ros.census import Census, fetch_hearers, fetch_publishers, take_census
 from mapspeak.server.tools.ros.commands import VELOCITIES, RosCommands, stand_of
 from mapspeak.server.tools.ros.inquiry import RosInquiry, full_name
 from mapspeak.server.tools.ros.lists import Filter, Page, choose, say_page
 from mapspeak.server.tools.ros.losses import say_loss
+from mapspeak.server.tools.ros.measuring import say_silence
 from mapspeak.server.tools.ros.publishing import Publication, Publisher
-from mapspeak.server.tools.ros.reading import Heard, hear
+from mapspeak.server.tools.ros.reading import Heard, hear, say_rate
+from mapspeak.server.tools.ros.stamps import say_stamp
 from mapspeak.server.tools.ros.views import BULKY, View, view_message
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.server.wording import list_some
@@ -25,7 +30,7 @@ from mapspeak.session import Session
 __all__ = ["TopicTools"]
 
 LONGEST_S = 25.0
-MOST_NODES = 20
+MOST_NAMED = 20
 VIEWS_KEPT = 4
 
 Topic = Annotated[str, Field(description="full name, such as /odom", max_length=200)]
@@ -37,6 +42,9 @@ Definition = Annotated[
     Field(
         description="only for a type nobody knows: its .msg, .srv or .action text", max_length=20000
     ),
+]
+WithEnds = Annotated[
+    bool, Field(description="count publishers and hearers, name topics without; asks every node")
 ]
 N = Annotated[int, Field(description="how many messages to show, the latest", ge=1, le=10)]
 Wait = Annotated[
@@ -80,7 +88,12 @@ class TopicTools:
             Tool(function=self.ros_publish, title="Publish on a ROS topic", effect=Effect.MOVES),
         ]
 
-    async def ros_topics(self, filter: Filter = None, page: Page = 1) -> str:  # noqa: A002
+    async def ros_topics(
+        self,
+        filter: Filter = None,  # noqa: A002
+        page: Page = 1,
+        ends: WithEnds = False,  # noqa: FBT002 - a flag
+    ) -> str:
         """Lists the robot's ROS topics with their types.
 
         Use it to find a topic, by its name or type; ros_topic tells more of one, ros_read reads it.
@@ -88,27 +101,32 @@ class TopicTools:
         graph = await self._inquiry.fetch_topics()
         topics = sorted(graph.types.items())
         chosen = choose(topics, filter, texts=lambda item: item)
-        return say_page(
-            "topics",
-            chosen,
-            page,
-            line=lambda item: f"{item[0]} {graph.dialect.type_name(item[1])}",
-            n_all=len(topics),
+        listed = partial(say_page, "topics", chosen, page, n_all=len(topics))
+        if not ends:
+            return listed(line=lambda item: f"{item[0]} {graph.dialect.type_name(item[1])}")
+        connection = self._inquiry.connection
+        census = await take_census(connection, await connection.fetch_nodes())
+        text = listed(
+            line=lambda item: (
+                f"{item[0]} {graph.dialect.type_name(item[1])} "
+                f"published by {census.publishers_of(item[0]).count()}, "
+                f"heard by {census.hearers_of(item[0]).count()}"
+            )
         )
+        return cut("\n".join([text, *_say_loose_ends(census, [name for name, _ in chosen])]))
 
     async def ros_topic(self, topic: Topic) -> str:
         """Tells a ROS topic's type, its fields, who publishes it and who listens.
 
-        Use it before publishing, or when nothing comes.
+        Use it when nothing comes; before ros_publish too.
         """
         name = full_name(topic)
         type_name = await self._inquiry.fetch_topic_type(name)
-        connection = self._inquiry.connection
-        publishers = await connection.fetch_publishers(name)
-        subscribers = await connection.fetch_subscribers(name)
+        publishers = await fetch_publishers(self._inquiry.connection, name)
+        hearers = await fetch_hearers(self._inquiry.connection, name)
         return cut(
             f"{name} {await self._inquiry.said(type_name)}\n"
-            f"published by: {_say_nodes(publishers)}\nheard by: {_say_nodes(subscribers)}\n"
+            f"published by: {publishers.say()}\nheard by: {hearers.say()}\n"
             f"{await self._say_fields(type_name)}"
         )
 
@@ -144,7 +162,7 @@ class TopicTools:
             duration_s=duration_s,
         )
         if not heard.messages:
-            raise await self._nothing_heard(name, duration_s or wait_s)
+            raise await self._nothing_heard(name, duration_s or wait_s, heard)
         since_s = started_s if duration_s else anyio.current_time() - heard.age_s
         loss = say_loss(self._inquiry.connection, since_s=since_s)
         head = f"{name} ({await self._inquiry.said(type_name)}): {_say_heard(heard, duration_s)}"
@@ -189,10 +207,10 @@ class TopicTools:
 
     async def _say_hearers(self, topic: str) -> str:
         try:
-            subscribers = await self._inquiry.connection.fetch_subscribers(topic)
+            hearers = await fetch_hearers(self._inquiry.connection, topic)
         except LinkError as error:
             return f"Who heard it is not known: {error.message}"
-        return f"Heard by: {_say_nodes(subscribers)}."
+        return f"Heard by: {hearers.say()}."
 
     async def _type_to_publish(self, topic: str, given: str | None) -> str:
         """Gives the topic's own type; the one that was given only where there is no topic yet."""
@@ -214,34 +232,41 @@ class TopicTools:
         except LinkError as error:
             return str(error)
 
-    async def _nothing_heard(self, topic: str, waited_s: float) -> LinkError:
+    async def _nothing_heard(self, topic: str, waited_s: float, heard: Heard) -> LinkError:
         loss = say_loss(self._inquiry.connection, since_s=anyio.current_time() - waited_s)
         if loss:
             return LinkError(
                 f"No message came on {topic} within {waited_s:g} s. {loss}",
                 hint="Read it again once the connection is back.",
             )
-        publishers = await self._inquiry.connection.fetch_publishers(topic)
-        if not publishers:
-            hint = "Nobody publishes it: start the node that should."
+        publishers = await fetch_publishers(self._inquiry.connection, topic)
+        if not publishers.others:
+            nobody = "Nobody" if publishers.ours is None else "Nobody but mapspeak"
+            hint = f"{nobody} publishes it: start the node that should."
         else:
             hint = (
-                f"It is published by {_say_nodes(publishers)}, perhaps seldom or only on a change: "
-                "a larger wait_s may help."
+                f"It is published by {publishers.say()}, yet {say_silence(heard)}: its node "
+                "may have died or be without data; what speaks seldom needs a larger wait_s."
             )
         return LinkError(f"No message came on {topic} within {waited_s:g} s.", hint=hint)
 
     async def _show(self, topic: str, type_name: str, heard: Heard, head: str) -> list[str | Image]:
-        """Gives the messages, and the picture of the latest where it has one."""
+        """Gives the messages with their stamps, and the picture of the latest where it has one."""
         views = [await self._view(topic, type_name, each) for each in heard.messages]
-        if len(views) == 1:
-            text = views[0].text
-        else:
-            text = "\n".join(
-                f"--- {number} of {len(views)}\n{view.text}" for number, view in enumerate(views, 1)
-            )
+        texts = [view.text for view in views]
+        now_s = self._session.robot.now_s
+        stamps = [say_stamp(each, now_s=now_s) for each in heard.messages[:-1]]
+        stamps.append(
+            say_stamp(heard.messages[-1], now_s=now_s, age_s=heard.age_s, period_s=heard.period_s)
+        )
+        texts = [
+            "\n".join(part for part in pair if part) for pair in zip(stamps, texts, strict=True)
+        ]
+        if len(texts) > 1:
+            texts = [f"--- {at} of {len(texts)}\n{text}" for at, text in enumerate(texts, 1)]
         picture = views[-1].picture
-        return [cut(f"{head}\n{text}"), *([] if picture is None else [picture])]
+        text = "\n".join([head, *texts])
+        return [cut(text), *([] if picture is None else [picture])]
 
     async def _view(self, topic: str, type_name: str, message: Message) -> View:
         if type_name not in BULKY:
@@ -258,15 +283,25 @@ class TopicTools:
 
 def _say_heard(heard: Heard, duration_s: float) -> str:
     if duration_s:
-        rate_hz = heard.n_received / heard.listened_s
         shown = len(heard.messages)
+        stopped = f", the last {heard.age_s:.1f} s ago" if heard.has_stopped else ""
         return (
-            f"{heard.n_received} messages in {heard.listened_s:.1f} s, {rate_hz:.2g} Hz; the "
+            f"{heard.n_received} messages in {heard.listened_s:.1f} s, "
+            f"{say_rate(heard.rate_hz)}{stopped}; the "
             f"{'latest' if shown == 1 else f'latest {shown}, the newest last'}:"
         )
     many = "" if len(heard.messages) == 1 else f"{len(heard.messages)} messages, the newest "
     return f"{many}{heard.age_s:.1f} s ago:"
 
 
-def _say_nodes(nodes: tuple[str, ...]) -> str:
-    return list_some(nodes, most=MOST_NODES) if nodes else "nobody"
+def _say_loose_ends(census: Census, topics: Sequence[str]) -> list[str]:
+    """Names the topics with an end where nobody is, and the nodes that did not tell."""
+    unsaid = [topic for topic in topics if not census.publishers_of(topic).others]
+    unheard = [topic for topic in topics if not census.hearers_of(topic).others]
+    lines = [
+        f"published by nobody: {list_some(unsaid, most=MOST_NAMED) or 'none'}",
+        f"heard by nobody: {list_some(unheard, most=MOST_NAMED) or 'none'}",
+    ]
+    if census.mute:
+        lines.append(f"not counted, they did not answer: {list_some(census.mute, most=MOST_NAMED)}")
+    return lines
