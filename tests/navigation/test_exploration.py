@@ -1,3 +1,4 @@
+import itertools
 from pathlib import Path
 
 import anyio
@@ -271,6 +272,21 @@ async def test_exploring_pauses_at_goals_where_asked(tmp_path: Path) -> None:
         states.append((await _explore(explorer, Bounds(stops_at_goals=True))).state)
     assert states[-1] is ExplorationState.NOTHING_LEFT
     assert set(states[:-1]) <= {ExplorationState.AT_GOAL}
+
+
+async def test_exploring_pauses_also_where_a_goal_has_been_seen_from_afar(tmp_path: Path) -> None:
+    robot = RoamingRobot(world_from_text(THREE_ROOMS, start=START))
+    explorer = Explorer(session_of(robot, tmp_path))
+    pauses = []
+    progress = await _explore(explorer, Bounds(stops_at_goals=True))
+    while not progress.state.is_end:
+        pauses.append(progress)
+        progress = await _explore(explorer, Bounds(stops_at_goals=True))
+    seen = [each for each in pauses if "has been seen from here" in each.sentence]
+    assert seen
+    assert all(each.trip is None for each in pauses)
+    points = [each.pose.point for each in seen]
+    assert all(a.distance_to(b) > 2.5 for a, b in itertools.pairwise(points))
 
 
 def test_a_blocked_place_is_open_again_when_the_map_has_changed_there() -> None:

@@ -139,7 +139,11 @@ def _read_representation(
     help=f"Streaming HTTP instead of stdio; {DEFAULT_HTTP} unless said otherwise.",
 )
 @click.option(
-    "--toolsets", callback=_split_names, default=None, help="Groups of tools, comma-separated."
+    "--toolsets",
+    callback=_split_names,
+    default=None,
+    help="Groups of tools, comma-separated, in place of look,places,drive,paper; others are "
+    "explore, routes, memory and ros.",
 )
 @click.option("--tools", callback=_split_names, default=None, help="Single tools besides.")
 @click.option("--read-only", "is_read_only", is_flag=True, help="No tool that changes anything.")

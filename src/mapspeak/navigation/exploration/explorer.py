@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import anyio
 
 from mapspeak.errors import PolicyError
+from mapspeak.geometry import Point
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.exploration.blocked import BlockedPlace
 from mapspeak.navigation.exploration.progress import (
@@ -32,6 +33,8 @@ SEEN_RATIO = 0.3
 Nothing else makes the robot turn on the way: two frontiers that are equally good would else take
 it back and forth between them.
 """
+PAUSE_M = 3.0
+"""As the crow flies from the last pause; nearer to it there is not much else to be looked at."""
 BESIDE_M = 1.5
 """A border with the unknown that is this near to a blocked place is what was to be seen there."""
 SLACK_S = 0.01
@@ -53,7 +56,8 @@ class Bounds:
         n_goals: So many frontiers to drive to.
         duration_s: So much robot time in calls.
         known_ratio: So much of the floor that is to be expected.
-        stops_at_goals: It pauses wherever the robot arrives, so that somebody can look around.
+        stops_at_goals: It pauses wherever the robot arrives, and where it sees from afar what it
+            was sent to see, so that somebody can look around.
     """
 
     n_goals: int | None = None
@@ -76,6 +80,7 @@ class Explorer:
         self._trips = Trips(site)
         self._state = ExplorationState.NOTHING_KNOWN
         self._bounds = Bounds()
+        self._paused_at: Point | None = None
         self._n_arrived = 0
         self._elapsed_s = 0.0
 
@@ -112,6 +117,7 @@ class Explorer:
 
     def _begin(self) -> None:
         self._trips.begin_count()
+        self._paused_at = None
         self._n_arrived = 0
         self._elapsed_s = 0.0
         self._bounds = Bounds()
@@ -125,6 +131,9 @@ class Explorer:
                 if (told := self._bound_reached(atlas)) is not None:
                     await self._trips.give_up()
                     return await self._end(atlas, ExplorationState.BOUND_REACHED, told)
+                if (seen := self._find_seen_from_here(atlas)) is not None:
+                    await self._trips.give_up()
+                    return await self._end(atlas, ExplorationState.AT_GOAL, seen)
                 state = await self._choose(atlas, ticket, client)
             if state is None:
                 return await self._end(atlas, *judge_end(atlas, self._blocked(atlas)))
@@ -151,6 +160,18 @@ class Explorer:
             if self._bounds.stops_at_goals:
                 return ExplorationState.AT_GOAL, "The robot stands at a frontier."
         return (ExplorationState.DRIVING, "There is more to explore.") if is_late else None
+
+    def _find_seen_from_here(self, atlas: Atlas) -> str | None:
+        """Says so where a pause is due because the target has been seen from afar."""
+        trip = self._trips.current
+        if not self._bounds.stops_at_goals or trip is None:
+            return None
+        is_near = (
+            self._paused_at is not None and atlas.robot.point.distance_to(self._paused_at) < PAUSE_M
+        )
+        if is_near or not self._must_turn(atlas, trip.target):
+            return None
+        return f"What {trip.target.id} promised has been seen from here."
 
     async def _choose(self, atlas: Atlas, ticket: int, client: str) -> TripState | None:
         """Sets out to the next target where there is no trip, or its end has been seen from afar.
@@ -230,6 +251,8 @@ class Explorer:
     async def _end(self, atlas: Atlas, state: ExplorationState, sentence: str) -> Progress:
         self._state = state
         self._trips.note_pose(atlas.robot)
+        if state is ExplorationState.AT_GOAL:
+            self._paused_at = atlas.robot.point
         return await self._site.compute(lambda: self._report(atlas, sentence))
 
     def _report(self, atlas: Atlas, sentence: str) -> Progress:
