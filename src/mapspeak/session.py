@@ -153,7 +153,7 @@ class Session:
             stamped = await self.robot.fetch_pose()
             memory = await self.compute(self._recall)
             revision, warnings = await self._survey(grid)
-            if revision is not None and await self._learn(revision, stamped.pose.point):
+            if revision is not None and await self._learn(revision):
                 revision, warnings = await self._survey(grid)
             self._atlas = Atlas(
                 grid,
@@ -274,25 +274,17 @@ class Session:
         revision = await surveyor.survey(grid, radius_m=self.robot.description.radius_m)
         return revision, await self.compute(lambda: surveyor.describe(revision))
 
-    async def _learn(self, revision: MapRevision, robot: Point) -> bool:
+    async def _learn(self, revision: MapRevision) -> bool:
         """Remembers what the last drive tells of doors; true when that changes ways."""
         drive, wall_time = self.drives.last_ended, self.find_wall_time()
         is_new = drive is not None and drive.goal_id != self._learned_from
-        if drive is None or not is_new or wall_time is None or self.drives.is_busy:
+        if drive is None or not is_new or wall_time is None:
             return False
         self._learned_from = drive.goal_id
-        begun = robot if self._atlas is None else self._atlas.robot.point
         try:
             return bool(
                 await self.compute(
-                    lambda: learn_from_drive(
-                        drive,
-                        self.memory,
-                        revision=revision,
-                        begun=begun,
-                        robot=robot,
-                        now=wall_time,
-                    )
+                    lambda: learn_from_drive(drive, self.memory, revision=revision, now=wall_time)
                 )
             )
         except SemanticMapError as error:

@@ -8,12 +8,13 @@ nobody else does, so that a drive ends also when the robot falls silent, jumps o
 import re
 from collections.abc import Awaitable, Callable, Generator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import anyio
 
 from mapspeak.errors import GoalError, LinkError, MapspeakError
 from mapspeak.geometry import Point, Pose
+from mapspeak.navigation.drivereport import Drive, DriveReport
 from mapspeak.navigation.safety import WhenBusy
 from mapspeak.navigation.vigil import Vigil
 from mapspeak.robot import GoalState, GoalStatus, Robot, StampedPose
@@ -25,46 +26,6 @@ PROGRESS_S = 1.0
 N_KEPT = 200
 N_BLOCKED_KEPT = 8
 FRONTIER = re.compile(r"F\d+")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Drive:
-    """A drive that was sent to the robot.
-
-    Attributes:
-        goal_id: The name it goes by: G1, G2, ...
-        goal: Where to.
-        place: What the goal was called when it was asked for.
-        robot_goal_id: What the robot's navigation calls it; None before it was sent there.
-        started_s: Robot time at which it was sent.
-        client: Who asked for it; empty where there can be only one.
-        final: How it ended, once it has.
-    """
-
-    goal_id: str
-    goal: Pose
-    place: str
-    robot_goal_id: str | None
-    started_s: float
-    client: str = ""
-    final: GoalStatus | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DriveReport:
-    """A drive and how it stands.
-
-    Attributes:
-        drive: The drive.
-        status: How it stands.
-        pose: Where the robot is now, or was last seen.
-        elapsed_s: Robot time since the drive was sent.
-    """
-
-    drive: Drive
-    status: GoalStatus
-    pose: Pose
-    elapsed_s: float
 
 
 OnProgress = Callable[[DriveReport], Awaitable[None]]
@@ -170,9 +131,11 @@ class DriveBook:
         """
         async with self._starting:
             busy = await self._find_busy()
+            begun_at = await self._find_begin()
             self._check_ticket(ticket)
             if busy is None or self._choose(busy, client, when_busy) is WhenBusy.REPLACE:
                 drive = self._note(goal, place, client, await self._robot.send_goal(goal))
+                drive = self._keep(replace(drive, begun_at=begun_at))
                 self._vigil.begin(drive.goal_id, now_s=self._robot.now_s)
                 self._end_all("A newer goal took its place.", but=drive)
                 return drive
@@ -196,6 +159,8 @@ class DriveBook:
         status = drive.final or await self._fetch_status(drive)
         drive = self._note_end(drive, status)
         stamped = await self._fetch_pose(is_over=status.state.is_final)
+        if drive.final is not None and drive.ended_at is None:
+            drive = self._keep(replace(drive, ended_at=stamped.pose.point))
         if drive.final is None and drive.robot_goal_id is not None:
             fault = self._vigil.judge(status, stamped.pose, now_s=self._robot.now_s)
             if fault is not None:
@@ -268,8 +233,7 @@ class DriveBook:
             if drive is not None:
                 report = await self.report(drive.goal_id)
                 if report.status.state is GoalState.CANCELLED:
-                    ended = replace(report.drive, final=replace(report.status, reason=reason))
-                    self._drives[drive.goal_id] = ended
+                    self._keep(replace(report.drive, final=replace(report.status, reason=reason)))
 
     # --- inside ---
 
@@ -340,8 +304,7 @@ class DriveBook:
                 self._note_end(drive, GoalStatus(state=GoalState.REJECTED, reason=str(error)))
                 return
             now_s = self._robot.now_s
-            sent = replace(drive, robot_goal_id=robot_goal_id, started_s=now_s)
-            self._drives[drive.goal_id] = sent
+            self._keep(replace(drive, robot_goal_id=robot_goal_id, started_s=now_s))
             self._vigil.begin(drive.goal_id, now_s=now_s)
 
     async def _fetch_status(self, drive: Drive) -> GoalStatus:
@@ -357,6 +320,13 @@ class DriveBook:
             if not is_over or self._last_seen is None:
                 raise
         return self._last_seen
+
+    async def _find_begin(self) -> Point | None:
+        """Gives where a drive begins; None of a robot that does not say."""
+        try:
+            return (await self._fetch_pose(is_over=False)).pose.point
+        except LinkError:
+            return None
 
     async def _give_up(self, drive: Drive, fault: GoalStatus) -> DriveReport:
         """Ends a drive that must not go on; the robot comes to a stand."""
@@ -390,8 +360,11 @@ class DriveBook:
 
     def _note_end(self, drive: Drive, status: GoalStatus) -> Drive:
         if drive.final is None and status.state.is_final:
-            drive = replace(drive, final=status)
-            self._drives[drive.goal_id] = drive
+            return self._keep(replace(drive, final=status))
+        return drive
+
+    def _keep(self, drive: Drive) -> Drive:
+        self._drives[drive.goal_id] = drive
         return drive
 
     def _forget_old(self) -> None:

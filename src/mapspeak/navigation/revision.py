@@ -32,7 +32,7 @@ class MapRevision:
         previous: The state before, whose rooms give theirs their ids.
         areas: What is closed of the floor: no way leads over it.
         hindrances: What ways lead round where that is not too far.
-        leaves_pockets: A gap that lacks less than a cell is open to a robot that is shut in by it.
+        leaves_pockets: A robot that a gap too narrow by a cell shuts in gets out of it.
 
     Attributes:
         grid: The map.

@@ -46,13 +46,15 @@ def learn(
         place="R2",
         robot_goal_id="g",
         started_s=0.0,
+        begun_at=begun,
+        ended_at=robot,
         final=GoalStatus(state=state),
     )
     revision = revision_with(*others, *store.read_events(), now=now)
-    return learn_from_drive(drive, store, revision=revision, begun=begun, robot=robot, now=now)
+    return learn_from_drive(drive, store, revision=revision, now=now)
 
 
-def come_through(store: SemanticMapStore, *others: Event) -> tuple[Event, ...]:
+def come_through(store: SemanticMapStore, *others: Event, now: datetime = NOW) -> tuple[Event, ...]:
     """Lets a drive through the north door arrive."""
     return learn(
         store,
@@ -61,14 +63,12 @@ def come_through(store: SemanticMapStore, *others: Event) -> tuple[Event, ...]:
         robot=BEHIND_NORTH_DOOR,
         goal=BEHIND_NORTH_DOOR,
         others=others,
+        now=now,
     )
 
 
-@pytest.mark.parametrize("state", [GoalState.BLOCKED, GoalState.TIMED_OUT])
-def test_ways_lead_round_a_door_at_which_the_robot_gave_up(
-    store: SemanticMapStore, state: GoalState
-) -> None:
-    (noted,) = learn(store, state)
+def test_ways_lead_round_a_door_at_which_the_robot_gave_up(store: SemanticMapStore) -> None:
+    (noted,) = learn(store, GoalState.BLOCKED)
 
     assert (noted.id, noted.place, noted.effect) == ("E1", "D1", Effect.AVOID)
     assert "the robot could not get through (D1), to be avoided" in noted.sentence(NOW)
@@ -130,10 +130,11 @@ def test_an_event_of_a_person_is_never_ended_by_driving_through(store: SemanticM
         (GoalState.BLOCKED, WEST),
         (GoalState.BLOCKED, Point(19.0, 6.0)),
         (GoalState.CANCELLED, BEFORE_NORTH_DOOR),
+        (GoalState.TIMED_OUT, BEFORE_NORTH_DOOR),
         (GoalState.PREEMPTED, BEFORE_NORTH_DOOR),
         (GoalState.ARRIVED, EAST),
     ],
-    ids=["far from a door", "behind the door", "cancelled", "replaced", "arrived"],
+    ids=["far from a door", "behind the door", "cancelled", "held", "replaced", "arrived"],
 )
 def test_other_ends_of_drives_tell_nothing_of_doors(
     store: SemanticMapStore, state: GoalState, robot: Point
@@ -142,8 +143,54 @@ def test_other_ends_of_drives_tell_nothing_of_doors(
     assert store.read_events() == ()
 
 
+def test_a_door_that_the_robot_did_not_drive_up_to_was_not_tried(store: SemanticMapStore) -> None:
+    assert learn(store, GoalState.BLOCKED, begun=BEFORE_NORTH_DOOR) == ()
+
+
+def test_pauses_begin_anew_once_the_robot_came_through(store: SemanticMapStore) -> None:
+    no_other_way = event(Effect.CLOSED, outlines=(SOUTH_WAY,), until=None)
+    for hours in range(3):
+        learn(store, GoalState.BLOCKED, now=NOW + timedelta(hours=hours), others=(no_other_way,))
+    come_through(store, no_other_way, now=NOW + timedelta(hours=3))
+    later = NOW + timedelta(hours=4)
+
+    (noted,) = learn(store, GoalState.BLOCKED, now=later)
+
+    assert noted.until == later + timedelta(minutes=15)
+    assert len(store.read_events()) == 1
+
+
+def test_pauses_begin_anew_when_the_last_was_long_ago(store: SemanticMapStore) -> None:
+    learn(store, GoalState.BLOCKED)
+    later = NOW + timedelta(days=30)
+
+    (noted,) = learn(store, GoalState.BLOCKED, now=later)
+
+    assert noted.until == later + timedelta(minutes=15)
+    assert len(store.read_events()) == 1
+
+
+async def test_the_next_drive_knows_of_the_door_too(tmp_path: Path) -> None:
+    robot = FakeRobot(office(), pose=Pose(WEST.x, WEST.y))
+    store = SemanticMapStore(tmp_path / "places.yaml")
+    session = Session(
+        robot, store, lease_s=60.0, guard=make_guard(tmp_path, Policy(), clock=WallClock(NOW))
+    )
+    with session.drives.preparing() as ticket:
+        drive = await session.drives.start(Pose(EAST.x, EAST.y), place="R2", ticket=ticket)
+    robot.pose = Pose(BEFORE_NORTH_DOOR.x, BEFORE_NORTH_DOOR.y)
+    assert drive.robot_goal_id is not None
+    robot.ended[drive.robot_goal_id] = GoalStatus(state=GoalState.BLOCKED)
+    await session.drives.report()
+
+    with session.drives.preparing():
+        await session.find_goal(place="R2", x=None, y=None, yaw_deg=None)
+
+    assert [each.source for each in store.read_events()] == [SOURCE]
+
+
 async def test_the_next_look_at_the_map_tells_of_the_door_that_was_shut(tmp_path: Path) -> None:
-    robot = FakeRobot(office(), pose=Pose(BEFORE_NORTH_DOOR.x, BEFORE_NORTH_DOOR.y))
+    robot = FakeRobot(office(), pose=Pose(WEST.x, WEST.y))
     store = SemanticMapStore(tmp_path / "places.yaml")
     session = Session(
         robot, store, lease_s=60.0, guard=make_guard(tmp_path, Policy(), clock=WallClock(NOW))
@@ -151,6 +198,7 @@ async def test_the_next_look_at_the_map_tells_of_the_door_that_was_shut(tmp_path
     await session.fetch_atlas()
     with session.drives.preparing() as ticket:
         drive = await session.drives.start(Pose(EAST.x, EAST.y), place="R2", ticket=ticket)
+    robot.pose = Pose(BEFORE_NORTH_DOOR.x, BEFORE_NORTH_DOOR.y)
     assert drive.robot_goal_id is not None
     robot.ended[drive.robot_goal_id] = GoalStatus(state=GoalState.BLOCKED)
     await session.drives.report()

@@ -21,22 +21,20 @@ from mapspeak.spatial.paths import Path
 __all__ = ["SOURCE", "learn_from_drive"]
 
 SOURCE = "the robot"
+SHUT = "the robot could not get through"
+OPEN_AGAIN = f"{SHUT}, and came through later"
 AHEAD_M = 1.5
 """A robot that gives up at a door stands so near to it, along its way."""
 SAME_DOOR_M = 0.5
+LEAST_TRY_M = 0.3
+"""A robot that has not come so much nearer to a door has not tried it."""
 FIRST_PAUSE = timedelta(minutes=15)
 LONGEST_PAUSE = timedelta(hours=24)
 PAUSE_GROWTH = 4
 
 
 def learn_from_drive(
-    drive: Drive,
-    store: SemanticMapStore,
-    *,
-    revision: MapRevision,
-    begun: Point,
-    robot: Point,
-    now: datetime,
+    drive: Drive, store: SemanticMapStore, *, revision: MapRevision, now: datetime
 ) -> tuple[Event, ...]:
     """Notes the door at which a drive gave up, or ends what was noted of one it came through.
 
@@ -44,8 +42,6 @@ def learn_from_drive(
         drive: The last that has ended.
         store: Where events are remembered.
         revision: The map as it is after it: what that shows as closed needs no event.
-        begun: Where the robot was before it.
-        robot: Where it is now.
         now: The operator's time.
 
     Returns:
@@ -54,14 +50,16 @@ def learn_from_drive(
     Raises:
         SemanticMapError: The memory cannot be read or written.
     """
-    state = None if drive.final is None else drive.final.state
-    if state not in (GoalState.ARRIVED, GoalState.BLOCKED, GoalState.TIMED_OUT):
+    begun, ended = drive.begun_at, drive.ended_at
+    if drive.final is None or begun is None or ended is None:
         return ()
     own = [each for each in store.read_events() if each.source == SOURCE]
-    if state is GoalState.ARRIVED:
-        passed = _find_crossed(own, revision, revision.find_path(begun, robot), now) if own else []
-        return tuple(end_event(store, each.id, now=now) for each in passed)
-    shut = _find_door_ahead(revision, robot, drive.goal.point, now)
+    if drive.final.state is GoalState.ARRIVED:
+        passed = _find_crossed(own, revision, revision.find_path(begun, ended), now) if own else []
+        return tuple(_end(store, each, now) for each in passed)
+    if drive.final.state is not GoalState.BLOCKED:
+        return ()
+    shut = _find_door_ahead(revision, begun, ended, drive.goal.point, now)
     return () if shut is None else (store.write_event(_prolong(shut, own, now)),)
 
 
@@ -79,13 +77,13 @@ def _find_crossed(
 
 
 def _find_door_ahead(
-    revision: MapRevision, robot: Point, goal: Point, now: datetime
+    revision: MapRevision, begun: Point, robot: Point, goal: Point, now: datetime
 ) -> Event | None:
     """Gives an event for the door close before the robot that its way goes on through."""
     rooms = revision.rooms
     near = [
         Event(
-            text="the robot could not get through",
+            text=SHUT,
             place=door.id,
             effect=Effect.AVOID,
             at=door.place,
@@ -95,18 +93,32 @@ def _find_door_ahead(
         )
         for door in sorted(rooms.doors, key=lambda door: door.place.distance_to(robot))
         if door.place.distance_to(robot) <= AHEAD_M + door.width_m / 2
+        and door.place.distance_to(begun) >= door.place.distance_to(robot) + LEAST_TRY_M
     ]
     crossed = _find_crossed(near, revision, revision.find_path(robot, goal), now) if near else []
     return crossed[0] if crossed else None
 
 
+def _end(store: SemanticMapStore, event: Event, now: datetime) -> Event:
+    ended = end_event(store, event.id, now=now)
+    return store.write_event(replace(ended, text=OPEN_AGAIN))
+
+
 def _prolong(shut: Event, own: Iterable[Event], now: datetime) -> Event:
-    """Gives the event an end: later each time that the robot finds the same door shut again."""
-    earlier = [each for each in own if _is_at(each, shut)]
-    lasting = current_events(earlier, now)
-    pauses = [each.until - each.recorded_at for each in earlier if each.until and each.recorded_at]
-    pause = min(PAUSE_GROWTH * pauses[-1], LONGEST_PAUSE) if pauses else FIRST_PAUSE
-    return replace(shut, id=lasting[-1].id if lasting else "", until=now + max(pause, FIRST_PAUSE))
+    """Gives the event an end: later each time that the robot finds the same door shut again.
+
+    A door has one event, which is written anew. What is long over, or was open in between, counts
+    no more.
+    """
+    before = next((each for each in own if _is_at(each, shut)), None)
+    if before is None:
+        return replace(shut, until=now + FIRST_PAUSE)
+    pause = FIRST_PAUSE
+    if before.text == SHUT and before.until and before.recorded_at:
+        is_lately = now - before.until <= LONGEST_PAUSE
+        longer = PAUSE_GROWTH * (before.until - before.recorded_at)
+        pause = min(longer, LONGEST_PAUSE) if is_lately else FIRST_PAUSE
+    return replace(shut, id=before.id, until=now + max(pause, FIRST_PAUSE))
 
 
 def _is_at(event: Event, door: Event) -> bool:

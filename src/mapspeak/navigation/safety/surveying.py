@@ -30,7 +30,7 @@ class Surveyor:
         wall_clock: The operator's.
         read_events: Gives the events that are remembered. They close what they say, and never
             open what a rule closes.
-        leaves_pockets: A gap that lacks less than a cell is open to a robot that is shut in by it.
+        leaves_pockets: A robot that a gap too narrow by a cell shuts in gets out of it.
     """
 
     def __init__(

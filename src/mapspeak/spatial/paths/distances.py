@@ -30,7 +30,8 @@ class DistanceField:
         radius_m: Of the robot.
         lattice: The cells that the distances belong to.
         costs: The distances in lattice cells, flat; infinite where the robot cannot go.
-        leaves_pockets: A gap that lacks less than a cell is open to a robot that is shut in by it.
+        leaves_pockets: See `open_pocket`.
+        closed_lattice: The map's, without a gap that was opened for this start.
     """
 
     start: Point
@@ -38,6 +39,7 @@ class DistanceField:
     lattice: Lattice
     costs: Costs
     leaves_pockets: bool = False
+    closed_lattice: Lattice
 
     def distance_to(self, point: Point) -> float | None:
         """Gives the metres to a point by path; None where the robot cannot get to."""
@@ -90,7 +92,7 @@ class DistanceField:
     def from_elsewhere(self, start: Point) -> "DistanceField":
         """Gives the distances from another place on the same map, for the same robot."""
         return _distances_over(
-            self.lattice, start, radius_m=self.radius_m, leaves_pockets=self.leaves_pockets
+            self.closed_lattice, start, radius_m=self.radius_m, leaves_pockets=self.leaves_pockets
         )
 
     def build_reachable_mask(self) -> Mask:
@@ -128,7 +130,7 @@ def distances_from(
 def _distances_over(
     lattice: Lattice, start: Point, *, radius_m: float, leaves_pockets: bool
 ) -> DistanceField:
-    costs = _spread_from(lattice, start, radius_m)
+    closed, costs = lattice, _spread_from(lattice, start, radius_m)
     reached_m2 = np.count_nonzero(np.isfinite(costs)) * lattice.cell_size_m**2
     if leaves_pockets and reached_m2 < POCKET_M2:
         opened = open_pocket(lattice, costs, start, radius_m=radius_m)
@@ -141,6 +143,7 @@ def _distances_over(
         lattice=lattice,
         costs=costs,
         leaves_pockets=leaves_pockets,
+        closed_lattice=closed,
     )
 
 

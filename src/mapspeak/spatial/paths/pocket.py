@@ -1,7 +1,7 @@
 """Out of a pocket: a robot that has got into a place gets out of it the way it came.
 
-A gap that a robot has just fitted through may look one cell too narrow in the map's next state.
-Behind it the robot would seem shut in for ever, and everything else out of reach.
+A gap that a robot has just fitted through may look too narrow in the map's next state, by one cell
+on each side. Behind it the robot would seem shut in for ever, and everything else out of reach.
 """
 
 import cv2
@@ -18,8 +18,8 @@ __all__ = ["POCKET_M2", "open_pocket"]
 
 POCKET_M2 = 5.0
 """A robot that can go nowhere but on so little floor may be in a pocket."""
-SLACK_RATIO = 0.2
-"""A gap is never taken for wider than by this share of the radius, however coarse the map is."""
+FINE_RATIO = 0.2
+"""Of the radius: on a map of larger cells one of them is no mere doubt about a gap."""
 
 
 def open_pocket(lattice: Lattice, costs: Costs, start: Point, *, radius_m: float) -> Lattice:
@@ -32,10 +32,13 @@ def open_pocket(lattice: Lattice, costs: Costs, start: Point, *, radius_m: float
         radius_m: Of the robot.
 
     Returns:
-        The same lattice where no gap that lacks less than one cell leads out.
+        The same lattice where no gap that lacks less than one cell on each side leads out, and on
+        a coarse map.
     """
-    slack_m = min(lattice.grid.resolution_m, SLACK_RATIO * radius_m)
-    narrow = build_narrow_lattice(lattice, radius_m - slack_m)
+    cell_m = lattice.grid.resolution_m
+    if cell_m > FINE_RATIO * radius_m:
+        return lattice
+    narrow = build_narrow_lattice(lattice, radius_m - cell_m)
     seeds = find_seeds(narrow, start, radius_m=radius_m)
     if seeds is None:
         return lattice
