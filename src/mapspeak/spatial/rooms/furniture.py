@@ -21,7 +21,9 @@ from mapspeak.spatial.rooms.solids import (
     line_along,
     open_box,
     places,
+    put_lines,
     run_lengths,
+    take_lines,
     turn_back,
     turn_upright,
     widen,
@@ -45,18 +47,19 @@ Numbers = NDArray[np.int32]
 
 
 def find_blocks(
-    raster: Raster, angle_deg: float, settings: RoomSettings
+    raster: Raster, wall: Picture, angle_deg: float, settings: RoomSettings
 ) -> tuple[Picture, Picture]:
     """Gives 1 on furniture with its inside, and 1 on the walls behind it.
 
     Args:
         raster: The map.
+        wall: 1 on what was taken for wall; nothing else runs on behind furniture.
         angle_deg: The direction of its walls.
         settings: The lengths.
     """
-    free, occupied = turn_upright(raster.free, raster.occupied, angle_deg)
+    free, occupied, wall = turn_upright(raster.free, raster.occupied, wall, angle_deg)
     solid = 1 - drop_specks(free, _SPECK_M2 / raster.cell_area_m2)
-    found = _find_blocks(solid, occupied, _Sizes(solid, raster.cell_size_m, settings))
+    found = _find_blocks(solid, occupied, wall, _Sizes(solid, raster.cell_size_m, settings))
     shape = raster.free.shape[0], raster.free.shape[1]
     block, behind = (turn_back(picture, shape, angle_deg) for picture in found)
     return block, behind & (1 - block)
@@ -105,11 +108,15 @@ def _find_wall_thickness(solid: Picture, most: int, least: float) -> float:
     return float(np.median(all_of_them)) if all_of_them.size >= least else 0.0
 
 
-def _find_blocks(solid: Picture, occupied: Picture, cells: _Sizes) -> tuple[Picture, Picture]:
+def _find_blocks(
+    solid: Picture, occupied: Picture, seen_wall: Picture, cells: _Sizes
+) -> tuple[Picture, Picture]:
     if cells.thin >= cells.thick:
         return np.zeros_like(solid), np.zeros_like(solid)
     bump = open_box(_find_bumps(solid, cells), cells.thin, cells.thin)
-    wall = _continue_walls(solid, bump, cells)
+    if not bump.any():
+        return bump, bump
+    wall = _continue_walls(solid, bump, seen_wall, cells)
     piece = open_box(bump & (1 - wall), cells.depth, cells.depth)
     rest = solid & (1 - piece)
     fixed = drop_small(rest, cells.crumb)
@@ -132,29 +139,50 @@ def _find_bumps(solid: Picture, cells: _Sizes) -> Picture:
 # --- walls behind ----------------------------------------------------------------------------
 
 
-def _continue_walls(solid: Picture, bump: Picture, cells: _Sizes) -> Picture:
+def _continue_walls(solid: Picture, bump: Picture, seen_wall: Picture, cells: _Sizes) -> Picture:
     """Gives 1 in bumps where walls that end at them run on in line."""
-    stubs = [_find_stubs(solid, bump, axis, cells) for axis in (0, 1)]
+    stubs = [_find_stubs(solid, bump, seen_wall, axis, cells) for axis in (0, 1)]
     wall = np.zeros_like(solid)
     for axis, stub in enumerate(stubs):
-        (before, _), (behind, _) = _reach(stub, solid, axis, cells)
-        is_at_floor = is_near(1 - solid, cells.tip, 1 - axis)
-        is_wall = (before & behind) | ((before | behind) & is_at_floor)
-        wall |= bump & is_wall.astype(np.uint8)
+        lines = _find_lines(stub, bump, axis)
+        near = is_near(1 - solid, cells.tip, 1 - axis).astype(np.uint8)
+        s, through, is_at_floor = (take_lines(each, lines, axis) for each in (stub, solid, near))
+        (before, _), (behind, _) = _reach(s, through, axis, cells)
+        put_lines(wall, (before & behind) | ((before | behind) & (is_at_floor > 0)), lines, axis)
+    wall &= bump
     inner = bump & (1 - wall)
     for axis, stub in enumerate(stubs):
-        (before, over), (behind, back_over) = _reach(stub, inner, axis, cells)
+        lines = _find_lines(stub, bump, axis)
+        s, whole, through = (take_lines(each, lines, axis) for each in (stub, solid, inner))
+        (before, over), (behind, back_over) = _reach(s, through, axis, cells)
         # A wall goes on behind a door if it has something there to end at.
-        ends_back, ends = _find_ends(solid, inner, axis)
-        is_wall = before | behind | (over & ends) | (back_over & ends_back)
-        wall |= is_wall.astype(np.uint8)
+        ends_back, ends = _find_ends(whole, through, axis)
+        put_lines(wall, before | behind | (over & ends) | (back_over & ends_back), lines, axis)
     return wall
 
 
-def _find_stubs(solid: Picture, bump: Picture, axis: int, cells: _Sizes) -> Picture:
-    """Gives pieces of thin wall along an axis."""
+def _find_lines(stub: Picture, bump: Picture, axis: int) -> Counts:
+    """Gives the lines along an axis on which a wall may run on into a bump."""
+    return np.flatnonzero(stub.any(axis=axis) & bump.any(axis=axis))
+
+
+def _find_stubs(
+    solid: Picture, bump: Picture, seen_wall: Picture, axis: int, cells: _Sizes
+) -> Picture:
+    """Gives pieces of thin wall along an axis.
+
+    What holds nothing that was taken for wall, and runs that way for twice the length, is none:
+    such as the shadow of a chair, or a speck on a wall.
+    """
+    across = 1 - axis
+    seen = open_box(widen(seen_wall, 1), *line_along(2 * cells.stub, axis).shape)
+    # What is widened so that runs bear a step aside is not to be longer for it.
+    held = seen & solid & np.asarray(cv2.dilate(seen_wall, line_along(3, across)), np.uint8)
+    for _ in range(cells.thin):
+        held = np.asarray(cv2.dilate(held, line_along(3, across)), np.uint8) & solid
     long = open_box(solid & (1 - bump), *line_along(cells.stub, axis).shape)
-    return long & is_short(solid, cells.thin, 1 - axis).astype(np.uint8)
+    is_thin = is_short(solid, cells.thin, across).astype(np.uint8)
+    return np.asarray(long & held & is_thin, np.uint8)
 
 
 def _reach(

@@ -22,11 +22,17 @@ class _Border:
 
 
 class _Forest:
-    """Basins joined into places, each with its clearance (its highest peak) and its area."""
+    """Basins joined into places, each with its clearance (its highest peak) and its area.
 
-    def __init__(self, clearance_m: list[float], area_m2: list[float]) -> None:
+    Its clearance is given also with the furniture in its place, never more than without.
+    """
+
+    def __init__(
+        self, clearance_m: list[float], standing_m: list[float], area_m2: list[float]
+    ) -> None:
         self._parent = list(range(len(clearance_m)))
         self.clearance_m = clearance_m
+        self.standing_m = standing_m
         self.area_m2 = area_m2
 
     def place(self, basin: int) -> int:
@@ -44,12 +50,14 @@ class _Forest:
     def join(self, narrow: int, wide: int) -> None:
         """Makes the narrower place part of the wider one."""
         self._parent[narrow] = wide
+        self.standing_m[wide] = max(self.standing_m[wide], self.standing_m[narrow])
         self.area_m2[wide] += self.area_m2[narrow]
 
 
 def merge_basins(
     basins: BasinLabels,
     clearance_m: Heights,
+    standing_m: Heights,
     saddles: list[Saddle],
     *,
     frames: Frames,
@@ -57,19 +65,28 @@ def merge_basins(
     settings: RoomSettings,
 ) -> NDArray[np.int32]:
     """Gives room numbers from 1, the largest room first; 0 where no room is."""
-    forest = _plant(basins, clearance_m, cell_area_m2)
+    forest = _plant(basins, clearance_m, standing_m, cell_area_m2)
     _join_equal_widths(forest, saddles, settings.same_width_ratio)
     borders = _join_open_borders(forest, saddles, frames, settings)
     _absorb_small(forest, borders, settings)
     return _number_by_area(basins, forest, settings.room_area_m2)
 
 
-def _plant(basins: BasinLabels, clearance_m: Heights, cell_area_m2: float) -> _Forest:
+def _plant(
+    basins: BasinLabels, clearance_m: Heights, standing_m: Heights, cell_area_m2: float
+) -> _Forest:
     n = int(basins.max(initial=0)) + 1
-    peak = np.zeros(n, np.float32)
-    np.maximum.at(peak, basins.ravel(), clearance_m.ravel())
+    peak = _find_peaks(basins, clearance_m, n)
+    is_same = standing_m is clearance_m
+    standing = peak if is_same else np.minimum(_find_peaks(basins, standing_m, n), peak)
     area = np.bincount(basins.ravel(), minlength=n) * cell_area_m2
-    return _Forest(peak.tolist(), area.tolist())
+    return _Forest(peak.tolist(), standing.tolist(), area.tolist())
+
+
+def _find_peaks(basins: BasinLabels, height: Heights, n: int) -> Heights:
+    peak = np.zeros(n, np.float32)
+    np.maximum.at(peak, basins.ravel(), height.ravel())
+    return peak
 
 
 def _join_equal_widths(forest: _Forest, saddles: list[Saddle], same_ratio: float) -> None:
@@ -96,7 +113,8 @@ def _join_open_borders(
         if saddle.is_doorway:
             borders.append(_Border(saddle=saddle, wall_m=settings.frame_m))
             continue
-        clearance_m, wide_m = forest.clearance_m[narrow], forest.clearance_m[wide]
+        # Taking furniture away may open a place, but makes no doors by widening what is beside.
+        clearance_m, wide_m = forest.standing_m[narrow], forest.clearance_m[wide]
         if _is_narrow(clearance_m, wide_m, saddle, settings):
             wall_m = frames.measure(saddle.row, saddle.col, saddle.height)
             if saddle.height <= _door_ratio(wall_m, settings) * clearance_m:
@@ -155,6 +173,7 @@ def _absorb_small(forest: _Forest, borders: list[_Border], settings: RoomSetting
 def _least_area(border: _Border, settings: RoomSettings) -> float:
     """Gives how large a place behind this border must be: a niche has no door frame."""
     is_framed = border.wall_m >= settings.frame_m / 2
+    is_framed &= 2 * border.saddle.height >= settings.least_door_m
     return settings.room_area_m2 if is_framed else settings.niche_area_m2
 
 

@@ -63,12 +63,15 @@ def _divide(
     settings: RoomSettings,
 ) -> Labels:
     """Gives room numbers; basins end where the floor has been cut at the doorways."""
-    height = _smooth(cut_floor, settings.smoothing_m / raster.cell_size_m)
+    sigma = settings.smoothing_m / raster.cell_size_m
+    height = _smooth(cut_floor.clearance_m, cut_floor.floor, sigma)
+    standing = floor.standing_m
     basins = build_basins(height, cut_floor.floor)
     saddles = find_saddles(basins, height) + _find_saddles_at(doorways, basins)
     return merge_basins(
         basins,
         height,
+        height if standing is None else _smooth(standing, floor.floor, sigma),
         sorted(saddles, key=lambda saddle: -saddle.height),
         frames=Frames(floor, raster.cell_size_m),
         cell_area_m2=raster.cell_area_m2,
@@ -76,9 +79,9 @@ def _divide(
     )
 
 
-def _smooth(floor: Floor, sigma: float) -> NDArray[np.float32]:
-    smooth = cv2.GaussianBlur(floor.clearance_m, (0, 0), sigma)
-    return np.where(floor.floor > 0, smooth, np.float32(0))
+def _smooth(clearance_m: NDArray[np.float32], floor: Picture, sigma: float) -> NDArray[np.float32]:
+    smooth = cv2.GaussianBlur(clearance_m, (0, 0), sigma)
+    return np.where(floor > 0, smooth, np.float32(0))
 
 
 def _draw(doorways: list[Doorway], floor: Picture) -> Picture:

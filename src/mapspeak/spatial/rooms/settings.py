@@ -16,10 +16,11 @@ class RoomSettings:
         wall_thickness_m: Where an obstacle is this thick, it is no such piece.
         island_size_m: An obstacle that can be walked around is wall only if it is larger.
         block_depth_m: Furniture is at least so deep.
-    block_ratio: And with the wall behind it so many times as thick as the map's walls are.
-    block_thickness_m: One of its sides is at most so long.
-    block_length_m: The floor around it is at most this far, along the walls and square to them.
-    direction_ratio: A main direction has at least this share of the strongest one's edges.
+        block_ratio: And with the wall behind it so many times as thick as the map's walls are.
+        block_thickness_m: One of its sides is at most so long.
+        block_length_m: The floor around it is at most this far, along the walls and square to
+            them.
+        direction_ratio: A main direction has at least this share of the strongest one's edges.
         pocket_area_m2: Unseen areas up to this size inside a room count as floor.
         smoothing_m: Standard deviation of the smoothing of clearances.
         same_width_ratio: Neighbouring places whose clearances differ less are one place.
@@ -27,6 +28,7 @@ class RoomSettings:
         door_ratio: A narrow place in a wall divides if its half width is at most this share of
             the clearance of the narrower side.
         gap_ratio: The same for a narrow place with no wall in line with it.
+        least_door_m: A narrower place is a gap beside furniture, or a door that is hardly open.
         leaf_width_m: Doors up to this width divide however wide the places behind them are.
         wide_ratio: A wider one divides if its half width is also at most this share of the
             clearance of the wider side.
@@ -60,6 +62,7 @@ class RoomSettings:
     door_width_m: float = 2.4
     door_ratio: float = 0.8
     gap_ratio: float = 0.5
+    least_door_m: float = 0.6
     leaf_width_m: float = 1.0
     wide_ratio: float = 0.6
     stub_m: float = 0.3

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from mapspeak.spatial.rooms.raster import Picture
 
 Numbers = NDArray[np.int16] | NDArray[np.int32]
+Places = NDArray[np.intp]
 Truths = NDArray[np.bool_]
 Affine = NDArray[np.float64]
 
@@ -16,19 +17,23 @@ _UPRIGHT_DEG = 0.6
 """A map whose walls are this near to its rows and columns need not be turned."""
 
 
-def turn_upright(free: Picture, occupied: Picture, angle_deg: float) -> tuple[Picture, ...]:
-    """Gives both pictures so turned that walls of this direction run along rows and columns."""
+def turn_upright(
+    free: Picture, occupied: Picture, wall: Picture, angle_deg: float
+) -> tuple[Picture, ...]:
+    """Gives all three so turned that walls of this direction run along rows and columns."""
     if _is_upright(angle_deg):
-        return free, occupied
+        return free, occupied, wall
     there, size = _find_turn(free.shape, angle_deg)
     turned = [
         np.asarray(cv2.warpAffine(part, there, size, flags=cv2.INTER_NEAREST), np.uint8)
-        for part in (free, occupied)
+        for part in (free, occupied, wall)
     ]
     # What is one cell thick falls apart when it is turned.
-    closed = cv2.morphologyEx(turned[1], cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    solid = np.asarray(closed, np.uint8)
-    return turned[0] & (1 - solid), solid
+    solid, closed_wall = (
+        np.asarray(cv2.morphologyEx(part, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)), np.uint8)
+        for part in turned[1:]
+    )
+    return turned[0] & (1 - solid), solid, closed_wall
 
 
 def turn_back(picture: Picture, shape: tuple[int, int], angle_deg: float) -> Picture:
@@ -106,6 +111,17 @@ def run_lengths(solid: Picture, axis: int) -> tuple[NDArray[np.intp], NDArray[np
     row, col = np.divmod(first, framed.shape[1])
     ends = (col > 0) & (col + stop - first < lines.shape[1])
     return (row * lines.shape[1] + col)[ends], (stop - first)[ends]
+
+
+def take_lines(picture: Picture, lines: Places, axis: int) -> Picture:
+    """Gives these lines of a picture along an axis: columns along 0, rows along 1."""
+    return np.take(picture, lines, axis=1 - axis)
+
+
+def put_lines(picture: Picture, found: Truths, lines: Places, axis: int) -> None:
+    """Sets in these lines of a picture what was found in them."""
+    here = (slice(None), lines) if axis == 0 else (lines, slice(None))
+    picture[here] |= found.astype(np.uint8)
 
 
 def last_place(is_set: Truths, axis: int, *, none: int) -> Numbers:
