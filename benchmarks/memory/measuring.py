@@ -17,7 +17,7 @@ from benchmarks.memory.asking import FindModel, open_atlas
 from benchmarks.memory.judging import Facing, Fault, Judged, Outcome, choose, judge_all
 from benchmarks.memory.observer import observe
 from benchmarks.memory.places import PlaceError, measure_places
-from benchmarks.memory.sites import Site, build_drawn, build_held_out, build_sites
+from benchmarks.memory.sites import Site, build_drawn, build_held_out, build_sites, build_worn
 from mapspeak.evaluation.scores import wilson_interval
 from mapspeak.semantic.retrieval import Embedder, find_model
 
@@ -28,10 +28,11 @@ SEEDS = (1, 2)
 GROUPS: dict[str, Callable[[], Iterator[Site]]] = {
     "used": build_sites,
     "drawn": build_drawn,
+    "worn": build_worn,
     "held out": build_held_out,
 }
 MEASURED = ("used", "held out")
-"""The others are for choosing alone."""
+"""Those drawn are for choosing alone, and the worn ones were looked at too often."""
 RULES: dict[str, Callable[[PlaceError], float]] = {
     "ours": lambda error: error.ours_m,
     "observer's own pose": lambda error: error.own_pose_m,
@@ -80,21 +81,25 @@ def measure() -> Iterator[Figure]:
     """Gives errors of places and how requests came out, each with ranges and without."""
     cv2.setNumThreads(1)
     for group in MEASURED:
-        sites = list(GROUPS[group]())
         for has_ranges in (False, True):
-            kind = f"{group}, {'bearings and ranges' if has_ranges else 'bearings alone'}"
-            trials = [
-                Trial(site, seed=seed, has_ranges=has_ranges) for seed in SEEDS for site in sites
-            ]
-            yield from _measure_errors(kind, [e for trial in trials for e in trial.errors])
-            for way in WAYS:
-                every = [each for trial in trials for each in trial.judged[way]]
-                drawn = choose(every, n=N_REQUESTS, seed=9)
-                yield from _measure_answers(f"{kind}, {way}: {len(drawn)} requests", drawn)
-                yield from _measure_answers(f"{kind}, {way}: all {len(every)} requests", every)
-                yield from _measure_causes(f"{kind}, {way}: all {len(every)} requests", every)
-            took_ms = 1e3 * sum(t.took_s for t in trials) / sum(t.n_waypoints for t in trials)
-            yield Figure(name=f"{kind}: CPU for one waypoint", value=took_ms, unit="ms")
+            yield from _measure_group(group, has_ranges=has_ranges, ways=tuple(WAYS))
+
+
+def _measure_group(group: str, *, has_ranges: bool, ways: Sequence[str]) -> Iterator[Figure]:
+    kind = f"{group}, {'bearings and ranges' if has_ranges else 'bearings alone'}"
+    sites = list(GROUPS[group]())
+    trials = [
+        Trial(site, seed=seed, has_ranges=has_ranges, ways=ways) for seed in SEEDS for site in sites
+    ]
+    yield from _measure_errors(kind, [e for trial in trials for e in trial.errors])
+    for way in ways:
+        every = [each for trial in trials for each in trial.judged[way]]
+        drawn = choose(every, n=N_REQUESTS, seed=9)
+        yield from _measure_answers(f"{kind}, {way}: {len(drawn)} requests", drawn)
+        yield from _measure_answers(f"{kind}, {way}: all {len(every)} requests", every)
+        yield from _measure_causes(f"{kind}, {way}: all {len(every)} requests", every)
+    took_ms = 1e3 * sum(t.took_s for t in trials) / sum(t.n_waypoints for t in trials)
+    yield Figure(name=f"{kind}: CPU for one waypoint", value=took_ms, unit="ms")
 
 
 def _measure_errors(kind: str, errors: Sequence[PlaceError]) -> Iterator[Figure]:
@@ -165,10 +170,18 @@ def _share(name: str, values: Sequence[bool]) -> Figure:
 @click.option("--group", type=click.Choice(list(GROUPS)), default="used", show_default=True)
 @click.option("--way", type=click.Choice(list(WAYS)), default="with model", show_default=True)
 @click.option("--wrong", "shows_wrong", is_flag=True, help="Lists the confident wrong answers.")
-def main(*, seed: int, has_ranges: bool, group: str, way: str, shows_wrong: bool) -> None:
+@click.option("--figures", "shows_figures", is_flag=True, help="Of both seeds, with intervals.")
+def main(
+    *, seed: int, has_ranges: bool, group: str, way: str, shows_wrong: bool, shows_figures: bool
+) -> None:
     """Shows every building: errors of places in metres, and answers."""
     cv2.setNumThreads(1)
     console = Console(width=150)
+    if shows_figures:
+        for figure in _measure_group(group, has_ranges=has_ranges, ways=(way,)):
+            said = f"{figure.value:.2f} {figure.unit}  {figure.name}"
+            console.print(said, markup=False, highlight=False, soft_wrap=True)
+        return
     table = Table("building", "things", *(f"{rule}, m" for rule in RULES), *Outcome, "faces it")
     wrong: list[Judged] = []
     for site in GROUPS[group]():

@@ -1,13 +1,15 @@
 """Buildings with things in them: shipped, drawn by a seeded generator, and real maps furnished.
 
-What the memory believes of observers was chosen on `build_sites` and, of the styles that are held
-out, on buildings of other seeds, `build_drawn`; `build_held_out` was not looked at for that, and
-must not be.
+What the memory believes of observers, and when it says `found`, was chosen on `build_sites` and
+`build_drawn`. The shipped buildings, `build_worn`, were held out at first, and then looked at four
+times between choices, so that they show nothing new. `build_held_out` draws others of the same
+styles, of seeds that nothing was chosen on; whoever looks at them and then chooses must draw new
+ones.
 """
 
 import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -36,7 +38,7 @@ from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import clearance_m
 from mapspeak.spatial.rooms import RoomMap
 
-__all__ = ["Site", "TrueThing", "build_drawn", "build_held_out", "build_sites"]
+__all__ = ["Site", "TrueThing", "build_drawn", "build_held_out", "build_sites", "build_worn"]
 
 MAPS = Path(__file__).parents[2] / "tests" / "maps"
 REAL_MAPS = (MAPS / "aws_small_house" / "map.yaml", MAPS / "freiburg79" / "whole.yaml")
@@ -47,8 +49,10 @@ APART_M = 1.2
 BODY_HEIGHT_M = 2.0
 RADIUS_M = BODY_RADIUS_M + 0.03
 USED_FOR_CHOOSING = ("office", "warehouse")
-DRAWN_SEEDS = (101, 102)
-"""A small and a large building of each style; none of them is shipped."""
+DRAWN_SEEDS = (101, 102, 103, 104)
+"""Two small and two large buildings of each style; none of them is shipped."""
+HELD_OUT_SEEDS = (301, 302)
+"""A small and a large one of each style. Measured once, when the rule of `found` was chosen."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,7 +163,12 @@ def _free_m(edges: NDArray[np.float64], start: Point, end: Point) -> float:
 
 
 def build_held_out() -> Iterator[Site]:
-    """Gives the shipped buildings that nothing was chosen on."""
+    """Gives drawn buildings that nothing was chosen on."""
+    return _draw(HELD_OUT_SEEDS)
+
+
+def build_worn() -> Iterator[Site]:
+    """Gives the shipped buildings that were held out until they had been looked at too often."""
     for name in world_names():
         if name not in USED_FOR_CHOOSING:
             yield Site(load_world(name))
@@ -167,9 +176,13 @@ def build_held_out() -> Iterator[Site]:
 
 def build_drawn() -> Iterator[Site]:
     """Gives buildings in the styles of those held out, for choosing."""
+    return _draw(DRAWN_SEEDS)
+
+
+def _draw(seeds: Sequence[int]) -> Iterator[Site]:
     with TemporaryDirectory() as folder:
         for style in style_names():
-            for seed in DRAWN_SEEDS:
+            for seed in seeds:
                 path = Path(folder) / f"{style}_{seed}.yaml"
                 path.write_text(draw_plan(style, seed=seed), encoding="utf-8")
                 yield Site(load_world(path))

@@ -22,7 +22,7 @@ from mapspeak.navigation.memory.recollection import (
 from mapspeak.navigation.revision import MapRevision
 from mapspeak.semantic import SemanticMap
 from mapspeak.semantic.consistency import check_memory
-from mapspeak.semantic.things import find_approach, find_fronts
+from mapspeak.semantic.things import find_approach, find_fronts, measure_faced
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import (
     FrontierReport,
@@ -64,11 +64,13 @@ class Reminders:
 
     Attributes:
         approaches: Where the robot would stand before a thing.
+        faced: The share of where a thing may be that it would face there.
         rooms: The rooms before a thing, by id.
         judge: What may be trusted; None until somebody asks.
     """
 
     approaches: dict[RememberedThing, Pose | None] = field(default_factory=dict)
+    faced: dict[RememberedThing, float] = field(default_factory=dict)
     rooms: dict[RememberedThing, tuple[str, ...]] = field(default_factory=dict)
     judge: Judge | None = None
 
@@ -237,6 +239,22 @@ class Atlas:
                     self.distances,
                     position,
                     [view.place for view in remembered.thing.supporting],
+                    whereabouts=remembered.thing.whereabouts,
+                )
+            )
+        return known[remembered]
+
+    def measure_faced(self, remembered: RememberedThing) -> float:
+        """Gives the share of where a thing may be that the robot would face before it."""
+        known, thing = self._reminders.faced, remembered.thing
+        if remembered not in known:
+            pose = self.find_approach(remembered)
+            seen_from = [view.place for view in thing.supporting]
+            known[remembered] = (
+                0.0
+                if pose is None or thing.whereabouts is None
+                else measure_faced(
+                    self.recollection.found.sight, pose, seen_from, thing.whereabouts
                 )
             )
         return known[remembered]

@@ -55,6 +55,7 @@ class RecallCandidate:
         room_ids: The rooms it may be in.
         pose: Where the robot would stand: of a thing, near it and facing it where it can.
         is_faced: True when it would stand near it and face it.
+        faced_ratio: The share of where a thing may be that it would face there.
         problem: Why the robot cannot drive there; empty where it can.
         path_m: The way there; None where there is none.
         last_seen: By the calendar; None where nobody noted it.
@@ -73,6 +74,7 @@ class RecallCandidate:
     room_ids: tuple[str, ...]
     pose: Pose
     is_faced: bool
+    faced_ratio: float
     problem: str
     path_m: float | None
     last_seen: datetime | None

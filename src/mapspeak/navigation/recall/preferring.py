@@ -11,8 +11,6 @@ __all__ = ["find_best_known"]
 
 LEAST_VIEWS = 3
 """Two views of wrong things meet somewhere now and then; three hardly ever do."""
-LARGEST_OFF_M = 1.0
-"""A place that is known no better may be that of the next one of the name."""
 APART_M = 2.0
 """Of things of one name that stand nearer to each other, views may have been mixed up."""
 
@@ -31,7 +29,7 @@ def find_best_known(
         None where there is none, or several, or where anything else speaks against it.
     """
     things = [each for each in meant if isinstance(each, RememberedThing)]
-    known = [each for each in things if _is_well_known(each)]
+    known = [each for each in things if each.thing.n_agreeing >= LEAST_VIEWS]
     sure = [
         each for each in known if not find_doubt(describe_candidate(atlas, each), room_id=room_id)
     ]
@@ -40,9 +38,3 @@ def find_best_known(
     (best,) = sure
     near = [each for each in things if each.point.distance_to(best.point) < APART_M]
     return best if near == [best] else None
-
-
-def _is_well_known(remembered: RememberedThing) -> bool:
-    off_m = remembered.thing.uncertainty_m
-    is_placed = off_m is not None and off_m <= LARGEST_OFF_M
-    return is_placed and remembered.thing.n_agreeing >= LEAST_VIEWS

@@ -19,6 +19,8 @@ SURE_RATIO = 0.98
 DOUBTFUL_RATIO = 0.5
 LARGEST_OFF_M = 1.2
 """A thing whose place is known no better is not sure to be ahead of who goes there."""
+LEAST_FACED_RATIO = 0.3
+"""Of where a thing may be, less than that ahead is too little to promise that it will be faced."""
 LONGEST_QUOTE = 120
 
 
@@ -109,8 +111,12 @@ def _doubt_thing(first: RecallCandidate, room_id: str | None) -> Iterator[str]:
         yield f"its place is known to within {first.uncertainty_m:.1f} m only"
     if room_id is not None and set(first.room_ids) != {room_id}:
         yield f"it may be in {' or '.join(first.room_ids) or 'no room'}"
-    if not first.is_faced and not first.problem:
+    if first.problem:
+        return
+    if not first.is_faced:
         yield "no place is known from which it would be in sight near by"
+    elif first.faced_ratio < LEAST_FACED_RATIO:
+        yield "much of where it may be would not be in sight from any place near by"
 
 
 def _say_found(first: RecallCandidate, doubt: str) -> str:

@@ -1,6 +1,6 @@
 """Things, joined out of what was seen of them from several places, and where they stand."""
 
-from mapspeak.semantic.things.approach import find_approach, find_fronts
+from mapspeak.semantic.things.approach import find_approach, find_fronts, measure_faced
 from mapspeak.semantic.things.finding import Things, find_things
 from mapspeak.semantic.things.labels import name_the_same
 from mapspeak.semantic.things.noise import NOISE, NoiseModel
@@ -19,5 +19,6 @@ __all__ = [
     "find_approach",
     "find_fronts",
     "find_things",
+    "measure_faced",
     "name_the_same",
 ]

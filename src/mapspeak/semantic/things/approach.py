@@ -8,31 +8,48 @@ import numpy as np
 from mapspeak.geometry import Point, Pose
 from mapspeak.semantic.things.sight import BODY_M, SightMap
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
-from mapspeak.spatial.grid import FREE_MAX, FloatArray
+from mapspeak.spatial.grid import FREE_MAX, FloatArray, Mask
 from mapspeak.spatial.paths import DistanceField, clearance_m
 
-__all__ = ["find_approach", "find_fronts"]
+__all__ = ["find_approach", "find_fronts", "measure_faced"]
 
 LARGEST_OFF_M = 1.4
 """One stands no farther from a thing, so that it is within 1.5 m on a coarse map, too."""
 BEST_OFF_M = 1.0
 """Near enough for 1.5 m, far enough to have it ahead even where its place is half a metre off."""
 COMFORT_M = 0.15
+FACED_M = 1.5
+FACED_RAD = math.radians(30)
+"""What is so near, and so little to the side, is faced: a camera has it well in its picture."""
+MISSED_M = 20.0
+"""Facing all of where a thing may be is worth so many metres: the best distance hardly counts
+beside it. Of 2, 6 and 20 the last faced most, in the buildings for choosing."""
+N_FINALISTS = 16
+"""Lines of sight cost most, so that only so many of the best standing places are asked for them."""
+BEFORE_M = 0.2
+"""The side of the cells in which a thing is looked for: the floor before it is no farther."""
 _STEP_BACK_M = 0.1
 
 
 def find_approach(
-    sight: SightMap, distances: DistanceField, target: Point, seen_from: Sequence[Point]
+    sight: SightMap,
+    distances: DistanceField,
+    target: Point,
+    seen_from: Sequence[Point],
+    *,
+    whereabouts: FloatArray | None = None,
 ) -> Pose | None:
     """Finds a pose that the robot can drive to and that faces a thing from near.
 
     A thing on a wall has floor on both sides of it; the right one is that from which it was seen.
+    Of all places on that side the best one faces most of where the thing may be.
 
     Args:
         sight: The map.
         distances: From the robot, on that map.
         target: Where the thing is.
         seen_from: The places of those who saw it.
+        whereabouts: Where it may be: points of the map frame, shape (n, 2), each as likely.
 
     Returns:
         None where the robot cannot get to within 1.4 m in sight of it.
@@ -45,11 +62,71 @@ def find_approach(
     is_seen = np.any([_sees(sight, front, points) for front in fronts], axis=0)
     tight_m = np.maximum(distances.radius_m + COMFORT_M - clear_m, 0.0)
     costs = np.where(is_seen, np.abs(off_m - BEST_OFF_M) + 2 * tight_m, np.inf)
+    if whereabouts is not None:
+        _add_missed(costs, sight, points, target, seen_from, whereabouts)
     best = int(np.argmin(costs))
     if not math.isfinite(costs[best]):
         return None
     place = Point(*points[best].tolist())
     return Pose(place.x, place.y, place.bearing_to(target))
+
+
+def measure_faced(
+    sight: SightMap, pose: Pose, seen_from: Sequence[Point], whereabouts: FloatArray
+) -> float:
+    """Gives the share of where a thing may be that a pose faces from 1.5 m with nothing between."""
+    stands, yaws = np.array([[pose.x, pose.y]]), np.array([pose.yaw_rad])
+    is_ahead = _have_ahead(stands, yaws, whereabouts)
+    return float((is_ahead & _have_in_sight(sight, stands, seen_from, whereabouts)).mean())
+
+
+def _add_missed(
+    costs: FloatArray,
+    sight: SightMap,
+    points: FloatArray,
+    target: Point,
+    seen_from: Sequence[Point],
+    whereabouts: FloatArray,
+) -> None:
+    """Adds to the costs of standing places what they do not face; of all but the best a part."""
+    yaws = np.arctan2(target.y - points[:, 1], target.x - points[:, 0])
+    is_ahead = _have_ahead(points, yaws, whereabouts)
+    costs += MISSED_M * (1 - is_ahead.mean(axis=1))
+    first = np.argsort(costs, kind="stable")[:N_FINALISTS]
+    is_seen = _have_in_sight(sight, points[first], seen_from, whereabouts)
+    hidden = (is_ahead[first] & ~is_seen).mean(axis=1)
+    rest_m = np.inf if len(first) < len(costs) else 0.0
+    kept = costs[first] + MISSED_M * hidden
+    costs += rest_m
+    costs[first] = kept
+
+
+def _have_ahead(stands: FloatArray, yaws: FloatArray, places: FloatArray) -> Mask:
+    """True for each standing place (row) and place (column) that lies ahead of it and near."""
+    east = places[:, 0] - stands[:, :1]
+    north = places[:, 1] - stands[:, 1:]
+    cos, sin = np.cos(yaws)[:, None], np.sin(yaws)[:, None]
+    ahead, aside = east * cos + north * sin, np.abs(north * cos - east * sin)
+    is_near = east * east + north * north <= FACED_M * FACED_M
+    return np.asarray(is_near & (aside <= ahead * math.tan(FACED_RAD)))
+
+
+def _have_in_sight(
+    sight: SightMap, stands: FloatArray, seen_from: Sequence[Point], places: FloatArray
+) -> Mask:
+    """True for each standing place (row) and place (column) with nothing between them.
+
+    What was met of a thing is the middle of a cell in a wall; what is seen of it lies before that.
+    """
+    viewers = np.array([(place.x, place.y) for place in seen_from]).reshape(-1, 1, 2)
+    ways = viewers - places
+    far_m = np.maximum(np.hypot(ways[..., 0], ways[..., 1]), 1e-6)
+    before = places + BEFORE_M * (ways / far_m[..., None]).sum(axis=0) / max(len(viewers), 1)
+    away = before[None] - stands[:, None]
+    angles = np.arctan2(away[..., 1], away[..., 0]).ravel() - sight.grid.origin.yaw_rad
+    starts = np.repeat(sight.grid.fractional_cells_at(stands), len(places), axis=0)
+    near_m = sight.cast(sight.obstacle_off, starts, angles, begin_m=0.0).reshape(away.shape[:2])
+    return np.asarray(near_m >= np.hypot(away[..., 0], away[..., 1]) - _STEP_BACK_M)
 
 
 def _reachable_near(

@@ -50,6 +50,7 @@ def describe_group(
         conflicting=tuple(_view(each, _say_conflict(each, position)) for each in conflicting),
         confidence_ratio=_confidence(group, agreements),
         n_agreeing=_count_agreeing(group, agreements),
+        whereabouts=placement.whereabouts if placement else None,
     )
 
 

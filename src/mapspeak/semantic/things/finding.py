@@ -18,7 +18,7 @@ from mapspeak.semantic.things.joining import (
 )
 from mapspeak.semantic.things.labels import name_the_same
 from mapspeak.semantic.things.noise import NOISE, NoiseModel
-from mapspeak.semantic.things.placing import Placement, place
+from mapspeak.semantic.things.placing import Placement, place, trust_range
 from mapspeak.semantic.things.sight import BODY_M, N_RAYS, SightMap, build_sight_map
 from mapspeak.semantic.things.sighting import Sighting, Surroundings, read_waypoints
 from mapspeak.semantic.things.thing import Thing
@@ -174,7 +174,12 @@ def _solve(sight: SightMap, pool: Sequence[Sighting], same_name: SameName) -> tu
 
 def _place(posteriors: Posteriors, group: Group) -> Placement:
     seen_from = [each.waypoint.pose.point for each in group]
-    return place(posteriors.sight, posteriors.of(group), seen_from)
+    posterior, (first, *more) = posteriors.of(group), group
+    if first.landmark.range_m is not None and first.likelihood is not None and not more:
+        posterior = trust_range(
+            posteriors.sight, first.likelihood, seen_from[0], first.landmark.range_m
+        )
+    return place(posteriors.sight, posterior, seen_from)
 
 
 def _agreeing(group: Group, agreements: Sequence[float]) -> Group:

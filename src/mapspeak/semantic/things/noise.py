@@ -23,7 +23,9 @@ class NoiseModel:
         wrong_ratio: The share of views that are wrong as a whole.
         range_m: The part of a range's standard deviation that is the same near and far.
         range_ratio: The part that grows with the range.
-        wrong_range_ratio: The share of ranges that are wrong where the direction is right.
+        wrong_range_ratio: The share of ranges that are wrong where the direction is right. Small,
+            for most errors take both, and those `wrong_ratio` counts; not 0, so that a range that
+            fits nothing in sight leaves the direction its say.
         seen_over_ratio: How often one sees over something that stands free, such as a table.
         floor_per_m: Things on a square metre of floor for those on a metre of wall or furniture.
         reach_m: Nobody names a thing that is farther.

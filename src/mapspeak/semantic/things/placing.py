@@ -13,6 +13,7 @@ import numpy as np
 from mapspeak.geometry import Point
 from mapspeak.semantic.things.likelihood import ViewLikelihood
 from mapspeak.semantic.things.sight import BODY_M, SightMap
+from mapspeak.semantic.things.spots import N_SIGMAS
 from mapspeak.spatial.grid import FloatArray, IntArray
 
 __all__ = [
@@ -23,12 +24,15 @@ __all__ = [
     "log_evidence",
     "measure_agreement",
     "place",
+    "trust_range",
 ]
 
 _LEAST_WEIGHT = 1e-4
 _PEAK_M = 0.5
 _MIDDLE_M = 0.75
 _MOST_PEAKS = 25
+N_WHEREABOUTS = 40
+"""Enough to tell shares of the weight to within a few in a hundred, few enough to keep."""
 HELD_RATIO = 0.9
 MISJOINED_RATIO = 0.07
 """Of things, so many have a view of another one among theirs; half of these lie within all the
@@ -49,17 +53,26 @@ class Posterior:
     weights: FloatArray
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Placement:
-    """Where a thing is.
+    """Where a thing is; compared by identity.
 
     Attributes:
         position: The middle of the densest part of all the weight.
         uncertainty_m: The radius around it that holds the thing with 90 %.
+        whereabouts: Points of the map frame, shape (n, 2): its surface is as likely at any as at
+            any other.
     """
 
     position: Point
     uncertainty_m: float
+    whereabouts: FloatArray
+
+    def __post_init__(self) -> None:
+        """Locks the points."""
+        points = np.array(self.whereabouts)
+        points.setflags(write=False)
+        object.__setattr__(self, "whereabouts", points)
 
 
 def build_posterior(
@@ -96,6 +109,30 @@ def log_evidence(
     return top + float(np.log(np.exp(logs - top).sum()))
 
 
+def trust_range(sight: SightMap, view: ViewLikelihood, viewer: Point, told_m: float) -> Posterior:
+    """Weighs the cells by a lone view with a range, as if it were not wrong.
+
+    How likely it is wrong, the trust in it says. Kept in the weight, that would reach as far as
+    the line of sight: there are walls along it, and things stand by walls more often than on the
+    floor where this one was told to be.
+
+    Args:
+        sight: The map.
+        view: What the view says.
+        viewer: Where one looked from.
+        told_m: The range; cells that its noise tells apart from it count only where all are such.
+    """
+    rows, cols = sight.rows.ravel()[view.cells], sight.cols.ravel()[view.cells]
+    here = sight.grid.fractional_cells_at(np.array([[viewer.x, viewer.y]]))[0]
+    far_m = np.hypot(rows - here[0], cols - here[1]) * sight.grid.resolution_m
+    sigmas_m = sight.noise.range_m + sight.noise.range_ratio * far_m
+    is_told = np.abs(far_m - told_m) <= N_SIGMAS * sigmas_m
+    kept = is_told if is_told.any() else slice(None)
+    return build_posterior(
+        sight, [ViewLikelihood(cells=view.cells[kept], ratios=view.ratios[kept])], [0.0]
+    )
+
+
 def find_middle(sight: SightMap, posterior: Posterior) -> tuple[float, float]:
     """Gives the mean of the weight in metres along the rows and columns of the grid."""
     rows, cols = sight.rows.ravel()[posterior.cells], sight.cols.ravel()[posterior.cells]
@@ -126,7 +163,22 @@ def place(sight: SightMap, posterior: Posterior, seen_from: Sequence[Point]) -> 
     row, col = (middle / sight.grid.resolution_m).tolist()
     radius_m = float(off_m[order[min(int(held), len(order) - 1)]])
     surface = _point_at(sight, row, col)
-    return Placement(_behind(surface, seen_from), math.hypot(radius_m, _SPREAD_M))
+    return Placement(
+        position=_behind(surface, seen_from),
+        uncertainty_m=math.hypot(radius_m, _SPREAD_M),
+        whereabouts=_draw(sight, posterior.weights, at),
+    )
+
+
+def _draw(sight: SightMap, weights: FloatArray, at: FloatArray) -> FloatArray:
+    """Gives places as often as their weight says: systematic resampling (Kitagawa, 1996)."""
+    levels = (np.arange(N_WHEREABOUTS) + 0.5) / N_WHEREABOUTS
+    drawn = np.searchsorted(np.cumsum(weights), levels * weights.sum())
+    down, across = at[np.minimum(drawn, len(at) - 1)].T
+    x, y, yaw_rad = sight.grid.origin.x, sight.grid.origin.y, sight.grid.origin.yaw_rad
+    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
+    points = np.stack([x + across * cos - down * sin, y + across * sin + down * cos], axis=1)
+    return np.asarray(points, dtype=np.float64)
 
 
 def _behind(surface: Point, seen_from: Sequence[Point]) -> Point:

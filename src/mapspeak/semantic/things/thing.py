@@ -1,10 +1,11 @@
 """A thing as it is remembered, and the views that speak for it and against it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 from mapspeak.geometry import Point
 from mapspeak.semantic.waypoint import Landmark
+from mapspeak.spatial.grid import FloatArray
 
 __all__ = ["Category", "Thing", "View"]
 
@@ -48,6 +49,8 @@ class Thing:
         conflicting: Views that say otherwise.
         confidence_ratio: That there is such a thing there, by its views alone.
         n_agreeing: From how many different places it was seen by views that agree on where it is.
+        whereabouts: Points of the map frame, shape (n, 2), locked: its surface is as likely at any
+            as at any other. None without a position; no part of what makes two things equal.
     """
 
     label: str
@@ -60,6 +63,7 @@ class Thing:
     conflicting: tuple[View, ...]
     confidence_ratio: float
     n_agreeing: int
+    whereabouts: FloatArray | None = field(default=None, compare=False, repr=False)
 
     @property
     def waypoints(self) -> tuple[str, ...]:
