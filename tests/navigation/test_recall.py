@@ -82,6 +82,19 @@ def test_several_of_one_name_are_ambiguous_and_the_nearest_by_path_comes_first()
     assert "Choose by room" in answer.advice
 
 
+def test_of_several_that_are_as_like_in_meaning_the_nearest_by_path_comes_first() -> None:
+    far = look("far", 2.0, 1.0, ("washbasin", LADDER), yaw_deg=180, range_m=2.0)
+    near = look("near", 4.8, 1.5, ("washbasin", EXTINGUISHER), range_m=2.6)
+    for places in ((far, near), (near, far)):
+        atlas = atlas_of(*places)
+        answer = recall(atlas, RecallQuery(words="where can I wash my hands"))
+        paths_m = [each.path_m for each in answer.candidates]
+        assert answer.verdict is Verdict.AMBIGUOUS
+        assert None not in paths_m
+        assert paths_m == sorted(paths_m, key=lambda path_m: path_m or 0.0)
+        assert "of 2 the nearest by path" in answer.advice
+
+
 def test_the_one_of_several_that_three_views_agree_on_is_found_and_the_others_are_told() -> None:
     third = look("east c", 4.8, 1.5, ("fire extinguisher", EXTINGUISHER), range_m=2.6)
     near = look("near", 2.0, 1.0, ("fire extinguisher", LADDER), yaw_deg=180)

@@ -1,6 +1,7 @@
 """From a request in words to candidates with their evidence, their place and a checked goal."""
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
@@ -32,8 +33,14 @@ def recall(atlas: Atlas, query: RecallQuery) -> Recall:
     best = _find_best(atlas, answer, passing, room_id=query.room_id) if is_tied else None
     if best is not None:
         answer = replace(answer, verdict=Verdict.FOUND)
+    n_alike = Counter(map(_likeness, answer.candidates))
     ranks = {
-        each.entry.id: _rank(atlas, each, passing[each.entry.id], is_tied=is_tied)
+        each.entry.id: _rank(
+            atlas,
+            each,
+            passing[each.entry.id],
+            is_tied=is_tied if each.basis is Basis.NAME else n_alike[_likeness(each)] > 1,
+        )
         for each in answer.candidates
     }
     ranked = sorted(
@@ -100,9 +107,14 @@ def find_speaking_places(atlas: Atlas, words: str) -> tuple[tuple[RememberedPlac
 def _rank(
     atlas: Atlas, found: Candidate, remembered: Remembered, *, is_tied: bool
 ) -> tuple[float, float, int]:
-    """Ranks by likeness; of several of one name the nearest by path comes first."""
+    """Ranks by likeness; of several that are as like the nearest by path comes first."""
     path_m = None
-    if is_tied and found.basis is Basis.NAME:
+    if is_tied:
         path_m = atlas.path_m(stand_at(atlas, Place(remembered.id, remembered)).point)
     far_m = math.inf if path_m is None else path_m
-    return -found.score_ratio, far_m, int(remembered.id[1:])
+    return -_likeness(found), far_m, int(remembered.id[1:])
+
+
+def _likeness(found: Candidate) -> float:
+    """Gives how alike a candidate is, as far as that tells two of them apart."""
+    return round(found.score_ratio, 3)

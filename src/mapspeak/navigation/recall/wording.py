@@ -11,6 +11,7 @@ from mapspeak.semantic.retrieval import (
     MatchEvidence,
     Verdict,
 )
+from mapspeak.semantic.waypoint import name_key
 
 __all__ = ["SURE_RATIO", "find_doubt", "say_advice", "say_evidence"]
 
@@ -146,10 +147,12 @@ def _say_ambiguous(answer: Answer, candidates: Sequence[RecallCandidate]) -> str
             "meant, then navigate_to its id."
         )
     kind = f' (it is more like "{answer.missing}")' if answer.missing else ""
+    n_same = sum(name_key(each.entry.name) == name_key(first.name) for each in answer.candidates)
+    of_several = f", of {n_same} the nearest by path" if n_same > 1 else ""
     return (
-        f"Ambiguous: nothing is called so, and it may not be remembered{kind}; {_name(first)} is "
-        "the nearest. See why each is listed, and navigate_to an id only if it fits; else say it "
-        "in other words, or search_for it."
+        f"Ambiguous: nothing is called so{kind}. The likeliest is {_name(first)}{of_several}; what "
+        "is meant may also not be remembered. See why each is listed, and navigate_to an id only "
+        "if it fits; else say it in other words, or search_for it."
     )
 
 
