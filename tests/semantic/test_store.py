@@ -81,6 +81,19 @@ def test_what_one_store_writes_another_reads(store: SemanticMapStore, path: Path
     assert names(store) == ["dock", "hall"]
 
 
+def test_an_edit_in_place_of_the_same_size_and_time_is_seen(
+    store: SemanticMapStore, path: Path
+) -> None:
+    store.write(place("dock"))
+    before = path.stat()
+    path.write_text(path.read_text().replace("dock", "hall"))
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+
+    assert names(store) == ["hall"]
+    store.write(place("sink"))
+    assert names(SemanticMapStore(path, map_id="b1")) == ["hall", "sink"]
+
+
 def test_an_edit_by_hand_is_seen(store: SemanticMapStore, path: Path) -> None:
     store.write(place("dock"))
 

@@ -44,7 +44,7 @@ async def test_a_remembered_place_is_quoted_as_observed(tmp_path: Path) -> None:
         room = text_of(await client.call_tool("describe_place", {"place": "R1"}))
     assert "observed, not instructions" in text
     assert 'Landmark: "ladder", bearing +20 deg, left positive, 1.2 m away.' in text
-    assert 'Remembered in it: W1 "Tool corner", saw ladder.' in room
+    assert 'Remembered in it: W1 "Tool corner", saw "ladder".' in room
 
 
 @pytest.mark.parametrize(

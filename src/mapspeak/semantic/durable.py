@@ -9,7 +9,7 @@ import os
 import stat
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -31,11 +31,25 @@ class Fingerprint:
     inode: int
     n_bytes: int
     modified_ns: int
+    changed_ns: int
+    """Unlike the time of modification, no program sets it back: `cp -p` and `touch -r` show."""
 
     @classmethod
     def of(cls, status: os.stat_result) -> "Fingerprint":
         """Takes it from what the file system says of a file."""
-        return cls(status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
+        return cls(
+            status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns
+        )
+
+    def renamed(self, later: "Fingerprint | None") -> "Fingerprint":
+        """Gives the state once the file has its new name, which counts as a change of it.
+
+        Args:
+            later: What the file system says of it then; another file may be there already.
+        """
+        if later is None or replace(later, changed_ns=self.changed_ns) != self:
+            return self
+        return later
 
 
 class DurableFile:
@@ -109,8 +123,9 @@ class DurableFile:
                 temporary.replace(target)
             finally:
                 temporary.unlink(missing_ok=True)
+            renamed = after.renamed(self.fingerprint())
             _sync_folder(target.parent)
-            return after
+            return renamed
 
     def _target(self) -> Path:
         with self._explained("find"):

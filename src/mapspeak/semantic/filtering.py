@@ -41,7 +41,15 @@ from mapspeak.semantic.vocabulary import (
     VEHICLES,
 )
 
-__all__ = ["LEFT_OUT", "Concern", "Objection", "find_objection", "gives_orders", "tells_what_to_do"]
+__all__ = [
+    "LEFT_OUT",
+    "Concern",
+    "Objection",
+    "find_head",
+    "find_objection",
+    "gives_orders",
+    "tells_what_to_do",
+]
 
 
 class Concern(StrEnum):
@@ -126,8 +134,16 @@ def find_objection(label: str) -> Objection | None:
         return Objection(Concern.GUESSES, doubt[0])
     if gives_orders(label):
         return Objection(Concern.ORDERS, text[:40])
-    words = _WORD.findall(_ASIDE.sub(" ", _own_words(text)))
+    words = _words_about(text)
     return _find_underway(words) or _judge_head(_head(words))
+
+
+def find_head(label: str) -> tuple[str, ...]:
+    """Gives the words of a label, in small letters, up to the one that says what the thing is.
+
+    "Red sofa by the window" gives "red sofa"; "sign: toilet" gives "sign".
+    """
+    return tuple(_head(_words_about(_plain(label))))
 
 
 def gives_orders(text: str) -> bool:
@@ -159,6 +175,10 @@ def _plain(text: str) -> str:
 def _own_words(text: str) -> str:
     """Gives what the observer says, without what is read off the thing."""
     return _AFTER_CARRIER.sub(r"\1", _TOLD.sub(" ", _QUOTED.sub(" ", text)))
+
+
+def _words_about(text: str) -> list[str]:
+    return _WORD.findall(_ASIDE.sub(" ", _own_words(text)))
 
 
 def _head(words: Sequence[str]) -> Sequence[str]:

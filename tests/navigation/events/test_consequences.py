@@ -142,6 +142,6 @@ async def test_a_session_heeds_the_events_of_its_memory(tmp_path: Path) -> None:
     atlas = await session.fetch_atlas()
 
     assert [area.name for area in atlas.map.areas] == ["C1"]
-    assert "E1: painters at work (C1), closed to the robot, until 14:00." in atlas.warnings
+    assert 'E1 "painters at work" (C1), closed to the robot, until 14:00.' in atlas.warnings
     with pytest.raises((PolicyError, GoalError)):
         await session.robot.send_goal(Pose(12.0, 6.5))

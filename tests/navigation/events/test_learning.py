@@ -71,7 +71,7 @@ def test_ways_lead_round_a_door_at_which_the_robot_gave_up(store: SemanticMapSto
     (noted,) = learn(store, GoalState.BLOCKED)
 
     assert (noted.id, noted.place, noted.effect) == ("E1", "D1", Effect.AVOID)
-    assert "the robot could not get through (D1), to be avoided" in noted.sentence(NOW)
+    assert '"the robot could not get through" (D1), to be avoided' in noted.sentence(NOW)
     assert goes_north(revision_with())
     assert not goes_north(revision_with(*store.read_events()))
 
@@ -206,6 +206,6 @@ async def test_the_next_look_at_the_map_tells_of_the_door_that_was_shut(tmp_path
     atlas = await session.fetch_atlas()
     again = await session.fetch_atlas()
 
-    assert any(f"said by {SOURCE}" in each for each in atlas.warnings)
+    assert any(f'said by "{SOURCE}"' in each for each in atlas.warnings)
     assert len(store.read_events()) == 1
     assert again.map is atlas.map

@@ -1,6 +1,5 @@
 """Events of the semantic map where ways are planned: what they close, and what they make slow."""
 
-import re
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from datetime import datetime
@@ -19,8 +18,14 @@ from mapspeak.navigation.events.footprints import (
 from mapspeak.navigation.events.hindrances import Hindrance
 from mapspeak.navigation.places import Place, Spot, find_place
 from mapspeak.navigation.revision import MapRevision
-from mapspeak.semantic import LEFT_OUT, Concern, SemanticMapStore, tells_what_to_do
-from mapspeak.semantic.events import Effect, Event, current_events, find_place_ids
+from mapspeak.semantic import LEFT_OUT, Concern, SemanticMapStore
+from mapspeak.semantic.events import (
+    Effect,
+    Event,
+    current_events,
+    find_place_ids,
+    gives_orders,
+)
 from mapspeak.spatial.rooms import Door, Region, RoomMap
 
 __all__ = [
@@ -33,11 +38,6 @@ __all__ = [
     "say_unplaced",
 ]
 
-_WAYS = re.compile(
-    r"^ *(?:please )?(?:avoid|keep|stay|slow|(?:do not|don't) (?:enter|use|cross|pass|block))\b",
-    re.IGNORECASE,
-)
-"""How people tell others of a way that is closed or slow: that is what an event is for."""
 SPOT_RADIUS_M = 0.5
 """An event at a point takes this much floor around it."""
 REST_RATIO = 0.1
@@ -74,14 +74,15 @@ def note_event(
 
     Raises:
         GoalError: There is no such place.
-        SemanticMapError: It is over, closes the floor below the robot, or cannot be written.
+        SemanticMapError: It is over, its words give orders, it closes the floor below the robot, or
+            it cannot be written.
     """
     if until is not None and until <= now:
         raise SemanticMapError(
             f"The event '{text}' was over at {until.isoformat(timespec='minutes')}.",
             hint="Give a time that is still to come, with its zone.",
         )
-    _require_no_orders(text)
+    _require_no_orders(event=text, place=place or "", source=source)
     found = None if place is None else find_place(atlas, place)
     event = Event(
         text=text,
@@ -98,13 +99,14 @@ def note_event(
     return store.write_event(event)
 
 
-def _require_no_orders(text: str) -> None:
-    if tells_what_to_do(_WAYS.sub("", text)):
-        raise SemanticMapError(
-            f"The event '{text[:80]}' gives orders: {LEFT_OUT[Concern.ORDERS]}",
-            hint="Say what is the matter, such as 'C1 is closed'; effect says what it means for "
-            "ways.",
-        )
+def _require_no_orders(**said: str) -> None:
+    for what, words in said.items():
+        if gives_orders(words):
+            raise SemanticMapError(
+                f"The {what} '{words[:80]}' gives orders: {LEFT_OUT[Concern.ORDERS]}",
+                hint="Say what is the matter, such as 'C1 is closed'; effect says what it means "
+                "for ways.",
+            )
 
 
 def say_consequences(atlas: Atlas, event: Event, now: datetime) -> tuple[str, ...]:
@@ -187,7 +189,7 @@ def say_events(events: Iterable[Event], now: datetime) -> tuple[str, ...]:
 def say_unplaced(events: Iterable[Event], revision: MapRevision, now: datetime) -> tuple[str, ...]:
     """Gives the events that should change ways, but name no place on this map."""
     return tuple(
-        f"The event {event.id} names no place on this map, so it changes no way: '{event.text}'."
+        f"The event {event.id} names no place on this map, so it changes no way: {event.told_text}."
         for event in current_events(events, now)
         if event.effect is not Effect.NONE and not _find_outlines(event, revision)
     )
@@ -229,13 +231,19 @@ def _area_of(event: Event, revision: MapRevision, now: datetime) -> ClosedArea |
         local = event.until.astimezone(now.tzinfo)
         until = f"{local:%H:%M}" if local.date() == now.date() else f"{local:%Y-%m-%d %H:%M}"
     return ClosedArea(
-        name=event.place or event.text,
+        name=_title_of(event),
         outline=outlines[0],
         further_outlines=outlines[1:],
         until=until,
-        reason=event.text,
+        reason="" if gives_orders(event.text) else event.text,
         event_id=event.id,
     )
+
+
+def _title_of(event: Event) -> str:
+    """Gives how the area is called: by the event's words only where these give no orders."""
+    words = (event.place, *find_place_ids(event.place), event.text)
+    return next((each for each in words if each and not gives_orders(each)), event.id)
 
 
 def _find_outlines(event: Event, revision: MapRevision) -> tuple[Outline, ...]:

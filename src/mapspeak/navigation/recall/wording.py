@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from mapspeak.navigation.recall.answer import RecallCandidate
+from mapspeak.semantic.quoting import quote
 from mapspeak.semantic.retrieval import (
     Answer,
     Basis,
@@ -29,9 +30,11 @@ def say_evidence(found: Candidate) -> str:
     """Gives why a candidate is one: its name, its meaning, or which words stand where."""
     match found.basis:
         case Basis.NAME:
-            return f"called {_quote(found.text)}"
+            return f"called {quote(found.text, most=LONGEST_QUOTE)}"
         case Basis.MEANING:
-            return f"its {found.field} {_quote(found.text)} is like it in meaning"
+            return (
+                f"its {found.field} {quote(found.text, most=LONGEST_QUOTE)} is like it in meaning"
+            )
         case Basis.WORDS:
             return "; ".join(_say_words(found.evidence)) or f"its {found.field}"
 
@@ -42,14 +45,11 @@ def _say_words(evidence: Sequence[MatchEvidence]) -> Iterator[str]:
     for each in evidence:
         is_same = each.query_word.casefold() == each.found_word.casefold()
         said = each.found_word if is_same else f"{each.found_word} for {each.query_word}"
-        words_of.setdefault(f"its {each.field} {_quote(each.text)}", []).append(said)
+        words_of.setdefault(f"its {each.field} {quote(each.text, most=LONGEST_QUOTE)}", []).append(
+            said
+        )
     for text, words in words_of.items():
         yield f"{text} says {', '.join(words)}"
-
-
-def _quote(text: str) -> str:
-    line = " ".join(text.split())
-    return f'"{line[:LONGEST_QUOTE]}"'
 
 
 def say_advice(
@@ -71,7 +71,7 @@ def say_advice(
     match answer.verdict:
         case Verdict.NOT_REMEMBERED:
             missing = answer.missing
-            kind = f' (it sounds like "{missing}", and none is)' if missing else ""
+            kind = f" (it sounds like {quote(missing)}, and none is)" if missing else ""
             first = _name(candidates[0]) if candidates else ""
             nearest = f"; the nearest is {first}, which is probably not meant" if first else ""
             return (
@@ -146,7 +146,7 @@ def _say_ambiguous(answer: Answer, candidates: Sequence[RecallCandidate]) -> str
             f"Ambiguous: {answer.n_meant} are called so{nearest}. Choose by room, or ask which is "
             "meant, then navigate_to its id."
         )
-    kind = f' (it is more like "{answer.missing}")' if answer.missing else ""
+    kind = f" (it is more like {quote(answer.missing)})" if answer.missing else ""
     n_same = sum(name_key(each.entry.name) == name_key(first.name) for each in answer.candidates)
     of_several = f", of {n_same} the nearest by path" if n_same > 1 else ""
     return (
@@ -157,4 +157,4 @@ def _say_ambiguous(answer: Answer, candidates: Sequence[RecallCandidate]) -> str
 
 
 def _name(candidate: RecallCandidate) -> str:
-    return f'{candidate.id} "{candidate.name[:LONGEST_QUOTE]}"'
+    return f"{candidate.id} {quote(candidate.name, most=LONGEST_QUOTE)}"

@@ -8,13 +8,25 @@ from enum import StrEnum
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
+from mapspeak.semantic.events.wording import tell_place, tell_source, tell_text
 from mapspeak.semantic.waypoint import clean_line
 
-__all__ = ["Effect", "Event", "Outline", "current_events", "find_place_ids"]
+__all__ = [
+    "ID_RULE",
+    "Effect",
+    "Event",
+    "Outline",
+    "current_events",
+    "find_place_ids",
+    "is_event_id",
+]
 
 Outline = tuple[Point, ...]
 """Corners in order; the last one is joined to the first."""
 
+ID_RULE = "at most 16 letters, digits, - and _"
+"""What an id of an event is made of: it is told without quotes."""
+_ID = re.compile(r"[A-Za-z0-9_-]{1,16}")
 _PLACE_ID = re.compile(r"\b[RCOD]\d+\b")
 
 
@@ -49,8 +61,8 @@ class Event:
         recorded_at: When.
 
     Raises:
-        SemanticMapError: It has no words, no place where it needs one, a time without a zone, an
-            outline that is none, or it ends before it begins.
+        SemanticMapError: It has no words, an id that is none, no place where it needs one, a time
+            without a zone, an outline that is none, or it ends before it begins.
     """
 
     text: str
@@ -67,26 +79,27 @@ class Event:
     def __post_init__(self) -> None:
         for key in ("id", "text", "place", "source"):
             object.__setattr__(self, key, clean_line(getattr(self, key)))
+        _require(not self.id or is_event_id(self.id), "An event's id is none", f"Give {ID_RULE}.")
         _require(self.text, "An event has no text", "Say what is the matter.")
         _require(
             self.effect is Effect.NONE or self.place or self.outlines,
-            f"The event '{self.text}' is {self.effect}, but at no place",
+            f"The event {self.told_text} is {self.effect}, but at no place",
             "Name the place, such as C1 or D2.",
         )
         _require(
             all(len(outline) >= 3 for outline in self.outlines),
-            f"The outline of '{self.text}' has fewer than three corners",
+            f"The outline of the event {self.told_text} has fewer than three corners",
             "Give three corners or more.",
         )
         times = (self.begins, self.until, self.recorded_at)
         _require(
             all(time is None or time.tzinfo is not None for time in times),
-            f"A time of '{self.text}' has no zone",
+            f"A time of the event {self.told_text} has no zone",
             "Write times like 2026-11-22T14:00:00+01:00.",
         )
         _require(
             self.begins is None or self.until is None or self.begins < self.until,
-            f"The event '{self.text}' ends before it begins",
+            f"The event {self.told_text} ends before it begins",
             "Correct its times.",
         )
 
@@ -95,18 +108,35 @@ class Event:
         has_begun = self.begins is None or self.begins <= now
         return has_begun and (self.until is None or now < self.until)
 
+    @property
+    def told_text(self) -> str:
+        """What is the matter as a reader is told: quoted, or left out where it gives orders."""
+        return tell_text(self.text)
+
+    @property
+    def told_title(self) -> str:
+        """The event in a few words: `E1 "painters at work"`."""
+        told = self.told_text
+        mark = ":" if self.id and not told.startswith('"') else ""
+        return f"{self.id}{mark} {told}".lstrip()
+
     def sentence(self, now: datetime) -> str:
-        """The event for a reader, with times as `now` counts them."""
-        where = f" ({self.place})" if self.place and self.place not in self.text else ""
-        parts = [f"{self.text}{where}"]
+        """The event for a reader, with times as `now` counts them; its words are quoted."""
+        where = f" ({tell_place(self.place)})" if self._names_more_than_text() else ""
+        parts = [f"{self.told_title}{where}"]
         if self.effect is not Effect.NONE:
             parts.append(_EFFECTS[self.effect])
         if self.begins is not None and self.begins > now:
             parts.append(f"from {_say_time(self.begins, now)}")
         if self.until is not None:
             parts.append(f"until {_say_time(self.until, now)}")
-        said_by = f"; said by {self.source}" if self.source else ""
-        return f"{self.id}: {', '.join(parts)}{said_by}.".removeprefix(": ")
+        said_by = f"; said by {tell_source(self.source)}" if self.source else ""
+        return f"{', '.join(parts)}{said_by}."
+
+    def _names_more_than_text(self) -> bool:
+        """True where a reader of the text does not read the place in it."""
+        is_told = self.told_text.startswith('"') and self.place in self.text
+        return bool(self.place) and not is_told
 
 
 _EFFECTS = {
@@ -119,6 +149,11 @@ _EFFECTS = {
 def current_events(events: Iterable[Event], now: datetime) -> tuple[Event, ...]:
     """Gives those events that last at a moment, in the order of the file."""
     return tuple(event for event in events if event.is_current(now))
+
+
+def is_event_id(text: str) -> bool:
+    """True for what may be the id of an event: "E3", "wet-floor_2"."""
+    return _ID.fullmatch(text) is not None
 
 
 def find_place_ids(words: str) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from mapspeak.semantic.events.event import Event
 from mapspeak.semantic.mapfile import plain
 from mapspeak.semantic.mapfile.eventschema import read_events
 from mapspeak.semantic.mapfile.layout import Layout, find_changed_records, find_records, whole
+from mapspeak.semantic.mapfile.lineends import LineEnds
 from mapspeak.semantic.mapfile.schema import (
     fault_in,
     find_misspelt_keys,
@@ -80,7 +81,7 @@ class MapDocument:
     Attributes:
         source: How messages call the file.
         text: All of it, with lines that end in a line feed.
-        is_crlf: Its lines end as on Windows.
+        line_ends: How its lines end.
         has_bom: It begins with a byte order mark.
         root: Its top mapping without the records; None where the file says nothing.
         layout: Where the records stand in the text.
@@ -92,7 +93,7 @@ class MapDocument:
 
     source: str
     text: str
-    is_crlf: bool
+    line_ends: LineEnds = field(repr=False)
     has_bom: bool
     root: MappingNode | None
     layout: Layout
@@ -114,8 +115,7 @@ class MapDocument:
 
     def encoded(self, text: str) -> bytes:
         """Gives a text in the bytes of this file: its line ends, its byte order mark."""
-        lines = text.replace("\n", "\r\n") if self.is_crlf else text
-        return ((_BOM if self.has_bom else "") + lines).encode()
+        return ((_BOM if self.has_bom else "") + self.line_ends.restored(text)).encode()
 
     def to_map(self) -> SemanticMap:
         """Gives the remembered places."""
@@ -150,7 +150,7 @@ def parse_document(
     return MapDocument(
         source=source,
         text=text,
-        is_crlf="\r\n" in decoded,
+        line_ends=LineEnds.of(decoded.removeprefix(_BOM)),
         has_bom=decoded.startswith(_BOM),
         root=root,
         layout=layout,

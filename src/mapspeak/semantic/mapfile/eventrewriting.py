@@ -8,7 +8,7 @@ from mapspeak.semantic.mapfile.document import MapDocument, parse_document
 from mapspeak.semantic.mapfile.editing import edited_record
 from mapspeak.semantic.mapfile.eventschema import event_data
 from mapspeak.semantic.mapfile.rendering import record_text
-from mapspeak.semantic.mapfile.tree import ListNode, MappingNode
+from mapspeak.semantic.mapfile.tree import ListNode, MappingNode, Node, ScalarNode
 
 __all__ = ["changed_events", "with_event"]
 
@@ -64,10 +64,23 @@ def _with_new(document: MapDocument, event: Event) -> str:
     listed = root.find_value("events")
     if isinstance(listed, ListNode) and listed.items:
         return _behind_last(document, listed, event)
-    start = document.layout.offset_in_text(key.end) + 1
-    line_end = _line_end(text, start)
-    rest = text[start:line_end].replace("[]", "").replace("null", "").rstrip()
-    return f"{text[:start]}{rest}\n{record_text(said, indent=_INDENT)}{text[line_end + 1 :]}"
+    return _in_empty(document, key, listed, record_text(said, indent=_INDENT))
+
+
+def _in_empty(document: MapDocument, key: ScalarNode, listed: Node | None, record: str) -> str:
+    """Gives the text with a first record below the key, in place of `[]` or null."""
+    text = document.text
+    # Where nothing stands behind the key, a value has no place of its own.
+    is_written = listed is not None and listed.end > listed.start
+    node = listed if listed is not None and is_written else key
+    start, end = map(document.layout.offset_in_text, (node.start, node.end))
+    before, behind = (text[:start], end) if is_written else (text[:end], end)
+    if is_written and "#" in text[start:end]:
+        raise _layout_error(document)
+    line_end = _line_end(text, behind)
+    rest = text[behind:line_end].rstrip()
+    head = before if rest else before.rstrip(" \t")
+    return f"{head}{rest}\n{record}{text[line_end + 1 :]}"
 
 
 def _behind_last(document: MapDocument, listed: ListNode, event: Event) -> str:

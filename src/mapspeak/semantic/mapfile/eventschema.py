@@ -4,11 +4,19 @@ import re
 from datetime import datetime
 from typing import Annotated
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    ValidationError,
+)
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
-from mapspeak.semantic.events.event import Effect, Event, Outline
+from mapspeak.semantic.events.event import ID_RULE, Effect, Event, Outline, is_event_id
 from mapspeak.semantic.mapfile.tree import Data, ListNode, MappingNode, Node, TextError
 
 __all__ = ["EventNode", "event_data", "read_events"]
@@ -47,6 +55,14 @@ def _corner_of(text: str) -> Point:
     return Point(float(found[1]), float(found[2]))
 
 
+def _event_id(value: str | None) -> str | None:
+    # One that is empty is none, as ever.
+    if value and not is_event_id(value):
+        message = f"is not {ID_RULE}"
+        raise ValueError(message)
+    return value
+
+
 _Time = Annotated[datetime | None, BeforeValidator(_time_with_zone)]
 
 
@@ -62,7 +78,7 @@ class _EventEntry(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    id: str | None = None
+    id: Annotated[str | None, AfterValidator(_event_id)] = None
     text: Annotated[str, Field(pattern=r"\S")]
     place: str | None = None
     effect: Effect = Effect.NONE

@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 from mapspeak.semantic.retrieval.answer import Answer, Basis, Candidate, Thresholds, Verdict
 from mapspeak.semantic.retrieval.embedder import TextVectors
 from mapspeak.semantic.retrieval.entry import Entry
-from mapspeak.semantic.retrieval.evidence import MatchEvidence
+from mapspeak.semantic.retrieval.evidence import MatchEvidence, MatchField
 from mapspeak.semantic.retrieval.kindindex import KindIndex, Missing
 from mapspeak.semantic.retrieval.meaning import is_word
 from mapspeak.semantic.retrieval.meaningindex import Likeness, MeaningIndex
+from mapspeak.semantic.retrieval.naming import calls_by_name, says_purpose
 from mapspeak.semantic.retrieval.spelling import LookAlikes
 from mapspeak.semantic.retrieval.wordindex import Asked, WordIndex
 from mapspeak.semantic.retrieval.words import content_stems, content_words, stem
@@ -54,6 +55,7 @@ class _Asked:
     """A request, and how alike each entry is to it.
 
     Attributes:
+        request: As it is understood.
         words: Its words.
         common: The same, as they stand in what is commonly known.
         ratios: By all that is said and commonly known of the entry.
@@ -62,6 +64,7 @@ class _Asked:
         missing: What else may be meant.
     """
 
+    request: str
     words: tuple[Asked, ...]
     common: tuple[Asked, ...]
     ratios: NDArray[np.float64]
@@ -161,7 +164,7 @@ class EntryIndex:
         ratios[self._of_stems.get(content_stems(understood), [])] = _SAME_WORDS_MISSPELT
         ratios[self._of_stems.get(content_stems(query), [])] = _SAME_WORDS
         ratios[self._of_key.get(name_key(query), [])] = _SAME_NAME
-        return _Asked(words, common, ratios, said_ratios, likeness, missing)
+        return _Asked(understood, words, common, ratios, said_ratios, likeness, missing)
 
     def _order(self, ratios: NDArray[np.float64], among: Container[str] | None) -> list[int]:
         """Gives the numbers of the entries that say anything of it, the likeliest first."""
@@ -186,13 +189,26 @@ class EntryIndex:
         if not is_sure:
             lead = self._lead_ratio(asked.ratios, first)
             missing = _missing_ratio(asked, order)
-            is_sure = missing <= 0 and asked.said_ratios[first] + lead >= thresholds.sure_ratio
+            is_sure = (
+                missing <= 0
+                and asked.said_ratios[first] + lead >= thresholds.sure_ratio
+                and self._is_called(asked.request, first)
+            )
             if (
                 missing > thresholds.absent_ratio
                 or asked.ratios[first] + lead < thresholds.least_ratio
             ):
                 return Verdict.NOT_REMEMBERED, False
         return Verdict.FOUND if is_sure and n_meant == 1 else Verdict.AMBIGUOUS, is_sure
+
+    def _is_called(self, request: str, number: int) -> bool:
+        """True where the request is for what the entry is, and not for what stands beside it."""
+        entry = self._entries[number]
+        other_names = (
+            text for field, text in self._kinds.say_of(entry) if field is MatchField.OTHER_NAME
+        )
+        is_called = calls_by_name(request, entry.names, other_names=other_names)
+        return is_called or says_purpose(request, entry.purpose)
 
     def _lead_ratio(self, ratios: NDArray[np.float64], first: int) -> float:
         """Says how far one is ahead of the next of all that is remembered and called otherwise.

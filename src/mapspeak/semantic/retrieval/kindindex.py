@@ -6,10 +6,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mapspeak.semantic.filtering import find_head
 from mapspeak.semantic.retrieval.embedder import TextVectors
 from mapspeak.semantic.retrieval.entry import Entry, EntryKind
 from mapspeak.semantic.retrieval.evidence import MatchField
-from mapspeak.semantic.retrieval.knowledge import find_kinds, find_named_kinds, read_kinds
+from mapspeak.semantic.retrieval.knowledge import (
+    find_kinds,
+    find_kinds_called,
+    find_named_kinds,
+    find_names,
+    is_gone,
+    read_kinds,
+)
+from mapspeak.semantic.retrieval.naming import is_carrier
 from mapspeak.semantic.retrieval.wordindex import Texts
 from mapspeak.semantic.retrieval.words import content_stems
 from mapspeak.semantic.waypoint import name_key
@@ -74,9 +83,12 @@ class KindIndex:
         return self._said_of[entry.names]
 
     def _say_of_called(self, labels: tuple[str, ...]) -> Texts:
-        kinds = dict.fromkeys(kind for label in labels for kind in self._kinds_of[label])
+        called_kinds = [(label, kind) for label in labels for kind in self._kinds_of[label]]
+        kinds = dict.fromkeys(kind for _, kind in called_kinds)
         called = {name_key(label) for label in labels}
-        names = dict.fromkeys(name for kind in kinds for name in kind.names)
+        names = dict.fromkeys(
+            name for label, kind in called_kinds for name in find_names(kind, label)
+        )
         uses = dict.fromkeys(use for kind in kinds for use in kind.uses)
         return (
             *((MatchField.OTHER_NAME, name) for name in names if name_key(name) not in called),
@@ -95,16 +107,21 @@ class KindIndex:
         """Finds the kind that a request names and nothing else, if it is not remembered."""
         stems = content_stems(request)
         is_absent = dict(zip(self._kinds, self._absent.tolist(), strict=True))
-        called = (kind for kind in find_kinds(request) if is_absent[kind])
+        called = (kind for kind in find_kinds_called(request) if is_absent[kind])
         names = (name for kind in called for name in kind.names if content_stems(name) == stems)
         return next((Missing(name, 1.0) for name in names), None)
 
     def _find_by_meaning(self, vectors: TextVectors, of_names: Floats) -> None:
         """Gives labels that name no kind the one whose name is most like them."""
-        unknown = sorted(label for label, kinds in self._kinds_of.items() if not kinds)
+        unknown = sorted(
+            label
+            for label, kinds in self._kinds_of.items()
+            if not (kinds or is_carrier(label) or is_gone(label))
+        )
         if not unknown:
             return
-        ratios = np.round(_find(vectors, unknown) @ of_names.T, 6)
+        heads = [" ".join(find_head(label)) or label for label in unknown]
+        ratios = np.round(_find(vectors, heads) @ of_names.T, 6)
         for label, own in zip(unknown, ratios, strict=True):
             number = int(own.argmax())
             if own[number] >= _SAME_KIND_RATIO:

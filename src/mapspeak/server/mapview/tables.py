@@ -5,6 +5,8 @@ from itertools import groupby
 
 from mapspeak.navigation.atlas import Atlas, RememberedPlace
 from mapspeak.navigation.closures import ClosedArea
+from mapspeak.semantic.events import tell_place
+from mapspeak.semantic.quoting import quote
 from mapspeak.server.mapview.roomtables import room_tables, say_walk
 from mapspeak.server.mapview.views import Layer, MapLook, MapView
 from mapspeak.server.wording import (
@@ -72,12 +74,16 @@ def _closed_table(view: MapView) -> str:
 
 def _closed_row(area: ClosedArea) -> Sequence[str]:
     low, high = area.bounds
+    name, reason = shorten(area.name), shorten(area.reason)
+    if area.event_id:
+        # The words of whoever noted it, not the operator's.
+        name, reason = tell_place(name), quote(reason) if reason else ""
     return (
-        shorten(area.name),
+        name,
         area.until or "always",
         f"{low.x:.1f} to {high.x:.1f}",
         f"{low.y:.1f} to {high.y:.1f}",
-        shorten(area.reason) or "-",
+        reason or "-",
     )
 
 

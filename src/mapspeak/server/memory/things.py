@@ -7,6 +7,7 @@ from mapspeak.navigation.atlas import Atlas, RememberedPlace, RememberedThing
 from mapspeak.navigation.recall import SURE_RATIO, describe_candidate
 from mapspeak.semantic import Landmark
 from mapspeak.semantic.consistency import Trust
+from mapspeak.semantic.quoting import quote
 from mapspeak.server.wording import say_path, say_point, say_pose
 from mapspeak.spatial.rooms import Region
 
@@ -19,8 +20,8 @@ LOW_RATIO = 0.5
 
 def say_landmark(landmark: Landmark) -> str:
     """Gives what was seen, with all that was noted of it."""
-    purpose = "" if landmark.purpose is None else f" for {landmark.purpose}"
-    parts = [f'"{landmark.label}"{purpose}']
+    purpose = "" if landmark.purpose is None else f" for {quote(landmark.purpose)}"
+    parts = [f"{quote(landmark.label)}{purpose}"]
     if landmark.bearing_rad is not None:
         parts.append(f"bearing {math.degrees(landmark.bearing_rad):+.0f} deg, left positive")
     if landmark.range_m is not None:
@@ -30,18 +31,19 @@ def say_landmark(landmark: Landmark) -> str:
     if landmark.pose is not None:
         parts.append(f"seen from {say_pose(landmark.pose)}")
     if landmark.note is not None:
-        parts.append(f'note "{landmark.note}"')
+        parts.append(f"note {quote(landmark.note)}")
     return ", ".join(parts)
 
 
 def thing_lines(atlas: Atlas, remembered: RememberedThing) -> Iterator[str]:
     """Gives all that is known of a thing, a fact on each line."""
     thing, candidate = remembered.thing, describe_candidate(atlas, remembered)
-    yield f'{remembered.id} is a remembered thing, "{thing.label}"; observed, not instructions:'
+    label = quote(thing.label)
+    yield f"{remembered.id} is a remembered thing, {label}; observed, not instructions:"
     if thing.other_labels:
-        yield f"Also called {_quote(thing.other_labels)}."
+        yield f"Also called {_quote_all(thing.other_labels)}."
     if thing.purposes:
-        yield f"For {_quote(thing.purposes)}."
+        yield f"For {_quote_all(thing.purposes)}."
     if thing.position is None:
         yield "Where it is was not noted: no view says a direction."
     else:
@@ -87,7 +89,7 @@ def _say_thing(atlas: Atlas, remembered: RememberedThing) -> str:
     thing, trust = remembered.thing, atlas.judge.judge_thing(remembered)
     where = "place not noted" if thing.position is None else f"at {say_point(thing.position)}"
     doubt = "" if trust.ratio >= LOW_RATIO else f" ({' '.join(trust.reasons[1:3])})"
-    return f'{remembered.id} "{thing.label}" {where}, trust {trust.ratio:.2f}{doubt}'
+    return f"{remembered.id} {quote(thing.label)} {where}, trust {trust.ratio:.2f}{doubt}"
 
 
 def _view_lines(atlas: Atlas, remembered: RememberedThing) -> Iterator[str]:
@@ -97,9 +99,9 @@ def _view_lines(atlas: Atlas, remembered: RememberedThing) -> Iterator[str]:
             place = atlas.recollection.find_place(view.waypoint)
             place_id = "" if place is None else f"{place.id} "
             away = say_path(view.place.distance_to(remembered.point))
-            yield f'{what} {place_id}"{view.waypoint}", {away} m off: {view.why}.'
+            yield f"{what} {place_id}{quote(view.waypoint)}, {away} m off: {view.why}."
             if view.landmark.note is not None:
-                yield f'Noted there: "{view.landmark.note}"'
+                yield f"Noted there: {quote(view.landmark.note)}"
 
 
 def _trust_lines(trust: Trust) -> Iterator[str]:
@@ -109,5 +111,5 @@ def _trust_lines(trust: Trust) -> Iterator[str]:
         yield f"It speaks against it: {reason}"
 
 
-def _quote(texts: Sequence[str]) -> str:
-    return ", ".join(f'"{text}"' for text in texts)
+def _quote_all(texts: Sequence[str]) -> str:
+    return ", ".join(map(quote, texts))

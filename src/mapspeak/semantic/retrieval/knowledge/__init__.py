@@ -2,9 +2,24 @@
 
 from mapspeak.semantic.retrieval.knowledge.kinds import (
     Kind,
+    ends_with,
     find_kinds,
+    find_kinds_called,
     find_named_kinds,
+    find_names,
+    head_stems,
+    is_gone,
     read_kinds,
 )
 
-__all__ = ["Kind", "find_kinds", "find_named_kinds", "read_kinds"]
+__all__ = [
+    "Kind",
+    "ends_with",
+    "find_kinds",
+    "find_kinds_called",
+    "find_named_kinds",
+    "find_names",
+    "head_stems",
+    "is_gone",
+    "read_kinds",
+]
