@@ -1,6 +1,7 @@
 import itertools
 import math
 
+import cv2
 import numpy as np
 import pytest
 
@@ -42,6 +43,17 @@ def at(grid: OccupancyGrid, row: int, col: int) -> Point:
 def test_clearance_is_measured_in_metres_to_the_nearest_occupied_cell() -> None:
     grid = grid_from_text("#...?", resolution_m=0.5)
     assert clearance_m(grid).tolist() == [[0.0, 0.5, 1.0, 1.5, 2.0]]
+
+
+@pytest.mark.parametrize("n_threads", [1, 2, 3])
+def test_clearance_is_the_same_to_the_last_digit_whoever_has_time_for_it(n_threads: int) -> None:
+    cells = np.where(np.random.default_rng(4).random((711, 711)) < 0.05, 100, 0).astype(np.int8)
+    grid = OccupancyGrid(cells=cells, resolution_m=1.0)
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(n_threads)
+    found = clearance_m(grid)
+    cv2.setNumThreads(before)
+    assert (found == np.sqrt(np.rint(found.astype(np.float64) ** 2)).astype(np.float32)).all()
 
 
 def test_clearance_is_infinite_where_nothing_is_occupied() -> None:

@@ -38,5 +38,10 @@ def _distance_to(blocked: Mask, resolution_m: float) -> Clearance:
     source = np.logical_not(blocked).view(np.uint8)
     transformed = cv2.distanceTransform(source, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     distance = np.asarray(transformed, dtype=np.float32)
+    # Its last digit depends on how many threads OpenCV finds free. In cells each distance is the
+    # root of a whole number, so that the right digit is known.
+    np.square(distance, out=distance)
+    np.rint(distance, out=distance)
+    np.sqrt(distance, out=distance)
     distance *= np.float32(resolution_m)
     return distance
