@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.semantic.retrieval import Thresholds
+from mapspeak.semantic.retrieval import Embedder, Thresholds, find_model
 from mapspeak.semantic.retrieval.words import split_words, stem
 
-__all__ = ["ConceptEmbedder"]
+__all__ = ["ConceptEmbedder", "shipped_model"]
 
 CONCEPTS = (
     ("fire", "flame", "burn", "extinguisher", "blanket"),
@@ -42,3 +42,10 @@ def _concepts(text: str) -> list[float]:
     counts = [sum(stem(word) in stems for word in concept) for concept in CONCEPTS]
     length = float(np.linalg.norm(counts)) or 1.0
     return [count / length for count in counts]
+
+
+def shipped_model() -> Embedder:
+    """Gives the model of the extra `semantic`, which the packages for development hold."""
+    model = find_model()
+    assert model is not None, "the extra semantic is not installed"
+    return model

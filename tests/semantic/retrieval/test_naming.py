@@ -4,6 +4,7 @@ from functools import cache
 
 import pytest
 
+from embedding import shipped_model
 from mapspeak.semantic.retrieval import (
     Answer,
     Entry,
@@ -11,7 +12,6 @@ from mapspeak.semantic.retrieval import (
     EntryKind,
     TextVectors,
     Verdict,
-    find_model,
 )
 from mapspeak.semantic.retrieval.naming import calls_by_name, is_carrier, says_purpose
 
@@ -20,11 +20,7 @@ OTHERS = ("desk", "whiteboard")
 
 @cache
 def model_vectors() -> TextVectors:
-    pytest.importorskip("onnxruntime", reason="mapspeak[semantic] is not installed")
-    model = find_model()
-    if model is None:
-        pytest.skip("mapspeak[semantic] is not installed")
-    return TextVectors(model)
+    return TextVectors(shipped_model())
 
 
 def ask(label: str, request: str, *, way: str) -> Answer:

@@ -3,21 +3,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from embedding import shipped_model
 from mapspeak.errors import ConfigError
-from mapspeak.semantic.retrieval import Embedder, find_model
-
-pytest.importorskip("onnxruntime", reason="mapspeak[semantic] is not installed")
-pytest.importorskip("tokenizers", reason="mapspeak[semantic] is not installed")
+from mapspeak.semantic.retrieval import Embedder
 
 TEXTS = ["ladder", "sink", "something to reach the top shelf", "anvil", "a much longer text, that"]
 
 
 @pytest.fixture(scope="module")
 def model() -> Embedder:
-    found = find_model()
-    if found is None:
-        pytest.skip("mapspeak[semantic] is not installed")
-    return found
+    return shipped_model()
 
 
 def test_each_text_gives_a_vector_of_length_one(model: Embedder) -> None:
