@@ -3,6 +3,7 @@
 from mapspeak.evaluation.scores.answers import (
     judge_choice,
     judge_number,
+    no_answer,
     read_letters,
     read_number,
     read_point,
@@ -40,6 +41,7 @@ __all__ = [
     "judge_room",
     "judge_route",
     "judge_thing",
+    "no_answer",
     "read_letters",
     "read_number",
     "read_point",

@@ -10,6 +10,7 @@ from mapspeak.geometry import Point
 __all__ = [
     "judge_choice",
     "judge_number",
+    "no_answer",
     "read_letters",
     "read_number",
     "read_point",
@@ -58,7 +59,7 @@ def judge_number(evidence: Evidence, truth: float, *, unit: str, tolerance: floa
     """Judges a number by how far it is off, in its own unit."""
     said = read_number(evidence.answer, unit)
     if said is None:
-        return _no_answer(evidence)
+        return no_answer(evidence)
     figures = {"off": round(abs(said - truth), 3), "truth": round(truth, 3)}
     reason = f"It said {said:g} {unit}, true are {truth:.2f} {unit}.".replace(" .", ".")
     if abs(said - truth) <= tolerance:
@@ -70,7 +71,7 @@ def judge_choice(evidence: Evidence, truth: Collection[str]) -> Score:
     """Judges a choice of letters: all right ones and no other."""
     said = read_letters(evidence.answer)
     if said is None:
-        return _no_answer(evidence)
+        return no_answer(evidence)
     wrong = len(said ^ set(truth))
     reason = f"It said {_listed(said)}, true is {_listed(truth)}."
     figures = {"n_wrong": float(wrong)}
@@ -83,7 +84,8 @@ def _listed(letters: Collection[str]) -> str:
     return ", ".join(sorted(letters)) or "none"
 
 
-def _no_answer(evidence: Evidence) -> Score:
+def no_answer(evidence: Evidence) -> Score:
+    """Gives the score of a trial that ended without an answer in the form asked for."""
     gave_up = evidence.state is TrialState.GAVE_UP
     return Score(
         is_success=False,

@@ -75,18 +75,18 @@ class Diary:
             room_id: Where that is.
             map_id: Which map the pose belongs to.
         """
-        if not self._is_open or self._wall_clock is None:
-            return Keeping()
-        observation = Observation(
-            recorded_at=self._wall_clock(),
-            pose=pose,
-            kind=ObservationKind.PICTURE,
-            labels=labels,
-            stamp_s=stamp_s,
-            map_id=map_id,
-            room_id=room_id,
+        return self._note(
+            lambda now: Observation(
+                recorded_at=now,
+                pose=pose,
+                kind=ObservationKind.PICTURE,
+                labels=labels,
+                stamp_s=stamp_s,
+                map_id=map_id,
+                room_id=room_id,
+            ),
+            content,
         )
-        return self._write(observation, content)
 
     def keep_record(self, waypoint: Waypoint) -> Keeping:
         """Keeps that a place was written down, with what was seen this time."""
@@ -108,17 +108,24 @@ class Diary:
             room_id: Where that is.
             map_id: Which map the pose belongs to.
         """
+        return self._note(
+            lambda now: Observation(
+                recorded_at=now,
+                pose=pose,
+                kind=ObservationKind.NOTE,
+                text=text,
+                room_id=room_id,
+                map_id=map_id,
+            )
+        )
+
+    def _note(
+        self, observe: Callable[[datetime], Observation], picture: bytes | None = None
+    ) -> Keeping:
+        """Keeps what is observed now; nothing where nothing is kept."""
         if not self._is_open or self._wall_clock is None:
             return Keeping()
-        observation = Observation(
-            recorded_at=self._wall_clock(),
-            pose=pose,
-            kind=ObservationKind.NOTE,
-            text=text,
-            room_id=room_id,
-            map_id=map_id,
-        )
-        return self._write(observation, None)
+        return self._write(observe(self._wall_clock()), picture)
 
     def _write(self, observation: Observation, picture: bytes | None) -> Keeping:
         try:

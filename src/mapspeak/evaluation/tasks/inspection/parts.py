@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Self
 
-from mapspeak.evaluation.scores import Evidence, read_said
-from mapspeak.evaluation.trials import Failure, Score, TrialState
+from mapspeak.evaluation.scores import Evidence, no_answer, read_said
+from mapspeak.evaluation.trials import Failure, Score
 from mapspeak.ros.messages import bare_type
 
 __all__ = ["Part", "PartKind", "judge_parts"]
@@ -91,7 +91,7 @@ def judge_parts(evidence: Evidence, truth: Sequence[Part], *, is_ordered: bool =
     said = read_said(evidence.answer)
     parts = [] if said is None else [each.strip(QUOTES) for each in said.split(",")]
     if not any(parts):
-        return _no_answer(evidence)
+        return no_answer(evidence)
     n_right = _count_right(parts, truth, is_ordered=is_ordered)
     figures = {"n_right": float(n_right), "n_asked": float(len(truth))}
     reason = f"It said {said}; true is {', '.join(part.said for part in truth)}."
@@ -104,15 +104,6 @@ def _count_right(parts: Sequence[str], truth: Sequence[Part], *, is_ordered: boo
     if is_ordered:
         return sum(part.fits(said) for part, said in zip(truth, parts, strict=False))
     return sum(any(part.fits(said) for said in parts) for part in truth)
-
-
-def _no_answer(evidence: Evidence) -> Score:
-    gave_up = evidence.state is TrialState.GAVE_UP
-    return Score(
-        is_success=False,
-        failure=Failure.GAVE_UP if gave_up else Failure.NO_ANSWER,
-        reason="There is no answer in the form that was asked for.",
-    )
 
 
 def _bare(match: re.Match[str]) -> tuple[str, ...]:
