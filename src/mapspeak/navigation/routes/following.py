@@ -89,11 +89,6 @@ class RouteProgress:
     sentence: str
     left_m: float | None = None
 
-    @property
-    def next_stop(self) -> Stop | None:
-        """The stop that is driven to, or would be with the next call."""
-        return next((stop for stop in self.stops if stop.state is StopState.AHEAD), None)
-
 
 class RouteBook:
     """The route of one robot, if it has one.

@@ -116,11 +116,6 @@ class Hold:
             if path.name not in answered and _is_running(told.get("process"))
         )
 
-    def clear_answers(self) -> None:
-        """Forgets the answers to earlier holds."""
-        for path in (self.folder / ANSWERS).glob("*.json"):
-            path.unlink(missing_ok=True)
-
     def _write(self, path: Path, text: str) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         # Renamed into place: a reader never sees half of it.

@@ -6,7 +6,6 @@ from enum import StrEnum
 
 from mapspeak.semantic.retrieval.entry import Entry
 from mapspeak.semantic.retrieval.evidence import MatchEvidence, MatchField
-from mapspeak.semantic.waypoint import name_key
 
 __all__ = ["Answer", "Basis", "Candidate", "Thresholds", "Verdict"]
 
@@ -111,9 +110,3 @@ class Answer:
             for number, each in enumerate(self.candidates)
             if number < n_sure or each.said_ratio >= least_said_ratio
         )
-
-    @property
-    def is_one_kind(self) -> bool:
-        """Whether all listed candidates that fit equally well are called the same."""
-        meant = self.candidates[: self.n_meant]
-        return len({name_key(candidate.entry.name) for candidate in meant}) == 1
