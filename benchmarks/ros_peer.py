@@ -23,7 +23,7 @@ from anyio.abc import Process
 from anyio.streams.buffered import BufferedByteReceiveStream
 
 from benchmarks.figure import Figure
-from benchmarks.server import HELLO
+from benchmarks.talking import HELLO
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.links.rosbridge.server import open_rosbridge_server
 from mapspeak.links.simulated import Clock, open_simulated_robot

@@ -22,7 +22,7 @@ from benchmarks.figure import Figure
 
 __all__ = ["main"]
 
-NOT_BENCHMARKS = {"figure", "run"}
+NOT_BENCHMARKS = {"figure", "run", "talking"}
 
 
 @click.command()

@@ -22,7 +22,12 @@ from mapspeak.navigation.memory.recollection import (
 from mapspeak.navigation.revision import MapRevision
 from mapspeak.semantic import SemanticMap
 from mapspeak.semantic.consistency import check_memory
-from mapspeak.semantic.things import find_approach, find_fronts, measure_faced
+from mapspeak.semantic.things import (
+    find_approach,
+    find_fronts,
+    find_least_path_m,
+    measure_faced,
+)
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import (
     FrontierReport,
@@ -47,6 +52,7 @@ class Reach:
         start: One of these places.
         crossings: Where it passes each door, by the door's id; None where it does not.
         standing: Where it would stand in each region, by the region's id.
+        out_of_reach: The same for regions it cannot get to.
         frontiers: By the places from which it has looked already.
         reminders: What was found of remembered things; of one state of the memory at a time.
     """
@@ -54,6 +60,7 @@ class Reach:
     start: Point
     crossings: dict[str, Point | None] = field(default_factory=dict)
     standing: dict[str, Point | None] = field(default_factory=dict)
+    out_of_reach: dict[str, Point] = field(default_factory=dict)
     frontiers: dict[tuple[Point, ...], FrontierReport] = field(default_factory=dict)
     reminders: dict[Recollection, "Reminders"] = field(default_factory=dict)
 
@@ -73,6 +80,14 @@ class Reminders:
     faced: dict[RememberedThing, float] = field(default_factory=dict)
     rooms: dict[RememberedThing, tuple[str, ...]] = field(default_factory=dict)
     judge: Judge | None = None
+
+    def of(self, things: Sequence[RememberedThing]) -> "Reminders":
+        """Gives what holds for another state of the memory: what was found of the very same."""
+        return Reminders(
+            approaches={each: self.approaches[each] for each in things if each in self.approaches},
+            faced={each: self.faced[each] for each in things if each in self.faced},
+            rooms={each: self.rooms[each] for each in things if each in self.rooms},
+        )
 
 
 class Atlas:
@@ -118,7 +133,11 @@ class Atlas:
         )
         self.robot = robot
         self.memory = memory
-        self.places = number_places(memory.waypoints)
+        self.places: tuple[RememberedPlace, ...] = (
+            previous.places
+            if previous is not None and previous.memory.waypoints == memory.waypoints
+            else number_places(memory.waypoints)
+        )
         self.warnings = memory.warnings
         self.recollector: Recollector = recollector or (
             Recollector() if previous is None else previous.recollector
@@ -244,6 +263,11 @@ class Atlas:
             )
         return known[remembered]
 
+    def find_least_path_m(self, remembered: RememberedThing) -> float:
+        """Gives metres than which no way to look at a thing is shorter."""
+        seen_from = [view.place for view in remembered.thing.supporting]
+        return find_least_path_m(self.grid, self.distances, remembered.point, seen_from)
+
     def measure_faced(self, remembered: RememberedThing) -> float:
         """Gives the share of where a thing may be that the robot would face before it."""
         known, thing = self._reminders.faced, remembered.thing
@@ -286,8 +310,9 @@ class Atlas:
     def _reminders(self) -> Reminders:
         known = self.reach.reminders
         if self.recollection not in known:
+            before = next(iter(known.values()), Reminders())
             known.clear()
-            known[self.recollection] = Reminders()
+            known[self.recollection] = before.of(self.things)
         return known[self.recollection]
 
     @cached_property

@@ -11,7 +11,7 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.navigation.closures import MARGIN_M, ClosedFloor
 from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, Mask
-from mapspeak.spatial.paths import DistanceField, clearance_m, distances_from
+from mapspeak.spatial.paths import DistanceField, distances_from
 
 __all__ = ["GoalCheck", "GoalVerdict", "check_goal", "judge_goal"]
 
@@ -242,7 +242,9 @@ def _clearance_at(grid: OccupancyGrid, point: Point) -> float:
     reach = int(SEARCH_M / grid.resolution_m)
     top, left = max(cell.row - reach, 0), max(cell.col - reach, 0)
     window = grid.crop(slice(top, cell.row + reach + 1), slice(left, cell.col + reach + 1))
-    return float(clearance_m(window)[cell.row - top, cell.col - left])
+    rows, cols = np.nonzero(window.occupied)
+    off = np.hypot(rows - (cell.row - top), cols - (cell.col - left))
+    return float(off.min(initial=math.inf)) * grid.resolution_m
 
 
 def _window(grid: OccupancyGrid, centre: Point, reach_m: float) -> OccupancyGrid:

@@ -368,8 +368,8 @@ def test_what_no_changed_waypoint_touches_is_not_worked_out_again() -> None:
     earlier = find_things(SemanticMap(waypoints=(*three_looks(), sink)), grid)
     moved = replace(sink, pose=Pose(2.2, 1.4, math.pi / 2))
     later = find_things(SemanticMap(waypoints=(*three_looks(), moved)), grid, earlier=earlier)
-    kept = [pool for pool in later.pools.values() if pool in earlier.pools.values()]
-    assert [each.group[0].landmark.label for pool in kept for each in pool] == ["printer"]
+    known = {id(thing) for thing in earlier.things}
+    assert [thing.label for thing in later.things if id(thing) in known] == ["printer"]
 
 
 @pytest.mark.parametrize(

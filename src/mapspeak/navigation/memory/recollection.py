@@ -290,11 +290,17 @@ def number_things(
     Returns:
         The things in the order of their ids, and how many ids were ever given.
     """
-    ids: dict[int, RememberedThing] = {}
-    same = {each.thing: each for each in earlier}
+    # By identity first: that is most of them, and to compare them as values is slow.
+    very_same = {id(each.thing): each for each in earlier}
+    ids: dict[int, RememberedThing] = {
+        number: very_same.pop(id(thing))
+        for number, thing in enumerate(things)
+        if id(thing) in very_same
+    }
+    same = {each.thing: each for each in very_same.values()}
     for number, thing in enumerate(things):
-        if thing in same:
-            ids[number] = _renewed(same.pop(thing), thing)
+        if number not in ids and thing in same:
+            ids[number] = replace(same.pop(thing), thing=thing)
     new = [number for number in range(len(things)) if number not in ids]
     gone = list(same.values())
     pairs = sorted(
@@ -312,11 +318,6 @@ def number_things(
             n_named += 1
             ids[number] = RememberedThing(id=f"T{n_named}", thing=things[number])
     return tuple(sorted(ids.values(), key=lambda each: int(each.id[1:]))), n_named
-
-
-def _renewed(remembered: RememberedThing, thing: Thing) -> RememberedThing:
-    """Gives the very thing that was found now: findings are about that object."""
-    return remembered if remembered.thing is thing else replace(remembered, thing=thing)
 
 
 def _sameness(thing: Thing, before: Thing) -> tuple[int, float] | None:

@@ -2,12 +2,18 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from heapq import heapify, heappop, heappush
+from itertools import islice
 
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.choosing import stand_at
-from mapspeak.navigation.memory.recollection import Remembered, RememberedPlace
+from mapspeak.navigation.memory.recollection import (
+    Remembered,
+    RememberedPlace,
+    RememberedThing,
+)
 from mapspeak.navigation.naming import Place, say_spot
 from mapspeak.navigation.recall.answer import Recall, RecallQuery
 from mapspeak.navigation.recall.candidates import describe_candidate
@@ -33,19 +39,7 @@ def recall(atlas: Atlas, query: RecallQuery) -> Recall:
     best = _find_best(atlas, answer, passing, room_id=query.room_id) if is_tied else None
     if best is not None:
         answer = replace(answer, verdict=Verdict.FOUND)
-    n_alike = Counter(map(_likeness, answer.candidates))
-    ranks = {
-        each.entry.id: _rank(
-            atlas,
-            each,
-            passing[each.entry.id],
-            is_tied=is_tied if each.basis is Basis.NAME else n_alike[_likeness(each)] > 1,
-        )
-        for each in answer.candidates
-    }
-    ranked = sorted(
-        answer.candidates, key=lambda each: (each.entry.id != best, ranks[each.entry.id])
-    )
+    ranked = _rank(atlas, answer.candidates, passing, best=best, is_tied=is_tied)
     candidates = tuple(
         describe_candidate(
             atlas,
@@ -53,7 +47,7 @@ def recall(atlas: Atlas, query: RecallQuery) -> Recall:
             score_ratio=each.score_ratio,
             evidence="; ".join(_say_why(query, each, passing[each.entry.id])),
         )
-        for each in ranked[: query.n]
+        for each in islice(ranked, query.n)
     )
     doubt = ""
     if answer.verdict is Verdict.FOUND:
@@ -105,14 +99,51 @@ def find_speaking_places(atlas: Atlas, words: str) -> tuple[tuple[RememberedPlac
 
 
 def _rank(
-    atlas: Atlas, found: Candidate, remembered: Remembered, *, is_tied: bool
-) -> tuple[float, float, int]:
-    """Ranks by likeness; of several that are as like the nearest by path comes first."""
-    path_m = None
-    if is_tied:
-        path_m = atlas.path_m(stand_at(atlas, Place(remembered.id, remembered)).point)
-    far_m = math.inf if path_m is None else path_m
-    return -_likeness(found), far_m, int(remembered.id[1:])
+    atlas: Atlas,
+    found: Sequence[Candidate],
+    passing: Mapping[str, Remembered],
+    *,
+    best: str | None,
+    is_tied: bool,
+) -> Iterator[Candidate]:
+    """Gives candidates by likeness, and of several that are as like the nearest by path first.
+
+    The way is worked out of those alone that may come next: of the others it is known that they
+    are no nearer.
+
+    Args:
+        atlas: The map with the memory.
+        found: The candidates.
+        passing: What they stand for, by id.
+        best: The id of the one that comes first whatever its likeness and way.
+        is_tied: Several are called what was asked for.
+    """
+    n_alike = Counter(map(_likeness, found))
+    queue: list[tuple[bool, float, float, int, bool, int]] = []
+    for i, each in enumerate(found):
+        needs_way = is_tied if each.basis is Basis.NAME else n_alike[_likeness(each)] > 1
+        least_m = _find_least_m(atlas, passing[each.entry.id]) if needs_way else math.inf
+        number = int(each.entry.id[1:])
+        queue.append((each.entry.id != best, -_likeness(each), least_m, number, needs_way, i))
+    heapify(queue)
+    while queue:
+        is_other, unlikeness, _, number, needs_way, i = heappop(queue)
+        if not needs_way:
+            yield found[i]
+            continue
+        way_m = _find_way_m(atlas, passing[found[i].entry.id])
+        heappush(queue, (is_other, unlikeness, way_m, number, False, i))
+
+
+def _find_least_m(atlas: Atlas, remembered: Remembered) -> float:
+    if isinstance(remembered, RememberedThing):
+        return atlas.find_least_path_m(remembered)
+    return 0.0
+
+
+def _find_way_m(atlas: Atlas, remembered: Remembered) -> float:
+    way_m = atlas.path_m(stand_at(atlas, Place(remembered.id, remembered)).point)
+    return math.inf if way_m is None else way_m
 
 
 def _likeness(found: Candidate) -> float:

@@ -29,12 +29,15 @@ def find_best_known(
         None where there is none, or several, or where anything else speaks against it.
     """
     things = [each for each in meant if isinstance(each, RememberedThing)]
-    known = [each for each in things if each.thing.n_agreeing >= LEAST_VIEWS]
-    sure = [
-        each for each in known if not find_doubt(describe_candidate(atlas, each), room_id=room_id)
-    ]
-    if len(things) < len(meant) or len(sure) != 1:
+    if len(things) < len(meant):
         return None
-    (best,) = sure
+    known = (each for each in things if each.thing.n_agreeing >= LEAST_VIEWS)
+    sure = (
+        each for each in known if not find_doubt(describe_candidate(atlas, each), room_id=room_id)
+    )
+    # To describe one costs much, and with a second one it is settled.
+    best, second = next(sure, None), next(sure, None)
+    if best is None or second is not None:
+        return None
     near = [each for each in things if each.point.distance_to(best.point) < APART_M]
     return best if near == [best] else None

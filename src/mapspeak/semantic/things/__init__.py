@@ -1,6 +1,11 @@
 """Things, joined out of what was seen of them from several places, and where they stand."""
 
-from mapspeak.semantic.things.approach import find_approach, find_fronts, measure_faced
+from mapspeak.semantic.things.approach import (
+    find_approach,
+    find_fronts,
+    find_least_path_m,
+    measure_faced,
+)
 from mapspeak.semantic.things.finding import Things, find_things
 from mapspeak.semantic.things.labels import name_the_same
 from mapspeak.semantic.things.noise import NOISE, NoiseModel
@@ -18,6 +23,7 @@ __all__ = [
     "build_sight_map",
     "find_approach",
     "find_fronts",
+    "find_least_path_m",
     "find_things",
     "measure_faced",
     "name_the_same",

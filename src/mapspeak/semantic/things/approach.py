@@ -6,12 +6,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.semantic.things.sight import BODY_M, SightMap
+from mapspeak.semantic.things.sight import BODY_M, N_RAYS, SightMap, bearing_index
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
-from mapspeak.spatial.grid import FREE_MAX, FloatArray, Mask
+from mapspeak.spatial.grid import FREE_MAX, FloatArray, IntArray, Mask
 from mapspeak.spatial.paths import DistanceField, clearance_m
 
-__all__ = ["find_approach", "find_fronts", "measure_faced"]
+__all__ = ["find_approach", "find_fronts", "find_least_path_m", "measure_faced"]
 
 LARGEST_OFF_M = 1.4
 """One stands no farther from a thing, so that it is within 1.5 m on a coarse map, too."""
@@ -55,20 +55,35 @@ def find_approach(
         None where the robot cannot get to within 1.4 m in sight of it.
     """
     points, clear_m = _reachable_near(sight, distances, target)
+    is_seen = _are_in_sight(sight, find_fronts(sight, target, seen_from), points)
+    points, clear_m = points[is_seen], clear_m[is_seen]
     if not len(points):
         return None
     off_m = np.hypot(points[:, 0] - target.x, points[:, 1] - target.y)
-    fronts = find_fronts(sight, target, seen_from)
-    is_seen = np.any([_sees(sight, front, points) for front in fronts], axis=0)
     tight_m = np.maximum(distances.radius_m + COMFORT_M - clear_m, 0.0)
-    costs = np.where(is_seen, np.abs(off_m - BEST_OFF_M) + 2 * tight_m, np.inf)
+    costs = np.abs(off_m - BEST_OFF_M) + 2 * tight_m
     if whereabouts is not None:
         _add_missed(costs, sight, points, target, seen_from, whereabouts)
-    best = int(np.argmin(costs))
-    if not math.isfinite(costs[best]):
-        return None
-    place = Point(*points[best].tolist())
+    place = Point(*points[int(np.argmin(costs))].tolist())
     return Pose(place.x, place.y, place.bearing_to(target))
+
+
+def find_least_path_m(
+    grid: OccupancyGrid, distances: DistanceField, target: Point, seen_from: Sequence[Point]
+) -> float:
+    """Gives metres than which no way to a thing is shorter; `find_approach` costs more to ask.
+
+    The way ends where one might look at the thing, or at a place that it was seen from. Infinite
+    where the robot gets to none of these.
+    """
+    rows, cols, _ = _floor_near(grid, target)
+    at = np.array([(place.x, place.y) for place in seen_from]).reshape(-1, 2)
+    stand_rows, stand_cols = grid.cells_at(at)
+    is_inside = (stand_rows >= 0) & (stand_rows < grid.n_rows)
+    is_inside &= (stand_cols >= 0) & (stand_cols < grid.n_cols)
+    rows = np.concatenate([rows, stand_rows[is_inside]])
+    cols = np.concatenate([cols, stand_cols[is_inside]])
+    return float(distances.distances_at(rows, cols).min(initial=math.inf))
 
 
 def measure_faced(
@@ -125,30 +140,41 @@ def _have_in_sight(
     away = before[None] - stands[:, None]
     angles = np.arctan2(away[..., 1], away[..., 0]).ravel() - sight.grid.origin.yaw_rad
     starts = np.repeat(sight.grid.fractional_cells_at(stands), len(places), axis=0)
-    near_m = sight.cast(sight.obstacle_off, starts, angles, begin_m=0.0).reshape(away.shape[:2])
-    return np.asarray(near_m >= np.hypot(away[..., 0], away[..., 1]) - _STEP_BACK_M)
+    away_m = np.hypot(away[..., 0], away[..., 1])
+    near_m = sight.cast(sight.obstacle_off, starts, angles, begin_m=0.0, reach_m=away_m.ravel())
+    return np.asarray(near_m.reshape(away_m.shape) >= away_m - _STEP_BACK_M)
 
 
 def _reachable_near(
     sight: SightMap, distances: DistanceField, target: Point
 ) -> tuple[FloatArray, FloatArray]:
     """Gives the middles of reachable cells around a point, and their clearance in metres."""
-    grid = sight.grid
-    cell = grid.cell_at(target)
-    reach = math.ceil(LARGEST_OFF_M / grid.resolution_m)
+    rows, cols, points = _floor_near(sight.grid, target)
+    is_reachable = np.isfinite(distances.distances_at(rows, cols))
+    rows, cols, points = rows[is_reachable], cols[is_reachable], points[is_reachable]
     # Farther obstacles than this do not matter for standing comfortably.
-    wide = reach + math.ceil((distances.radius_m + COMFORT_M) / grid.resolution_m)
-    top, left = max(cell.row - wide, 0), max(cell.col - wide, 0)
-    window = grid.crop(
-        slice(top, max(cell.row + wide + 1, 0)), slice(left, max(cell.col + wide + 1, 0))
-    )
-    rows, cols = np.nonzero(window.free)
-    if not rows.size:
-        return np.empty((0, 2)), np.empty(0)
-    points = window.points_at(rows, cols)
+    wide_m = LARGEST_OFF_M + distances.radius_m + COMFORT_M
+    down, across = _window(sight.grid, target, wide_m)
+    clear_m = clearance_m(sight.grid.crop(down, across))
+    return points, clear_m[rows - down.start, cols - across.start].astype(np.float64)
+
+
+def _floor_near(grid: OccupancyGrid, target: Point) -> tuple[IntArray, IntArray, FloatArray]:
+    """Gives the free cells from which one might look at a thing: rows, columns, and middles."""
+    down, across = _window(grid, target, LARGEST_OFF_M)
+    rows, cols = np.nonzero(grid.crop(down, across).free)
+    rows, cols = rows + down.start, cols + across.start
+    points = grid.points_at(rows, cols)
     is_near = np.hypot(points[:, 0] - target.x, points[:, 1] - target.y) <= LARGEST_OFF_M
-    is_near &= np.isfinite(distances.distances_at(rows + top, cols + left))
-    return points[is_near], clearance_m(window)[rows, cols][is_near].astype(np.float64)
+    return rows[is_near], cols[is_near], points[is_near]
+
+
+def _window(grid: OccupancyGrid, middle: Point, reach_m: float) -> tuple[slice, slice]:
+    cell, reach = grid.cell_at(middle), math.ceil(reach_m / grid.resolution_m)
+    down, across = (
+        slice(max(at - reach, 0), max(at + reach + 1, 0)) for at in (cell.row, cell.col)
+    )
+    return down, across
 
 
 def find_fronts(sight: SightMap, target: Point, seen_from: Sequence[Point]) -> list[Point]:
@@ -186,11 +212,24 @@ def _last_floor(grid: OccupancyGrid, start: Point, end: Point) -> Point:
     return Point(*points[floor[0]].tolist()) if floor.size else end
 
 
-def _sees(sight: SightMap, front: Point, points: FloatArray) -> FloatArray:
-    """True for points with nothing between them and the front of a thing."""
-    away = np.array([[front.x, front.y]]) - points
-    in_grid = np.arctan2(away[:, 1], away[:, 0]) - sight.grid.origin.yaw_rad
-    near_m = sight.cast(
-        sight.obstacle_off, sight.grid.fractional_cells_at(points), in_grid, begin_m=0.0
-    )
-    return np.asarray(near_m >= np.hypot(away[:, 0], away[:, 1]) - _STEP_BACK_M)
+def _are_in_sight(sight: SightMap, fronts: Sequence[Point], points: FloatArray) -> Mask:
+    """True for points with nothing between them and any of the fronts of a thing.
+
+    Sight goes both ways, and the fronts are few: one looks from each of them to all sides.
+    """
+    grid = sight.grid
+    at = np.array(list({grid.cell_at(front): (front.x, front.y) for front in fronts}.values()))
+    angles = np.arange(N_RAYS) * (math.tau / N_RAYS)
+    starts = np.repeat(grid.fractional_cells_at(at), N_RAYS, axis=0)
+    east, north = (np.subtract.outer(points[:, axis], at[:, axis]) for axis in (0, 1))
+    away_m = np.hypot(east, north)
+    free_m = sight.cast(
+        sight.obstacle_off,
+        starts,
+        np.tile(angles, len(at)),
+        begin_m=_STEP_BACK_M,
+        reach_m=away_m.max(initial=0.0) + _STEP_BACK_M,
+    ).reshape(len(at), N_RAYS)
+    rays = bearing_index(np.arctan2(north, east) - grid.origin.yaw_rad)
+    is_free = np.take_along_axis(free_m.T, rays, axis=0) >= away_m
+    return np.asarray(is_free.any(axis=1))

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -50,12 +50,13 @@ class Things:
         things: Those with most views first, then by label and place.
         sight: The map, ready for looking around in it.
         surroundings: What each waypoint, and each of its standpoints, sees.
+        pools: The things of all views that bear related names, by these views.
     """
 
     things: tuple[Thing, ...]
     sight: SightMap
     surroundings: dict[Waypoint, Surroundings]
-    pools: dict[tuple[Sighting, ...], tuple[Located, ...]]
+    pools: dict[tuple[Sighting, ...], tuple[Thing, ...]]
 
     def is_in_plain_sight(self, waypoint: Waypoint, point: Point) -> bool:
         """True when who stands at a waypoint has nothing between itself and a point near by."""
@@ -107,17 +108,14 @@ def find_things(
     surroundings = read_waypoints(
         sight, semantic_map.waypoints, earlier.surroundings if earlier else {}
     )
-    pools = _divide(surroundings, same_name)
+    found = Things(things=(), sight=sight, surroundings=surroundings, pools={})
     known = earlier.pools if earlier else {}
-    located = {pool: known.get(pool) or _solve(sight, pool, same_name) for pool in pools}
-    found = Things(things=(), sight=sight, surroundings=surroundings, pools=located)
-    things = [thing for pool in located.values() for thing in _describe(found, pool, same_name)]
-    return Things(
-        things=tuple(sorted(things, key=_rank)),
-        sight=sight,
-        surroundings=surroundings,
-        pools=located,
-    )
+    pools = {
+        pool: known.get(pool) or _describe(found, _solve(sight, pool, same_name), same_name)
+        for pool in _divide(surroundings, same_name)
+    }
+    things = (thing for pool in pools.values() for thing in pool)
+    return replace(found, things=tuple(sorted(things, key=_rank)), pools=pools)
 
 
 def _is_of(sight: SightMap, grid: OccupancyGrid, noise: NoiseModel) -> bool:
@@ -214,9 +212,9 @@ def _add_to_nearest(
     return True
 
 
-def _describe(found: Things, pool: Sequence[Located], same_name: SameName) -> list[Thing]:
+def _describe(found: Things, pool: Sequence[Located], same_name: SameName) -> tuple[Thing, ...]:
     alone = [each for each in pool if len(each.group) == 1 and each.placement is not None]
-    return [
+    return tuple(
         describe_group(
             each.group,
             each.placement,
@@ -224,7 +222,7 @@ def _describe(found: Things, pool: Sequence[Located], same_name: SameName) -> li
             conflicting=_against(found, each, alone, same_name),
         )
         for each in pool
-    ]
+    )
 
 
 def _against(

@@ -64,6 +64,7 @@ class SightMap:
         angles: FloatArray,
         *,
         begin_m: float | FloatArray = OWN_M,
+        reach_m: float | FloatArray | None = None,
     ) -> FloatArray:
         """Gives how far one sees, in metres, from each place along its angle.
 
@@ -74,22 +75,33 @@ class SightMap:
             places: Fractional cells, shape (n, 2).
             angles: In the frame of the grid, shape (n,).
             begin_m: Nearer obstacles do not count; one number, or one for each ray.
+            reach_m: Farther ones do not, either; as far as anybody names things where None.
         """
-        farthest = self.noise.reach_m / self.grid.resolution_m
-        places = np.clip(places, -_FARTHEST_CELL, _FARTHEST_CELL)
-        ways = np.stack([np.sin(angles), np.cos(angles)], axis=1)
-        far = np.zeros(len(places)) + begin_m / self.grid.resolution_m
+        size_m = self.grid.resolution_m
+        reach_m = self.noise.reach_m if reach_m is None else reach_m
+        rows, cols = np.clip(places, -_FARTHEST_CELL, _FARTHEST_CELL).T
+        far = np.zeros(len(places)) + begin_m / size_m
+        farthest = np.zeros(len(places)) + reach_m / size_m
+        rays = np.stack([rows, cols, np.sin(angles), np.cos(angles), farthest, far])
         going = np.arange(len(places))
         while going.size:
-            at = np.floor(places[going] + far[going, None] * ways[going]).astype(np.intp)
-            is_inside = ((at >= 0) & (at < self.grid.cells.shape)).all(axis=1)
-            at[~is_inside] = 0
-            free = np.where(is_inside, off[at[:, 0], at[:, 1]], 0.0)
-            is_on = (free > 0.0) & (far[going] < farthest)
+            row, col, down, across, most, at = rays
+            free = self._look_up(off, row + at * down, col + at * across)
+            is_on = (free > 0.0) & (at < most)
+            if not is_on.all():
+                far[going] = at
+                going, free, rays = going[is_on], free[is_on], rays[:, is_on]
             # Both the ray's place in its cell and the obstacle's corner may be nearer by 0.71.
-            going = going[is_on]
-            far[going] += np.maximum(free[is_on] - math.sqrt(2), 0.5)
-        return np.minimum(far, farthest) * self.grid.resolution_m
+            rays[-1] += np.maximum(free - math.sqrt(2), 0.5)
+        return np.minimum(far, farthest) * size_m
+
+    def _look_up(self, off: Clearance, rows: FloatArray, cols: FloatArray) -> Clearance:
+        """Gives what is free around places, as fractional cells; nothing off the array."""
+        n_rows, n_cols = self.grid.cells.shape
+        rows, cols = np.floor(rows), np.floor(cols)
+        is_inside = (rows >= 0) & (rows < n_rows) & (cols >= 0) & (cols < n_cols)
+        flat = np.where(is_inside, rows * n_cols + cols, 0).astype(np.intp)
+        return np.asarray(np.where(is_inside, off.ravel()[flat], 0.0), dtype=np.float32)
 
 
 def build_sight_map(grid: OccupancyGrid, *, noise: NoiseModel = NOISE) -> SightMap:
