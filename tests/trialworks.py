@@ -1,5 +1,6 @@
 """What trials do in tests of the scheduler; importable, as other processes have to find it."""
 
+import errno
 import os
 import signal
 import sys
@@ -38,6 +39,18 @@ def raise_error() -> None:
 def kill_itself() -> None:
     """Dies as for want of memory."""
     os.kill(os.getpid(), signal.SIGKILL)
+
+
+def fill_the_disk() -> None:
+    """Fails as a trial does that finds no room for what it writes, deep inside its tasks."""
+    error = OSError(errno.ENOSPC, "No space left on device")
+    raise ExceptionGroup("tasks", [ExceptionGroup("a task", [error])])
+
+
+def succeed_after_an_interrupt(run: Path, trial: Trial) -> None:
+    """Is interrupted as by Ctrl-C in a terminal, which reaches every process of it."""
+    os.kill(os.getpid(), signal.SIGINT)
+    succeed(run, trial)
 
 
 def wait_for_ever() -> None:

@@ -6,7 +6,17 @@ from filelock import FileLock
 
 from mapspeak.cli.evaluating import evaluate
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.trials import read_plan, read_results
+from mapspeak.evaluation.agents import agent_names
+from mapspeak.evaluation.agents.models import Thinking
+from mapspeak.evaluation.tasks import FAMILIES
+from mapspeak.evaluation.trials import (
+    RunPlan,
+    read_plan,
+    read_results,
+    trial_folder,
+    write_plan,
+)
+from mapspeak.server import Representation
 
 TWO_ROOMS = """
 title: Two rooms with a door between them.
@@ -55,6 +65,12 @@ def test_an_evaluation_ends_with_a_table_and_goes_on_where_it_was(tmp_path: Path
         ("--task", "nothing"),
         ("--worlds", "nowhere"),
         ("--representation", "nohow"),
+        ("--agent", ","),
+        ("--task", ""),
+        ("--worlds", " "),
+        ("--representation", ""),
+        ("--thinking", "lots"),
+        ("--thinking", "low"),
     ],
 )
 def test_what_does_not_exist_is_refused_before_anything_runs(
@@ -84,3 +100,53 @@ def test_a_folder_keeps_its_seed(tmp_path: Path) -> None:
     asked = ("--task", "question-way", "--worlds", str(world), "--out", str(tmp_path / "out"))
     with pytest.raises(ConfigError, match="seed 7"):
         run(*asked)
+
+
+def test_the_help_names_all_there_is_to_choose_from() -> None:
+    told = " ".join(CliRunner().invoke(evaluate, ["--help"]).output.split())
+    names = (*agent_names(), *FAMILIES, *Representation, *Thinking)
+    assert [name for name in names if name not in told] == []
+
+
+def test_what_is_named_twice_is_run_once(tmp_path: Path) -> None:
+    world = tmp_path / "two.yaml"
+    world.write_text(TWO_ROOMS)
+    status, _ = run(
+        *("--agent", "random,scripted,random", "--task", "question-way,question-way"),
+        *("--worlds", f"{world},{world}", "--trials", "1", "--out", str(tmp_path / "out")),
+    )
+    assert status == 0
+    assert len(read_plan(tmp_path / "out").trials) == 2
+
+
+def test_a_result_that_was_cut_off_is_run_again_and_told(tmp_path: Path) -> None:
+    world, folder = tmp_path / "two.yaml", tmp_path / "out"
+    world.write_text(TWO_ROOMS)
+    asked = ("--agent", "random", "--task", "question-way", "--worlds", str(world), "--trials", "1")
+    run(*asked, "--out", str(folder))
+    (trial,) = read_plan(folder).trials
+    (trial_folder(folder, trial) / "result.json").write_text("")
+    status, printed = run(*asked, "--out", str(folder))
+    assert status == 0
+    assert "1 result was cut off and is run again" in printed
+    assert [result.trial for result in read_results(folder)] == [trial]
+
+
+def test_with_fewer_agents_what_others_did_stays_in_table_and_report(tmp_path: Path) -> None:
+    world, folder = tmp_path / "two.yaml", tmp_path / "out"
+    world.write_text(TWO_ROOMS)
+    asked = ("--task", "question-way", "--worlds", str(world), "--trials", "1")
+    run(*asked, "--agent", "random,scripted", "--out", str(folder))
+    status, printed = run(*asked, "--agent", "scripted", "--out", str(folder))
+    assert status == 0
+    assert "1 trial that is not asked for any more has a result" in printed
+    assert "random" in printed
+    assert "random" in (folder / "report.csv").read_text()
+
+
+def test_a_report_that_cannot_be_put_in_its_place_leaves_no_half_of_it(tmp_path: Path) -> None:
+    write_plan(tmp_path, RunPlan(trials=(), versions={}, options={"seed": 0}))
+    (tmp_path / "report.html").mkdir()
+    with pytest.raises(IsADirectoryError):
+        run("--report", "--out", str(tmp_path))
+    assert [path.name for path in tmp_path.iterdir() if path.name.startswith(".report")] == []

@@ -13,10 +13,13 @@ __all__ = ["evaluate"]
 
 TABLE_WIDTH = 180
 """Characters of the table where nobody knows the width, as in a file."""
+INTERRUPTED = 130
+"""Exit status after Ctrl-C, as shells have it."""
 
 
 def _split(_context: click.Context, _parameter: click.Parameter, value: str) -> tuple[str, ...]:
-    return tuple(part.strip() for part in value.split(",") if part.strip())
+    """Gives what stands between the commas, each once."""
+    return tuple(dict.fromkeys(part.strip() for part in value.split(",") if part.strip()))
 
 
 @click.command("eval")
@@ -26,7 +29,8 @@ def _split(_context: click.Context, _parameter: click.Parameter, value: str) -> 
     callback=_split,
     default="scripted",
     show_default=True,
-    help="Who answers, comma-separated: scripted, oracle, random, or a model.",
+    help="Who answers, comma-separated: scripted, oracle, random, nearest-frontier, paper-loop, "
+    "mock, PROVIDER/MODEL for a model, command:PROGRAM for a client program.",
 )
 @click.option(
     "--task",
@@ -35,7 +39,7 @@ def _split(_context: click.Context, _parameter: click.Parameter, value: str) -> 
     default="paper",
     show_default=True,
     help="Tasks, or groups of them: paper, rooms, objects, relations, routes, search, questions, "
-    "failures, all.",
+    "failures, inspection, all.",
 )
 @click.option(
     "--worlds",
@@ -52,7 +56,13 @@ def _split(_context: click.Context, _parameter: click.Parameter, value: str) -> 
     show_default=True,
     help="Of each task in each world; a world is explored once.",
 )
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Of each first trial; the next has the next.",
+)
 @click.option(
     "--out",
     "folder",
@@ -67,13 +77,23 @@ def _split(_context: click.Context, _parameter: click.Parameter, value: str) -> 
     callback=_split,
     default="picture-table",
     show_default=True,
-    help="How the server shows the map, comma-separated.",
+    help="How the server shows the map, comma-separated: picture-table, table, picture-rooms, "
+    "picture-numbers, paper-picture, raw-grid.",
 )
 @click.option(
-    "--thinking", callback=_split, default="", help="How much a model may think, comma-separated."
+    "--thinking",
+    callback=_split,
+    default="",
+    help="How much a model may think, comma-separated: none, low, medium, high. Without it the "
+    "provider decides.",
 )
 @click.option(
-    "--jobs", "n_jobs", type=click.IntRange(min=1), default=2, show_default=True, help="At a time."
+    "--jobs",
+    "n_jobs",
+    type=click.IntRange(min=1),
+    default=2,
+    show_default=True,
+    help="Trials at a time.",
 )
 @click.option(
     "--hang-s",
@@ -82,7 +102,13 @@ def _split(_context: click.Context, _parameter: click.Parameter, value: str) -> 
     show_default=True,
     help="A trial that takes longer by the wall clock is killed, and the others go on.",
 )
-@click.option("--quiet", "is_quiet", is_flag=True, help="Print the table only.")
+@click.option(
+    "--retry",
+    "has_retry",
+    is_flag=True,
+    help="Run also those again that crashed or hung before.",
+)
+@click.option("--quiet", "is_quiet", is_flag=True, help="Show no progress.")
 @click.option(
     "--report",
     "is_report_only",
@@ -100,13 +126,17 @@ def evaluate(
     thinking: tuple[str, ...],
     n_jobs: int,
     hang_s: float,
+    has_retry: bool,  # noqa: FBT001 - a flag
     is_quiet: bool,  # noqa: FBT001 - a flag
     is_report_only: bool,  # noqa: FBT001 - a flag
 ) -> None:
     """Runs tasks in simulated worlds and scores them by the simulator's truth.
 
+    Try it with: mapspeak eval --worlds flat_1 --trials 2
+
     Started again with the same folder, it goes on where it was left off. The exit status is 0 when
-    every trial came to a result, whatever the result is; 1 when one crashed or hung.
+    every trial came to a result, whatever the result is; 1 when one crashed or hung; 2 when
+    something that was asked for does not exist.
     """
     from mapspeak.evaluation.agents import check_agent  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.evaluation.runs import RunOptions  # noqa: PLC0415
@@ -114,9 +144,6 @@ def evaluate(
     if is_report_only:
         _report(folder)
         return
-    for agent in agents:
-        for amount in thinking or (None,):
-            check_agent(agent, amount)
     options = RunOptions(
         agents=agents,
         tasks=tasks,
@@ -128,15 +155,21 @@ def evaluate(
         thinking=thinking or (None,),
         n_jobs=n_jobs,
         hang_s=hang_s,
+        has_retry=has_retry,
     )
+    for agent in agents:
+        for amount in options.thinking:
+            check_agent(agent, amount)
     sys.exit(_run(options, is_quiet=is_quiet))
 
 
 def _report(folder: Path) -> None:
     """Makes the report of a run's folder and says where it is."""
     from mapspeak.evaluation.report import write_report  # noqa: PLC0415 - heavy
+    from mapspeak.evaluation.runs import writing_to  # noqa: PLC0415
 
-    report = write_report(folder)
+    with writing_to(folder):
+        report = write_report(folder)
     for problem in report.problems:
         click.echo(problem, err=True)
     click.echo(f"The report is {report.page}.")
@@ -146,15 +179,22 @@ def _run(options: "RunOptions", *, is_quiet: bool) -> int:
     """Runs an evaluation, prints its table, and gives the exit status."""
     from rich.console import Console  # noqa: PLC0415 - heavy; help must be quick
 
+    from mapspeak.evaluation.report import read_run  # noqa: PLC0415
     from mapspeak.evaluation.runs import build_table, run_evaluation, show_run  # noqa: PLC0415
     from mapspeak.evaluation.scores import count_rows  # noqa: PLC0415
-    from mapspeak.evaluation.trials import read_results  # noqa: PLC0415
 
     with show_run(is_quiet=is_quiet) as bar:
-        run_evaluation(options, on_plan=bar.begin, on_done=bar.note)
+        try:
+            run_evaluation(options, on_plan=bar.begin, on_done=bar.note, tell=bar.tell)
+        except KeyboardInterrupt:
+            bar.tell(
+                f"Stopped: {bar.n_done} of {bar.n_asked} are done. Start again with the same "
+                "options to go on; --report shows what there is."
+            )
+            return INTERRUPTED
     console = Console()
     if not console.is_terminal:
         console.width = TABLE_WIDTH
-    console.print(build_table(count_rows(read_results(options.folder))))
+    console.print(build_table(count_rows(read_run(options.folder).results)))
     _report(options.folder)
     return 1 if bar.n_broken else 0

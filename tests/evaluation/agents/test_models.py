@@ -11,6 +11,7 @@ from hearing import Hearing
 from mapspeak.errors import ConfigError
 from mapspeak.evaluation.agents import AgentEnd, Assignment
 from mapspeak.evaluation.agents.models import (
+    Ending,
     MockMind,
     ModelAgent,
     Reply,
@@ -135,6 +136,30 @@ async def test_out_of_budget_it_still_says_what_it_has_cost(tmp_path: Path) -> N
     end, _ = await run(ModelAgent(Scripted(*looking), "x/y"), assignment(tmp_path), Hearing(most=2))
     assert end.state is TrialState.OUT_OF_BUDGET
     assert (end.n_decisions, end.n_input_tokens) == (3, 30)
+
+
+@pytest.mark.parametrize(
+    ("ending", "said", "state", "answer"),
+    [
+        (Ending.REFUSED, "", TrialState.GAVE_UP, "The model refused to answer."),
+        (Ending.REFUSED, "I will not.", TrialState.GAVE_UP, "I will not."),
+        (Ending.CUT_OFF, "The room", TrialState.OUT_OF_BUDGET, "The room"),
+    ],
+)
+async def test_a_model_that_did_not_end_by_itself_has_not_finished(
+    tmp_path: Path, ending: Ending, said: str, state: TrialState, answer: str
+) -> None:
+    mind = Scripted(Reply(text=said, ending=ending))
+    end, _ = await run(ModelAgent(mind, "x/y"), assignment(tmp_path), Hearing())
+    assert (end.state, end.answer) == (state, answer)
+
+
+async def test_a_call_that_came_before_the_cut_is_made(tmp_path: Path) -> None:
+    cut = Reply(text="", wishes=(LOOK,), ending=Ending.CUT_OFF)
+    witness = Hearing()
+    agent = ModelAgent(Scripted(cut, Reply(text="Done.")), "x/y")
+    end, _ = await run(agent, assignment(tmp_path), witness)
+    assert (end.state, witness.calls) == (TrialState.FINISHED, ["look_at_map"])
 
 
 def test_a_picture_is_estimated_by_its_pixels() -> None:

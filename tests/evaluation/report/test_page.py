@@ -7,7 +7,16 @@ from urllib.parse import unquote
 import pytest
 
 from mapspeak.evaluation.report import write_report
-from mapspeak.evaluation.trials import Failure, ToolCall, Turn, write_result
+from mapspeak.evaluation.trials import (
+    Failure,
+    RunPlan,
+    Sitting,
+    ToolCall,
+    TrialState,
+    Turn,
+    write_plan,
+    write_result,
+)
 from reportmaking import (
     ReadPage,
     make_result,
@@ -246,3 +255,51 @@ def test_a_file_that_is_no_picture_is_not_shown_as_one(run: Path) -> None:
     (folder / "pictures" / "003.png").write_text("<svg onload='alert(1)'/>")
     (replay, *_) = page_of(run).all("details", "trial")
     assert "003.png is no picture." in replay.text
+
+
+def test_earlier_sittings_are_shown_with_what_was_different_in_them(tmp_path: Path) -> None:
+    first, second = make_trial(1), make_trial(2)
+    earlier = Sitting(versions={"mapspeak": "1.0.0"}, options={"seed": 0, "n_trials": 1}, n_done=1)
+    now = RunPlan(
+        trials=(first, second),
+        versions={"mapspeak": "2.0.0"},
+        options={"seed": 0, "n_trials": 2},
+        earlier=(earlier,),
+    )
+    write_plan(tmp_path, now)
+    write_trial(tmp_path, first)
+    write_trial(tmp_path, second)
+    page = page_of(tmp_path)
+    assert "run in several sittings" in page.text
+    assert "n_trials: 1; mapspeak: 1.0.0" in page.text
+    told = json.loads((tmp_path / "report.json").read_text())["earlier"]
+    assert [(each["versions"]["mapspeak"], each["n_done"]) for each in told] == [("1.0.0", 1)]
+
+
+def test_a_run_in_one_sitting_says_nothing_of_others(run: Path) -> None:
+    assert "sitting" not in page_of(run).text
+
+
+def test_a_broken_trial_says_in_the_list_what_broke_it(tmp_path: Path) -> None:
+    trial = make_trial(1)
+    write_run(tmp_path, trial)
+    error = (
+        "Traceback (most recent call last):\n  ...\nValueError: the door is locked (exit code 1)"
+    )
+    broken = make_result(
+        trial, failure=Failure.BROKEN, state=TrialState.CRASHED, error=error, answer=""
+    )
+    write_result(tmp_path, broken)
+    page = page_of(tmp_path)
+    (trials,) = page.all("table", "trials")
+    assert "ValueError: the door is locked (exit code 1)" in trials.text
+    assert "Traceback" not in trials.text
+    assert "0.00 % to 79.35 %; 1 broken" in page.text
+
+
+def test_a_trial_that_was_out_of_budget_says_so_in_the_list(tmp_path: Path) -> None:
+    trial = make_trial(1)
+    write_run(tmp_path, trial)
+    write_trial(tmp_path, trial, failure=Failure.WRONG_PLACE, state=TrialState.OUT_OF_BUDGET)
+    (trials,) = page_of(tmp_path).all("table", "trials")
+    assert "wrong place, out of budget" in trials.text

@@ -24,3 +24,21 @@ def test_a_plan_names_the_versions_it_was_made_with(tmp_path: Path) -> None:
 def test_a_representation_that_is_none_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="no representation 'poem'"):
         RunOptions(folder=tmp_path, representations=("poem",))
+
+
+def test_a_script_is_asked_once_whatever_models_may_think(tmp_path: Path) -> None:
+    options = RunOptions(
+        agents=("scripted", "mock"),
+        tasks=("smallest-room",),
+        worlds=("flat_1",),
+        n_trials=1,
+        thinking=("low", "high"),
+        folder=tmp_path,
+    )
+    trials = plan_run(options, options.load_worlds()).trials
+    assert [trial.answerer for trial in trials] == ["scripted", "mock+low", "mock+high"]
+
+
+def test_thinking_without_anyone_who_thinks_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="--thinking is for models"):
+        RunOptions(folder=tmp_path, agents=("scripted", "oracle"), thinking=("low",))

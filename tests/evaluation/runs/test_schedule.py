@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import trialworks
+from mapspeak.errors import ConfigError
 from mapspeak.evaluation.runs import Job, run_jobs
 from mapspeak.evaluation.trials import (
     Failure,
@@ -103,6 +104,20 @@ def test_a_trial_whose_preparation_broke_is_broken_too(tmp_path: Path) -> None:
     ]
     run_jobs(tmp_path, jobs, n_jobs=2, on_done=trialworks.ignore)
     assert read_result(tmp_path, LAST).score.failure is Failure.BROKEN
+
+
+def test_a_full_disk_ends_the_run_and_is_nobodys_result(tmp_path: Path) -> None:
+    jobs = [Job(trial=GOOD, work=trialworks.fill_the_disk, wall_s=LONG_S)]
+    with pytest.raises(ConfigError, match="the disk is full"):
+        run_jobs(tmp_path, jobs, n_jobs=1, on_done=trialworks.ignore)
+    assert not is_done(tmp_path, GOOD)
+
+
+def test_an_interrupt_is_for_the_run_and_not_for_its_trials(tmp_path: Path) -> None:
+    work = partial(trialworks.succeed_after_an_interrupt, tmp_path, GOOD)
+    jobs = [Job(trial=GOOD, work=work, wall_s=LONG_S)]
+    run_jobs(tmp_path, jobs, n_jobs=1, on_done=trialworks.ignore)
+    assert read_result(tmp_path, GOOD).score.is_success
 
 
 def test_a_trials_folder_is_named_so_that_any_system_can_hold_it(tmp_path: Path) -> None:

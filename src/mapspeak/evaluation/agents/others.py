@@ -9,11 +9,19 @@ from mapspeak.evaluation.agents.agent import Agent
 from mapspeak.evaluation.agents.command import CommandAgent, find_program
 from mapspeak.evaluation.agents.exploring import NearestFrontierAgent, PaperLoopAgent
 from mapspeak.evaluation.agents.models import MockMind, ModelAgent, Thinking
-from mapspeak.evaluation.agents.models.throughinspect import open_mind
+from mapspeak.evaluation.agents.models.throughinspect import find_client, open_mind
 
-__all__ = ["OTHER_NAMES", "check_other", "find_other", "find_versions"]
+__all__ = [
+    "OTHER_NAMES",
+    "can_think",
+    "check_other",
+    "find_other",
+    "find_versions",
+    "read_thinking",
+]
 
-OTHER_NAMES = ("nearest-frontier", "paper-loop", "mock")
+MOCK = "mock"
+OTHER_NAMES = ("nearest-frontier", "paper-loop", MOCK)
 COMMAND = "command:"
 INSPECT = "inspect-ai"
 
@@ -28,16 +36,25 @@ def find_other(name: str, thinking: str | None) -> Agent | None:
     Raises:
         ConfigError: The model or program cannot be had, or there is no such way to think.
     """
-    amount = _read_thinking(thinking)
+    amount = read_thinking(thinking)
     if name == "nearest-frontier":
         return NearestFrontierAgent()
     if name == "paper-loop":
         return PaperLoopAgent()
-    if name == "mock":
+    if name == MOCK:
         return ModelAgent(MockMind(), name)
     if name.startswith(COMMAND):
         return CommandAgent(find_program(name.removeprefix(COMMAND)), name, amount)
     return ModelAgent(open_mind(name, amount), name) if "/" in name else None
+
+
+def can_think(name: str) -> bool:
+    """True for models, their mock and client programs; scripts think as much as they are made to.
+
+    Args:
+        name: An agent's, whether it is there or not.
+    """
+    return name == MOCK or "/" in name or name.startswith(COMMAND)
 
 
 def check_other(name: str, thinking: str | None = None) -> bool:
@@ -47,7 +64,7 @@ def check_other(name: str, thinking: str | None = None) -> bool:
         ConfigError: There is one, but something that it needs is missing.
     """
     if "/" in name and not name.startswith(COMMAND):
-        open_mind(name, _read_thinking(thinking)).check()
+        open_mind(name, read_thinking(thinking)).check()
         return True
     agent = find_other(name, thinking)
     if isinstance(agent, CommandAgent):
@@ -58,8 +75,8 @@ def check_other(name: str, thinking: str | None = None) -> bool:
 def find_versions(names: Iterable[str]) -> dict[str, str]:
     """Gives the versions of what stands behind some agents, each by its own name.
 
-    It is `inspect-ai` behind models, and a client program behind "command:PROGRAM"; what does not
-    say its version is left out.
+    It is `inspect-ai` and the provider's own package behind models, and a client program behind
+    "command:PROGRAM"; what does not say its version is left out.
     """
     versions: dict[str, str] = {}
     for name in names:
@@ -68,12 +85,18 @@ def find_versions(names: Iterable[str]) -> dict[str, str]:
             if said is not None:
                 versions[name] = said
         elif "/" in name:
-            with suppress(PackageNotFoundError):
-                versions[INSPECT] = version(INSPECT)
+            for package in (INSPECT, find_client(name)):
+                with suppress(PackageNotFoundError):
+                    versions[package] = version(package)
     return versions
 
 
-def _read_thinking(thinking: str | None) -> Thinking | None:
+def read_thinking(thinking: str | None) -> Thinking | None:
+    """Gives how much a model may think; None where nothing was said.
+
+    Raises:
+        ConfigError: There is no such way to think.
+    """
     if thinking is None:
         return None
     if thinking not in set(Thinking):

@@ -10,7 +10,7 @@ from mapspeak.evaluation.report.curves import Curve, trace_coverage
 from mapspeak.evaluation.report.gathering import Attempt, Run, Standing, read_course
 from mapspeak.evaluation.report.paper import PAPER_NOTE, PAPER_ROWS, PAPER_TASKS, PaperRow
 from mapspeak.evaluation.scores import Interval, TableRow, bootstrap_interval, count_rows
-from mapspeak.evaluation.trials import Trial, TrialResult, TrialState
+from mapspeak.evaluation.trials import Sitting, Trial, TrialResult, TrialState
 
 __all__ = [
     "AgentRow",
@@ -131,6 +131,7 @@ class Report:
         reported_with: The mapspeak that made the report; the run's own is among `versions`.
         versions: What the run was made with.
         options: What was asked for.
+        earlier: Sittings of the run before, with other versions or options.
         counts: How many trials there are.
         agents: Who was asked.
         paper: The paper's table, as printed.
@@ -147,6 +148,7 @@ class Report:
     reported_with: str
     versions: dict[str, str]
     options: dict[str, object]
+    earlier: tuple[Sitting, ...]
     counts: Counts
     agents: tuple[AgentRow, ...]
     paper: tuple[PaperRow, ...]
@@ -175,6 +177,7 @@ def build_report(run: Run) -> Report:
         reported_with=__version__,
         versions=run.plan.versions,
         options=run.plan.options,
+        earlier=run.plan.earlier,
         counts=_count(run),
         agents=_list_agents(run),
         paper=PAPER_ROWS,

@@ -1,13 +1,10 @@
 """Reads a run's folder, whole or not: what was asked for, and how each trial of it stands."""
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TypeVar
-
-from pydantic import ValidationError
 
 from mapspeak.errors import ConfigError, MapError
 from mapspeak.evaluation.trials import (
@@ -24,6 +21,7 @@ from mapspeak.evaluation.trials import (
     read_turns,
     trial_folder,
 )
+from mapspeak.evaluation.trials.records import say_fault
 from mapspeak.simulator import StateRecord, read_state_log
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map
@@ -141,8 +139,9 @@ def read_run(folder: Path) -> Run:
         ) from error
     except (OSError, ValueError) as error:
         raise ConfigError(
-            f"{folder / 'run.json'} cannot be read: {_first_line(error)}.",
-            hint="Start the evaluation again with the same --out; finished trials are kept.",
+            f"{folder / 'run.json'} cannot be read: {say_fault(error)}.",
+            hint="Delete it and start the evaluation again with the same options; "
+            "finished trials are kept.",
         ) from error
     return Run(
         folder=folder,
@@ -161,7 +160,7 @@ def _read_attempt(run: Path, trial: Trial) -> Attempt:
     try:
         result = read_result(run, trial)
     except (OSError, ValueError) as error:
-        return _unreadable(trial, folder, _first_line(error))
+        return _unreadable(trial, folder, say_fault(error))
     if result.trial != trial:
         return _unreadable(trial, folder, "it is the result of another trial")
     standing = _STANDINGS[result.state]
@@ -194,7 +193,7 @@ def _try(name: str, read: Callable[[], _Value], problems: list[str]) -> _Value |
     try:
         return read()
     except (OSError, ValueError, TypeError, MapError) as error:
-        problems.append(f"{name} cannot be read: {_first_line(error)}.")
+        problems.append(f"{name} cannot be read: {say_fault(error)}.")
         return None
 
 
@@ -204,15 +203,3 @@ def _read_states(path: Path) -> tuple[StateRecord, ...]:
 
 def _read_grid(path: Path) -> OccupancyGrid | None:
     return load_map(path).grid if path.exists() else None
-
-
-def _first_line(error: Exception) -> str:
-    """Says in a few words what is wrong with a file."""
-    if isinstance(error, ValidationError):
-        first = error.errors(include_url=False, include_input=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
-        return f"{where}: {first['msg']}" if where else first["msg"]
-    if isinstance(error, json.JSONDecodeError):
-        return error.msg
-    lines = str(error).splitlines()
-    return lines[0].rstrip(".") if lines else type(error).__name__

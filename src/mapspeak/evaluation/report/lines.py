@@ -23,6 +23,7 @@ OF_RESULTS = (
     "n_picture_tokens",
     "robot_s",
     "wall_s",
+    "cpu_s",
     "n_collisions",
     "error",
 )

@@ -6,13 +6,17 @@ from collections.abc import Iterable, Iterator
 from importlib import resources
 
 from mapspeak.evaluation.report.figures import Report
-from mapspeak.evaluation.report.gathering import Attempt
+from mapspeak.evaluation.report.gathering import Attempt, Standing
 from mapspeak.evaluation.report.markup import Html, element, joined, table, text
 from mapspeak.evaluation.report.replay import show_standing
 from mapspeak.evaluation.report.sections import show_figures
 from mapspeak.evaluation.report.wording import NOTHING, cell
+from mapspeak.evaluation.trials import TrialResult
 
 __all__ = ["build_document", "build_page_body"]
+
+MOST_SAID = 240
+"""Characters of an error in the list; all of it is in the replay."""
 
 
 def build_page_body(
@@ -90,11 +94,10 @@ def _line(attempt: Attempt, links: dict[str, str]) -> list[Html]:
     if result is None:
         what = cell(attempt.problem or NOTHING)
         return [*cells, cell(NOTHING), what, *(cell(NOTHING) for _ in range(3))]
-    failure = result.score.failure
-    mistake = cell(NOTHING if failure is None else failure.replace("_", " "))
+    mistake = cell(_say_mistake(attempt, result))
     if attempt.is_broken:
         spent = (cell(NOTHING) for _ in range(3))
-        return [*cells, mistake, cell(result.score.reason), *spent]
+        return [*cells, mistake, cell(_last_line(result.error) or result.score.reason), *spent]
     return [
         *cells,
         mistake,
@@ -103,3 +106,22 @@ def _line(attempt: Attempt, links: dict[str, str]) -> list[Html]:
         cell(result.n_calls),
         cell(f"{result.wall_s:.1f}"),
     ]
+
+
+def _say_mistake(attempt: Attempt, result: TrialResult) -> str:
+    """Says what kind of mistake was made, and whether it was made for want of budget."""
+    failure = result.score.failure
+    if failure is None:
+        return NOTHING
+    kind = failure.replace("_", " ")
+    is_out = attempt.standing is Standing.OUT_OF_BUDGET
+    return f"{kind}, {attempt.standing}" if is_out else kind
+
+
+def _last_line(error: str | None) -> str:
+    """Gives what of an error says most: a trace ends with what went wrong."""
+    lines = (error or "").strip().splitlines()
+    if not lines:
+        return ""
+    last = lines[-1]
+    return last if len(last) <= MOST_SAID else f"{last[:MOST_SAID]}..."

@@ -11,6 +11,7 @@ from mapspeak.evaluation.report.wording import (
     NOTHING,
     cell,
     figure_cell,
+    say_broken,
     say_percent,
     share_cell,
 )
@@ -20,8 +21,8 @@ __all__ = ["show_figures"]
 
 COSTS = (
     ("n_input_tokens", "tokens read"),
+    ("n_picture_tokens", "picture tokens, estimated"),
     ("n_output_tokens", "tokens written"),
-    ("n_picture_tokens", "of them pictures"),
     ("n_calls", "calls"),
     ("n_decisions", "decisions"),
     ("driven_m", "metres"),
@@ -30,8 +31,8 @@ COSTS = (
 )
 PER_DECISION = (
     ("n_input_tokens", "tokens read"),
+    ("n_picture_tokens", "picture tokens, estimated"),
     ("n_output_tokens", "tokens written"),
-    ("n_picture_tokens", "of them pictures"),
     ("n_calls", "calls"),
     ("robot_s", "robot s"),
     ("wall_s", "wall s"),
@@ -80,6 +81,9 @@ def _show_counts(report: Report) -> Iterator[Html]:
             "the others start from; they are in no figure."
         )
         yield element("p", {}, text(said))
+    if report.earlier:
+        said = "It was run in several sittings, with other versions or options: see What was run."
+        yield element("p", {"class": "problem"}, text(said))
     if counts.n_counted < counts.n_asked:
         yield element(
             "p", {"class": "problem"}, text("This run is not complete: the report shows a part.")
@@ -132,7 +136,7 @@ def _coverage_cell(row: TableRow | None) -> Html:
         return cell("not run", kind="none")
     names = ("paper_ratio", "recall", "known_ratio")
     ratio, recall, known = (row.figures.get(f"coverage_{name}") for name in names)
-    done = f"{row.n_successes}/{row.n_trials} explorations done"
+    done = f"{row.n_successes}/{row.n_trials} explorations done{say_broken(row)}"
     if ratio is None or recall is None:
         return cell(done)
     said = f"{say_percent(ratio.value)} by the paper's ratio, {say_percent(recall.value)} recall"
@@ -152,7 +156,7 @@ def _show_success(rows: Sequence[ReportRow], series: Series) -> Iterator[Html]:
     ordered = sorted(rows, key=lambda row: _task_order(rows, row))
     yield plot_bars(_success_bars(ordered), series)
     heading = ("task", "agent", "map shown as", "done", "SPL", "crashed or hung", "unfinished")
-    yield table((*heading, "no result"), map(_success_line, ordered), kind="success")
+    yield table((*heading, "not run or unreadable"), map(_success_line, ordered), kind="success")
     ways = list(_spl_bars(ordered))
     if ways:
         yield element("h3", {}, text("Success weighted by path length (SPL)"))
@@ -326,13 +330,33 @@ def _show_run(report: Report) -> Iterator[Html]:
     yield table(
         ("asked for, and with what", ""), ([cell(a), cell(b)] for a, b in facts), kind="facts"
     )
+    yield from _show_sittings(report)
     if report.problems:
         yield element("h3", {}, text("What could not be read"))
         lines = ([cell(each.trial_id), cell(each.what)] for each in report.problems)
         yield table(("trial", "problem"), lines, kind="problems")
 
 
+def _show_sittings(report: Report) -> Iterator[Html]:
+    """Shows what earlier sittings ran with, where it was something else."""
+    if not report.earlier:
+        return
+    yield element("h3", {}, text("Earlier sittings"))
+    now = {**report.options, **report.versions}
+    n_before = 0
+    lines: list[list[Html]] = []
+    for each in report.earlier:
+        then = {**each.options, **each.versions}
+        changed = (name for name in {**then, **now} if then.get(name) != now.get(name))
+        said = "; ".join(f"{name}: {_say_option(then.get(name))}" for name in changed)
+        lines.append([cell(each.n_done - n_before), cell(said or NOTHING)])
+        n_before = each.n_done
+    yield table(("trials with a result", "what was different from the table above"), lines)
+
+
 def _say_option(value: object) -> str:
+    if value is None:
+        return "not said"
     if isinstance(value, list):
         return ", ".join("not said" if each is None else str(each) for each in value)
     return str(value)

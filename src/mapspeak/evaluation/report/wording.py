@@ -5,7 +5,15 @@ from collections.abc import Callable
 from mapspeak.evaluation.report.markup import Html, element, text
 from mapspeak.evaluation.scores import Interval, TableRow
 
-__all__ = ["NOTHING", "cell", "figure_cell", "say_figure", "say_percent", "share_cell"]
+__all__ = [
+    "NOTHING",
+    "cell",
+    "figure_cell",
+    "say_broken",
+    "say_figure",
+    "say_percent",
+    "share_cell",
+]
 
 NOTHING = "–"  # noqa: RUF001 - a dash, as tables have it
 """Stands where there is no figure."""
@@ -45,7 +53,13 @@ def share_cell(row: TableRow | None) -> Html:
     if row is None or row.success is None:
         return cell("not run", kind="none")
     said = text(f"{row.n_successes}/{row.n_trials} ({100 * row.success.value:.2f} %)")
-    return element("td", _exact(row.success), said, _span(row.success, say_percent))
+    span = f"{say_percent(row.success.low)} to {say_percent(row.success.high)}{say_broken(row)}"
+    return element("td", _exact(row.success), said, element("small", {}, text(span)))
+
+
+def say_broken(row: TableRow) -> str:
+    """Gives how many trials broke, to follow what else is said; nothing where none did."""
+    return f"; {row.n_broken} broken" if row.n_broken else ""
 
 
 def _exact(interval: Interval) -> dict[str, object]:

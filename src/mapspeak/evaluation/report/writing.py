@@ -164,6 +164,9 @@ def _write_replays(run: Run) -> None:
 def _write(path: Path, parts: Iterable[str]) -> None:
     """Writes a file so that it is there whole or not at all."""
     new = path.with_name(f".{path.name}.{os.getpid()}")
-    with new.open("w", encoding="utf-8", errors="replace", newline="\n") as file:
-        file.writelines(parts)
-    new.replace(path)
+    try:
+        with new.open("w", encoding="utf-8", errors="replace", newline="\n") as file:
+            file.writelines(parts)
+        new.replace(path)
+    finally:
+        new.unlink(missing_ok=True)

@@ -1,23 +1,22 @@
 """A whole evaluation: which trials, what each has to wait for, and going on where one left off."""
 
 import platform
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import numpy as np
-from filelock import FileLock, Timeout
 
 from mapspeak import __version__
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.agents.others import find_versions
+from mapspeak.evaluation.agents.others import can_think, find_versions, read_thinking
 from mapspeak.evaluation.runs.attempt import attempt
+from mapspeak.evaluation.runs.folder import alone_in, check_folder, take_up, writing_to
 from mapspeak.evaluation.runs.schedule import Job, run_jobs
 from mapspeak.evaluation.scores import Site
 from mapspeak.evaluation.tasks import EXPLORE, Task, choose_tasks
-from mapspeak.evaluation.trials import RunPlan, Trial, TrialResult, read_plan, write_plan
+from mapspeak.evaluation.trials import RunPlan, Trial, TrialResult, write_plan
 from mapspeak.server import Representation
 from mapspeak.simulator import World, load_world, world_names
 
@@ -50,12 +49,13 @@ class RunOptions:
         seed: The first trial's; each further one has the next.
         folder: Where everything goes.
         representations: How the server shows the map.
-        thinking: How much models may think; None where nothing was said.
+        thinking: How much models may think; None where nothing was said. Scripts are asked once.
         n_jobs: Trials at a time.
         hang_s: Wall time after which a trial's process is killed.
+        has_retry: Trials that crashed or hung before are run again.
 
     Raises:
-        ConfigError: There is no such representation.
+        ConfigError: There is no such representation or way to think, or nothing was chosen.
     """
 
     agents: tuple[str, ...] = (SCRIPTED,)
@@ -68,8 +68,11 @@ class RunOptions:
     thinking: tuple[str | None, ...] = (None,)
     n_jobs: int = 2
     hang_s: float = 1200.0
+    has_retry: bool = False
 
     def __post_init__(self) -> None:
+        _check_chosen(self)
+        _check_thinking(self)
         for name in self.representations:
             if name not in set(Representation):
                 raise ConfigError(
@@ -89,6 +92,28 @@ class RunOptions:
             for each in (world_names() if name == ALL_WORLDS else [name])
         )
         return {name: load_world(name) for name in dict.fromkeys(names)}
+
+
+def _check_chosen(options: RunOptions) -> None:
+    chosen = {
+        "--agent": options.agents,
+        "--task": options.tasks,
+        "--worlds": options.worlds,
+        "--representation": options.representations,
+    }
+    for flag, names in chosen.items():
+        if not names:
+            raise ConfigError(f"{flag} names nothing.", hint="Leave it away for the default.")
+
+
+def _check_thinking(options: RunOptions) -> None:
+    for amount in options.thinking:
+        read_thinking(amount)
+    if any(options.thinking) and not any(map(can_think, options.agents)):
+        raise ConfigError(
+            f"--thinking is for models and client programs, not for {', '.join(options.agents)}.",
+            hint="Leave it away, or name a model with --agent.",
+        )
 
 
 def plan_run(options: RunOptions, worlds: Mapping[str, World]) -> RunPlan:
@@ -131,6 +156,8 @@ def plan_run(options: RunOptions, worlds: Mapping[str, World]) -> RunPlan:
             "seed": options.seed,
             "representations": list(options.representations),
             "thinking": list(options.thinking),
+            "n_jobs": options.n_jobs,
+            "hang_s": options.hang_s,
         },
     )
 
@@ -138,9 +165,10 @@ def plan_run(options: RunOptions, worlds: Mapping[str, World]) -> RunPlan:
 def _trials_of(options: RunOptions, task: Task, world: str) -> Iterator[Trial]:
     n_trials = 1 if task.name == EXPLORE else options.n_trials
     for number in range(1, n_trials + 1):
-        for agent in options.agents:
-            for representation in options.representations:
-                for thinking in options.thinking:
+        for agent in dict.fromkeys(options.agents):
+            amounts = options.thinking if can_think(agent) else (None,)
+            for representation in dict.fromkeys(options.representations):
+                for thinking in dict.fromkeys(amounts):
                     yield Trial(
                         task=task.name,
                         world=world,
@@ -169,44 +197,33 @@ def run_evaluation(
     *,
     on_plan: Callable[[RunPlan], None],
     on_done: Callable[[TrialResult], None],
+    tell: Callable[[str], None],
 ) -> RunPlan:
-    """Runs every trial that has no result yet, and gives the plan.
+    """Runs every trial that has no result yet, and gives the plan of what was asked for.
 
     Args:
         options: What is asked for.
         on_plan: Told of all trials before the first one.
-        on_done: Told of every result, also of those that were there already.
+        on_done: Told of every result of it, also of those that were there already.
+        tell: Told in sentences what became of an earlier sitting in the same folder.
 
     Raises:
-        ConfigError: Something asked for does not exist, the folder holds another evaluation, or
-            another run is at work in it.
+        ConfigError: Something asked for does not exist, the folder holds something else or cannot
+            be written to, or another run is at work in it.
     """
     worlds = options.load_worlds()
     plan = plan_run(options, worlds)
-    _check_folder(options)
-    with _alone_in(options.folder):
-        write_plan(options.folder, plan)
+    folder = options.folder
+    check_folder(folder)
+    with writing_to(folder), alone_in(folder):
+        found = take_up(folder, plan, has_retry=options.has_retry)
+        write_plan(folder, found.plan)
+        for note in found.notes:
+            tell(note)
         on_plan(plan)
         jobs = make_jobs(options, plan, worlds)
-        run_jobs(options.folder, jobs, n_jobs=options.n_jobs, on_done=on_done)
+        run_jobs(folder, jobs, n_jobs=options.n_jobs, on_done=on_done)
     return plan
-
-
-@contextmanager
-def _alone_in(folder: Path) -> Generator[None]:
-    """Keeps other runs out of a folder; a run that was killed keeps nobody out."""
-    folder.mkdir(parents=True, exist_ok=True)
-    lock = FileLock(folder / ".run.lock")
-    try:
-        lock.acquire(timeout=0)
-    except Timeout as error:
-        raise ConfigError(
-            f"Another run is at work in {folder}.", hint="Wait for it, or choose another --out."
-        ) from error
-    try:
-        yield
-    finally:
-        lock.release()
 
 
 def _floor_m2(world: World) -> float:
@@ -214,17 +231,6 @@ def _floor_m2(world: World) -> float:
     ends = [end for wall in world.walls for end in (wall.start, wall.end)]
     xs, ys = [end.x for end in ends], [end.y for end in ends]
     return (max(xs) - min(xs)) * (max(ys) - min(ys)) if ends else 0.0
-
-
-def _check_folder(options: RunOptions) -> None:
-    if not (options.folder / "run.json").exists():
-        return
-    seed = read_plan(options.folder).options["seed"]
-    if seed != options.seed:
-        raise ConfigError(
-            f"{options.folder} holds an evaluation with the seed {seed}, not {options.seed}.",
-            hint="Go on with that seed, or choose another folder with --out.",
-        )
 
 
 def make_jobs(options: RunOptions, plan: RunPlan, worlds: Mapping[str, World]) -> Iterable[Job]:

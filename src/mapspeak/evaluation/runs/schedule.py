@@ -6,16 +6,19 @@ result, and the others never notice. A trial with a result is not run again.
 
 import multiprocessing
 import os
+import signal
 import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
+from mapspeak.errors import ConfigError, MapspeakError
+from mapspeak.evaluation.runs.folder import NO_ROOM
 from mapspeak.evaluation.trials import (
     Failure,
     Score,
@@ -35,6 +38,8 @@ PRELOAD = ("mapspeak.evaluation.runs", "mapspeak.evaluation.runs.preload", "maps
 """What every trial needs; imported once, before processes are forked."""
 LAST_WORDS = 2000
 """Characters of a crash that its result keeps."""
+FULL_DISK = 74
+"""Exit status of a trial that could not write: no fault of it, and so none of its results."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,6 +99,9 @@ def run_jobs(
         jobs: What to do. A job's predecessor must be among them, or be done.
         n_jobs: Processes at a time.
         on_done: Told of each result, also of those that were there already.
+
+    Raises:
+        ConfigError: The disk is full; what is done is kept.
     """
     jobs = list(jobs)
     for job in jobs:
@@ -106,8 +114,10 @@ def run_jobs(
             _start_more(desk, processes)
             _await_one(desk)
     finally:
+        # All are told before one is waited for: a second Ctrl-C may end the waiting.
         for running in desk.running:
             running.process.kill()
+        for running in desk.running:
             running.process.join()
 
 
@@ -163,6 +173,11 @@ def _settle(desk: _Desk, running: _Running) -> None:
         desk.on_done(read_result(desk.run, running.job.trial))
         return
     code = running.process.exitcode
+    if code == FULL_DISK:
+        raise ConfigError(
+            f"{desk.run} cannot be written to: the disk is full.",
+            hint="Make room and start again; finished trials are kept.",
+        )
     errors = trial_folder(desk.run, running.job.trial) / ERRORS
     said = errors.read_text("utf-8", "replace")[-LAST_WORDS:] if errors.exists() else ""
     how = f"killed by signal {-code}" if code is not None and code < 0 else f"exit code {code}"
@@ -193,18 +208,34 @@ def _is_broken(run: Path, trial: Trial) -> bool:
 def _work_apart(work: Callable[[], None], errors: Path) -> None:
     """Does the work; what it says goes to a file, and it ends when the run does."""
     _end_with_parent()
+    # Ctrl-C in a terminal reaches all processes; what becomes of a trial is the run's to say.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     with errors.open("w", encoding="utf-8") as said:
         os.dup2(said.fileno(), 1)
         os.dup2(said.fileno(), 2)
     try:
         work()
-    except BaseException:  # noqa: BLE001 - the process's last words, for the result
-        sys.stderr.write(traceback.format_exc())
+    except BaseException as error:  # noqa: BLE001 - the process's last words, for the result
+        leaves = list(_leaves(error))
+        if any(isinstance(leaf, OSError) and leaf.errno in NO_ROOM for leaf in leaves):
+            os._exit(FULL_DISK)
+        # What we raise on purpose says what to do; anything else is a bug, and needs its trace.
+        is_ours = all(isinstance(leaf, MapspeakError) for leaf in leaves)
+        sys.stderr.write("\n".join(map(str, leaves)) if is_ours else traceback.format_exc())
         sys.stderr.flush()
         os._exit(1)
     sys.stderr.flush()
     # Nothing here is worth an orderly end: threads may wait for what never comes.
     os._exit(0)
+
+
+def _leaves(error: BaseException) -> Iterator[BaseException]:
+    """Gives all errors of a group of groups."""
+    if isinstance(error, BaseExceptionGroup):
+        for each in error.exceptions:
+            yield from _leaves(each)
+    else:
+        yield error
 
 
 def _end_with_parent() -> None:

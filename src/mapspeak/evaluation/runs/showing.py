@@ -2,7 +2,7 @@
 
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from rich.console import Console
 from rich.progress import (
@@ -31,30 +31,38 @@ class RunBar:
     Attributes:
         progress: The bar.
         bar: Its line.
-        results: All so far, without preparations.
+        n_asked: Trials and preparations that were asked for; 0 before that is known.
+        n_done: Those with a result.
         n_broken: Trials that crashed or hung, preparations among them.
     """
 
     progress: Progress
     bar: TaskID
-    results: list[TrialResult] = field(default_factory=list)
+    n_asked: int = 0
+    n_done: int = 0
     n_broken: int = 0
     _n_successes: int = 0
     _preparations: frozenset[str] = frozenset()
 
     def begin(self, plan: RunPlan) -> None:
-        """Takes note of how much there is to do."""
+        """Takes note of how much there is to do, and begins to show it."""
         self._preparations = frozenset(trial.id for trial in plan.preparations)
-        self.progress.update(self.bar, total=len(plan.trials) + len(plan.preparations))
+        self.n_asked = len(plan.trials) + len(plan.preparations)
+        self.progress.update(self.bar, total=self.n_asked)
+        self.progress.start()
 
     def note(self, result: TrialResult) -> None:
         """Takes note of a result."""
         self.n_broken += result.state in (TrialState.CRASHED, TrialState.HUNG)
+        self.n_done += 1
         if result.trial.id not in self._preparations:
-            self.results.append(result)
             self._n_successes += result.score.is_success
         said = f"{self._n_successes} done, {self.n_broken} broken; last {result.trial.id}"
         self.progress.update(self.bar, advance=1, description=said)
+
+    def tell(self, said: str) -> None:
+        """Says something besides."""
+        self.progress.console.print(said, markup=False, highlight=False, soft_wrap=True)
 
 
 @contextmanager
@@ -67,8 +75,11 @@ def show_run(*, is_quiet: bool) -> Generator[RunBar]:
         TimeRemainingColumn(),
         TextColumn("{task.description}"),
     )
-    with Progress(*columns, console=Console(stderr=True), disable=is_quiet) as progress:
+    progress = Progress(*columns, console=Console(stderr=True), disable=is_quiet)
+    try:
         yield RunBar(progress, progress.add_task("starting", total=None))
+    finally:
+        progress.stop()
 
 
 def build_table(rows: Sequence[TableRow]) -> Table:

@@ -2,6 +2,7 @@
 
 from mapspeak.evaluation.trials.records import (
     RunPlan,
+    Sitting,
     is_done,
     read_plan,
     read_result,
@@ -29,6 +30,7 @@ __all__ = [
     "RunPlan",
     "Score",
     "Setting",
+    "Sitting",
     "ToolCall",
     "Trial",
     "TrialResult",

@@ -8,23 +8,26 @@ OUT/trials/TRIAL_ID/turns.jsonl   the conversation, as it happens
                     result.json   its presence means that the trial is done
 """
 
+import json
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 
 from mapspeak.evaluation.trials.trial import Trial, TrialResult, Turn
 
 __all__ = [
     "RunPlan",
+    "Sitting",
     "is_done",
     "read_plan",
     "read_result",
     "read_results",
     "read_turns",
+    "say_fault",
     "trial_folder",
     "turn_line",
     "write_plan",
@@ -37,22 +40,40 @@ PLAN = "run.json"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Sitting:
+    """A time that a run was started, before it was taken up with other versions or options.
+
+    Attributes:
+        versions: As in `RunPlan`.
+        options: As in `RunPlan`.
+        n_done: Trials that had a result when it ended, those of earlier sittings among them.
+    """
+
+    versions: dict[str, str]
+    options: dict[str, Any]
+    n_done: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RunPlan:
     """What a run was asked for, and with what.
 
     Attributes:
-        trials: All of them, in their order; preparations are not among them.
+        trials: All of them, in their order; preparations are not among them. Trials that were
+            asked for once and have a result stay.
         preparations: Trials that were not asked for but that others start from: the scripted
             exploration whose map and memory they are given.
         versions: Of mapspeak, Python and numpy, of `inspect-ai` behind models and of client
             programs, by name.
         options: As on the command line.
+        earlier: Sittings before, with other versions or options.
     """
 
     trials: tuple[Trial, ...]
     preparations: tuple[Trial, ...] = ()
     versions: dict[str, str]
     options: dict[str, Any]
+    earlier: tuple[Sitting, ...] = ()
 
 
 _PLAN: TypeAdapter[RunPlan] = TypeAdapter(RunPlan)
@@ -114,8 +135,27 @@ def read_turns(run: Path, trial: Trial) -> tuple[Turn, ...]:
     return tuple(_TURN.validate_json(line) for line in whole)
 
 
+def say_fault(error: Exception) -> str:
+    """Says in a few words why a file cannot be read."""
+    if isinstance(error, ValidationError):
+        first = error.errors(include_url=False, include_input=False)[0]
+        where = ".".join(str(part) for part in first["loc"])
+        return f"{where}: {first['msg']}" if where else first["msg"]
+    if isinstance(error, json.JSONDecodeError):
+        return error.msg
+    lines = str(error).splitlines()
+    return lines[0].rstrip(".") if lines else type(error).__name__
+
+
 def _write_at_once(path: Path, data: bytes) -> None:
     """Puts a file in its place whole, so that no reader and no crash ever sees half of it."""
     new = path.with_name(f".{path.name}.{os.getpid()}")
-    new.write_bytes(data)
-    new.replace(path)
+    try:
+        with new.open("wb") as file:
+            file.write(data)
+            file.flush()
+            # Else a machine that loses power may keep the name and lose what it stands for.
+            os.fsync(file.fileno())
+        new.replace(path)
+    finally:
+        new.unlink(missing_ok=True)

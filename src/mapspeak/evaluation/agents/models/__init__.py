@@ -1,7 +1,17 @@
 """Models as agents: one loop of tool calls, and who may be asked in it."""
 
 from mapspeak.evaluation.agents.models.loop import ModelAgent
-from mapspeak.evaluation.agents.models.mind import Mind, Reply, Talk, Thinking, Usage, Wish
+from mapspeak.evaluation.agents.models.mind import Ending, Mind, Reply, Talk, Thinking, Usage, Wish
 from mapspeak.evaluation.agents.models.mock import MockMind
 
-__all__ = ["Mind", "MockMind", "ModelAgent", "Reply", "Talk", "Thinking", "Usage", "Wish"]
+__all__ = [
+    "Ending",
+    "Mind",
+    "MockMind",
+    "ModelAgent",
+    "Reply",
+    "Talk",
+    "Thinking",
+    "Usage",
+    "Wish",
+]

@@ -13,7 +13,7 @@ from PIL import Image
 
 from mapspeak.errors import LinkError
 from mapspeak.evaluation.agents.agent import AgentEnd, Assignment, Connection
-from mapspeak.evaluation.agents.models.mind import Mind, Reply, Talk, Wish
+from mapspeak.evaluation.agents.models.mind import Ending, Mind, Reply, Talk, Wish
 from mapspeak.evaluation.client import Answer, OutOfBudgetError, Picture, ToolClient
 from mapspeak.evaluation.trials.trial import TrialState
 
@@ -21,6 +21,8 @@ __all__ = ["ModelAgent", "estimate_picture_tokens"]
 
 PIXELS_PER_TOKEN = 750
 """Anthropic's published rule for pictures of up to 1568 px; other APIs count otherwise."""
+REFUSED = "The model refused to answer."
+CUT_OFF = "The model was cut off: it wrote as much as it may, or had too much to read."
 WRAP_UP_S = 1.0
 """So long before its time is up it ends by itself, so that what it has cost is not lost."""
 
@@ -83,7 +85,11 @@ class ModelAgent:
     connection: Connection = field(default=Connection.STDIO, kw_only=True)
 
     async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
-        """Carries out the assignment; also out of budget it says what it has cost."""
+        """Carries out the assignment; also out of budget it says what it has cost.
+
+        Raises:
+            LinkError: There is nothing to call, or the model cannot be asked or never answered.
+        """
         listed = await tools.list_tools()
         if not listed:
             raise LinkError("The server offers no tools.", hint="Look at --toolsets.")
@@ -94,6 +100,11 @@ class ModelAgent:
                 return await _converse(talk, tools, account)
         except OutOfBudgetError as error:
             return account.end(str(error), TrialState.OUT_OF_BUDGET)
+        if not account.n_turns:
+            raise LinkError(
+                f"{self.name} has not answered once in {task.limits.wall_s:.0f} s.",
+                hint="See whether its server answers at all.",
+            )
         return account.end("It took too long.", TrialState.OUT_OF_BUDGET)
 
 
@@ -104,11 +115,19 @@ async def _converse(talk: Talk, tools: ToolClient, account: _Account) -> AgentEn
         # The last words are noted by whoever asked for them.
         _tell_witness(tools, reply.text if reply.wishes else "", reply, account)
         if not reply.wishes:
-            return account.end(reply.text, TrialState.FINISHED)
+            return _end(reply, account)
         for wish in reply.wishes:
             answer = await _fulfil(tools, wish)
             account.n_pictures_cost += sum(map(estimate_picture_tokens, answer.pictures))
             talk.tell(wish, answer)
+
+
+def _end(reply: Reply, account: _Account) -> AgentEnd:
+    if reply.ending is Ending.REFUSED:
+        return account.end(reply.text or REFUSED, TrialState.GAVE_UP)
+    if reply.ending is Ending.CUT_OFF:
+        return account.end(reply.text or CUT_OFF, TrialState.OUT_OF_BUDGET)
+    return account.end(reply.text, TrialState.FINISHED)
 
 
 def _tell_witness(tools: ToolClient, text: str, reply: Reply, account: _Account) -> None:

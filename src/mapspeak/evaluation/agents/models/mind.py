@@ -9,7 +9,7 @@ from mcp_types import Tool
 
 from mapspeak.evaluation.client import Answer
 
-__all__ = ["Mind", "Reply", "Talk", "Thinking", "Usage", "Wish"]
+__all__ = ["Ending", "Mind", "Reply", "Talk", "Thinking", "Usage", "Wish"]
 
 
 class Thinking(StrEnum):
@@ -51,6 +51,17 @@ class Usage:
     n_output_tokens: int
 
 
+class Ending(StrEnum):
+    """Why a model says no more in a reply."""
+
+    ITS_OWN = "its own"
+    """It has said what it had to say."""
+    REFUSED = "refused"
+    """The model, or its provider for it, does not want to answer."""
+    CUT_OFF = "cut off"
+    """It has written as much as it may, or has more to read than it can."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reply:
     """What a model answers to all that was said.
@@ -59,18 +70,24 @@ class Reply:
         text: In words.
         wishes: Calls that it wants made, in their order; none when it has finished.
         usage: What it has cost; None where the API does not say.
+        ending: Why it ends.
     """
 
     text: str
     wishes: tuple[Wish, ...] = ()
     usage: Usage | None = None
+    ending: Ending = Ending.ITS_OWN
 
 
 class Talk(Protocol):
     """One conversation, which keeps all that was said in it."""
 
     async def ask(self) -> Reply:
-        """Gives the model's answer to all that was said so far."""
+        """Gives the model's answer to all that was said so far.
+
+        Raises:
+            LinkError: The model cannot be reached, or does not take what it was asked.
+        """
         ...
 
     def tell(self, wish: Wish, answer: Answer) -> None:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from mcp_types import Tool
 
-from mapspeak.errors import ConfigError
-from mapspeak.evaluation.agents.models.mind import Reply, Talk, Thinking, Usage, Wish
+from mapspeak.errors import ConfigError, LinkError
+from mapspeak.evaluation.agents.models.mind import Ending, Reply, Talk, Thinking, Usage, Wish
 from mapspeak.evaluation.agents.models.mock import count_mock_tokens, decide
 from mapspeak.evaluation.client import Answer
 
@@ -21,10 +21,18 @@ if TYPE_CHECKING:
     from inspect_ai.model import ChatMessage, GenerateConfig, Model, ModelOutput, ModelUsage
     from inspect_ai.tool import ToolInfo
 
-__all__ = ["InspectMind", "open_mind"]
+__all__ = ["InspectMind", "find_client", "open_mind"]
 
 MOCK = "mockllm/"
+CLIENT = "openai"
+"""The package that the library speaks through where there is no other; the extra brings it."""
+CLIENTS = {"anthropic": "anthropic", "google": "google-genai"}
+"""Packages that it wants besides, by the provider."""
 MOST_RETRIES = 5
+ANSWER_WITHIN_S = 300
+"""A request that takes longer is given up and made anew: a lost connection is never answered."""
+MOST_SAID = 300
+"""Characters of a provider's error that are passed on: some repeat the whole request."""
 
 
 def open_mind(name: str, thinking: Thinking | None) -> "InspectMind":
@@ -42,9 +50,19 @@ def open_mind(name: str, thinking: Thinking | None) -> "InspectMind":
     except ImportError as error:
         raise ConfigError(
             f"{name} is asked through inspect-ai, which is not installed.",
-            hint="pip install 'mapspeak[eval]', or take the agent mock.",
+            hint=f"{_say_install(name)}, or take the agent mock.",
         ) from error
     return InspectMind(name, thinking)
+
+
+def _say_install(name: str) -> str:
+    client = find_client(name)
+    return f"pip install 'mapspeak[eval]'{'' if client == CLIENT else f' {client}'}"
+
+
+def find_client(name: str) -> str:
+    """Gives the package that the library speaks through to a model's provider."""
+    return CLIENTS.get(name.partition("/")[0], CLIENT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +91,7 @@ class InspectMind:
 
         config = GenerateConfig(
             max_retries=MOST_RETRIES,
+            attempt_timeout=ANSWER_WITHIN_S,
             seed=seed,
             # The library makes a budget of it where a provider counts thoughts in tokens.
             reasoning_effort=None if self.thinking is None else self.thinking.value,
@@ -108,8 +127,9 @@ class InspectMind:
 
 
 def _plain(error: Exception) -> str:
-    """Gives a message without the library's markup and line ends."""
-    return " ".join(re.sub(r"\[/?[a-z ]*\]", "", str(error)).split())
+    """Gives a message as a sentence, without the library's markup and line ends."""
+    said = " ".join(re.sub(r"\[/?[a-z ]*\]", "", str(error)).split())
+    return f"{said.removeprefix('ERROR: ').rstrip('.')}."
 
 
 @dataclass(slots=True)
@@ -120,7 +140,7 @@ class _InspectTalk:
     config: "GenerateConfig"
 
     async def ask(self) -> Reply:
-        output = await self.model.generate(self.messages, tools=self.tools, config=self.config)
+        output = await self._generate()
         # Said again as it is: some providers want their own thoughts back, signed.
         self.messages.append(output.message)
         return Reply(
@@ -135,7 +155,17 @@ class _InspectTalk:
                 for call in output.message.tool_calls or ()
             ),
             usage=_read_usage(output.usage),
+            ending=_ENDINGS.get(output.stop_reason, Ending.ITS_OWN),
         )
+
+    async def _generate(self) -> "ModelOutput":
+        try:
+            return await self.model.generate(self.messages, tools=self.tools, config=self.config)
+        except Exception as error:  # each provider has errors of its own, of no common kind
+            raise LinkError(
+                f"{self.model} cannot be asked: {_say_cause(error)}",
+                hint="See the provider's own words; mapspeak eval --retry runs what broke again.",
+            ) from error
 
     def tell(self, wish: Wish, answer: Answer) -> None:
         from inspect_ai.model import (  # noqa: PLC0415 - an optional extra
@@ -154,6 +184,22 @@ class _InspectTalk:
         self.messages.append(
             ChatMessageTool(content=content, tool_call_id=wish.id, function=wish.tool, error=error)
         )
+
+
+_ENDINGS = {
+    "content_filter": Ending.REFUSED,
+    "max_tokens": Ending.CUT_OFF,
+    "model_length": Ending.CUT_OFF,
+}
+"""Endings by the library's names."""
+
+
+def _say_cause(error: BaseException) -> str:
+    """Gives what the provider said, which the library may have wrapped in its own errors."""
+    while error.__cause__ is not None:
+        error = error.__cause__
+    said = " ".join(str(error).split())[:MOST_SAID].rstrip(".")
+    return f"{type(error).__name__}: {said}."
 
 
 def _as_info(tool: Tool) -> "ToolInfo":
