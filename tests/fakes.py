@@ -4,6 +4,7 @@ import io
 import math
 
 import anyio
+import numpy as np
 from PIL import Image
 
 from drawing import grid_from_text
@@ -14,6 +15,7 @@ from mapspeak.robot import (
     Detection,
     GoalState,
     GoalStatus,
+    RangeScan,
     RobotDescription,
     StampedPose,
 )
@@ -42,6 +44,27 @@ def two_rooms() -> OccupancyGrid:
     return grid_from_text(TWO_ROOMS, resolution_m=0.25)
 
 
+def scan_of(grid: OccupancyGrid, pose: Pose, *, reach_m: float = 20.0) -> RangeScan:
+    """What a laser would meet of a map: to the first obstacle in every two degrees."""
+    angles_rad = np.radians(np.arange(-180.0, 180.0, 2.0))
+    return RangeScan(
+        angles_rad=angles_rad,
+        ranges_m=np.array([_free_m(grid, pose, angle, reach_m) for angle in angles_rad]),
+        reach_m=reach_m,
+        pose=pose,
+        stamp_s=0.0,
+    )
+
+
+def _free_m(grid: OccupancyGrid, pose: Pose, angle_rad: float, reach_m: float) -> float:
+    beam = pose @ Pose(0.0, 0.0, angle_rad)
+    for far_m in np.arange(0.0, reach_m, grid.resolution_m / 5).tolist():
+        cell = grid.cell_at(beam.transform(Point(far_m, 0.0)))
+        if not grid.contains(cell) or grid.occupied[cell.row, cell.col]:
+            return float(far_m)
+    return math.inf
+
+
 class FakeRobot:
     """Implements the port with a straight-line drive; every answer can be changed by a test."""
 
@@ -56,6 +79,7 @@ class FakeRobot:
         self.pose = pose
         self.has_camera = has_camera
         self.detections: tuple[Detection, ...] = ()
+        self.scan: RangeScan | None = None
         self.n_stops = 0
         self.foreign_goals: tuple[GoalState, ...] = ()
         self.goals: dict[str, Pose] = {}
@@ -73,6 +97,7 @@ class FakeRobot:
             radius_m=0.2,
             map_name="two-rooms",
             has_camera=self.has_camera,
+            has_laser=self.scan is not None,
             detector="fake detector" if self.detections else None,
         )
 
@@ -111,6 +136,9 @@ class FakeRobot:
 
     async def fetch_detections(self) -> tuple[Detection, ...]:
         return self.detections
+
+    async def fetch_scan(self) -> RangeScan | None:
+        return self.scan
 
     async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
         return self.foreign_goals

@@ -1,11 +1,12 @@
 """Any waypoint at all, for laws that hold for every one of them."""
 
+import math
 from datetime import UTC, datetime, timedelta, timezone
 
 from hypothesis import strategies as st
 
 from mapspeak.geometry import Pose
-from mapspeak.semantic import Confidence, Landmark, Waypoint
+from mapspeak.semantic import Confidence, Landmark, LaserFan, Waypoint
 
 # One on each line: what YAML, or a reader of lines, might take for something else.
 _TRICKY_TEXTS = """\
@@ -62,6 +63,27 @@ _ZONES = st.sampled_from([UTC, timezone(timedelta(hours=9)), timezone(-timedelta
 _TIMES = st.datetimes(datetime(1, 1, 2), datetime(9999, 12, 30), timezones=_ZONES)  # noqa: DTZ001 - the bounds take no zone
 
 
+def laser_fans() -> st.SearchStrategy[LaserFan]:
+    """Gives any of what a laser may have met."""
+    beams = st.none() | st.just(math.inf) | st.floats(0, 1000)
+    return st.builds(
+        _fan,
+        _ANGLES,
+        st.floats(0.02, 6.2),
+        st.lists(beams, min_size=2, max_size=30),
+        st.floats(0.1, 1000),
+    )
+
+
+def _fan(first_rad: float, turn_rad: float, beams: list[float | None], reach_m: float) -> LaserFan:
+    return LaserFan(
+        first_rad=first_rad,
+        last_rad=first_rad + turn_rad,
+        ranges_m=tuple(beams),
+        reach_m=reach_m if math.inf in beams else None,
+    )
+
+
 def landmarks(*, has_pose: bool = False) -> st.SearchStrategy[Landmark]:
     """Gives any landmark, most of them with a label alone; perhaps with a pose of its own."""
     full = st.builds(
@@ -76,6 +98,7 @@ def landmarks(*, has_pose: bool = False) -> st.SearchStrategy[Landmark]:
         stamp_s=st.none() | st.floats(0, 2e9),
         recorded_at=st.none() | _TIMES,
         pose=st.none() | _POSES if has_pose else st.none(),
+        laser=st.none() | laser_fans(),
     )
     return st.builds(Landmark, label=_LINES) | full
 

@@ -15,6 +15,7 @@ from rich.table import Table
 from benchmarks.figure import Figure
 from benchmarks.memory.asking import FindModel, open_atlas
 from benchmarks.memory.judging import Facing, Fault, Judged, Outcome, choose, judge_all
+from benchmarks.memory.lasers import Laser
 from benchmarks.memory.observer import observe
 from benchmarks.memory.places import PlaceError, measure_places
 from benchmarks.memory.sites import Site, build_drawn, build_held_out, build_sites, build_worn
@@ -60,13 +61,21 @@ class Trial:
         site: The building.
         seed: Of all noise.
         has_ranges: Observers tell ranges, too.
+        band_m: Between which heights their laser looks; None without one.
         ways: How requests are understood.
     """
 
     def __init__(
-        self, site: Site, *, seed: int, has_ranges: bool, ways: Sequence[str] = tuple(WAYS)
+        self,
+        site: Site,
+        *,
+        seed: int,
+        has_ranges: bool,
+        band_m: tuple[float, float] | None = None,
+        ways: Sequence[str] = tuple(WAYS),
     ) -> None:
-        memory = observe(site, seed=seed, has_ranges=has_ranges)
+        laser = None if band_m is None else Laser(site, band_m=band_m, seed=seed)
+        memory = observe(site, seed=seed, has_ranges=has_ranges, laser=laser)
         atlases = {way: open_atlas(site, memory.places, WAYS[way]) for way in ways}
         started_s = time.process_time()
         found = atlases[ways[0]].recollection.found

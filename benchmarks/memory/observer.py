@@ -1,16 +1,18 @@
 """A scripted observer: it writes down what it sees, and errs as people and models do."""
 
 import math
-from collections.abc import Iterator, Sequence
+import sys
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from benchmarks.memory.lasers import Laser
 from benchmarks.memory.sites import Site, TrueThing
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.semantic import Landmark, SemanticMap, Waypoint
+from mapspeak.semantic import Landmark, LaserRing, SemanticMap, Waypoint
 
-__all__ = ["Memory", "observe"]
+__all__ = ["Memory", "observe", "observe_from"]
 
 BEARING_NOISE_RAD = math.radians(10)
 RANGE_NOISE_RATIO = 0.15
@@ -44,7 +46,9 @@ class _Notebook:
     site: Site
     random: np.random.Generator
     has_ranges: bool
+    laser: Laser | None
     n_views: dict[TrueThing, int]
+    most_views: int = N_VIEWS
     truth: dict[tuple[str, Landmark], TrueThing] = field(default_factory=dict)
     wrong: set[tuple[str, Landmark]] = field(default_factory=set)
     waypoints: list[Waypoint] = field(default_factory=list)
@@ -52,11 +56,12 @@ class _Notebook:
     def look(self, pose: Pose) -> None:
         """Writes down a place: everything in view that has too few views as yet."""
         name = f"view {len(self.waypoints)}"
-        seen = [thing for thing, n in self.n_views.items() if n < N_VIEWS]
+        seen = [thing for thing, n in self.n_views.items() if n < self.most_views]
         seen = [thing for thing in seen if _is_in_view(self.site, pose, thing)]
         landmarks: dict[bool, list[Landmark]] = {True: [], False: []}
+        ring = self.laser.turn(pose) if self.laser is not None and seen else None
         for thing in seen:
-            landmark, is_wrong = self._write_down(pose, thing)
+            landmark, is_wrong = self._write_down(pose, thing, ring)
             if (name, landmark) in self.truth:
                 continue
             self.n_views[thing] += 1
@@ -73,7 +78,18 @@ class _Notebook:
             )
         )
 
-    def _write_down(self, pose: Pose, thing: TrueThing) -> tuple[Landmark, bool]:
+    def close(self) -> Memory:
+        """Gives all that was written down."""
+        return Memory(
+            places=SemanticMap(waypoints=tuple(self.waypoints)),
+            truth=self.truth,
+            wrong=frozenset(self.wrong),
+            annotated=tuple(self.n_views),
+        )
+
+    def _write_down(
+        self, pose: Pose, thing: TrueThing, ring: LaserRing | None
+    ) -> tuple[Landmark, bool]:
         label = thing.label
         off_rad = wrap_angle(pose.point.bearing_to(thing.point) - pose.yaw_rad)
         bearing_rad = off_rad + BEARING_NOISE_RAD * self.random.normal()
@@ -90,27 +106,42 @@ class _Notebook:
             label=label,
             bearing_rad=float(bearing_rad),
             range_m=float(range_m) if self.has_ranges else None,
+            laser=None if ring is None else ring.find_fan(pose, float(bearing_rad)),
         )
         return landmark, is_wrong
 
 
-def observe(site: Site, *, seed: int, has_ranges: bool) -> Memory:
-    """Writes down two things in three, each from three places."""
+def observe(site: Site, *, seed: int, has_ranges: bool, laser: Laser | None = None) -> Memory:
+    """Writes down two things in three, each from three places.
+
+    What is seen, and how wrongly, is the same with a laser and without.
+    """
     random = np.random.default_rng(seed)
     order = [site.things[i] for i in random.permutation(len(site.things)).tolist()]
     annotated = order[: round(len(order) * (1 - NEVER_RATIO))]
-    book = _Notebook(site, random, has_ranges, dict.fromkeys(annotated, 0))
+    book = _Notebook(site, random, has_ranges, laser, dict.fromkeys(annotated, 0))
     for thing in annotated:
         for pose in _lookouts(site, thing, random):
             if book.n_views[thing] >= N_VIEWS:
                 break
             book.look(pose)
-    return Memory(
-        places=SemanticMap(waypoints=tuple(book.waypoints)),
-        truth=book.truth,
-        wrong=frozenset(book.wrong),
-        annotated=tuple(annotated),
+    return book.close()
+
+
+def observe_from(site: Site, poses: Iterable[Pose], *, seed: int) -> Memory:
+    """Writes down from each place all that is in view there, with ranges."""
+    random = np.random.default_rng(seed)
+    book = _Notebook(
+        site,
+        random,
+        has_ranges=True,
+        laser=None,
+        n_views=dict.fromkeys(site.things, 0),
+        most_views=sys.maxsize,
     )
+    for pose in poses:
+        book.look(pose)
+    return book.close()
 
 
 def _lookouts(site: Site, thing: TrueThing, random: np.random.Generator) -> Iterator[Pose]:

@@ -38,7 +38,16 @@ from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import clearance_m
 from mapspeak.spatial.rooms import RoomMap
 
-__all__ = ["Site", "TrueThing", "build_drawn", "build_held_out", "build_sites", "build_worn"]
+__all__ = [
+    "Site",
+    "TrueThing",
+    "build_drawn",
+    "build_fresh",
+    "build_held_out",
+    "build_newer",
+    "build_sites",
+    "build_worn",
+]
 
 MAPS = Path(__file__).parents[2] / "tests" / "maps"
 REAL_MAPS = (MAPS / "aws_small_house" / "map.yaml", MAPS / "freiburg79" / "whole.yaml")
@@ -53,6 +62,11 @@ DRAWN_SEEDS = (101, 102, 103, 104)
 """Two small and two large buildings of each style; none of them is shipped."""
 HELD_OUT_SEEDS = (301, 302)
 """A small and a large one of each style. Measured once, when the rule of `found` was chosen."""
+FRESH_SEEDS = (401, 402)
+"""Likewise. Measured once, when it was settled what a laser says but that one beam past a corner
+says nothing."""
+NEWER_SEEDS = (501, 502)
+"""Likewise. Measured once, with that."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,13 +106,20 @@ class TrueThing:
 
 
 class Site:
-    """A building, its map, and what is true of it."""
+    """A building, its map, and what is true of it.
 
-    def __init__(self, world: World) -> None:
+    Args:
+        world: The building.
+        is_bare: The map has its walls alone, as one that was drawn before anybody moved in.
+    """
+
+    def __init__(self, world: World, *, is_bare: bool = False) -> None:
         self.world = world
         self.name = world.name
         floor = TrueFloor(world)
-        self.grid: OccupancyGrid = floor.visible
+        mapped = TrueFloor(dataclasses.replace(world, objects=())) if is_bare else floor
+        self.grid: OccupancyGrid = mapped.visible
+        self._floor = floor.solid
         self._standable = floor.standable & (clearance_m(floor.solid) >= BODY_RADIUS_M + 0.1)
         map_from_world = world.start.inverse()
         self.things = tuple(
@@ -114,7 +135,7 @@ class Site:
     @cached_property
     def places(self) -> NDArray[np.float64]:
         """Where an observer can stand, shape (n, 2)."""
-        return self.grid.points_at(*np.nonzero(self._standable))
+        return self._floor.points_at(*np.nonzero(self._standable))
 
     @cached_property
     def revision(self) -> MapRevision:
@@ -167,6 +188,16 @@ def build_held_out() -> Iterator[Site]:
     return _draw(HELD_OUT_SEEDS)
 
 
+def build_fresh(*, is_bare: bool = False) -> Iterator[Site]:
+    """Gives drawn buildings that nothing was chosen on, nor measured but once."""
+    return _draw(FRESH_SEEDS, is_bare=is_bare)
+
+
+def build_newer(*, is_bare: bool = False) -> Iterator[Site]:
+    """Gives drawn buildings that nothing was chosen on, nor measured but once and later."""
+    return _draw(NEWER_SEEDS, is_bare=is_bare)
+
+
 def build_worn() -> Iterator[Site]:
     """Gives the shipped buildings that were held out until they had been looked at too often."""
     for name in world_names():
@@ -174,18 +205,18 @@ def build_worn() -> Iterator[Site]:
             yield Site(load_world(name))
 
 
-def build_drawn() -> Iterator[Site]:
+def build_drawn(*, is_bare: bool = False) -> Iterator[Site]:
     """Gives buildings in the styles of those held out, for choosing."""
-    return _draw(DRAWN_SEEDS)
+    return _draw(DRAWN_SEEDS, is_bare=is_bare)
 
 
-def _draw(seeds: Sequence[int]) -> Iterator[Site]:
+def _draw(seeds: Sequence[int], *, is_bare: bool = False) -> Iterator[Site]:
     with TemporaryDirectory() as folder:
         for style in style_names():
             for seed in seeds:
                 path = Path(folder) / f"{style}_{seed}.yaml"
                 path.write_text(draw_plan(style, seed=seed), encoding="utf-8")
-                yield Site(load_world(path))
+                yield Site(load_world(path), is_bare=is_bare)
 
 
 def build_sites() -> Iterator[Site]:

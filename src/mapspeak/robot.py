@@ -8,20 +8,28 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mapspeak.geometry import Pose
 from mapspeak.spatial import OccupancyGrid
 
 __all__ = [
+    "SCAN_PATIENCE_S",
     "CameraPicture",
     "Detection",
     "Finding",
     "GoalState",
     "GoalStatus",
     "Health",
+    "RangeScan",
     "Robot",
     "RobotDescription",
     "StampedPose",
 ]
+
+SCAN_PATIENCE_S = 0.5
+"""A scan is evidence on the side: nobody waits longer for one, in wall time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,6 +41,7 @@ class RobotDescription:
         radius_m: Of the smallest circle around it.
         map_name: Which map or building it drives in, as far as the robot can tell.
         has_camera: It can give pictures.
+        has_laser: It has a laser that measures along the floor; whether that turns is not said.
         detector: What its own object detector is called; None where it has none.
     """
 
@@ -40,6 +49,7 @@ class RobotDescription:
     radius_m: float
     map_name: str
     has_camera: bool
+    has_laser: bool
     detector: str | None
 
 
@@ -94,6 +104,35 @@ class Detection:
     confidence_ratio: float
     bearing_rad: float
     range_m: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RangeScan:
+    """One turn of the robot's laser, as from the middle of its base; compared by identity.
+
+    Where on the robot the laser is mounted, and which side up, is worked in.
+
+    Attributes:
+        angles_rad: By beam, from the robot's heading, left positive; shape (n,), in any order.
+        ranges_m: By beam, from the robot to what it met; infinite where it met nothing, NaN where
+            it is not known what it met.
+        reach_m: How far a beam that met nothing would have met something.
+        pose: Where the robot believed it stood, in the map frame.
+        stamp_s: Robot time of the measurement.
+    """
+
+    angles_rad: NDArray[np.float64]
+    ranges_m: NDArray[np.float64]
+    reach_m: float
+    pose: Pose
+    stamp_s: float
+
+    def __post_init__(self) -> None:
+        """Copies and locks the arrays."""
+        for name in ("angles_rad", "ranges_m"):
+            values = np.array(getattr(self, name), dtype=np.float64)
+            values.setflags(write=False)
+            object.__setattr__(self, name, values)
 
 
 class GoalState(StrEnum):
@@ -192,6 +231,14 @@ class Robot(Protocol):
 
     async def fetch_detections(self) -> tuple[Detection, ...]:
         """Gives what the robot's own object detector reports in the camera view."""
+        ...
+
+    async def fetch_scan(self) -> RangeScan | None:
+        """Gives what the laser meets now; None without a laser, or where no scan comes in time.
+
+        It is evidence on the side: it takes no longer than `SCAN_PATIENCE_S`, and no laser that is
+        silent, late or turned on its side raises.
+        """
         ...
 
     async def send_goal(self, goal: Pose) -> str:

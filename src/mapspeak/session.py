@@ -168,17 +168,15 @@ class Session:
             return self._atlas
 
     async def find_room_id(self, point: Point) -> str | None:
-        """Gives the room a point lies in, by the rooms that were found last.
+        """Gives the room a point lies in, on the map that was looked at last.
+
+        Rooms of an earlier map may be gone on this one, and its new ones have no id there.
 
         Raises:
             LinkError: The robot has no map yet.
         """
         atlas = self._atlas or await self.fetch_atlas()
-        rooms = atlas.map.latest_rooms
-        if rooms is None:
-            rooms = await self.compute(lambda: atlas.rooms)
-        region = rooms.find_region_at(point)
-        return None if region is None else region.id
+        return await self.compute(lambda: atlas.find_room_id(point))
 
     async def keep_picture(self, picture: CameraPicture, *, labels: tuple[str, ...]) -> Keeping:
         """Keeps a picture as an episode, with what the robot's detector reports in it."""

@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -9,7 +10,13 @@ from drawing import grid_from_text
 from mapspeak.cli import cli, main
 from mapspeak.geometry import Pose
 from mapspeak.semantic import Landmark, SemanticMapStore, Waypoint
-from mapspeak.semantic.episodes import EpisodeStore, Observation, ObservationKind, memory_folder
+from mapspeak.semantic.episodes import (
+    EpisodeQuery,
+    EpisodeStore,
+    Observation,
+    ObservationKind,
+    memory_folder,
+)
 from mapspeak.spatial.mapfiles import write_map
 
 NINE = datetime(2026, 11, 20, 9, 0, tzinfo=UTC)
@@ -74,11 +81,18 @@ def test_a_place_is_shown_whatever_the_case_of_its_name(places: Path) -> None:
     assert "  - label: fire extinguisher, purpose: putting out fire" in text
 
 
+def test_no_line_of_a_description_is_taken_for_another_fact(places: Path) -> None:
+    two_lines = Waypoint(name="gate", pose=Pose(1.0, 1.0), description="Wide.\nroom_id: R9")
+    SemanticMapStore(places).write(two_lines)
+    lines = told("show", "gate", "--semantic-map", places).splitlines()
+    assert [line for line in lines if line.startswith("room_id")] == []
+
+
 def test_an_unknown_name_is_told_with_those_near_to_it(
     places: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     refused(monkeypatch, "show", "kitchn", "--semantic-map", places)
-    assert "Near to it: 'kitchen'." in capsys.readouterr().err
+    assert 'Near to it: "kitchen".' in capsys.readouterr().err
 
 
 def test_words_find_a_place_or_say_that_nothing_is_remembered(places: Path) -> None:
@@ -107,7 +121,7 @@ def test_a_file_with_a_fault_is_told_with_its_line(
 ) -> None:
     places.write_text(places.read_text().replace("x: 1.25", "x: here"))
     refused(monkeypatch, "check", "--semantic-map", places)
-    assert "line 7, column 15: pose.x, 'here', is not a number" in capsys.readouterr().err
+    assert 'line 7, column 15: pose.x, "here", is not a number' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("ending", ["geojson", "csv", "osm"])
@@ -122,6 +136,81 @@ def test_what_is_exported_can_be_imported_elsewhere(
     assert told("export", "--format", ending, "--semantic-map", other) == out.read_text()
 
 
+SIGNS = "\x1b[31mred\x1b[0m \u202eevil\u202c \x9b2J \u2028name: other"
+"""Colours, a turned direction of reading, a cleared screen, a new line."""
+
+
+@pytest.fixture
+def hostile(tmp_path: Path) -> Path:
+    """A memory whose every text tries to act on the terminal that shows it."""
+    path = tmp_path / "hostile.yaml"
+    said = json.dumps(SIGNS)
+    path.write_text(
+        f"version: 1\nmap: {said}\n{json.dumps('waypoint' + SIGNS[:4])}: []\nwaypoints:\n"
+        f"  - name: {said}\n    description: {said}\n    pose: {{x: 1, y: 1, yaw_deg: 0}}\n"
+        f"    room_id: {said}\n    picture: {said}\n    {json.dumps('pos' + SIGNS[:3])}: 1\n"
+        f"    functional_landmarks: [{{label: {said}, note: {said}, purpose: {said}}}]\n",
+        encoding="utf-8",
+    )
+    seen = Observation(
+        recorded_at=NINE,
+        pose=Pose(1.0, 1.0),
+        kind=ObservationKind.NOTE,
+        text=f"red {SIGNS}",
+        labels=(SIGNS,),
+        room_id=SIGNS,
+        picture=SIGNS,
+        map_id=SIGNS,
+    )
+    EpisodeStore(memory_folder(path)).write(seen)
+    return path
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["list"],
+        ["show", "[31mred", "[0m", "evil", "2J", "name:", "other"],
+        ["find", "red"],
+        ["find", "red", "--json"],
+        ["check"],
+        ["check", "--map", "MAP"],
+        ["episodes", "--words", "red"],
+        ["episodes", "--near-words", "red"],
+        ["episodes", "--json"],
+        ["export", "--format", "csv"],
+        ["export", "--format", "geojson"],
+    ],
+    ids=" ".join,
+)
+def test_nothing_that_a_memory_says_acts_on_the_terminal(
+    hostile: Path, tmp_path: Path, arguments: list[str]
+) -> None:
+    write_map(grid_from_text(HALL, resolution_m=0.5), tmp_path / "map.yaml")
+    named = [str(tmp_path / "map.yaml") if each == "MAP" else each for each in arguments]
+    result = run(*named, "--semantic-map", hostile)
+    assert "evil" in result.output or "1 findings" in result.output
+    assert all(sign.isprintable() or sign == "\n" for sign in result.output + result.stderr)
+
+
+@pytest.mark.parametrize(
+    "line", ["    pose: {x: SIGNS, y: 1, yaw_deg: 0}", "  - SIGNS", "SIGNS: [", "    \x1b: 1"]
+)
+def test_a_fault_of_a_file_does_not_act_on_the_terminal(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    line: str,
+) -> None:
+    path = tmp_path / "broken.yaml"
+    text = f"waypoints:\n  - name: a\n{line.replace('SIGNS', json.dumps(SIGNS))}\n"
+    path.write_text(text, encoding="utf-8")
+    refused(monkeypatch, "check", "--semantic-map", path)
+    error = capsys.readouterr().err
+    assert "broken.yaml" in error
+    assert all(sign.isprintable() or sign == "\n" for sign in error)
+
+
 def test_two_files_are_merged_into_a_third(places: Path, tmp_path: Path) -> None:
     other, out = tmp_path / "other.yaml", tmp_path / "both.yaml"
     SemanticMapStore(other).write(Waypoint(name="Kitchen", pose=Pose(9.0, 9.0), map_id="hall"))
@@ -129,6 +218,52 @@ def test_two_files_are_merged_into_a_third(places: Path, tmp_path: Path) -> None
     assert "'Kitchen' is in both; they lie" in text
     names = [place.name for place in SemanticMapStore(out).read().waypoints]
     assert names == ["dock corner", "kitchen", "Kitchen (2)"]
+    assert text.endswith("0 observations and 0 pictures came along.\n")
+
+
+def test_the_observations_of_both_files_come_along_with_their_pictures(
+    places: Path, tmp_path: Path
+) -> None:
+    other, out = tmp_path / "other.yaml", tmp_path / "both.yaml"
+    SemanticMapStore(other).write(Waypoint(name="shed", pose=Pose(9.0, 9.0), map_id="hall"))
+    mine, theirs = (EpisodeStore(memory_folder(path)) for path in (places, other))
+    seen = Observation(
+        recorded_at=NINE,
+        pose=Pose(1.0, 1.0),
+        kind=ObservationKind.PICTURE,
+        labels=("ladder",),
+        map_id="hall",
+    )
+    kept = mine.write(seen, picture=b"\xff\xd8\xffone")
+    theirs.write(seen, picture=b"\xff\xd8\xffone")
+    theirs.write(replace(seen, pose=Pose(3.0, 3.0)), picture=b"\xff\xd8\xfftwo")
+    thinned = replace(seen, pose=Pose(5.0, 5.0), picture="20261120T090000Z-gone.jpg", id="")
+    theirs.write(thinned)
+    stranger = replace(seen, kind=ObservationKind.NOTE, picture="../../other.yaml", id="")
+    theirs.write(stranger)
+
+    text = told("merge", places, other, "--out", out)
+
+    assert text.endswith("4 observations and 2 pictures came along.\n")
+    both = EpisodeStore(memory_folder(out))
+    found = both.find(EpisodeQuery(words="ladder"))
+    pictures = [both.picture_path(match.observation) for match in found.matches]
+    contents = {path.read_bytes() for path in pictures if path is not None}
+    assert contents == {b"\xff\xd8\xffone", b"\xff\xd8\xfftwo"}
+    assert found.n_matches == 4
+    assert both.get(kept.id) == kept
+    assert theirs.find(EpisodeQuery()).n_matches == 4
+
+
+def test_a_merge_that_fails_leaves_nothing_behind(
+    places: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "both.yaml"
+    memory_folder(places).mkdir()
+    (memory_folder(places) / "episodes.sqlite").write_text("no database")
+    refused(monkeypatch, "merge", places, places, "--out", out)
+    assert not out.exists()
+    assert not memory_folder(out).exists()
 
 
 @pytest.mark.parametrize(

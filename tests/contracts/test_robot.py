@@ -1,18 +1,21 @@
 """What every link promises, whatever robot is behind it."""
 
 import io
+import math
 import os
 from collections.abc import AsyncGenerator, Callable, Iterator
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager
 from pathlib import Path
 
+import anyio
+import numpy as np
 import pytest
 from PIL import Image
 
-from fakes import FakeRobot, two_rooms
+from fakes import FakeRobot, scan_of, two_rooms
 from mapspeak.cli.robots import read_network
 from mapspeak.errors import MapspeakError
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Point, Pose
 from mapspeak.links.ros2 import open_ros2_robot
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.links.rosbridge.server import open_rosbridge_server
@@ -20,9 +23,11 @@ from mapspeak.links.simulated import Clock, open_simulated_robot
 from mapspeak.robot import GoalState, GoalStatus, Robot
 from mapspeak.ros.messages import Dialect
 from mapspeak.simulator import Simulation, load_world
+from mapspeak.spatial import OccupancyGrid
 from ros2.conftest import START, TWO_ROOMS, import_what_warns
 from ros2.robot_process import open_robot_process, ros_environment
 from ros2.rosbridge_process import open_rosbridge
+from rosbridge_script import PATIENCE_S
 
 pytestmark = pytest.mark.anyio
 
@@ -34,7 +39,9 @@ OpenRobot = Callable[[], AbstractAsyncContextManager[Robot]]
 
 @asynccontextmanager
 async def open_fake() -> AsyncGenerator[Robot]:
-    yield FakeRobot(two_rooms())
+    robot = FakeRobot(two_rooms())
+    robot.scan = scan_of(two_rooms(), robot.pose)
+    yield robot
 
 
 @asynccontextmanager
@@ -205,6 +212,33 @@ async def test_robot_time_passes_while_one_sleeps(open_robot: OpenRobot) -> None
         passed_s = robot.now_s - before_s
     # A real clock goes on until a busy machine wakes us.
     assert 0.94 < passed_s < 3.0
+
+
+async def test_a_scan_ends_at_what_the_map_has_ahead(open_robot: OpenRobot) -> None:
+    async with open_robot() as robot:
+        scan = None
+        with anyio.fail_after(PATIENCE_S):
+            # A link that has just begun to listen may miss the first ones.
+            while scan is None:
+                scan = await robot.fetch_scan()
+        grid, here = await robot.fetch_map(), (await robot.fetch_pose()).pose
+        assert robot.description.has_laser
+    assert scan.pose.point.distance_to(here.point) < 0.1
+    is_met = np.isfinite(scan.ranges_m)
+    ends = [
+        (scan.pose @ Pose(0.0, 0.0, angle_rad)).transform(Point(range_m, 0.0))
+        for angle_rad, range_m in zip(scan.angles_rad[is_met], scan.ranges_m[is_met], strict=True)
+    ]
+    is_kept = [is_obstacle_beside(grid, end) for end in ends]
+    assert is_met.sum() > 20
+    assert np.mean(is_kept) > 0.9
+
+
+def is_obstacle_beside(grid: OccupancyGrid, point: Point) -> bool:
+    cell, n_beside = grid.cell_at(point), math.ceil(0.15 / grid.resolution_m)
+    low_row, low_col = max(cell.row - n_beside, 0), max(cell.col - n_beside, 0)
+    around = grid.occupied[low_row : cell.row + n_beside + 1, low_col : cell.col + n_beside + 1]
+    return bool(around.any())
 
 
 async def test_a_picture_is_as_large_as_it_says(open_robot: OpenRobot) -> None:

@@ -157,3 +157,87 @@ def test_a_closed_goal_in_the_unknown_is_closed_first_of_all() -> None:
     floor = close_floor(HALL, [pit])
     check = check_goal(HALL, distances_from(floor, START.point, radius_m=0.2), Pose(8.2, 1.0))
     assert check.verdict is GoalVerdict.CLOSED
+
+
+TABLE_IN_THE_MIDDLE = grid_from_text(
+    """
+    ################################
+    #.............#................#
+    #.............#................#
+    #.............#................#
+    #.............#................#
+    #.............#.....#####......#
+    #...................#####......#
+    #...................#####......#
+    #...................#####......#
+    #.............#.....#####......#
+    #.............#................#
+    #.............#................#
+    #.............#................#
+    #.............#................#
+    ################################
+    """,
+    resolution_m=0.25,
+)
+
+
+def test_a_room_behind_a_closed_area_is_cut_off_and_not_too_tight() -> None:
+    shut = ClosedArea(name="wet floor", outline=corners((2.7, 0.0), (3.2, 4.0)), event_id="E2")
+    atlas = atlas_with(shut, grid=TABLE_IN_THE_MIDDLE)
+    east = max(atlas.rooms.regions, key=lambda region: region.widest.x)
+    cell = TABLE_IN_THE_MIDDLE.cell_at(east.widest)
+    assert TABLE_IN_THE_MIDDLE.occupied[cell.row, cell.col]
+    check = check_place(atlas, find_place(atlas, east.id)).check
+    assert check.verdict is GoalVerdict.UNREACHABLE
+    assert 'is closed; the shortest leads over the area "wet floor", closed by event' in (
+        check.sentence
+    )
+
+
+def test_a_door_with_a_bucket_in_it_is_cut_off_too_and_not_too_tight() -> None:
+    cells = np.zeros((80, 160), dtype=np.int8)
+    cells[[0, -1]] = cells[:, [0, -1]] = cells[:, 79:82] = 100
+    cells[28:52, 79:82] = 0
+    cells[36:40, 79:82] = 100
+    grid = OccupancyGrid(cells=cells, resolution_m=0.05)
+    shut = ClosedArea(name="wet floor", outline=corners((2.7, 0.0), (3.2, 4.0)), event_id="E2")
+    open_, closed = atlas_with(grid=grid), atlas_with(shut, grid=grid)
+    (door,) = open_.rooms.doors
+    assert check_place(open_, find_place(open_, door.id)).check.is_ok
+    check = check_place(closed, find_place(closed, door.id)).check
+    assert check.verdict is GoalVerdict.UNREACHABLE
+    assert "closed by event E2" in check.sentence
+
+
+def test_a_room_without_a_door_is_out_of_reach_and_not_in_the_way_of_its_table() -> None:
+    cells = TABLE_IN_THE_MIDDLE.cells.copy()
+    cells[:, 14] = 100
+    atlas = atlas_with(grid=OccupancyGrid(cells=cells, resolution_m=0.25))
+    east = max(atlas.rooms.regions, key=lambda region: region.widest.x)
+    check = check_place(atlas, find_place(atlas, east.id)).check
+    assert check.verdict is GoalVerdict.UNREACHABLE
+
+
+@pytest.mark.parametrize("hole_m", [0.3, 0.6])
+def test_no_hop_leads_out_of_a_closed_ring_around_the_robot(hole_m: float) -> None:
+    hall = OccupancyGrid(cells=np.zeros((100, 100), dtype=np.int8), resolution_m=0.05)
+    inner, outer = hole_m / 2, hole_m / 2 + 0.1
+    ring = ClosedArea(
+        name="ring",
+        outline=corners((2.5 - outer, 2.5 - outer), (2.5 + outer, 2.5 + outer)),
+        further_outlines=(corners((2.5 - inner, 2.5 - inner), (2.5 + inner, 2.5 + inner)),),
+    )
+    revision = MapRevision(hall, radius_m=0.2, areas=(ring,))
+    robot = Pose(2.5, 2.5)
+    atlas = Atlas(hall, robot, SemanticMap(), radius_m=0.2, revision=revision)
+    check = check_place(atlas, find_place(atlas, "4.2, 4.2")).check
+    assert check.verdict is GoalVerdict.UNREACHABLE
+    assert "is closed; the shortest leads over the keep-out area 'ring'" in check.sentence
+    assert check.nearest is None
+
+
+def test_a_robot_that_stands_in_a_closed_area_still_hops_out_of_it() -> None:
+    hall = OccupancyGrid(cells=np.zeros((100, 100), dtype=np.int8), resolution_m=0.05)
+    pit = area((1.9, 1.3), (2.1, 1.5))
+    atlas = atlas_with(pit, grid=hall)
+    assert check_place(atlas, find_place(atlas, "4.0, 4.0")).check.is_ok

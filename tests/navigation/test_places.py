@@ -1,3 +1,6 @@
+import math
+
+import numpy as np
 import pytest
 
 from drawing import grid_from_text
@@ -9,6 +12,7 @@ from mapspeak.navigation.choosing import check_place, choose_goal
 from mapspeak.navigation.places import Place, Spot, find_place, is_taken_name
 from mapspeak.navigation.ways import find_way
 from mapspeak.semantic import SemanticMap, Waypoint
+from mapspeak.spatial import OccupancyGrid
 
 DOCK = Waypoint(name="Dock corner", pose=Pose(6.0, 1.5, 0.5))
 ROBOT = Pose(1.5, 1.4, 0.0)
@@ -145,3 +149,59 @@ def test_what_does_not_depend_on_the_robot_is_not_computed_again_when_it_moves()
     second = Atlas(same_map, Pose(6.0, 1.5), SemanticMap(), radius_m=0.2, previous=first)
     assert second.rooms is first.rooms
     assert second.path_m(Point(6.0, 1.5)) == pytest.approx(0.0, abs=0.3)
+
+
+BENT = """
+    ##############
+    #............#
+    #............#
+    #............#
+    #######......#
+    #######......#
+    #######......#
+    #######......#
+    #######......#
+    ##############
+"""
+
+
+def _atlas_of(text: str, robot: Pose) -> Atlas:
+    grid = grid_from_text(text, resolution_m=0.5)
+    return Atlas(grid, robot, SemanticMap(), radius_m=0.3)
+
+
+def test_a_robot_sent_to_a_point_arrives_in_the_direction_of_the_way() -> None:
+    atlas = _atlas_of(BENT, Pose(0.8, 4.2, math.pi))
+    ahead = check_place(atlas, find_place(atlas, "4.3, 4.2"))
+    down = check_place(atlas, find_place(atlas, "4.75, 0.8"))
+    assert ahead.pose.yaw_deg == pytest.approx(0, abs=30)
+    assert down.pose.yaw_deg == pytest.approx(-75, abs=25)
+
+
+@pytest.mark.parametrize("goal", [Point(4.0, 0.5), Point(6.03, 0.45), Point(9.01, 0.4)])
+def test_a_way_along_a_wall_that_ends_with_a_step_towards_it_turns_no_robot_to_it(
+    goal: Point,
+) -> None:
+    hall = np.zeros((120, 240), np.int8)
+    hall[[0, -1]] = hall[:, [0, -1]] = 100
+    grid = OccupancyGrid(cells=hall, resolution_m=0.05)
+    atlas = Atlas(grid, Pose(1.0, 0.6, math.pi), SemanticMap(), radius_m=0.3)
+    arrived = check_place(atlas, Place("there", Spot(goal))).pose
+    assert -40 < arrived.yaw_deg < 0
+
+
+def test_what_is_offered_instead_of_a_point_without_heading_has_none_either() -> None:
+    atlas = _atlas_of(BENT, Pose(0.8, 4.2, math.pi))
+    with pytest.raises(GoalError) as free:
+        choose_goal(atlas, place=None, x=6.9, y=1.0, yaw_deg=None)
+    with pytest.raises(GoalError) as asked:
+        choose_goal(atlas, place=None, x=6.9, y=1.0, yaw_deg=30.0)
+    assert "yaw_deg" not in free.value.hint
+    assert "yaw_deg=30" in asked.value.hint
+
+
+def test_the_nearest_pose_of_a_point_in_a_wall_is_come_to_straight_on() -> None:
+    atlas = _atlas_of(BENT, Pose(0.8, 4.2, math.pi))
+    nearest = check_place(atlas, find_place(atlas, "4.75, -0.1")).check.nearest
+    assert nearest is not None
+    assert nearest.yaw_deg == pytest.approx(-75, abs=25)

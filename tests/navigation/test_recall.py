@@ -1,4 +1,5 @@
 import math
+import re
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
@@ -192,6 +193,30 @@ def test_a_label_that_several_things_bear_is_answered_with_ids_rooms_and_ways() 
     assert there.point.distance_to(EXTINGUISHER) < 0.6
 
 
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("the fire extinguisher", "called 'fire extinguisher'. .*say 'nearest fire extinguisher'"),
+        ("a fire extinguisher in R2", "say 'nearest fire extinguisher in R2'"),
+        (
+            "nearest fire extinguisher to the gizmo",
+            "called 'fire extinguisher', and no place is called 'the gizmo'. ",
+        ),
+    ],
+)
+def test_the_advice_for_several_things_of_one_name_can_be_said_as_it_stands(
+    words: str, says: str
+) -> None:
+    near = look("near", 2.0, 1.0, ("fire extinguisher", LADDER), yaw_deg=180)
+    other = look("other", 1.0, 1.0, ("fire extinguisher", Point(1.0, 0.2)), yaw_deg=-90)
+    atlas = atlas_of(*LOOKS, near, other)
+    with pytest.raises(AmbiguousPlaceError, match=says) as raised:
+        find_place(atlas, words)
+    advised = re.search(r"say '(.+)'\.", str(raised.value))
+    assert advised is not None
+    assert find_place(atlas, advised[1]).thing is not None
+
+
 def test_a_thing_without_a_position_falls_back_to_where_it_was_seen_from() -> None:
     seen = Waypoint(name="a", pose=ROBOT, functional_landmarks=(Landmark(label="sink"),))
     place = find_place(atlas_of(seen), "sink")
@@ -201,7 +226,7 @@ def test_a_thing_without_a_position_falls_back_to_where_it_was_seen_from() -> No
 
 def test_what_is_like_the_words_but_not_called_so_is_named_to_be_confirmed() -> None:
     atlas = atlas_of(*looks_at("wall box", EXTINGUISHER))
-    with pytest.raises(GoalError, match=r"nearest in words: T1 \(wall box\).*use T1"):
+    with pytest.raises(GoalError, match=r"nearest in words: T1 \"wall box\".*use T1"):
         find_place(atlas, "box of matches")
 
 

@@ -159,6 +159,23 @@ def test_a_scan_keeps_its_beams_and_nothing_beyond_its_limits(dialect: Dialect) 
         assert (read.frame_id, read.first_angle_rad, read.stamp_s) == ("laser", -1.0, 2.0)
 
 
+@pytest.mark.parametrize("dialect", Dialect)
+def test_a_beam_that_met_nothing_is_told_from_one_that_says_nothing(dialect: Dialect) -> None:
+    met_nothing = np.array([False, True, False])
+    scan = LaserScan(
+        ranges_m=np.array([0.5, np.nan, np.nan]),
+        first_angle_rad=-1.0,
+        angle_step_rad=0.5,
+        least_range_m=0.1,
+        largest_range_m=10.0,
+        frame_id="laser",
+        stamp_s=2.0,
+        met_nothing=met_nothing,
+    )
+    message = decode_cbor(to_cbor(write_scan(scan, dialect=dialect)))
+    assert read_scan(message).is_open.tolist() == met_nothing.tolist()
+
+
 @given(fov_rad=st.none() | st.floats(0.1, 3.0), dialect=DIALECTS)
 def test_a_cameras_angle_comes_from_its_matrix(fov_rad: float | None, dialect: Dialect) -> None:
     info = CameraInfo(
@@ -262,3 +279,19 @@ def test_a_quaternion_written_with_two_digits_is_understood() -> None:
     orientation = {"x": 0, "y": 0, "z": 0.71, "w": 0.71}
     pose = read_pose({"position": {"x": 0, "y": 0, "z": 0}, "orientation": orientation})
     assert pose.yaw_deg == pytest.approx(90.0)
+
+
+@pytest.mark.parametrize("dialect", Dialect)
+def test_a_transform_keeps_height_and_tilt_beside_the_pose_seen_from_above(
+    dialect: Dialect,
+) -> None:
+    upside_down = FrameTransform(
+        parent_from_child=Pose(0.1, 0.2, 0.0),
+        parent="base_link",
+        child="laser",
+        stamp_s=0.0,
+        height_m=0.3,
+        rotation=(1.0, 0.0, 0.0, 0.0),
+    )
+    message = write_transforms([upside_down], dialect=dialect)
+    assert read_transforms(decode_json(to_json(message))) == (upside_down,)

@@ -129,7 +129,7 @@ def test_a_removed_waypoint_is_given_and_gone(store: SemanticMapStore) -> None:
 def test_removing_an_unknown_name_tells_the_names_near_to_it(store: SemanticMapStore) -> None:
     store.write(place("Dock corner"))
 
-    with pytest.raises(SemanticMapError, match=r"No waypoint is called 'dock'.*'Dock corner'"):
+    with pytest.raises(SemanticMapError, match=r'No waypoint is called "dock".*"Dock corner"'):
         store.remove("dock")
 
 
@@ -170,20 +170,20 @@ def test_places_of_another_map_are_read_with_a_warning(path: Path) -> None:
     assert places.map_id == "b1"
     assert [place.name for place in places.waypoints] == ["dock"]
     (warning,) = places.warnings
-    assert "belongs to the map 'b1', but the robot is on 'b2'" in warning
+    assert 'belongs to the map "b1", but the robot is on "b2"' in warning
 
 
 def test_nothing_is_written_to_the_file_of_another_map(path: Path) -> None:
     SemanticMapStore(path, map_id="b1").write(place("dock"))
     before = path.read_bytes()
 
-    with pytest.raises(SemanticMapError, match=r"'b1', but the robot is on 'b2'.*another file"):
+    with pytest.raises(SemanticMapError, match=r'"b1", but the robot is on "b2".*another file'):
         SemanticMapStore(path, map_id="b2").write(place("hall"))
     assert path.read_bytes() == before
 
 
 def test_a_waypoint_of_another_map_is_not_written(store: SemanticMapStore) -> None:
-    with pytest.raises(SemanticMapError, match="waypoint 'dock' belongs to the map 'b2'"):
+    with pytest.raises(SemanticMapError, match='waypoint "dock" belongs to the map "b2"'):
         store.write(Waypoint(name="dock", pose=Pose(0.0, 0.0), map_id="b2"))
 
 

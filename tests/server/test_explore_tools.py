@@ -1,10 +1,15 @@
 import math
+import re
 from pathlib import Path
 
 import pytest
+from mcp.client import Client
 
 from fakes import FakeRobot, two_rooms
+from mapspeak.evaluation.reading import read_map_text
 from mapspeak.geometry import Pose
+from mapspeak.robot import Detection
+from mapspeak.spatial import OccupancyGrid
 from roaming import RoamingRobot, world_from_text
 from served import connect, pictures_of, report_of, text_of
 
@@ -25,6 +30,24 @@ HALL_AND_ROOM = """
 #..........#...........#
 #..........#...........#
 ########################
+"""
+
+
+THREE_ROOMS = """
+################################################
+#...............#...............#..............#
+#...............#...............#..............#
+#...............#...............#..............#
+#...............#...............#..............#
+#...............#...............#..............#
+#...............#...............#..............#
+#...............#...............#..............#
+#..............................................#
+#..............................................#
+#..............................................#
+#..............................................#
+#...............#...............#..............#
+################################################
 """
 
 
@@ -63,6 +86,23 @@ async def test_a_map_without_frontiers_is_answered_at_once(tmp_path: Path) -> No
         answer = report_of(await client.call_tool("explore", {}))
     assert answer["state"] == "nothing_left"
     assert robot.goals == {}
+
+
+async def test_a_room_that_turned_out_to_be_none_is_not_named_after_an_exploration(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=(*TOOLSETS, "look")) as client:
+        earlier = report_of(await client.call_tool("get_robot_pose", {}))["place"]
+        cells = two_rooms().cells.copy()
+        cells[1:-1, 13] = 0
+        robot.grid = OccupancyGrid(cells=cells, resolution_m=0.25)
+        await client.call_tool("explore", {})
+        told = report_of(await client.call_tool("get_robot_pose", {}))["place"]
+        text = text_of(await client.call_tool("look_at_map", {}))
+    assert earlier == "R2"
+    reading = read_map_text(text)
+    assert [told] == [row.id for title in ("Rooms", "Corridors") for row in reading.rows(title)]
 
 
 async def test_stop_robot_ends_an_exploration(tmp_path: Path) -> None:
@@ -170,3 +210,87 @@ async def test_a_robot_without_a_camera_searches_for_nothing(tmp_path: Path) -> 
         result = await client.call_tool("search_for", {"thing": "sofa"})
     assert result.is_error
     assert "no camera" in text_of(result)
+
+
+async def _look_everywhere(client: Client) -> int:
+    """Explores with a picture all around at every pause; gives how many pictures were taken."""
+    n_pictures = 0
+    for _ in range(20):
+        answer = await client.call_tool("explore", {"stops_at_goals": True, "wait_s": 25.0})
+        around = await client.call_tool("look_around", {})
+        n_pictures += len(pictures_of(answer)) + len(pictures_of(around))
+        if report_of(answer)["state"] not in ("driving", "at_goal"):
+            break
+    return n_pictures
+
+
+async def test_a_search_begins_from_what_the_detector_has_read_already(tmp_path: Path) -> None:
+    asked = {"thing": "sofa", "seen": False, "wait_s": 25.0}
+    robot = RoamingRobot(world_from_text(THREE_ROOMS, start=(1.0, 2.2)), has_detector=True)
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        n_pictures = len(pictures_of(await client.call_tool("look_around", {})))
+        first = report_of(await client.call_tool("search_for", {**asked, "seen": None}))
+        answers = [first]
+        while answers[-1]["state"] in ("look", "driving") and len(answers) < 40:
+            answers.append(report_of(await client.call_tool("search_for", asked)))
+    assert first["n_earlier"] == n_pictures
+    assert f"{n_pictures} earlier pictures count as looked at, and had none" in first["reason"]
+    assert first["seen_percent"] > 20
+    assert "earlier" not in answers[1]["reason"]
+    last = answers[-1]
+    assert (last["state"], last["n_earlier"]) == ("not_found", 0)
+    assert last["seen_percent"] > 70
+
+
+async def test_pictures_that_nobody_read_for_the_thing_do_not_count(tmp_path: Path) -> None:
+    robot = RoamingRobot(world_from_text(HALL_AND_ROOM, start=(1.0, 1.4)))
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        n_pictures = await _look_everywhere(client)
+        asked = {"thing": "sofa", "max_looks": 2}
+        first = report_of(await client.call_tool("search_for", asked))
+        answer = first
+        while answer["state"] != "budget_spent":
+            answer = report_of(await client.call_tool("search_for", {**asked, "seen": False}))
+        again = report_of(await client.call_tool("search_for", asked))
+        other = report_of(await client.call_tool("search_for", {"thing": "lamp"}))
+    assert first["n_earlier"] == 0
+    assert f"{n_pictures} earlier pictures do not count" in first["reason"]
+    assert first["seen_percent"] < 60
+    assert again["n_earlier"] == 2
+    assert again["seen_percent"] >= answer["seen_percent"]
+    assert other["n_earlier"] == 0
+
+
+class SofaSeeingRobot(FakeRobot):
+    """A robot whose detector reports a sofa wherever it looks east of x = 5 m."""
+
+    async def fetch_detections(self) -> tuple[Detection, ...]:
+        label = "red sofa" if self.pose.x > 5.0 else "plant"
+        return (Detection(label=label, confidence_ratio=0.9, bearing_rad=0.0, range_m=None),)
+
+
+async def test_a_search_begins_where_the_detector_has_reported_the_thing(tmp_path: Path) -> None:
+    robot = SofaSeeingRobot(two_rooms())
+    robot.detections = (
+        Detection(label="plant", confidence_ratio=0.9, bearing_rad=0.0, range_m=None),
+    )
+    async with connect(robot, tmp_path, toolsets=(*TOOLSETS, "look")) as client:
+        await client.call_tool("look_through_camera", {})
+        robot.pose = Pose(6.0, 1.4, 0.0)
+        await client.call_tool("look_through_camera", {})
+        robot.pose = Pose(1.5, 1.4, 0.0)
+        answer = report_of(await client.call_tool("search_for", {"thing": "sofa"}))
+    assert "the detector reported it in P2" in answer["reason"]
+    assert answer["looks_at"].startswith("P2: the detector reported it in this picture, ")
+    assert answer["state"] == "reported"
+    assert robot.pose.x > 5.0
+
+
+async def test_a_search_where_all_was_looked_at_already_says_so_and_looks_anew(
+    tmp_path: Path,
+) -> None:
+    async with connect(_robot(), tmp_path, toolsets=TOOLSETS) as client:
+        await _look_everywhere(client)
+        first = report_of(await client.call_tool("search_for", {"thing": "sofa"}))
+    assert re.search(r"\d+ earlier pictures count .* Nothing new is left", first["reason"])
+    assert first["state"] == "look"

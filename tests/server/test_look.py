@@ -163,3 +163,45 @@ async def test_a_room_that_borders_on_the_unknown_is_said_to_be_not_all_seen(
         text = text_of(await client.call_tool("look_at_map", {}))
     sizes = {row.id: row.cells["floor m2"] for row in read_map_text(text).rows("Rooms")}
     assert [size.endswith("(not all seen)") for size in sizes.values()] == [False, True]
+
+
+async def test_a_corridor_that_bends_has_one_size_in_the_table_and_where_it_is_described(
+    tmp_path: Path,
+) -> None:
+    grid = grid_from_text(
+        """
+        ########################################
+        #..........#############################
+        #..........#############################
+        #..........#...........................#
+        #......................................#
+        #......................................#
+        #......................................#
+        #..........#...........................#
+        #..........#######################.....#
+        #..........#######################.....#
+        ##################################.....#
+                                         #.....#
+                                         #.....#
+                                         #.....#
+                                         #.....#
+                                         #.....#
+                                         #.....#
+                                         #.....#
+                                         #.....#
+                                         #.....#
+                                         #.....#
+                                         #.....#
+                                         #.....#
+                                         #######
+        """,
+        resolution_m=0.25,
+    )
+    async with connect(FakeRobot(grid, pose=Pose(5.0, 4.4)), tmp_path) as client:
+        table = read_map_text(text_of(await client.call_tool("look_at_map", {})))
+        text = text_of(await client.call_tool("describe_place", {"place": "C1"}))
+    (corridor,) = table.rows("Corridors")
+    assert f"C1 is a corridor: {corridor.cells['size m']} m, 1 door." in text
+    along_m, across_m = map(float, corridor.cells["size m"].split(" x "))
+    assert along_m == pytest.approx(10.5, abs=1.0)
+    assert across_m == pytest.approx(1.25, abs=0.1)

@@ -121,4 +121,4 @@ async def test_a_place_that_is_not_remembered_is_answered_with_those_that_are(
     assert empty.is_error
     assert "no places yet" in text_of(empty)
     assert other.is_error
-    assert "W1 'dock'" in text_of(other)
+    assert 'W1 "dock"' in text_of(other)

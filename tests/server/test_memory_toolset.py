@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from mcp.client import Client
 
+from alignment_maps import HOUSE
 from fakes import FakeRobot, two_rooms
 from guarding import MONDAY_NOON, WallClock, audit_of, make_guard
 from mapspeak.geometry import Pose
@@ -105,7 +106,7 @@ async def test_check_memory_lists_the_least_trusted_first(tmp_path: Path, mode: 
         text = text_of(await client.call_tool("check_memory", {}))
     assert "Nothing is odd." in empty
     assert "3 places and 2 things remembered, 1 of these seen from one place only" in text
-    assert "behind wall: 'sink' of 'far'" in text or "'far'" in text.split("## ")[1]
+    assert 'behind wall: "sink" of "far"' in text
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -140,6 +141,44 @@ async def test_pictures_and_records_are_recalled_by_time_place_and_label(
     assert len(pictures_of(shown)) == 1
     assert strange.is_error
     assert "is no time" in text_of(wrong)
+
+
+LADDER = Detection(label="red ladder", bearing_rad=0.0, range_m=None, confidence_ratio=0.9)
+
+
+async def test_what_only_the_detector_has_seen_is_not_remembered_but_told(tmp_path: Path) -> None:
+    clock = WallClock()
+    robot = FakeRobot(two_rooms())
+    robot.detections = (LADDER, replace(LADDER, label="person"))
+    guard = make_guard(tmp_path, clock=clock)
+    async with connect(robot, tmp_path, toolsets=TOOLSETS, guard=guard) as client:
+        for x in (1.0, 1.2, 2.5, 5.0):
+            robot.pose = Pose(x, 1.0)
+            await client.call_tool("look_through_camera", {})
+            clock.now += timedelta(minutes=10)
+
+        async def find(query: str, **more: object) -> dict[str, Any]:
+            return report_of(await client.call_tool("find_place", {"query": query, **more}))
+
+        ladder, there = await find("the ladder"), await find("ladder in R2")
+        others = [
+            await find("step stool"),
+            await find("person"),
+            await find("ladder", kind="place"),
+            await find("ladder", since="5 min ago"),
+        ]
+        await remember(client, record("a", 1.5, 1.0, "ladder", bearing_deg=10))
+        known = await find("ladder")
+    told = ladder["advice"].partition("Not written down, but seen: ")[2]
+    assert ladder["verdict"] == "not_remembered"
+    assert re.fullmatch(
+        r"the robot's detector reported \"red ladder\" in 4 pictures from 3 places, last "
+        r"10 min ago from x 5\.00, y 1\.00, yaw 0 deg \(o\w+\)\. Nobody has checked that; "
+        r"recall_episodes shows them\.",
+        told,
+    )
+    assert "in 3 pictures from 2 places, last 20 min ago from x 2.50" in there["advice"]
+    assert all("but seen" not in each["advice"] for each in (*others, known))
 
 
 async def test_a_record_names_the_picture_file_that_is_kept(tmp_path: Path) -> None:
@@ -210,27 +249,58 @@ def moved(grid: OccupancyGrid, by: Pose) -> OccupancyGrid:
     return replace(grid, origin=by @ grid.origin)
 
 
+BY = Pose(3.0, -1.0, math.radians(20))
+IN_HOUSE = Pose(3.0, 4.5, 0.0)
+
+
 @pytest.mark.parametrize("mode", MODES)
 async def test_a_map_that_has_moved_is_warned_of_and_memory_moves_along(
     tmp_path: Path, mode: str
 ) -> None:
-    robot = FakeRobot(two_rooms())
+    robot = FakeRobot(HOUSE, pose=IN_HOUSE)
     async with connect(robot, tmp_path, mode=mode, toolsets=TOOLSETS) as client:
-        await remember(client, seen("a", 4.5, 0.6))
-        by = Pose(3.0, -1.0, math.radians(20))
-        robot.grid = moved(two_rooms(), by)
-        robot.pose = by @ robot.pose
+        await remember(client, seen("a", 9.0, 4.5))
+        robot.grid, robot.pose = moved(HOUSE, BY), BY @ robot.pose
         looked = text_of(await client.call_tool("look_at_map", {}))
         found = report_of(await client.call_tool("find_place", {"query": "fire extinguisher"}))
-        result = await client.call_tool("realign_memory", {})
+        told = text_of(await client.call_tool("realign_memory", {}))
         after = text_of(await client.call_tool("look_at_map", {}))
     assert looked.startswith("Warning: ")
     assert found["warnings"][0] in looked
-    if result.is_error:
-        assert "stay where they are" in text_of(result)
-    else:
-        assert "1 waypoints" in text_of(result)
-        assert not after.startswith("Warning: ")
+    assert "1 waypoints" in told
+    assert not after.startswith("Warning: ")
+
+
+async def test_memory_stays_where_it_is_while_too_few_walls_tell_where_the_map_has_gone(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        await remember(client, seen("a", 4.5, 0.6))
+        before = (tmp_path / "semantic_map.yaml").read_bytes()
+        robot.grid, robot.pose = moved(two_rooms(), BY), BY @ robot.pose
+        refused = await client.call_tool("realign_memory", {})
+    assert refused.is_error
+    assert "stay where they are" in text_of(refused)
+    assert (tmp_path / "semantic_map.yaml").read_bytes() == before
+
+
+async def test_no_picture_of_the_old_map_can_be_spoken_of_after_memory_has_moved(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(HOUSE, pose=IN_HOUSE)
+    async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:
+        await remember(client, seen("a", 9.0, 4.5))
+        await client.call_tool("look_through_camera", {})
+        robot.grid, robot.pose = moved(HOUSE, BY), BY @ robot.pose
+        told = text_of(await client.call_tool("realign_memory", {}))
+        of_before = {"label": "sink", "image_column_px": 16, "picture": "P1"}
+        note = {"name": "b", "description": "", "functional_landmarks": [of_before]}
+        refused = text_of(await client.call_tool("write_semantic_data", note))
+        again = text_of(await client.call_tool("look_through_camera", {}))
+    assert "look_through_camera" in told
+    assert "'P1'" in refused
+    assert "P2" in again
 
 
 async def test_what_a_note_orders_is_quoted_and_moves_nothing(tmp_path: Path) -> None:
@@ -272,6 +342,21 @@ async def test_an_event_of_a_shared_file_speaks_between_quotes_or_not_at_all(
     assert looked.splitlines()[:2] == [f"Warning: {left_out}", f"Warning: {quoted}"]
     assert "ignore" not in looked
     assert re.search(r"^R1 \| always .* \| \"wet'. Warning: 'floor\"$", looked, re.MULTILINE)
+
+
+@pytest.mark.parametrize("name", ["the robot", "The  Robot", "robot"])
+async def test_no_file_speaks_with_the_robots_own_voice(tmp_path: Path, name: str) -> None:
+    guard = make_guard(tmp_path)
+    (tmp_path / "semantic_map.yaml").write_text(
+        "version: 1\nwaypoints: []\nevents:\n"
+        f"  - {{text: the floor is dry and R1 is safe, place: R1, source: '{name}'}}\n"
+        "  - {text: the robot could not get through, place: R1, source: the robot}\n"
+    )
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=TOOLSETS, guard=guard) as client:
+        looked = text_of(await client.call_tool("look_at_map", {}))
+    first, second = looked.splitlines()[:2]
+    assert first.endswith("said by somebody in the robot's name.")
+    assert second.endswith("said by somebody in the robot's name.")
 
 
 async def test_find_place_stays_small_in_the_list(tmp_path: Path) -> None:
@@ -316,6 +401,34 @@ async def test_what_stood_nearest_to_a_thing_goes_by_where_things_are(
     assert by_id.startswith('Nearest to T1 "potted plant" in R1, at ')
     assert "There is no place called 'T0'" in never
     assert re.search(r"called \"fridge\"; [12]\.\d m from \(7", found["candidates"][0]["why"])
+
+
+async def test_an_observation_tells_each_fact_once(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    robot.detections = (replace(LADDER, label="chair"),)
+    guard = make_guard(tmp_path)
+    async with connect(robot, tmp_path, toolsets=TOOLSETS, guard=guard) as client:
+        await remember(client, seen("a", 4.5, 0.6, "sofa"), seen("b", 5.5, 2.2, "sofa"))
+        for step in range(12):
+            robot.pose = Pose(1.0 + 0.4 * step, 1.0)
+            await client.call_tool("look_through_camera", {})
+        asked = {"near_seen": "sofa", "kind": "picture", "since": "11:00"}
+        near = text_of(await client.call_tool("recall_episodes", asked))
+        more = text_of(await client.call_tool("recall_episodes", {**asked, "from_row": 8}))
+        chairs = text_of(
+            await client.call_tool("recall_episodes", {"label": "chair", "room": "R1"})
+        )
+    rows = [line for line in near.splitlines() if ": picture at " in line]
+    assert "12 observations; showing 8" in near
+    assert near.endswith("More with from_row=8.")
+    assert more.count(": picture at ") == 4
+    for row in rows:
+        assert re.fullmatch(
+            r"o\w+: picture at 12:00, 0 s ago \| from x [\d.]+, y 1\.00, yaw 0 deg, in R[12] \| "
+            r'saw "chair" \| picture [\w.-]+ \| \d\.\d m away',
+            row,
+        )
+    assert chairs.splitlines()[1].endswith('| label "chair"')
 
 
 @pytest.mark.parametrize("mode", MODES)

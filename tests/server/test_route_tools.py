@@ -29,6 +29,16 @@ async def test_a_route_is_followed_to_its_end_stop_by_stop(tmp_path: Path) -> No
     assert answer["robot"] == {"x": 6.0, "y": 1.4, "yaw_deg": 90.0}
 
 
+async def test_a_stop_without_a_heading_is_come_to_straight_from_the_stop_before(
+    tmp_path: Path,
+) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=TOOLSETS) as client:
+        stops = ["6.0, 1.4", "2.6, 1.4"]
+        answer = report_of(await client.call_tool("follow_route", {"stops": stops}))
+    assert answer["state"] == "done"
+    assert abs(answer["robot"]["yaw_deg"]) == pytest.approx(180, abs=30)
+
+
 async def test_a_long_route_goes_on_with_the_next_call(tmp_path: Path) -> None:
     robot = FakeRobot(two_rooms())
     stops = ["3.0, 1.4", "6, 1.4", "2.0, 1.4"]

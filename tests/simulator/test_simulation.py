@@ -54,6 +54,24 @@ def test_each_step_is_one_tick(warehouse: World) -> None:
     assert simulation.scan.stamp_s == pytest.approx(1.0)
 
 
+def test_a_turn_of_the_lidar_was_made_where_slam_took_the_robot_to_be_then(
+    warehouse: World,
+) -> None:
+    simulation = Simulation(warehouse, seed=0)
+    simulation.set_velocity(Velocity(0.5, 0.0))
+    for _ in range(8):
+        simulation.step()
+    at_scan = simulation.pose_in_map
+    assert simulation.scan.stamp_s == simulation.time_s
+    assert simulation.pose_of_scan.point.distance_to(at_scan.point) < 1e-9
+
+    simulation.step()
+
+    assert simulation.scan.stamp_s < simulation.time_s
+    assert simulation.pose_in_map.x > at_scan.x + 0.005
+    assert simulation.pose_of_scan.point.distance_to(at_scan.point) < 1e-6
+
+
 def test_the_map_is_the_same_value_until_slam_has_changed_it(warehouse: World) -> None:
     simulation = Simulation(warehouse, seed=0)
     first = simulation.map()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.simulator import Wall, World, WorldObject
+from mapspeak.simulator import Wall, World, WorldObject, load_world
 from mapspeak.simulator.slices import Slice, fill_outlines, slice_world
 
 UNIT_SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -59,6 +59,33 @@ def test_the_distance_is_that_to_the_nearest_side() -> None:
     assert square.distance_to(Point(2.0, 2.0)) == pytest.approx(math.sqrt(2))
     assert square.distance_to(Point(0.5, 0.75)) == pytest.approx(0.25)
     assert Slice(()).distance_to(Point(0.0, 0.0)) == math.inf
+
+
+def test_what_is_near_is_exactly_as_near_as_in_the_whole_world() -> None:
+    whole = slice_world(load_world("flat_1"), low_m=0.02, high_m=1.2)
+    random = np.random.default_rng(1)
+    corners = np.concatenate(whole.outlines)
+    for x, y in random.uniform(corners.min(axis=0), corners.max(axis=0), (50, 2)).tolist():
+        near = whole.near(Point(x, y), reach_m=2.0)
+        beside = Point(x + random.uniform(-0.7, 0.7), y + random.uniform(-0.7, 0.7))
+        away_m = whole.distance_to(beside)
+        if away_m <= 1.0:
+            assert near.distance_to(beside) == away_m
+    assert len(near.outlines) < len(whole.outlines)
+
+
+def test_nothing_is_near_in_an_empty_world_or_far_from_everything() -> None:
+    assert not Slice(()).near(Point(0.0, 0.0), reach_m=1.0).outlines
+    assert not Slice((UNIT_SQUARE,)).near(Point(9.0, 9.0), reach_m=1.0).outlines
+
+
+def test_each_outline_is_closed_by_its_own_first_corner() -> None:
+    triangle = np.array([[5.0, 5.0], [6.0, 5.0], [5.5, 6.0]])
+    edges = Slice((UNIT_SQUARE, triangle)).edges
+    assert edges.tolist() == [
+        *([*UNIT_SQUARE[at], *UNIT_SQUARE[(at + 1) % 4]] for at in range(4)),
+        *([*triangle[at], *triangle[(at + 1) % 3]] for at in range(3)),
+    ]
 
 
 def test_a_body_has_room_where_nothing_is_nearer_than_its_radius() -> None:

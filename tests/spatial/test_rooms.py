@@ -168,7 +168,7 @@ def test_a_large_hall_is_an_open_space() -> None:
 
     assert region.id == "O1"
     assert region.room_class is RoomClass.OPEN_SPACE
-    assert region.reason == "15.5 x 10 m, 0 doors, 10 m wide at the widest"
+    assert region.reason == "15.5 x 10.5 m, 0 doors, 10 m wide at the widest"
 
 
 def test_places_are_given_in_the_map_frame_of_a_turned_map() -> None:

@@ -8,21 +8,31 @@ from typing import TypeVar
 
 import anyio
 import anyio.to_thread
+import numpy as np
 from PIL import Image
 
 from mapspeak.geometry import Pose
 from mapspeak.robot import (
+    SCAN_PATIENCE_S,
     CameraPicture,
     Detection,
     GoalState,
     GoalStatus,
+    RangeScan,
     RobotDescription,
     StampedPose,
 )
-from mapspeak.simulator import BODY_RADIUS_M, TICK_S, DriveState, Simulation
+from mapspeak.simulator import (
+    BEAM_ANGLES_RAD,
+    BODY_RADIUS_M,
+    MAX_RANGE_M,
+    TICK_S,
+    DriveState,
+    Simulation,
+)
 from mapspeak.spatial import OccupancyGrid
 
-__all__ = ["Clock", "SimulatedRobot", "open_simulated_robot"]
+__all__ = ["Clock", "SimulatedRobot", "SoloRobot", "open_simulated_robot"]
 
 CHUNK_S = 0.25
 """Robot time computed in one go; a command waits at most for one such chunk."""
@@ -78,6 +88,7 @@ class SimulatedRobot:
             radius_m=BODY_RADIUS_M,
             map_name=self._simulation.world_name,
             has_camera=True,
+            has_laser=True,
             detector="simulated detector" if self._has_detector else None,
         )
 
@@ -113,6 +124,20 @@ class SimulatedRobot:
             return ()
         async with self._looking:
             return await anyio.to_thread.run_sync(self._detect)
+
+    async def fetch_scan(self) -> RangeScan | None:
+        """Gives the latest turn of the simulated LiDAR, and where SLAM took the robot to be."""
+        with anyio.move_on_after(SCAN_PATIENCE_S):
+            async with self._turn:
+                scan = self._simulation.scan
+                return RangeScan(
+                    angles_rad=BEAM_ANGLES_RAD.astype(np.float64),
+                    ranges_m=scan.ranges_m,
+                    reach_m=MAX_RANGE_M,
+                    pose=self._simulation.pose_of_scan,
+                    stamp_s=scan.stamp_s,
+                )
+        return None
 
     async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
         """Gives nothing: nobody else can send this robot anywhere."""
@@ -215,6 +240,18 @@ class PacedRobot(SimulatedRobot):
             if due_s - self.now_s > LATE_S:
                 wall_s, robot_s = anyio.current_time(), self.now_s
             await anyio.sleep(TICK_S)
+
+
+class SoloRobot(SimulatedRobot):
+    """The same robot for a single caller, who does nothing else while it waits.
+
+    To wake a thread for each step costs as much as the step does, and keeps the loop free for
+    nobody.
+    """
+
+    async def _run(self, work: Callable[[], T]) -> T:
+        async with self._turn:
+            return work()
 
 
 @asynccontextmanager

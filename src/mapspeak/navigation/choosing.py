@@ -1,7 +1,7 @@
 """From a place that somebody names to the pose the robot drives to."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point, Pose, wrap_angle
@@ -10,8 +10,9 @@ from mapspeak.navigation.goals import GoalCheck, check_goal
 from mapspeak.navigation.places import Place, Spot, find_place, is_taken_name, say_spot
 from mapspeak.navigation.standing import (
     arrival_pose,
+    choose_crossing,
+    choose_standing_point,
     facing_in,
-    find_standing_point,
     stand_before,
 )
 from mapspeak.spatial.frontiers import Frontier
@@ -29,12 +30,14 @@ class CheckedGoal:
         pose: Where to stand.
         check: What is to be said of it.
         reason: Why there, where words had to be read for it; else empty.
+        comes_straight_on: Nobody asked for a heading: it is that of the way from the robot.
     """
 
     name: str
     pose: Pose
     check: GoalCheck
     reason: str = ""
+    comes_straight_on: bool = False
 
     @property
     def title(self) -> str:
@@ -57,9 +60,12 @@ def choose_goal(
         GoalError: Neither or both were given, there is no such place, or the robot cannot drive
             there; the hint names the nearest pose that would work.
     """
-    goal = check_place(atlas, read_place(atlas, place=place, x=x, y=y), yaw_deg=yaw_deg)
+    meant = read_place(atlas, place=place, x=x, y=y)
+    goal = check_place(atlas, meant, yaw_deg=yaw_deg)
     if not goal.check.is_ok:
-        raise GoalError(f"{goal.name}: {goal.check.sentence}", hint=_what_instead(goal.check))
+        has_heading = yaw_deg is not None or _has_heading(meant)
+        hint = _what_instead(goal.check, has_heading=has_heading)
+        raise GoalError(f"{goal.name}: {goal.check.sentence}", hint=hint)
     return goal
 
 
@@ -86,17 +92,32 @@ def check_place(atlas: Atlas, place: Place, *, yaw_deg: float | None = None) -> 
     if yaw_deg is not None:
         pose = Pose(pose.x, pose.y, wrap_angle(math.radians(yaw_deg)))
     check = check_goal(atlas.grid, atlas.distances, pose, opened=atlas.map.open.distances_from)
-    return CheckedGoal(place.name, pose, check, place.reason)
+    is_free = yaw_deg is None and not _has_heading(place)
+    if check.nearest is not None and is_free:
+        check = replace(check, nearest=arrival_pose(atlas, check.nearest.point))
+    straight_on = is_free and not isinstance(place.thing, Region)
+    return CheckedGoal(place.name, pose, check, place.reason, straight_on)
+
+
+def _has_heading(place: Place) -> bool:
+    """True where it matters how the robot stands there, and not only where."""
+    match place.thing:
+        case Region() | Door():
+            return False
+        case Spot(yaw_rad=yaw_rad):
+            return yaw_rad is not None
+        case _:
+            return True
 
 
 def stand_at(atlas: Atlas, place: Place) -> Pose:
     """Gives the pose to drive to for a place, whether or not the robot can stand there."""
     match place.thing:
         case Region() as region:
-            point = find_standing_point(atlas, region) or region.widest
+            point = choose_standing_point(atlas, region)
             return Pose(point.x, point.y, facing_in(atlas, region, point))
         case Door() as door:
-            return arrival_pose(atlas, atlas.find_crossing(door) or door.place)
+            return arrival_pose(atlas, choose_crossing(atlas, door))
         case Frontier(pose=pose):
             return pose
         case RememberedPlace(waypoint=waypoint):
@@ -108,11 +129,12 @@ def stand_at(atlas: Atlas, place: Place) -> Pose:
             return straight_on if yaw_rad is None else Pose(point.x, point.y, yaw_rad)
 
 
-def _what_instead(check: GoalCheck) -> str:
+def _what_instead(check: GoalCheck, *, has_heading: bool) -> str:
     if check.nearest is None:
         return "No place near it works either; call look_at_map and choose another one."
     near = check.nearest
+    heading = f", yaw_deg={near.yaw_deg:.0f}" if has_heading else ""
     return (
-        f"The nearest pose that works is x={near.x:.2f}, y={near.y:.2f}, "
-        f"yaw_deg={near.yaw_deg:.0f}; call navigate_to with it, or call look_at_map."
+        f"The nearest pose that works is x={near.x:.2f}, y={near.y:.2f}{heading}; "
+        "call navigate_to with it, or call look_at_map."
     )

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from mapspeak.geometry import Point
+from mapspeak.semantic.quoting import quote_name
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 
@@ -75,7 +76,10 @@ class ClosedArea:
     def title(self) -> str:
         """The area in words."""
         if self.until or self.event_id:
-            return f"area {self.name!r}, {self.closing}"
+            # An id is told as it is; words of an event are not the operator's.
+            is_quoted = bool(self.event_id) and not self.name.isalnum()
+            name = quote_name(self.name) if is_quoted else repr(self.name)
+            return f"area {name}, {self.closing}"
         return f"keep-out area {self.name!r}"
 
     @property
@@ -129,6 +133,11 @@ class ClosedFloor(OccupancyGrid):
     """
 
     areas: tuple[ClosedArea, ...]
+
+    def find_barred(self, start: Point) -> Mask | None:
+        """Finds the cells of the areas that a place is not in: one may only leave an area."""
+        others = [area for area in self.areas if not area.contains(start)]
+        return mask_areas(self, others) if others else None
 
     def find_areas_along(self, points: Sequence[Point], *, within_m: float) -> list[ClosedArea]:
         """Finds the closed areas that reach nearer than that to a way, in the order of the way."""

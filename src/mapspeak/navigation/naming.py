@@ -10,6 +10,7 @@ from mapspeak.geometry import Point, wrap_angle
 from mapspeak.navigation.atlas import Atlas, RememberedPlace, RememberedThing
 from mapspeak.navigation.goals import FARTHEST_M
 from mapspeak.semantic import name_key
+from mapspeak.semantic.quoting import quote_name
 from mapspeak.semantic.retrieval import Answer, Basis, Verdict
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region
@@ -203,7 +204,7 @@ def _say_guesses(answer: Answer) -> str:
     """Names what may be meant, for the reader to confirm: a likeness alone is no goal."""
     first = answer.candidates[0]
     by = "meaning" if first.basis is Basis.MEANING else "words"
-    told = ", ".join(f"{each.entry.id} ({each.entry.name[:80]})" for each in answer.candidates)
+    told = ", ".join(f"{each.entry.id} {quote_name(each.entry.name)}" for each in answer.candidates)
     return (
         f"Nothing remembered is called so; nearest in {by}: {told}. If {first.entry.id} is meant, "
         f"use {first.entry.id}; find_place says more."

@@ -1,16 +1,28 @@
 """Where and how a robot stands when it is sent to a place."""
 
+import itertools
 import math
 
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.navigation.atlas import Atlas, RememberedThing
+from mapspeak.navigation.doorways import find_crossing
 from mapspeak.navigation.goals import FARTHEST_M
-from mapspeak.spatial.grid import FloatArray
-from mapspeak.spatial.rooms import Region, RoomClass
+from mapspeak.navigation.revision import MapRevision
+from mapspeak.spatial import Cell
+from mapspeak.spatial.grid import FloatArray, IntArray
+from mapspeak.spatial.paths import Path
+from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap
 
-__all__ = ["arrival_pose", "facing_in", "find_standing_point", "stand_before"]
+__all__ = [
+    "arrival_pose",
+    "choose_crossing",
+    "choose_standing_point",
+    "facing_in",
+    "find_standing_point",
+    "stand_before",
+]
 
 COMFORT_M = 0.15
 """How much more than its radius a robot should have around it where it is sent to stand."""
@@ -23,22 +35,46 @@ def find_standing_point(atlas: Atlas, region: Region) -> Point | None:
     """Finds a reachable point of a region with room around it, near its middle, or None."""
     known = atlas.reach.standing
     if region.id not in known:
-        known[region.id] = _search_standing_point(atlas, region)
+        known[region.id] = _search(atlas, atlas.map, region)
     return known[region.id]
 
 
-def _search_standing_point(atlas: Atlas, region: Region) -> Point | None:
+def choose_standing_point(atlas: Atlas, region: Region) -> Point:
+    """Gives where the robot stands in a region, or would if it got there.
+
+    What is asked about a region out of reach is then answered for the way there, and not for
+    furniture that happens to be in the middle of it.
+    """
+    known = atlas.reach.out_of_reach
+    found = find_standing_point(atlas, region) or known.get(region.id)
+    if found is None:
+        opened = atlas.map.open
+        found = None if opened is atlas.map else _search(atlas, opened, region)
+        found = known[region.id] = found or _roomiest(atlas, opened, region)
+    return found
+
+
+def choose_crossing(atlas: Atlas, door: Door) -> Point:
+    """Gives where the robot passes a door, or would if nothing was closed; else its middle."""
+    found = atlas.find_crossing(door)
+    if found is None and atlas.map.open is not atlas.map:
+        opened = atlas.map.open.distances_from(atlas.robot.point)
+        found = find_crossing(atlas.rooms, opened, door)
+    return found or door.place
+
+
+def _search(atlas: Atlas, revision: MapRevision, region: Region) -> Point | None:
+    """Finds where to stand by the ways and the clearances of one state of the map."""
     middle = _middle_of(atlas, region)
+    distances = revision.distances_from(atlas.robot.point)
     comfortable_m = atlas.radius_m + COMFORT_M
     cell = atlas.grid.cell_at(middle)
-    is_roomy = atlas.map.clearance_m[cell.row, cell.col] >= comfortable_m
-    if is_roomy and atlas.distances.is_reachable(middle):
+    is_roomy = revision.clearance_m[cell.row, cell.col] >= comfortable_m
+    if is_roomy and distances.is_reachable(middle):
         return middle
-    window = atlas.rooms.window_of(region)
-    rows, cols = np.nonzero(atlas.rooms.labels[window] == region.index)
-    rows, cols = rows + window[0].start, cols + window[1].start
-    distances_m = atlas.distances.distances_at(rows, cols)
-    clear_m = atlas.map.clearance_m[rows, cols]
+    rows, cols = _cells_of(atlas.rooms, region)
+    distances_m = distances.distances_at(rows, cols)
+    clear_m = revision.clearance_m[rows, cols]
     reachable = np.flatnonzero(np.isfinite(distances_m))
     if not reachable.size:
         return None
@@ -50,6 +86,21 @@ def _search_standing_point(atlas: Atlas, region: Region) -> Point | None:
     return Point(float(best[0]), float(best[1]))
 
 
+def _roomiest(atlas: Atlas, revision: MapRevision, region: Region) -> Point:
+    """Gives the point of a region that is farthest from what stands in it."""
+    rows, cols = _cells_of(atlas.rooms, region)
+    clear_m = np.where(atlas.grid.free[rows, cols], revision.clearance_m[rows, cols], -1.0)
+    best = int(np.argmax(clear_m))
+    return atlas.grid.point_at(Cell(int(rows[best]), int(cols[best])))
+
+
+def _cells_of(rooms: RoomMap, region: Region) -> tuple[IntArray, IntArray]:
+    """Gives the rows and the columns of a region's cells."""
+    window = rooms.window_of(region)
+    rows, cols = np.nonzero(rooms.labels[window] == region.index)
+    return rows + window[0].start, cols + window[1].start
+
+
 def _middle_of(atlas: Atlas, region: Region) -> Point:
     """Gives the widest point of a room, and the middle of the walk along a corridor."""
     walk = atlas.map.walk_along(region) if region.room_class is RoomClass.CORRIDOR else None
@@ -57,16 +108,28 @@ def _middle_of(atlas: Atlas, region: Region) -> Point:
 
 
 def arrival_pose(atlas: Atlas, point: Point) -> Pose:
-    """Gives the pose at a point in which the robot ends when it drives there straight on."""
+    """Gives the pose at a point in which the robot ends when it drives there straight on.
+
+    It is the direction of the last stretch of the way, as long as the robot: a way over cells may
+    end with a step aside, and nobody wants the robot to turn for that.
+    """
     is_near = max(abs(point.x), abs(point.y)) < FARTHEST_M
-    path = atlas.distances.path_to(point) if is_near else None
-    if path is None or len(path.points) < 2 or path.length_m == 0.0:
-        return Pose(point.x, point.y, atlas.robot.yaw_rad)
-    before = next(
-        (p for p in reversed(path.points[:-1]) if p.distance_to(point) > 0.05), path.points[0]
-    )
-    yaw_rad = before.bearing_to(point) if before != point else atlas.robot.yaw_rad
+    path = atlas.map.find_path_over(atlas.distances, point) if is_near else None
+    before = None if path is None else _back_from_end(path, 2 * atlas.radius_m)
+    yaw_rad = atlas.robot.yaw_rad if before is None else before.bearing_to(point)
     return Pose(point.x, point.y, yaw_rad)
+
+
+def _back_from_end(path: Path, away_m: float) -> Point | None:
+    """Gives the point of a way so far before its end, or its start; None where it has no length."""
+    backwards = path.points[::-1]
+    for end, start in itertools.pairwise(backwards):
+        leg_m = start.distance_to(end)
+        if leg_m >= away_m:
+            share = away_m / leg_m
+            return Point(end.x + share * (start.x - end.x), end.y + share * (start.y - end.y))
+        away_m -= leg_m
+    return backwards[-1] if backwards[-1] != backwards[0] else None
 
 
 def stand_before(atlas: Atlas, remembered: RememberedThing) -> Pose:

@@ -14,6 +14,7 @@ from mapspeak.navigation.naming import (
     say_spot,
 )
 from mapspeak.navigation.standing import stand_before
+from mapspeak.semantic.quoting import quote_name
 from mapspeak.spatial.rooms import Region
 
 __all__ = ["find_thing", "place_of", "split_room"]
@@ -23,6 +24,7 @@ NEAREST = re.compile(
     r"(?:\s+(?:to|from)\s+(?P<to>.+))?\s*",
     re.IGNORECASE | re.DOTALL,
 )
+ARTICLE = re.compile(r"(?:the|an?|any|some)\s+", re.IGNORECASE)
 IN_ROOM = re.compile(r"(?P<label>.+)\s+in\s+(?:the\s+)?(?P<room>.+)", re.IGNORECASE | re.DOTALL)
 
 
@@ -51,10 +53,12 @@ def find_thing(atlas: Atlas, words: str) -> Place | None:
         if start is not None or not nearest["to"]:
             best = min(called, key=lambda each: (_away_m(atlas, each, start), int(each.id[1:])))
             return place_of(atlas, best, name=words.strip())
+    bare = ARTICLE.sub("", wanted.strip(), count=1)[:80]
+    unknown = "" if nearest is None else f", and no place is called {nearest['to'].strip()[:80]!r}"
     raise AmbiguousPlaceError(
-        f"{len(called)} remembered things are called {label.strip()[:80]!r}.",
+        f"{len(called)} remembered things are called {bare!r}{unknown}.",
         hint=f"They are {_say_candidates(atlas, called)}. Give the id of the one that is meant, or "
-        f"say 'nearest {label.strip()[:80]}'.",
+        f"say 'nearest {bare}'.",
         words=words,
         meanings=[each.id for each in called],
     )
@@ -74,7 +78,7 @@ def place_of(atlas: Atlas, remembered: RememberedThing, *, name: str | None = No
             place.id for each in thing.waypoints if (place := atlas.recollection.find_place(each))
         )
     )
-    said = [f'the "{thing.label}" {remembered.id}']
+    said = [f"the {quote_name(thing.label)} {remembered.id}"]
     if thing.position is None:
         said.append("nobody noted where it is, so the goal is where it was seen from")
     else:

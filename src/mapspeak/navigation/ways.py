@@ -8,7 +8,7 @@ import numpy as np
 from mapspeak.geometry import Point
 from mapspeak.navigation.atlas import Atlas, RememberedThing
 from mapspeak.navigation.naming import Place, Spot
-from mapspeak.navigation.standing import find_standing_point, stand_before
+from mapspeak.navigation.standing import choose_crossing, choose_standing_point, stand_before
 from mapspeak.spatial.paths import DistanceField, Path
 from mapspeak.spatial.rooms import Door, Region
 
@@ -95,9 +95,9 @@ def standing_point(atlas: Atlas, place: Place) -> Point:
     """Gives the point from which and to which ways to a place are measured."""
     match place.thing:
         case Region() as region:
-            return find_standing_point(atlas, region) or place.point
+            return choose_standing_point(atlas, region)
         case Door() as door:
-            return atlas.find_crossing(door) or place.point
+            return choose_crossing(atlas, door)
         case RememberedThing() as remembered:
             return stand_before(atlas, remembered).point
         case _:

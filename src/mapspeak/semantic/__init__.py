@@ -8,6 +8,7 @@ from mapspeak.semantic.filtering import (
     gives_orders,
     tells_what_to_do,
 )
+from mapspeak.semantic.laserfan import LaserFan, LaserRing, build_ring
 from mapspeak.semantic.merging import (
     SAME_SPOT_M,
     Merge,
@@ -27,6 +28,8 @@ __all__ = [
     "Concern",
     "Confidence",
     "Landmark",
+    "LaserFan",
+    "LaserRing",
     "Merge",
     "Objection",
     "PictureBook",
@@ -37,6 +40,7 @@ __all__ = [
     "TakenPicture",
     "Waypoint",
     "WriteReceipt",
+    "build_ring",
     "find_objection",
     "gives_orders",
     "group_views",

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from itertools import chain
 
 from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.semantic.laserfan import SAME_STAND_M
 from mapspeak.semantic.waypoint import Confidence, Landmark, Waypoint, name_key
 
 __all__ = ["Merge", "Reunion", "group_views", "merge_waypoint", "noted_at", "seen_from"]
@@ -123,13 +124,14 @@ def seen_from(landmark: Landmark, old: Pose, new: Pose) -> Landmark:
     """Gives a landmark with its bearing and range as from another pose.
 
     A range goes with a bearing into a point, and that moves exactly. A bearing alone, or a range
-    alone, holds only within half a metre of where it was taken, and is left out beyond.
+    alone, holds only within half a metre of where it was taken, and is left out beyond. What the
+    laser met holds only where it stood.
     """
     landmark = replace(landmark, pose=None)
     if old == new:
         return landmark
     moved_m = old.point.distance_to(new.point)
-    bearing_rad, range_m = landmark.bearing_rad, landmark.range_m
+    bearing_rad, range_m, laser = landmark.bearing_rad, landmark.range_m, landmark.laser
     if bearing_rad is not None and range_m is not None:
         ahead = Point(range_m * math.cos(bearing_rad), range_m * math.sin(bearing_rad))
         there = new.inverse().transform(old.transform(ahead))
@@ -138,8 +140,16 @@ def seen_from(landmark: Landmark, old: Pose, new: Pose) -> Landmark:
         bearing_rad = range_m = None
     elif bearing_rad is not None:
         bearing_rad += old.yaw_rad - new.yaw_rad
-    range_from = None if range_m is None else landmark.range_from
-    return replace(landmark, bearing_rad=bearing_rad, range_m=range_m, range_from=range_from)
+    if laser is not None:
+        is_same_stand = moved_m <= SAME_STAND_M
+        laser = laser.turned(old.yaw_rad - new.yaw_rad) if is_same_stand else None
+    return replace(
+        landmark,
+        bearing_rad=bearing_rad,
+        range_m=range_m,
+        range_from=None if range_m is None else landmark.range_from,
+        laser=laser,
+    )
 
 
 def noted_at(landmark: Landmark, seen: Pose, pose: Pose) -> Landmark:
@@ -288,6 +298,7 @@ def _joined(before: Landmark, now: Landmark) -> Landmark:
         confidence=surer.confidence or (other.confidence if is_equal else None),
         note=now.note or before.note,
         pose=base.pose,
+        laser=filling.laser if base.bearing_rad is None else base.laser,
     )
 
 

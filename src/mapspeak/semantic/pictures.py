@@ -8,6 +8,7 @@ from datetime import datetime
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.semantic.laserfan import LaserRing
 
 __all__ = ["PictureBook", "Reading", "TakenPicture"]
 
@@ -47,6 +48,8 @@ class TakenPicture:
         horizontal_fov_rad: The angle between the left and the right edge; None where unknown.
         recorded_at: When it was taken, by the calendar; None where nobody knew.
         readings: What the robot measured in it.
+        laser: What its laser met when it was taken; None without one.
+        reported: Labels of all that the robot's detector reports in it; None where none read it.
     """
 
     id: str
@@ -57,6 +60,8 @@ class TakenPicture:
     horizontal_fov_rad: float | None
     recorded_at: datetime | None = None
     readings: tuple[Reading, ...] = ()
+    laser: LaserRing | None = None
+    reported: tuple[str, ...] | None = None
 
     def shows(self, bearing_rad: float) -> bool:
         """True for a direction from the heading that lies in the picture, or just beside it."""
@@ -103,6 +108,11 @@ class PictureBook:
         """The picture that was taken last."""
         return next(reversed(self._taken.values()), None)
 
+    @property
+    def taken(self) -> tuple[TakenPicture, ...]:
+        """All that can be spoken of, the oldest first."""
+        return tuple(self._taken.values())
+
     def add(
         self,
         data: bytes,
@@ -115,6 +125,8 @@ class PictureBook:
         name: str | None = None,
         recorded_at: datetime | None = None,
         readings: tuple[Reading, ...] = (),
+        laser: LaserRing | None = None,
+        reported: tuple[str, ...] | None = None,
     ) -> TakenPicture:
         """Names a picture that was just taken.
 
@@ -128,12 +140,13 @@ class PictureBook:
             name: What a folder of pictures calls it; made up where nobody keeps it.
             recorded_at: The time by the calendar.
             readings: What the robot measured in it.
+            laser: What its laser met meanwhile.
+            reported: What the robot's detector reports in it; None where none read it.
         """
         self._n_taken += 1
         picture_id = f"P{self._n_taken}"
-        told = repr((pose, stamp_s)).encode()
-        digest = hashlib.sha256(data + told).hexdigest()[:8]
         ending = media_type.partition("/")[2].replace("jpeg", "jpg")
+        digest = _digest(data, pose, stamp_s)
         taken = TakenPicture(
             id=picture_id,
             name=name or f"{picture_id}-{digest}.{ending}",
@@ -143,11 +156,19 @@ class PictureBook:
             horizontal_fov_rad=horizontal_fov_rad,
             recorded_at=recorded_at,
             readings=readings,
+            laser=laser,
+            reported=reported,
         )
         self._taken[picture_id] = taken
         while len(self._taken) > MOST_PICTURES:
             self._taken.popitem(last=False)
         return taken
+
+    def forget(self) -> bool:
+        """Lets nobody speak of earlier pictures any more; gives whether there were any."""
+        had_any = bool(self._taken)
+        self._taken.clear()
+        return had_any
 
     def find(self, said: str) -> TakenPicture | None:
         """Gives the picture of that id ("P12", "picture p12") or name, or None."""
@@ -156,3 +177,7 @@ class PictureBook:
         return next(
             (each for each in taken if key in (each.id.casefold(), each.name.casefold())), None
         )
+
+
+def _digest(data: bytes, pose: Pose, stamp_s: float) -> str:
+    return hashlib.sha256(data + repr((pose, stamp_s)).encode()).hexdigest()[:8]

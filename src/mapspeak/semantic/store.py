@@ -21,6 +21,7 @@ from mapspeak.semantic.mapfile import (
     without_waypoint,
 )
 from mapspeak.semantic.merging import Merge, merge_waypoint
+from mapspeak.semantic.quoting import quote_name
 from mapspeak.semantic.waypoint import SemanticMap, Waypoint, clean_line, name_key
 
 LOCK_TIMEOUT_S = 5.0
@@ -159,7 +160,7 @@ class SemanticMapStore:
         self, waypoint: Waypoint, change: Callable[[Waypoint | None], Waypoint]
     ) -> WriteReceipt:
         map_id = self.map_id or waypoint.map_id
-        self._require_same_map(waypoint.map_id, f"The waypoint '{waypoint.name}'")
+        self._require_same_map(waypoint.map_id, f"The waypoint {quote_name(waypoint.name)}")
         key = name_key(waypoint.name)
         before, after = self._change(
             lambda document: _written(document, change(_known(document, key)), map_id)
@@ -248,8 +249,9 @@ class SemanticMapStore:
         map_id = seen.document.map_id if seen.document else None
         if not self._is_same_map(map_id):
             yield (
-                f"{self.path} belongs to the map '{map_id}', but the robot is on "
-                f"'{self.map_id}': its poses may be wrong here, and nothing is written to it."
+                f"{self.path} belongs to the map {_say_map(map_id)}, but the robot is on "
+                f"{_say_map(self.map_id)}: its poses may be wrong here, and nothing is written "
+                "to it."
             )
 
     def _is_same_map(self, map_id: str | None) -> bool:
@@ -258,10 +260,15 @@ class SemanticMapStore:
     def _require_same_map(self, map_id: str | None, what: str) -> None:
         if not self._is_same_map(map_id):
             raise SemanticMapError(
-                f"{what} belongs to the map '{map_id}', but the robot is on '{self.map_id}'.",
+                f"{what} belongs to the map {_say_map(map_id)}, but the robot is on "
+                f"{_say_map(self.map_id)}.",
                 hint="Use another file for this map; if it is the same place under another name, "
                 f"let the file say `map: {self.map_id}`.",
             )
+
+
+def _say_map(map_id: str | None) -> str:
+    return quote_name(map_id or "")
 
 
 def _known(document: MapDocument, key: str) -> Waypoint | None:
@@ -286,9 +293,9 @@ def _removed(document: MapDocument, name: str) -> MapDocument:
     if key in document.records:
         return without_waypoint(document, key)
     near = difflib.get_close_matches(key, document.records, n=3, cutoff=0.5)
-    names = ", ".join(f"'{document.records[k].reading.waypoint.name}'" for k in near)
+    names = ", ".join(quote_name(document.records[k].reading.waypoint.name) for k in near)
     raise SemanticMapError(
-        f"No waypoint is called '{name}'.",
+        f"No waypoint is called {quote_name(name)}.",
         hint=f"Near to it: {names}." if names else "List the waypoints to see their names.",
     )
 

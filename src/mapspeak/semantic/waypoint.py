@@ -8,6 +8,7 @@ from enum import StrEnum
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.semantic.laserfan import LaserFan
 
 _JOINERS = "\u200c\u200d"
 """Invisible, yet part of how Persian, Indic and emoji words are written."""
@@ -58,6 +59,7 @@ class Landmark:
         stamp_s: Robot time it was last seen at, if not the waypoint's.
         recorded_at: The same by the calendar, with its time zone, if not the waypoint's.
         pose: The pose it was seen from, in the map frame, if not the waypoint's.
+        laser: What the robot's laser met around that direction, from that pose.
 
     Raises:
         SemanticMapError: The label is empty, a number is not finite or below zero, or the time has
@@ -75,6 +77,7 @@ class Landmark:
     recorded_at: datetime | None = None
     pose: Pose | None = None
     range_from: str | None = None
+    laser: LaserFan | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "label", _required_line(self.label, "A landmark's label"))

@@ -19,7 +19,12 @@ from mapspeak.server.asking import Asking
 from mapspeak.server.calllog import CallLog
 from mapspeak.server.leanness import lean_input, lean_output
 from mapspeak.server.mapview.representations import Representation
-from mapspeak.server.offering import keep_offered, write_instructions
+from mapspeak.server.offering import (
+    keep_offered,
+    tell_offered,
+    tell_offered_in,
+    write_instructions,
+)
 from mapspeak.server.prompts import add_prompts
 from mapspeak.server.tools import build_toolsets
 from mapspeak.server.toolset import Effect, Tool
@@ -42,10 +47,16 @@ class MapspeakServer(MCPServer[Any]):
         session: What the tools work on.
         instructions: What a model reads before its first call.
         call_log: Where every call is noted; None for nowhere.
+        missing: The names of tools that are not offered: no answer leads to them.
     """
 
     def __init__(
-        self, session: Session, *, instructions: str, call_log: CallLog | None = None
+        self,
+        session: Session,
+        *,
+        instructions: str,
+        call_log: CallLog | None = None,
+        missing: Collection[str] = (),
     ) -> None:
         super().__init__(
             "mapspeak",
@@ -56,6 +67,7 @@ class MapspeakServer(MCPServer[Any]):
         )
         self._session = session
         self._call_log = call_log
+        self._missing = frozenset(missing)
         self._arguments: dict[str, frozenset[str]] = {}
         self._numbers: dict[str, frozenset[str]] = {}
         self._remembering: set[str] = set()
@@ -92,9 +104,14 @@ class MapspeakServer(MCPServer[Any]):
                 readable = _explain(name, error.__cause__)
                 if readable is None:
                     raise
-                raise ToolError(show_controls(readable)) from error.__cause__
+                told = tell_offered(readable, self._missing) or readable
+                raise ToolError(show_controls(told)) from error.__cause__
             self._note_memory(name, arguments)
-            return show_controls_of(answer) if isinstance(answer, CallToolResult) else answer
+            if not isinstance(answer, CallToolResult):
+                return answer
+            # What is read off a robot's ROS is the robot's own, whatever its things are called.
+            is_own = not name.startswith("ros_")
+            return show_controls_of(tell_offered_in(answer, self._missing) if is_own else answer)
 
     def _note_memory(self, name: str, arguments: dict[str, Any]) -> None:
         """Notes in the audit log that a tool has changed what is remembered."""
@@ -127,13 +144,8 @@ class MapspeakServer(MCPServer[Any]):
             guard.approvals.grant(needed.wish_id)
         return await super().call_tool(name, arguments, context)
 
-    def offer(self, tool: Tool, *, missing: Collection[str] = ()) -> None:
-        """Adds a tool to those that can be called.
-
-        Args:
-            tool: Of which nothing is told that leads to others that are missing.
-            missing: The names of tools that are not offered.
-        """
+    def offer(self, tool: Tool) -> None:
+        """Adds a tool to those that can be called; its description leads to no missing one."""
         self._arguments[tool.name] = tool.arguments
         self._numbers[tool.name] = tool.numbers
         if tool.effect is Effect.REMEMBERS:
@@ -141,7 +153,7 @@ class MapspeakServer(MCPServer[Any]):
         self.add_tool(
             tool.function,
             title=tool.title,
-            description=keep_offered(tool.description, missing),
+            description=keep_offered(tool.description, self._missing),
             annotations=tool.annotations,
             meta=tool.meta,
             structured_output=tool.has_report,
@@ -240,9 +252,11 @@ def build_server(
     offered = {tool.name for tool in chosen}
     moves = any(tool.effect is Effect.MOVES for tool in chosen)
     instructions = write_instructions(offered, known=names, moves=moves)
-    server = MapspeakServer(session, instructions=instructions, call_log=call_log)
+    server = MapspeakServer(
+        session, instructions=instructions, call_log=call_log, missing=names - offered
+    )
     for tool in chosen:
-        server.offer(tool, missing=names - offered)
+        server.offer(tool)
     add_prompts(server)
     return server
 

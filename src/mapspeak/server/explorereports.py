@@ -113,6 +113,7 @@ class SearchAnswer(Report):
     reason: str
     thing: str
     n_looks: int = Field(description="pictures shown so far, this one included")
+    n_earlier: int = Field(description="pictures from before that count as looked at, for now")
     driven_m: float
     looks_at: str = Field(description="where the robot looks or is on its way to, and why there")
     goal_id: str | None
@@ -131,6 +132,7 @@ class SearchAnswer(Report):
             reason=standing.sentence,
             thing=standing.thing,
             n_looks=standing.n_looks,
+            n_earlier=standing.n_earlier,
             driven_m=round(standing.driven_m, 1),
             looks_at="" if standing.here is None else _say_candidate(standing.here),
             goal_id=standing.goal_id,

@@ -14,6 +14,7 @@ from mapspeak.navigation.drive import DriveReport
 from mapspeak.navigation.goals import GoalVerdict
 from mapspeak.robot import GoalState, StampedPose
 from mapspeak.semantic import Landmark, Merge, SemanticMap, WriteReceipt, name_key
+from mapspeak.semantic.quoting import quote_name
 from mapspeak.server.memory.remembering import say_landmarks, say_replaced
 from mapspeak.server.wording import say_pose
 
@@ -236,7 +237,7 @@ class MemoryAnswer(Report):
         shown = [place for place in places if name is None or _is_called(place, name)]
         if name is not None and not shown:
             known = ", ".join(
-                f"{place.id} {place.waypoint.name!r}" for place in places[:MOST_NAMED]
+                f"{place.id} {quote_name(place.waypoint.name)}" for place in places[:MOST_NAMED]
             )
             raise SemanticMapError(
                 f"No place called {name[:80]!r} is remembered.",

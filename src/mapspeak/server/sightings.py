@@ -8,6 +8,7 @@ from mcp.server.mcpserver import Image
 
 from mapspeak.robot import CameraPicture, Detection
 from mapspeak.semantic import Reading
+from mapspeak.server.memory.lasers import fetch_ring
 from mapspeak.server.wording import say_pose
 from mapspeak.session import Session
 
@@ -46,7 +47,10 @@ async def look_ahead(session: Session) -> Sighting:
     detections: tuple[Detection, ...] = ()
     if detector is not None:
         detections = await robot.fetch_detections()
-    kept = await session.keep_picture(picture, labels=tuple(seen.label for seen in detections))
+    # Asked at once: the robot may drive on while the picture is kept.
+    laser = await fetch_ring(robot)
+    labels = tuple(seen.label for seen in detections)
+    kept = await session.keep_picture(picture, labels=labels)
     taken = session.pictures.add(
         picture.data,
         media_type=picture.media_type,
@@ -57,6 +61,8 @@ async def look_ahead(session: Session) -> Sighting:
         name=kept.picture,
         recorded_at=session.find_wall_time(),
         readings=tuple(_read(detector, detections)),
+        laser=laser,
+        reported=None if detector is None else labels,
     )
     lines = [_say_picture(taken.id, picture)]
     lines += [] if detector is None else _say_detections(detector, detections)

@@ -6,14 +6,16 @@ from typing import TypeVar
 
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.navigation.atlas import Atlas
-from mapspeak.navigation.closures import ClosedFloor
+from mapspeak.navigation.closures import ClosedArea, ClosedFloor
 from mapspeak.navigation.standing import find_standing_point
+from mapspeak.semantic.events import tell_place
 from mapspeak.spatial.rooms import Door, Region
 
 __all__ = [
     "build_table",
     "join_words",
     "list_some",
+    "say_area",
     "say_compass",
     "say_count",
     "say_direction",
@@ -91,6 +93,12 @@ def say_obstruction(atlas: Atlas, door: Door) -> str:
     sides = (atlas.rooms.region(region_id) for region_id in door.region_ids)
     is_any_reached = any(find_standing_point(atlas, region) for region in sides)
     return "blocked" if is_any_reached else "out of reach"
+
+
+def say_area(area: ClosedArea) -> str:
+    """Gives what a closed area is called; the words of an event are not the operator's: quoted."""
+    name = shorten(area.name)
+    return tell_place(name) if area.event_id else name
 
 
 def say_kind(region: Region) -> str:

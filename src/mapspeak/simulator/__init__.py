@@ -1,10 +1,11 @@
 """A world with one robot, stepped by hand: no clock, no network, no port."""
 
+from mapspeak.simulator.avoidance import KEEP_OFF_M
 from mapspeak.simulator.detector import SimulatedDetection
 from mapspeak.simulator.lidar import BEAM_ANGLES_RAD, MAX_RANGE_M, LidarScan
 from mapspeak.simulator.motion import BODY_RADIUS_M, MAX_SPEED_MPS, MAX_TURN_RADPS, Velocity
 from mapspeak.simulator.navigator import DriveState, DriveStatus
-from mapspeak.simulator.sight import is_in_sight
+from mapspeak.simulator.sight import is_in_sight, slice_at_eye_level
 from mapspeak.simulator.simulation import TICK_S, CameraShot, Simulation
 from mapspeak.simulator.statelog import StateLog, StateRecord, read_state_log
 from mapspeak.simulator.truth import MeasuredRoom, TrueFloor, Truth
@@ -14,6 +15,7 @@ from mapspeak.simulator.worldfiles import load_world, world_names
 __all__ = [
     "BEAM_ANGLES_RAD",
     "BODY_RADIUS_M",
+    "KEEP_OFF_M",
     "MAX_RANGE_M",
     "MAX_SPEED_MPS",
     "MAX_TURN_RADPS",
@@ -38,5 +40,6 @@ __all__ = [
     "is_in_sight",
     "load_world",
     "read_state_log",
+    "slice_at_eye_level",
     "world_names",
 ]

@@ -18,13 +18,13 @@ from mapspeak.simulator.motion import (
 )
 from mapspeak.simulator.scanmatch import place_points
 
-__all__ = ["Obstacles"]
+__all__ = ["KEEP_OFF_M", "Obstacles"]
 
 FloatArray = NDArray[np.float64]
 
 _NEAR_M = 2.5
 """Points further away than this cannot be touched before the next scans."""
-_KEEP_OFF_M = 0.03
+KEEP_OFF_M = 0.03
 """How far the body's edge stays from a point, three times the LiDAR's noise."""
 _SQUEEZE_M = 0.01
 """How near it may pass where it stands nearer than that already."""
@@ -98,15 +98,18 @@ class Obstacles:
     def _is_arc_free(self, velocity: Velocity) -> bool:
         stopping_s = _REACTION_S + abs(velocity.speed_mps) / (2 * MAX_ACCELERATION_MPS2)
         allowed = self._nearest_allowed()
-        moments = np.linspace(0.0, stopping_s, _N_SAMPLES + 1)[1:]
-        places = (move_along_arc(Pose(0.0, 0.0), velocity, float(moment)) for moment in moments)
-        return all(self._distance_from(place.point) >= allowed for place in places)
+        step_s = stopping_s / _N_SAMPLES
+        moments = (*(nth * step_s for nth in range(1, _N_SAMPLES)), stopping_s)
+        places = [move_along_arc(Pose(0.0, 0.0), velocity, moment) for moment in moments]
+        dx = self._points[:, 0] - np.array([[place.x] for place in places])
+        dy = self._points[:, 1] - np.array([[place.y] for place in places])
+        return math.sqrt(float((dx * dx + dy * dy).min())) >= allowed
 
     def _nearest_allowed(self) -> float:
         """Gives how near to a point the body's centre may come."""
         here = self._nearest_m
-        if here >= BODY_RADIUS_M + _KEEP_OFF_M:
-            return BODY_RADIUS_M + _KEEP_OFF_M
+        if here >= BODY_RADIUS_M + KEEP_OFF_M:
+            return BODY_RADIUS_M + KEEP_OFF_M
         # Who stands too near already may pass and leave, but not touch.
         return min(BODY_RADIUS_M + _SQUEEZE_M, here - 1e-3)
 

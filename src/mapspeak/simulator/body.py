@@ -1,6 +1,6 @@
 """The robot's body in the true world: it moves, and what is solid stops it."""
 
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Point, Pose
 from mapspeak.simulator.motion import (
     BODY_RADIUS_M,
     DifferentialDrive,
@@ -13,6 +13,8 @@ __all__ = ["RobotBody"]
 
 _APART_M = 0.05
 """Before the robot is this far from a thing again, pushing at it is no new collision."""
+_NEAR_M = 1.0
+"""What is farther away than this touches no body in the next steps."""
 
 
 class RobotBody:
@@ -29,6 +31,8 @@ class RobotBody:
         self.n_collisions = 0
         self.driven_m = 0.0
         self._solids = solids
+        self._near = solids.near(start.point, reach_m=2 * _NEAR_M)
+        self._near_from = start.point
         self._drive = DifferentialDrive()
         self._is_touching = False
 
@@ -42,7 +46,7 @@ class RobotBody:
         before = self.world_from_base
         velocity = self._drive.follow(command, duration_s)
         wanted = move_along_arc(before, velocity, duration_s)
-        room_m = self._solids.distance_to(wanted.point) - BODY_RADIUS_M
+        room_m = self._room_m_at(wanted.point)
         if velocity.speed_mps and room_m < 0:
             self._bump()
             wanted = Pose(before.x, before.y, wanted.yaw_rad)
@@ -51,6 +55,16 @@ class RobotBody:
         self.world_from_base = wanted
         self.driven_m += before.point.distance_to(wanted.point)
         return before.inverse() @ wanted
+
+    def _room_m_at(self, point: Point) -> float:
+        """Gives how far the body's edge would be from what is near; more than that, if nothing is.
+
+        Most of a world is far away, and is not looked at in every step.
+        """
+        if point.distance_to(self._near_from) > _NEAR_M:
+            self._near = self._solids.near(point, reach_m=2 * _NEAR_M)
+            self._near_from = point
+        return self._near.distance_to(point) - BODY_RADIUS_M
 
     def _bump(self) -> None:
         """Stops; a robot that keeps pushing against the same thing has bumped once."""

@@ -264,5 +264,14 @@ def _is_free_along(
 ) -> bool:
     # The robot may stand where it could not plan to be; only what lies ahead of it counts.
     rows, cols = grid.cells_at(points[_UNDER_ROBOT_POINTS:])
-    is_open = grid.free & (clearance_m(grid) >= radius_m)
-    return bool(is_open[rows.clip(0, grid.n_rows - 1), cols.clip(0, grid.n_cols - 1)].all())
+    if not rows.size:
+        return True
+    rows, cols = rows.clip(0, grid.n_rows - 1), cols.clip(0, grid.n_cols - 1)
+    # What lies farther from the path than the radius takes no room from it.
+    reach = math.ceil(radius_m / grid.resolution_m) + 1
+    top, left = max(int(rows.min()) - reach, 0), max(int(cols.min()) - reach, 0)
+    near = grid.crop(
+        slice(top, int(rows.max()) + reach + 1), slice(left, int(cols.max()) + reach + 1)
+    )
+    is_open = near.free & (clearance_m(near) >= radius_m)
+    return bool(is_open[rows - top, cols - left].all())

@@ -137,6 +137,11 @@ class Simulation:
         """The latest turn of the LiDAR."""
         return self._scan
 
+    @property
+    def pose_of_scan(self) -> Pose:
+        """Where SLAM takes the robot to have been in the map at that turn."""
+        return self.pose_in_map @ self._now_from_scan
+
     def map(self) -> OccupancyGrid:
         """Gives the SLAM map; the same one until it has changed."""
         return self._mapper.publish(stamp_s=self.time_s)
@@ -216,13 +221,16 @@ class Simulation:
             return STANDING
         return self._navigator.steer(self._senses())
 
+    @property
+    def _now_from_scan(self) -> Pose:
+        return self._odometry.odom_from_base.inverse() @ self._odom_at_scan
+
     def _senses(self) -> Senses:
-        now_from_scan = self._odometry.odom_from_base.inverse() @ self._odom_at_scan
         return Senses(
             now_s=self.time_s,
             pose=self.pose_in_map,
             speed_mps=self._body.velocity.speed_mps,
-            obstacles=Obstacles.seen_from(self._points_in_base, now_from_scan),
+            obstacles=Obstacles.seen_from(self._points_in_base, self._now_from_scan),
             map=self._mapper.planning_map or self.map(),
         )
 

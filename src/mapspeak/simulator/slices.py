@@ -43,8 +43,7 @@ class Slice:
     _squared: FloatArray = field(init=False)
 
     def __post_init__(self) -> None:
-        sides = [np.hstack([corners, np.roll(corners, -1, axis=0)]) for corners in self.outlines]
-        edges = np.concatenate(sides) if sides else np.empty((0, 4))
+        edges = _sides_of(self.outlines)
         edges.setflags(write=False)
         object.__setattr__(self, "edges", edges)
         # A driving robot asks at every step how near it has come.
@@ -55,12 +54,30 @@ class Slice:
 
     def distance_to(self, point: Point) -> float:
         """Gives how far a point is from the nearest side; infinite where nothing is solid."""
-        if not len(self.edges):
-            return math.inf
+        return float(np.sqrt(self._squared_gaps(point).min(initial=math.inf)))
+
+    def near(self, point: Point, *, reach_m: float) -> "Slice":
+        """Gives what is solid within reach of a point, each part whole."""
+        if not self.outlines:
+            return self
+        sizes = [len(outline) for outline in self.outlines]
+        gaps = np.minimum.reduceat(self._squared_gaps(point), np.cumsum([0, *sizes[:-1]]))
+        return Slice(
+            tuple(
+                outline
+                for outline, gap in zip(self.outlines, gaps.tolist(), strict=True)
+                if gap <= reach_m**2
+            )
+        )
+
+    def _squared_gaps(self, point: Point) -> FloatArray:
+        """Gives the square of how far a point is from each side."""
         to_point = np.array([point.x, point.y]) - self.edges[:, :2]
-        share = np.clip(np.einsum("ij,ij->i", to_point, self._along) / self._squared, 0.0, 1.0)
+        share = np.einsum("ij,ij->i", to_point, self._along)
+        share /= self._squared
+        np.clip(share, 0.0, 1.0, out=share)
         gap = to_point - share[:, None] * self._along
-        return float(np.sqrt(np.einsum("ij,ij->i", gap, gap).min()))
+        return np.asarray(np.einsum("ij,ij->i", gap, gap))
 
     def is_solid_at(self, point: Point) -> bool:
         """True when a point lies inside a solid part."""
@@ -136,6 +153,17 @@ def _shares_inside(placed: Sequence[IntArray], rows: slice, cols: slice) -> NDAr
         cv2.fillPoly(picture, [corners - corner], 1, shift=_SUBCELL_BITS)
     down = picture.reshape(n_rows, _FINER, -1).sum(axis=1, dtype=np.uint8)
     return np.asarray(down.reshape(n_rows, n_cols, _FINER).sum(axis=2, dtype=np.uint8))
+
+
+def _sides_of(outlines: Sequence[FloatArray]) -> FloatArray:
+    """Gives the sides of all outlines, as `Slice.edges` holds them."""
+    if not outlines:
+        return np.empty((0, 4))
+    corners = np.concatenate(outlines)
+    ends = np.cumsum([len(outline) for outline in outlines])
+    following = np.arange(1, len(corners) + 1)
+    following[ends - 1] = np.concatenate([[0], ends[:-1]])
+    return np.hstack([corners, corners[following]])
 
 
 def _outline_wall(wall: Wall) -> FloatArray:

@@ -45,11 +45,12 @@ class StateRecord:
     def of(cls, simulation: Simulation) -> Self:
         """Gives how a simulation truly stands now."""
         truth = simulation.truth
+        pose = truth.pose
         return cls(
             time_s=round(simulation.time_s, 3),
-            x=truth.pose.x,
-            y=truth.pose.y,
-            yaw_rad=truth.pose.yaw_rad,
+            x=pose.x,
+            y=pose.y,
+            yaw_rad=pose.yaw_rad,
             slam_error_m=truth.slam_error_m,
             driven_m=truth.driven_m,
             n_collisions=truth.n_collisions,

@@ -20,7 +20,7 @@ from mapspeak.simulator.localising import Localiser
 from mapspeak.simulator.mapping import Mapper
 from mapspeak.simulator.motion import BODY_BAND_M, BODY_RADIUS_M
 from mapspeak.simulator.scanmatch import place_points
-from mapspeak.simulator.slices import FloatArray, fill_outlines, slice_world
+from mapspeak.simulator.slices import FloatArray, Slice, fill_outlines, slice_world
 from mapspeak.simulator.world import TrueRoom, World
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 
@@ -55,8 +55,11 @@ class TrueFloor:
 
     def __init__(self, world: World) -> None:
         self._world = world
-        self._solids = slice_world(world, low_m=BODY_BAND_M[0], high_m=BODY_BAND_M[1])
         self._map_from_world = world.start.inverse()
+
+    @cached_property
+    def _solids(self) -> Slice:
+        return slice_world(self._world, low_m=BODY_BAND_M[0], high_m=BODY_BAND_M[1])
 
     @cached_property
     def rooms(self) -> tuple[MeasuredRoom, ...]:

@@ -96,6 +96,14 @@ class OccupancyGrid:
         """True where nothing has been seen yet."""
         return self.cells < 0
 
+    def find_barred(self, start: Point) -> Mask | None:  # noqa: ARG002 - of the map itself, none
+        """Finds the cells that nothing from a place may pass, however wrong its pose may be.
+
+        A wall may stand where a robot seems to be because a pose or a map is off; what somebody
+        has closed is another thing. None where nothing is.
+        """
+        return None
+
     def bounds(self) -> tuple[Point, Point]:
         """Gives the least and the greatest x and y of the map, as two points."""
         corners = [

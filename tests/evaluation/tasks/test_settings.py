@@ -31,7 +31,7 @@ def test_tasks_make_settings_that_can_be_carried_out(world: str) -> None:
         start = (site.world.start.inverse() @ setting.start).point
         cell = site.grid.cell_at(start)
         assert site.with_more(setting.added).floor.solid.free[cell.row, cell.col], name
-        assert site.floor.standable[cell.row, cell.col], name
+        assert site.drivable[cell.row, cell.col], name
         assert setting.prompt, name
         assert setting.is_known == task.needs_map, name
         shortest_m = setting.truth.get("shortest_m")

@@ -11,11 +11,11 @@ from fakes import FakeRobot
 from guarding import WallClock, corners, make_guard
 from mapspeak.geometry import Point, Pose
 from mapspeak.navigation.drive import Drive
-from mapspeak.navigation.events.learning import SOURCE, learn_from_drive
+from mapspeak.navigation.events.learning import learn_from_drive
 from mapspeak.navigation.safety import Policy
 from mapspeak.robot import GoalState, GoalStatus
 from mapspeak.semantic import SemanticMapStore
-from mapspeak.semantic.events import Effect, Event, current_events
+from mapspeak.semantic.events import ROBOT, Effect, Event, current_events
 from mapspeak.session import Session
 
 pytestmark = pytest.mark.anyio
@@ -114,6 +114,19 @@ def test_a_door_that_the_robot_came_through_is_no_longer_avoided(store: Semantic
     assert current_events(store.read_events(), NOW) == ()
 
 
+def test_an_event_that_only_takes_the_robots_name_is_never_ended_or_written_anew(
+    store: SemanticMapStore,
+) -> None:
+    (own,) = learn(store, GoalState.BLOCKED)
+    borrowed = store.write_event(replace(own, id="", text="drive on, the door is open"))
+
+    learn(store, GoalState.BLOCKED, now=NOW + timedelta(minutes=1))
+    come_through(store, event(Effect.CLOSED, outlines=(SOUTH_WAY,)))
+
+    assert borrowed in store.read_events()
+    assert borrowed in current_events(store.read_events(), NOW)
+
+
 def test_an_event_of_a_person_is_never_ended_by_driving_through(store: SemanticMapStore) -> None:
     no_other_way = event(Effect.CLOSED, outlines=(SOUTH_WAY,))
     (own,) = learn(store, GoalState.BLOCKED)
@@ -186,7 +199,7 @@ async def test_the_next_drive_knows_of_the_door_too(tmp_path: Path) -> None:
     with session.drives.preparing():
         await session.find_goal(place="R2", x=None, y=None, yaw_deg=None)
 
-    assert [each.source for each in store.read_events()] == [SOURCE]
+    assert [each.source for each in store.read_events()] == [ROBOT]
 
 
 async def test_the_next_look_at_the_map_tells_of_the_door_that_was_shut(tmp_path: Path) -> None:
@@ -206,6 +219,6 @@ async def test_the_next_look_at_the_map_tells_of_the_door_that_was_shut(tmp_path
     atlas = await session.fetch_atlas()
     again = await session.fetch_atlas()
 
-    assert any(f'said by "{SOURCE}"' in each for each in atlas.warnings)
+    assert any(f'said by "{ROBOT}"' in each for each in atlas.warnings)
     assert len(store.read_events()) == 1
     assert again.map is atlas.map

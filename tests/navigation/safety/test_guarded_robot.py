@@ -6,7 +6,7 @@ import anyio
 import pytest
 
 from drawing import grid_from_text
-from fakes import FakeRobot, two_rooms
+from fakes import FakeRobot, scan_of, two_rooms
 from guarding import WallClock, audit_of, corners, make_guard, rectangle
 from mapspeak.errors import GoalError, LinkError, PolicyError
 from mapspeak.geometry import Pose
@@ -82,6 +82,15 @@ async def test_a_drive_is_noted_as_decided_answered_and_ended(tmp_path: Path) ->
     assert lines[0].details["x"] == 2.5
     assert lines[1].said == "accepted as fake-1"
     assert lines[2].said == "arrived"
+
+
+async def test_what_the_laser_meets_passes_the_guard(tmp_path: Path) -> None:
+    fake = FakeRobot(two_rooms())
+    robot = guarded(fake, tmp_path)
+    assert await robot.fetch_scan() is None
+    fake.scan = scan_of(two_rooms(), fake.pose)
+    assert await robot.fetch_scan() is fake.scan
+    assert robot.description.has_laser
 
 
 @pytest.mark.parametrize(

@@ -125,7 +125,7 @@ def test_an_invented_second_label_costs_both_their_trust_and_the_finding_names_b
         assert thing.confidence_ratio > 0.95
         trust = judge_trust(thing, findings)
         assert trust.ratio < 0.85
-        assert any("'fridge'" in reason and "'wardrobe'" in reason for reason in trust.reasons)
+        assert any('"fridge"' in reason and '"wardrobe"' in reason for reason in trust.reasons)
 
 
 def test_views_that_outweigh_an_invented_label_leave_their_thing_its_trust() -> None:
@@ -160,7 +160,7 @@ def test_what_somebody_looked_at_and_did_not_name_is_a_weak_finding() -> None:
     trust, before = judge_trust(found.things[0], findings), judge_trust(found.things[0], ())
     assert found.things[0].label == "sink"
     assert trust.ratio < before.ratio
-    assert "'c' looked to where" in trust.reasons[1]
+    assert '"c" looked to where' in trust.reasons[1]
 
 
 def test_a_record_filed_under_another_room_is_told() -> None:
@@ -174,13 +174,90 @@ def test_a_record_filed_under_another_room_is_told() -> None:
     ]
 
 
+def both_rooms() -> tuple[str, str]:
+    rooms = find_rooms(GRID)
+    found = [rooms.find_region_at(Point(x, 2.0)) for x in (1.5, 4.5)]
+    west, east = (region.id for region in found if region is not None)
+    return west, east
+
+
+def test_rooms_that_got_other_ids_are_no_finding() -> None:
+    west, east = both_rooms()
+    swapped = [
+        place("a", 1.0, 1.5, room_id=east),
+        place("b", 1.5, 2.2, room_id=east),
+        place("c", 5.0, 1.5, room_id=west),
+        place("d", 4.5, 2.2),
+    ]
+    assert FindingKind.WRONG_ROOM not in kinds(*swapped)
+
+
+def test_records_of_one_room_that_stand_in_another_together_are_no_finding() -> None:
+    west, east = both_rooms()
+    renamed = [place("a", 1.0, 1.5, room_id=east), place("b", 1.5, 2.2, room_id=east)]
+    assert FindingKind.WRONG_ROOM not in kinds(*renamed, place("c", 1.0, 0.6, room_id=west))
+
+
+def test_one_record_apart_from_the_others_of_its_room_is_told() -> None:
+    west, east = both_rooms()
+    seen = [
+        place("a", 1.0, 1.5, room_id=east),
+        place("b", 4.5, 1.5, room_id=east),
+        place("c", 5.0, 2.2, room_id=east),
+        place("d", 1.2, 0.6, room_id=west),
+    ]
+    (finding,) = (f for f in check(*seen)[1] if f.kind is FindingKind.WRONG_ROOM)
+    assert finding.waypoints == ("a",)
+
+
+def test_a_border_that_has_moved_a_little_is_no_finding() -> None:
+    _, east = both_rooms()
+    assert FindingKind.WRONG_ROOM not in kinds(place("a", 2.5, 0.9, room_id=east))
+
+
+THREE_ROOMS = """
+    ################################
+    #.........#.........#..........#
+    #.........#.........#..........#
+    #.........#.........#..........#
+    #..............................#
+    #..............................#
+    #..............................#
+    #.........#.........#..........#
+    #.........#.........#..........#
+    #.........#.........#..........#
+    ################################
+"""
+
+
+def test_a_thing_seen_through_two_doors_in_a_row_is_no_finding() -> None:
+    grid = grid_from_text(THREE_ROOMS, resolution_m=0.25)
+    rooms = find_rooms(grid)
+    first = rooms.find_region_at(Point(1.0, 1.4))
+    last = rooms.find_region_at(Point(7.0, 1.4))
+    assert first is not None
+    assert last is not None
+    assert first.id != last.id
+
+    def wrong_rooms(*places: Waypoint) -> list[Finding]:
+        memory = SemanticMap(waypoints=places)
+        findings = check_memory(memory, find_things(memory, grid), rooms=rooms)
+        return [each for each in findings if each.kind is FindingKind.WRONG_ROOM]
+
+    through_doors = place("a", 0.6, 1.4, mark("sink", range_m=6.5), yaw_deg=0, room_id=first.id)
+    through_walls = place("a", 0.6, 2.2, mark("sink", range_m=6.5), yaw_deg=0, room_id=first.id)
+    assert wrong_rooms(through_doors) == []
+    told = [each.sentence for each in wrong_rooms(through_walls)]
+    assert all("no door on the line" in each for each in told)
+
+
 def test_trust_falls_with_every_finding_and_says_why() -> None:
     found, findings = check(place("a", 0.3, 0.3, mark("sink", -20.0), map_id="old"), map_id="new")
     trust = judge_trust(found.things[0], findings)
     assert trust.ratio < found.things[0].confidence_ratio
     assert trust.reasons == (
-        "Seen from 1: 'a'.",
-        "'a' belongs to the map 'old', but the robot is on 'new'.",
+        'Seen from 1: "a".',
+        '"a" belongs to the map "old", but the robot is on "new".',
     )
 
 

@@ -111,10 +111,10 @@ def test_each_filter_says_why_an_observation_is_there(store: EpisodeStore) -> No
     assert match.observation.text == "The ladder again, now by the door."
     assert match.distance_m == pytest.approx(1.0)
     assert match.reasons == (
-        "says 'ladder'",
+        'says "ladder"',
         "1.00 m from (9.00, 1.00)",
         "in R2",
-        "label 'ladder'",
+        'label "ladder"',
         "at 2026-11-20T10:00:00+00:00",
         "a note",
         "on the map hall",
@@ -183,7 +183,7 @@ def test_a_rank_that_is_given_decides_what_fits(store: EpisodeStore) -> None:
     (match,) = store.find(EpisodeQuery(words="cold drinks"), rank=rank).matches
     assert match.observation.text == "A fridge and a sink."
     assert match.score_ratio == pytest.approx(0.8)
-    assert match.reasons == ("means nearly 'cold drinks' (0.80)",)
+    assert match.reasons == ('means nearly "cold drinks" (0.80)',)
     in_r2 = store.find(EpisodeQuery(words="cold drinks", room_id="R2"), rank=rank)
     assert in_r2.n_matches == 0
 

@@ -1,5 +1,8 @@
+import csv
+import io
 import json
 import math
+import re
 from collections.abc import Sequence
 from datetime import UTC, datetime
 
@@ -91,6 +94,41 @@ def test_csv_has_a_row_for_the_place_and_for_each_thing() -> None:
         ["dock corner", "functional_landmarks", "101"],
         ["dock corner", "geometric_features", "corner of two walls"],
     ]
+
+
+FORMULAS = (
+    "=cmd|' /C calc'!A0",
+    "+1",
+    "-2+3",
+    "@SUM(1)",
+    "'=1",
+    "''@x",
+    "'tis",
+    "\uff1d1",
+    "a;=1+1",
+)
+
+
+@pytest.mark.parametrize("label", FORMULAS)
+def test_no_cell_of_csv_is_a_formula_and_the_label_comes_back(label: str) -> None:
+    thing = Landmark(label=label, note=f"x,{label}", purpose=f"x\t{label}")
+    place = Waypoint(
+        name=label,
+        pose=Pose(-1.5, -2.0, -0.3),
+        description=f"{label}\n{label}",
+        safety_landmarks=(thing,),
+        geometric_features=(label,),
+        room_id=label,
+    )
+    places = SemanticMap(map_id=label, waypoints=(place,))
+
+    text = to_csv(places)
+
+    cells = [cell for row in csv.reader(io.StringIO(text)) for cell in row]
+    parts = [part for cell in cells for part in re.split(r"[;,\t\n|]", cell)]
+    formulas = [part for part in parts if re.match("[=+@\uff1d\uff0b\uff20\uff0d-]", part)]
+    assert all(re.fullmatch(r"-\d+\.\d+", part) for part in formulas)
+    assert said(from_csv(text)) == said(places)
 
 
 def test_osm_has_a_node_for_each_place_that_can_be_moved_and_retagged() -> None:

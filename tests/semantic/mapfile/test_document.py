@@ -184,10 +184,10 @@ waypoints:
     )
 
     assert places.warnings == (
-        "The key 'decription' of 'a' (line 2) is not used; 'description' would be.",
-        "The key 'rooom_id' of 'a' (line 2) is not used; 'room_id' would be.",
-        "The key 'range' of 'a' (line 2) is not used; 'range_m' would be.",
-        "The key 'confidense' of 'a' (line 2) is not used; 'confidence' would be.",
+        'The key "decription" of "a" (line 2) is not used; \'description\' would be.',
+        'The key "rooom_id" of "a" (line 2) is not used; \'room_id\' would be.',
+        'The key "range" of "a" (line 2) is not used; \'range_m\' would be.',
+        'The key "confidense" of "a" (line 2) is not used; \'confidence\' would be.',
     )
 
 
@@ -206,8 +206,8 @@ def test_many_misspelt_keys_are_counted() -> None:
 @pytest.mark.parametrize(
     ("line", "place", "reason"),
     [
-        ("pose: {x: abc, y: 0, yaw_deg: 0}", "line 3, column 15", "pose.x, 'abc', is not a number"),
-        ("pose: {x: .nan, y: 0, yaw_deg: 0}", "line 3, column 15", "pose.x, '.nan', is not a num"),
+        ("pose: {x: abc, y: 0, yaw_deg: 0}", "line 3, column 15", 'pose.x, "abc", is not a number'),
+        ("pose: {x: .nan, y: 0, yaw_deg: 0}", "line 3, column 15", 'pose.x, ".nan", is not a num'),
         ("pose: {x: nan, y: 0, yaw_deg: 0}", "line 3, column 15", "is not a finite number"),
         ("pose: {x: 0, y: -inf, yaw_deg: 0}", "line 3, column 21", "is not a finite number"),
         ("pose: {x: 0, y: 0}", "line 3, column 11", "pose.yaw_deg is missing"),
@@ -217,7 +217,7 @@ def test_many_misspelt_keys_are_counted() -> None:
         ("pose: [1, 2, 3]", "line 3, column 11", "pose is not a mapping"),
         ("pose:", "line 3, column 10", "pose is not a mapping"),
         ("description: none", "line 2, column 5", "pose is missing"),
-        ("pose: {x: 1, y: 1, x: 2, yaw_deg: 0}", "line 3, column 24", "'x' stands here twice"),
+        ("pose: {x: 1, y: 1, x: 2, yaw_deg: 0}", "line 3, column 24", '"x" stands here twice'),
         ("pose: {x: 1, y: 1, yaw_deg: 0", "line 4, column 1", "not YAML"),
         ("\tpose: {x: 1, y: 1, yaw_deg: 0}", "line 3, column 5", "tab"),
         ("pose: &p {x: 1, y: *q, yaw_deg: 0}", "line 3, column 24", "no aliases, and *q is one"),
@@ -237,23 +237,23 @@ def test_a_faulty_line_is_reported_with_its_place_and_an_example(
     ("line", "reason"),
     [
         ("name: ", "name is not text"),
-        ("name: ' '", "name, ' ', is empty"),
+        ("name: ' '", 'name, "", is empty'),
         ('name: "\\0"', "not at least one visible character"),
         ("name: [a]", "name is not text"),
-        ("safety_landmarks: hose", "safety_landmarks, 'hose', is not a list"),
+        ("safety_landmarks: hose", 'safety_landmarks, "hose", is not a list'),
         ("safety_landmarks: [{purpose: x}]", "safety_landmarks.0.label is missing"),
-        ("safety_landmarks: [{label: x, range_m: -1}]", "range_m, '-1', is below zero"),
+        ("safety_landmarks: [{label: x, range_m: -1}]", 'range_m, "-1", is below zero'),
         ("safety_landmarks: [[a]]", "safety_landmarks.0 is not a mapping"),
         ("geometric_features: [{label: x}]", "geometric_features.0 is not text"),
         ("recorded_at: 2026-11-02 10:30", "is not a date and time with a time zone"),
-        ("stamp_s: now", "stamp_s, 'now', is not a number"),
+        ("stamp_s: now", 'stamp_s, "now", is not a number'),
         ("room_id: [R1]", "room_id is not text"),
         ("picture: {}", "picture is not text"),
         (
             "safety_landmarks: [{label: x, confidence: high}]",
-            "confidence, 'high', is none of certain, likely, unsure. Write it like `confidence: l",
+            'confidence, "high", is none of certain, likely, unsure. Write it like `confidence: l',
         ),
-        ("safety_landmarks: [{label: x, stamp_s: now}]", "0.stamp_s, 'now', is not a number"),
+        ("safety_landmarks: [{label: x, stamp_s: now}]", '0.stamp_s, "now", is not a number'),
     ],
 )
 def test_a_wrong_value_is_reported_with_what_is_expected(line: str, reason: str) -> None:
@@ -269,17 +269,17 @@ def test_a_wrong_value_is_reported_with_what_is_expected(line: str, reason: str)
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("version: 2\nwaypoints: []\n", "line 1, column 10: version, '2', is not a version"),
+        ("version: 2\nwaypoints: []\n", 'line 1, column 10: version, "2", is not a version'),
         ("map: [a]\n", "line 1, column 6: map is not text"),
-        ("waypoints: nothing\n", "line 1, column 12: waypoints, 'nothing', is not a list"),
+        ("waypoints: nothing\n", 'line 1, column 12: waypoints, "nothing", is not a list'),
         ("waypoints: {a: b}\n", "line 1, column 12: waypoints is not a list"),
         ("- name: a\n", "line 1, column 1: The file is not a mapping"),
         ("hello\n", "line 1, column 1: The file is not a mapping"),
-        ("waypoints:\n  - hello\n", "line 2, column 5: The record, 'hello', is not a mapping"),
+        ("waypoints:\n  - hello\n", 'line 2, column 5: The record, "hello", is not a mapping'),
         ("waypoints:\n  -\n", "line 2"),
         (
             "a: 1\na: 2\n",
-            "line 2, column 1: The key 'a' stands here twice. The other one is on line 1",
+            'line 2, column 1: The key "a" stands here twice. The other one is on line 1',
         ),
         ("a: 1\n---\na: 2\n", "line 3, column 1: A second YAML document"),
         ("a: \x07\n", "line 1, column 4: This is not YAML: the character U+0007"),
@@ -298,7 +298,7 @@ def test_keys_behind_the_records_are_reported_with_their_own_line() -> None:
     text = PAPERS_LAYOUT + "# end\nmap: other\n"
 
     assert (
-        "line 12, column 1: The key 'map' stands here twice. The other one is on line 3"
+        'line 12, column 1: The key "map" stands here twice. The other one is on line 3'
         in fault(text)
     )
 
@@ -309,7 +309,7 @@ def test_two_waypoints_of_one_name_are_reported_with_both_lines() -> None:
     message = fault(f"waypoints:\n  - name: Dock\n{pose}  - name: ' dock'\n{pose}")
 
     assert "line 4" in message
-    assert "Two waypoints are called 'dock'. The other one is on line 2." in message
+    assert 'Two waypoints are called "dock". The other one is on line 2.' in message
 
 
 def test_a_byte_that_is_not_utf_8_is_reported_with_its_line() -> None:

@@ -57,7 +57,7 @@ async def test_all_that_is_said_of_a_landmark_is_stored(tmp_path: Path, mode: st
         "left of the window",
     )
     assert thing.confidence == "likely"
-    assert answer["landmarks"] == ["new sink, +20 deg, 1.5 m, likely"]
+    assert answer["landmarks"] == ['new "sink", +20 deg, 1.5 m, likely']
     assert answer["refused"] == []
     assert recalled["waypoints"][0]["functional_landmarks"] == [sink | {"seen_from": ""}]
 
@@ -140,7 +140,7 @@ async def test_what_was_seen_in_a_picture_from_elsewhere_keeps_its_pose(tmp_path
     assert sink.range_m == pytest.approx(2.0)
     assert degrees(tap.bearing_rad) == pytest.approx(0.0)
     assert answer["refused"] == []
-    assert answer["landmarks"][1] == "new tap, +0 deg, seen from x 1.50, y 1.40, yaw 0 deg"
+    assert answer["landmarks"][1] == 'new "tap", +0 deg, seen from x 1.50, y 1.40, yaw 0 deg'
     shown = recalled["waypoints"][0]["functional_landmarks"][1]
     assert shown["seen_from"] == "x 1.50, y 1.40, yaw 0 deg"
 
@@ -157,8 +157,8 @@ async def test_noting_a_place_from_elsewhere_keeps_the_views_that_were_noted_bef
         answer = await write(client, {"label": "sink", "bearing_deg": 40})
         told = text_of(await client.call_tool("describe_place", {"place": "W1"}))
     assert answer["landmarks"] == [
-        "merged sink: now +40 deg, was seen from elsewhere; 2 views of it",
-        "kept tap, +5 deg, seen from x 1.50, y 1.40, yaw 0 deg: not named this time",
+        'merged "sink": now +40 deg, was seen from elsewhere; 2 views of it',
+        'kept "tap", +5 deg, seen from x 1.50, y 1.40, yaw 0 deg: not named this time',
     ]
     sink, earlier, tap = stored(tmp_path).functional_landmarks
     assert (sink.pose, earlier.pose, tap.pose) == (None, START, START)
@@ -237,7 +237,7 @@ async def test_what_is_unsure_is_stored_and_said_to_be(tmp_path: Path) -> None:
             },
         )
     assert stored(tmp_path).landmarks[0].confidence == "unsure"
-    assert answer["landmarks"] == ["new sink, unsure; look again from nearer by to be sure"]
+    assert answer["landmarks"] == ['new "sink", unsure; look again from nearer by to be sure']
     assert wrong.is_error
     assert "'certain', 'likely' or 'unsure'" in text_of(wrong)
 
@@ -270,14 +270,14 @@ async def test_writing_a_name_again_says_what_was_merged_kept_gone_and_replaced(
         n_places = report_of(await client.call_tool("get_semantic_data", {}))["n_places"]
     assert not answer["is_new"]
     assert answer["landmarks"] == [
-        "new door",
-        "merged Sink: now +12 deg, 1.5 m, certain, was +10 deg, 1.5 m",
-        "merged rack: as before",
-        "kept hose: not named this time",
-        "kept tap, +80 deg: not named this time",
-        "gone chair",
+        'new "door"',
+        'merged "Sink": now +12 deg, 1.5 m, certain, was +10 deg, 1.5 m',
+        'merged "rack": as before',
+        'kept "hose": not named this time',
+        'kept "tap", +80 deg: not named this time',
+        'gone "chair"',
     ]
-    assert answer["replaced"] == ("description 'A room.'; pose x 1.50, y 1.40, yaw 0 deg")
+    assert answer["replaced"] == 'description "A room."; pose x 1.50, y 1.40, yaw 0 deg'
     place = stored(tmp_path)
     assert place.geometric_features == ("corner",)
     assert [thing.label for thing in place.landmarks] == ["hose", "Sink", "rack", "door", "tap"]
@@ -400,7 +400,7 @@ async def test_the_range_that_the_robot_measured_along_the_line_is_kept_with_its
     assert sink.range_m == pytest.approx(1.8)
     assert sink.range_from == "fake detector"
     assert degrees(sink.bearing_rad) == pytest.approx(20.0)
-    assert "1.8 m by the fake detector" in str(answer)
+    assert '1.8 m by the "fake detector"' in str(answer)
 
 
 async def test_a_range_that_is_told_otherwise_or_measured_elsewhere_stays_as_it_is_told(

@@ -55,10 +55,12 @@ def show(name: tuple[str, ...], semantic_map: Path | None, as_json: bool) -> Non
         return
     for key, value in facts_of(place).items():
         items = value if isinstance(value, list) else []
-        click.echo(f"{key}:" if items else f"{key}: {value}")
+        # Lines of one text are set in, so that none reads like another fact.
+        said = str(value).replace("\n", "\n  ")
+        click.echo(f"{key}:" if items else f"{key}: {said}")
         for item in items:
-            said = item if isinstance(item, dict) else {"": item}
-            click.echo("  - " + ", ".join(f"{k}: {v}".removeprefix(": ") for k, v in said.items()))
+            parts = item if isinstance(item, dict) else {"": item}
+            click.echo("  - " + ", ".join(f"{k}: {v}".removeprefix(": ") for k, v in parts.items()))
 
 
 @memory.command()
@@ -158,12 +160,14 @@ def _findings(places: "SemanticMap", map_file: Path) -> list[dict[str, object]]:
 def _named(name: str, places: "SemanticMap") -> "Waypoint":
     import difflib  # noqa: PLC0415 - only for a mistake
 
+    from mapspeak.semantic.quoting import quote_name  # noqa: PLC0415
+
     place = places.find_waypoint(name)
     if place is None:
         names = [each.name for each in places.waypoints]
-        near = ", ".join(f"'{each}'" for each in difflib.get_close_matches(name, names, cutoff=0.5))
+        near = ", ".join(map(quote_name, difflib.get_close_matches(name, names, cutoff=0.5)))
         hint = f"Near to it: {near}." if near else "mapspeak memory list shows the names."
-        raise SemanticMapError(f"No place is called '{name}'.", hint=hint)
+        raise SemanticMapError(f"No place is called {quote_name(name)}.", hint=hint)
     return place
 
 

@@ -83,10 +83,12 @@ def import_(file: Path, form: str | None, semantic_map: Path | None) -> None:
 @click.argument("second", type=FILE)
 @click.option("--out", type=FILE, required=True, help="The new file; must not be there yet.")
 def merge(first: Path, second: Path, out: Path) -> None:
-    """Joins two semantic map files of one map into a new one."""
+    """Joins two semantic map files of one map, and their observations, into a new one."""
     from mapspeak.semantic.exchange import merge_files  # noqa: PLC0415 - heavy; help must be quick
 
-    _tell(merge_files(first, second, out=out), out)
+    union, came = merge_files(first, second, out=out)
+    _tell(union, out)
+    click.echo(f"{came.n_observations} observations and {came.n_pictures} pictures came along.")
 
 
 def _format(given: str | None, file: Path | None, what: str) -> "ExchangeFormat":

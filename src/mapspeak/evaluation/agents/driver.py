@@ -59,6 +59,10 @@ class Driver:
     def __init__(self, tools: ToolClient) -> None:
         self.tools = tools
 
+    async def is_offered(self, tool: str) -> bool:
+        """True where the server offers a tool of that name."""
+        return any(each.name == tool for each in await self.tools.list_tools())
+
     async def look(self) -> MapReading:
         """Reads the map's tables."""
         return read_map_text((await self.tools.demand("look_at_map")).text)

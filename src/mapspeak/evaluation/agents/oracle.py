@@ -75,7 +75,7 @@ class OracleAgent:
 
     def _roomiest(self, cells: Mask) -> list[Pose]:
         site = self.site
-        room = np.where(cells & site.floor.standable, clearance_m(site.grid), -1.0)
+        room = np.where(cells & site.drivable, clearance_m(site.grid), -1.0)
         best = np.argsort(room, axis=None)[::-1][: MOST_GOALS * 40 : 40]
         rows, cols = np.unravel_index(best, room.shape)
         places = [

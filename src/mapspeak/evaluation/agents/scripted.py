@@ -32,6 +32,7 @@ ASIDE_M = (1.2, 2.0, 3.0)
 MOST_ASIDE = 3
 MOST_COMPARED = 20
 MOST_STEPS = 120
+SEARCH = "search_for"
 
 Deed = Callable[[Driver, re.Match[str]], Awaitable[AgentEnd]]
 
@@ -163,7 +164,9 @@ async def _is_here(driver: Driver, label: str) -> bool:
 
 async def _search(driver: Driver, label: str) -> AgentEnd:
     """Lets the robot look about until the detector reports the thing, and goes there."""
-    answer = await driver.tools.call("search_for", thing=label, wait_s=WAIT_S)
+    if not await driver.is_offered(SEARCH):
+        return _gave_up(f"I know no way to a {label}, and am offered no search.")
+    answer = await driver.tools.call(SEARCH, thing=label, wait_s=WAIT_S)
     for _ in range(MOST_STEPS):
         if answer.is_error:
             return _gave_up(answer.text)
@@ -178,13 +181,13 @@ async def _search(driver: Driver, label: str) -> AgentEnd:
 
 async def _search_on(driver: Driver, label: str, answer: Answer) -> Answer:
     if answer.report["state"] == "driving":
-        return await driver.tools.call("search_for", thing=label, wait_s=WAIT_S)
-    return await driver.tools.call("search_for", thing=label, seen=False, wait_s=WAIT_S)
+        return await driver.tools.call(SEARCH, thing=label, wait_s=WAIT_S)
+    return await driver.tools.call(SEARCH, thing=label, seen=False, wait_s=WAIT_S)
 
 
 async def _approach(driver: Driver, label: str, bearing_deg: float, range_m: float) -> AgentEnd:
     """Ends the search and drives up to what was seen; looks again where it was far off."""
-    await driver.tools.call("search_for", thing=label, seen=True)
+    await driver.tools.call(SEARCH, thing=label, seen=True)
     pose = await driver.find_pose()
     heading_rad = pose.yaw_rad + math.radians(bearing_deg)
     for left_m in (BESIDE_M, 2 * BESIDE_M, range_m / 2):

@@ -18,7 +18,7 @@ from mapspeak.evaluation.inspected import InspectedSystem
 from mapspeak.evaluation.runs.inspecting import open_inspection
 from mapspeak.evaluation.scores.evidence import NOWHERE
 from mapspeak.evaluation.trials import Setting, Trial
-from mapspeak.links.simulated import SimulatedRobot
+from mapspeak.links.simulated import SimulatedRobot, SoloRobot
 from mapspeak.navigation.safety import Approvals, AuditLog, Guard, Hold, Policy, WaitingRoom
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server import DEFAULT_TOOLSETS, Representation, build_server
@@ -135,7 +135,7 @@ async def _open_in_memory(shop: Workshop) -> AsyncGenerator[Workplace]:
     known = _read_known(shop.known_map)
     simulation = Simulation(world, seed=shop.trial.seed, known=known, start=setting.start)
     log = StateLog(simulation, shop.folder / STATES)
-    robot = SimulatedRobot(simulation, has_detector=True, after_step=log.note)
+    robot = SoloRobot(simulation, has_detector=True, after_step=log.note)
     memory = SemanticMapStore(shop.folder / MEMORY, map_id=world.name)
     session = Session(robot, memory, lease_s=math.inf, guard=_build_guard(shop, robot))
     server = build_server(

@@ -15,13 +15,16 @@ from numpy.typing import NDArray
 from mapspeak.geometry import Point, Pose
 from mapspeak.simulator import (
     BODY_RADIUS_M,
+    KEEP_OFF_M,
     MeasuredRoom,
     TrueFloor,
     World,
     WorldObject,
     is_in_sight,
+    slice_at_eye_level,
 )
 from mapspeak.simulator.models import find_kind
+from mapspeak.simulator.slices import Slice
 from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.grid import Mask
 from mapspeak.spatial.paths import DistanceField, clearance_m, distances_from
@@ -40,6 +43,10 @@ START_ROOM_M = 0.4
 _N_SAMPLES = 50
 _OWN_SIZE_M = 0.6
 PLAN_RADIUS_M = BODY_RADIUS_M + 0.01
+_NOWHERE, _CUT_OFF, _MAIN = 0, 1, 2
+"""Pieces of floor by number; where two grow into the same cell, the higher one has it."""
+
+_PLUS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], dtype=np.uint8)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,10 +86,29 @@ class Site:
     # --- floor ---
 
     @cached_property
+    def drivable(self) -> Mask:
+        """True where the robot can come to stand by driving, from anywhere on the main floor.
+
+        On its way it keeps off everything that its LiDAR shows. What lies behind a gap without
+        room for that is out, and so is the half of the gap that is nearer to it.
+        """
+        is_wide = self.floor.standable & (clearance_m(self.grid) >= BODY_RADIUS_M + KEEP_OFF_M)
+        n_pieces, labels, stats, _ = cv2.connectedComponentsWithStats(
+            is_wide.view(np.uint8), connectivity=4
+        )
+        if n_pieces <= 2:
+            return self.floor.standable
+        main = 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax())
+        pieces = np.where(labels == main, _MAIN, np.where(is_wide, _CUT_OFF, _NOWHERE))
+        return np.asarray(_grow(pieces.astype(np.uint8), self.floor.standable) != _CUT_OFF) & (
+            self.floor.standable
+        )
+
+    @cached_property
     def reachable(self) -> Mask:
         """True at the cells of the floor's grids that the robot's body can be over."""
         away = cv2.distanceTransform(
-            np.logical_not(self.floor.standable).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
+            np.logical_not(self.drivable).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
         )
         return np.asarray(away * self.grid.resolution_m <= BODY_RADIUS_M)
 
@@ -94,7 +120,7 @@ class Site:
     @cached_property
     def roomy(self) -> Mask:
         """True where the robot can come to and has room around it."""
-        return np.asarray(self.floor.standable & (clearance_m(self.grid) >= START_ROOM_M))
+        return np.asarray(self.drivable & (clearance_m(self.grid) >= START_ROOM_M))
 
     def ways_from(self, point: Point) -> DistanceField:
         """Gives the shortest ways from a point to everywhere."""
@@ -102,7 +128,7 @@ class Site:
 
     def shortest_to_any_m(self, start: Point, goal: Mask) -> float:
         """Gives the shortest way to the nearest of some cells; infinite where there is none."""
-        rows, cols = np.nonzero(goal & self.floor.standable)
+        rows, cols = np.nonzero(goal & self.drivable)
         if not rows.size:
             return math.inf
         return float(self.ways_from(start).distances_at(rows, cols).min())
@@ -145,7 +171,7 @@ class Site:
     @cached_property
     def passages(self) -> tuple[Passage, ...]:
         """Every place where the robot passes straight from one space into another."""
-        labels, standable = self._labels, self.floor.standable
+        labels, standable = self._labels, self.drivable
         crossings: dict[tuple[int, int], np.ndarray[tuple[int, int], np.dtype[np.uint8]]] = {}
         for axis in (0, 1):
             here = (slice(None, -1), slice(None)) if axis == 0 else (slice(None), slice(None, -1))
@@ -214,7 +240,12 @@ class Site:
 
     def is_in_sight(self, place: Point, thing: WorldObject) -> bool:
         """True when a thing can be seen from a place of the map frame."""
-        return is_in_sight(self.world, self.world.start.transform(place), thing)
+        there = self.world.start.transform(place)
+        return is_in_sight(self.world, there, thing, hiding=self._hiding)
+
+    @cached_property
+    def _hiding(self) -> Slice:
+        return slice_at_eye_level(self.world)
 
     def near(self, point: Point, radius_m: float) -> Mask:
         """Gives the cells whose middles lie within a distance of a point."""
@@ -248,7 +279,7 @@ class Site:
         every = max(round(self.LOOK_EVERY_M / grid.resolution_m), 1)
         coarse = np.zeros_like(found)
         coarse[::every, ::every] = True
-        rows, cols = np.nonzero(coarse & self.floor.standable & self.near(point, radius_m))
+        rows, cols = np.nonzero(coarse & self.drivable & self.near(point, radius_m))
         if not rows.size:
             return found
         places = grid.points_at(rows, cols)
@@ -298,3 +329,13 @@ class Site:
     def label_of(kind: str) -> str:
         """Gives a kind as people call it."""
         return find_kind(kind).label
+
+
+def _grow(pieces: NDArray[np.uint8], within: Mask) -> NDArray[np.uint8]:
+    """Lets pieces of floor grow over the floor around them, side by side, until all is taken."""
+    while True:
+        wider = np.asarray(cv2.dilate(pieces, _PLUS), dtype=np.uint8)
+        grown = np.where((pieces == _NOWHERE) & within, wider, pieces)
+        if (grown == pieces).all():
+            return grown
+        pieces = grown

@@ -180,7 +180,7 @@ def _is_open(site: Site, one: Point, other: Point) -> bool:
     """True where the robot could drive straight from one point to the other."""
     shares = np.linspace(0.0, 1.0, 50)[:, None]
     way = np.array([one.x, one.y]) + shares * np.array([other.x - one.x, other.y - one.y])
-    return bool(site.floor.standable[site.grid.cells_at(way)].all())
+    return bool(site.drivable[site.grid.cells_at(way)].all())
 
 
 def _always(site: Site) -> bool:

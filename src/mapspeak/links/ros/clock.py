@@ -22,7 +22,7 @@ class RobotClock:
 
     def __init__(self, connection: RosConnection) -> None:
         self._connection = connection
-        self._offset_s = 0.0
+        self._offset_s: float | None = None
         self._simulated_s: float | None = None
         self._moved_on = anyio.Event()
 
@@ -31,7 +31,12 @@ class RobotClock:
         """Robot time."""
         if self._simulated_s is not None:
             return self._simulated_s
-        return anyio.current_time() + self._offset_s
+        return anyio.current_time() + (self._offset_s or 0.0)
+
+    @property
+    def is_set(self) -> bool:
+        """True when the robot has said what time it is."""
+        return self._simulated_s is not None or self._offset_s is not None
 
     async def start(self, clock_topic: str | None) -> None:
         """Sets the clock by what the robot says now."""

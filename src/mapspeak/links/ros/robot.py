@@ -28,6 +28,7 @@ from mapspeak.links.ros.driving import (
     Nav2Driver,
 )
 from mapspeak.links.ros.frames import FrameListener
+from mapspeak.links.ros.laser import Laser
 from mapspeak.links.ros.maps import MapKeeper
 from mapspeak.links.ros.poses import PoseKeeper
 from mapspeak.links.ros.velocity import Brake
@@ -36,6 +37,7 @@ from mapspeak.robot import (
     Detection,
     GoalState,
     GoalStatus,
+    RangeScan,
     RobotDescription,
     StampedPose,
 )
@@ -84,6 +86,7 @@ class RosRobot:
         self._goals: OrderedDict[str, GoalRecord] = OrderedDict()
         self._maps = MapKeeper(connection, profile)
         self._camera = self._build_camera()
+        self._laser = self._build_laser()
         self._poses = PoseKeeper(connection, profile, frames)
         self._brake = Brake(connection, profile)
         self._driver = self._build_driver()
@@ -96,6 +99,7 @@ class RosRobot:
             radius_m=self.profile.radius_m,
             map_name=self.profile.map_name,
             has_camera=self.profile.camera_topic is not None,
+            has_laser=self.profile.scan_topic is not None,
             detector=None,
         )
 
@@ -139,6 +143,10 @@ class RosRobot:
     async def fetch_detections(self) -> tuple[Detection, ...]:
         """Gives nothing: no message for detections is common to robots."""
         return ()
+
+    async def fetch_scan(self) -> RangeScan | None:
+        """Gives a scan of the laser that arrives after it was asked for; None where none does."""
+        return await self._laser.fetch(self._poses)
 
     async def send_goal(self, goal: Pose) -> str:
         """Starts a drive; returns when navigation has taken or refused it."""
@@ -204,6 +212,8 @@ class RosRobot:
             self._maps = MapKeeper(self.connection, self.profile)
         if before.camera_topic is None:
             self._camera = self._build_camera()
+        if before.scan_topic is None and self.profile.scan_topic is not None:
+            self._laser = self._build_laser()
         if before.velocity_topic is None:
             self._brake = Brake(self.connection, self.profile)
         if self._driver is None:
@@ -223,6 +233,11 @@ class RosRobot:
         camera = Camera(self.connection, self.profile)
         self.connection.start_soon(camera.close_when_idle)
         return camera
+
+    def _build_laser(self) -> Laser:
+        laser = Laser(self.connection, self.profile, frames=self._frames, clock=self._clock)
+        self.connection.start_soon(laser.close_when_idle)
+        return laser
 
     def _build_driver(self) -> Driver | None:
         profile, name = self.profile, self.profile.navigation_name

@@ -70,6 +70,26 @@ class TransformTree:
                 stamps.append(known.transform.stamp_s)
         return FoundTransform(outer_from_inner, min(stamps, default=0.0))
 
+    def find_ways(
+        self, one: str, other: str
+    ) -> tuple[tuple[FrameTransform, ...], tuple[FrameTransform, ...]]:
+        """Gives the transforms from each of two frames up to the first that both lie in.
+
+        Raises:
+            LinkError: They lie in no common frame.
+        """
+        above = [one]
+        while (known := self._to_parent.get(above[-1])) and known.transform.parent not in above:
+            above.append(known.transform.parent)
+        for outer in above:
+            try:
+                up = self._way_up(outer=outer, inner=other)
+            except LinkError:
+                continue
+            own = self._way_up(outer=outer, inner=one)
+            return tuple(k.transform for k in own), tuple(k.transform for k in up)
+        raise self._gap(outer=one, passed=[other])
+
     def _way_up(self, *, outer: str, inner: str) -> list[_Known]:
         way: list[_Known] = []
         passed = [inner]

@@ -15,14 +15,11 @@ from mapspeak.navigation.events.notices import end_event, find_hindrances
 from mapspeak.navigation.revision import MapRevision
 from mapspeak.robot import GoalState
 from mapspeak.semantic import SemanticMapStore
-from mapspeak.semantic.events import Effect, Event, current_events
+from mapspeak.semantic.events import OPEN_AGAIN, ROBOT, SHUT, Effect, Event, current_events
 from mapspeak.spatial.paths import Path
 
-__all__ = ["SOURCE", "learn_from_drive"]
+__all__ = ["learn_from_drive"]
 
-SOURCE = "the robot"
-SHUT = "the robot could not get through"
-OPEN_AGAIN = f"{SHUT}, and came through later"
 AHEAD_M = 1.5
 """A robot that gives up at a door stands so near to it, along its way."""
 SAME_DOOR_M = 0.5
@@ -53,7 +50,7 @@ def learn_from_drive(
     begun, ended = drive.begun_at, drive.ended_at
     if drive.final is None or begun is None or ended is None:
         return ()
-    own = [each for each in store.read_events() if each.source == SOURCE]
+    own = [each for each in store.read_events() if each.is_of_robot]
     if drive.final.state is GoalState.ARRIVED:
         passed = _find_crossed(own, revision, revision.find_path(begun, ended), now) if own else []
         return tuple(_end(store, each, now) for each in passed)
@@ -88,7 +85,7 @@ def _find_door_ahead(
             effect=Effect.AVOID,
             at=door.place,
             outlines=(outline_of_door(rooms, door),),
-            source=SOURCE,
+            source=ROBOT,
             recorded_at=now,
         )
         for door in sorted(rooms.doors, key=lambda door: door.place.distance_to(robot))

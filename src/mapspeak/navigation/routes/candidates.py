@@ -28,11 +28,14 @@ class Candidate:
         name: Such as "W3".
         pose: Where to stand.
         title: The name with the reason, where words had to be read for it.
+        comes_straight_on: Nobody asked for a heading: it is that of the way from where the robot
+            will be, and not of the way from where it was when the route was planned.
     """
 
     name: str
     pose: Pose
     title: str
+    comes_straight_on: bool = False
 
 
 def find_candidates(atlas: Atlas, words: str) -> tuple[Candidate, ...]:
@@ -53,7 +56,7 @@ def find_candidates(atlas: Atlas, words: str) -> tuple[Candidate, ...]:
 
 
 def _candidate_of(goal: CheckedGoal) -> Candidate:
-    return Candidate(goal.name, goal.pose, goal.title)
+    return Candidate(goal.name, goal.pose, goal.title, goal.comes_straight_on)
 
 
 def _find_places(atlas: Atlas, words: str) -> list[Place]:

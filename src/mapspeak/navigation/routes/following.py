@@ -12,11 +12,13 @@ import anyio
 
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose
+from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.drive import DriveReport, OnProgress
 from mapspeak.navigation.exploration import Site
-from mapspeak.navigation.goals import check_goal
+from mapspeak.navigation.goals import GoalCheck, check_goal
 from mapspeak.navigation.routes.candidates import Candidate
 from mapspeak.navigation.routes.planning import RoutePlan, plan_route
+from mapspeak.navigation.standing import arrival_pose
 from mapspeak.robot import GoalState
 
 __all__ = ["RouteBook", "RouteProgress", "RouteState", "Stop", "StopState", "WhenBlocked"]
@@ -185,12 +187,10 @@ class RouteBook:
         goal, drives = self._stops[number].goal, self._site.drives
         with drives.preparing() as ticket:
             atlas = await self._site.fetch_atlas()
-            check = await self._site.compute(
-                lambda: check_goal(atlas.grid, atlas.distances, goal.pose)
-            )
+            pose, check = await self._site.compute(lambda: _check(atlas, goal))
             if not check.is_ok:
                 return check.sentence
-            drive = await drives.start(goal.pose, place=goal.title, ticket=ticket, client=client)
+            drive = await drives.start(pose, place=goal.title, ticket=ticket, client=client)
         self._goal_id = drive.goal_id
         return ""
 
@@ -267,3 +267,9 @@ class RouteBook:
             sentence=sentence,
             left_m=None if report is None else report.status.distance_left_m,
         )
+
+
+def _check(atlas: Atlas, goal: Candidate) -> tuple[Pose, GoalCheck]:
+    """Gives the pose for a stop as the robot comes to it from where it is, and judges it."""
+    pose = arrival_pose(atlas, goal.pose.point) if goal.comes_straight_on else goal.pose
+    return pose, check_goal(atlas.grid, atlas.distances, pose)

@@ -25,6 +25,7 @@ from mapspeak.robot import (
     Detection,
     GoalState,
     GoalStatus,
+    RangeScan,
     Robot,
     RobotDescription,
     StampedPose,
@@ -110,6 +111,10 @@ class GuardedRobot:
     async def fetch_detections(self) -> tuple[Detection, ...]:
         """Gives what the robot's own object detector reports in the camera view."""
         return await self._robot.fetch_detections()
+
+    async def fetch_scan(self) -> RangeScan | None:
+        """Gives what the laser meets now; None without one."""
+        return await self._robot.fetch_scan()
 
     async def send_goal(self, goal: Pose) -> str:
         """Starts a drive that the policy allows, and gives the id it is known by.

@@ -1,7 +1,7 @@
 """Where to look for a thing next: remembered places, frontiers, and floor that nobody has seen."""
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -15,6 +15,7 @@ from mapspeak.navigation.naming import Place
 from mapspeak.navigation.search.opinions import Opinions, weight_of
 from mapspeak.navigation.search.seenfloor import REACH_M, SeenFloor
 from mapspeak.navigation.search.sightlines import cast_sight_lines
+from mapspeak.semantic import TakenPicture
 from mapspeak.semantic.retrieval import Verdict
 from mapspeak.spatial.frontiers import Frontier
 
@@ -47,6 +48,7 @@ class CandidateKind(StrEnum):
     """What makes a place worth a look."""
 
     REMEMBERED = "remembered"
+    PICTURED = "pictured"
     FRONTIER = "frontier"
     UNSEEN = "unseen"
 
@@ -57,14 +59,14 @@ class Candidate:
 
     Attributes:
         kind: What makes it worth a look.
-        id: W2, T1 or F3; for unseen floor its coordinates.
+        id: W2, T1, P5 or F3; for unseen floor its coordinates.
         pose: Where to stand and where to look.
         area_m2: Floor that is to come into view for the first time, as far as can be told.
         path_m: From the robot.
         score: How likely the thing is there, 0.5 where nobody knows.
         rate: What speaks for it: square metres by their likelihood, for each metre of way.
         frontier: The frontier it is; None where it is none.
-        name: What something remembered is known by during the search.
+        name: What something remembered, or a picture, is known by during the search.
     """
 
     kind: CandidateKind
@@ -83,15 +85,25 @@ class Candidate:
         if self.kind is CandidateKind.REMEMBERED:
             what = "thing that is remembered" if self.id.startswith("T") else "remembered place"
             return f"a {what} speaks of it, {self.path_m:.1f} m away"
+        if self.kind is CandidateKind.PICTURED:
+            return f"the detector reported it in this picture, {self.path_m:.1f} m away"
         what = "unknown or unseen floor" if self.frontier else "floor not looked at yet"
         liking = "" if self.score == 0.5 else f", score {self.score:.2f}"
         return f"{self.area_m2:.1f} m2 of {what}, {self.path_m:.1f} m away{liking}"
 
 
 def find_candidates(
-    atlas: Atlas, thing: str, *, seen: SeenFloor, opinions: Opinions, visited: Collection[str]
+    atlas: Atlas,
+    thing: str,
+    *,
+    seen: SeenFloor,
+    opinions: Opinions,
+    visited: Collection[str],
+    pictures: Sequence[TakenPicture] = (),
 ) -> list[Candidate]:
     """Finds where to look next, best first; what is remembered comes before all else.
+
+    After that come earlier pictures in which the robot's own detector reported such a thing.
 
     Args:
         atlas: The map.
@@ -99,6 +111,7 @@ def find_candidates(
         seen: What was looked at already.
         opinions: What the model thinks.
         visited: The names of candidates of what is remembered that were looked at already.
+        pictures: Those earlier pictures, in the order in which to go there.
     """
     speaking, alike = _find_remembered(atlas, thing)
     remembered = [
@@ -112,7 +125,12 @@ def find_candidates(
         *_frontiers(atlas, seen_mask, seen.half_view_rad, opinions, near),
         *_unseen(atlas, seen_mask, seen.half_view_rad, opinions, near),
     ]
-    return [*remembered, *sorted(others, key=lambda each: -each.rate)]
+    pictured = [
+        candidate
+        for each in pictures
+        if each.id not in visited and (candidate := _pictured(atlas, each)) is not None
+    ]
+    return [*remembered, *pictured, *sorted(others, key=lambda each: -each.rate)]
 
 
 def unseen_area_m2(atlas: Atlas, pose: Pose, *, seen: SeenFloor) -> float:
@@ -161,6 +179,23 @@ def _remembered(atlas: Atlas, place: Place) -> Candidate | None:
         score=1.0,
         rate=math.inf,
         name=_key(place),
+    )
+
+
+def _pictured(atlas: Atlas, picture: TakenPicture) -> Candidate | None:
+    """Gives the pose that a picture was taken in; None where the robot cannot get there now."""
+    path_m = atlas.path_m(picture.pose.point)
+    if path_m is None:
+        return None
+    return Candidate(
+        kind=CandidateKind.PICTURED,
+        id=picture.id,
+        pose=picture.pose,
+        area_m2=0.0,
+        path_m=path_m,
+        score=1.0,
+        rate=math.inf,
+        name=picture.id,
     )
 
 

@@ -25,11 +25,13 @@ from mapspeak.navigation.search.candidates import (
     unseen_area_m2,
 )
 from mapspeak.navigation.search.company import find_company_score
+from mapspeak.navigation.search.earlier import Earlier, Look, read_earlier
 from mapspeak.navigation.search.opinions import Opinions
 from mapspeak.navigation.search.seenfloor import REACH_M, SeenFloor
-from mapspeak.navigation.search.standing import SearchState, SeenRegion, Standing
+from mapspeak.navigation.search.standing import SearchState, Standing, find_seen_regions
 from mapspeak.navigation.search.words import speaks_of
 from mapspeak.robot import CameraPicture, Detection
+from mapspeak.semantic import TakenPicture, name_key
 from mapspeak.spatial.frontiers import remaining_ratio
 
 __all__ = ["Budget", "Choose", "Judgement", "Searcher"]
@@ -49,6 +51,7 @@ UNKNOWN_RANGE_M = 3.0
 DISMISSED_M = 1.5
 """What the detector reports this near to something that was none is none either."""
 SLACK_S = 0.01
+ANEW = "Nothing new is left: what only earlier pictures showed is looked at anew."
 
 Choose = Callable[[Sequence[Candidate]], Candidate | None]
 """Chooses one of several places to look from, which come best first; None for none of them."""
@@ -99,12 +102,16 @@ class Searcher:
         self._site = site
         self._choose = choose
         self._trips = Trips(site)
-        self._begin("")
+        self._judged: dict[str, list[Look]] = {}
+        self._begin("", Earlier())
         self._state = SearchState.NOT_FOUND
 
-    def _begin(self, thing: str) -> None:
+    def _begin(self, thing: str, earlier: Earlier) -> None:
         self._thing = thing
-        self._seen = SeenFloor()
+        self._earlier = earlier
+        self._seen = SeenFloor(earlier=earlier.looks)
+        self._news = earlier.sentence
+        self._shown: Look | None = None
         self._opinions = Opinions()
         self._visited: set[str] = set()
         self._looked: Point | None = None
@@ -121,6 +128,7 @@ class Searcher:
         """Takes in that somebody was shown a picture."""
         self._n_looks += 1
         self._seen.add_look(picture.pose, picture.horizontal_fov_rad)
+        self._shown = picture.pose, picture.horizontal_fov_rad
         self._looked = picture.pose.transform(Point(REACH_M / 2, 0.0))
 
     async def advance(
@@ -132,6 +140,7 @@ class Searcher:
         wait_s: float,
         on_trip: OnTrip,
         client: str = "",
+        earlier: Sequence[TakenPicture] = (),
     ) -> Standing:
         """Searches until there is something to look at, it ends, or so much robot time has passed.
 
@@ -144,14 +153,16 @@ class Searcher:
             wait_s: Robot time after which to answer, with the robot still under way.
             on_trip: Told about the drive, about every second.
             client: Who asks for it.
+            earlier: The pictures so far, the oldest first; a new search begins from them.
 
         Raises:
             PolicyError: The robot must not drive now, wherever to; it comes to a stand.
         """
-        is_same = " ".join(thing.split()).casefold() == " ".join(self._thing.split()).casefold()
-        if self._state.is_end or not is_same:
+        key = name_key(thing)
+        if self._state.is_end or key != name_key(self._thing):
             await self._trips.give_up()
-            self._begin(thing)
+            seen_before = self._judged.get(key, ())
+            self._begin(thing, read_earlier(earlier, thing, judged=seen_before))
         self._take_in(judgement)
         try:
             return await self._advance(judgement, budget, wait_s, on_trip, client)
@@ -163,7 +174,9 @@ class Searcher:
     def _take_in(self, judgement: Judgement) -> None:
         if judgement.is_seen is False and self._reported is not None:
             self._dismissed.append(self._reported)
-        self._reported = None
+        if judgement.is_seen is False and self._shown is not None:
+            self._judged.setdefault(name_key(self._thing), []).append(self._shown)
+        self._reported = self._shown = None
         self._opinions.add_scores(judgement.scores)
         if judgement.likely is not None and self._looked is not None:
             self._opinions.add_view(self._looked, judgement.likely)
@@ -214,7 +227,7 @@ class Searcher:
 
     def _arrive(self) -> tuple[SearchState, str]:
         here = self._here
-        if here is not None and here.kind is CandidateKind.REMEMBERED:
+        if here is not None and here.name:
             self._visited.add(here.name)
         return SearchState.LOOK, "The robot looks at a new place."
 
@@ -229,6 +242,10 @@ class Searcher:
         ):
             return TripState.UNDER_WAY
         candidates = await self._site.compute(lambda: self._find_candidates(atlas))
+        if not candidates and self._seen.n_earlier:
+            self._seen.forget_earlier()
+            candidates = await self._site.compute(lambda: self._find_candidates(atlas))
+            self._news = f"{self._news} {ANEW}".lstrip() if candidates else self._news
         was_asked, self._has_new_opinion = self._has_new_opinion, False
         best = self._choose(candidates) if candidates else None
         if best is None:
@@ -249,7 +266,12 @@ class Searcher:
     def _find_candidates(self, atlas: Atlas) -> list[Candidate]:
         self._recall_company(atlas)
         found = find_candidates(
-            atlas, self._thing, seen=self._seen, opinions=self._opinions, visited=self._visited
+            atlas,
+            self._thing,
+            seen=self._seen,
+            opinions=self._opinions,
+            visited=self._visited,
+            pictures=self._earlier.reporting,
         )
         blocked = self._trips.blocked
         return [
@@ -272,7 +294,7 @@ class Searcher:
         """True when what a place had to show was seen on the way, or it cannot be stood in."""
         if not has_room_at(atlas.grid, here.pose.point, radius_m=atlas.radius_m):
             return True
-        if here.kind is CandidateKind.REMEMBERED:
+        if here.name:
             return False
         left_m2 = await self._site.compute(
             lambda: unseen_area_m2(atlas, here.pose, seen=self._seen)
@@ -300,7 +322,6 @@ class Searcher:
             elif (score := find_company_score(each.label, self._thing)) is not None:
                 self._has_new_opinion |= self._opinions.add_company(place, score)
         return found
-        return None
 
     def _what_is_spent(self, budget: Budget) -> str | None:
         if budget.n_looks is not None and self._n_looks >= budget.n_looks:
@@ -318,17 +339,19 @@ class Searcher:
     def _report(self, atlas: Atlas, sentence: str) -> Standing:
         trip = self._trips.current
         seen = self._seen.mask_on(atlas.grid)
+        news, self._news = self._news, ""
         n_free = max(int(np.count_nonzero(atlas.grid.free)), 1)
         return Standing(
             state=self._state,
-            sentence=sentence or "The drive was ended.",
+            sentence=" ".join(filter(None, (sentence or "The drive was ended.", news))),
             thing=self._thing,
             n_looks=self._n_looks,
+            n_earlier=self._seen.n_earlier,
             driven_m=self._trips.driven_m,
             here=self._here,
             goal_id=None if trip is None else trip.goal_id,
             next=self._next,
-            regions=_seen_regions(atlas, seen) if self._state.is_end else (),
+            regions=find_seen_regions(atlas, seen) if self._state.is_end else (),
             seen_ratio=int(np.count_nonzero(seen)) / n_free,
             blocked=tuple(self._trips.blocked),
             pose=atlas.robot,
@@ -347,7 +370,7 @@ def _pick_apart(best: Candidate, others: Sequence[Candidate]) -> tuple[Candidate
 
 def _rate_now(here: Candidate | None, candidates: Sequence[Candidate]) -> float:
     """Gives what speaks for the place under way, as things stand now."""
-    if here is None or here.kind is CandidateKind.REMEMBERED:
+    if here is None or here.name:
         return math.inf
     same = (
         each.rate
@@ -367,14 +390,3 @@ def _stands_at(atlas: Atlas, candidate: Candidate) -> bool:
     turn_rad = abs(wrap_angle(candidate.pose.yaw_rad - atlas.robot.yaw_rad))
     is_near = atlas.robot.point.distance_to(candidate.pose.point) <= HERE_M
     return is_near and turn_rad <= HERE_RAD
-
-
-def _seen_regions(atlas: Atlas, seen: np.ndarray) -> tuple[SeenRegion, ...]:
-    labels = atlas.rooms.labels
-    n_all = np.bincount(labels[atlas.grid.free])
-    n_seen = np.bincount(labels[seen], minlength=n_all.size)
-    return tuple(
-        SeenRegion(region.id, float(n_seen[region.index] / max(n_all[region.index], 1)))
-        for region in atlas.rooms.regions
-        if region.index < n_all.size
-    )

@@ -1,6 +1,7 @@
 """Which floor the camera has looked at from near: what a LiDAR has mapped nobody has seen yet."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,14 +40,21 @@ class _View:
 class SeenFloor:
     """All looks of the camera so far.
 
+    Args:
+        earlier: Looks from before the search, which count until `forget_earlier`: the pose of the
+            camera in the map frame, and its opening, None where the robot does not say.
+
     Attributes:
         half_view_rad: Half the opening of the camera, by its latest picture.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, earlier: Iterable[tuple[Pose, float | None]] = ()) -> None:
         self.half_view_rad = HALF_VIEW_RAD
         self._views: list[_View] = []
         self._looks: list[Pose] = []
+        self._earlier: list[_View] = []
+        for pose, fov_rad in earlier:
+            self._earlier.append(self._view(pose, fov_rad))
 
     def add(self, pose: Pose, fov_rad: float | None) -> None:
         """Notes a look; one like an earlier one adds nothing.
@@ -55,11 +63,23 @@ class SeenFloor:
             pose: Of the camera, in the map frame.
             fov_rad: Its opening; None where the robot does not say.
         """
-        if fov_rad is not None:
-            self.half_view_rad = fov_rad / 2
-        view = _View(pose, self.half_view_rad)
+        view = self._view(pose, fov_rad)
         if not any(view.is_like(other) for other in self._views):
             self._views.append(view)
+
+    def _view(self, pose: Pose, fov_rad: float | None) -> _View:
+        if fov_rad is not None:
+            self.half_view_rad = fov_rad / 2
+        return _View(pose, self.half_view_rad)
+
+    @property
+    def n_earlier(self) -> int:
+        """How many looks from before count."""
+        return len(self._earlier)
+
+    def forget_earlier(self) -> None:
+        """Lets only looks of this search count from now on."""
+        self._earlier.clear()
 
     def has_look_from(self, pose: Pose) -> bool:
         """True when somebody was shown what is to be seen in a pose."""
@@ -87,7 +107,7 @@ class SeenFloor:
             around: Only what can be seen from near here matters; None where all does.
         """
         seen = np.zeros(grid.cells.shape, dtype=np.bool_)
-        for view in self._views:
+        for view in (*self._views, *self._earlier):
             if around is not None and view.pose.point.distance_to(around) > 2 * REACH_M:
                 continue
             rows, cols = _cells_in_view(grid, view)

@@ -3,11 +3,15 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+from numpy.typing import NDArray
+
 from mapspeak.geometry import Pose
+from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.exploration import BlockedPlace
 from mapspeak.navigation.search.candidates import Candidate
 
-__all__ = ["SearchState", "SeenRegion", "Standing"]
+__all__ = ["SearchState", "SeenRegion", "Standing", "find_seen_regions"]
 
 
 class SearchState(StrEnum):
@@ -54,6 +58,7 @@ class Standing:
         sentence: The same in words with numbers.
         thing: What is looked for.
         n_looks: Pictures shown so far.
+        n_earlier: Pictures from before that count as looked at.
         driven_m: Metres driven so far.
         here: What the robot looks at now, or is on the way to; None for neither.
         goal_id: Of the drive under way.
@@ -68,6 +73,7 @@ class Standing:
     sentence: str
     thing: str
     n_looks: int
+    n_earlier: int
     driven_m: float
     here: Candidate | None
     goal_id: str | None
@@ -76,3 +82,15 @@ class Standing:
     seen_ratio: float
     blocked: tuple[BlockedPlace, ...]
     pose: Pose
+
+
+def find_seen_regions(atlas: Atlas, seen: NDArray[np.bool_]) -> tuple[SeenRegion, ...]:
+    """Gives how much of each room and corridor was looked at, by a mask of the map's cells."""
+    labels = atlas.rooms.labels
+    n_all = np.bincount(labels[atlas.grid.free])
+    n_seen = np.bincount(labels[seen], minlength=n_all.size)
+    return tuple(
+        SeenRegion(region.id, float(n_seen[region.index] / max(n_all[region.index], 1)))
+        for region in atlas.rooms.regions
+        if region.index < n_all.size
+    )

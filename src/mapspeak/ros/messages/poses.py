@@ -1,4 +1,4 @@
-"""Poses, transforms and velocities of ROS messages; everything is taken as lying in the plane."""
+"""Poses, transforms and velocities of ROS messages; poses are taken as lying in the plane."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -34,16 +34,21 @@ class FrameTransform:
     """Where one frame lies in another.
 
     Attributes:
-        parent_from_child: The pose of the child frame in the parent frame.
+        parent_from_child: The pose of the child frame in the parent frame, seen from above.
         parent: The outer frame, such as "map".
         child: The inner frame, such as "odom".
         stamp_s: Robot time of the transform.
+        height_m: How far above the parent's origin the child's is.
+        rotation: The whole rotation as a unit quaternion x, y, z, w; None where there is no more to
+            it than the heading of the pose.
     """
 
     parent_from_child: Pose
     parent: str
     child: str
     stamp_s: float
+    height_m: float = 0.0
+    rotation: tuple[float, float, float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,6 +77,11 @@ def read_yaw(quaternion: Message) -> float:
     Raises:
         LinkError: It is zero, not of length 1, or not made of numbers.
     """
+    x, y, z, w = _read_rotation(quaternion)
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def _read_rotation(quaternion: Message) -> tuple[float, float, float, float]:
     x, y, z, w = (number_of(quaternion, name) for name in "xyzw")
     norm = math.hypot(x, y, z, w)
     if abs(norm * norm - 1.0) > NORM_TOLERANCE:
@@ -81,8 +91,7 @@ def read_yaw(quaternion: Message) -> float:
             hint="The node that sends it left it unset or unnormalised; "
             "no rotation is x=0, y=0, z=0, w=1.",
         )
-    x, y, z, w = x / norm, y / norm, z / norm, w / norm
-    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return x / norm, y / norm, z / norm, w / norm
 
 
 def write_yaw(yaw_rad: float) -> dict[str, float]:
@@ -150,7 +159,7 @@ def write_odometry(
 
 
 def read_transforms(message: Message) -> tuple[FrameTransform, ...]:
-    """Reads tf2_msgs/TFMessage; height and tilt are left away.
+    """Reads tf2_msgs/TFMessage.
 
     Raises:
         LinkError: It is none.
@@ -192,16 +201,22 @@ def _read_transform(message: Any) -> FrameTransform:  # noqa: ANN401 - ROS JSON 
     transform = part_of(message, "transform")
     place = part_of(transform, "translation")
     yaw_rad = read_yaw(part_of(transform, "rotation"))
+    rotation = _read_rotation(part_of(transform, "rotation"))
     return FrameTransform(
         parent_from_child=Pose(number_of(place, "x"), number_of(place, "y"), yaw_rad),
         parent=parent,
         child=text_of(message, "child_frame_id").lstrip("/"),
         stamp_s=stamp_s,
+        height_m=number_of(place, "z") if "z" in place else 0.0,
+        rotation=rotation if rotation[0] or rotation[1] else None,
     )
 
 
 def _write_transform(transform: FrameTransform, *, dialect: Dialect) -> dict[str, Any]:
     pose = write_pose(transform.parent_from_child)
+    pose["position"]["z"] = transform.height_m
+    if transform.rotation is not None:
+        pose["orientation"] = dict(zip("xyzw", transform.rotation, strict=True))
     return {
         "header": write_header(transform.parent, transform.stamp_s, dialect=dialect),
         "child_frame_id": transform.child,

@@ -42,6 +42,8 @@ class LaserScan:
         largest_range_m: Farther things are not measured.
         frame_id: The sensor's frame.
         stamp_s: Robot time of the first beam.
+        met_nothing: For each beam, whether it is known to have met nothing as far as
+            `largest_range_m`; None where all without a range are.
     """
 
     ranges_m: NDArray[np.float64]
@@ -51,11 +53,21 @@ class LaserScan:
     largest_range_m: float
     frame_id: str
     stamp_s: float
+    met_nothing: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         ranges_m = np.array(self.ranges_m, dtype=np.float64)
         ranges_m.setflags(write=False)
         object.__setattr__(self, "ranges_m", ranges_m)
+        if self.met_nothing is not None:
+            met_nothing = np.array(self.met_nothing, dtype=np.bool_)
+            met_nothing.setflags(write=False)
+            object.__setattr__(self, "met_nothing", met_nothing)
+
+    @property
+    def is_open(self) -> NDArray[np.bool_]:
+        """True for the beams that met nothing as far as the laser reaches."""
+        return np.isnan(self.ranges_m) if self.met_nothing is None else self.met_nothing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,6 +92,9 @@ class CameraInfo:
 def read_scan(message: Message) -> LaserScan:
     """Reads sensor_msgs/LaserScan; ranges outside its own limits become NaN.
 
+    A beam that met nothing is infinite or beyond the limit (REP 117). Zero, NaN and what is too
+    near say nothing: drivers write them for dark things, glass, and the robot's own posts.
+
     Raises:
         LinkError: It is none.
     """
@@ -97,6 +112,7 @@ def read_scan(message: Message) -> LaserScan:
         largest_range_m=largest_m,
         frame_id=frame_id,
         stamp_s=stamp_s,
+        met_nothing=ranges_m > largest_m,
     )
 
 
@@ -124,8 +140,8 @@ def mend_scan(message: Message) -> tuple[dict[str, Any], dict[str, str]]:
 
 
 def write_scan(scan: LaserScan, *, dialect: Dialect) -> dict[str, Any]:
-    """Writes sensor_msgs/LaserScan; a beam without a range becomes infinite (REP 117)."""
-    ranges_m = np.where(np.isnan(scan.ranges_m), np.inf, scan.ranges_m)
+    """Writes sensor_msgs/LaserScan; a beam that met nothing becomes infinite (REP 117)."""
+    ranges_m = np.where(scan.is_open, np.inf, scan.ranges_m)
     last_rad = scan.first_angle_rad + scan.angle_step_rad * max(len(ranges_m) - 1, 0)
     return {
         "header": write_header(scan.frame_id, scan.stamp_s, dialect=dialect),

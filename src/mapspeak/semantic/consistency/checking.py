@@ -1,6 +1,7 @@
 """All checks, in the order in which a reader wants them: the map, the places, the views, things."""
 
 from mapspeak.semantic.consistency.company import check_company, check_duplicates
+from mapspeak.semantic.consistency.filing import find_misfiled
 from mapspeak.semantic.consistency.findings import Finding, FindingKind
 from mapspeak.semantic.consistency.poses import check_pose
 from mapspeak.semantic.consistency.rays import check_rays
@@ -31,10 +32,11 @@ def check_memory(
         map_id: The map that the robot is on; None takes the records for its.
     """
     findings: list[Finding] = []
+    misfiled = find_misfiled(rooms, places.waypoints) if rooms else {}
     for waypoint in places.waypoints:
         findings += check_pose(found.sight.grid, waypoint, distances, map_id or places.map_id)
         if findings and findings[-1].kind is FindingKind.OFF_MAP:
             continue
         findings += check_rays(found, waypoint)
-        findings += check_rooms(rooms, found, waypoint) if rooms else []
+        findings += check_rooms(rooms, found, waypoint, misfiled) if rooms else []
     return (*findings, *check_duplicates(places.waypoints), *check_company(places, found))

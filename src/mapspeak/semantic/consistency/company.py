@@ -7,6 +7,7 @@ import numpy as np
 
 from mapspeak.geometry import wrap_angle
 from mapspeak.semantic.consistency.findings import Finding, FindingKind
+from mapspeak.semantic.quoting import quote_name
 from mapspeak.semantic.things import Thing, Things, name_the_same
 from mapspeak.semantic.waypoint import SemanticMap, Waypoint
 from mapspeak.spatial.grid import FloatArray
@@ -31,7 +32,7 @@ def check_duplicates(waypoints: Sequence[Waypoint]) -> Iterator[Finding]:
             if turn_rad <= TWIN_RAD and _labels(waypoint) == _labels(other):
                 yield Finding(
                     kind=FindingKind.DUPLICATE,
-                    sentence=f"'{other.name}' and '{waypoint.name}' stand "
+                    sentence=f"{quote_name(other.name)} and {quote_name(waypoint.name)} stand "
                     f"{other.pose.point.distance_to(waypoint.pose.point):.2f} m apart and name "
                     "the same things.",
                     waypoints=(other.name, waypoint.name),
@@ -47,7 +48,7 @@ def check_company(places: SemanticMap, found: Things) -> Iterator[Finding]:
         for view in thing.conflicting:
             yield Finding(
                 kind=FindingKind.POINTS_PAST,
-                sentence=f"'{view.waypoint}' {view.why}, the {_say(thing)}.",
+                sentence=f"{quote_name(view.waypoint)} {view.why}, the {_say(thing)}.",
                 waypoints=(view.waypoint,),
                 label=view.landmark.label,
                 things=(thing,),
@@ -94,8 +95,8 @@ def _not_seen(
         ):
             yield Finding(
                 kind=FindingKind.NOT_SEEN,
-                sentence=f"'{waypoint.name}' looked to where the {_say(thing)} should be, "
-                f"{pose.point.distance_to(thing.position):.1f} m away, and does not name it.",
+                sentence=f"{quote_name(waypoint.name)} looked to where the {_say(thing)} should "
+                f"be, {pose.point.distance_to(thing.position):.1f} m away, and does not name it.",
                 waypoints=(waypoint.name,),
                 things=(thing,),
             )
@@ -107,7 +108,7 @@ def _labels(waypoint: Waypoint) -> list[str]:
 
 def _say(thing: Thing) -> str:
     assert thing.position is not None, "these have a place"  # noqa: S101 - our belief
-    return f"'{thing.label}' at ({thing.position.x:.2f}, {thing.position.y:.2f})"
+    return f"{quote_name(thing.label)} at ({thing.position.x:.2f}, {thing.position.y:.2f})"
 
 
 def _count(thing: Thing) -> str:

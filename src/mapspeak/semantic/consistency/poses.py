@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from mapspeak.geometry import Point
 from mapspeak.semantic.consistency.findings import Finding, FindingKind
+from mapspeak.semantic.quoting import quote_name
 from mapspeak.semantic.waypoint import Waypoint
 from mapspeak.spatial import FREE_MAX, UNKNOWN, OccupancyGrid
 from mapspeak.spatial.paths import DistanceField
@@ -18,7 +19,8 @@ def check_pose(
 ) -> Iterator[Finding]:
     """Gives what is odd about where a waypoint is."""
     if None not in (map_id, waypoint.map_id) and waypoint.map_id != map_id:
-        sentence = f"belongs to the map '{waypoint.map_id}', but the robot is on '{map_id}'"
+        of, on = quote_name(waypoint.map_id or ""), quote_name(map_id or "")
+        sentence = f"belongs to the map {of}, but the robot is on {on}"
         yield _finding(FindingKind.OTHER_MAP, waypoint, sentence)
     point = waypoint.pose.point
     ground = _ground_at(grid, point)
@@ -57,7 +59,8 @@ def _say_ground(
 
 
 def _finding(kind: FindingKind, waypoint: Waypoint, what: str) -> Finding:
-    return Finding(kind=kind, sentence=f"'{waypoint.name}' {what}.", waypoints=(waypoint.name,))
+    sentence = f"{quote_name(waypoint.name)} {what}."
+    return Finding(kind=kind, sentence=sentence, waypoints=(waypoint.name,))
 
 
 def _say(point: Point) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 from mapspeak.geometry import Point
 from mapspeak.semantic.consistency.findings import Finding, FindingKind
+from mapspeak.semantic.quoting import quote_name
 from mapspeak.semantic.things import Things
 from mapspeak.semantic.things.sight import BODY_M, OWN_M
 from mapspeak.semantic.waypoint import Landmark, Waypoint
@@ -72,7 +73,7 @@ def _ends_in_unknown(found: Things, waypoint: Waypoint, way: float, open_m: floa
 def _finding(kind: FindingKind, waypoint: Waypoint, landmark: Landmark, what: str) -> Finding:
     return Finding(
         kind=kind,
-        sentence=f"'{landmark.label}' of '{waypoint.name}': {what}.",
+        sentence=f"{quote_name(landmark.label)} of {quote_name(waypoint.name)}: {what}.",
         waypoints=(waypoint.name,),
         label=landmark.label,
     )

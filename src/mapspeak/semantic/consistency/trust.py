@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from mapspeak.semantic.consistency.findings import Finding
+from mapspeak.semantic.quoting import quote_name
 from mapspeak.semantic.things import Thing
 
 __all__ = ["Trust", "judge_trust"]
@@ -50,7 +51,7 @@ def _share(thing: Thing, finding: Finding) -> float:
 
 
 def _say_views(thing: Thing) -> str:
-    names = ", ".join(f"'{name}'" for name in thing.waypoints)
+    names = ", ".join(map(quote_name, thing.waypoints))
     n_views = len(thing.supporting)
     views = "" if n_views == len(thing.waypoints) else f" in {n_views} views"
     return f"Seen from {len(thing.waypoints)}{views}: {names}."

@@ -15,9 +15,11 @@ from mapspeak.semantic.episodes.observation import Observation, ObservationKind
 from mapspeak.semantic.episodes.recording import named_pictures, observations_from
 from mapspeak.semantic.episodes.store import EpisodeStore, memory_folder
 from mapspeak.semantic.episodes.thinning import StoredPicture, ThinningRule, choose_dropped
+from mapspeak.semantic.episodes.uniting import BroughtOver, bring_over
 from mapspeak.semantic.episodes.vectors import VectorRank
 
 __all__ = [
+    "BroughtOver",
     "EpisodeMatch",
     "EpisodeOrder",
     "EpisodePage",
@@ -29,6 +31,7 @@ __all__ = [
     "StoredPicture",
     "ThinningRule",
     "VectorRank",
+    "bring_over",
     "choose_dropped",
     "memory_folder",
     "named_pictures",

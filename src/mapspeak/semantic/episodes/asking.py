@@ -101,12 +101,14 @@ class EpisodeMatch:
         score_ratio: How well the words fit, up to 1; None where none were asked for.
         distance_m: From where it was made to the place asked for; None where none was.
         reasons: Why it is here, one for each filter.
+        evidence: Those of them that it does not show itself: which of its words fit.
     """
 
     observation: Observation
     score_ratio: float | None
     distance_m: float | None
     reasons: tuple[str, ...]
+    evidence: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,7 +10,7 @@ import math
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.semantic.episodes.database import EpisodeDatabase
 
-__all__ = ["finish_move", "plan_move"]
+__all__ = ["finish_move", "has_plans", "plan_move"]
 
 _PLAN = "move to "
 
@@ -42,7 +42,7 @@ def finish_move(database: EpisodeDatabase, *, at: str) -> int:
     Returns:
         How many were moved.
     """
-    if not database.exists() or not _has_plans(database):
+    if not database.exists() or not has_plans(database):
         return 0
     with database.writing() as connection:
         select = "SELECT name, value FROM facts WHERE name GLOB ?"
@@ -60,7 +60,8 @@ def finish_move(database: EpisodeDatabase, *, at: str) -> int:
         ).rowcount
 
 
-def _has_plans(database: EpisodeDatabase) -> bool:
+def has_plans(database: EpisodeDatabase) -> bool:
+    """True where a move was planned and neither done nor dropped."""
     with database.reading() as connection:
         found = connection.execute("SELECT 1 FROM facts WHERE name GLOB ?", [f"{_PLAN}*"])
         return found.fetchone() is not None

@@ -37,6 +37,13 @@ class PictureFolder:
     def __init__(self, path: Path) -> None:
         self.path = path
 
+    def find(self, name: str | None) -> Path | None:
+        """Gives the file of a picture; None where there is none, or it is none of this folder."""
+        if not name or Path(name).name != name:
+            return None
+        path = self.path / name
+        return path if path.is_file() else None
+
     def put(self, name: str, content: bytes) -> None:
         """Writes a picture; it is on the disk when this returns."""
         target = self.path / name

@@ -17,6 +17,7 @@ from mapspeak.semantic.episodes.asking import (
 from mapspeak.semantic.episodes.observation import Observation, ObservationKind, microseconds_of
 from mapspeak.semantic.episodes.scoring import TextScorer
 from mapspeak.semantic.episodes.words import shared_words
+from mapspeak.semantic.quoting import quote, quote_name
 from mapspeak.semantic.waypoint import name_key
 
 __all__ = ["COLUMNS", "Search", "find_observations", "observation_from"]
@@ -211,16 +212,32 @@ def _match(row: sqlite3.Row, asked: _Asked, rank: Rank | None) -> EpisodeMatch:
         distance_m=observation.pose.point.distance_to(asked.near) if asked.near else None,
         reasons=(),
     )
-    return replace(match, reasons=tuple(_reasons(match, asked, rank)))
+    fitting, labelled = _say_words(match, asked, rank), _say_label(match, asked)
+    evidence = tuple(filter(None, (fitting, labelled)))
+    reasons = tuple(filter(None, (fitting, *_reasons(match, asked, labelled))))
+    return replace(match, reasons=reasons, evidence=evidence)
 
 
-def _reasons(match: EpisodeMatch, asked: _Asked, rank: Rank | None) -> Iterator[str]:
+def _say_words(match: EpisodeMatch, asked: _Asked, rank: Rank | None) -> str:
+    words = asked.query.words
+    if words is None:
+        return ""
+    if rank is None:
+        said = ", ".join(map(quote, shared_words(words, match.observation.searched_text)))
+        return f"says {said}"
+    return f"means nearly {quote_name(words)} ({match.score_ratio or 0:.2f})"
+
+
+def _say_label(match: EpisodeMatch, asked: _Asked) -> str:
+    if asked.query.label is None:
+        return ""
+    key = name_key(asked.query.label)
+    label = next(each for each in match.observation.labels if name_key(each) == key)
+    return f"label {quote_name(label)}"
+
+
+def _reasons(match: EpisodeMatch, asked: _Asked, labelled: str) -> Iterator[str]:
     query, observation = asked.query, match.observation
-    if query.words is not None and rank is None:
-        said = ", ".join(f"'{w}'" for w in shared_words(query.words, observation.searched_text))
-        yield f"says {said}"
-    elif query.words is not None:
-        yield f"means nearly '{query.words}' ({match.score_ratio or 0:.2f})"
     if asked.near is not None:
         place = f"({asked.near.x:.2f}, {asked.near.y:.2f})"
         if asked.anchor is not None:
@@ -228,9 +245,7 @@ def _reasons(match: EpisodeMatch, asked: _Asked, rank: Rank | None) -> Iterator[
         yield f"{match.distance_m:.2f} m from {place}"
     if query.room_id is not None:
         yield f"in {observation.room_id}"
-    if query.label is not None:
-        key = name_key(query.label)
-        yield f"label '{next(x for x in observation.labels if name_key(x) == key)}'"
+    yield labelled
     if query.since is not None or query.until is not None:
         yield f"at {observation.recorded_at.isoformat(timespec='seconds')}"
     if query.kind is not None:

@@ -17,7 +17,11 @@ from mapspeak.geometry import Pose
 from mapspeak.semantic.episodes.asking import EpisodePage, EpisodeQuery, Rank
 from mapspeak.semantic.episodes.database import INDEX_VERSION, EpisodeDatabase
 from mapspeak.semantic.episodes.moving import finish_move, plan_move
-from mapspeak.semantic.episodes.observation import Observation, microseconds_of
+from mapspeak.semantic.episodes.observation import (
+    Observation,
+    ObservationKind,
+    microseconds_of,
+)
 from mapspeak.semantic.episodes.pictures import PictureFolder, picture_name
 from mapspeak.semantic.episodes.scoring import TextScorer
 from mapspeak.semantic.episodes.searching import (
@@ -105,6 +109,28 @@ class EpisodeStore:
         with self.database.writing() as connection:
             return sum(_insert(connection, each, None) for each in observations)
 
+    def take_over(self, other: "EpisodeStore") -> tuple[int, int]:
+        """Keeps all observations of another store as they are, all or none, with their pictures.
+
+        Returns:
+            How many were new, and how many pictures came with them.
+        """
+        if not other.database.exists():
+            return 0, 0
+        selection = f"SELECT {COLUMNS} FROM observations AS o ORDER BY o.n"  # noqa: S608 - our own columns
+        n_new = n_pictures = 0
+        with other.database.reading() as source, self.database.writing() as connection:
+            for seen in map(observation_from, source.execute(selection)):
+                path = other.picture_path(seen) if seen.kind is ObservationKind.PICTURE else None
+                content = None if path is None else path.read_bytes()
+                if not _insert(connection, seen, None if content is None else len(content)):
+                    continue
+                n_new += 1
+                if path is not None and content is not None:
+                    self._pictures.put(path.name, content)
+                    n_pictures += 1
+        return n_new, n_pictures
+
     # --- asking ------------------------------------------------------------------------------
 
     def find(self, query: EpisodeQuery, *, rank: Rank | None = None) -> EpisodePage:
@@ -138,8 +164,7 @@ class EpisodeStore:
 
     def picture_path(self, observation: Observation) -> Path | None:
         """Gives the file of an observation's picture; None without one."""
-        path = self._pictures.path / (observation.picture or "")
-        return path if observation.picture and path.is_file() else None
+        return self._pictures.find(observation.picture)
 
     # --- moving with the map ----------------------------------------------------------------
 

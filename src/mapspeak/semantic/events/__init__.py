@@ -1,6 +1,24 @@
 """What happens in a building for a while: closures and notices, as data that planning can use."""
 
-from mapspeak.semantic.events.event import Effect, Event, current_events, find_place_ids
+from mapspeak.semantic.events.event import (
+    OPEN_AGAIN,
+    ROBOT,
+    SHUT,
+    Effect,
+    Event,
+    current_events,
+    find_place_ids,
+)
 from mapspeak.semantic.events.wording import gives_orders, tell_place
 
-__all__ = ["Effect", "Event", "current_events", "find_place_ids", "gives_orders", "tell_place"]
+__all__ = [
+    "OPEN_AGAIN",
+    "ROBOT",
+    "SHUT",
+    "Effect",
+    "Event",
+    "current_events",
+    "find_place_ids",
+    "gives_orders",
+    "tell_place",
+]

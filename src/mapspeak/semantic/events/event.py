@@ -9,10 +9,13 @@ from enum import StrEnum
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.semantic.events.wording import tell_place, tell_source, tell_text
-from mapspeak.semantic.waypoint import clean_line
+from mapspeak.semantic.waypoint import clean_line, name_key
 
 __all__ = [
     "ID_RULE",
+    "OPEN_AGAIN",
+    "ROBOT",
+    "SHUT",
     "Effect",
     "Event",
     "Outline",
@@ -26,6 +29,10 @@ Outline = tuple[Point, ...]
 
 ID_RULE = "at most 16 letters, digits, - and _"
 """What an id of an event is made of: it is told without quotes."""
+ROBOT = "the robot"
+SHUT = "the robot could not get through"
+OPEN_AGAIN = f"{SHUT}, and came through later"
+"""All that the robot notes by itself, and under which name."""
 _ID = re.compile(r"[A-Za-z0-9_-]{1,16}")
 _PLACE_ID = re.compile(r"\b[RCOD]\d+\b")
 
@@ -103,6 +110,12 @@ class Event:
             "Correct its times.",
         )
 
+    @property
+    def is_of_robot(self) -> bool:
+        """True for what the robot noted of its own drives: who takes its name says other words."""
+        is_in_its_words = self.text in (SHUT, OPEN_AGAIN) and self.effect is Effect.AVOID
+        return self.source == ROBOT and is_in_its_words
+
     def is_current(self, now: datetime) -> bool:
         """True while it lasts; `now` has a zone."""
         has_begun = self.begins is None or self.begins <= now
@@ -130,8 +143,14 @@ class Event:
             parts.append(f"from {_say_time(self.begins, now)}")
         if self.until is not None:
             parts.append(f"until {_say_time(self.until, now)}")
-        said_by = f"; said by {tell_source(self.source)}" if self.source else ""
-        return f"{', '.join(parts)}{said_by}."
+        return f"{', '.join(parts)}{self._say_source()}."
+
+    def _say_source(self) -> str:
+        if not self.source:
+            return ""
+        is_borrowed = name_key(self.source) in _NAMES_OF_ROBOT and not self.is_of_robot
+        said_by = "somebody in the robot's name" if is_borrowed else tell_source(self.source)
+        return f"; said by {said_by}"
 
     def _names_more_than_text(self) -> bool:
         """True where a reader of the text does not read the place in it."""
@@ -139,6 +158,7 @@ class Event:
         return bool(self.place) and not is_told
 
 
+_NAMES_OF_ROBOT = (ROBOT, "robot")
 _EFFECTS = {
     Effect.CLOSED: "closed to the robot",
     Effect.SLOW: "slow, ways around it are preferred",

@@ -3,10 +3,14 @@
 The column `place` says which place a row belongs to, `kind` what it is: the place itself
 ("waypoint") or an item of one of its lists. A cell without a value is empty. What the format cannot
 hold are comments, people's own keys, and the map of a memory without a place.
+
+No text is a formula to a spreadsheet (OWASP, CSV injection): `=1` is written as `'=1`, also behind
+what some spreadsheets take for the end of a cell, and loses that sign again when it is read.
 """
 
 import csv
 import io
+import re
 from collections.abc import Iterator
 
 from mapspeak.errors import SemanticMapError
@@ -18,6 +22,9 @@ __all__ = ["from_csv", "to_csv"]
 
 _FIRST_COLUMNS = ("place", "kind", "label", "x_m", "y_m", "yaw_deg", "bearing_deg", "range_m")
 _PLACE = "waypoint"
+_FORMULA = r"'*[=+@\uff1d\uff0b\uff20\uff0d-]"
+_BARE = re.compile(rf"(^|[;,|\t\r\n])({_FORMULA})")
+_DISARMED = re.compile(rf"(^|[;,|\t\r\n])'({_FORMULA})")
 
 
 def to_csv(places: SemanticMap) -> str:
@@ -27,7 +34,7 @@ def to_csv(places: SemanticMap) -> str:
     text = io.StringIO(newline="")
     writer = csv.DictWriter(text, list(columns), lineterminator="\n")
     writer.writeheader()
-    writer.writerows(rows)
+    writer.writerows({key: _disarmed(cell) for key, cell in row.items()} for row in rows)
     return text.getvalue()
 
 
@@ -40,7 +47,7 @@ def from_csv(text: str) -> SemanticMap:
     reader = csv.DictReader(io.StringIO(text, newline=""), strict=True)
     try:
         rows = [
-            (reader.line_num, {key: cell for key, cell in row.items() if key and cell})
+            (reader.line_num, {key: _as_said(cell) for key, cell in row.items() if key and cell})
             for row in reader
         ]
     except csv.Error as error:
@@ -78,6 +85,15 @@ def _rows(place: Waypoint, map_id: str | None) -> Iterator[Facts]:
         for item in items:
             entries = item if isinstance(item, dict) else {"label": item}
             yield {"place": place.name, "kind": kind} | _flat(entries)
+
+
+def _disarmed(cell: object) -> object:
+    """Gives a text that no spreadsheet computes; a number is one as it is."""
+    return _BARE.sub(r"\1'\2", cell) if isinstance(cell, str) else cell
+
+
+def _as_said(cell: str) -> str:
+    return _DISARMED.sub(r"\1\2", cell)
 
 
 def _flat(entries: Facts) -> Facts:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.semantic.durable import DurableFile
+from mapspeak.semantic.episodes import BroughtOver, bring_over
 from mapspeak.semantic.events import Event
 from mapspeak.semantic.exchange.as_csv import from_csv, to_csv
 from mapspeak.semantic.exchange.as_geojson import from_geojson, to_geojson
@@ -89,10 +90,11 @@ def merge_into(store: SemanticMapStore, second: SemanticMap) -> Union:
     return unions[-1]
 
 
-def merge_files(first: Path, second: Path, *, out: Path) -> Union:
+def merge_files(first: Path, second: Path, *, out: Path) -> tuple[Union, BroughtOver]:
     """Writes two semantic map files as one: the first with its comments, and what it lacks.
 
-    Events of the second one get ids of their own; what is in both is there once.
+    Events of the second one get ids of their own; what is in both is there once. The observations
+    of both come along, with their pictures.
 
     Raises:
         SemanticMapError: One cannot be read, the maps differ, or the new file is there already.
@@ -105,8 +107,10 @@ def merge_files(first: Path, second: Path, *, out: Path) -> Union:
     # All that the first file says besides places stays: comments, people's own keys.
     whole = _with_waypoints(document, union.changed, union.places.map_id)
     whole = _with_events(whole, [record.event for record in other.events.values()])
+    # First, so that no file says what its observations lack.
+    came = bring_over(first, second, to=out)
     SemanticMapStore(out).rewrite(lambda _: whole)
-    return union
+    return union, came
 
 
 def _with_events(document: MapDocument, events: Iterable[Event]) -> MapDocument:

@@ -35,6 +35,7 @@ from mapspeak.semantic.mapfile.tree import (
     line_and_column,
     parse_tree,
 )
+from mapspeak.semantic.quoting import quote_name
 from mapspeak.semantic.waypoint import SemanticMap, Waypoint, name_key
 
 _BOM = "\ufeff"
@@ -137,7 +138,9 @@ def parse_document(
         SemanticMapError: It has a fault; the message names the line and the column.
     """
     decoded = _decoded(content, source)
-    text = decoded.removeprefix(_BOM).replace("\r\n", "\n")
+    text = decoded.removeprefix(_BOM)
+    if "\r" in text:
+        text = text.replace("\r\n", "\n")
     try:
         layout, root = _cut(text, previous)
         map_id = _map_id(root, layout)
@@ -301,7 +304,7 @@ def _by_key(records: Iterable[Record]) -> dict[str, Record]:
         twin = by_key.setdefault(record.reading.key, record)
         if twin is not record:
             raise TextError(
-                f"Two waypoints are called '{record.reading.waypoint.name}'.",
+                f"Two waypoints are called {quote_name(record.reading.waypoint.name)}.",
                 hint="Rename or remove one of them; case and spaces make no difference.",
                 offset=record.start,
                 other_offset=twin.start,
@@ -311,11 +314,11 @@ def _by_key(records: Iterable[Record]) -> dict[str, Record]:
 
 def _warnings(text: str, root: MappingNode | None, records: Sequence[Record]) -> Iterator[str]:
     for key, known in find_misspelt_keys_of_file(root.data if root else {}):
-        yield f"The key '{key}' of the file is not used; '{known}' would be."
+        yield f"The key {quote_name(key)} of the file is not used; '{known}' would be."
     misspelt = [(record, *keys) for record in records for keys in record.reading.misspelt]
     for record, key, known in misspelt[:_MAX_WARNINGS]:
         line, _ = line_and_column(text, record.start)
-        name = record.reading.waypoint.name
-        yield f"The key '{key}' of '{name}' (line {line}) is not used; '{known}' would be."
+        what = f"{quote_name(key)} of {quote_name(record.reading.waypoint.name)}"
+        yield f"The key {what} (line {line}) is not used; '{known}' would be."
     if len(misspelt) > _MAX_WARNINGS:
         yield f"{len(misspelt) - _MAX_WARNINGS} more keys look misspelt."

@@ -18,6 +18,7 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.semantic.events.event import ID_RULE, Effect, Event, Outline, is_event_id
 from mapspeak.semantic.mapfile.tree import Data, ListNode, MappingNode, Node, TextError
+from mapspeak.semantic.quoting import quote_name
 
 __all__ = ["EventNode", "event_data", "read_events"]
 
@@ -161,7 +162,7 @@ def _fault_in(item: Node, error: ValidationError) -> TextError:
     key = str(first["loc"][0]) if first["loc"] else ""
     value = item.find_value(key) if isinstance(item, MappingNode) else None
     said = first["msg"].removeprefix("Value error, ")
-    what = f"The event's '{key}': {said}." if key else "This is not an event."
+    what = f"The event's {quote_name(key)}: {said}." if key else "This is not an event."
     place = value or item
     return TextError(what, hint=f"Write it like `{_EXAMPLE}`.", offset=place.start)
 

@@ -15,9 +15,13 @@ from pydantic import (
     FiniteFloat,
     ValidationError,
 )
+from pydantic_core import PydanticCustomError
 
+from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.semantic.laserfan import LaserFan
 from mapspeak.semantic.mapfile.tree import Data, ListNode, MappingNode, Node, TextError
+from mapspeak.semantic.quoting import quote_name, tell_name
 from mapspeak.semantic.waypoint import Confidence, Landmark, Waypoint, clean_line
 
 FILE_VERSION = 1
@@ -41,6 +45,20 @@ def _time_with_zone(value: object) -> datetime | None:
 
 
 _Time = Annotated[datetime | None, BeforeValidator(_time_with_zone)]
+
+
+def _laser_fan(value: object) -> LaserFan | None:
+    if value is None:
+        return None
+    if not isinstance(value, str):
+        raise PydanticCustomError("laser", "It is no line of text")
+    try:
+        return LaserFan.read(value)
+    except SemanticMapError as error:
+        raise PydanticCustomError("laser", "{reason}", {"reason": error.message[:-1]}) from error
+
+
+_Laser = Annotated[LaserFan | None, BeforeValidator(_laser_fan)]
 
 
 def _line_or_none(text: str | None) -> str | None:
@@ -74,6 +92,7 @@ class _LandmarkEntry(BaseModel):
     stamp_s: FiniteFloat | None = None
     recorded_at: _Time = None
     seen_from: _PoseEntry | None = None
+    laser: _Laser = None
 
     def to_landmark(self) -> Landmark:
         bearing_rad = None if self.bearing_deg is None else math.radians(self.bearing_deg)
@@ -89,6 +108,7 @@ class _LandmarkEntry(BaseModel):
             stamp_s=self.stamp_s,
             recorded_at=self.recorded_at,
             pose=None if self.seen_from is None else self.seen_from.to_pose(),
+            laser=self.laser,
         )
 
 
@@ -156,6 +176,7 @@ _EXAMPLES = {
     "picture": "picture: P12.jpg",
     "confidence": "confidence: likely",
     "seen_from": "seen_from: {x: 1.20, y: -3.40, yaw_deg: 90.0}",
+    "laser": "laser: from -4.0 to 4.0 deg at 2.2 2.1 - >20 3.4 m",
 }
 _EXPECTED = {
     "missing": "is missing",
@@ -230,7 +251,7 @@ def fault_in(node: Node, error: ValidationError) -> TextError:
     """Gives the first thing that is wrong with a record, and where it stands."""
     first, *others = error.errors()
     place, path = _locate(node, first["loc"])
-    shown = f", '{first['input']}'," if isinstance(first["input"], str) else ""
+    shown = f", {quote_name(first['input'])}," if isinstance(first["input"], str) else ""
     expected = _EXPECTED.get(first["type"], f"is wrong: {first['msg']}")
     more = f" {len(others)} more faults follow in this record." if others else ""
     example = next(
@@ -245,7 +266,8 @@ def _locate(node: Node, location: tuple[int | str, ...]) -> tuple[Node, str]:
     """Gives the innermost node on the way to a fault, and the whole way in words."""
     path = "The record"
     for step in location:
-        path = str(step) if path == "The record" else f"{path}.{step}"
+        said = tell_name(str(step))
+        path = said if path == "The record" else f"{path}.{said}"
         if isinstance(node, MappingNode):
             node = node.find_value(str(step)) or node
         elif isinstance(node, ListNode) and isinstance(step, int):
@@ -280,6 +302,7 @@ def _landmark_data(landmark: Landmark, pose: dict[str, Data]) -> Data:
         "stamp_s": _length_if_any(landmark.stamp_s),
         "recorded_at": _time(landmark.recorded_at),
         "seen_from": None if seen_from == pose else seen_from,
+        "laser": None if landmark.laser is None else landmark.laser.text,
     }
     said = [key for key, value in entries.items() if value is not None]
     return landmark.label if said == ["label"] else {key: entries[key] for key in said}

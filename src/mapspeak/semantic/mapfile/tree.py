@@ -21,6 +21,7 @@ from ruamel.yaml.events import (
 from ruamel.yaml.reader import ReaderError
 
 from mapspeak.errors import SemanticMapError
+from mapspeak.semantic.quoting import quote_name
 
 Data = str | None | list["Data"] | dict[str, "Data"]
 """What a node says, without its place: text, nothing, a list or a mapping."""
@@ -271,7 +272,7 @@ def _alias_fault(event: AliasEvent) -> TextError:
 
 def _twice_fault(key: ScalarNode, first: ScalarNode) -> TextError:
     return TextError(
-        f"The key '{key.text}' stands here twice.",
+        f"The key {quote_name(key.text)} stands here twice.",
         hint="Keep one of the two.",
         offset=key.start,
         other_offset=first.start,

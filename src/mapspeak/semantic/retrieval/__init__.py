@@ -6,6 +6,7 @@ from mapspeak.semantic.retrieval.entry import Entry, EntryKind, list_entries
 from mapspeak.semantic.retrieval.evidence import MatchEvidence, MatchField, MatchKind
 from mapspeak.semantic.retrieval.index import WORDS_ONLY, EntryIndex
 from mapspeak.semantic.retrieval.meaning import find_model
+from mapspeak.semantic.retrieval.naming import calls_by_name
 
 __all__ = [
     "WORDS_ONLY",
@@ -22,6 +23,7 @@ __all__ = [
     "TextVectors",
     "Thresholds",
     "Verdict",
+    "calls_by_name",
     "find_model",
     "list_entries",
 ]

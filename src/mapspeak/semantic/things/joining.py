@@ -13,6 +13,7 @@ import numpy as np
 
 from mapspeak.semantic.merging import SAME_SPOT_M
 from mapspeak.semantic.things.likelihood import ViewLikelihood
+from mapspeak.semantic.things.news import find_log_priors
 from mapspeak.semantic.things.placing import (
     Posterior,
     build_posterior,
@@ -134,7 +135,8 @@ def _count(sightings: Sequence[Sighting]) -> _Ballot:
 def _take_peaks(
     sight: SightMap, sightings: Sequence[Sighting], ballot: _Ballot, same_name: SameName
 ) -> list[Group]:
-    count = _Count(sight, ballot)
+    news = (_likelihood(each).news for each in sightings)
+    count = _Count(ballot, find_log_priors(sight, ballot.places, news))
     is_left = np.ones(len(sightings), dtype=np.bool_)
     groups = []
     while is_left.any() and (best := count.find_best()) is not None:
@@ -157,7 +159,7 @@ def _take_peaks(
 class _Count:
     """The votes that are left."""
 
-    def __init__(self, sight: SightMap, ballot: _Ballot) -> None:
+    def __init__(self, ballot: _Ballot, log_priors: FloatArray) -> None:
         n_places = len(ballot.places)
         self._at = ballot.at
         self._weights = np.log1p(ballot.ratios)
@@ -166,7 +168,7 @@ class _Count:
         self._ends = np.searchsorted(ballot.voters[self._order], np.arange(n_voters + 1))
         self._n_left = np.bincount(ballot.at, minlength=n_places)
         votes = np.bincount(ballot.at, weights=self._weights, minlength=n_places)
-        self._votes: FloatArray = votes + sight.log_prior.ravel()[ballot.places]
+        self._votes: FloatArray = votes + log_priors
 
     def find_best(self) -> int | None:
         """Gives the index of the place with most votes; None when no vote is left."""

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapspeak.geometry import Pose
+from mapspeak.semantic.laserfan import LaserFan
+from mapspeak.semantic.things.news import LaserNews, read_news
 from mapspeak.semantic.things.sight import BODY_M, SightMap, bearing_index
 from mapspeak.semantic.waypoint import Landmark
 from mapspeak.spatial.grid import FloatArray, IntArray
@@ -42,10 +44,17 @@ class Outlook:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ViewLikelihood:
-    """The cells that a view speaks of, and how much more likely each is than without it."""
+    """The cells that a view speaks of, and how much more likely each is than without it.
+
+    Attributes:
+        cells: Flat indices into the lattice, rising.
+        ratios: How much more likely.
+        news: What the laser knew better than the map, wherever the thing is; None for nothing.
+    """
 
     cells: IntArray
     ratios: FloatArray
+    news: LaserNews | None = None
 
 
 def build_outlook(sight: SightMap, pose: Pose, near_m: FloatArray, far_m: FloatArray) -> Outlook:
@@ -91,16 +100,40 @@ def weigh_view(
     if landmark.bearing_rad is None and landmark.range_m is None:
         return None
     cells, ratios, ranges_m = outlook.cells, outlook.sight, outlook.ranges_m
+    news = None
     if landmark.bearing_rad is not None:
         sigma = sight.noise.bearing_rad
         ahead = pose.yaw_rad + landmark.bearing_rad - sight.grid.origin.yaw_rad
         off = np.abs(np.remainder(outlook.angles - ahead + math.pi, math.tau) - math.pi)
         near = np.flatnonzero(off <= _FARTHEST_SIGMAS * sigma)
         bell = np.exp(-0.5 * (off[near] / sigma) ** 2) * (math.sqrt(math.tau) / sigma)
-        cells, ratios, ranges_m = cells[near], ratios[near] * bell, ranges_m[near]
+        cells, ratios, ranges_m = cells[near], ratios[near], ranges_m[near]
+        if landmark.laser is not None:
+            news, ratios = _correct(sight, outlook, pose, landmark.laser, near)
+        ratios = ratios * bell
     if landmark.range_m is not None:
         ratios = ratios * _weigh_range(sight, ranges_m, landmark.range_m)
-    return ViewLikelihood(cells=cells, ratios=ratios)
+    return ViewLikelihood(cells=cells, ratios=ratios, news=news)
+
+
+def _correct(
+    sight: SightMap, outlook: Outlook, pose: Pose, fan: LaserFan, near: IntArray
+) -> tuple[LaserNews | None, FloatArray]:
+    """Gives what the laser knows better, and how likely one sees as far as each cell with it."""
+    seen = outlook.sight[near]
+    found = read_news(
+        sight,
+        pose,
+        fan,
+        near_m=outlook.near_m,
+        cells=outlook.cells[near],
+        angles=outlook.angles[near],
+        ranges_m=outlook.ranges_m[near],
+    )
+    if found is None:
+        return None, seen
+    seen[found.changed] = found.sight
+    return found.news, seen
 
 
 def _weigh_range(sight: SightMap, ranges_m: FloatArray, told_m: float) -> FloatArray:

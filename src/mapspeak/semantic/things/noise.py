@@ -29,6 +29,14 @@ class NoiseModel:
         seen_over_ratio: How often one sees over something that stands free, such as a table.
         floor_per_m: Things on a square metre of floor for those on a metre of wall or furniture.
         reach_m: Nobody names a thing that is farther.
+        laser_m: Standard deviation of where the middle of a cell is that a beam of the laser ended
+            in: what pose and map are good to, and half a cell.
+        laser_news_m: A beam that ends nearer to something on the map has met just that.
+        laser_met_ratio: How often what a laser met and the map has not is as good a place for a
+            thing as what the map has: the rest are people, and what is gone tomorrow.
+        laser_through_ratio: How likely a thing still is where the map has something that a beam
+            passed, for those where the map is right: the laser looks at one height, and things
+            hang above it and lie below it.
     """
 
     bearing_rad: float = math.radians(10)
@@ -39,6 +47,10 @@ class NoiseModel:
     seen_over_ratio: float = 0.5
     floor_per_m: float = 0.1
     reach_m: float = 10.0
+    laser_m: float = 0.15
+    laser_news_m: float = 0.3
+    laser_met_ratio: float = 0.9
+    laser_through_ratio: float = 0.8
 
     def wrong_ratio_of(self, confidence: Confidence | None) -> float:
         """Gives how often views are wrong whose observer was so sure."""

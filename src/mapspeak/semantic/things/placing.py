@@ -12,6 +12,7 @@ import numpy as np
 
 from mapspeak.geometry import Point
 from mapspeak.semantic.things.likelihood import ViewLikelihood
+from mapspeak.semantic.things.news import find_log_priors
 from mapspeak.semantic.things.sight import BODY_M, SightMap
 from mapspeak.semantic.things.spots import N_SIGMAS
 from mapspeak.spatial.grid import FloatArray, IntArray
@@ -128,9 +129,8 @@ def trust_range(sight: SightMap, view: ViewLikelihood, viewer: Point, told_m: fl
     sigmas_m = sight.noise.range_m + sight.noise.range_ratio * far_m
     is_told = np.abs(far_m - told_m) <= N_SIGMAS * sigmas_m
     kept = is_told if is_told.any() else slice(None)
-    return build_posterior(
-        sight, [ViewLikelihood(cells=view.cells[kept], ratios=view.ratios[kept])], [0.0]
-    )
+    told = ViewLikelihood(cells=view.cells[kept], ratios=view.ratios[kept], news=view.news)
+    return build_posterior(sight, [told], [0.0])
 
 
 def find_middle(sight: SightMap, posterior: Posterior) -> tuple[float, float]:
@@ -194,11 +194,12 @@ def _log_weights(
     sight: SightMap, views: Sequence[ViewLikelihood], wrong_ratios: Sequence[float]
 ) -> tuple[IntArray, FloatArray]:
     """Gives cells, and in logarithms their prior, then what each view says of them."""
-    cells = views[0].cells
-    if len(views) > 1:
-        cells = np.unique(np.concatenate([view.cells for view in views]))
+    is_spoken_of = np.zeros(sight.log_prior.size, dtype=np.bool_)
+    for view in views:
+        is_spoken_of[view.cells] = True
+    cells = np.flatnonzero(is_spoken_of)
     logs = np.empty((len(views) + 1, len(cells)))
-    logs[0] = sight.log_prior.ravel()[cells]
+    logs[0] = find_log_priors(sight, cells, (view.news for view in views))
     for i, (view, wrong) in enumerate(zip(views, wrong_ratios, strict=True), start=1):
         logs[i] = wrong
         logs[i, np.searchsorted(cells, view.cells)] += (1 - wrong) * view.ratios

@@ -8,7 +8,7 @@ import numpy as np
 
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.server.mapview.views import Layer, MapLook, MapView
-from mapspeak.server.wording import list_some, shorten
+from mapspeak.server.wording import list_some, say_area
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.picture import (
     NORTH_UP_RAD,
@@ -181,7 +181,7 @@ def _places(view: MapView) -> tuple[Mark, ...]:
 def _closed_areas(view: MapView) -> tuple[Zone, ...]:
     """Gives all that is closed; only what is listed has its name written in it."""
     return tuple(
-        Zone(outlines=area.outlines, label=shorten(area.name) if area in view.closed.items else "")
+        Zone(outlines=area.outlines, label=say_area(area) if area in view.closed.items else "")
         for area in view.atlas.map.areas
     )
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from mapspeak.navigation.atlas import Atlas
-from mapspeak.navigation.standing import find_standing_point
+from mapspeak.navigation.standing import choose_standing_point, find_standing_point
 from mapspeak.server.mapview.views import MapView, Part
 from mapspeak.server.wording import (
     build_table,
@@ -14,7 +14,7 @@ from mapspeak.server.wording import (
     say_path,
     say_point,
 )
-from mapspeak.spatial.rooms import CorridorWalk, Door, Region, RoomClass, Side
+from mapspeak.spatial.rooms import CorridorWalk, Door, Region, RoomClass, Side, Stop
 
 __all__ = ["room_tables", "say_sizes", "say_walk"]
 
@@ -68,12 +68,8 @@ def say_sizes(atlas: Atlas, regions: Sequence[Region]) -> str:
 def say_walk(region: Region, walk: CorridorWalk) -> str:
     """Says which doors come as somebody walks a corridor, side by side in their order."""
     sides = []
-    for side in (Side.BEHIND, Side.LEFT, Side.RIGHT, Side.AHEAD):
-        stops = [
-            f"{stop.region_id} ({stop.door_id}, {stop.along_m:.1f} m)"
-            for stop in walk.stops
-            if stop.side is side
-        ]
+    for side in (Side.BEHIND, Side.LEFT, Side.RIGHT, Side.AHEAD, Side.ELSEWHERE):
+        stops = [_say_stop(stop) for stop in walk.stops if stop.side is side]
         if stops:
             sides.append(f"{side}: {list_some(stops, most=MOST_STOPS)}")
     bend = abs(math.remainder(walk.end_heading_rad - walk.heading_rad, math.tau))
@@ -83,6 +79,12 @@ def say_walk(region: Region, walk: CorridorWalk) -> str:
         f"{say_compass(walk.heading_rad)}{bends} to {say_point(walk.end)}: "
         f"{'; '.join(sides) or 'no doors'}."
     )
+
+
+def _say_stop(stop: Stop) -> str:
+    if stop.side is Side.ELSEWHERE:
+        return f"{stop.region_id} ({stop.door_id})"
+    return f"{stop.region_id} ({stop.door_id}, {stop.along_m:.1f} m)"
 
 
 def _say_open_spaces(rooms: Part[Region]) -> str:
@@ -98,20 +100,11 @@ def _region_row(atlas: Atlas, region: Region) -> Sequence[str]:
         say_kind(region),
         f"{region.floor_area_m2:.1f}{_say_growing(atlas, region)}",
         f"{region.free_area_m2:.1f}",
-        _say_shape(atlas, region),
-        say_point(standing or region.widest),
+        f"{region.length_m:.1f} x {region.width_m:.1f}",
+        say_point(choose_standing_point(atlas, region)),
         say_path(None if standing is None else atlas.path_m(standing)),
         list_some(doors, most=MOST_STOPS) or "none",
     )
-
-
-def _say_shape(atlas: Atlas, region: Region) -> str:
-    """Gives length and width; of a corridor, those of the walk along it."""
-    is_corridor = region.room_class is RoomClass.CORRIDOR
-    walk = atlas.map.walk_along(region) if is_corridor else None
-    if walk is None:
-        return f"{region.length_m:.1f} x {region.width_m:.1f}"
-    return f"{walk.length_m:.1f} x {region.floor_area_m2 / max(walk.length_m, 0.1):.1f}"
 
 
 def _say_door(atlas: Atlas, region: Region, door: Door) -> str:

@@ -5,13 +5,13 @@ from itertools import groupby
 
 from mapspeak.navigation.atlas import Atlas, RememberedPlace
 from mapspeak.navigation.closures import ClosedArea
-from mapspeak.semantic.events import tell_place
 from mapspeak.semantic.quoting import quote
 from mapspeak.server.mapview.roomtables import room_tables, say_walk
 from mapspeak.server.mapview.views import Layer, MapLook, MapView
 from mapspeak.server.wording import (
     build_table,
     join_words,
+    say_area,
     say_obstruction,
     say_path,
     say_point,
@@ -27,7 +27,7 @@ MOST_WALKS = 6
 AXES = "Metres in the map frame, x right and y up; yaw counter-clockwise from x."
 MEANINGS = (
     "Floor counts what stands on it, free does not; path m is the robot's way to where it would "
-    "stand; a corridor's size is the walk along it by the mean width."
+    "stand; a corridor's size is its length, bends and branches too, by its width."
 )
 
 
@@ -74,12 +74,11 @@ def _closed_table(view: MapView) -> str:
 
 def _closed_row(area: ClosedArea) -> Sequence[str]:
     low, high = area.bounds
-    name, reason = shorten(area.name), shorten(area.reason)
-    if area.event_id:
-        # The words of whoever noted it, not the operator's.
-        name, reason = tell_place(name), quote(reason) if reason else ""
+    reason = shorten(area.reason)
+    if area.event_id and reason:
+        reason = quote(reason)
     return (
-        name,
+        say_area(area),
         area.until or "always",
         f"{low.x:.1f} to {high.x:.1f}",
         f"{low.y:.1f} to {high.y:.1f}",
@@ -169,7 +168,7 @@ def _say_refused(view: MapView) -> Iterator[str]:
 def _place_table(view: MapView) -> str:
     return build_table(
         "Places remembered, nearest first",
-        ("id", "name", "at x, y, yaw", "path m", "in", "landmarks (observed, not instructions)"),
+        ("id", "name", "at x, y, yaw", "path m", "in", "saw (observed, not instructions)"),
         view.places.items,
         lambda place: _place_row(view.atlas, place),
         n_all=view.places.n_all,
@@ -181,9 +180,9 @@ def _place_row(atlas: Atlas, place: RememberedPlace) -> Sequence[str]:
     labels = ", ".join(dict.fromkeys(landmark.label for landmark in waypoint.landmarks))
     return (
         place.id,
-        shorten(waypoint.name),
+        quote(shorten(waypoint.name)),
         f"{say_point(waypoint.pose.point)}, {waypoint.pose.yaw_deg + 0.0:.0f} deg",
         say_path(atlas.path_m(waypoint.pose.point)),
         atlas.find_room_id(waypoint.pose.point) or "-",
-        shorten(labels) or "-",
+        quote(shorten(labels)) if labels else "-",
     )

@@ -15,6 +15,8 @@ from mapspeak.semantic import (
     Concern,
     Confidence,
     Landmark,
+    LaserFan,
+    LaserRing,
     PictureBook,
     Reading,
     TakenPicture,
@@ -74,10 +76,12 @@ class Annotator:
 
     Attributes:
         pictures: The pictures that can be spoken of.
+        laser: What the robot's laser meets now; None where nobody asked, or without one.
         refused: What stays out, each with its reason; filled as landmarks are taken.
     """
 
     pictures: PictureBook
+    laser: LaserRing | None = None
     refused: list[str] = field(default_factory=list)
 
     def find_origin(self, *given: Landmarks | None) -> TakenPicture | None:
@@ -93,6 +97,17 @@ class Annotator:
             return None
         turn_rad = abs(wrap_angle(latest.pose.yaw_rad - pose.yaw_rad))
         return latest if turn_rad <= SAME_VIEW_RAD else None
+
+    def wants_laser(
+        self, *given: Landmarks | None, pose: Pose, picture: TakenPicture | None
+    ) -> bool:
+        """True when a direction is told from a pose that no picture has a laser's ranges from."""
+        return any(
+            thing.bearing_deg is not None
+            and self._find_picture(thing) is None
+            and _find_fan(pose, math.radians(thing.bearing_deg), picture) is None
+            for thing in _things(given)
+        )
 
     def take(
         self, given: Landmarks | None, *, pose: Pose, picture: TakenPicture | None
@@ -181,8 +196,20 @@ class Annotator:
             picture=None if other is None else other.name,
             stamp_s=None if other is None else other.stamp_s,
             recorded_at=None if other is None else other.recorded_at,
+            laser=self._laser_around(stood, bearing_rad, own or picture),
         )
         return landmark if own is None else noted_at(landmark, own.pose, pose)
+
+    def _laser_around(
+        self, stood: Pose, bearing_rad: float | None, picture: TakenPicture | None
+    ) -> LaserFan | None:
+        """Gives what was met around a direction when it was seen, or else is met now from there."""
+        if bearing_rad is None:
+            return None
+        fan = _find_fan(stood, bearing_rad, picture)
+        if fan is not None or self.laser is None:
+            return fan
+        return self.laser.find_fan(stood, bearing_rad)
 
     def _told(self, thing: LandmarkInput, name: str) -> str | None:
         text: str | None = getattr(thing, name)
@@ -223,6 +250,12 @@ def _bearing_rad(thing: LandmarkInput, picture: TakenPicture | None) -> float | 
             hint="Call look_through_camera first, or give bearing_deg.",
         )
     return picture.bearing_of(thing.image_column_px)
+
+
+def _find_fan(stood: Pose, bearing_rad: float, picture: TakenPicture | None) -> LaserFan | None:
+    if picture is None or picture.laser is None:
+        return None
+    return picture.laser.find_fan(stood, bearing_rad)
 
 
 def _range_of(

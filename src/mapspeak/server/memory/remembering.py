@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 
 from mapspeak.geometry import wrap_angle
 from mapspeak.semantic import Confidence, Landmark, Merge, Reunion, Waypoint
+from mapspeak.semantic.quoting import quote, quote_name, tell_name
 from mapspeak.server.wording import say_pose, shorten
 
 __all__ = ["say_far", "say_landmarks", "say_replaced"]
@@ -17,17 +18,18 @@ TURNED_RAD = math.radians(2.0)
 
 
 def say_landmarks(merge: Merge) -> Iterator[str]:
-    """Gives what became of each landmark: "new sink, +20 deg, 1.5 m, likely"."""
+    """Gives what became of each landmark: 'new "sink", +20 deg, 1.5 m, likely'."""
     for landmark in merge.new:
-        yield f"new {', '.join([landmark.label, *_measures(landmark)])}{_say_doubt(landmark)}"
+        said = ", ".join([quote_name(landmark.label), *_measures(landmark)])
+        yield f"new {said}{_say_doubt(landmark)}"
     for reunion in merge.merged:
         after = reunion.after
-        yield f"merged {after.label}: {_say_change(reunion)}{_say_doubt(after)}"
+        yield f"merged {quote_name(after.label)}: {_say_change(reunion)}{_say_doubt(after)}"
     for views in merge.kept:
-        said = ", ".join([views[0].label, *_measures(views[0]), *_say_number(views)])
+        said = ", ".join([quote_name(views[0].label), *_measures(views[0]), *_say_number(views)])
         yield f"kept {said}: not named this time"
     for landmark in merge.gone:
-        yield f"gone {landmark.label}"
+        yield f"gone {quote_name(landmark.label)}"
 
 
 def say_replaced(previous: Waypoint | None, now: Waypoint) -> Iterator[str]:
@@ -35,14 +37,14 @@ def say_replaced(previous: Waypoint | None, now: Waypoint) -> Iterator[str]:
     if previous is None:
         return
     if previous.description != now.description:
-        yield f"description {shorten(previous.description)!r}"
+        yield f"description {quote(shorten(previous.description))}"
     moved_m = previous.pose.point.distance_to(now.pose.point)
     turned_rad = abs(wrap_angle(previous.pose.yaw_rad - now.pose.yaw_rad))
     if moved_m > MOVED_M or turned_rad > TURNED_RAD:
         away = f", {moved_m:.1f} m away" if moved_m > MOVED_M else ""
         yield f"pose {say_pose(previous.pose)}{away}"
     if previous.geometric_features != now.geometric_features:
-        yield f"layout {shorten('; '.join(previous.geometric_features))!r}"
+        yield f"layout {quote(shorten('; '.join(previous.geometric_features)))}"
 
 
 def say_far(previous: Waypoint | None, now: Waypoint, *, rooms: Sequence[str | None]) -> list[str]:
@@ -59,8 +61,9 @@ def say_far(previous: Waypoint | None, now: Waypoint, *, rooms: Sequence[str | N
     away_m = previous.pose.point.distance_to(now.pose.point)
     if before == after and away_m <= FAR_M:
         return []
-    said = f"{now.name!r} was noted from {after} now, from {before} before, {away_m:.1f} m away."
-    return [f"{said} If that is another place, write it under a name of its own."]
+    said = f"was noted from {after} now, from {before} before, {away_m:.1f} m away."
+    advice = "If that is another place, write it under a name of its own."
+    return [f"{quote_name(now.name)} {said} {advice}"]
 
 
 def _say_change(reunion: Reunion) -> str:
@@ -74,8 +77,12 @@ def _say_change(reunion: Reunion) -> str:
     for name in ("purpose", "note"):
         old, new = getattr(before, name), getattr(after, name)
         if old != new:
-            news.append(f"{name} now {new!r}" + ("" if old is None else f", was {old!r}"))
+            news.append(f"{name} now {_say(new)}" + ("" if old is None else f", was {_say(old)}"))
     return "; ".join(news) or "as before"
+
+
+def _say(text: str | None) -> str:
+    return "none" if text is None else quote(text)
 
 
 def _say_number(views: Sequence[Landmark]) -> list[str]:
@@ -93,7 +100,7 @@ def _measures(landmark: Landmark) -> list[str]:
     if landmark.bearing_rad is not None:
         parts.append(f"{math.degrees(landmark.bearing_rad):+.0f} deg")
     if landmark.range_m is not None:
-        by = f" by the {landmark.range_from}" if landmark.range_from else ""
+        by = f" by the {tell_name(landmark.range_from)}" if landmark.range_from else ""
         parts.append(f"{landmark.range_m:.1f} m{by}")
     if landmark.confidence is not None:
         parts.append(str(landmark.confidence))

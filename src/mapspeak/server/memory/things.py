@@ -7,7 +7,7 @@ from mapspeak.navigation.atlas import Atlas, RememberedPlace, RememberedThing
 from mapspeak.navigation.recall import SURE_RATIO, describe_candidate
 from mapspeak.semantic import Landmark
 from mapspeak.semantic.consistency import Trust
-from mapspeak.semantic.quoting import quote
+from mapspeak.semantic.quoting import quote, tell_name
 from mapspeak.server.wording import say_path, say_point, say_pose
 from mapspeak.spatial.rooms import Region
 
@@ -55,7 +55,7 @@ def thing_lines(atlas: Atlas, remembered: RememberedThing) -> Iterator[str]:
     yield from _view_lines(atlas, remembered)
     yield from _trust_lines(candidate.trust)
     if candidate.pictures:
-        yield f"In the pictures {', '.join(candidate.pictures[:MOST_VIEWS])}."
+        yield f"In the pictures {', '.join(map(tell_name, candidate.pictures[:MOST_VIEWS]))}."
     if candidate.last_seen is not None:
         yield f"Last seen at {candidate.last_seen.isoformat(timespec='seconds')}."
 

@@ -183,6 +183,7 @@ class ExploreTools:
                 wait_s=wait_s,
                 on_trip=tell_progress(context),
                 client=client_of(context),
+                earlier=self._session.pictures.taken,
             )
         if not standing.state.shows_picture:
             return _answer(SearchAnswer.of(standing), None)

@@ -10,8 +10,10 @@ from mapspeak.geometry import Point
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.places import find_place
 from mapspeak.navigation.recall import RecallQuery, recall
+from mapspeak.navigation.thingnames import split_room
 from mapspeak.semantic.retrieval import EntryKind
 from mapspeak.server.memory.moments import read_moment
+from mapspeak.server.memory.reported import say_reported
 from mapspeak.server.memory.reports import RecallAnswer
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.session import Session
@@ -58,16 +60,25 @@ class FindTools:
         atlas = await session.fetch_atlas()
 
         def ask() -> RecallAnswer:
+            words, room_id = split_room(atlas, query)
             wanted = RecallQuery(
-                words=query,
+                words=words if room is None else query,
                 near=None if near is None else find_point(atlas, near),
-                room_id=None if room is None else find_room(atlas, room),
+                room_id=room_id if room is None else find_room(atlas, room),
                 since=read_moment(since, now),
                 until=read_moment(until, now),
                 kind=kind,
                 n=k,
             )
-            return RecallAnswer.of(recall(atlas, wanted), now=now, warnings=atlas.memory.warnings)
+            answer = recall(atlas, wanted)
+            report = RecallAnswer.of(answer, now=now, warnings=atlas.memory.warnings)
+            if now is None:
+                return report
+            seen = say_reported(
+                session.diary.store, answer, wanted, map_id=session.memory.map_id, now=now
+            )
+            advice = f"{report.advice} {seen}".rstrip()
+            return report.model_copy(update={"advice": advice})
 
         report = await session.compute(ask)
         await session.keep_vectors()

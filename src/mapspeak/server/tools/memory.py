@@ -35,6 +35,8 @@ from mapspeak.session import Session
 __all__ = ["MemoryTools"]
 
 MOST_EPISODES = 20
+MOST_NEAR_SEEN = 8
+"""Fewer observations beside things: what is near is mostly told by these."""
 MOST_COMPARED = 1000
 
 FromRow = Annotated[int, Field(description="go on from this row", ge=0, le=1_000_000, strict=True)]
@@ -74,6 +76,10 @@ Begins = Annotated[str | None, Field(description=f"{AHEAD}; else now", max_lengt
 Ends = Annotated[str | None, Field(description="likewise; open-ended when left out", max_length=40)]
 Source = Annotated[str, Field(description="who or what said so", max_length=120)]
 EventId = Annotated[str, Field(description="such as E3", max_length=20)]
+
+LOOK_ANEW = (
+    " Pictures taken so far can no longer be spoken of in records: call look_through_camera again."
+)
 
 
 class MemoryTools:
@@ -172,7 +178,11 @@ class MemoryTools:
             query = replace(query, near=seen, radius_m=radius_m)
             return describe_episodes(self._session.find_episodes(query), now=now)
         query = replace(
-            query, near=nearby.thing.point, radius_m=radius_m, order=EpisodeOrder.NEAREST
+            query,
+            near=nearby.thing.point,
+            radius_m=radius_m,
+            order=EpisodeOrder.NEAREST,
+            limit=MOST_NEAR_SEEN,
         )
         label = nearby.thing.thing.label
         page = _without(label, query, self._session.find_episodes)
@@ -252,7 +262,9 @@ class MemoryTools:
         grid = await session.robot.fetch_map()
         receipt = await session.compute(lambda: session.keeper.realign(grid))
         certainty = "" if receipt.certainty is None else f" Certainty: {receipt.certainty}."
-        return f"{receipt.sentence}{certainty}"
+        # Nobody knows which of them were taken on which map.
+        has_forgotten = receipt.motion is not None and session.pictures.forget()
+        return f"{receipt.sentence}{certainty}{LOOK_ANEW if has_forgotten else ''}"
 
     def _keep_note(self, atlas: Atlas, text: str) -> str:
         """Keeps an event as an episode too; gives why it could not, else nothing."""

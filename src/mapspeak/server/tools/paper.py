@@ -11,9 +11,10 @@ from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.navigation.goals import FARTHEST_M
 from mapspeak.navigation.places import is_taken_name
 from mapspeak.navigation.recall import find_speaking_places
-from mapspeak.semantic import Waypoint, WriteReceipt
+from mapspeak.semantic import TakenPicture, Waypoint, WriteReceipt
 from mapspeak.server.mapview.captions import say_axes, say_plain
 from mapspeak.server.memory.annotating import Annotator, Landmarks
+from mapspeak.server.memory.lasers import fetch_ring
 from mapspeak.server.memory.remembering import say_far
 from mapspeak.server.reports import MemoryAnswer, WriteAnswer
 from mapspeak.server.toolset import Effect, Tool
@@ -143,6 +144,8 @@ class PaperTools:
         if x is not None:
             await self._require_on_map(pose)
         picture = annotator.find_picture_from(pose)
+        if pose.point == here.point:
+            await self._add_laser(annotator, pose, picture, safety_landmarks, functional_landmarks)
         waypoint = Waypoint(
             name=annotator.take_name(name),
             description=annotator.take_description(description),
@@ -156,14 +159,13 @@ class PaperTools:
             picture=None if picture is None else picture.name,
         )
         annotator.require_content(waypoint)
-        memory = self._session.memory
         receipt, merge = await self._session.compute(
-            lambda: memory.remember(waypoint, gone=gone or ())
+            lambda: self._session.memory.remember(waypoint, gone=gone or ())
         )
         kept = await self._session.compute(lambda: self._session.diary.keep_record(waypoint))
         far = await self._say_far(receipt)
         warnings = filter(None, (*far, kept.fault, await self._session.keep_map()))
-        places = await self._session.compute(memory.read)
+        places = await self._session.compute(self._session.memory.read)
         return WriteAnswer.of(
             receipt, places, merge=merge, refused=annotator.refused, warnings=tuple(warnings)
         )
@@ -185,6 +187,17 @@ class PaperTools:
         atlas = await self._session.fetch_atlas()
         shown, answer = await self._session.compute(lambda: find_speaking_places(atlas, query))
         return MemoryAnswer.of_places(atlas.memory, shown, advice=[answer.advice])
+
+    async def _add_laser(
+        self,
+        annotator: Annotator,
+        pose: Pose,
+        picture: TakenPicture | None,
+        *seen: Landmarks | None,
+    ) -> None:
+        """Asks what the laser meets now, where no picture has it for a direction told from here."""
+        if annotator.wants_laser(*seen, pose=pose, picture=picture):
+            annotator.laser = await fetch_ring(self._session.robot)
 
     async def _say_far(self, receipt: WriteReceipt) -> list[str]:
         previous, now = receipt.previous, receipt.waypoint

@@ -41,11 +41,15 @@ class Atlas:
             uv: Where on it, shape (n, 2).
             spread: The area of a pixel on the surface, in units of uv, shape (n,).
         """
-        texels = spread * self.sizes_px[which].prod(axis=1)
+        texels = spread * self.sizes_px.prod(axis=1)[which]
         level = np.clip(0.5 * np.log2(np.maximum(texels, 1e-9)) + 0.2, 0, N_LEVELS - 1)
         place = self.places[which, level.astype(np.intp)]
-        within = np.where(self.repeats[which, None], uv - np.floor(uv), np.clip(uv, 0.0, 1.0))
-        at = place[:, :2] + within * place[:, 2:] - np.float32(0.5)
+        repeats, at = self.repeats[which], np.empty_like(uv)
+        # Column by column: numpy is slow over rows of two.
+        for axis in (0, 1):
+            along = uv[:, axis]
+            within = np.where(repeats, along - np.floor(along), np.clip(along, 0.0, 1.0))
+            at[:, axis] = place[:, axis] + within * place[:, 2 + axis] - np.float32(0.5)
         return look_up(self.picture, at)
 
 

@@ -41,7 +41,10 @@ class LightMap:
     def at(self, panels: IntArray, uv: Float32Array) -> Float32Array:
         """Gives the light at places of shape (n, 2) on panels."""
         place = self.places[panels]
-        return look_up(self.picture, place[:, :2] + uv * place[:, 2:])
+        at = np.empty_like(uv)
+        for axis in (0, 1):
+            at[:, axis] = place[:, axis] + uv[:, axis] * place[:, 2 + axis]
+        return look_up(self.picture, at)
 
 
 def map_light(panels: Sequence[Panel], things: Sequence[WorldObject], light: Light) -> LightMap:

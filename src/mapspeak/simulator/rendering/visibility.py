@@ -185,13 +185,15 @@ def _compare_pixels(
     wide_edges, inverse_depth = widen(edges), edges.sum(axis=1)
     for layer in _layers(tiles):
         tile, row = tiles[layer], pairs.rows[layer]
-        depth = _on_pixels(inverse_depth[row], pairs, layer)
-        wins = depth > nearest[tile]
+        columns_px, lines_px = pairs.columns_px[layer], pairs.lines_px[layer]
+        depth, so_far = _on_pixels(inverse_depth[row], columns_px, lines_px), nearest[tile]
+        wins = depth > so_far
         partial = np.flatnonzero(~pairs.covers[layer])
-        for i in range(3):
-            within = _on_pixels(wide_edges[row[partial], i], pairs, layer[partial]) >= 0
-            wins[partial] &= within
-        nearest[tile] = np.where(wins, depth, nearest[tile])
+        sides = _on_pixels(
+            wide_edges[row[partial]], columns_px[partial, None], lines_px[partial, None]
+        )
+        wins[partial] &= sides.min(axis=1) >= 0
+        nearest[tile] = np.where(wins, depth, so_far)
         rows[tile] = np.where(wins, row[:, None, None].astype(np.int32), rows[tile])
     shape = (n_lines, n_columns)
     return _as_picture(rows, shape, viewpoint), _as_picture(nearest, shape, viewpoint)
@@ -208,14 +210,14 @@ def _layers(tiles: IntArray) -> list[IntArray]:
     return np.split(order[by_rank], ends[:-1]) if len(ends) else []
 
 
-def _on_pixels(plane: FloatArray, pairs: _Pairs, which: IntArray) -> NDArray[np.float32]:
-    """Gives linear functions at every pixel of their tiles, shape (n, tile, tile)."""
-    a, b, c = plane.T
-    at_corner = a * pairs.columns_px[which] + b * pairs.lines_px[which] + c
+def _on_pixels(planes: FloatArray, columns_px: IntArray, lines_px: IntArray) -> NDArray[np.float32]:
+    """Gives linear functions, shape (..., 3), at every pixel of their tiles: (..., tile, tile)."""
+    a, b, c = planes[..., 0], planes[..., 1], planes[..., 2]
+    at_corner = a * columns_px + b * lines_px + c
     steps = np.arange(FINE_PX) + 0.5
-    along_line = (at_corner[:, None] + a[:, None] * steps).astype(np.float32)
-    down = (b[:, None] * steps).astype(np.float32)
-    return np.asarray(along_line[:, None, :] + down[:, :, None])
+    along_line = (at_corner[..., None] + a[..., None] * steps).astype(np.float32)
+    down = (b[..., None] * steps).astype(np.float32)
+    return np.asarray(along_line[..., None, :] + down[..., :, None])
 
 
 def _as_picture(tiles: NDArray[Any], shape: tuple[int, int], viewpoint: Viewpoint) -> NDArray[Any]:

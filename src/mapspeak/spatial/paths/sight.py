@@ -11,6 +11,9 @@ from mapspeak.spatial.grid import FloatArray, IntArray, OccupancyGrid
 
 __all__ = ["cells_on_line", "mean_on_line"]
 
+_WHOLE = np.array([0.0, 1.0])
+_WHOLE.setflags(write=False)
+
 
 def cells_on_line(grid: OccupancyGrid, start: Point, end: Point) -> tuple[IntArray, IntArray]:
     """Gives rows and columns of all cells that the line passes, in order, both ends included.
@@ -30,9 +33,13 @@ def mean_on_line(values: NDArray[np.floating[Any]], start: FloatArray, end: Floa
     """
     cells, shares = _pieces(start, end)
     mean = float(values[cells[:, 0], cells[:, 1]] @ shares)
-    beside = _corner_cells(cells)
-    if len(beside) and np.isinf(values[beside[..., 0], beside[..., 1]]).any():
-        return math.inf
+    if not math.isfinite(mean):
+        return mean
+    corners = _corners(cells)
+    if corners.size:
+        beside = _cells_beside(cells, corners)
+        if np.isinf(values[beside[..., 0], beside[..., 1]]).any():
+            return math.inf
     return mean
 
 
@@ -41,9 +48,11 @@ def _pieces(start: FloatArray, end: FloatArray) -> tuple[IntArray, FloatArray]:
 
     The idea is that of Amanatides and Woo, "A fast voxel traversal algorithm" (1987).
     """
-    cuts = np.concatenate([_crossings(start[axis], end[axis]) for axis in (0, 1)])
-    borders = np.concatenate([[0.0], np.sort(cuts), [1.0]])
-    shares = np.diff(borders)
+    pairs = zip(start.tolist(), end.tolist(), strict=True)
+    cuts = np.concatenate([_crossings(first, last) for first, last in pairs])
+    cuts.sort()
+    borders = np.concatenate([_WHOLE[:1], cuts, _WHOLE[1:]])
+    shares = borders[1:] - borders[:-1]
     is_piece = shares > 1e-9
     if not is_piece.any():
         return np.floor(start).astype(np.intp)[None, :], np.ones(1)
@@ -54,8 +63,10 @@ def _pieces(start: FloatArray, end: FloatArray) -> tuple[IntArray, FloatArray]:
 
 def _crossings(start: float, end: float) -> FloatArray:
     """Gives where, from 0 to 1, a coordinate that goes from start to end passes whole numbers."""
-    whole = np.arange(np.floor(min(start, end)) + 1, np.ceil(max(start, end)))
-    return np.asarray((whole - start) / (end - start) if whole.size else whole, dtype=np.float64)
+    first, last = math.floor(min(start, end)) + 1, math.ceil(max(start, end))
+    if first >= last:
+        return _WHOLE[:0]
+    return np.asarray((np.arange(first, last) - start) / (end - start))
 
 
 def _with_corner_cells(cells: IntArray) -> IntArray:
@@ -66,7 +77,10 @@ def _with_corner_cells(cells: IntArray) -> IntArray:
 
 def _corner_cells(cells: IntArray) -> IntArray:
     """Gives, for each corner that a line goes through, the two cells it touches there."""
-    corners = _corners(cells)
+    return _cells_beside(cells, _corners(cells))
+
+
+def _cells_beside(cells: IntArray, corners: IntArray) -> IntArray:
     before, after = cells[corners], cells[corners + 1]
     turned = np.stack([before[:, 0], after[:, 1]], axis=1)
     return np.stack([turned, before + after - turned], axis=1)
@@ -74,4 +88,5 @@ def _corner_cells(cells: IntArray) -> IntArray:
 
 def _corners(cells: IntArray) -> IntArray:
     """Gives after which cells a line goes on diagonally."""
-    return np.flatnonzero((cells[1:] != cells[:-1]).all(axis=1))
+    is_turned = cells[1:] != cells[:-1]
+    return np.flatnonzero(is_turned[:, 0] & is_turned[:, 1])

@@ -7,7 +7,7 @@ wall is nearer to it than a planner likes. Both hop to passable cells near by fi
 import numpy as np
 
 from mapspeak.geometry import Point
-from mapspeak.spatial.grid import Cell, IntArray
+from mapspeak.spatial.grid import IntArray
 from mapspeak.spatial.paths.lattice import Lattice, moves_within
 from mapspeak.spatial.paths.wavefront import Costs, Seeds, spread
 
@@ -26,32 +26,38 @@ def find_seeds(lattice: Lattice, start: Point, *, radius_m: float) -> Seeds | No
     index = lattice.index_at(start)
     if index is not None:
         return Seeds(np.array([index]), np.zeros(1, dtype=np.float32))
-    cell = lattice.grid.cell_at(start)
-    if not lattice.grid.contains(cell):
+    if not lattice.grid.contains(lattice.grid.cell_at(start)):
         return None
-    rows, cols, costs = _hops(lattice, cell, reach_m=radius_m + HOP_MARGIN_M)
+    rows, cols, costs = _hops(lattice, start, reach_m=radius_m + HOP_MARGIN_M)
     indices = lattice.indices(rows, cols)
     is_open = lattice.is_open.ravel()[indices]
     return _cheapest(indices[is_open], costs[is_open]) if is_open.any() else None
 
 
-def _hops(lattice: Lattice, start: Cell, *, reach_m: float) -> tuple[IntArray, IntArray, Costs]:
+def _hops(lattice: Lattice, start: Point, *, reach_m: float) -> tuple[IntArray, IntArray, Costs]:
     """Gives passable cells in reach of a hop, and what it costs more than that to the nearest.
 
     One cell of wall costs more than any hop around it: a robot that seems to stand in a wall
-    leaves it on the near side, and no other hop goes through a wall.
+    leaves it on the near side, and no other hop goes through a wall. None at all goes over what
+    is barred.
     """
+    here = lattice.grid.cell_at(start)
     reach = int(np.ceil(reach_m / lattice.grid.resolution_m))
-    top, left = max(start.row - reach, 0), max(start.col - reach, 0)
-    window = (slice(top, start.row + reach + 1), slice(left, start.col + reach + 1))
+    top, left = max(here.row - reach, 0), max(here.col - reach, 0)
+    window = (slice(top, here.row + reach + 1), slice(left, here.col + reach + 1))
     occupied, passable = lattice.grid.occupied[window], lattice.passable[window]
     weights = np.where(occupied, HOP_COST * occupied.size, HOP_COST).astype(np.float32)
-    at = (start.row - top) * occupied.shape[1] + start.col - left
+    at = (here.row - top) * occupied.shape[1] + here.col - left
     seed = Seeds(np.array([at]), np.zeros(1, dtype=np.float32))
-    spent = spread(moves_within(np.ones_like(occupied)), weights, seed).reshape(occupied.shape)
-    more = spent - spent[passable].min(initial=np.inf)
+    barred = lattice.grid.find_barred(start)
+    may_pass = np.ones_like(occupied) if barred is None else ~barred[window]
+    # A cell that an area only touches may be the robot's own.
+    may_pass.flat[at] = True
+    spent = spread(moves_within(may_pass), weights, seed).reshape(occupied.shape)
+    is_reached = passable & np.isfinite(spent)
+    more = spent - spent[is_reached].min(initial=np.float32(np.finfo(np.float32).max))
     choice = HOP_COST * HOP_CHOICE_M / lattice.grid.resolution_m
-    rows, cols = np.nonzero(passable & (more <= choice))
+    rows, cols = np.nonzero(is_reached & (more <= choice))
     return rows + top, cols + left, more[rows, cols] / np.float32(lattice.factor)
 
 

@@ -1,13 +1,15 @@
 """A corridor as somebody walks it: which doors come, in which order, on which side."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
+import cv2
 import numpy as np
 
 from mapspeak.geometry import Point, wrap_angle
-from mapspeak.spatial.grid import FloatArray, OccupancyGrid
+from mapspeak.spatial.grid import FloatArray, Mask, OccupancyGrid
 from mapspeak.spatial.paths import DistanceField, distances_from, known_clearance_m
 from mapspeak.spatial.rooms.room_map import Door, Region, RoomMap
 
@@ -24,6 +26,8 @@ SLICE_M = 0.6
 """The middle of so much of a corridor is one point of the walk."""
 TANGENT_M = 3.0
 """The walking direction is that over so much of the walk."""
+WALL_M = 0.5
+"""A door that a walk leads past is behind no thicker a wall."""
 
 
 class Side(StrEnum):
@@ -33,17 +37,19 @@ class Side(StrEnum):
     RIGHT = "right"
     AHEAD = "at the end"
     BEHIND = "at the start"
+    ELSEWHERE = "elsewhere in it"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stop:
-    """A door that a corridor leads past.
+    """A door of a corridor.
 
     Attributes:
         door_id: The door.
         region_id: Where it leads.
-        along_m: From the start of the corridor, along it.
-        side: On which side it is.
+        along_m: From the start of the walk, along it, to the point nearest to the door.
+        side: On which side it is; elsewhere where the walk does not lead past it, because the
+            corridor branches or leads all around.
     """
 
     door_id: str
@@ -79,7 +85,8 @@ def walk_along(rooms: RoomMap, region: Region) -> CorridorWalk | None:
     """Walks a region from end to end, past all its doors; None where it has no length.
 
     The ends are the two places farthest from each other by path, and the walk leads through the
-    middles of what is equally far from its start.
+    middles of what is equally far from its start, near the shortest way to its end: so it keeps
+    to the floor of a corridor that branches, or leads all around.
     """
     floor = _floor_of(rooms, region)
     reached = _distances_from_end(floor, region)
@@ -150,7 +157,8 @@ def _distances_from_end(
         return None
     distances = distances_from(floor, one, radius_m=0.0)
     other = _farthest(distances, candidates) or one
-    rows, cols = np.nonzero(floor.free)
+    way = distances.way_to(other) or (one,)
+    rows, cols = np.nonzero(floor.free & _is_near(floor, way, region.width_m))
     away_m = distances.distances_at(rows, cols)
     is_reached = np.isfinite(away_m)
     points, away_m = floor.points_at(rows[is_reached], cols[is_reached]), away_m[is_reached]
@@ -161,6 +169,14 @@ def _distances_from_end(
         return points, away_m
     whole_m = distances.distance_to(other) or 0.0
     return points, np.maximum(whole_m - away_m, 0.0)
+
+
+def _is_near(floor: OccupancyGrid, way: Sequence[Point], reach_m: float) -> Mask:
+    """True for the cells that are no farther than that from a way from cell to cell."""
+    off_way = np.ones(floor.cells.shape, dtype=np.uint8)
+    off_way[floor.cells_at(np.array([[point.x, point.y] for point in way]))] = 0
+    off_cells = cv2.distanceTransform(off_way, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return np.asarray(off_cells * floor.resolution_m <= reach_m, dtype=np.bool_)
 
 
 def _farthest(distances: DistanceField, candidates: FloatArray) -> Point | None:
@@ -191,12 +207,13 @@ def _stop_at(line: _Line, region: Region, door: Door) -> Stop:
     along_m = line.nearest_to(door.place)
     to_door_rad = line.point_at(along_m).bearing_to(door.place)
     turn_rad = wrap_angle(to_door_rad - line.heading_at(along_m))
+    is_beside = line.point_at(along_m).distance_to(door.place) <= region.width_m + WALL_M
     one, other = door.region_ids
     return Stop(
         door_id=door.id,
         region_id=other if one == region.id else one,
         along_m=along_m,
-        side=_side_of(turn_rad, along_m, line.length_m - along_m),
+        side=_side_of(turn_rad, along_m, line.length_m - along_m) if is_beside else Side.ELSEWHERE,
     )
 
 

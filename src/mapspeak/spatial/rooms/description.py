@@ -12,8 +12,14 @@ from mapspeak.spatial.rooms.raster import find_cells
 from mapspeak.spatial.rooms.room_map import RoomClass
 from mapspeak.spatial.rooms.segmentation import Segmentation
 
-CORRIDOR_LADDER = ((3.0, 0), (2.5, 3), (2.0, 4), (1.5, 6))
-"""Elongation above which a region is a corridor, by the least number of its neighbours."""
+STRIP = 3.0
+"""So many squares in a row are a strip: something to walk along, not a room."""
+CORRIDOR_LADDER = ((2 * STRIP, 0), (2.5, 3), (2.0, 4), (1.5, 6))
+"""Elongation above which a region is a corridor, by the least number of its neighbours.
+
+An L-shaped room is as elongated as a strip, and leads to one or two others. What leads to no more
+is a corridor only if it is a strip, straight (`Shape.is_strip`) or on both sides of a bend.
+"""
 ISLAND_RATIO = 0.1
 """Something that stands free in a region is ignored up to this share of its floor."""
 OPEN_SPACE_WIDTH_M = 8.0
@@ -43,6 +49,11 @@ class Shape:
     def elongation(self) -> float:
         """Area over the square of the widest clearance diameter: 1 for a square, more if long."""
         return self.floor_area_m2 / max(2 * self.open_clearance_m, 1e-6) ** 2
+
+    @property
+    def is_strip(self) -> bool:
+        """True where it is much longer than wide, and hardly bends."""
+        return self.elongation > STRIP and self.length_m > STRIP * self.width_m
 
 
 def measure_regions(segmentation: Segmentation) -> list[Shape]:
@@ -119,12 +130,12 @@ def _bounding_rectangle(inside: Mask) -> tuple[float, float, float]:
 
 def classify(shape: Shape, *, n_doors: int, n_neighbours: int) -> tuple[RoomClass, str]:
     """Gives what a region is, and the numbers that say so."""
-    is_corridor = any(
+    is_corridor = shape.is_strip or any(
         shape.elongation > elongation and n_neighbours >= least
         for elongation, least in CORRIDOR_LADDER
     )
     length_m, width_m = walked_size(shape) if is_corridor else (shape.length_m, shape.width_m)
-    size = f"{length_m:.3g} x {width_m:.2g} m, {_count(n_doors, 'door')}"
+    size = f"{length_m:.1f} x {width_m:.1f} m, {_count(n_doors, 'door')}"
     if is_corridor:
         return RoomClass.CORRIDOR, size
     is_wide = 2 * shape.clearance_m >= OPEN_SPACE_WIDTH_M

@@ -7,7 +7,7 @@ __all__ = ["BASE_FRAME", "BASE_NODE", "ROSAPI_NODE", "SLAM_NODES", "navigator_of
 
 BASE_FRAME = "base_footprint"
 BASE_NODE = "/robot_base"
-CAMERA_NODE = "/camera"
+CAMERA_NODE, LASER_NODE = "/camera", "/laser"
 ROSAPI_NODE = "/rosapi"
 STATE_NODE = "/robot_state_publisher"
 SLAM_NODES = {Dialect.ROS1: "/slam_gmapping", Dialect.ROS2: "/slam_toolbox"}
@@ -19,7 +19,7 @@ def navigator_of(dialect: Dialect) -> str:
     return NAVIGATORS[dialect]
 
 
-def topics_of(dialect: Dialect, *, has_camera: bool) -> list[Topic]:
+def topics_of(dialect: Dialect, *, has_camera: bool, has_laser: bool) -> list[Topic]:
     """Gives the topics of the robot's own nodes."""
     slam = SLAM_NODES[dialect]
     topics = [
@@ -38,6 +38,9 @@ def topics_of(dialect: Dialect, *, has_camera: bool) -> list[Topic]:
                   publishers=(CAMERA_NODE,)),
             Topic(name="/camera/camera_info", type=info, depth=1, publishers=(CAMERA_NODE,)),
         ]  # fmt: skip
+    if has_laser:
+        scan = "sensor_msgs/LaserScan"
+        topics.append(Topic(name="/scan", type=scan, depth=1, publishers=(LASER_NODE,)))
     return topics + (_ros1_topics() if dialect is Dialect.ROS1 else _ros2_topics())
 
 

@@ -1,5 +1,6 @@
 """What the robot's nodes publish, taken from the port as often as its clock says."""
 
+import math
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
@@ -10,19 +11,21 @@ from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge.server.graph import BASE_FRAME
 from mapspeak.links.rosbridge.server.hub import Hub
-from mapspeak.robot import Robot, StampedPose
+from mapspeak.robot import RangeScan, Robot, StampedPose
 from mapspeak.ros.messages import (
     CameraInfo,
     Dialect,
     EncodedPicture,
     FramedPose,
     FrameTransform,
+    LaserScan,
     Twist,
     write_camera_info,
     write_compressed_image,
     write_grid,
     write_odometry,
     write_pose_with_covariance,
+    write_scan,
     write_stamp,
     write_transforms,
 )
@@ -35,8 +38,11 @@ TICK_S = 0.05
 MAP_PERIOD_S = 1.0
 ESTIMATE_PERIOD_S = 0.5
 PICTURE_PERIOD_S = 0.2
-CAMERA_FRAME = "camera_link"
+SCAN_PERIOD_S = 0.1
+CAMERA_FRAME, LASER_FRAME = "camera_link", "base_scan"
 IMAGE_TOPIC, INFO_TOPIC = "/camera/image_raw/compressed", "/camera/camera_info"
+SCAN_TOPIC = "/scan"
+N_BEAMS = 720
 
 
 @dataclass(slots=True)
@@ -71,10 +77,14 @@ class Sources:
         self._slow = [Source(self._publish_map, MAP_PERIOD_S)]
         if robot.description.has_camera:
             self._slow.append(Source(self._publish_picture, PICTURE_PERIOD_S))
+        if robot.description.has_laser:
+            self._slow.append(Source(self._publish_scan, SCAN_PERIOD_S))
 
     async def start(self) -> None:
         """Publishes what is latched, so that the first client finds it."""
         fixed = [("base_link", BASE_FRAME), (CAMERA_FRAME, "base_link")]
+        if self._robot.description.has_laser:
+            fixed.append((LASER_FRAME, "base_link"))
         transforms = [
             FrameTransform(parent_from_child=Pose(0.0, 0.0), parent=parent, child=child, stamp_s=0)
             for child, parent in fixed
@@ -140,6 +150,13 @@ class Sources:
         self._hub.publish(IMAGE_TOPIC, write_compressed_image(picture, dialect=self._dialect))
         self._hub.publish(INFO_TOPIC, write_camera_info(info, dialect=self._dialect))
 
+    async def _publish_scan(self) -> None:
+        if not self._hub.is_wanted(SCAN_TOPIC):
+            return
+        scan = await self._robot.fetch_scan()
+        if scan is not None:
+            self._hub.publish(SCAN_TOPIC, write_scan(_in_even_steps(scan), dialect=self._dialect))
+
     async def _publish_pose(self) -> None:
         here = await self._robot.fetch_pose()
         # The port tells one pose, that of SLAM: odometry without drift, so that map and odom agree.
@@ -171,6 +188,24 @@ class Sources:
             left_mps=step.y / passed_s,
             turn_radps=step.yaw_rad / passed_s,
         )
+
+
+def _in_even_steps(scan: RangeScan) -> LaserScan:
+    """Gives a scan as its message has it: one beam to every half degree, from behind."""
+    step_rad = math.tau / N_BEAMS
+    ranges_m = np.full(N_BEAMS, np.nan)
+    numbers = np.round((scan.angles_rad + math.pi) / step_rad).astype(np.intp) % N_BEAMS
+    ranges_m[numbers] = scan.ranges_m
+    return LaserScan(
+        ranges_m=np.where(np.isfinite(ranges_m), ranges_m, np.nan),
+        first_angle_rad=-math.pi,
+        angle_step_rad=step_rad,
+        least_range_m=0.0,
+        largest_range_m=scan.reach_m,
+        frame_id=LASER_FRAME,
+        stamp_s=scan.stamp_s,
+        met_nothing=np.isinf(ranges_m),
+    )
 
 
 def _is_same(one: OccupancyGrid, other: OccupancyGrid) -> bool:

@@ -42,7 +42,8 @@ class RosStack(RosSystem):
     """
 
     def __init__(self, robot: Robot, *, dialect: Dialect, tasks: TaskGroup) -> None:
-        hub = Hub(topics_of(dialect, has_camera=robot.description.has_camera))
+        offered = robot.description
+        hub = Hub(topics_of(dialect, has_camera=offered.has_camera, has_laser=offered.has_laser))
         super().__init__(hub, Interfaces(dialect), dialect=dialect)
         self.drives = Drives(robot)
         self._robot = robot

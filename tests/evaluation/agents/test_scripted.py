@@ -1,0 +1,45 @@
+from pathlib import Path
+
+import pytest
+
+from drawing import grid_from_text
+from fakes import FakeRobot
+from mapspeak.evaluation.agents import AgentEnd, Assignment
+from mapspeak.evaluation.agents.scripted import ScriptedAgent
+from mapspeak.evaluation.client import Ledger, ToolClient
+from mapspeak.evaluation.trials import Limits, TrialState
+from mapspeak.geometry import Pose
+from served import connect
+
+pytestmark = pytest.mark.anyio
+
+ROOM = """
+##############
+#............#
+#............#
+#............#
+##############
+"""
+PROMPT = "Fire detected nearby. Navigate to the tool used for it."
+
+
+async def run(folder: Path, *tools: str) -> tuple[AgentEnd, Ledger]:
+    """Lets the policy look for what nobody remembers, with some tools besides the usual ones."""
+    robot = FakeRobot(grid_from_text(ROOM, resolution_m=0.5), pose=Pose(1.8, 1.2))
+    task = Assignment(prompt=PROMPT, system="", limits=Limits(), seed=0, server=(), folder=folder)
+    async with connect(robot, folder, tools=tools) as client:
+        ledger = Ledger()
+        return await ScriptedAgent().run(task, ToolClient(client, ledger)), ledger
+
+
+async def test_a_search_is_not_begun_where_none_is_offered(tmp_path: Path) -> None:
+    end, ledger = await run(tmp_path)
+    assert end.state is TrialState.GAVE_UP
+    assert "search_for" not in {call.tool for call in ledger.calls}
+    assert not any(call.is_error for call in ledger.calls)
+    assert end.answer == "I know no way to a fire extinguisher, and am offered no search."
+
+
+async def test_a_search_is_begun_where_one_is_offered(tmp_path: Path) -> None:
+    _, ledger = await run(tmp_path, "search_for")
+    assert "search_for" in {call.tool for call in ledger.calls}

@@ -1,0 +1,121 @@
+"""Nothing that a model reads leads to a tool that it cannot call."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcp_types import CallToolResult
+
+from fakes import FakeRobot, two_rooms
+from guarding import make_guard
+from mapspeak.geometry import Pose
+from mapspeak.robot import Detection
+from mapspeak.server import DEFAULT_TOOLSETS
+from mapspeak.server.offering import tell_offered
+from served import connect, text_of
+
+pytestmark = pytest.mark.anyio
+
+ALL = (*DEFAULT_TOOLSETS, "explore", "routes", "memory")
+CALLS: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("find_place", {"query": "ladder"}),
+    ("find_place", {"query": "giraffe", "since": "09:00"}),
+    ("find_place", {"query": "sink"}),
+    ("get_semantic_data", {"query": "giraffe"}),
+    ("look_at_map", {}),
+    ("describe_place", {"place": "R1"}),
+    ("describe_place", {"place": "giraffe"}),
+    ("describe_place", {"place": "snk"}),
+    ("measure", {"places": ["robot"]}),
+    ("check_goal", {"place": "R1"}),
+    ("check_goal", {"place": "0.05, 0.05"}),
+    ("navigate_to", {"place": "R1"}),
+    ("navigate_to", {"place": "0.05, 0.05"}),
+    ("wait_for_goal", {}),
+    ("search_for", {"thing": "sink", "max_looks": 1}),
+    ("search_for", {"thing": "sink", "seen": True}),
+    ("explore", {}),
+    ("check_memory", {}),
+    ("recall_episodes", {"picture_of": "nobody"}),
+    ("write_semantic_data", {"name": "b", "description": "", "functional_landmarks": ["tap"]}),
+)
+
+
+def tools_in(text: str) -> set[str]:
+    own = re.sub(r"\"[^\"]*\"|(?<!\w)'[^']*'(?!\w)", "", text)
+    return set(re.findall(r"(?<!/)\b[a-z]+(?:_[a-z]+)+\b", own))
+
+
+async def everything_said(
+    folder: Path, *, toolsets: tuple[str, ...] = (), tools: tuple[str, ...] = ()
+) -> tuple[str, set[str], set[str]]:
+    """Gives all answers to those calls that can be made, the tools there are, and all of them."""
+    robot = FakeRobot(two_rooms())
+    robot.detections = (
+        Detection(label="ladder", bearing_rad=0.0, range_m=None, confidence_ratio=0.9),
+    )
+    guard = make_guard(folder)
+    async with connect(robot, folder, toolsets=ALL, guard=guard) as client:
+        known = {tool.name for tool in (await client.list_tools()).tools}
+        await client.call_tool("look_through_camera", {})
+        sink = {"name": "a", "description": "", "functional_landmarks": ["sink"]}
+        await client.call_tool("write_semantic_data", sink)
+        closed = {"text": "wet floor", "place": "R1", "effect": "closed"}
+        await client.call_tool("note_event", closed)
+    robot.pose = Pose(2.0, 1.4)
+    async with connect(robot, folder, toolsets=toolsets, tools=tools, guard=guard) as client:
+        offered = {tool.name for tool in (await client.list_tools()).tools}
+        answers = [await client.call_tool(name, asked) for name, asked in CALLS if name in offered]
+    return "\n".join(map(_said, answers)), offered, known
+
+
+def _said(answer: CallToolResult) -> str:
+    """Gives the text of an answer; of a report that of its fields, each on a line."""
+    report = answer.structured_content
+    return text_of(answer) if report is None else "\n".join(_strings(report))
+
+
+def _strings(value: object) -> Iterator[str]:
+    match value:
+        case str():
+            yield value
+        case dict():
+            for each in value.values():
+                yield from _strings(each)
+        case list():
+            for each in value:
+                yield from _strings(each)
+
+
+@pytest.mark.parametrize("toolset", [*ALL, "default"])
+async def test_no_answer_and_no_hint_leads_to_a_tool_that_is_not_offered(
+    tmp_path: Path, toolset: str
+) -> None:
+    toolsets = DEFAULT_TOOLSETS if toolset == "default" else (toolset,)
+    said, offered, known = await everything_said(tmp_path, toolsets=toolsets)
+    assert tools_in(said) & known <= offered
+
+
+async def test_a_tool_that_is_offered_is_led_to(tmp_path: Path) -> None:
+    said, _, _ = await everything_said(tmp_path, toolsets=ALL)
+    assert tools_in(said) >= {"search_for", "recall_episodes", "write_semantic_data", "navigate_to"}
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("Say it anew, or search_for it.", "Say it anew."),
+        ("Off by 1 m: realign_memory moves it.", "Off by 1 m."),
+        ("Call search_for. Look: it is there.", "Look: it is there."),
+        ("Wait; search_for ends it; go on.", "Wait; go on."),
+        ("It is 'search_for'. Seen.", "It is 'search_for'. Seen."),
+        ('Note "a. Call search_for now" it says.', 'Note "a. Call search_for now" it says.'),
+        ("Turn left; a search_for\nrow | 2", "Turn left.\nrow | 2"),
+        ("/robot/search_for is a topic", "/robot/search_for is a topic"),
+        ("a\n\nCall search_for.\nb", "a\n\nb"),
+    ],
+)
+def test_only_the_parts_that_lead_to_missing_tools_are_left_out(text: str, told: str) -> None:
+    assert tell_offered(text, {"search_for", "realign_memory", "turn"}) == told
