@@ -1,9 +1,13 @@
+import math
+from dataclasses import replace
+
 import pytest
 
-from fakes import FakeRobot, two_rooms
+from alignment_maps import HOUSE, fine
+from fakes import START, FakeRobot, scan_of, two_rooms
 from mapspeak.geometry import Pose
 from mapspeak.navigation.checkup import examine
-from mapspeak.robot import Finding, Health
+from mapspeak.robot import Finding, Health, RangeScan
 
 pytestmark = pytest.mark.anyio
 
@@ -41,6 +45,37 @@ async def test_a_robot_that_cannot_be_where_it_believes_is_doubted(pose: Pose, s
     assert found["place"].health is Health.DOUBTFUL
     assert said in found["place"].said
     assert "initial pose" in found["place"].hint
+
+
+async def test_a_laser_that_meets_what_the_map_has_is_fine() -> None:
+    robot = FakeRobot(two_rooms())
+    robot.scan = scan_of(two_rooms(), START)
+    laser = (await _examine(robot))["laser"]
+    assert laser.health is Health.FINE
+    assert "100 % of these what the map has" in laser.said
+
+
+async def test_a_laser_that_meets_what_the_map_has_not_casts_doubt_on_pose_and_mounting() -> None:
+    house, here = fine(HOUSE), Pose(8.0, 5.0, 0.0)
+    robot = FakeRobot(house, pose=here)
+    as_mounted = scan_of(house, here)
+    robot.scan = replace(as_mounted, angles_rad=as_mounted.angles_rad + math.radians(60))
+    laser = (await _examine(robot))["laser"]
+    assert laser.health is Health.DOUBTFUL
+    assert "initial pose" in laser.hint
+    assert "mounted" in laser.hint
+
+
+async def test_a_laser_that_gives_no_scan_is_doubted_and_no_more() -> None:
+    class SilentRobot(FakeRobot):
+        async def fetch_scan(self) -> RangeScan | None:
+            return None
+
+    robot = SilentRobot(two_rooms())
+    robot.scan = scan_of(two_rooms(), START)
+    laser = (await _examine(robot))["laser"]
+    assert laser.health is Health.DOUBTFUL
+    assert "all else works without" in laser.said
 
 
 async def test_a_pose_that_is_old_is_doubted() -> None:

@@ -72,12 +72,14 @@ class Reminders:
     Attributes:
         approaches: Where the robot would stand before a thing.
         faced: The share of where a thing may be that it would face there.
+        fronts: The last floor before a thing, for each who saw it.
         rooms: The rooms before a thing, by id.
         judge: What may be trusted; None until somebody asks.
     """
 
     approaches: dict[RememberedThing, Pose | None] = field(default_factory=dict)
     faced: dict[RememberedThing, float] = field(default_factory=dict)
+    fronts: dict[RememberedThing, list[Point]] = field(default_factory=dict)
     rooms: dict[RememberedThing, tuple[str, ...]] = field(default_factory=dict)
     judge: Judge | None = None
 
@@ -86,6 +88,7 @@ class Reminders:
         return Reminders(
             approaches={each: self.approaches[each] for each in things if each in self.approaches},
             faced={each: self.faced[each] for each in things if each in self.faced},
+            fronts={each: self.fronts[each] for each in things if each in self.fronts},
             rooms={each: self.rooms[each] for each in things if each in self.rooms},
         )
 
@@ -258,6 +261,7 @@ class Atlas:
                     self.distances,
                     position,
                     [view.place for view in remembered.thing.supporting],
+                    fronts=self._find_fronts(remembered),
                     whereabouts=remembered.thing.whereabouts,
                 )
             )
@@ -287,12 +291,20 @@ class Atlas:
         """Gives the rooms a thing may be in, by id: those on the side that it was seen from."""
         known = self._reminders.rooms
         if remembered not in known:
-            thing = remembered.thing
-            seen_from = fronts = [view.place for view in thing.supporting]
-            if thing.position is not None:
-                fronts = find_fronts(self.recollection.found.sight, thing.position, seen_from)
-            room_ids = map(self._find_room_on_line, fronts, seen_from)
+            seen_from = [view.place for view in remembered.thing.supporting]
+            room_ids = map(self._find_room_on_line, self._find_fronts(remembered), seen_from)
             known[remembered] = tuple(dict.fromkeys(filter(None, room_ids)))
+        return known[remembered]
+
+    def _find_fronts(self, remembered: RememberedThing) -> list[Point]:
+        """Gives the last floor before a thing for each who saw it; their own without a position."""
+        known, thing = self._reminders.fronts, remembered.thing
+        if remembered not in known:
+            seen_from = [view.place for view in thing.supporting]
+            sight, position = self.recollection.found.sight, thing.position
+            known[remembered] = (
+                seen_from if position is None else find_fronts(sight, position, seen_from)
+            )
         return known[remembered]
 
     def _find_room_on_line(self, end: Point, start: Point) -> str | None:

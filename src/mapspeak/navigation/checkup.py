@@ -3,8 +3,10 @@
 import math
 from collections.abc import Awaitable, Callable
 
+import numpy as np
+
 from mapspeak.errors import LinkError, MapError
-from mapspeak.robot import Finding, Health, Robot
+from mapspeak.robot import Finding, Health, RangeScan, Robot
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import clearance_m
 
@@ -12,6 +14,10 @@ __all__ = ["examine"]
 
 OLD_POSE_S = 5.0
 """A pose older than this is no answer to where a driving robot is."""
+ON_MAP_M = 0.3
+"""What a laser meets no farther from what the map has is that very thing."""
+LEAST_ON_MAP_RATIO = 0.5
+"""People and moved chairs take beams away, but hardly every other one."""
 
 
 async def examine(robot: Robot) -> tuple[Finding, ...]:
@@ -24,6 +30,8 @@ async def examine(robot: Robot) -> tuple[Finding, ...]:
         found.append(_busy(len(goals)))
     if robot.description.has_camera:
         found.append(await _ask("picture", lambda: _look_at_picture(robot)))
+    if robot.description.has_laser:
+        found.append(await _ask("laser", lambda: _look_at_laser(robot)))
     return tuple(found)
 
 
@@ -107,3 +115,46 @@ async def _look_at_picture(robot: Robot) -> Finding:
     fov_rad = picture.horizontal_fov_rad
     wide = ", angle unknown" if fov_rad is None else f", {math.degrees(fov_rad):.0f} deg wide"
     return Finding(what="picture", health=Health.FINE, said=f"{picture.media_type}, {size}{wide}")
+
+
+async def _look_at_laser(robot: Robot) -> Finding:
+    scan = await robot.fetch_scan()
+    if scan is None:
+        return Finding(
+            what="laser",
+            health=Health.DOUBTFUL,
+            said="no scan that can be used came; all else works without",
+            hint="Check that it publishes, that the clocks agree, and that TF leads from the "
+            "robot's base to its frame.",
+        )
+    met = np.isfinite(scan.ranges_m)
+    said = f"{met.size} beams, {np.count_nonzero(met)} of them met something"
+    ratio = _share_on_map(await robot.fetch_map(), scan)
+    if ratio is None:
+        return Finding(what="laser", health=Health.DOUBTFUL, said=said, hint="Is it covered?")
+    said += f", {100 * ratio:.0f} % of these what the map has"
+    if ratio >= LEAST_ON_MAP_RATIO:
+        return Finding(what="laser", health=Health.FINE, said=said)
+    return Finding(
+        what="laser",
+        health=Health.DOUBTFUL,
+        said=said,
+        hint="Set the initial pose, or check how the laser is mounted by TF: turned, or upside "
+        "down. On a map that is old it may be right.",
+    )
+
+
+def _share_on_map(grid: OccupancyGrid, scan: RangeScan) -> float | None:
+    """Gives the share of what a laser met that lies at what the map has; None where it met none."""
+    is_met = np.isfinite(scan.ranges_m)
+    if not is_met.any():
+        return None
+    ways = scan.pose.yaw_rad + scan.angles_rad[is_met]
+    far_m = scan.ranges_m[is_met]
+    xs, ys = scan.pose.x + far_m * np.cos(ways), scan.pose.y + far_m * np.sin(ways)
+    rows, cols = grid.cells_at(np.stack([xs, ys], axis=1))
+    is_inside = (rows >= 0) & (rows < grid.n_rows) & (cols >= 0) & (cols < grid.n_cols)
+    away_m = clearance_m(grid)[rows[is_inside], cols[is_inside]]
+    # From middle to middle of cells, so that one cell more is the very surface.
+    n_on_map = np.count_nonzero(away_m <= max(ON_MAP_M, 1.5 * grid.resolution_m))
+    return n_on_map / len(rows)

@@ -61,6 +61,8 @@ FARTHEST_M = 1e6
 """No map reaches so far; farther numbers are typing errors, and overflow cell indices."""
 SEARCH_M = 8.0
 """How far around a goal another one is looked for first."""
+NEAR_M = 1.0
+"""Whatever is nearer than that is the nearest within a square of twice as many metres."""
 WALL_SIDES_M = 0.15
 """A goal in a wall belongs to the nearer side; to both where they differ by no more than this."""
 
@@ -239,7 +241,14 @@ def _clearance_at(grid: OccupancyGrid, point: Point) -> float:
     cell = grid.cell_at(point)
     if not grid.contains(cell) or not grid.free[cell.row, cell.col]:
         return 0.0
-    reach = int(SEARCH_M / grid.resolution_m)
+    # Most goals have something near, and a small window is looked at in no time.
+    near_m = _nearest_obstacle_m(grid, cell, NEAR_M)
+    return near_m if near_m <= NEAR_M else _nearest_obstacle_m(grid, cell, SEARCH_M)
+
+
+def _nearest_obstacle_m(grid: OccupancyGrid, cell: Cell, reach_m: float) -> float:
+    """Gives the metres to the nearest obstacle in the square within reach; infinite without one."""
+    reach = math.ceil(reach_m / grid.resolution_m)
     top, left = max(cell.row - reach, 0), max(cell.col - reach, 0)
     window = grid.crop(slice(top, cell.row + reach + 1), slice(left, cell.col + reach + 1))
     rows, cols = np.nonzero(window.occupied)

@@ -37,6 +37,7 @@ def find_approach(
     target: Point,
     seen_from: Sequence[Point],
     *,
+    fronts: Sequence[Point] | None = None,
     whereabouts: FloatArray | None = None,
 ) -> Pose | None:
     """Finds a pose that the robot can drive to and that faces a thing from near.
@@ -49,13 +50,15 @@ def find_approach(
         distances: From the robot, on that map.
         target: Where the thing is.
         seen_from: The places of those who saw it.
+        fronts: What `find_fronts` gives for these, where it is at hand.
         whereabouts: Where it may be: points of the map frame, shape (n, 2), each as likely.
 
     Returns:
         None where the robot cannot get to within 1.4 m in sight of it.
     """
     points, clear_m = _reachable_near(sight, distances, target)
-    is_seen = _are_in_sight(sight, find_fronts(sight, target, seen_from), points)
+    fronts = find_fronts(sight, target, seen_from) if fronts is None else fronts
+    is_seen = _are_in_sight(sight, fronts, points)
     points, clear_m = points[is_seen], clear_m[is_seen]
     if not len(points):
         return None
@@ -192,24 +195,24 @@ def find_fronts(sight: SightMap, target: Point, seen_from: Sequence[Point]) -> l
     # What is seen over furniture has its front behind it.
     is_over = near_m < far_m - BODY_M
     until_m = np.where(is_over, far_m, np.minimum(near_m, far_m)) - _STEP_BACK_M
-    return [
-        _last_floor(
-            sight.grid, Point(x, y), Point(x + far * math.cos(way), y + far * math.sin(way))
-        )
-        for (x, y), far, way in zip(starts.tolist(), until_m.tolist(), ways.tolist(), strict=True)
-    ]
+    ends = starts + until_m[:, None] * np.stack([np.cos(ways), np.sin(ways)], axis=1)
+    return [Point(x, y) for x, y in _last_floor(sight.grid, starts, ends).tolist()]
 
 
-def _last_floor(grid: OccupancyGrid, start: Point, end: Point) -> Point:
-    """Finds the last floor on the line from one point to another; the end where there is none."""
-    n_steps = max(math.ceil(start.distance_to(end) / grid.resolution_m), 1)
-    shares = np.linspace(1.0, 0.0, n_steps + 1)[:, None]
-    points = np.array([[end.x, end.y]]) * shares + np.array([[start.x, start.y]]) * (1.0 - shares)
-    rows, cols = grid.cells_at(points)
+def _last_floor(grid: OccupancyGrid, starts: FloatArray, ends: FloatArray) -> FloatArray:
+    """Finds the last floor on each line from a start to an end; the end where there is none."""
+    away_m = np.hypot(*(ends - starts).T)
+    n_steps = np.maximum(np.ceil(away_m / grid.resolution_m), 1)
+    steps = np.arange(int(n_steps.max(initial=0)) + 1)
+    shares = np.maximum(1.0 - steps / n_steps[:, None], 0.0)[..., None]
+    points = ends[:, None] * shares + starts[:, None] * (1.0 - shares)
+    rows, cols = grid.cells_at(points.reshape(-1, 2))
     is_inside = (rows >= 0) & (rows < grid.n_rows) & (cols >= 0) & (cols < grid.n_cols)
     values = np.where(is_inside, grid.cells[rows * is_inside, cols * is_inside], UNKNOWN)
-    floor = np.flatnonzero((values >= 0) & (values <= FREE_MAX))
-    return Point(*points[floor[0]].tolist()) if floor.size else end
+    is_floor = ((values >= 0) & (values <= FREE_MAX)).reshape(shares.shape[:2])
+    # Where there is none the first is chosen, which is the end.
+    last = np.argmax(is_floor, axis=1)
+    return np.asarray(points[np.arange(len(points)), last])
 
 
 def _are_in_sight(sight: SightMap, fronts: Sequence[Point], points: FloatArray) -> Mask:

@@ -8,6 +8,7 @@ START_POSE = "Start SLAM or AMCL on the robot, so that TF leads from the map to 
 START_CAMERA = (
     "Start the camera driver, or name camera_topic in robot.yaml; all else works without."
 )
+START_LASER = "Start the laser's driver, or name scan_topic in robot.yaml; all else works without."
 START_NAVIGATION = "Start Nav2 (ROS 1: move_base) on the robot, or name navigation in robot.yaml."
 START_RADIUS = "Name radius_m in robot.yaml: the navigation does not tell it (robot_radius)."
 START_VELOCITY = "Name velocity_topic in robot.yaml, so that a stop can command zero velocity."
@@ -21,6 +22,7 @@ def describe_profile(profile: RobotProfile) -> tuple[Finding, ...]:
         _found("map topic", profile.map_topic, START_MAP),
         _describe_pose(profile),
         _found("camera topic", profile.camera_topic, START_CAMERA, Health.DOUBTFUL),
+        _found("scan topic", profile.scan_topic, START_LASER, Health.DOUBTFUL),
         _describe_navigation(profile),
         _describe_planner(profile),
         _found("velocity topic", profile.velocity_topic, START_VELOCITY, Health.DOUBTFUL),
