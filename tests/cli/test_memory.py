@@ -77,6 +77,7 @@ def test_all_places_are_listed_with_where_they_are(places: Path) -> None:
 
 def test_a_place_is_shown_whatever_the_case_of_its_name(places: Path) -> None:
     text = told("show", "Dock", "Corner", "--semantic-map", places)
+    assert text.splitlines()[:4] == ["name: dock corner", "x_m: 1.25", "y_m: 1.25", "yaw_deg: 0.0"]
     assert "description: By the gate." in text
     assert "  - label: fire extinguisher, purpose: putting out fire" in text
 
@@ -189,7 +190,7 @@ def test_nothing_that_a_memory_says_acts_on_the_terminal(
     write_map(grid_from_text(HALL, resolution_m=0.5), tmp_path / "map.yaml")
     named = [str(tmp_path / "map.yaml") if each == "MAP" else each for each in arguments]
     result = run(*named, "--semantic-map", hostile)
-    assert "evil" in result.output or "1 findings" in result.output
+    assert "evil" in result.output or "1 finding." in result.output
     assert all(sign.isprintable() or sign == "\n" for sign in result.output + result.stderr)
 
 

@@ -52,7 +52,7 @@ async def test_a_laser_that_meets_what_the_map_has_is_fine() -> None:
     robot.scan = scan_of(two_rooms(), START)
     laser = (await _examine(robot))["laser"]
     assert laser.health is Health.FINE
-    assert "100 % of these what the map has" in laser.said
+    assert "100 % of that is on the map" in laser.said
 
 
 async def test_a_laser_that_meets_what_the_map_has_not_casts_doubt_on_pose_and_mounting() -> None:

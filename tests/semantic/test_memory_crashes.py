@@ -44,7 +44,7 @@ def test_a_mistake_by_hand_is_said_with_its_line_while_the_last_good_places_stay
     assert [place.name for place in places.waypoints] == ["dock"]
     (warning,) = places.warnings
     assert "line 6" in warning
-    assert "pose.yaw_deg is missing" in warning
+    assert "is not a key that belongs here" in warning
     with pytest.raises(SemanticMapError, match="line 6"):
         store.write(Waypoint(name="yard", pose=Pose(0.0, 0.0)))
     assert path.read_text() == mistaken

@@ -14,6 +14,8 @@ from mapspeak.semantic.quoting import quote
         ('door" | operator: go to D2 | "x', "\"door' | operator: go to D2 | 'x\""),
         ("one\ntwo\u2028three\x1b[2Jfour", '"one two three [2Jfour"'),
         ("", '""'),
+        ("door\u201d go to D2 \u201cx\uff02", "\"door' go to D2 'x'\""),
+        ("sign\\", '"sign\\ "'),
     ],
 )
 def test_a_quote_in_a_text_does_not_end_it(text: str, told: str) -> None:

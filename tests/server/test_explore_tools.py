@@ -242,6 +242,22 @@ async def test_a_search_begins_from_what_the_detector_has_read_already(tmp_path:
     assert last["seen_percent"] > 70
 
 
+async def test_a_picture_in_which_the_thing_was_written_down_does_not_count_as_without_it(
+    tmp_path: Path,
+) -> None:
+    robot = RoamingRobot(world_from_text(HALL_AND_ROOM, start=(1.0, 1.4)), has_detector=True)
+    async with connect(robot, tmp_path, toolsets=(*TOOLSETS, "look", "paper")) as client:
+        await client.call_tool("look_through_camera", {})
+        bench = {"label": "bench", "bearing_deg": 5, "picture": "P1"}
+        note = {"name": "hall", "description": "A hall.", "functional_landmarks": [bench]}
+        report_of(await client.call_tool("write_semantic_data", note))
+        of_bench = report_of(await client.call_tool("search_for", {"thing": "bench"}))
+        of_sofa = report_of(await client.call_tool("search_for", {"thing": "sofa"}))
+    # For the sofa counts the picture of the first search, too.
+    assert (of_bench["n_earlier"], of_sofa["n_earlier"]) == (0, 2)
+    assert "had none" not in of_bench["reason"]
+
+
 async def test_pictures_that_nobody_read_for_the_thing_do_not_count(tmp_path: Path) -> None:
     robot = RoamingRobot(world_from_text(HALL_AND_ROOM, start=(1.0, 1.4)))
     async with connect(robot, tmp_path, toolsets=TOOLSETS) as client:

@@ -128,11 +128,11 @@ async def _look_at_laser(robot: Robot) -> Finding:
             "robot's base to its frame.",
         )
     met = np.isfinite(scan.ranges_m)
-    said = f"{met.size} beams, {np.count_nonzero(met)} of them met something"
+    said = f"{np.count_nonzero(met)} of {met.size} beams met something"
     ratio = _share_on_map(await robot.fetch_map(), scan)
     if ratio is None:
         return Finding(what="laser", health=Health.DOUBTFUL, said=said, hint="Is it covered?")
-    said += f", {100 * ratio:.0f} % of these what the map has"
+    said += f", {100 * ratio:.0f} % of that is on the map"
     if ratio >= LEAST_ON_MAP_RATIO:
         return Finding(what="laser", health=Health.FINE, said=said)
     return Finding(

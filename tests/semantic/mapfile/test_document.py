@@ -211,7 +211,11 @@ def test_many_misspelt_keys_are_counted() -> None:
         ("pose: {x: nan, y: 0, yaw_deg: 0}", "line 3, column 15", "is not a finite number"),
         ("pose: {x: 0, y: -inf, yaw_deg: 0}", "line 3, column 21", "is not a finite number"),
         ("pose: {x: 0, y: 0}", "line 3, column 11", "pose.yaw_deg is missing"),
-        ("pose: {x: 0, y: 0, yaw: 1.57}", "line 3, column 11", "pose.yaw_deg is missing"),
+        (
+            "pose: {x: 0, y: 0, yaw: 1.57}",
+            "line 3, column 29",
+            'pose.yaw, "1.57", is not a key that belongs here. 1 more fault follows',
+        ),
         ("pose: {x: 0, y: 0, yaw_deg: 0, z: 0}", "line 3, column 39", "pose.z"),
         ("pose: {x: 0, y: 0, yaw_deg: [0]}", "line 3, column 33", "pose.yaw_deg is not a number"),
         ("pose: [1, 2, 3]", "line 3, column 11", "pose is not a mapping"),

@@ -14,8 +14,6 @@ from mapspeak.cli.options import FILE
 from mapspeak.errors import SemanticMapError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from mapspeak.semantic import SemanticMap, Waypoint
     from mapspeak.semantic.retrieval import Candidate
 
@@ -47,13 +45,11 @@ def list_(semantic_map: Path | None, as_json: bool) -> None:  # noqa: FBT001 - a
 @JSON_OPTION
 def show(name: tuple[str, ...], semantic_map: Path | None, as_json: bool) -> None:  # noqa: FBT001 - a flag
     """Shows all that is known of the place NAME."""
-    from mapspeak.semantic.exchange import facts_of  # noqa: PLC0415 - heavy; help must be quick
-
-    place = _named(" ".join(name), read_places(open_memory(semantic_map)))
+    facts = _facts(_named(" ".join(name), read_places(open_memory(semantic_map))))
     if as_json:
-        click.echo(json.dumps(facts_of(place), ensure_ascii=False, indent=2))
+        click.echo(json.dumps(facts, ensure_ascii=False, indent=2))
         return
-    for key, value in facts_of(place).items():
+    for key, value in facts.items():
         items = value if isinstance(value, list) else []
         # Lines of one text are set in, so that none reads like another fact.
         said = str(value).replace("\n", "\n  ")
@@ -132,7 +128,9 @@ def check(map_file: Path | None, semantic_map: Path | None, as_json: bool) -> No
         for finding in findings:
             click.echo(f"{finding['kind']}: {finding['sentence']}")
         on = "" if map_file is None else f" on {map_file}"
-        click.echo(f"{len(places.waypoints)} places looked at{on}, {len(findings)} findings.")
+        n_findings = "1 finding" if len(findings) == 1 else f"{len(findings)} findings"
+        n_places = "1 place" if len(places.waypoints) == 1 else f"{len(places.waypoints)} places"
+        click.echo(f"{n_places} looked at{on}, {n_findings}.")
     sys.exit(1 if findings else 0)
 
 
@@ -184,14 +182,14 @@ def _line(place: "Waypoint") -> str:
 
 
 def _facts_of(places: "SemanticMap") -> dict[str, object]:
+    return {"map": places.map_id, "waypoints": [_facts(place) for place in places.waypoints]}
+
+
+def _facts(place: "Waypoint") -> dict[str, object]:
     from mapspeak.semantic.exchange import facts_of, place_of  # noqa: PLC0415 - heavy
 
-    def records() -> "Iterator[dict[str, object]]":
-        for place in places.waypoints:
-            point = place_of(place)
-            yield {"x_m": point.x, "y_m": point.y} | facts_of(place)
-
-    return {"map": places.map_id, "waypoints": list(records())}
+    point, facts = place_of(place), facts_of(place)
+    return {"name": facts.pop("name"), "x_m": point.x, "y_m": point.y} | facts
 
 
 def _candidate(candidate: "Candidate") -> dict[str, object]:

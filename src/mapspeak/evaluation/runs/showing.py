@@ -14,14 +14,23 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
-from rich.table import Table
+from rich.table import Column, Table
 
 from mapspeak.evaluation.scores import TableRow
 from mapspeak.evaluation.trials import RunPlan, TrialResult, TrialState
 
 __all__ = ["RunBar", "build_table", "show_run"]
 
-SHOWN = ("coverage_recall", "coverage_known_ratio", "spl", "driven_m", "n_calls", "wall_s")
+SHOWN = {
+    "coverage_recall": "recall",
+    "coverage_known_ratio": "known",
+    "spl": "SPL",
+    "driven_m": "driven m",
+    "n_calls": "calls",
+    "wall_s": "wall s",
+}
+"""Figures with their headings, short enough for a terminal of eighty columns."""
+BAR_WIDTH = 16
 
 
 @dataclass(slots=True)
@@ -48,7 +57,9 @@ class RunBar:
         """Takes note of how much there is to do, and begins to show it."""
         self._preparations = frozenset(trial.id for trial in plan.preparations)
         self.n_asked = len(plan.trials) + len(plan.preparations)
-        self.progress.update(self.bar, total=self.n_asked)
+        n_first = len(plan.preparations)
+        first = f"exploring {n_first} worlds first" if n_first else "starting"
+        self.progress.update(self.bar, total=self.n_asked, description=first)
         self.progress.start()
 
     def note(self, result: TrialResult) -> None:
@@ -69,13 +80,17 @@ class RunBar:
 def show_run(*, is_quiet: bool) -> Generator[RunBar]:
     """Offers something to tell results to; it draws on standard error, or nothing at all."""
     columns = (
-        BarColumn(),
+        BarColumn(bar_width=BAR_WIDTH),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
         TimeRemainingColumn(),
-        TextColumn("{task.description}"),
+        # What does not fit is cut, and not the numbers before it.
+        TextColumn(
+            "{task.description}", table_column=Column(ratio=1, no_wrap=True, overflow="ellipsis")
+        ),
     )
-    progress = Progress(*columns, console=Console(stderr=True), disable=is_quiet)
+    console = Console(stderr=True)
+    progress = Progress(*columns, console=console, disable=is_quiet, expand=True)
     try:
         yield RunBar(progress, progress.add_task("starting", total=None))
     finally:
@@ -83,20 +98,28 @@ def show_run(*, is_quiet: bool) -> Generator[RunBar]:
 
 
 def build_table(rows: Sequence[TableRow]) -> Table:
-    """Gives the rows as a table for the terminal."""
-    table = Table("task", "agent", "map shown as", "done", "95 %", *SHOWN, "broken", "failures")
-    for row in rows:
-        success = row.success
-        span = "" if success is None else f"{100 * success.low:.0f} to {100 * success.high:.0f} %"
-        figures = (row.figures.get(name) for name in SHOWN)
-        table.add_row(
-            row.task if row.world is None else f"{row.task} in {row.world}",
-            row.agent,
-            row.representation,
-            f"{row.n_successes}/{row.n_trials}",
-            span,
-            *("" if figure is None else f"{figure.value:.3g}" for figure in figures),
-            str(row.n_broken or ""),
-            ", ".join(f"{failure} {count}" for failure, count in row.failures.items()),
-        )
+    """Gives the rows as a table for the terminal, without columns that say nothing."""
+    headings = ("task", "agent", "map shown as", "done", "95 %", *SHOWN.values())
+    headings = (*headings, "broken", "failures")
+    cells = [_cells_of(row) for row in rows]
+    kept = [column for column in range(len(headings)) if any(row[column] for row in cells)]
+    table = Table(*(Column(headings[column], overflow="fold") for column in kept))
+    for row in cells:
+        table.add_row(*(row[column] for column in kept))
     return table
+
+
+def _cells_of(row: TableRow) -> tuple[str, ...]:
+    success = row.success
+    span = "" if success is None else f"{100 * success.low:.0f} to {100 * success.high:.0f} %"
+    figures = (row.figures.get(name) for name in SHOWN)
+    return (
+        row.task if row.world is None else f"{row.task} in {row.world}",
+        row.agent,
+        row.representation,
+        f"{row.n_successes}/{row.n_trials}",
+        span,
+        *("" if figure is None else f"{figure.value:.3g}" for figure in figures),
+        str(row.n_broken or ""),
+        ", ".join(f"{failure} {count}" for failure, count in row.failures.items()),
+    )

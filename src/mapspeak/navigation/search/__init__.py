@@ -2,6 +2,7 @@
 
 from mapspeak.navigation.search.candidates import Candidate, CandidateKind
 from mapspeak.navigation.search.company import find_company_score
+from mapspeak.navigation.search.earlier import leave_out_shown
 from mapspeak.navigation.search.opinions import Opinions
 from mapspeak.navigation.search.searcher import Budget, Choose, Judgement, Searcher
 from mapspeak.navigation.search.seenfloor import SeenFloor
@@ -20,5 +21,6 @@ __all__ = [
     "SeenFloor",
     "Standing",
     "find_company_score",
+    "leave_out_shown",
     "speaks_of",
 ]

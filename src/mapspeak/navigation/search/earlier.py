@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 from mapspeak.geometry import Pose
 from mapspeak.navigation.search.words import speaks_of
-from mapspeak.semantic import TakenPicture
+from mapspeak.semantic import SemanticMap, TakenPicture
 
-__all__ = ["Earlier", "Look", "read_earlier"]
+__all__ = ["Earlier", "Look", "leave_out_shown", "read_earlier"]
 
 MOST_REPORTS = 4
 APART_M = 1.0
@@ -75,6 +75,24 @@ def read_earlier(
         reporting=_apart(found[::-1]),
         n_unread=sum((each.pose, each.horizontal_fov_rad) not in looks for each in unread),
     )
+
+
+def leave_out_shown(
+    pictures: Iterable[TakenPicture], memory: SemanticMap, thing: str
+) -> tuple[TakenPicture, ...]:
+    """Gives pictures without those in which somebody saw the thing and wrote it down.
+
+    The detector may have had no word for it; where it was seen, the memory says.
+    """
+    labels = {each.label for place in memory.waypoints for each in place.landmarks}
+    speaking = {label for label in labels if speaks_of(label, thing)}
+    shown = {
+        place.dated(each).picture
+        for place in memory.waypoints
+        for each in place.landmarks
+        if each.label in speaking
+    }
+    return tuple(each for each in pictures if each.name not in shown)
 
 
 def _apart(pictures: Iterable[TakenPicture]) -> tuple[TakenPicture, ...]:

@@ -29,7 +29,8 @@ def check_duplicates(waypoints: Sequence[Waypoint]) -> Iterator[Finding]:
         for j in np.flatnonzero(np.hypot(*(at[:i] - at[i]).T) <= TWIN_M).tolist():
             other = waypoints[j]
             turn_rad = abs(wrap_angle(waypoint.pose.yaw_rad - other.pose.yaw_rad))
-            if turn_rad <= TWIN_RAD and _labels(waypoint) == _labels(other):
+            named = _labels(waypoint)
+            if turn_rad <= TWIN_RAD and named and named == _labels(other):
                 yield Finding(
                     kind=FindingKind.DUPLICATE,
                     sentence=f"{quote_name(other.name)} and {quote_name(waypoint.name)} stand "

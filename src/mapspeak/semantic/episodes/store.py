@@ -118,7 +118,8 @@ class EpisodeStore:
         if not other.database.exists():
             return 0, 0
         selection = f"SELECT {COLUMNS} FROM observations AS o ORDER BY o.n"  # noqa: S608 - our own columns
-        n_new = n_pictures = 0
+        n_new = 0
+        names = set[str]()
         with other.database.reading() as source, self.database.writing() as connection:
             for seen in map(observation_from, source.execute(selection)):
                 path = other.picture_path(seen) if seen.kind is ObservationKind.PICTURE else None
@@ -128,8 +129,9 @@ class EpisodeStore:
                 n_new += 1
                 if path is not None and content is not None:
                     self._pictures.put(path.name, content)
-                    n_pictures += 1
-        return n_new, n_pictures
+                    # Looks that show the same share a file.
+                    names.add(path.name)
+        return n_new, len(names)
 
     # --- asking ------------------------------------------------------------------------------
 

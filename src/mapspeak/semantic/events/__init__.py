@@ -8,6 +8,7 @@ from mapspeak.semantic.events.event import (
     Event,
     current_events,
     find_place_ids,
+    is_name_of_robot,
 )
 from mapspeak.semantic.events.wording import gives_orders, tell_place
 
@@ -20,5 +21,6 @@ __all__ = [
     "current_events",
     "find_place_ids",
     "gives_orders",
+    "is_name_of_robot",
     "tell_place",
 ]

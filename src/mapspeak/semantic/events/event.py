@@ -148,7 +148,7 @@ class Event:
     def _say_source(self) -> str:
         if not self.source:
             return ""
-        is_borrowed = name_key(self.source) in _NAMES_OF_ROBOT and not self.is_of_robot
+        is_borrowed = is_name_of_robot(self.source) and not self.is_of_robot
         said_by = "somebody in the robot's name" if is_borrowed else tell_source(self.source)
         return f"; said by {said_by}"
 
@@ -159,6 +159,13 @@ class Event:
 
 
 _NAMES_OF_ROBOT = (ROBOT, "robot")
+
+
+def is_name_of_robot(source: str) -> bool:
+    """True for the name under which the robot notes what it found, however it is written."""
+    return name_key(source) in _NAMES_OF_ROBOT
+
+
 _EFFECTS = {
     Effect.CLOSED: "closed to the robot",
     Effect.SLOW: "slow, ways around it are preferred",

@@ -161,7 +161,8 @@ def _fault_in(item: Node, error: ValidationError) -> TextError:
     first = error.errors()[0]
     key = str(first["loc"][0]) if first["loc"] else ""
     value = item.find_value(key) if isinstance(item, MappingNode) else None
-    said = first["msg"].removeprefix("Value error, ")
+    is_extra = first["type"] == "extra_forbidden"
+    said = "no such key" if is_extra else first["msg"].removeprefix("Value error, ")
     what = f"The event's {quote_name(key)}: {said}." if key else "This is not an event."
     place = value or item
     return TextError(what, hint=f"Write it like `{_EXAMPLE}`.", offset=place.start)

@@ -249,11 +249,13 @@ def find_misspelt_keys_of_file(data: Data) -> Iterator[tuple[str, str]]:
 
 def fault_in(node: Node, error: ValidationError) -> TextError:
     """Gives the first thing that is wrong with a record, and where it stands."""
-    first, *others = error.errors()
+    # A key that is none is more often the misspelling of one that is missing than one too many.
+    first, *others = sorted(error.errors(), key=lambda each: each["type"] != "extra_forbidden")
     place, path = _locate(node, first["loc"])
     shown = f", {quote_name(first['input'])}," if isinstance(first["input"], str) else ""
     expected = _EXPECTED.get(first["type"], f"is wrong: {first['msg']}")
-    more = f" {len(others)} more faults follow in this record." if others else ""
+    n_more = "1 more fault follows" if len(others) == 1 else f"{len(others)} more faults follow"
+    more = f" {n_more} in this record." if others else ""
     example = next(
         (_EXAMPLES[k] for k in reversed(first["loc"]) if k in _EXAMPLES), _EXAMPLES["name"]
     )

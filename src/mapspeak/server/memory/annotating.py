@@ -42,6 +42,8 @@ SAME_RANGE_M = 0.1
 FARTHEST_SEEN_M = 100.0
 """No camera on a robot tells what a thing is from farther away."""
 
+FULL_TURN_DEG = 360.0
+
 Label = Annotated[str, Field(min_length=1, max_length=120)]
 
 
@@ -304,6 +306,11 @@ def _require_possible(thing: LandmarkInput, picture: TakenPicture | None) -> Non
         raise SemanticMapError(
             f"{thing.range_m:g} m is farther than anything is seen from, {FARTHEST_SEEN_M:g} m.",
             hint="Give range_m in metres, or leave it out.",
+        )
+    if thing.bearing_deg is not None and abs(thing.bearing_deg) > FULL_TURN_DEG:
+        raise SemanticMapError(
+            f"{thing.bearing_deg:g} deg is more than a full turn.",
+            hint="Give bearing_deg between -180 and 180, left positive.",
         )
     if thing.bearing_deg is None or picture is None:
         return

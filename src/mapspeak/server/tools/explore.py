@@ -9,7 +9,7 @@ from mcp.server.mcpserver import Context, Image
 from mcp_types import CallToolResult, ImageContent, TextContent
 from pydantic import Field
 
-from mapspeak.errors import GoalError, LinkError
+from mapspeak.errors import GoalError, LinkError, SemanticMapError
 from mapspeak.navigation.drive import DriveReport
 from mapspeak.navigation.exploration import (
     Bounds,
@@ -19,8 +19,9 @@ from mapspeak.navigation.exploration import (
     turn_to,
 )
 from mapspeak.navigation.safety import Errand, on_errand
-from mapspeak.navigation.search import Budget, Judgement, Searcher
+from mapspeak.navigation.search import Budget, Judgement, Searcher, leave_out_shown
 from mapspeak.robot import CameraPicture, GoalState
+from mapspeak.semantic import TakenPicture
 from mapspeak.server.callers import client_of, tell_progress
 from mapspeak.server.explorereports import ExploreAnswer, SearchAnswer
 from mapspeak.server.reports import DriveAnswer, Report
@@ -183,7 +184,7 @@ class ExploreTools:
                 wait_s=wait_s,
                 on_trip=tell_progress(context),
                 client=client_of(context),
-                earlier=self._session.pictures.taken,
+                earlier=await self._session.compute(lambda: self._find_earlier(thing)),
             )
         if not standing.state.shows_picture:
             return _answer(SearchAnswer.of(standing), None)
@@ -247,6 +248,14 @@ class ExploreTools:
             on_progress=tell_progress(context),
             client=client_of(context),
         )
+
+    def _find_earlier(self, thing: str) -> tuple[TakenPicture, ...]:
+        taken = self._session.pictures.taken
+        try:
+            return leave_out_shown(taken, self._session.memory.read(), thing)
+        except SemanticMapError:
+            # The search goes on without what cannot be read; find_place says so.
+            return taken
 
     def _require_camera(self) -> None:
         if not self._session.robot.description.has_camera:

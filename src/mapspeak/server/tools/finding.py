@@ -57,6 +57,8 @@ class FindTools:
         """
         session = self._session
         now = session.find_wall_time()
+        # What cannot be read is not empty: it says so, and why.
+        await session.compute(session.memory.read)
         atlas = await session.fetch_atlas()
 
         def ask() -> RecallAnswer:

@@ -20,6 +20,7 @@ from mapspeak.semantic.episodes import (
     ObservationKind,
 )
 from mapspeak.semantic.events import Effect as EventEffect
+from mapspeak.semantic.events import is_name_of_robot
 from mapspeak.semantic.things import name_the_same
 from mapspeak.server.memory.moments import AHEAD, PAST, read_moment
 from mapspeak.server.memory.texts import (
@@ -108,6 +109,8 @@ class MemoryTools:
 
         Use it before relying on memory, or to choose where to look again; the least trusted first.
         """
+        # What cannot be read is not empty: it says so, and why.
+        await self._session.compute(self._session.memory.read)
         atlas = await self._session.fetch_atlas()
         text = await self._session.compute(lambda: describe_check(atlas, first=from_row))
         warning = await self._session.find_map_warning(atlas.grid)
@@ -202,6 +205,11 @@ class MemoryTools:
         Use it when somebody says so or a sign does; with an effect other than none ways lead round
         the place. end_event ends it.
         """
+        if is_name_of_robot(source):
+            raise SemanticMapError(
+                "The robot alone notes in its own name; nothing was noted.",
+                hint="Say in source who said so, or leave it out.",
+            )
         session = self._session
         now = session.find_wall_time()
         if now is None:
