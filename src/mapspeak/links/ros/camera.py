@@ -1,10 +1,9 @@
 """Pictures of the front camera, subscribed to only while somebody looks."""
 
-import anyio
-
 from mapspeak.errors import LinkError
 from mapspeak.links.ros.discovery import RobotProfile
 from mapspeak.links.ros.discovery.profile import COMPRESSED_IMAGE, RAW_IMAGE
+from mapspeak.links.ros.lingering import THROTTLE_MS, Lingering
 from mapspeak.ros import RosConnection, Subscription
 from mapspeak.ros.messages import (
     EncodedPicture,
@@ -16,9 +15,6 @@ from mapspeak.ros.messages import (
 
 PATIENCE_S = 5.0
 INFO_PATIENCE_S = 1.0
-LINGER_S = 10.0
-"""After the last picture; one who looks around asks again before that."""
-THROTTLE_MS = 100
 CAMERA_HINT = "Check that the camera's driver runs, or name another camera_topic in robot.yaml."
 
 
@@ -37,11 +33,7 @@ class Camera:
         self._connection = connection
         self._profile = profile
         self._patience_s = patience_s
-        self._pictures: Subscription | None = None
-        self._infos: Subscription | None = None
-        self._n_looking = 0
-        self._looked_s = 0.0
-        self._is_open = anyio.Event()
+        self._lingering = Lingering(connection, self._subscribe)
 
     async def fetch(self) -> EncodedPicture:
         """Gives a picture that arrives after it was asked for.
@@ -49,56 +41,38 @@ class Camera:
         Raises:
             LinkError: There is no camera, no picture came, or it cannot be read.
         """
-        self._n_looking += 1
-        try:
-            message = await self._next_message(self._subscribe())
-        finally:
-            self._n_looking -= 1
-            self._looked_s = anyio.current_time()
+        with self._lingering.look() as (pictures, *_):
+            message = await self._next_message(pictures)
         return self._read(message)
 
     async def fetch_fov_rad(self) -> float | None:
         """Gives the horizontal field of view in radians; None where the camera does not say."""
-        if self._infos is None:
+        infos = self._lingering.subscriptions[1:]
+        if not infos:
             return None
         try:
-            info = await self._infos.wait_for_more_than(0, timeout_s=INFO_PATIENCE_S)
+            info = await infos[0].wait_for_more_than(0, timeout_s=INFO_PATIENCE_S)
             return read_camera_info(info).horizontal_fov_rad
         except LinkError:
             return None
 
     async def close_when_idle(self) -> None:
         """Ends the subscription whenever nobody has looked for a while; runs until cancelled."""
-        while True:
-            await self._is_open.wait()
-            await anyio.sleep_until(self._looked_s + LINGER_S)
-            if self._n_looking == 0 and anyio.current_time() >= self._looked_s + LINGER_S:
-                self._unsubscribe()
+        await self._lingering.close_when_idle()
 
-    def _subscribe(self) -> Subscription:
-        if self._pictures is None:
-            if self._profile.camera_topic is None:
-                raise LinkError("The robot publishes no camera pictures.", hint=CAMERA_HINT)
-            self._looked_s = anyio.current_time()
-            self._pictures = self._connection.subscribe(
-                self._profile.camera_topic,
-                type_name=self._profile.dialect.type_name(self._profile.camera_type or RAW_IMAGE),
-                is_bulky=True,
-                throttle_ms=THROTTLE_MS,
-            )
-            if self._profile.camera_info_topic is not None:
-                self._infos = self._connection.subscribe(
-                    self._profile.camera_info_topic, throttle_ms=THROTTLE_MS
-                )
-            self._is_open.set()
-        return self._pictures
-
-    def _unsubscribe(self) -> None:
-        for subscription in (self._pictures, self._infos):
-            if subscription is not None:
-                self._connection.unsubscribe(subscription)
-        self._pictures = self._infos = None
-        self._is_open = anyio.Event()
+    def _subscribe(self) -> tuple[Subscription, ...]:
+        """Begins with the pictures; the camera's measures follow where it tells them."""
+        profile = self._profile
+        if profile.camera_topic is None:
+            raise LinkError("The robot publishes no camera pictures.", hint=CAMERA_HINT)
+        type_name = profile.dialect.type_name(profile.camera_type or RAW_IMAGE)
+        pictures = self._connection.subscribe(
+            profile.camera_topic, type_name=type_name, is_bulky=True, throttle_ms=THROTTLE_MS
+        )
+        if profile.camera_info_topic is None:
+            return (pictures,)
+        infos = self._connection.subscribe(profile.camera_info_topic, throttle_ms=THROTTLE_MS)
+        return pictures, infos
 
     async def _next_message(self, pictures: Subscription) -> Message:
         before = pictures.n_received

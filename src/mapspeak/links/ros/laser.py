@@ -8,15 +8,13 @@ from mapspeak.errors import LinkError
 from mapspeak.links.ros.clock import RobotClock
 from mapspeak.links.ros.discovery import RobotProfile
 from mapspeak.links.ros.frames import FrameListener
+from mapspeak.links.ros.lingering import THROTTLE_MS, Lingering
 from mapspeak.links.ros.mounting import Mounting, find_mounting
 from mapspeak.links.ros.poses import PoseKeeper
 from mapspeak.robot import SCAN_PATIENCE_S, RangeScan
 from mapspeak.ros import RosConnection, Subscription
 from mapspeak.ros.messages import LaserScan, Message, read_scan
 
-LINGER_S = 10.0
-"""After the last scan; one who looks around asks again before that."""
-THROTTLE_MS = 100
 STALE_S = 1.0
 """Of robot time: an older scan was held up on its way, or its driver's clock is not the robot's."""
 
@@ -46,10 +44,7 @@ class Laser:
         self._frames = frames
         self._clock = clock
         self._patience_s = patience_s
-        self._scans: Subscription | None = None
-        self._n_looking = 0
-        self._looked_s = 0.0
-        self._is_open = anyio.Event()
+        self._lingering = Lingering(connection, self._subscribe)
 
     async def fetch(self, poses: PoseKeeper) -> RangeScan | None:
         """Gives a scan that arrives after it was asked for, or None.
@@ -57,43 +52,28 @@ class Laser:
         Args:
             poses: Knows where the robot is when it comes.
         """
-        if self._profile.scan_topic is None or not self._connection.is_open:
+        if not self._connection.is_open:
             return None
-        self._n_looking += 1
         try:
-            message = await self._next_message(self._subscribe(self._profile.scan_topic))
+            with self._lingering.look() as (scans,):
+                message = await self._next_message(scans)
             return self._read(message, poses)
         except LinkError:
             return None
-        finally:
-            self._n_looking -= 1
-            self._looked_s = anyio.current_time()
 
     async def close_when_idle(self) -> None:
         """Ends the subscription whenever nobody has looked for a while; runs until cancelled."""
-        while True:
-            await self._is_open.wait()
-            await anyio.sleep_until(self._looked_s + LINGER_S)
-            if self._n_looking == 0 and anyio.current_time() >= self._looked_s + LINGER_S:
-                self._unsubscribe()
+        await self._lingering.close_when_idle()
 
-    def _subscribe(self, topic: str) -> Subscription:
-        if self._scans is None:
-            self._looked_s = anyio.current_time()
-            self._scans = self._connection.subscribe(
-                topic,
-                type_name=self._profile.dialect.type_name("sensor_msgs/LaserScan"),
-                is_bulky=True,
-                throttle_ms=THROTTLE_MS,
-            )
-            self._is_open.set()
-        return self._scans
-
-    def _unsubscribe(self) -> None:
-        if self._scans is not None:
-            self._connection.unsubscribe(self._scans)
-        self._scans = None
-        self._is_open = anyio.Event()
+    def _subscribe(self) -> tuple[Subscription, ...]:
+        profile = self._profile
+        if profile.scan_topic is None:
+            raise LinkError("The robot publishes no scans.", hint="Name scan_topic in robot.yaml.")
+        type_name = profile.dialect.type_name("sensor_msgs/LaserScan")
+        scans = self._connection.subscribe(
+            profile.scan_topic, type_name=type_name, is_bulky=True, throttle_ms=THROTTLE_MS
+        )
+        return (scans,)
 
     async def _next_message(self, scans: Subscription) -> Message:
         silent_s = anyio.current_time() - scans.begun_s
