@@ -1,11 +1,15 @@
 """A scripted robot behind a scripted rosbridge: what it offers and answers is set by each test."""
 
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping
+from contextlib import asynccontextmanager
 from typing import Any
 
 import anyio
 
 from mapspeak.geometry import Pose
+from mapspeak.links.ros import DrivingPatience, RobotOverrides, RosRobot
+from mapspeak.links.rosbridge import open_rosbridge_robot
+from mapspeak.links.rosbridge.client import Timing
 from mapspeak.links.rosbridge.protocol.encoding import to_cbor
 from mapspeak.ros.messages import (
     Dialect,
@@ -14,7 +18,7 @@ from mapspeak.ros.messages import (
     write_transforms,
 )
 from mapspeak.spatial import OccupancyGrid
-from rosbridge_script import PATIENCE_S, Operation, ScriptedServer, Visitor
+from rosbridge_script import PATIENCE_S, Operation, ScriptedServer, Visitor, running
 
 STATUS_TOPIC = "/navigate_to_pose/_action/status"
 CANCEL_SERVICE = "/navigate_to_pose/_action/cancel_goal"
@@ -156,6 +160,28 @@ class ScriptedRobot:
         self.server.tell()
         if self.accepts_goals:
             await self.feed_back(3.0)
+
+
+@asynccontextmanager
+async def connect_scripted(
+    scripted: ScriptedRobot,
+    *,
+    timing: Timing,
+    patience: DrivingPatience,
+    overrides: RobotOverrides | None = None,
+) -> AsyncGenerator[RosRobot]:
+    """Gives the robot that a scripted rosbridge plays; all of it has to be over in time."""
+    with anyio.fail_after(PATIENCE_S):
+        async with (
+            running(scripted.server) as server,
+            open_rosbridge_robot(
+                server.url,
+                overrides=overrides or RobotOverrides(),
+                timing=timing,
+                patience=patience,
+            ) as robot,
+        ):
+            yield robot
 
 
 async def eventually(look: Callable[[], Awaitable[object]]) -> None:

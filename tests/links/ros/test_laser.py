@@ -1,8 +1,8 @@
 """The robot's laser over ROS: where it is mounted, how old a scan is, and none at all."""
 
 import math
-from collections.abc import AsyncGenerator, Mapping
-from contextlib import asynccontextmanager
+from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import anyio
@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 
 from mapspeak.geometry import Pose
-from mapspeak.links.ros import DrivingPatience, RobotOverrides, RosRobot
+from mapspeak.links.ros import DrivingPatience, RobotOverrides
 from mapspeak.links.ros.laser import Laser
-from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.links.rosbridge.client import Timing
 from mapspeak.robot import RangeScan
 from mapspeak.ros.messages import Dialect, FrameTransform, LaserScan, write_scan, write_transforms
-from rosbridge_robot import ScriptedRobot, eventually
-from rosbridge_script import PATIENCE_S, Operation, running
+from rosbridge_robot import ScriptedRobot, connect_scripted, eventually
+from rosbridge_script import Operation
 
 pytestmark = pytest.mark.anyio
 
@@ -78,21 +77,7 @@ def scripted_with(
     return scripted
 
 
-@asynccontextmanager
-async def connected(
-    scripted: ScriptedRobot, overrides: RobotOverrides | None = None
-) -> AsyncGenerator[RosRobot]:
-    with anyio.fail_after(PATIENCE_S):
-        async with (
-            running(scripted.server) as server,
-            open_rosbridge_robot(
-                server.url,
-                overrides=overrides or RobotOverrides(),
-                timing=QUICK,
-                patience=PATIENT,
-            ) as robot,
-        ):
-            yield robot
+connected = partial(connect_scripted, timing=QUICK, patience=PATIENT)
 
 
 async def fetched(
@@ -269,6 +254,6 @@ async def test_a_laser_that_falls_silent_gives_none_and_may_speak_again() -> Non
 async def test_robot_yaml_says_which_laser() -> None:
     scripted = scripted_with(scan_message({30: 1.5}), topic="/rear/scan")
     scripted.topics["/scan"] = "sensor_msgs/msg/LaserScan"
-    async with connected(scripted, RobotOverrides(scan_topic="/rear/scan")) as robot:
+    async with connected(scripted, overrides=RobotOverrides(scan_topic="/rear/scan")) as robot:
         assert nearest(await robot.fetch_scan()) == pytest.approx((30.0, 1.5))
     assert subscriptions(scripted) == []

@@ -1,19 +1,17 @@
 """A robot whose offers are found bit by bit, as those of ROS 2 are."""
 
-from collections.abc import AsyncGenerator, Callable
-from contextlib import asynccontextmanager
+from collections.abc import Callable
+from functools import partial
 
-import anyio
 import pytest
 
 from drawing import grid_from_text
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
-from mapspeak.links.ros import DrivingPatience, RosRobot
-from mapspeak.links.rosbridge import open_rosbridge_robot
+from mapspeak.links.ros import DrivingPatience
 from mapspeak.links.rosbridge.client import Timing
-from rosbridge_robot import CANCEL_SERVICE, ScriptedRobot
-from rosbridge_script import PATIENCE_S, Operation, running
+from rosbridge_robot import CANCEL_SERVICE, ScriptedRobot, connect_scripted
+from rosbridge_script import PATIENCE_S, Operation
 
 pytestmark = pytest.mark.anyio
 
@@ -28,16 +26,7 @@ MAP = """
 """
 
 
-@asynccontextmanager
-async def connected(
-    scripted: ScriptedRobot, *, patience: DrivingPatience = PATIENT
-) -> AsyncGenerator[RosRobot]:
-    with anyio.fail_after(PATIENCE_S):
-        async with (
-            running(scripted.server) as server,
-            open_rosbridge_robot(server.url, timing=QUICK, patience=patience) as robot,
-        ):
-            yield robot
+connected = partial(connect_scripted, timing=QUICK, patience=PATIENT)
 
 
 def only_after(n_looks: int, found: object, *, nothing: object) -> Callable[[Operation], object]:

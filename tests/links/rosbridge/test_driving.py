@@ -1,7 +1,6 @@
 """Goals of ROS 1 and of robots that only take a pose: told apart by what their topics say."""
 
-from collections.abc import AsyncGenerator
-from contextlib import asynccontextmanager
+from functools import partial
 from typing import Any
 
 import anyio
@@ -11,7 +10,6 @@ from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.links.ros import RosRobot
 from mapspeak.links.ros.driving import DrivingPatience
-from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.links.rosbridge.client import Timing
 from mapspeak.robot import GoalState, GoalStatus
 from mapspeak.ros.messages import (
@@ -20,8 +18,8 @@ from mapspeak.ros.messages import (
     write_pose_stamped,
     write_stamp,
 )
-from rosbridge_robot import ScriptedRobot, eventually
-from rosbridge_script import PATIENCE_S, Operation, running
+from rosbridge_robot import ScriptedRobot, connect_scripted, eventually
+from rosbridge_script import PATIENCE_S, Operation
 
 pytestmark = pytest.mark.anyio
 
@@ -38,16 +36,7 @@ PENDING, ACTIVE, PREEMPTED, SUCCEEDED, ABORTED, REJECTED = 0, 1, 2, 3, 4, 5
 GOAL = Pose(4.0, 2.0)
 
 
-@asynccontextmanager
-async def connected(
-    scripted: ScriptedRobot, *, patience: DrivingPatience = LONG
-) -> AsyncGenerator[RosRobot]:
-    with anyio.fail_after(PATIENCE_S):
-        async with (
-            running(scripted.server) as server,
-            open_rosbridge_robot(server.url, timing=QUICK, patience=patience) as robot,
-        ):
-            yield robot
+connected = partial(connect_scripted, timing=QUICK, patience=LONG)
 
 
 def published(scripted: ScriptedRobot, topic: str) -> list[Operation]:

@@ -2,9 +2,8 @@
 
 import io
 import random
-from collections.abc import AsyncGenerator
-from contextlib import asynccontextmanager
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import anyio
@@ -31,6 +30,7 @@ from rosbridge_robot import (
     STATUS_TOPIC,
     SUCCEEDED,
     ScriptedRobot,
+    connect_scripted,
     eventually,
 )
 from rosbridge_script import PATIENCE_S, Operation, running
@@ -51,25 +51,7 @@ ROOM = """
     """
 
 
-@asynccontextmanager
-async def connected(
-    scripted: ScriptedRobot,
-    *,
-    patience: DrivingPatience = LONG,
-    overrides: RobotOverrides | None = None,
-    timing: Timing = QUICK,
-) -> AsyncGenerator[RosRobot]:
-    with anyio.fail_after(PATIENCE_S):
-        async with (
-            running(scripted.server) as server,
-            open_rosbridge_robot(
-                server.url,
-                overrides=overrides or RobotOverrides(),
-                timing=timing,
-                patience=patience,
-            ) as robot,
-        ):
-            yield robot
+connected = partial(connect_scripted, timing=QUICK, patience=LONG)
 
 
 def waits_after(n_silent: int) -> tuple[float, ...]:
