@@ -136,12 +136,16 @@ class Session:
         """Does heavy work in a thread, so that a stop is answered meanwhile."""
         return await anyio.to_thread.run_sync(work)
 
-    async def fetch_atlas(self) -> Atlas:
+    async def fetch_atlas(self, *, needs_memory: bool = False) -> Atlas:
         """Gives the map as it is now, with everything on it under its id.
+
+        Args:
+            needs_memory: Nothing can be said without the memory: what cannot be read is not empty.
 
         Raises:
             MapError: The robot's map has no cells.
             LinkError: The robot has no map yet.
+            SemanticMapError: The memory is needed and cannot be read.
         """
         async with self._surveying:
             grid = await self.robot.fetch_map()
@@ -151,7 +155,7 @@ class Session:
                     hint="Wait until SLAM or the map server has sent one, then look again.",
                 )
             stamped = await self.robot.fetch_pose()
-            memory = await self.compute(self._recall)
+            memory = await self.compute(self.memory.read if needs_memory else self._recall)
             revision, warnings = await self._survey(grid)
             if revision is not None and await self._learn(revision):
                 revision, warnings = await self._survey(grid)

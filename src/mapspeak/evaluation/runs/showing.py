@@ -58,7 +58,8 @@ class RunBar:
         self._preparations = frozenset(trial.id for trial in plan.preparations)
         self.n_asked = len(plan.trials) + len(plan.preparations)
         n_first = len(plan.preparations)
-        first = f"exploring {n_first} worlds first" if n_first else "starting"
+        worlds = "a world" if n_first == 1 else f"{n_first} worlds"
+        first = f"exploring {worlds} first" if n_first else "starting"
         self.progress.update(self.bar, total=self.n_asked, description=first)
         self.progress.start()
 

@@ -57,9 +57,7 @@ class FindTools:
         """
         session = self._session
         now = session.find_wall_time()
-        # What cannot be read is not empty: it says so, and why.
-        await session.compute(session.memory.read)
-        atlas = await session.fetch_atlas()
+        atlas = await session.fetch_atlas(needs_memory=True)
 
         def ask() -> RecallAnswer:
             words, room_id = split_room(atlas, query)

@@ -109,9 +109,7 @@ class MemoryTools:
 
         Use it before relying on memory, or to choose where to look again; the least trusted first.
         """
-        # What cannot be read is not empty: it says so, and why.
-        await self._session.compute(self._session.memory.read)
-        atlas = await self._session.fetch_atlas()
+        atlas = await self._session.fetch_atlas(needs_memory=True)
         text = await self._session.compute(lambda: describe_check(atlas, first=from_row))
         warning = await self._session.find_map_warning(atlas.grid)
         return f"Warning: {warning}\n{text}" if warning else text
