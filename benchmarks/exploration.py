@@ -220,7 +220,7 @@ class Truth:
 def known_ratio(grid: OccupancyGrid, points: FloatArray) -> float:
     """Gives the share of some points that a map knows."""
     rows, cols = grid.cells_at(points)
-    is_inside = (rows >= 0) & (rows < grid.n_rows) & (cols >= 0) & (cols < grid.n_cols)
+    is_inside = grid.contains_cells(rows, cols)
     return float((~grid.unknown[rows[is_inside], cols[is_inside]]).sum() / max(len(points), 1))
 
 

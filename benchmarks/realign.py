@@ -193,7 +193,7 @@ def roughened(grid: OccupancyGrid, random: np.random.Generator) -> OccupancyGrid
 
 def _look_up(grid: OccupancyGrid, points: np.ndarray) -> np.ndarray:
     rows, cols = grid.cells_at(points)
-    is_inside = (rows >= 0) & (rows < grid.n_rows) & (cols >= 0) & (cols < grid.n_cols)
+    is_inside = grid.contains_cells(rows, cols)
     found = grid.cells[np.where(is_inside, rows, 0), np.where(is_inside, cols, 0)]
     return np.asarray(np.where(is_inside, found, -1), dtype=np.int8)
 

@@ -91,7 +91,7 @@ class Motion:
         x = self.pose.x + steps_m * math.cos(towards)
         y = self.pose.y + steps_m * math.sin(towards)
         rows, cols = self.grid.cells_at(np.column_stack([x, y]))
-        inside = (rows >= 0) & (rows < self.grid.n_rows) & (cols >= 0) & (cols < self.grid.n_cols)
+        inside = self.grid.contains_cells(rows, cols)
         free = np.zeros(len(steps_m), dtype=bool)
         free[inside] = self.grid.free[rows[inside], cols[inside]]
         return math.inf if free.all() else float(steps_m[int(np.argmin(free))])

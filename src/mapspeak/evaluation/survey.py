@@ -50,7 +50,7 @@ def _near_in_sight(grid: OccupancyGrid, place: Point) -> Mask:
     xs = place.x + np.cos(angles)[:, None] * reach
     ys = place.y + np.sin(angles)[:, None] * reach
     rows, cols = grid.cells_at(np.stack([xs.ravel(), ys.ravel()], axis=1))
-    is_inside = (rows >= 0) & (rows < grid.n_rows) & (cols >= 0) & (cols < grid.n_cols)
+    is_inside = grid.contains_cells(rows, cols)
     is_open = np.zeros(rows.shape, dtype=bool)
     is_open[is_inside] = grid.free[rows[is_inside], cols[is_inside]]
     is_open = is_open.reshape(xs.shape)

@@ -153,7 +153,7 @@ def _share_on_map(grid: OccupancyGrid, scan: RangeScan) -> float | None:
     far_m = scan.ranges_m[is_met]
     xs, ys = scan.pose.x + far_m * np.cos(ways), scan.pose.y + far_m * np.sin(ways)
     rows, cols = grid.cells_at(np.stack([xs, ys], axis=1))
-    is_inside = (rows >= 0) & (rows < grid.n_rows) & (cols >= 0) & (cols < grid.n_cols)
+    is_inside = grid.contains_cells(rows, cols)
     away_m = clearance_m(grid)[rows[is_inside], cols[is_inside]]
     # From middle to middle of cells, so that one cell more is the very surface.
     n_on_map = np.count_nonzero(away_m <= max(ON_MAP_M, 1.5 * grid.resolution_m))

@@ -163,7 +163,7 @@ def _sights_in(atlas: Atlas, region: Region, point: Point, angles: FloatArray) -
     xs = point.x + np.outer(np.cos(angles), steps_m)
     ys = point.y + np.outer(np.sin(angles), steps_m)
     rows, cols = atlas.grid.cells_at(np.stack([xs.ravel(), ys.ravel()], axis=1))
-    inside = (rows >= 0) & (rows < atlas.grid.n_rows) & (cols >= 0) & (cols < atlas.grid.n_cols)
+    inside = atlas.grid.contains_cells(rows, cols)
     rows, cols = np.where(inside, rows, 0), np.where(inside, cols, 0)
     is_ours = (atlas.rooms.labels[rows, cols] == region.index) & atlas.grid.free[rows, cols]
     is_seen = np.logical_and.accumulate((inside & is_ours).reshape(xs.shape), axis=1)

@@ -103,8 +103,7 @@ class _ObstacleLayer:
     def mark(self, points_in_map: FloatArray) -> None:
         """Counts what a scan shows on open floor."""
         rows, cols = self.grid.cells_at(points_in_map)
-        is_inside = (rows >= 0) & (rows < self.grid.n_rows) & (cols >= 0)
-        is_inside &= cols < self.grid.n_cols
+        is_inside = self.grid.contains_cells(rows, cols)
         rows, cols = rows[is_inside], cols[is_inside]
         is_news = self._is_open[rows, cols]
         if not is_news.any():

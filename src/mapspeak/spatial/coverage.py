@@ -128,8 +128,7 @@ def _count_found(
     found_grid: OccupancyGrid,
 ) -> int:
     there_rows, there_cols = found_grid.cells_at(wanted_grid.points_at(rows, cols))
-    is_inside = (there_rows >= 0) & (there_rows < found_grid.n_rows)
-    is_inside &= (there_cols >= 0) & (there_cols < found_grid.n_cols)
+    is_inside = found_grid.contains_cells(there_rows, there_cols)
     return int(np.count_nonzero(found[there_rows[is_inside], there_cols[is_inside]]))
 
 

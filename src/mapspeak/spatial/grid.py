@@ -118,6 +118,10 @@ class OccupancyGrid:
         """True when the cell lies inside the array."""
         return 0 <= cell.row < self.n_rows and 0 <= cell.col < self.n_cols
 
+    def contains_cells(self, rows: IntArray, cols: IntArray) -> Mask:
+        """True where the cell of that row and column lies inside the array; arrays of one shape."""
+        return np.asarray((rows >= 0) & (rows < self.n_rows) & (cols >= 0) & (cols < self.n_cols))
+
     def crop(self, rows: slice, cols: slice) -> "OccupancyGrid":
         """Gives a part of the map, at its own place in the world; slices begin on the array."""
         corner = Pose(cols.start * self.resolution_m, rows.start * self.resolution_m)

@@ -87,8 +87,7 @@ def known_ratio(grid: OccupancyGrid, reference: OccupancyGrid, wanted: Mask) -> 
     """Gives the share of some cells of a reference that a map knows; 1 where there are none."""
     rows, cols = np.nonzero(wanted)
     there_rows, there_cols = grid.cells_at(reference.points_at(rows, cols))
-    is_inside = (there_rows >= 0) & (there_rows < grid.n_rows)
-    is_inside &= (there_cols >= 0) & (there_cols < grid.n_cols)
+    is_inside = grid.contains_cells(there_rows, there_cols)
     n_known = (~grid.unknown[there_rows[is_inside], there_cols[is_inside]]).sum()
     return float(n_known) / rows.size if rows.size else 1.0
 

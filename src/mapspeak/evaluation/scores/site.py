@@ -309,8 +309,7 @@ class Site:
         """The floor between the walls of every space, by its name."""
         rows, cols = np.nonzero(self._labels)
         at_rows, at_cols = self._walls.cells_at(self.grid.points_at(rows, cols))
-        is_inside = (at_rows >= 0) & (at_rows < self._walls.n_rows)
-        is_inside &= (at_cols >= 0) & (at_cols < self._walls.n_cols)
+        is_inside = self._walls.contains_cells(at_rows, at_cols)
         is_free = ~self._walls.occupied[at_rows[is_inside], at_cols[is_inside]]
         labels = self._labels[rows[is_inside], cols[is_inside]][is_free]
         n_free = np.bincount(labels, minlength=len(self._label_of) + 1)

@@ -211,8 +211,7 @@ def _views(site: Site, grid: OccupancyGrid) -> list[Point]:
     rows, cols = np.nonzero(site.roomy)
     places = site.grid.points_at(rows, cols)
     at_rows, at_cols = grid.cells_at(places)
-    is_inside = (at_rows >= 0) & (at_rows < grid.n_rows)
-    is_inside &= (at_cols >= 0) & (at_cols < grid.n_cols)
+    is_inside = grid.contains_cells(at_rows, at_cols)
     known = places[is_inside][grid.free[at_rows[is_inside], at_cols[is_inside]]]
     every = max(len(known) // N_VIEWS, 1)
     return [Point(float(x), float(y)) for x, y in known[::every]]
@@ -225,8 +224,7 @@ def _news_m2(site: Site, grid: OccupancyGrid, view: Point) -> float:
     if not rows.size:
         return 0.0
     at_rows, at_cols = grid.cells_at(site.grid.points_at(rows, cols))
-    is_inside = (at_rows >= 0) & (at_rows < grid.n_rows)
-    is_inside &= (at_cols >= 0) & (at_cols < grid.n_cols)
+    is_inside = grid.contains_cells(at_rows, at_cols)
     is_known = np.zeros(rows.size, dtype=bool)
     is_known[is_inside] = ~grid.unknown[at_rows[is_inside], at_cols[is_inside]]
     return float((~is_known).sum()) * site.LOOK_EVERY_M**2

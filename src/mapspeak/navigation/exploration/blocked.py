@@ -123,7 +123,7 @@ def _patch_around(grid: OccupancyGrid, centre: Point) -> _Patch:
 
 def _kinds_at(grid: OccupancyGrid, points: NDArray[np.float64]) -> NDArray[np.int8]:
     rows, cols = grid.cells_at(points)
-    is_inside = (rows >= 0) & (rows < grid.n_rows) & (cols >= 0) & (cols < grid.n_cols)
+    is_inside = grid.contains_cells(rows, cols)
     kinds = np.full(len(points), UNKNOWN, dtype=np.int8)
     rows, cols = rows[is_inside], cols[is_inside]
     kinds[is_inside] = np.where(

@@ -114,7 +114,7 @@ def is_in_sight(atlas: Atlas, points: FloatArray, thing: Point) -> Mask:
     shares = np.linspace(0.0, 1.0, math.ceil(longest_m / grid.resolution_m * 2) + 2)
     steps = points[:, None, :] + shares[None, :, None] * lines[:, None, :]
     rows, cols = grid.cells_at(steps.reshape(-1, 2))
-    inside = (rows >= 0) & (rows < grid.n_rows) & (cols >= 0) & (cols < grid.n_cols)
+    inside = grid.contains_cells(rows, cols)
     is_floor = inside & grid.free[np.where(inside, rows, 0), np.where(inside, cols, 0)]
     is_floor = is_floor.reshape(len(points), shares.size)
     is_blocked = np.logical_or.accumulate(~is_floor, axis=1)

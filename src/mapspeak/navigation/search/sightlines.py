@@ -45,7 +45,7 @@ def cast_sight_lines(
     starts = grid.fractional_cells_at(places)
     rows = _floored(starts[:, 0, None, None] + np.outer(np.sin(in_grid), steps))
     cols = _floored(starts[:, 1, None, None] + np.outer(np.cos(in_grid), steps))
-    is_inside = (rows >= 0) & (rows < grid.n_rows) & (cols >= 0) & (cols < grid.n_cols)
+    is_inside = grid.contains_cells(rows, cols)
     rows[~is_inside] = cols[~is_inside] = 0
     is_free = grid.free[rows, cols] & is_inside
     return SightLines(rows=rows, cols=cols, is_open=np.logical_and.accumulate(is_free, axis=2))

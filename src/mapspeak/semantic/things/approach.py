@@ -82,8 +82,7 @@ def find_least_path_m(
     rows, cols, _ = _floor_near(grid, target)
     at = np.array([(place.x, place.y) for place in seen_from]).reshape(-1, 2)
     stand_rows, stand_cols = grid.cells_at(at)
-    is_inside = (stand_rows >= 0) & (stand_rows < grid.n_rows)
-    is_inside &= (stand_cols >= 0) & (stand_cols < grid.n_cols)
+    is_inside = grid.contains_cells(stand_rows, stand_cols)
     rows = np.concatenate([rows, stand_rows[is_inside]])
     cols = np.concatenate([cols, stand_cols[is_inside]])
     return float(distances.distances_at(rows, cols).min(initial=math.inf))
@@ -207,7 +206,7 @@ def _last_floor(grid: OccupancyGrid, starts: FloatArray, ends: FloatArray) -> Fl
     shares = np.maximum(1.0 - steps / n_steps[:, None], 0.0)[..., None]
     points = ends[:, None] * shares + starts[:, None] * (1.0 - shares)
     rows, cols = grid.cells_at(points.reshape(-1, 2))
-    is_inside = (rows >= 0) & (rows < grid.n_rows) & (cols >= 0) & (cols < grid.n_cols)
+    is_inside = grid.contains_cells(rows, cols)
     values = np.where(is_inside, grid.cells[rows * is_inside, cols * is_inside], UNKNOWN)
     is_floor = ((values >= 0) & (values <= FREE_MAX)).reshape(shares.shape[:2])
     # Where there is none the first is chosen, which is the end.

@@ -53,8 +53,7 @@ def _count_overlap(previous: RoomMap, current: RoomMap) -> NDArray[np.float64]:
     rows, cols = rows[::every], cols[::every]
     here = previous.labels[rows, cols].astype(np.intp)
     there_row, there_col = current.grid.cells_at(previous.grid.points_at(rows, cols))
-    inside = (there_row >= 0) & (there_row < current.grid.n_rows)
-    inside &= (there_col >= 0) & (there_col < current.grid.n_cols)
+    inside = current.grid.contains_cells(there_row, there_col)
     there = np.zeros(here.size, np.intp)
     there[inside] = current.labels[there_row[inside], there_col[inside]]
     shape = (len(previous.regions) + 1, len(current.regions) + 1)
