@@ -28,7 +28,7 @@ def test_an_equals_sign_in_an_address_is_no_name() -> None:
 
 @pytest.mark.parametrize(
     ("given", "said"),
-    [(["sim", "yard=sim"], "'sim' has none"), (["a=sim", "a=sim"], "Two robots are called 'a'")],
+    [(["sim", "yard=sim"], "'sim' has no name"), (["a=sim", "a=sim"], "Two robots are called 'a'")],
 )
 def test_names_that_are_missing_or_taken_are_said(given: list[str], said: str) -> None:
     with pytest.raises(ConfigError, match=said):

@@ -1,16 +1,27 @@
-"""What `mapspeak serve --help` says of the tools that can be chosen."""
+"""`mapspeak serve`: its help, and what it writes and tells."""
 
+import os
 import re
+import shlex
+import sys
 from pathlib import Path
 
+import anyio
+import pytest
 from click.testing import CliRunner
+from mcp.client import Client
+from mcp.client.stdio import StdioServerParameters, stdio_client
 
-from fakes import FakeRobot
+from fakes import FakeRobot, two_rooms
 from mapspeak.cli import cli
-from mapspeak.semantic import SemanticMapStore
+from mapspeak.cli.memory.files import rename_memory
+from mapspeak.geometry import Pose
+from mapspeak.semantic import SemanticMapStore, Waypoint
 from mapspeak.server import DEFAULT_TOOLSETS
 from mapspeak.server.tools import build_toolsets
 from mapspeak.session import Session
+from rosbridge_robot import ScriptedRobot
+from rosbridge_script import PATIENCE_S, running
 
 
 def test_the_help_names_every_toolset_and_those_that_are_there_by_default(tmp_path: Path) -> None:
@@ -23,3 +34,92 @@ def test_the_help_names_every_toolset_and_those_that_are_there_by_default(tmp_pa
     assert tuple(found[1].split(",")) == DEFAULT_TOOLSETS
     others = set(re.findall(r"\w+", found[2])) - {"and"}
     assert others | set(DEFAULT_TOOLSETS) == set(build_toolsets(session))
+
+
+SECRETS = ("bob", "s3cr3tpw", "t0k3nvalue")
+UNMASKED = f"umask 000; exec {shlex.quote(sys.executable)} -m mapspeak"
+FACTS = {"name": "desk", "description": "Where the cups are."}
+
+
+def every_mode_under(folder: Path) -> dict[str, str]:
+    return {
+        str(path.relative_to(folder)): oct(path.stat().st_mode & 0o777)
+        for path in folder.rglob("*")
+    }
+
+
+async def serve_and_stop(url: str, folder: Path, stderr: Path) -> str:
+    """Let a client remember and stop, and an operator too; return what the operator is told."""
+    call_log = shlex.quote(str(folder / "calls.jsonl"))
+    arguments = f"serve --robot {shlex.quote(url)} --call-log {call_log}"
+    settings = {"XDG_DATA_HOME": str(folder), "PATH": os.environ["PATH"]}
+    server = StdioServerParameters(
+        command="sh", args=["-c", f"{UNMASKED} {arguments}"], env=settings
+    )
+    with stderr.open("w") as errors:
+        async with Client(stdio_client(server, errlog=errors)) as client:
+            await client.call_tool("look_at_map", {})
+            await client.call_tool("write_semantic_data", FACTS)
+            told = await anyio.run_process(
+                ["sh", "-c", f"{UNMASKED} stop"], env=settings, check=False
+            )
+            await client.call_tool("stop_robot", {})
+    return told.stdout.decode() + told.stderr.decode()
+
+
+@pytest.mark.anyio
+async def test_what_is_written_and_told_holds_no_secret_and_is_for_its_user_alone(
+    tmp_path: Path,
+) -> None:
+    scripted = ScriptedRobot()
+    scripted.topics["/map"] = "nav_msgs/msg/OccupancyGrid"
+    scripted.latched["/map"] = scripted.map_message(two_rooms())
+    folder = tmp_path / "data"
+    folder.mkdir()
+    with anyio.fail_after(PATIENCE_S):
+        async with running(scripted.server) as server:
+            address = f"bob:s3cr3tpw@127.0.0.1:{server.port}/?token=t0k3nvalue"
+            told = await serve_and_stop(f"ws://{address}", folder, tmp_path / "stderr")
+
+    assert f"ws://127.0.0.1:{server.port}" in told
+    written = [path for path in folder.rglob("*") if path.is_file()]
+    names = [str(path.relative_to(folder)) for path in written]
+    contents = [path.read_bytes() for path in [*written, tmp_path / "stderr"]]
+    for secret in SECRETS:
+        assert secret not in told
+        assert not [name for name in names if secret in name]
+        assert not [content for content in contents if secret.encode() in content]
+    modes = every_mode_under(folder)
+    assert {"mapspeak/audit.jsonl", "calls.jsonl", f"mapspeak/ws_127.0.0.1_{server.port}.yaml"} <= {
+        *modes
+    }
+    assert set(modes.values()) <= {"0o600", "0o700"}, modes
+
+
+def test_a_memory_that_is_named_by_a_password_gets_another_name(tmp_path: Path) -> None:
+    old, new = tmp_path / "ws_bob_s3cr3tpw_robot.yaml", tmp_path / "ws_robot_9090.yaml"
+    SemanticMapStore(old).write(Waypoint(name="desk", pose=Pose(1.0, 2.0)))
+    episodes = tmp_path / "ws_bob_s3cr3tpw_robot.memory"
+    episodes.mkdir()
+
+    rename_memory(old, new)
+
+    assert not [path for path in tmp_path.iterdir() if "s3cr3tpw" in path.name]
+    assert (tmp_path / "ws_robot_9090.memory").is_dir()
+    assert [each.name for each in SemanticMapStore(new).read().waypoints] == ["desk"]
+    assert new.stat().st_mode & 0o777 == 0o600
+
+
+def test_a_memory_that_is_named_by_a_password_never_takes_the_place_of_another(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    old, new = tmp_path / "ws_bob_s3cr3tpw_robot.yaml", tmp_path / "ws_robot_9090.yaml"
+    old.write_text("old")
+    new.write_text("new")
+
+    rename_memory(old, new)
+
+    assert (old.read_text(), new.read_text()) == ("old", "new")
+    said = capsys.readouterr().err
+    assert "Remove it" in said
+    assert "s3cr3tpw" not in said

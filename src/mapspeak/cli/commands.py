@@ -1,5 +1,6 @@
 """All commands, and what becomes of errors."""
 
+import os
 import sys
 
 import click
@@ -9,6 +10,7 @@ from mapspeak.cli.approving import approve
 from mapspeak.cli.demonstrating import demo
 from mapspeak.cli.evaluating import evaluate
 from mapspeak.cli.examining import doctor
+from mapspeak.cli.guarding import keep_private
 from mapspeak.cli.mapping import map_command
 from mapspeak.cli.memory import memory
 from mapspeak.cli.replaying import replay
@@ -50,13 +52,16 @@ for command in COMMANDS:
 
 
 def main() -> None:
-    """Runs the command line; what went wrong on purpose is said in one line, without a trace."""
+    """Run the command line; what went wrong on purpose is said in one line, without a trace."""
+    umask = keep_private()
     try:
         cli()
     except* MapspeakError as group:
         for error in _leaves(group):
             click.echo(f"mapspeak: {error}", err=True)
         sys.exit(2)
+    finally:
+        os.umask(umask)
 
 
 def _leaves(group: BaseExceptionGroup[MapspeakError]) -> list[MapspeakError]:

@@ -25,9 +25,11 @@ def name_robots(given: Sequence[str]) -> dict[str, str]:
     for each in given:
         match = NAME.fullmatch(each)
         if match is None:
+            from mapspeak.links.rosbridge import quote_address  # noqa: PLC0415 - heavy
+
             raise ConfigError(
-                f"With several robots each needs a name of letters, digits, _ and - (40 at most); "
-                f"{each[:80]!r} has none.",
+                f"{quote_address(each)} has no name: with several robots each needs one of "
+                "letters, digits, _ and - (40 at most).",
                 hint="Write --robot hall=ws://192.168.1.20:9090 --robot yard=ws://192.168.1.21:9090.",
             )
         if match["name"] in named:

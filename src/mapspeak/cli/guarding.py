@@ -2,6 +2,7 @@
 
 import os
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -21,6 +22,7 @@ __all__ = [
     "build_guard",
     "control_folder",
     "data_folder",
+    "keep_private",
     "wall_clock",
 ]
 
@@ -93,6 +95,14 @@ def build_guard(choice: GuardChoice, *, robot: str) -> "Guard":
         wall_clock=wall_clock,
         robot=robot,
     )
+
+
+def keep_private() -> int:
+    """Let no other user read what is written from now on, and return the umask until then."""
+    if data_folder().is_dir():
+        with suppress(PermissionError):
+            data_folder().chmod(0o700)
+    return os.umask(0o077)
 
 
 def data_folder() -> Path:

@@ -53,6 +53,19 @@ class RobotChoice:
     known_map: Path | None = None
     start: Pose | None = None
 
+    @property
+    def shown(self) -> str:
+        """The robot as it may be shown and stored: an address without its secrets.
+
+        Raises:
+            ConfigError: The address is invalid.
+        """
+        if not self.robot.startswith(ROSBRIDGE_SCHEMES):
+            return self.robot
+        from mapspeak.links.rosbridge import RobotAddress  # noqa: PLC0415 - heavy
+
+        return RobotAddress(url=self.robot).shown
+
 
 @asynccontextmanager
 async def open_robot(choice: RobotChoice) -> AsyncGenerator["Robot"]:
@@ -72,8 +85,10 @@ async def open_robot(choice: RobotChoice) -> AsyncGenerator["Robot"]:
     elif kind == "dds":
         opened = _open_dds(choice, world)
     else:
+        from mapspeak.links.rosbridge import quote_address  # noqa: PLC0415 - heavy
+
         raise ConfigError(
-            f"There is no link for the robot {choice.robot!r}.",
+            f"{quote_address(choice.robot)} is not a robot: there is no link for it.",
             hint="Use sim, sim:WORLD, sim:PATH to a world file, ws://HOST:9090 for a rosbridge, or "
             "for ROS 2 without one ros2 (as a node of it) or dds (without ROS here).",
         )

@@ -16,6 +16,7 @@ import click
 
 from mapspeak.cli.fleet import file_for, name_robots, split_files
 from mapspeak.cli.guarding import GUARD_OPTIONS, GuardChoice, build_guard, data_folder
+from mapspeak.cli.memory.files import rename_memory
 from mapspeak.cli.options import DEFAULT_WORLD, FILE, ROBOT_HELP, ROBOT_OPTIONS, add_options
 from mapspeak.cli.robots import RobotChoice, find_connection, open_robot
 from mapspeak.errors import ConfigError
@@ -323,10 +324,11 @@ async def _open_session(
     from mapspeak.semantic import SemanticMapStore  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.session import Session  # noqa: PLC0415
 
-    guard = build_guard(start.guard, robot=name or start.choice.robot)
+    guard = build_guard(start.guard, robot=name or start.choice.shown)
     robot = await links.enter_async_context(open_robot(start.choice))
     map_name = robot.description.map_name
-    path = start.semantic_map or usual_semantic_map(map_name, start.choice.robot)
+    path = start.semantic_map or usual_semantic_map(map_name, start.choice.shown)
+    rename_memory(usual_semantic_map(map_name, start.choice.robot), path)
     # A client on stdio cannot vanish unnoticed: its end of the pipe closes.
     lease_s = math.inf if options.http is None else options.lease_s
     memory = SemanticMapStore(path, map_id=map_name or None)
@@ -377,7 +379,7 @@ def usual_semantic_map(map_name: str, robot: str) -> Path:
 
     Args:
         map_name: Of the robot's map; empty where it does not say.
-        robot: The robot's address, whose file it is then.
+        robot: The robot as it is shown, whose file it is then.
     """
     name = map_name or robot
     return data_folder() / f"{re.sub(r'[^A-Za-z0-9_.-]+', '_', name)}.yaml"

@@ -382,7 +382,8 @@ async def test_a_token_goes_into_the_header_or_ahead_of_everything_else() -> Non
     ("url", "shown"),
     [
         ("ws://robot", "ws://robot:9090"),
-        ("ws://robot:8080/path", "ws://robot:8080"),
+        ("ws://robot:8080/", "ws://robot:8080"),
+        ("ws://robot/?token=secret", "ws://robot:9090"),
         ("wss://user:secret@robot", "wss://robot:9090"),
         ("ws://[fe80::1]", "ws://[fe80::1]:9090"),
         ("ws://[fe80::1]:80", "ws://[fe80::1]:80"),
@@ -390,6 +391,21 @@ async def test_a_token_goes_into_the_header_or_ahead_of_everything_else() -> Non
 )
 def test_an_address_has_the_usual_port_and_shows_no_password(url: str, shown: str) -> None:
     assert RobotAddress(url=url).shown == shown
+    assert "secret" not in repr(RobotAddress(url=url))
+
+
+def test_robots_behind_one_gateway_are_told_apart_without_their_tokens() -> None:
+    urls = ("wss://gate/hall", "wss://gate/?id=7", "wss://gate/?id=8&token=a", "wss://gate")
+    assert len({RobotAddress(url=url).shown for url in urls}) == len(urls)
+    renewed = RobotAddress(url="wss://gate/?id=8&token=b")
+    assert renewed.shown == RobotAddress(url=urls[2]).shown
+
+
+@pytest.mark.parametrize("url", ["ws://bob:secret@robot:port", "ws://robot:x/?token=secret"])
+def test_what_is_no_address_is_refused_without_showing_its_secrets(url: str) -> None:
+    with pytest.raises(ConfigError) as refused:
+        RobotAddress(url=url)
+    assert "secret" not in str(refused.value)
 
 
 @pytest.mark.parametrize("url", ["", "robot:9090", "http://robot", "ws://", "ws://robot:port"])

@@ -18,6 +18,7 @@ __all__ = [
     "find_memory",
     "open_memory",
     "read_places",
+    "rename_memory",
     "write_out",
 ]
 
@@ -64,6 +65,33 @@ def read_places(store: "SemanticMapStore") -> "SemanticMap":
     for warning in places.warnings:
         click.echo(f"mapspeak: {warning}", err=True)
     return places
+
+
+def rename_memory(old: Path, new: Path) -> None:
+    """Move a memory that was named by the whole address of its robot, which may hold a password.
+
+    Args:
+        old: The file as it was named once.
+        new: The file as it is named today.
+    """
+    from mapspeak.semantic.episodes import memory_folder  # noqa: PLC0415 - heavy
+
+    if old == new or not old.exists():
+        return
+    # Secrets must not reach a log either, so the old name is not shown.
+    if new.exists():
+        click.echo(
+            f"mapspeak: a memory in {old.parent} is named by this robot's whole address and is not "
+            f"used: {new.name} is. Remove it: its name may hold a password.",
+            err=True,
+        )
+        return
+    old.chmod(0o600)
+    for before, after in ((memory_folder(old), memory_folder(new)), (old, new)):
+        if before.exists():
+            before.rename(after)
+    old.with_name(f".{old.name}.lock").unlink(missing_ok=True)
+    click.echo(f"mapspeak: this robot's memory is now {new}.", err=True)
 
 
 def write_out(text: str, out: Path | None) -> None:

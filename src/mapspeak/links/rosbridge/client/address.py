@@ -1,8 +1,11 @@
 """Where a robot's rosbridge is, and what it wants to see before it talks."""
 
+import re
 import ssl
 from dataclasses import dataclass, field
+from hashlib import sha256
 from pathlib import Path
+from urllib.parse import parse_qsl, urlencode
 
 from websockets.exceptions import InvalidURI
 from websockets.uri import WebSocketURI, parse_uri
@@ -10,6 +13,8 @@ from websockets.uri import WebSocketURI, parse_uri
 from mapspeak.errors import ConfigError
 
 DEFAULT_PORT = 9090
+SECRET_KEY = re.compile("token|key|auth|pass|secret|sig", re.IGNORECASE)
+"""Of a query: what changes without the robot becoming another one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,7 +31,7 @@ class RobotAddress:
         ConfigError: The URL is none, or there is no such file.
     """
 
-    url: str
+    url: str = field(repr=False)
     headers: dict[str, str] = field(default_factory=dict, repr=False)
     token: str | None = field(default=None, repr=False)
     ca_file: Path | None = None
@@ -47,10 +52,16 @@ class RobotAddress:
 
     @property
     def shown(self) -> str:
-        """The URL as people may see it: without user and password."""
+        """The URL as it may be shown and stored: without user, password and token.
+
+        A path or an id may hold a token too: a digest tells robots behind one gateway apart.
+        """
         uri = self.uri
         host = f"[{uri.host}]" if ":" in uri.host else uri.host
-        return f"{'wss' if uri.secure else 'ws'}://{host}:{uri.port}"
+        pairs = [pair for pair in parse_qsl(uri.query) if not SECRET_KEY.search(pair[0])]
+        resource = f"{uri.path.rstrip('/')}?{urlencode(pairs)}"
+        digest = "" if resource == "?" else f"/~{sha256(resource.encode()).hexdigest()[:8]}"
+        return f"{'wss' if uri.secure else 'ws'}://{host}:{uri.port}{digest}"
 
     def build_ssl_context(self) -> ssl.SSLContext | None:
         """Gives what decides whether a wss server is the right one; None for ws.
@@ -69,12 +80,17 @@ class RobotAddress:
             ) from error
 
 
+def quote_address(text: str) -> str:
+    """Return what was given as an address in quotes, unless a part of it may be a secret."""
+    return "What was given" if {"@", "?", "#"} & set(text) else repr(text[:80])
+
+
 def _parse(url: str) -> WebSocketURI:
     try:
         return parse_uri(url)
     except (InvalidURI, ValueError) as error:
         raise ConfigError(
-            f"{_without_password(url)!r} is not the address of a rosbridge server.",
+            f"{quote_address(url)} is not the address of a rosbridge server.",
             hint="It looks like ws://192.168.1.20:9090, ws://[fe80::1]:9090 or wss://robot:9090.",
         ) from error
 
@@ -86,8 +102,3 @@ def _with_port(url: str, uri: WebSocketURI) -> str:
         return url
     scheme = "wss" if uri.secure else "ws"
     return url.replace(f"{scheme}://{authority}", f"{scheme}://{authority}:{DEFAULT_PORT}", 1)
-
-
-def _without_password(url: str) -> str:
-    scheme, separator, rest = url[:200].partition("://")
-    return f"{scheme}{separator}{rest.rsplit('@', 1)[-1]}"
