@@ -1,6 +1,11 @@
-from collections.abc import Iterable
+import json
+import re
+import socket
+from collections.abc import AsyncGenerator, Iterable
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 
+import anyio
 import pytest
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -17,6 +22,7 @@ START: Message = {"type": "http.response.start", "status": 200, "headers": []}
 MORE: Message = {"type": "http.response.body", "body": b"so far", "more_body": True}
 END: Message = {"type": "http.response.body", "body": b"", "more_body": False}
 HANG_UP: Message = {"type": "http.disconnect"}
+JSON = {"Content-Type": "application/json", "Accept": "application/json, text/event-stream"}
 
 
 class Answering:
@@ -103,3 +109,94 @@ async def test_other_machines_are_not_served_without_a_token(address: str, tmp_p
     session = Session(FakeRobot(), SemanticMapStore(tmp_path / "m.yaml"), lease_s=60.0)
     with pytest.raises(ConfigError, match="MAPSPEAK_HTTP_TOKEN"):
         await serve_http(build_server(session), address)
+
+
+@asynccontextmanager
+async def drive_over_http(folder: Path) -> AsyncGenerator[tuple[FakeRobot, str, str]]:
+    """Serve a robot that a client drives; give it, the server's address and the client's session."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        address = f"127.0.0.1:{free.getsockname()[1]}"
+    robot = FakeRobot(two_rooms())
+    session = Session(robot, SemanticMapStore(folder / "m.yaml"), lease_s=60.0)
+    with anyio.fail_after(20.0):
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(serve_http, build_server(session), address)
+            client = await begin_session(address)
+            with session.drives.preparing() as ticket:
+                goal = await session.find_goal(place=None, x=6.0, y=1.4, yaw_deg=None)
+                await session.drives.start(goal.pose, place=goal.name, ticket=ticket, client=client)
+            yield robot, address, client
+            tasks.cancel_scope.cancel()
+
+
+async def request(address: str, method: str, headers: dict[str, str], body: str = "") -> str:
+    """Return what the server answers, as it comes; nothing where it is not there."""
+    host, port = address.split(":")
+    fields = {"Host": address, "Connection": "close", "Content-Length": str(len(body))} | headers
+    lines = [f"{method} /mcp HTTP/1.1", *(f"{name}: {text}" for name, text in fields.items())]
+    try:
+        stream = await anyio.connect_tcp(host, int(port))
+    except OSError:
+        return ""
+    answer = ""
+    async with stream:
+        await stream.send("\r\n".join([*lines, "", body]).encode())
+        with suppress(anyio.EndOfStream):
+            while True:
+                answer += (await stream.receive()).decode()
+    return answer
+
+
+async def begin_session(address: str) -> str:
+    """Return the id of a new session, once the server listens."""
+    hello = {
+        "jsonrpc": "2.0",
+        "id": 1,
+        "method": "initialize",
+        "params": {
+            "protocolVersion": "2025-06-18",
+            "capabilities": {},
+            "clientInfo": {"name": "test", "version": "0"},
+        },
+    }
+    answer = ""
+    while not answer:
+        await anyio.lowlevel.checkpoint()
+        answer = await request(address, "POST", JSON, json.dumps(hello))
+    found = re.search(r"mcp-session-id: (\w+)", answer)
+    assert found is not None, answer
+    return found[1]
+
+
+@pytest.mark.parametrize(
+    ("changed", "status", "n_stops"),
+    [
+        ({}, 200, 1),
+        ({"Host": "evil.example"}, 421, 0),
+        ({"Origin": "http://evil.example"}, 403, 0),
+        ({"Mcp-Session-Id": "unknown"}, 404, 0),
+        ({"Mcp-Session-Id": "unknown", "Host": "evil.example"}, 421, 0),
+    ],
+)
+async def test_only_the_end_of_a_known_session_stops_its_drive(
+    tmp_path: Path, changed: dict[str, str], status: int, n_stops: int
+) -> None:
+    async with drive_over_http(tmp_path) as (robot, address, session):
+        answer = await request(address, "DELETE", {"Mcp-Session-Id": session} | changed)
+        assert answer.startswith(f"HTTP/1.1 {status} ")
+        assert robot.n_stops == n_stops
+
+
+async def test_a_client_that_leaves_in_mid_request_costs_one_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    async with drive_over_http(tmp_path) as (_, address, session):
+        host, port = address.split(":")
+        fields = JSON | {"Host": address, "Mcp-Session-Id": session, "Content-Length": "1000"}
+        lines = ["POST /mcp HTTP/1.1", *(f"{name}: {text}" for name, text in fields.items())]
+        async with await anyio.connect_tcp(host, int(port)) as stream:
+            await stream.send("\r\n".join([*lines, "", "{"]).encode())
+        while not [each for each in caplog.records if "left before its request" in each.message]:
+            await anyio.lowlevel.checkpoint()
+    assert "Traceback" not in capfd.readouterr().err
+    assert not [each for each in caplog.records if each.exc_info]

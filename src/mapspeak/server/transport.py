@@ -1,12 +1,15 @@
 """How a server reaches its clients: stdio, or streaming HTTP with its doors closed by default."""
 
 import ipaddress
+import logging
 import secrets
 import socket
 from collections.abc import Awaitable, Callable
+from http import HTTPStatus
 
 import uvicorn
-from mcp.server.transport_security import TransportSecuritySettings
+from mcp.server.transport_security import TransportSecurityMiddleware, TransportSecuritySettings
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -15,6 +18,9 @@ from mapspeak.server.app import MapspeakServer
 from mapspeak.server.fleet import FleetServer
 
 __all__ = ["serve_http", "serve_stdio"]
+
+HEALTH = "/health"
+HTTP_LOGGERS = ("mcp.server.streamable_http", "uvicorn.error")
 
 
 async def serve_stdio(server: MapspeakServer | FleetServer) -> None:
@@ -38,14 +44,29 @@ async def serve_http(
             f"{host} can be reached from other machines, and no token is set.",
             hint="Set MAPSPEAK_HTTP_TOKEN, or serve on 127.0.0.1.",
         )
+    security = _security(host, port)
     # Cancellation is lost with json_response or stateless_http: never use either for a robot.
-    app = server.streamable_http_app(transport_security=_security(host, port), host=host)
-    app.add_route("/health", _say_ok)
-    watched: ASGIApp = HangUpWatch(app, server.note_hang_up)
+    app = server.streamable_http_app(transport_security=security, host=host)
+    app.add_route(HEALTH, _say_ok)
+    watched: ASGIApp = HostGuard(HangUpWatch(app, server.note_hang_up), security)
     guarded = watched if token is None else TokenGuard(watched, token)
     config = uvicorn.Config(guarded, log_level="warning")
+    for name in HTTP_LOGGERS:
+        logging.getLogger(name).addFilter(shorten_disconnect)
     with _listen(host, port) as listener:
         await uvicorn.Server(config).serve(sockets=[listener])
+
+
+def shorten_disconnect(record: logging.LogRecord) -> bool:
+    """Let a client that leaves in the middle of its request cost one line, not a trace."""
+    if record.exc_info and isinstance(record.exc_info[1], ClientDisconnect):
+        record.msg, record.args, record.exc_info = (
+            "A client left before its request ended.",
+            (),
+            None,
+        )
+        record.levelno, record.levelname = logging.WARNING, "WARNING"
+    return True
 
 
 class HangUpWatch:
@@ -65,13 +86,15 @@ class HangUpWatch:
             await self._app(scope, receive, send)
             return
         client = dict(scope["headers"]).get(b"mcp-session-id", b"").decode("latin-1")
-        is_answered = False
+        is_answered = is_ended = False
 
         async def watch_send(message: Message) -> None:
-            nonlocal is_answered
+            nonlocal is_answered, is_ended
             await send(message)
             is_body = message["type"] == "http.response.body"
             is_answered = is_answered or (is_body and not message.get("more_body", False))
+            if scope.get("method") == "DELETE" and message["type"] == "http.response.start":
+                is_ended = message["status"] < HTTPStatus.BAD_REQUEST
 
         async def watch_receive() -> Message:
             message = await receive()
@@ -79,9 +102,26 @@ class HangUpWatch:
                 await self._on_hang_up(client)
             return message
 
-        if scope.get("method") == "DELETE":
-            await self._on_hang_up(client)
         await self._app(scope, watch_receive, watch_send)
+        if is_ended:
+            await self._on_hang_up(client)
+
+
+class HostGuard:
+    """Lets only requests through that name this server, before anything is done for them."""
+
+    def __init__(self, app: ASGIApp, security: TransportSecuritySettings) -> None:
+        self._app = app
+        self._security = TransportSecurityMiddleware(security)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Passes the request on, or answers 421 or 403."""
+        if scope["type"] == "http" and scope["path"] != HEALTH:
+            refusal = await self._security.validate_request(Request(scope))
+            if refusal is not None:
+                await refusal(scope, receive, send)
+                return
+        await self._app(scope, receive, send)
 
 
 class TokenGuard:
@@ -106,7 +146,7 @@ class TokenGuard:
         scheme, _, given = dict(scope["headers"]).get(b"authorization", b"").partition(b" ")
         is_bearer = scheme.lower() == b"bearer"
         is_right = secrets.compare_digest(given.strip(), self._token)
-        return scope["path"] == "/health" or (is_bearer and is_right)
+        return scope["path"] == HEALTH or (is_bearer and is_right)
 
 
 async def _say_ok(_request: object) -> PlainTextResponse:
