@@ -113,7 +113,7 @@ async def test_other_machines_are_not_served_without_a_token(address: str, tmp_p
 
 @asynccontextmanager
 async def drive_over_http(folder: Path) -> AsyncGenerator[tuple[FakeRobot, str, str]]:
-    """Serve a robot that a client drives; give it, the server's address and the client's session."""
+    """Serve a robot that a client drives; yield it, the address, and the client's session."""
     with socket.create_server(("127.0.0.1", 0)) as free:
         address = f"127.0.0.1:{free.getsockname()[1]}"
     robot = FakeRobot(two_rooms())

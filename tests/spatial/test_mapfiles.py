@@ -1,4 +1,5 @@
 import math
+import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -366,3 +367,34 @@ def test_a_value_that_no_map_can_have_is_refused_without_a_trace(tmp_path: Path,
     file.write_text("\n".join([*kept, line]))
     with pytest.raises(MapError):
         load_map(file)
+
+
+ALIAS_BOMB = """\
+a: &a [0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
+b: &b [*a, *a, *a, *a, *a, *a, *a, *a, *a, *a]
+c: &c [*b, *b, *b, *b, *b, *b, *b, *b, *b, *b]
+d: &d [*c, *c, *c, *c, *c, *c, *c, *c, *c, *c]
+e: &e [*d, *d, *d, *d, *d, *d, *d, *d, *d, *d]
+f: &f [*e, *e, *e, *e, *e, *e, *e, *e, *e, *e]
+g: &g [*f, *f, *f, *f, *f, *f, *f, *f, *f, *f]
+image: map.pgm
+origin: [*g, *g, *g]
+"""
+
+
+@pytest.mark.parametrize("text", [ALIAS_BOMB, "image: &name map.pgm\nmode: *name\n"])
+def test_a_yaml_with_aliases_is_refused_before_it_is_unfolded(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "map.yaml"
+    path.write_text(text)
+    with pytest.raises(MapError, match="not YAML") as refused:
+        load_map(path)
+    assert "aliases" in refused.value.hint
+
+
+def test_a_pipe_in_place_of_a_map_or_its_picture_is_refused(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.yaml")
+    with pytest.raises(MapError, match="not a regular file"):
+        load_map(tmp_path / "pipe.yaml")
+    os.mkfifo(tmp_path / "pipe.pgm")
+    with pytest.raises(MapError, match="not a regular file"):
+        load_map(write_yaml(tmp_path, image="pipe.pgm"))

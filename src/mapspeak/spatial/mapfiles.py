@@ -17,10 +17,12 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat,
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.events import AliasEvent
 
 from mapspeak.errors import MapError
 from mapspeak.geometry import Pose
 from mapspeak.spatial.grid import FREE_MAX, UNKNOWN, OccupancyGrid
+from mapspeak.spatial.opening import open_regular
 
 __all__ = [
     "MAX_CELLS",
@@ -37,6 +39,7 @@ Grey = NDArray[np.uint8]
 MAX_CELLS = 80_000_000
 """About 8,900 x 8,900 cells, or 450 x 450 m at 5 cm."""
 
+_MAX_YAML_BYTES = 1_000_000
 _FREE, _OCCUPIED = 0, 100
 _UNKNOWN_GREY, _FREE_GREY, _OCCUPIED_GREY = 205, 254, 0
 _DEFAULT_OCCUPIED_THRESH, _DEFAULT_FREE_THRESH = 0.65, 0.196
@@ -256,7 +259,8 @@ def _read_description(path: Path) -> _Description:
 
 def _parse_yaml(path: Path) -> CommentedMap:
     try:
-        document = YAML(typ="rt", pure=True).load(path.read_text(encoding="utf-8"))
+        with open_regular(path) as file:
+            document = _load_without_aliases(file.read(_MAX_YAML_BYTES).decode())
     except FileNotFoundError as error:
         raise MapError(
             f"There is no map file {path}.", hint="Check the path of the .yaml file."
@@ -269,7 +273,7 @@ def _parse_yaml(path: Path) -> CommentedMap:
     except (ValueError, RecursionError, YAMLError) as error:
         raise MapError(
             f"{path.name}{_line_of(error)} is not YAML.",
-            hint="A map's .yaml holds lines such as 'resolution: 0.05'.",
+            hint="A map's .yaml holds lines such as 'resolution: 0.05', no aliases.",
         ) from error
     if not isinstance(document, CommentedMap):
         raise MapError(
@@ -277,6 +281,13 @@ def _parse_yaml(path: Path) -> CommentedMap:
             hint="It needs image, resolution, origin, negate, occupied_thresh and free_thresh.",
         )
     return document
+
+
+def _load_without_aliases(text: str) -> object:
+    """Refuse aliases, since a few lines of them can stand for gigabytes."""
+    if any(isinstance(event, AliasEvent) for event in YAML(pure=True).parse(text)):
+        raise YAMLError("aliases")
+    return YAML(typ="rt", pure=True).load(text)
 
 
 def _line_of(error: Exception) -> str:
@@ -304,7 +315,7 @@ def _say_wrong_value(path: Path, document: CommentedMap, error: ValidationError)
 def _read_picture(path: Path) -> tuple[Grey, Grey | None]:
     """Gives the greys of a picture, and its alpha channel if it has one."""
     try:
-        with Image.open(path, formats=_PICTURE_FORMATS) as picture:
+        with open_regular(path) as file, Image.open(file, formats=_PICTURE_FORMATS) as picture:
             _check_size(path, picture.width, picture.height)
             return _channels(picture)
     except FileNotFoundError as error:
