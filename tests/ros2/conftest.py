@@ -38,9 +38,18 @@ def domain(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
 
 
 @pytest.fixture
-def robot(domain: dict[str, str]) -> Iterator[RobotProcess]:
-    """A robot in the left of two rooms, as a process of its own, in the domain of this one."""
-    with open_robot_process(TWO_ROOMS, pose=START, speed_mps=2.0, environment=domain) as process:
+def robot(domain: dict[str, str], request: pytest.FixtureRequest) -> Iterator[RobotProcess]:
+    """A robot in the left of two rooms, as a process of its own, in the domain of this one.
+
+    A test that is parametrized with it, indirectly, gives more options of its program.
+    """
+    with open_robot_process(
+        TWO_ROOMS,
+        pose=START,
+        speed_mps=2.0,
+        environment=domain,
+        options=getattr(request, "param", ()),
+    ) as process:
         yield process
 
 

@@ -15,117 +15,84 @@ from pathlib import Path
 from typing import Any
 
 import rclpy
-from nav2_msgs.action import NavigateToPose
-from rclpy.action import ActionServer, CancelResponse, GoalResponse
-from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.duration import Duration
 from rclpy.executors import MultiThreadedExecutor
 
 from drawing import grid_from_text
+from faulty import Faults
 from mapspeak.geometry import Pose
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map
 from ros2.robot_motion import Motion
-from ros2.robot_topics import Topics, pose_from_message
+from ros2.robot_navigation import STEP_S, Navigation
+from ros2.robot_topics import Topics
 
-STEP_S = 0.05
 N_THREADS = 8  # each goal under way holds one
-UNKNOWN_ERROR = 9000  # as Nav2 has it
+COSTMAPS = ("local_costmap", "global_costmap")
+USUAL_PARTS = ("map", "tf", "odometry", "scan", "camera", "velocity", "actions")
 
 Reply = dict[str, Any]
 
 
 class RobotNode:
-    """What the robot does of itself, at each step, and when it is asked to.
+    """What the robot does of itself, at each step, and when it is asked to."""
 
-    Goals wait in threads of their own, so all that changes the robot holds its lock.
-    """
-
-    def __init__(self, *, motion: Motion, map_texts: "MapReader") -> None:
-        self.node = rclpy.create_node("robot")
+    def __init__(
+        self,
+        motion: Motion,
+        executor: Any,  # noqa: ANN401
+        map_texts: "MapReader",
+        arguments: argparse.Namespace,
+    ) -> None:
+        self.node = rclpy.create_node("robot", namespace=arguments.namespace)
+        self._executor = executor
+        self._arguments = arguments
         self._lock = threading.RLock()
         self.motion = motion
-        self.topics = Topics(self.node, on_velocity=self.hear_velocity)
+        self.topics = Topics(self.node, motion.faults)
         self._read_map = map_texts
-        self._drive: Drive | None = None
-        self._n_recoveries = 0
-        self._velocities: list[tuple[float, float]] = []
+        self._contexts: list[Any] = []
         declare_parameters(self.node)
-        self._actions = ActionServer(
-            self.node,
-            NavigateToPose,
-            "navigate_to_pose",
-            execute_callback=self.drive,
-            callback_group=ReentrantCallbackGroup(),
-            goal_callback=self.judge_goal,
-            cancel_callback=lambda _handle: CancelResponse.ACCEPT,
-        )
         self.topics.offer_motor_switch(self.switch_motors)
-        self.topics.publish_map(motion.grid)
+        self.navigation = self._start_navigation()
+        for part in {*USUAL_PARTS, *arguments.also} - {*arguments.later}:
+            self.appear(part=part)
+        for number in range(arguments.participants):
+            self._join(number)
+        executor.add_node(self.node)
         self.node.create_timer(STEP_S, self.step)
+
+    def _start_navigation(self) -> Navigation:
+        navigation = Navigation(
+            self.motion,
+            namespace=self._arguments.namespace,
+            lock=self._lock,
+            drives_by_velocity=self._arguments.drives_by_velocity,
+        )
+        self._executor.add_node(navigation.node)
+        return navigation
+
+    def _join(self, number: int) -> None:
+        """Add a participant to the domain: a process more, as far as DDS can tell."""
+        context = rclpy.Context()
+        context.init()
+        self._contexts.append(context)
+        rclpy.create_node(f"bystander_{number}", context=context)
 
     # --- at each step
 
     def step(self) -> None:
         with self._lock:
-            if self._drive and self._drive.handle.is_cancel_requested:
-                self.end(self._drive, self._drive.handle.canceled)
-            if self._drive:
-                self.drive_on(self._drive)
-            else:
-                self.motion.coast(STEP_S)
+            if self.motion.faults.is_paused:
+                return
+            is_carried = self.navigation.step() and not self._arguments.drives_by_velocity
+            self.motion.pass_time(STEP_S, is_carried=is_carried)
             self.topics.publish_state(self.motion)
-
-    def drive_on(self, drive: "Drive") -> None:
-        is_blocked = not self.motion.approach(drive.goal, STEP_S)
-        if is_blocked:
-            self.end(drive, drive.handle.abort, "The way is blocked.")
-        elif self.motion.has_reached(drive.goal):
-            self.end(drive, drive.handle.succeed)
-        else:
-            drive.handle.publish_feedback(self.feedback(drive))
-
-    def feedback(self, drive: "Drive") -> Any:  # noqa: ANN401 - rclpy has no types
-        feedback = NavigateToPose.Feedback()
-        feedback.current_pose = self.topics.stamped(self.motion.pose)
-        distance_m = self.motion.pose.point.distance_to(drive.goal.point)
-        feedback.distance_remaining = distance_m
-        feedback.number_of_recoveries = self._n_recoveries
-        feedback.navigation_time = (self.node.get_clock().now() - drive.began_at).to_msg()
-        remaining_s = distance_m / self.motion.speed_mps
-        feedback.estimated_time_remaining = Duration(seconds=remaining_s).to_msg()
-        return feedback
-
-    # --- goals
-
-    def judge_goal(self, goal: Any) -> Any:  # noqa: ANN401
-        is_known = goal.pose.header.frame_id == "map"
-        return GoalResponse.ACCEPT if is_known else GoalResponse.REJECT
-
-    def drive(self, handle: Any) -> Any:  # noqa: ANN401
-        """Takes a new goal, which ends the one before as Nav2 does, and waits until it is over."""
-        drive = Drive(handle, began_at=self.node.get_clock().now())
-        with self._lock:
-            if self._drive:
-                self.end(self._drive, self._drive.handle.abort, "Another goal came.")
-            self._drive = drive
-        drive.is_over.wait()
-        return drive.result
-
-    def end(self, drive: "Drive", become: Callable[[], None], why: str = "") -> None:
-        self._drive = None
-        become()
-        drive.result.error_code = UNKNOWN_ERROR if why else NavigateToPose.Result.NONE
-        drive.result.error_msg = why
-        drive.is_over.set()
 
     # --- what others ask by ROS
 
     def hear_velocity(self, message: Any) -> None:  # noqa: ANN401
-        velocity = (message.linear.x, message.angular.z)
         with self._lock:
-            self._velocities.append(velocity)
-            self.motion.take_velocity(*velocity)
+            self.motion.hear((message.linear.x, message.angular.z))
 
     def switch_motors(self, request: Any, response: Any) -> Any:  # noqa: ANN401
         self.motion.has_power = request.data
@@ -141,54 +108,90 @@ class RobotNode:
             reply = COMMANDS[command.pop("do")](self, **command)
         say(json.dumps(reply))
 
+    def appear(self, *, part: str) -> Reply:
+        """Start a part of the robot that was not there yet."""
+        if part == "actions":
+            self.navigation.offer_actions()
+        elif part == "goal_topic":
+            self.navigation.offer_goal_topic()
+        elif part == "costmaps":
+            self._start_costmaps()
+        else:
+            self.topics.start(part, on_velocity=self.hear_velocity)
+        if part == "map":
+            self.topics.publish_map(self.motion.grid)
+        return {}
+
+    def _start_costmaps(self) -> None:
+        for name in COSTMAPS:
+            node = rclpy.create_node(name, namespace=f"{self._arguments.namespace}/{name}")
+            if self._arguments.footprint:
+                node.declare_parameter("footprint", self._arguments.footprint)
+            else:
+                node.declare_parameter("robot_radius", self._arguments.robot_radius)
+            self._executor.add_node(node)
+
+    def set_faults(self, **faults: Any) -> Reply:  # noqa: ANN401
+        for name, value in faults.items():
+            setattr(self.motion.faults, name, set(value) if name == "silent" else value)
+        return {}
+
+    def kill_navigation(self) -> Reply:
+        """Let navigation hang in what it does, as a process does that was killed."""
+        self._executor.remove_node(self.navigation.node)
+        self.navigation.freeze()
+        return {}
+
+    def restart_navigation(self) -> Reply:
+        self.navigation.node.destroy_node()
+        self.navigation = self._start_navigation()
+        self.navigation.offer_actions()
+        return {}
+
     def change_map(self, *, text: str) -> Reply:
         self.motion.grid = self._read_map(text)
         self.topics.publish_map(self.motion.grid)
         return {}
 
     def update_map(self, *, row: int, col: int, text: str) -> Reply:
-        """Changes a rectangle of the map and tells only that, as costmaps do."""
+        """Change a rectangle of the map and tell only that, as costmaps do."""
         patch = grid_from_text(text)
         self.motion.paint(patch.cells, row=row, col=col)
         self.topics.publish_map_update(patch.cells, row=row, col=col)
         return {}
 
     def tell(self) -> Reply:
-        """Tells the truth about the robot, and what it has heard on /cmd_vel."""
+        """Tell the truth about the robot, and what it has heard."""
         pose = self.motion.pose
         return {
             "pose": [pose.x, pose.y, pose.yaw_rad],
-            "velocities": self._velocities,
-            "is_driving": self._drive is not None,
+            "driven_m": self.motion.driven_m,
+            "velocities": [velocity for _, velocity in self.motion.heard],
+            "velocity_times_s": [heard_s for heard_s, _ in self.motion.heard],
+            "is_driving": self.navigation.is_driving,
+            "n_goals": len(self.navigation.goals),
+            "n_cancels": len(self.navigation.cancels),
         }
 
     def leave(self) -> None:
-        """Ends what waits, so that the program can end."""
-        with self._lock:
-            if self._drive:
-                self.end(self._drive, self._drive.handle.abort, "The robot is switched off.")
+        """End what waits, so that the program can end."""
+        self.motion.faults.acceptance_s = 0.0
+        self.navigation.leave()
 
     def set_recoveries(self, *, n: int) -> Reply:
-        self._n_recoveries = n
+        self.navigation.n_recoveries = n
         return {}
 
 
-class Drive:
-    """A goal under way."""
-
-    def __init__(self, handle: Any, *, began_at: Any) -> None:  # noqa: ANN401
-        self.handle = handle
-        self.goal = pose_from_message(handle.request.pose.pose)
-        self.began_at = began_at
-        self.result = NavigateToPose.Result()
-        self.is_over = threading.Event()
-
-
 COMMANDS: dict[str, Callable[..., Reply]] = {
+    "appear": RobotNode.appear,
     "change_map": RobotNode.change_map,
-    "update_map": RobotNode.update_map,
-    "tell": RobotNode.tell,
+    "kill_navigation": RobotNode.kill_navigation,
+    "restart_navigation": RobotNode.restart_navigation,
+    "set_faults": RobotNode.set_faults,
     "set_recoveries": RobotNode.set_recoveries,
+    "tell": RobotNode.tell,
+    "update_map": RobotNode.update_map,
 }
 
 
@@ -205,7 +208,7 @@ class MapReader:
 
 
 def declare_parameters(node: Any) -> None:  # noqa: ANN401
-    """Declares one parameter of each kind."""
+    """Declare one parameter of each kind."""
     for name, value in {
         "robot_name": "test robot",
         "robot_radius": 0.22,
@@ -226,6 +229,15 @@ def read_arguments() -> argparse.Namespace:
     parser.add_argument("--resolution-m", type=float, default=0.5)
     parser.add_argument("--pose", type=float, nargs=3, required=True, metavar=("X", "Y", "YAW"))
     parser.add_argument("--speed-mps", type=float, default=1.0)
+    parser.add_argument("--namespace", default="", help="of all names, TF's too")
+    parser.add_argument("--also", nargs="*", default=[], help="goal_topic, costmaps")
+    parser.add_argument("--later", nargs="*", default=[], help="parts that come when told to")
+    parser.add_argument("--participants", type=int, default=0, help="that do nothing, beside it")
+    parser.add_argument("--robot-radius", type=float, default=0.35, help="in the costmaps")
+    parser.add_argument("--footprint", default="", help="in the costmaps, instead of a radius")
+    parser.add_argument(
+        "--drives-by-velocity", action="store_true", help="navigation publishes /cmd_vel"
+    )
     return parser.parse_args()
 
 
@@ -240,12 +252,14 @@ def main() -> None:
         raise SystemExit("The speed must be above zero.")
     read_map = MapReader(resolution_m=arguments.resolution_m)
     motion = Motion(
-        grid=read_map(arguments.map), pose=Pose(*arguments.pose), speed_mps=arguments.speed_mps
+        read_map(arguments.map),
+        pose=Pose(*arguments.pose),
+        speed_mps=arguments.speed_mps,
+        faults=Faults(),
     )
     with rclpy.init():
-        robot = RobotNode(motion=motion, map_texts=read_map)
         executor = MultiThreadedExecutor(N_THREADS)
-        executor.add_node(robot.node)
+        robot = RobotNode(motion, executor, read_map, arguments)
 
         def listen() -> None:
             for line in sys.stdin:

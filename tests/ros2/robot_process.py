@@ -7,7 +7,7 @@ import select
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -44,19 +44,43 @@ class RobotProcess:
         """Sets the number of recoveries that feedback tells."""
         self._command(do="set_recoveries", n=n)
 
+    def set_faults(self, **faults: Any) -> None:  # noqa: ANN401
+        """Changes what is wrong with the robot, by the names of `Faults`; silent is a list."""
+        self._command(do="set_faults", **faults)
+
+    def appear(self, part: str) -> None:
+        """Starts a part that was to come later."""
+        self._command(do="appear", part=part)
+
+    def kill_navigation(self) -> None:
+        """Lets navigation hang as a killed process does; the wheels keep what they were told."""
+        self._command(do="kill_navigation")
+
+    def restart_navigation(self) -> None:
+        self._command(do="restart_navigation")
+
+    def tell(self) -> dict[str, Any]:
+        """Gives all that the robot knows of itself: driven_m, n_goals, n_cancels and more."""
+        return self._command(do="tell")
+
+    @property
+    def driven_m(self) -> float:
+        """How far it has truly driven."""
+        return float(self.tell()["driven_m"])
+
     @property
     def pose(self) -> Pose:
         """Where the robot truly is, in the map frame."""
-        return Pose(*self._command(do="tell")["pose"])
+        return Pose(*self.tell()["pose"])
 
     @property
     def is_driving(self) -> bool:
-        return bool(self._command(do="tell")["is_driving"])
+        return bool(self.tell()["is_driving"])
 
     @property
     def velocities(self) -> list[tuple[float, float]]:
         """What came on /cmd_vel so far: forwards in m/s, turning in rad/s."""
-        return [(forward, turn) for forward, turn in self._command(do="tell")["velocities"]]
+        return [(forward, turn) for forward, turn in self.tell()["velocities"]]
 
     def _command(self, **command: Any) -> dict[str, Any]:  # noqa: ANN401
         if self.process.stdin is None:
@@ -75,6 +99,7 @@ def open_robot_process(
     resolution_m: float = 0.5,
     speed_mps: float = 1.0,
     environment: dict[str, str] | None = None,
+    options: Sequence[str] = (),
 ) -> Iterator[RobotProcess]:
     """Starts a robot, waits until it is ready, and ends it.
 
@@ -84,11 +109,13 @@ def open_robot_process(
         resolution_m: The side of a cell of the drawing.
         speed_mps: How fast it drives to goals.
         environment: Of the ROS domain; a free one when it is not given.
+        options: More of the program's, such as --namespace or --later.
     """
     environment = environment or ros_environment()
     arguments = (
         *("--map", str(map_text), "--resolution-m", str(resolution_m)),
         *("--speed-mps", str(speed_mps), "--pose", str(pose.x), str(pose.y), str(pose.yaw_rad)),
+        *options,
     )
     process = subprocess.Popen(  # noqa: S603 - our own program
         [sys.executable, "-m", "ros2.robot_node", *arguments],

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import Pose as PoseMessage
-from geometry_msgs.msg import PoseStamped, Transform, TransformStamped, Twist
+from geometry_msgs.msg import Transform, TransformStamped, Twist
 from map_msgs.msg import OccupancyGridUpdate
 from nav_msgs.msg import OccupancyGrid as GridMessage
 from nav_msgs.msg import Odometry
@@ -17,6 +17,7 @@ from sensor_msgs.msg import CameraInfo, Image, LaserScan
 from std_srvs.srv import SetBool
 from tf2_msgs.msg import TFMessage
 
+from faulty import Faults
 from mapspeak.geometry import Pose
 from mapspeak.spatial import OccupancyGrid
 from ros2.robot_motion import Motion
@@ -28,29 +29,44 @@ N_BEAMS = 72
 SCAN_RANGE_M = 10.0
 WIDTH, HEIGHT, FOCAL_LENGTH_PX = 64, 48, 32.0
 PADDING_BYTES = 8
+PARTS: dict[str, tuple[tuple[str, type, QoSProfile | int], ...]] = {
+    "map": (("map", GridMessage, LATCHED), ("map_updates", OccupancyGridUpdate, 10)),
+    "tf": (("tf", TFMessage, 100), ("tf_static", TFMessage, LATCHED)),
+    "odometry": (("odom", Odometry, 10),),
+    "scan": (("scan", LaserScan, 10),),
+    "camera": (("camera/image_raw", Image, 10), ("camera/camera_info", CameraInfo, 10)),
+    "velocity": (),
+}
+"""What belongs to each part of the robot: its topics, their types and how they are sent."""
 
 Message = Any  # rclpy has no types
 
 
 class Topics:
-    """Publishers and subscriptions of one node."""
+    """Publishers and subscriptions of one node; a part is there from when it is started."""
 
-    def __init__(self, node: Any, *, on_velocity: Callable[[Message], None]) -> None:  # noqa: ANN401
+    def __init__(self, node: Any, faults: Faults) -> None:  # noqa: ANN401
         self._node = node
+        self._faults = faults
         self._n_steps = 0
-        self._map = node.create_publisher(GridMessage, "map", LATCHED)
-        self._map_updates = node.create_publisher(OccupancyGridUpdate, "map_updates", 10)
-        self._tf = node.create_publisher(TFMessage, "/tf", 100)
-        self._tf_static = node.create_publisher(TFMessage, "/tf_static", LATCHED)
-        self._odometry = node.create_publisher(Odometry, "odom", 10)
-        self._scan = node.create_publisher(LaserScan, "scan", 10)
-        self._image = node.create_publisher(Image, "camera/image_raw", 10)
-        self._camera_info = node.create_publisher(CameraInfo, "camera/camera_info", 10)
-        node.create_subscription(Twist, "cmd_vel", on_velocity, 10)
-        self._publish_static_frames()
+        self._publishers: dict[str, Any] = {}
+
+    def start(self, part: str, *, on_velocity: Callable[[Message], None]) -> None:
+        """Start to publish, or to hear, what belongs to a part of the robot."""
+        if part == "velocity":
+            self._node.create_subscription(Twist, "cmd_vel", on_velocity, 10)
+        for topic, kind, qos in PARTS[part]:
+            self._publishers[topic] = self._node.create_publisher(kind, topic, qos)
+        if part == "tf":
+            self._publish_static_frames()
 
     def offer_motor_switch(self, answer: Callable[[Message, Message], Message]) -> None:
         self._node.create_service(SetBool, "switch_motors", answer)
+
+    def _publish(self, topic: str, message: Message) -> None:
+        publisher = self._publishers.get(topic)
+        if publisher is not None and publisher.topic_name not in self._faults.silent:
+            publisher.publish(message)
 
     # --- the map
 
@@ -62,7 +78,7 @@ class Topics:
         message.info.width, message.info.height = grid.n_cols, grid.n_rows
         message.info.origin = message_from_pose(grid.origin)
         message.data = packed(grid.cells)
-        self._map.publish(message)
+        self._publish("map", message)
 
     def publish_map_update(self, cells: NDArray[np.int8], *, row: int, col: int) -> None:
         message = OccupancyGridUpdate()
@@ -71,7 +87,7 @@ class Topics:
         message.x, message.y = col, row
         message.height, message.width = cells.shape
         message.data = packed(cells)
-        self._map_updates.publish(message)
+        self._publish("map_updates", message)
 
     # --- where the robot is and what it sees
 
@@ -81,7 +97,7 @@ class Topics:
             ("map", "odom", MAP_FROM_ODOM),
             ("odom", "base_footprint", odom_from_base),
         ):
-            self._tf.publish(TFMessage(transforms=[self._frame(parent, child, pose)]))
+            self._publish("tf", TFMessage(transforms=[self._frame(parent, child, pose)]))
         self._publish_odometry(odom_from_base)
         if self._n_steps % CAMERA_EVERY == 0:
             self._publish_scan(motion)
@@ -93,7 +109,7 @@ class Topics:
         message.header.stamp = self._now()
         message.header.frame_id, message.child_frame_id = "odom", "base_footprint"
         message.pose.pose = message_from_pose(odom_from_base)
-        self._odometry.publish(message)
+        self._publish("odom", message)
 
     def _publish_scan(self, motion: Motion) -> None:
         message = LaserScan()
@@ -104,7 +120,7 @@ class Topics:
         message.angle_max = math.pi - message.angle_increment
         message.range_max = SCAN_RANGE_M
         message.ranges = motion.scan(n_beams=N_BEAMS, range_m=SCAN_RANGE_M)
-        self._scan.publish(message)
+        self._publish("scan", message)
 
     def _publish_picture(self) -> None:
         """A picture with its left half red and its right half blue; its rows are padded."""
@@ -119,8 +135,8 @@ class Topics:
         info.distortion_model = "plumb_bob"
         info.k = [focal, 0.0, cx, 0.0, focal, cy, 0.0, 0.0, 1.0]
         info.p = [focal, 0.0, cx, 0.0, 0.0, focal, cy, 0.0, 0.0, 0.0, 1.0, 0.0]
-        self._image.publish(image)
-        self._camera_info.publish(info)
+        self._publish("camera/image_raw", image)
+        self._publish("camera/camera_info", info)
 
     # --- frames
 
@@ -130,7 +146,7 @@ class Topics:
         rotation = camera.transform.rotation
         rotation.x, rotation.y, rotation.z, rotation.w = -0.5, 0.5, -0.5, 0.5
         base = self._frame("base_footprint", "base_link", Pose(0.0, 0.0, 0.0))
-        self._tf_static.publish(TFMessage(transforms=[base, camera]))
+        self._publish("tf_static", TFMessage(transforms=[base, camera]))
 
     def _frame(self, parent: str, child: str, pose: Pose) -> Message:
         frame = TransformStamped()
@@ -141,12 +157,6 @@ class Topics:
         frame.transform.translation.x = pose.x
         frame.transform.translation.y = pose.y
         return frame
-
-    def stamped(self, pose: Pose) -> Message:
-        message = PoseStamped(pose=message_from_pose(pose))
-        message.header.frame_id = "map"
-        message.header.stamp = self._now()
-        return message
 
     def _now(self) -> Message:
         return self._node.get_clock().now().to_msg()

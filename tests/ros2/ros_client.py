@@ -5,7 +5,6 @@ from contextlib import contextmanager
 from typing import Any
 
 import rclpy
-from action_msgs.srv import CancelGoal
 from nav2_msgs.action import NavigateToPose
 from rclpy.action import ActionClient
 from rclpy.duration import Duration
@@ -37,6 +36,7 @@ class RosClient:
         where: Callable[[Message], bool] = lambda _: True,
         qos: QoSProfile | int = 10,
         meanwhile: Callable[[], None] = lambda: None,
+        patience_s: float = PATIENCE_S,
     ) -> Message:
         """Gives the first message of a kind that fits.
 
@@ -46,6 +46,7 @@ class RosClient:
             where: Whether a message is the one.
             qos: How it is sent.
             meanwhile: What is done once for every message that does not fit.
+            patience_s: How long to wait at most.
         """
         found = rclpy.task.Future()
 
@@ -59,7 +60,7 @@ class RosClient:
 
         subscription = self.node.create_subscription(kind, topic, take, qos)
         try:
-            return self.wait_for(found)
+            return self.wait_for(found, patience_s=patience_s)
         finally:
             self.node.destroy_subscription(subscription)
 
@@ -71,16 +72,34 @@ class RosClient:
         on_feedback: Callable[[Message], None] = lambda _: None,
     ) -> Message:
         """Gives the handle of a goal, which says whether it was accepted."""
+        return self.wait_for(self.begin_goal(goal, frame=frame, on_feedback=on_feedback))
+
+    def begin_goal(
+        self,
+        goal: Pose,
+        *,
+        frame: str = "map",
+        on_feedback: Callable[[Message], None] = lambda _: None,
+    ) -> Message:
+        """Sends a goal; gives what its handle will be in."""
         request = NavigateToPose.Goal()
         request.pose.header.frame_id = frame
         request.pose.pose = message_from_pose(goal)
-        if not self._navigator.wait_for_server(timeout_sec=PATIENCE_S):
+        if not self.has_navigation(within_s=PATIENCE_S):
             raise AssertionError("no action server")
-        return self.wait_for(
-            self._navigator.send_goal_async(
-                request, feedback_callback=lambda message: on_feedback(message.feedback)
-            )
+        return self._navigator.send_goal_async(
+            request, feedback_callback=lambda message: on_feedback(message.feedback)
         )
+
+    def has_navigation(self, *, within_s: float) -> bool:
+        return bool(self._navigator.wait_for_server(timeout_sec=within_s))
+
+    def send(self, kind: type, action: str, goal: Message) -> Message:
+        """Gives the handle of a goal of another action."""
+        client = ActionClient(self.node, kind, action)
+        if not client.wait_for_server(timeout_sec=PATIENCE_S):
+            raise AssertionError("no action server")
+        return self.wait_for(client.send_goal_async(goal))
 
     def start_goal(self, goal: Pose) -> Message:
         """Gives the handle of a goal that the robot has begun to drive to."""
@@ -96,7 +115,7 @@ class RosClient:
     def cancel(self, handle: Message) -> bool:
         """Asks for the end of a goal, and says whether the robot will."""
         reply = self.wait_for(handle.cancel_goal_async())
-        return bool(reply.return_code == CancelGoal.Response.ERROR_NONE)
+        return bool(reply.goals_canceling)
 
     def call(self, kind: type, name: str, request: Message) -> Message:
         client = self.node.create_client(kind, name)
@@ -116,10 +135,10 @@ class RosClient:
             if self.node.get_clock().now() > deadline:
                 raise TimeoutError(f"nothing within {PATIENCE_S} s")
 
-    def wait_for(self, future: Message) -> Message:
-        self._executor.spin_until_future_complete(future, timeout_sec=PATIENCE_S)
+    def wait_for(self, future: Message, *, patience_s: float = PATIENCE_S) -> Message:
+        self._executor.spin_until_future_complete(future, timeout_sec=patience_s)
         if not future.done():
-            raise TimeoutError(f"nothing within {PATIENCE_S} s")
+            raise TimeoutError(f"nothing within {patience_s} s")
         return future.result()
 
     def close(self) -> None:

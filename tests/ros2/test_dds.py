@@ -166,7 +166,7 @@ async def test_the_graph_is_the_robots(robot: RobotProcess) -> None:
         assert graph.types["/map"] == "nav_msgs/OccupancyGrid"
         assert graph.actions == (NAVIGATE,)
         assert await connection.fetch_action_type(NAVIGATE) == "nav2_msgs/NavigateToPose"
-        assert await connection.fetch_nodes() == ("/robot",)
+        assert await connection.fetch_nodes() == ("/bt_navigator", "/robot")
         node = await connection.fetch_node("/robot")
         assert "/map" in node.publishes
         assert "/cmd_vel" in node.subscribes

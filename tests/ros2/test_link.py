@@ -363,7 +363,7 @@ async def test_the_graph_is_the_robots_and_not_ours(robot: RobotProcess) -> None
         assert graph.types["/map"] == "nav_msgs/OccupancyGrid"
         assert graph.actions == (NAVIGATION,)
         assert not [topic for topic in graph.types if topic.startswith("/ours")]
-        assert await connection.fetch_nodes() == ("/robot",)
+        assert await connection.fetch_nodes() == ("/bt_navigator", "/robot")
         assert "/map" in (await connection.fetch_node("/robot")).publishes
         assert await connection.fetch_publishers("/map") == ("/robot",)
         assert await connection.fetch_subscribers("/cmd_vel") == ("/robot",)

@@ -1,5 +1,6 @@
 """The robot of these tests is a robot to any ROS 2 program: seen through plain rclpy."""
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -172,3 +173,106 @@ def test_parameters_of_every_kind_can_be_read(client: "RosClient") -> None:
     assert (recoveries.integer_value, is_docked.bool_value) == (6, False)
     assert list(layers.string_array_value) == ["static", "obstacles"]
     assert list(serial.byte_array_value) == [b"\x01", b"\xff"]
+
+
+# --- what can be wrong with it
+
+
+def test_a_goal_accepted_late_cannot_be_cancelled_before(
+    robot: RobotProcess, client: "RosClient"
+) -> None:
+    from action_msgs.srv import CancelGoal  # noqa: PLC0415
+
+    robot.set_faults(acceptance_s=math.inf)
+    sent = client.begin_goal(NEXT_ROOM)
+    client.wait_until(lambda: robot.tell()["n_goals"] == 1)
+    name = "/navigate_to_pose/_action/cancel_goal"
+    assert not client.call(CancelGoal, name, CancelGoal.Request()).goals_canceling
+    assert robot.driven_m == 0.0
+    robot.set_faults(acceptance_s=0.0)
+    handle = client.wait_for(sent)
+    assert client.wait_for_result(handle).status == SUCCEEDED
+    assert robot.driven_m == pytest.approx(NEXT_ROOM.x - START.x, abs=0.1)
+
+
+def test_goals_are_rejected_aborted_or_not_cancelled_as_told(
+    robot: RobotProcess, client: "RosClient"
+) -> None:
+    robot.set_faults(rejects=True)
+    assert not client.send_goal(NEXT_ROOM).accepted
+    robot.set_faults(rejects=False, aborts=True)
+    assert client.wait_for_result(client.send_goal(NEXT_ROOM)).status == ABORTED
+    robot.set_faults(aborts=False, ignores_cancels=True)
+    handle = client.start_goal(NEXT_ROOM)
+    assert not client.cancel(handle)
+    assert client.wait_for_result(handle).status == SUCCEEDED
+
+
+def test_a_silent_topic_keeps_its_publisher(robot: RobotProcess, client: "RosClient") -> None:
+    from sensor_msgs.msg import LaserScan  # noqa: PLC0415
+
+    client.wait_for_message(LaserScan, "/scan")
+    robot.set_faults(silent=["/scan"])
+    with pytest.raises(TimeoutError):
+        client.wait_for_message(LaserScan, "/scan", patience_s=2.0)
+    assert client.node.count_publishers("/scan") == 1
+    robot.set_faults(silent=[])
+    client.wait_for_message(LaserScan, "/scan")
+
+
+def test_a_spin_turns_the_robot_on_its_spot(robot: RobotProcess, client: "RosClient") -> None:
+    from nav2_msgs.action import Spin  # noqa: PLC0415
+
+    handle = client.send(Spin, "spin", Spin.Goal(target_yaw=1.5))
+    assert client.wait_for_result(handle).status == SUCCEEDED
+    assert robot.pose.yaw_rad == pytest.approx(1.5)
+    assert robot.driven_m == 0.0
+
+
+DRIVES_BY_VELOCITY = ("--drives-by-velocity",)
+
+
+@pytest.mark.parametrize("robot", [DRIVES_BY_VELOCITY], indirect=True)
+def test_without_watchdog_a_base_drives_on_when_navigation_dies(
+    robot: RobotProcess, client: "RosClient"
+) -> None:
+    robot.set_faults(has_watchdog=False)
+    client.start_goal(NEXT_ROOM)
+    client.wait_until(lambda: robot.driven_m > 0.2)
+    robot.kill_navigation()
+    driven_m = robot.driven_m
+    client.wait_until(lambda: robot.driven_m > driven_m + 1.0)
+    assert (2.0, 0.0) in robot.velocities
+
+
+LATE = ("--later", "actions", "scan", "--also", "goal_topic", "costmaps")
+
+
+@pytest.mark.parametrize("robot", [LATE], indirect=True)
+def test_parts_appear_when_they_are_told_to(robot: RobotProcess, client: "RosClient") -> None:
+    from rcl_interfaces.srv import GetParameters  # noqa: PLC0415
+
+    request = GetParameters.Request(names=["robot_radius"])
+    name = "/local_costmap/local_costmap/get_parameters"
+    assert client.call(GetParameters, name, request).values[0].double_value == 0.35
+    assert not client.has_navigation(within_s=1.0)
+    assert client.node.count_publishers("/scan") == 0
+    robot.appear("scan")
+    robot.appear("actions")
+    client.wait_until(lambda: client.node.count_publishers("/scan") == 1)
+    assert client.wait_for_result(client.send_goal(NEXT_ROOM)).status == SUCCEEDED
+
+
+NAMED = ("--namespace", "/robot1", "--participants", "12")
+
+
+@pytest.mark.parametrize("robot", [NAMED], indirect=True)
+def test_a_namespace_is_before_all_names_and_others_are_in_the_domain(
+    robot: RobotProcess, client: "RosClient"
+) -> None:
+    assert robot.process.poll() is None
+    wanted = {"/robot1/tf", "/robot1/tf_static", "/robot1/map", "/robot1/scan", "/robot1/cmd_vel"}
+    client.wait_until(
+        lambda: wanted <= {name for name, _ in client.node.get_topic_names_and_types()}
+    )
+    client.wait_until(lambda: len(set(client.node.get_node_names())) == 15)

@@ -1,6 +1,7 @@
 """The nodes and topics of a robot, as its ROS would show them."""
 
 from mapspeak.links.rosbridge.server.hub import ROSBRIDGE_NODE, Topic
+from mapspeak.robot import RobotDescription
 from mapspeak.ros.messages import Dialect
 
 __all__ = ["BASE_FRAME", "BASE_NODE", "ROSAPI_NODE", "SLAM_NODES", "navigator_of", "topics_of"]
@@ -19,7 +20,7 @@ def navigator_of(dialect: Dialect) -> str:
     return NAVIGATORS[dialect]
 
 
-def topics_of(dialect: Dialect, *, has_camera: bool, has_laser: bool) -> list[Topic]:
+def topics_of(dialect: Dialect, offered: RobotDescription) -> list[Topic]:
     """Gives the topics of the robot's own nodes."""
     slam = SLAM_NODES[dialect]
     topics = [
@@ -31,14 +32,14 @@ def topics_of(dialect: Dialect, *, has_camera: bool, has_laser: bool) -> list[To
         Topic(name="/odom", type="nav_msgs/Odometry", publishers=(BASE_NODE,)),
         Topic(name="/cmd_vel", type="geometry_msgs/Twist", subscribers=(BASE_NODE,)),
     ]
-    if has_camera:
+    if offered.has_camera:
         image, info = "sensor_msgs/CompressedImage", "sensor_msgs/CameraInfo"
         topics += [
             Topic(name="/camera/image_raw/compressed", type=image, depth=1,
                   publishers=(CAMERA_NODE,)),
             Topic(name="/camera/camera_info", type=info, depth=1, publishers=(CAMERA_NODE,)),
         ]  # fmt: skip
-    if has_laser:
+    if offered.has_laser:
         scan = "sensor_msgs/LaserScan"
         topics.append(Topic(name="/scan", type=scan, depth=1, publishers=(LASER_NODE,)))
     return topics + (_ros1_topics() if dialect is Dialect.ROS1 else _ros2_topics())

@@ -39,13 +39,22 @@ class RosStack(RosSystem):
         robot: Any robot; its `sleep` must give way to other tasks.
         dialect: Which ROS to be.
         tasks: Where what takes long is done.
+        hub: Carries the robot's topics; one is made of `topics_of` where none is given.
+        drives: Takes the goals; likewise.
     """
 
-    def __init__(self, robot: Robot, *, dialect: Dialect, tasks: TaskGroup) -> None:
-        offered = robot.description
-        hub = Hub(topics_of(dialect, has_camera=offered.has_camera, has_laser=offered.has_laser))
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        dialect: Dialect,
+        tasks: TaskGroup,
+        hub: Hub | None = None,
+        drives: Drives | None = None,
+    ) -> None:
+        hub = hub or Hub(topics_of(dialect, robot.description))
         super().__init__(hub, Interfaces(dialect), dialect=dialect)
-        self.drives = Drives(robot)
+        self.drives = drives or Drives(robot)
         self._robot = robot
         self._tasks = tasks
         self._sources = Sources(robot, self.hub, dialect=dialect)
