@@ -10,14 +10,15 @@ import socket
 import struct
 from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import anyio
-from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
 
 from mapspeak.links.dds import DdsConnection, DdsTiming, open_dds_connection
 from mapspeak.links.dds.cdr import HEADER_BYTES
+from mapspeak.links.dds.definitions import build_type_book
 from mapspeak.links.dds.discovery import Framing
 from mapspeak.links.dds.endpoints import Inlet, Outlet, Quality, Sample
 from mapspeak.links.dds.names import (
@@ -29,6 +30,7 @@ from mapspeak.links.dds.names import (
 from mapspeak.links.dds.network import DdsNetwork
 from mapspeak.links.dds.participant import Participant
 from mapspeak.links.dds.types import Types
+from mapspeak.ros.definitions import hash_type
 
 RELIABLE = Quality(is_reliable=True, is_latched=False, depth=10)
 LATCHED = Quality(is_reliable=True, is_latched=True, depth=10)
@@ -59,18 +61,36 @@ def _is_free(domain_id: int) -> bool:
     return True
 
 
+@dataclass(frozen=True, kw_only=True)
+class Hashed(Quality):
+    """Tells the hash of the type, as ROS 2 does since Iron."""
+
+    type_hash: str
+
+    @property
+    def qos(self) -> Qos:
+        told = Policy.Userdata(f"typehash={self.type_hash};".encode())
+        return Qos(told, base=Quality.qos.__get__(self))
+
+
 class DdsNode:
     """A node: publishes, listens, and serves what it is told to.
+
+    Args:
+        network: Where.
+        name: Its own.
+        distro: Of ROS 2, whose types it has; empty for a node that tells no hashes of them.
 
     Attributes:
         heard: What came on each topic it listens to.
         types: Its own, to which a test may add.
     """
 
-    def __init__(self, network: DdsNetwork, *, name: str = "/robot") -> None:
+    def __init__(self, network: DdsNetwork, *, name: str = "/robot", distro: str = "") -> None:
         self.name = name
         self.participant = Participant(network)
-        self.types = Types()
+        self.types = Types(distro=distro)
+        self._book = build_type_book(distro) if distro else None
         self.heard: dict[str, list[Request]] = {}
         self._outlets: dict[str, tuple[str, Outlet]] = {}
         self._inlets: list[Inlet] = []
@@ -79,7 +99,9 @@ class DdsNode:
         )
 
     def advertise(self, topic: str, type_name: str, *, quality: Quality = RELIABLE) -> None:
-        outlet = self.participant.write_to(dds_topic(topic), type_name, quality=quality)
+        outlet = self.participant.write_to(
+            dds_topic(topic), type_name, quality=self._hashed(quality, type_name)
+        )
         self._outlets[topic] = (type_name, outlet)
         self.introduce()
 
@@ -89,11 +111,9 @@ class DdsNode:
 
     def publish_hashed(self, topic: str, type_name: str, type_hash: str) -> None:
         """Advertises a topic and tells the hash of its type, as newer versions of ROS do."""
-        known, raw_type = self.participant._topic(dds_topic(topic), type_name)
-        described = Policy.Userdata(f"typehash={type_hash};".encode())
-        qos = Qos(described, base=RELIABLE.qos)
-        writer: DataWriter[Any] = DataWriter(self.participant._publisher, known, qos)
-        self._outlets[topic] = (type_name, Outlet(writer, raw_type))
+        quality = Hashed(is_reliable=True, is_latched=False, depth=10, type_hash=type_hash)
+        outlet = self.participant.write_to(dds_topic(topic), type_name, quality=quality)
+        self._outlets[topic] = (type_name, outlet)
         self.introduce()
 
     def listen(self, topic: str, type_name: str, *, quality: Quality = RELIABLE) -> None:
@@ -110,7 +130,9 @@ class DdsNode:
     ) -> None:
         """Serves: `answer` gets each request, and a function that replies, at once or later."""
         name = ServiceName(service=service, type_name=type_name)
-        replies = self.participant.write_to(name.reply_topic, name.reply_type, quality=RELIABLE)
+        replies = self.participant.write_to(
+            name.reply_topic, name.reply_type, quality=self._hashed(RELIABLE, name.reply_type)
+        )
         self._outlets[name.reply_topic] = (name.reply_type, replies)
         skip = NUMBER_BYTES if framing is Framing.NUMBERED else 0
 
@@ -131,7 +153,7 @@ class DdsNode:
             self.participant.read(
                 name.request_topic,
                 name.request_type,
-                quality=RELIABLE,
+                quality=self._hashed(RELIABLE, name.request_type),
                 decode=decode,
                 take=lambda sample: take(_content(sample)),
             )
@@ -160,6 +182,16 @@ class DdsNode:
         }
         self._introduction.write(self.types.encode(DISCOVERY_TYPE, message))
 
+    def _hashed(self, quality: Quality, type_name: str) -> Quality:
+        if self._book is None:
+            return quality
+        return Hashed(
+            is_reliable=quality.is_reliable,
+            is_latched=quality.is_latched,
+            depth=quality.depth,
+            type_hash=hash_type(self._book, type_name),
+        )
+
     def _read(
         self, topic: str, type_name: str, quality: Quality, take: Callable[[Request], None]
     ) -> None:
@@ -182,8 +214,10 @@ def _content(sample: Sample) -> Any:  # noqa: ANN401 - ROS JSON
 
 
 @asynccontextmanager
-async def open_dds_node(network: DdsNetwork, *, name: str = "/robot") -> AsyncGenerator[DdsNode]:
-    node = DdsNode(network, name=name)
+async def open_dds_node(
+    network: DdsNetwork, *, name: str = "/robot", distro: str = ""
+) -> AsyncGenerator[DdsNode]:
+    node = DdsNode(network, name=name, distro=distro)
     async with anyio.create_task_group() as tasks:
         tasks.start_soon(node.participant.run)
         try:

@@ -176,7 +176,7 @@ def test_an_action_has_the_parts_that_ros_makes_of_it() -> None:
 
 
 def test_humbles_navigation_has_an_empty_result() -> None:
-    humble = Codec(build_type_book(is_humble=True))
+    humble = Codec(build_type_book("humble"))
     data = bytes.fromhex("00010000 04 00")
     assert humble.decode("nav2_msgs/action/NavigateToPose_GetResult_Response", data) == {
         "status": 4,

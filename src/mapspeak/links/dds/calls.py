@@ -15,6 +15,7 @@ from mapspeak.links.dds.names import (
     action_type_of,
     dds_topic,
     reply_topic,
+    request_topic,
 )
 from mapspeak.links.dds.participant import Participant
 from mapspeak.links.dds.services import ServiceClient
@@ -120,9 +121,14 @@ class Calls:
                 asked.note_server(None if server is None else server.framing)
 
     async def _find_server(self, service: str) -> Endpoint | None:
-        """Finds who serves a service; right after opening, others are still found bit by bit."""
+        """Finds who serves a service; right after opening, others are still found bit by bit.
+
+        Who serves it is found by its answers; what it takes is told by who reads the requests.
+        """
         with anyio.move_on_after(APPEARANCE_S):
             while self._discovery.server_of(service) is None:
+                await self._news.wait()
+            while not self._discovery.readers_of(request_topic(service)):
                 await self._news.wait()
         return self._discovery.server_of(service)
 

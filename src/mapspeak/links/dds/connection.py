@@ -190,6 +190,8 @@ class DdsConnection(GraphQuestions, NativeConnection):
             self._found_s = None
         elif self._found_s is None:
             self._found_s = anyio.current_time()
+        for each in self.discovery.ends_of(dds_name):
+            self.types.take_hash(each.type_name, each.type_hash)
         self._topics.note_change(dds_name)
         self._calls.note_change(dds_name)
 

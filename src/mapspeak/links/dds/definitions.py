@@ -8,7 +8,7 @@ from mapspeak.ros.definitions import TypeBook, known_definitions
 from mapspeak.ros.messages import Dialect, Message, bare_type
 
 _NODES = (
-    "string node_namespace\nstring node_name\n"
+    "string<=256 node_namespace\nstring<=256 node_name\n"
     "rmw_dds_common/{gid}[] reader_gid_seq\nrmw_dds_common/{gid}[] writer_gid_seq"
 )
 _TEXTS = {
@@ -23,46 +23,7 @@ _TEXTS = {
     "rmw_dds_common/LongParticipantEntitiesInfo": (
         "rmw_dds_common/LongGid gid\nrmw_dds_common/LongNodeEntitiesInfo[] node_entities_info_seq"
     ),
-    "type_description_interfaces/FieldType": (
-        "uint8 type_id\nuint64 capacity\nuint64 string_capacity\nstring nested_type_name"
-    ),
-    "type_description_interfaces/Field": (
-        "string name\ntype_description_interfaces/FieldType type\nstring default_value"
-    ),
-    "type_description_interfaces/IndividualTypeDescription": (
-        "string type_name\ntype_description_interfaces/Field[] fields"
-    ),
-    "type_description_interfaces/TypeDescription": (
-        "type_description_interfaces/IndividualTypeDescription type_description\n"
-        "type_description_interfaces/IndividualTypeDescription[] referenced_type_descriptions"
-    ),
-    "type_description_interfaces/TypeSource": (
-        "string type_name\nstring encoding\nstring raw_file_contents"
-    ),
-    "type_description_interfaces/KeyValue": "string key\nstring value",
-    "type_description_interfaces/GetTypeDescription_Request": (
-        "string type_name\nstring type_hash\nbool include_type_sources true"
-    ),
-    "type_description_interfaces/GetTypeDescription_Response": (
-        "bool successful\nstring failure_reason\n"
-        "type_description_interfaces/TypeDescription type_description\n"
-        "type_description_interfaces/TypeSource[] type_sources\n"
-        "type_description_interfaces/KeyValue[] extra_information"
-    ),
 }
-
-_ELAPSED = "builtin_interfaces/Duration total_elapsed_time"
-_OLDER = {
-    "nav2_msgs/BackUp_Result": _ELAPSED,
-    "nav2_msgs/ComputePathToPose_Result": (
-        "nav_msgs/Path path\nbuiltin_interfaces/Duration planning_time"
-    ),
-    "nav2_msgs/DriveOnHeading_Result": _ELAPSED,
-    "nav2_msgs/NavigateToPose_Result": "std_msgs/Empty result",
-    "nav2_msgs/Spin_Result": _ELAPSED,
-    "nav2_msgs/Wait_Result": _ELAPSED,
-}
-"""As Humble has them, whose robots cannot describe their types themselves."""
 
 _ACTION_PARTS = {
     "SendGoal_Request": "unique_identifier_msgs/UUID goal_id\n{action}_Goal goal",
@@ -79,15 +40,18 @@ _PLAIN_TYPES = {
 }  # fmt: skip
 """By type_description_interfaces/FieldType, below the step from one kind of list to the next."""
 _STEP, _NESTED = 48, 1
+_LIMITED = (21, 22)
 _ONE, _ARRAY, _BOUNDED, _SEQUENCE = range(4)
 _ROS_NAME = re.compile(r"[A-Za-z]\w*(?:/(?:msg|srv|action))?/[A-Za-z]\w*")
 
 
-def build_type_book(*, is_humble: bool = False) -> TypeBook:
-    """Gives the types that come with mapspeak, and those that DDS needs."""
-    texts = {**known_definitions(Dialect.ROS2), **_TEXTS}
-    if is_humble:
-        texts |= _OLDER
+def build_type_book(distro: str = "") -> TypeBook:
+    """Gives the types that come with mapspeak, and those that DDS needs.
+
+    Args:
+        distro: See `known_definitions`.
+    """
+    texts = {**known_definitions(Dialect.ROS2, distro=distro), **_TEXTS}
     for name in [name for name in texts if name.endswith("_Goal")]:
         texts |= action_parts(name.removesuffix("_Goal"))
     return TypeBook(texts)
@@ -130,5 +94,7 @@ def _type_of(described: Message) -> str:
             f"The robot describes a field of the kind {described['type_id']}, unknown to us.",
             hint="Take rosbridge, which reads its types on the robot.",
         )
+    if plain in _LIMITED:
+        name = f"{name}<={int(described['string_capacity'])}"
     capacity = int(described["capacity"])
     return name + {_ONE: "", _ARRAY: f"[{capacity}]", _BOUNDED: f"[<={capacity}]"}.get(shape, "[]")

@@ -148,11 +148,13 @@ class Discovery:
         """Gives the readers of a topic of DDS."""
         return [each for each in self._readers.values() if each.topic == topic]
 
+    def ends_of(self, topic: str) -> list[Endpoint]:
+        """Gives the writers on a topic of DDS, then its readers."""
+        return [*self.writers_of(topic), *self.readers_of(topic)]
+
     def type_of(self, topic: str) -> str | None:
         """Gives the type of a topic of DDS; None where nobody reads or writes it."""
-        return next(
-            (each.type_name for each in (*self.writers_of(topic), *self.readers_of(topic))), None
-        )
+        return next((each.type_name for each in self.ends_of(topic)), None)
 
     def with_type(self, type_name: str) -> list[Endpoint]:
         """Gives the readers and writers of a type: of a message, a service or an action."""

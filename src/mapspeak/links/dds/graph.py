@@ -51,28 +51,26 @@ class GraphQuestions(ABC):
     async def learn(self, endpoint: Endpoint, *wanted: str) -> None:
         """Makes types known: does nothing where they are, else asks the node behind an endpoint.
 
+        Nodes find a type by its hash, and DDS tells no hash by which they find that of a service.
+
         Raises:
             LinkError: They stay unknown.
         """
-        if not all(map(self.types.knows, wanted)):
+        unknown = [name for name in wanted if not self.types.knows(name)]
+        if unknown and SERVICE_PART.search(unknown[0]):
+            raise self.types.refusal(unknown[0])
+        if unknown:
             await self.ask_type(endpoint)
 
     async def ask_type(self, endpoint: Endpoint) -> None:
         """Asks the node behind a reader or writer of a topic for its type.
 
-        Nodes find a type by its hash, and DDS tells the hashes of topics' types alone.
-
         Raises:
             LinkError: It does not tell.
         """
         service = f"{self.discovery.node_with(endpoint.key)}/{DESCRIBE}"
-        is_told = bool(endpoint.type_hash) and not SERVICE_PART.search(endpoint.type_name)
-        if not is_told or self.discovery.server_of(service) is None:
-            raise LinkError(
-                f"We do not know what a {endpoint.type_name} looks like, and DDS does not tell.",
-                hint="Nodes of ROS 2 Jazzy and later tell the types of topics, and no others. "
-                "Take rosbridge or rclpy for this robot.",
-            )
+        if not endpoint.type_hash or self.discovery.server_of(service) is None:
+            raise self.types.refusal(endpoint.type_name)
         request = {
             "type_name": endpoint.type_name,
             "type_hash": endpoint.type_hash,

@@ -27,7 +27,7 @@ class ServiceName:
     @property
     def request_topic(self) -> str:
         """Where requests are written."""
-        return f"{REQUEST}{self.service}Request"
+        return request_topic(self.service)
 
     @property
     def reply_topic(self) -> str:
@@ -69,6 +69,11 @@ def ros_type(dds_name: str) -> str | None:
 def dds_topic(topic: str) -> str:
     """Gives "rt/map" for "/map"."""
     return f"{TOPIC}/{topic.lstrip('/')}"
+
+
+def request_topic(service: str) -> str:
+    """Gives "rq/robot/get_parametersRequest" for "/robot/get_parameters"."""
+    return f"{REQUEST}/{service.lstrip('/')}Request"
 
 
 def reply_topic(service: str) -> str:

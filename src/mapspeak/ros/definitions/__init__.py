@@ -3,7 +3,7 @@
 from mapspeak.ros.definitions.book import TypeBook
 from mapspeak.ros.definitions.checking import check_message
 from mapspeak.ros.definitions.describing import describe_type, say_fields
-from mapspeak.ros.definitions.known import known_definitions
+from mapspeak.ros.definitions.known import DISTROS, known_definitions
 from mapspeak.ros.definitions.parsing import (
     FLOATS,
     TIMES,
@@ -25,9 +25,12 @@ from mapspeak.ros.definitions.parts import (
     split_parts,
     write_definition,
 )
+from mapspeak.ros.definitions.typestore import EMPTY, build_typestore, hash_type, name_in_ros2
 
 __all__ = [
     "ACTION_PARTS",
+    "DISTROS",
+    "EMPTY",
     "FLOATS",
     "GENERATED",
     "SERVICE_PARTS",
@@ -37,12 +40,15 @@ __all__ = [
     "Field",
     "MessageType",
     "TypeBook",
+    "build_typestore",
     "check_message",
     "describe_type",
     "find_actions_of_ros1",
     "find_odd_lines",
+    "hash_type",
     "kinds_of",
     "known_definitions",
+    "name_in_ros2",
     "name_parts",
     "parse_definition",
     "say_fields",

@@ -33,11 +33,11 @@ class DefinitionKeeper:
         self._known: dict[str, str] = {}
         self._not_told: set[str] = set()
 
-    async def fetch(self, type_name: str, *, dialect: Dialect) -> Mapping[str, str]:
+    async def fetch(self, type_name: str, *, dialect: Dialect, distro: str) -> Mapping[str, str]:
         """Gives the texts of a type's parts and of all types within, as the port says."""
         bare, kinds = bare_type(type_name), _kinds_of(type_name)
         if not self._known:
-            self._known = known_definitions(dialect)
+            self._known = known_definitions(dialect, distro=distro)
         if not self._find(self._told, bare, kinds) and self._is_worth_asking(bare, kinds):
             await self._ask_graph()
             if dialect is Dialect.ROS1 and not self._find(self._told, bare, kinds):

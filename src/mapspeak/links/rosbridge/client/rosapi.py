@@ -131,7 +131,9 @@ class Rosapi(ABC):
 
     async def fetch_definitions(self, type_name: str) -> Mapping[str, str]:
         """Gives the .msg texts of a type and of all within it: the robot's, else our own."""
-        return await self._definitions.fetch(type_name, dialect=await self._fetch_dialect())
+        dialect = await self._fetch_dialect()
+        distro = "" if self._version is None else self._version[1]
+        return await self._definitions.fetch(type_name, dialect=dialect, distro=distro)
 
     async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
         """Gives the names of a node's parameters."""
