@@ -43,6 +43,7 @@ class RobotDescription:
         has_camera: It can give pictures.
         has_laser: It has a laser that measures along the floor; whether that turns is not said.
         detector: What its own object detector is called; None where it has none.
+        map_frame: What ROS calls the frame of its map.
     """
 
     name: str
@@ -51,6 +52,7 @@ class RobotDescription:
     has_camera: bool
     has_laser: bool
     detector: str | None
+    map_frame: str = "map"
 
 
 @dataclass(frozen=True, slots=True)

@@ -102,7 +102,11 @@ class Session:
             when_busy = guard.policy.when_busy
             if ros is not None:
                 ros = GuardedConnection(
-                    ros, guard=guard, now_s=lambda: robot.now_s, by_hand=self._guarded.by_hand
+                    ros,
+                    guard=guard,
+                    now_s=lambda: robot.now_s,
+                    by_hand=self._guarded.by_hand,
+                    planner=self._guarded.planner,
                 )
         self.ros = ros
         self.robot: Robot = self._guarded or robot

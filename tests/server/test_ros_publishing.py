@@ -306,7 +306,8 @@ async def test_parameters_with_which_a_robot_loses_itself_are_denied(
 ) -> None:
     async with guarded_server(dialect, tmp_path, Policy()) as caller:
         text = await caller.refuse("ros_set_parameter", node=node, parameter=parameter, value=value)
-    assert "the policy denies *" in text
+    assert "The policy denies this: set " in text
+    assert "(set_parameter.usual_denials: *" in text
 
 
 async def test_what_may_be_set_may_be_deleted(tmp_path: Path) -> None:
@@ -318,7 +319,7 @@ async def test_what_may_be_set_may_be_deleted(tmp_path: Path) -> None:
             "ros_set_parameter", node="/", parameter="use_sim_time", value=None
         )
     assert text == "colour of / is deleted."
-    assert "may not delete /:use_sim_time: the policy denies *use_sim_time" in denied
+    assert "delete /:use_sim_time (set_parameter.usual_denials: *use_sim_time)" in denied
 
 
 async def test_what_is_denied_is_said_before_anything_else_is_wrong_with_it(
@@ -330,9 +331,14 @@ async def test_what_is_denied_is_said_before_anything_else_is_wrong_with_it(
         called = await caller.refuse("ros_call", service="/base/shutdown")
         published = await caller.refuse("ros_publish", topic="/map", message={"odd": 1})
         sent = await caller.refuse("ros_send_goal", action="/navigate_to_pose", goal={"x": 1})
-    assert "the policy denies *shutdown*" in called
-    assert "the policy denies */map" in published
-    assert "the policy denies *navigate_to_pose*" in sent
+        nowhere = await caller.refuse("ros_publish", topic="/initialpose", message={})
+        gone = await caller.refuse("ros_call", service="/reinitialize_global_localization")
+    assert "(call.usual_denials: *shutdown*)" in called
+    assert "(publish.usual_denials: */map)" in published
+    assert "(act.usual_denials: *navigate*)" in sent
+    assert "publish anything on /initialpose (publish.usual_denials: */initialpose)" in nowhere
+    assert "(call.usual_denials: *global_localization*)" in gone
+    assert "()" not in called + published + sent + nowhere + gone
 
 
 async def test_parameters_are_read_under_a_policy_that_lets_nothing_be_called(

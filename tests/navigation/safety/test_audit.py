@@ -54,7 +54,7 @@ def test_why_something_was_refused_is_noted_with_the_rule(tmp_path: Path) -> Non
         guard.clear(command, robot_s=1.0)
     (line,) = audit_of(tmp_path)
     assert line.verdict == "refused"
-    assert line.said.startswith("set_parameter.names: ")
+    assert line.said.startswith("set_parameter.usual_denials: ")
 
 
 def test_a_last_line_that_a_crash_cut_off_is_left_out(tmp_path: Path) -> None:

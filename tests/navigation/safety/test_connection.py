@@ -41,6 +41,7 @@ class FakeRos:
     def __init__(self) -> None:
         self.heard: list[tuple[Any, ...]] = []
         self.is_dead = False
+        self.action_types: dict[str, str] = {}
         self.advertised: list[str] = []
 
     def advertise(self, topic: str, *, type_name: str) -> None:
@@ -65,6 +66,11 @@ class FakeRos:
     async def send_goal(self, action: str, *_: object, **__: object) -> str:
         self.heard.append((action,))
         return "goal"
+
+    async def fetch_action_type(self, action: str) -> str:
+        if action not in self.action_types:
+            raise LinkError("The robot does not tell.", hint="Give the type.")
+        return self.action_types[action]
 
     async def set_parameter(self, node: str, name: str, value: object) -> None:
         self.heard.append((node, name, value))
@@ -213,6 +219,77 @@ async def test_a_message_that_holds_more_than_a_velocity_is_no_stop(tmp_path: Pa
     with pytest.raises(PolicyError, match="denies"):
         connection.publish_everywhere("/odom", {"twist": {"twist": STAND}, "pose": {}})
     assert ros.heard == []
+
+
+@pytest.mark.parametrize(
+    ("type_name", "message"),
+    [
+        ("geometry_msgs/msg/Twist", {"linear": ZERO, "angular": {**ZERO, "x": 0.1}}),
+        ("geometry_msgs/msg/Twist", {"linear": {**ZERO, "z": -0.1}, "angular": ZERO}),
+        ("geometry_msgs/msg/TwistStamped", {"header": {}, "twist": CREEP}),
+        ("ackermann_msgs/msg/AckermannDrive", {"speed": 0.0, "steering_angle": 1.0}),
+        ("ackermann_msgs/msg/AckermannDrive", {"speed": 0.0, "steering_angle_velocity": 5.0}),
+        ("ackermann_msgs/msg/AckermannDrive", {"speed": 0.0, "acceleration": 9.0, "jerk": 5.0}),
+        ("ackermann_msgs/msg/AckermannDriveStamped", {"drive": {"speed": 0.0, "jerk": 5.0}}),
+        ("geometry_msgs/msg/Twist", {"linear": ZERO, "angular": ZERO, "on": True}),
+    ],
+)
+async def test_a_speed_of_zero_beside_anything_else_is_no_stop(
+    tmp_path: Path, type_name: str, message: dict[str, Any]
+) -> None:
+    ros = FakeRos()
+    guard = make_guard(tmp_path)
+    guard.hold.put("a test", at=guard.wall_clock())
+    connection = guarded(ros, tmp_path)
+    connection.advertise("/drive", type_name=type_name)
+    with pytest.raises(PolicyError, match="held"):
+        await connection.publish("/drive", message)
+    with pytest.raises(PolicyError, match="held"):
+        connection.publish_everywhere("/drive", message)
+    assert ros.heard == []
+
+
+async def test_zero_velocities_of_every_kind_pass_a_hold(tmp_path: Path) -> None:
+    ros = FakeRos()
+    guard = make_guard(tmp_path)
+    guard.hold.put("a test", at=guard.wall_clock())
+    connection = guarded(ros, tmp_path)
+    for type_name, message in (
+        ("geometry_msgs/msg/Twist", STAND),
+        ("geometry_msgs/msg/TwistStamped", {"header": {"stamp": {"sec": 7}}, "twist": STAND}),
+        ("ackermann_msgs/AckermannDrive", {"speed": 0.0, "steering_angle": 0.0, "jerk": 0}),
+    ):
+        connection.advertise("/drive", type_name=type_name)
+        await connection.publish("/drive", message)
+    assert len(ros.heard) == 3
+
+
+async def test_an_action_is_judged_by_the_type_that_the_robot_tells(tmp_path: Path) -> None:
+    ros = FakeRos()
+    ros.action_types["/patrol"] = "nav2_msgs/action/FollowWaypoints"
+    connection = guarded(ros, tmp_path)
+    with pytest.raises(PolicyError, match=r"act\.usual_denials: \*/FollowWaypoints"):
+        await connection.send_goal("/patrol", {}, type_name="demo_msgs/action/Wave")
+    with pytest.raises(PolicyError, match="NavigateToPose"):
+        await connection.send_goal("/errand", {}, type_name="nav2_msgs/action/NavigateToPose")
+    assert ros.heard == []
+    await connection.send_goal("/wave", {}, type_name="demo_msgs/action/Wave")
+    assert ros.heard == [("/wave",)]
+
+
+async def test_a_goal_that_ros_1_sends_by_a_topic_is_held_to_the_rules_of_actions(
+    tmp_path: Path,
+) -> None:
+    ros = FakeRos()
+    connection = guarded(ros, tmp_path)
+    with pytest.raises(PolicyError, match=r"act\.usual_denials"):
+        connection.advertise("/drive_on/goal", type_name="move_base_msgs/MoveBaseActionGoal")
+    connection.advertise("/wave/goal", type_name="demo_msgs/WaveActionGoal")
+    await connection.publish("/wave/goal", {"goal_id": {"id": "7"}, "goal": {"times": 3}})
+    assert [name for name, _ in ros.heard] == ["/wave/goal"]
+    decided = audit_of(tmp_path)[-2]
+    assert (decided.kind, decided.details["action"]) == ("act", "/wave")
+    assert decided.details["goal"] == {"times": 3}
 
 
 async def test_what_failed_is_noted_as_given_up(tmp_path: Path) -> None:

@@ -1,3 +1,4 @@
+import dataclasses
 import math
 from datetime import datetime, time, timedelta
 from typing import Any
@@ -188,6 +189,153 @@ def test_what_would_go_around_the_policy_is_denied_by_default(command: Command) 
     decision = decide(command, policy=Policy(), situation=NOW)
     assert isinstance(decision, Refused)
     assert "denies" in decision.reason
+
+
+DENIED: dict[Kind, tuple[str, ...]] = {
+    Kind.CALL: (
+        "/set_initial_pose",
+        "/reinitialize_global_localization",
+        "/map_server/load_map",
+        "/slam_toolbox/deserialize_map",
+        "/keepout_filter/toggle_filter",
+        "/collision_monitor/toggle",
+        "/gazebo/set_model_state",
+    ),
+    Kind.PUBLISH: (
+        "/odometry/filtered",
+        "/base_scan",
+        "/map_updates",
+        "/speed_limit",
+        "/keepout_filter_mask",
+        "/costmap_filter_info",
+        "/goal_update",
+    ),
+    Kind.SET_PARAMETER: (
+        "/controller_server:FollowPath.vx_max",
+        "/controller_server:FollowPath.wz_max",
+        "/controller_server:FollowPath.ax_max",
+        "/controller_server:FollowPath.v_linear_max",
+        "/collision_monitor:PolygonStop.enabled",
+        "/planner_server:GridBased.allow_unknown",
+        "/velocity_smoother:max_accel",
+    ),
+    Kind.ACT: (
+        "/follow_gps_waypoints",
+        "/follow_object",
+        "/navigate_complete_coverage",
+        "/move_base_flex/exe_path",
+        "/undock_robot",
+    ),
+}
+
+
+def named(kind: Kind, name: str, type_name: str = "") -> Command:
+    match kind:
+        case Kind.PUBLISH:
+            return Publish(topic=name, type=type_name, message={})
+        case Kind.CALL:
+            return Call(service=name, type=type_name, arguments={})
+        case Kind.ACT:
+            return Act(action=name, type=type_name, goal={})
+        case _:
+            node, _, parameter = name.partition(":")
+            return SetParameter(node=node, name=parameter, value=1)
+
+
+def refusal_of(command: Command, policy: Policy) -> Refused | None:
+    decision = decide(command, policy=policy, situation=NOW)
+    return decision if isinstance(decision, Refused) else None
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"), [(kind, name) for kind, names in DENIED.items() for name in names]
+)
+def test_the_usual_denials_know_what_stock_robots_call_it(kind: Kind, name: str) -> None:
+    refused = refusal_of(named(kind, name), Policy())
+    assert refused is not None
+    assert refused.rule == f"{kind}.usual_denials"
+    assert "()" not in refused.reason
+
+
+@pytest.mark.parametrize(
+    ("kind", "type_name"),
+    [
+        (Kind.ACT, "nav2_msgs/action/NavigateToPose"),
+        (Kind.ACT, "nav2_msgs/action/NavigateThroughPoses"),
+        (Kind.ACT, "nav2_msgs/action/FollowWaypoints"),
+        (Kind.ACT, "nav2_msgs/action/FollowGPSWaypoints"),
+        (Kind.ACT, "nav2_msgs/action/FollowPath"),
+        (Kind.ACT, "nav2_msgs/action/Spin"),
+        (Kind.ACT, "nav2_msgs/action/BackUp"),
+        (Kind.ACT, "nav2_msgs/action/DriveOnHeading"),
+        (Kind.ACT, "nav2_msgs/action/ComputeAndTrackRoute"),
+        (Kind.ACT, "nav2_msgs/action/FollowObject"),
+        (Kind.ACT, "nav2_msgs/action/DockRobot"),
+        (Kind.ACT, "opennav_docking_msgs/action/UndockRobot"),
+        (Kind.ACT, "opennav_coverage_msgs/action/NavigateCompleteCoverage"),
+        (Kind.ACT, "move_base_msgs/MoveBase"),
+        (Kind.ACT, "mbf_msgs/ExePath"),
+        (Kind.ACT, "irobot_create_msgs/action/DriveDistance"),
+        (Kind.CALL, "nav2_msgs/srv/SetInitialPose"),
+        (Kind.CALL, "nav2_msgs/srv/Toggle"),
+        (Kind.CALL, "rcl_interfaces/srv/SetParametersAtomically"),
+        (Kind.PUBLISH, "nav_msgs/msg/Odometry"),
+        (Kind.PUBLISH, "sensor_msgs/LaserScan"),
+        (Kind.PUBLISH, "geometry_msgs/msg/PoseWithCovarianceStamped"),
+    ],
+)
+def test_a_type_is_denied_whatever_its_name(kind: Kind, type_name: str) -> None:
+    refused = refusal_of(named(kind, "/patrol", type_name), Policy())
+    assert refused is not None
+    assert refused.rule == f"{kind}.usual_denials"
+
+
+@pytest.mark.parametrize(
+    "type_name",
+    ["nav2_msgs/action/ComputePathToPose", "control_msgs/action/FollowJointTrajectory"],
+)
+def test_an_action_that_does_not_drive_the_base_is_allowed(type_name: str) -> None:
+    assert refusal_of(named(Kind.ACT, "/plan", type_name), Policy()) is None
+
+
+def test_a_refusal_says_its_key_and_how_this_one_name_is_opened() -> None:
+    refused = refusal_of(named(Kind.ACT, "/spin"), Policy())
+    assert refused is not None
+    assert refused.reason == (
+        "The policy denies this: send a goal to /spin (act.usual_denials: *spin*)."
+    )
+    assert '`act: {allow: ["*", "/spin"]}`' in refused.hint
+    assert "--policy" in refused.hint
+
+
+def test_a_name_that_is_allowed_in_full_is_free_of_the_usual_denials() -> None:
+    name = "/move_base/DWAPlannerROS/set_parameters"
+    command = named(Kind.CALL, name, "dynamic_reconfigure/Reconfigure")
+    usual = Policy().patterns[Kind.CALL]
+
+    def is_allowed(*allow: str, deny: tuple[str, ...] = ()) -> bool:
+        patterns = dataclasses.replace(usual, allow=allow, deny=deny)
+        return refusal_of(command, Policy(patterns={Kind.CALL: patterns})) is None
+
+    assert is_allowed(name)
+    assert is_allowed("*", name)
+    assert not is_allowed("*")
+    assert not is_allowed("/move_base/*")
+    assert not is_allowed("*", "/other")
+    assert not is_allowed("*", name, deny=("*set_parameters",))
+
+
+@pytest.mark.parametrize(
+    ("patterns", "key"),
+    [(Patterns(deny=("/lamp",)), "publish.deny"), (Patterns(allow=("/a", "/b")), "publish.allow")],
+)
+def test_a_denial_of_ones_own_says_its_key(patterns: Patterns, key: str) -> None:
+    policy = Policy(patterns={Kind.PUBLISH: patterns})
+    refused = refusal_of(velocity({}, topic="/lamp"), policy)
+    assert refused is not None
+    assert refused.rule == key
+    assert f"({key}: " in refused.reason
+    assert f"change {key}" in refused.hint
 
 
 def test_only_what_is_allowed_passes_and_a_denial_is_stronger() -> None:

@@ -10,7 +10,7 @@ from guarding import audit_of, corners, make_guard, rectangle
 from mapspeak.geometry import Point, Pose
 from mapspeak.navigation.closures import ClosedArea
 from mapspeak.navigation.safety import AreaRule, GuardedRobot, Policy, Surveyor
-from mapspeak.navigation.safety.lookout import KEEP_M
+from mapspeak.navigation.safety.monitor import KEEP_M
 from mapspeak.robot import GoalState
 from mapspeak.spatial import OccupancyGrid
 

@@ -24,7 +24,7 @@ from mapspeak.navigation.safety import (
     Surveyor,
     calling,
 )
-from mapspeak.navigation.safety.lookout import KEEP_M
+from mapspeak.navigation.safety.monitor import KEEP_M
 from mapspeak.robot import GoalState, StampedPose
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.session import Session
@@ -398,6 +398,90 @@ async def test_a_hold_stops_a_robot_that_drives_by_other_means_too(tmp_path: Pat
     assert fake.n_stops == 1
 
 
+async def test_a_held_robot_that_moves_again_is_stopped_again(tmp_path: Path) -> None:
+    fake = FakeRobot(two_rooms())
+    guard = make_guard(tmp_path)
+    surveyor = Surveyor((), wall_clock=guard.wall_clock)
+    robot = GuardedRobot(fake, guard=guard, surveyor=surveyor, repeat_s=0.0)
+    guard.hold.put("by hand", at=guard.wall_clock())
+    for _ in range(3):
+        await robot.obey_hold()
+    assert fake.n_stops == 1
+    await fake.send_goal(FAR)  # by another client
+    await fake.sleep(0.2)
+    await robot.obey_hold()
+    assert fake.n_stops == 2
+    assert list(fake.ended) == ["fake-1"]
+    for _ in range(3):
+        await robot.obey_hold()
+    assert fake.n_stops == 2
+
+
+async def test_a_held_robot_whose_pose_is_not_known_is_stopped_again_and_again(
+    tmp_path: Path,
+) -> None:
+    fake = BlindRobot(two_rooms())
+    fake.is_blind = True
+    guard = make_guard(tmp_path)
+    surveyor = Surveyor((), wall_clock=guard.wall_clock)
+    robot = GuardedRobot(fake, guard=guard, surveyor=surveyor, repeat_s=0.0)
+    guard.hold.put("by hand", at=guard.wall_clock())
+    for _ in range(4):
+        await robot.obey_hold()
+    assert fake.n_stops == 4
+    guard.hold.lift()
+    await robot.obey_hold()
+    assert fake.n_stops == 4
+
+
+async def test_stops_of_a_held_robot_are_repeated_no_faster_than_said(tmp_path: Path) -> None:
+    fake = BlindRobot(two_rooms())
+    fake.is_blind = True
+    guard = make_guard(tmp_path)
+    surveyor = Surveyor((), wall_clock=guard.wall_clock)
+    robot = GuardedRobot(fake, guard=guard, surveyor=surveyor, repeat_s=3600.0)
+    guard.hold.put("by hand", at=guard.wall_clock())
+    for _ in range(20):
+        await robot.obey_hold()
+    assert fake.n_stops == 2
+
+
+async def test_a_goal_of_another_client_is_stopped_before_an_area(tmp_path: Path) -> None:
+    fake = FakeRobot(FINE_HALL, pose=Pose(0.5, 1.0))
+    robot = guarded(fake, tmp_path, Policy(areas=(rectangle("pit", (2.0, 0.5), (3.0, 1.5)),)))
+    await fake.send_goal(Pose(4.0, 1.0))
+    await robot.sleep(10.0)
+    assert fake.n_stops == 1
+    assert 2.0 - fake.pose.x >= 0.2 + KEEP_M
+    assert "'pit': something that mapspeak did not start" in audit_of(tmp_path)[-1].said
+
+
+async def test_a_robot_that_others_drive_away_from_areas_is_left_alone(tmp_path: Path) -> None:
+    fake = FakeRobot(FINE_HALL, pose=Pose(1.72, 1.0))
+    robot = guarded(fake, tmp_path, Policy(areas=(rectangle("pit", (2.0, 0.5), (3.0, 1.5)),)))
+    await fake.send_goal(Pose(0.5, 1.0))
+    await robot.sleep(5.0)
+    assert fake.n_stops == 0
+    assert fake.pose.x == 0.5
+
+
+async def test_an_area_that_closes_later_is_watched_too(tmp_path: Path) -> None:
+    clock = WallClock()
+    hours = Hours(begins=time(13))
+    outline = corners((2.0, 0.5), (3.0, 1.5))
+    fake = FakeRobot(FINE_HALL, pose=Pose(0.5, 1.0))
+    policy = Policy(areas=(AreaRule(name="lab", outline=outline, hours=hours),))
+    robot = guarded(fake, tmp_path, policy, clock)
+    await robot.sleep(5.0)
+    clock.now = clock.now.replace(hour=13)
+    await fake.send_goal(Pose(1.0, 1.0))
+    await robot.sleep(2.0)
+    await fake.send_goal(Pose(4.0, 1.0))
+    await robot.sleep(10.0)
+    assert fake.n_stops == 1
+    assert fake.pose.x < 1.8
+
+
 async def test_a_clients_stop_latches_where_the_policy_says_so(tmp_path: Path) -> None:
     robot = guarded(FakeRobot(two_rooms()), tmp_path, Policy(latches_on_stop=True))
     await robot.stop()
@@ -594,9 +678,11 @@ async def test_a_stop_for_a_hold_that_failed_is_tried_again(tmp_path: Path) -> N
     with pytest.raises(LinkError):
         await robot.obey_hold()
     assert guard.hold.answers() == ()
+    assert guard.hold.failures() == (("fake robot", "The line is dead. Wait."),)
     await robot.obey_hold()
     assert fake.n_stops == 2
     assert guard.hold.answers() == ("fake robot",)
+    assert guard.hold.failures() == ()
 
 
 async def test_a_stop_before_an_area_that_failed_is_tried_again(tmp_path: Path) -> None:

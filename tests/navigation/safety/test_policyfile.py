@@ -69,6 +69,12 @@ def test_denials_of_ones_own_come_on_top_of_the_usual_ones(tmp_path: Path) -> No
     assert policy.patterns[Kind.PUBLISH].find_denial("/cmd_vel") is None
 
 
+def test_the_usual_denials_can_be_left_away_altogether(tmp_path: Path) -> None:
+    policy = policy_of(tmp_path, "act: {usual_denials: false}")
+    denial = policy.patterns[Kind.ACT].find_denial("/spin", ["nav2_msgs/Spin"])
+    assert denial is None
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [

@@ -45,6 +45,10 @@ class WheeledRobot(FakeRobot):
             raise LinkError("No pose has arrived.", hint="Start localisation.")
         return await super().fetch_pose()
 
+    async def stop(self) -> None:
+        await super().stop()
+        self.velocity = twist()
+
     async def sleep(self, duration_s: float) -> None:
         await super().sleep(duration_s)
         forward_m = self.velocity["linear"]["x"] * duration_s
@@ -222,18 +226,20 @@ async def test_a_robot_that_goes_on_by_itself_is_stopped_before_the_area(tmp_pat
     assert "a published velocity was about to drive into it" in said
 
 
-async def test_after_a_stand_nobody_watches_any_more(tmp_path: Path) -> None:
+async def test_a_robot_that_others_drive_is_stopped_before_the_area_too(tmp_path: Path) -> None:
     stand = Stand(tmp_path, PIT)
-    await stand.publish(twist(0.4))
-    await stand.publish(twist())
+    await stand.session.robot.fetch_pose()
     stand.robot.velocity = twist(0.4)
     await stand.session.robot.sleep(20.0)
-    assert stand.robot.n_stops == 0
+    assert stand.robot.n_stops == 1
+    edge_m = PIT.outline[0].x - stand.robot.pose.x - RADIUS_M
+    assert 0.05 <= edge_m <= 0.5
+    assert "something that mapspeak did not start was about" in audit_of(tmp_path)[-1].said
 
 
 async def test_a_velocity_by_all_ways_at_once_is_for_standing_only(tmp_path: Path) -> None:
     stand = Stand(tmp_path, PIT)
-    with pytest.raises(PolicyError, match="only to make the robot stand"):
+    with pytest.raises(PolicyError, match="only when it is zero"):
         stand.ros.publish_everywhere("/cmd_vel", twist(0.1))
     assert stand.ros.publish_everywhere("/cmd_vel", twist()) == 1
 

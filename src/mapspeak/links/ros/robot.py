@@ -101,6 +101,7 @@ class RosRobot:
             has_camera=self.profile.camera_topic is not None,
             has_laser=self.profile.scan_topic is not None,
             detector=None,
+            map_frame=self.profile.map_frame,
         )
 
     @property

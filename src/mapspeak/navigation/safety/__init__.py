@@ -1,5 +1,6 @@
 """Limits that are on: a policy, a guard in front of the robot, a hold, an audit log."""
 
+from mapspeak.navigation.hold import Hold
 from mapspeak.navigation.safety.approvals import Approvals, WaitingRoom
 from mapspeak.navigation.safety.audit import AuditLine, AuditLog, read_audit
 from mapspeak.navigation.safety.caller import NOBODY, Caller, calling, current_caller
@@ -23,8 +24,7 @@ from mapspeak.navigation.safety.deciding import (
     decide,
 )
 from mapspeak.navigation.safety.errands import Errand, on_errand
-from mapspeak.navigation.safety.guard import ApprovalNeededError, Clearance, Guard
-from mapspeak.navigation.safety.hold import Hold
+from mapspeak.navigation.safety.guard import ApprovalNeededError, Guard, Permit
 from mapspeak.navigation.safety.policy import (
     Approval,
     AreaRule,
@@ -52,7 +52,6 @@ __all__ = [
     "AuditLog",
     "Call",
     "Caller",
-    "Clearance",
     "Command",
     "Decision",
     "Drive",
@@ -67,6 +66,7 @@ __all__ = [
     "NeedsApproval",
     "Otherwise",
     "Patterns",
+    "Permit",
     "Policy",
     "Publish",
     "Refused",

@@ -8,7 +8,17 @@ from typing import Any
 from mapspeak.geometry import Pose
 from mapspeak.navigation.goals import GoalCheck
 
-__all__ = ["Act", "Call", "Command", "Drive", "Kind", "Publish", "SetParameter", "say_command"]
+__all__ = [
+    "Act",
+    "Call",
+    "Command",
+    "Drive",
+    "Kind",
+    "Publish",
+    "SetParameter",
+    "read_action_goal",
+    "say_command",
+]
 
 SAME_GOAL_M = 0.5
 """An approved goal stays approved while a changing map moves it by no more than this."""
@@ -79,13 +89,15 @@ class Act:
 
     Attributes:
         action: Its name.
-        type: Its type.
+        type: Its type, as the caller says.
         goal: The goal's fields.
+        true_type: Its type, as the robot says; empty when the robot does not tell it.
     """
 
     action: str
     type: str
     goal: Message
+    true_type: str = ""
     kind = Kind.ACT
 
 
@@ -119,15 +131,30 @@ def say_command(command: Command) -> str:
         case Drive(goal=goal):
             return f"drive to ({goal.x:.2f}, {goal.y:.2f}), yaw {goal.yaw_deg:.0f} deg"
         case Publish():
-            return f"publish {command.type} on {command.topic}"
+            return f"publish {command.type or 'anything'} on {command.topic}"
         case Call():
-            return f"call {command.service} ({command.type})"
+            return f"call {command.service}{_in_brackets(command.type)}"
         case Act():
-            return f"send a goal to {command.action} ({command.type})"
+            kind = _in_brackets(command.true_type or command.type)
+            return f"send a goal to {command.action}{kind}"
         case SetParameter(value=None):
             return f"delete {command.full_name}"
         case SetParameter():
             return f"set {command.full_name} to {str(command.value)[:MOST_SHOWN]!r}"
+
+
+def read_action_goal(command: Publish) -> Act | None:
+    """Return the goal that a message is by which ROS 1 sends one; None for any other message."""
+    action = command.topic.removesuffix("/goal")
+    kind = command.type.removesuffix("ActionGoal")
+    goal = command.message.get("goal", {})
+    if command.topic == action or command.type == kind or not isinstance(goal, Mapping):
+        return None
+    return Act(action=action, type=kind, goal=goal, true_type=kind)
+
+
+def _in_brackets(text: str) -> str:
+    return f" ({text})" if text else ""
 
 
 def is_same(one: Command, other: Command) -> bool:

@@ -2,12 +2,27 @@
 
 import re
 from collections.abc import Callable, Coroutine, Mapping
+from contextlib import suppress
 from typing import Any, TypeVar
 
-from mapspeak.navigation.safety.commands import Act, Call, Command, Publish, SetParameter
-from mapspeak.navigation.safety.deciding import find_speeds, is_name_denied
+from mapspeak.errors import LinkError
+from mapspeak.navigation.safety.commands import (
+    Act,
+    Call,
+    Command,
+    Publish,
+    SetParameter,
+    read_action_goal,
+)
+from mapspeak.navigation.safety.deciding import Refused, find_speeds, is_name_denied
 from mapspeak.navigation.safety.guard import Guard
-from mapspeak.navigation.safety.velocities import HandDriving, stand_of
+from mapspeak.navigation.safety.planning import Planner
+from mapspeak.navigation.safety.velocities import (
+    HandDriving,
+    is_zero_velocity,
+    refuse_velocity,
+    zero_velocity_of,
+)
 from mapspeak.ros import ActionGoal, NodeLinks, OwnEnds, RosConnection, RosGraph, Subscription
 from mapspeak.ros.messages import Message
 
@@ -30,6 +45,7 @@ class GuardedConnection:
         guard: Decides and notes.
         now_s: Robot time.
         by_hand: Knows where velocities would take the robot; None where nothing is closed.
+        planner: Holds the poses of goals to the map; None where nobody checks them.
     """
 
     def __init__(
@@ -39,7 +55,9 @@ class GuardedConnection:
         guard: Guard,
         now_s: Callable[[], float],
         by_hand: HandDriving | None = None,
+        planner: Planner | None = None,
     ) -> None:
+        self._planner = planner
         self._connection = connection
         self._by_hand = by_hand
         self._guard = guard
@@ -59,6 +77,10 @@ class GuardedConnection:
             await self._connection.publish(topic, message)
             self._note_stop(command)
             return
+        goal = read_action_goal(command)
+        if goal is not None:
+            await self._send(goal, self._connection.publish(topic, message))
+            return
         objection = await self._by_hand.find_objection(message) if self._by_hand else None
         done = self._connection.publish(topic, message)
         # From before it is sent: what fails half-way may move the robot all the same.
@@ -77,9 +99,9 @@ class GuardedConnection:
             self._note_stop(command)
             return n_ways
         objection = self._objection_unseen(command)
-        cleared = self._guard.clear(command, robot_s=self._now_s(), objection=objection)
+        permit = self._guard.clear(command, robot_s=self._now_s(), objection=objection)
         n_ways = self._connection.publish_everywhere(topic, message)
-        self._guard.note_result(cleared, f"by {n_ways} ways", robot_s=self._now_s())
+        self._guard.note_result(permit, f"by {n_ways} ways", robot_s=self._now_s())
         return n_ways
 
     async def call_service(
@@ -110,10 +132,33 @@ class GuardedConnection:
         Raises:
             PolicyError: It does not.
         """
-        command = Act(action=action, type=type_name, goal=arguments)
-        return await self._guarded(
+        command = Act(
+            action=action,
+            type=type_name,
+            goal=arguments,
+            true_type=await self._fetch_action_type(action),
+        )
+        return await self._send(
             command, self._connection.send_goal(action, arguments, type_name=type_name)
         )
+
+    async def _send(self, command: Act, work: Coroutine[Any, Any, T]) -> T:
+        """Send the goal of an action that the policy allows, when its poses are goals."""
+        objection = None
+        try:
+            # What is denied anyway needs no look at the map.
+            if self._planner is not None and not is_name_denied(command, self._guard.policy):
+                objection = await self._planner.judge_message(command.goal)
+        except BaseException:
+            work.close()
+            raise
+        return await self._guarded(command, work, objection)
+
+    async def _fetch_action_type(self, action: str) -> str:
+        """Return an action's type as the robot says; empty when it does not tell it."""
+        with suppress(LinkError):
+            return await self._connection.fetch_action_type(action)
+        return ""
 
     async def set_parameter(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401
         """Sets a node's parameter that the policy allows to be set.
@@ -134,29 +179,30 @@ class GuardedConnection:
         if not is_stop and is_name_denied(command, self._guard.policy):
             self._guard.clear(command, robot_s=self._now_s())
 
-    def _watch_over(self, command: Publish, objection: str | None) -> None:
+    def _watch_over(self, command: Publish, objection: Refused | None) -> None:
         """Lets the robot be watched that is about to be driven by a velocity."""
-        if self._by_hand is None or objection is not None or not any(find_speeds(command.message)):
+        is_velocity = _is_velocity(command.type)
+        if self._by_hand is None or objection is not None or not is_velocity:
             return
-        stand = stand_of(command.message)
+        zero = zero_velocity_of(command.message)
         self._by_hand.begin(
             command.topic,
-            stand=lambda: self._connection.publish_everywhere(command.topic, stand),
+            publish_zero=lambda: self._connection.publish_everywhere(command.topic, zero),
         )
 
-    def _objection_unseen(self, command: Publish) -> str | None:
-        """Gives what is against a velocity where there is no time to look for the robot."""
+    def _objection_unseen(self, command: Publish) -> Refused | None:
+        """Return what is against a velocity when there is no time to look for the robot."""
         is_free = self._by_hand is None or not self._by_hand.knows_areas
         if is_free or not any(find_speeds(command.message)):
             return None
-        return "A velocity goes out by all ways at once only to make the robot stand."
+        return refuse_velocity("A velocity goes out by all ways at once only when it is zero.")
 
     async def _guarded(
-        self, command: Command, work: Coroutine[Any, Any, T], objection: str | None = None
+        self, command: Command, work: Coroutine[Any, Any, T], objection: Refused | None = None
     ) -> T:
         """Does what was decided to be allowed, and notes how it ended."""
         try:
-            cleared = self._guard.clear(command, robot_s=self._now_s(), objection=objection)
+            permit = self._guard.clear(command, robot_s=self._now_s(), objection=objection)
         except BaseException:
             work.close()
             raise
@@ -165,14 +211,14 @@ class GuardedConnection:
             result = await work
             said = "done"
         finally:
-            self._guard.note_result(cleared, said, robot_s=self._now_s())
+            self._guard.note_result(permit, said, robot_s=self._now_s())
         return result
 
     def _note_stop(self, command: Publish | Call) -> None:
         if self._by_hand is not None and isinstance(command, Publish):
             self._by_hand.end(command.topic)
         name = command.service if isinstance(command, Call) else command.topic
-        said = f"a stand, or the end of a goal, on {name}"
+        said = f"zero velocity, or the end of a goal, on {name}"
         self._guard.note_event("stop", said, robot_s=self._now_s())
 
     # --- what ends something: never refused ---
@@ -247,7 +293,8 @@ class GuardedConnection:
         Raises:
             PolicyError: The policy forbids the topic: the robot must not even hear of it.
         """
-        self.check_name(Publish(topic=topic, type=type_name, message={}))
+        command = Publish(topic=topic, type=type_name, message={})
+        self.check_name(read_action_goal(command) or command)
         self._types[topic] = type_name
         self._connection.advertise(topic, type_name=type_name)
 
@@ -325,7 +372,8 @@ def _is_stop(command: Publish | Call) -> bool:
     if CANCEL_TYPE.fullmatch(command.type) and command.topic.endswith("/cancel"):
         return True
     # Only types that hold nothing else: an odometry with a speed of zero is no stop.
-    if not VELOCITY_TYPE.fullmatch(command.type):
-        return False
-    speeds = [speed for _, speed in find_speeds(command.message)]
-    return bool(speeds) and all(speed == 0.0 for speed in speeds)
+    return _is_velocity(command.type) and is_zero_velocity(command.message)
+
+
+def _is_velocity(type_name: str) -> bool:
+    return VELOCITY_TYPE.fullmatch(type_name) is not None

@@ -1,11 +1,13 @@
 """Whether a command may go to the robot: one pure function over values."""
 
+import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from mapspeak.navigation.goals import GoalVerdict
+from mapspeak.navigation.goals import GoalCheck, GoalVerdict
+from mapspeak.navigation.hold import say_hold
 from mapspeak.navigation.safety.commands import (
     Act,
     Call,
@@ -15,8 +17,8 @@ from mapspeak.navigation.safety.commands import (
     SetParameter,
     say_command,
 )
-from mapspeak.navigation.safety.hold import say_hold
-from mapspeak.navigation.safety.policy import Policy
+from mapspeak.navigation.safety.policy import RATE_KEYS, Policy
+from mapspeak.ros.messages import bare_type
 
 __all__ = [
     "Allowed",
@@ -27,6 +29,7 @@ __all__ = [
     "decide",
     "find_speeds",
     "is_name_denied",
+    "judge_check",
 ]
 
 MOST_NESTED = 8
@@ -86,13 +89,13 @@ class Situation:
         held_by: Why the robot is held; None where it is not.
         n_in_last_minute: Commands of this kind that were allowed in the last minute.
         is_approved: A person has agreed to this command.
-        objection: Why a published velocity must not be, by where it would take the robot.
+        objection: What is against a velocity or the goal of an action by where it leads.
     """
 
     held_by: str | None = None
     n_in_last_minute: int = 0
     is_approved: bool = False
-    objection: str | None = None
+    objection: Refused | None = None
 
 
 def decide(command: Command, *, policy: Policy, situation: Situation) -> Decision:
@@ -100,9 +103,9 @@ def decide(command: Command, *, policy: Policy, situation: Situation) -> Decisio
     refusals = (
         _against_everything(policy, situation),
         _against_name(command, policy),
-        _against_goal(command, policy),
+        judge_check(command.check, policy) if isinstance(command, Drive) else None,
         _against_speed(command, policy),
-        _against_way(situation),
+        situation.objection,
         _against_rate(command, policy, situation),
     )
     refused = next((each for each in refusals if each is not None), None)
@@ -135,35 +138,52 @@ def is_name_denied(command: Command, policy: Policy) -> bool:
 
 
 def _against_name(command: Command, policy: Policy) -> Refused | None:
-    name = _name_of(command)
     patterns = policy.patterns.get(command.kind)
-    denial = None if name is None or patterns is None else patterns.find_denial(name)
+    if isinstance(command, Drive) or patterns is None:
+        return None
+    name = _name_of(command)
+    denial = patterns.find_denial(name, _types_of(command))
     if denial is None:
         return None
+    key, said = f"{command.kind}.{denial.key}", ", ".join(denial.patterns) or "nothing"
+    how = f"change {key}"
+    if denial.key == "usual_denials":
+        opened = json.dumps([*patterns.allow, name], ensure_ascii=False)
+        how = f"open this one name: `{command.kind}: {{allow: {opened}}}`"
     return Refused(
-        rule=f"{command.kind}.names",
-        reason=f"The robot may not {say_command(command)}: {denial}.",
-        hint="To drive use navigate_to, to stop stop_robot; a person can change policy.yaml.",
+        rule=key,
+        reason=f"The policy denies this: {say_command(command)} ({key}: {said}).",
+        hint="To drive use navigate_to, to stop stop_robot. In the file given to mapspeak with "
+        f"--policy a person can {how}.",
     )
 
 
-def _name_of(command: Command) -> str | None:
+def _name_of(command: Publish | Call | Act | SetParameter) -> str:
     match command:
         case Publish(topic=name) | Call(service=name) | Act(action=name):
             return name
         case SetParameter():
             return command.full_name
-        case Drive():
-            return None
 
 
-def _against_goal(command: Command, policy: Policy) -> Refused | None:
-    if not isinstance(command, Drive):
-        return None
-    check = command.check
+def _types_of(command: Publish | Call | Act | SetParameter) -> tuple[str, ...]:
+    """Return the types that a command is known by, as they were written and as "package/Type"."""
+    types: tuple[str, ...] = ()
+    match command:
+        case Act():
+            types = (command.type, command.true_type)
+        case Publish() | Call():
+            types = (command.type,)
+        case SetParameter():
+            pass
+    return tuple({form for each in types if each for form in (each, bare_type(each))})
+
+
+def judge_check(check: GoalCheck, policy: Policy) -> Refused | None:
+    """Return what is against a goal by what the map says of it; None when nothing is."""
     always = (GoalVerdict.NOT_FINITE, GoalVerdict.CLOSED)
     if not check.is_ok and (policy.needs_known_way or check.verdict in always):
-        return Refused(rule="goals", reason=check.sentence, hint=_what_instead(command))
+        return Refused(rule="goals", reason=check.sentence, hint=_what_instead(check))
     if check.path_m is not None and check.path_m > policy.farthest_m:
         return Refused(
             rule="goals.farthest_m",
@@ -174,8 +194,8 @@ def _against_goal(command: Command, policy: Policy) -> Refused | None:
     return None
 
 
-def _what_instead(drive: Drive) -> str:
-    near = drive.check.nearest
+def _what_instead(check: GoalCheck) -> str:
+    near = check.nearest
     if near is None:
         return "No place near it works either; call look_at_map and choose another one."
     return f"The nearest pose that works is x={near.x:.2f}, y={near.y:.2f}."
@@ -185,18 +205,20 @@ def _against_speed(command: Command, policy: Policy) -> Refused | None:
     if not isinstance(command, Publish):
         return None
     limits = {
-        "linear": ("A linear speed", policy.speeds.linear_mps, "m/s"),
-        "angular": ("An angular speed", policy.speeds.angular_radps, "rad/s"),
-        "speed": ("A speed", policy.speeds.linear_mps, "m/s"),
+        "linear": ("A linear speed", "linear_mps", "m/s"),
+        "angular": ("An angular speed", "angular_radps", "rad/s"),
+        "speed": ("A speed", "linear_mps", "m/s"),
     }
     for part, speed in find_speeds(command.message):
-        name, most, unit = limits[part]
+        name, key, unit = limits[part]
+        most: float = getattr(policy.speeds, key)
         # Written so that what is no number is refused too.
         if not speed <= most:
             return Refused(
-                rule=f"speed.{part}",
+                rule=f"speed.{key}",
                 reason=f"{name} of {speed:g} {unit} is above the limit, {most:g} {unit}.",
-                hint=f"Publish at most {most:g} {unit}.",
+                hint=f"Publish at most {most:g} {unit}; a person can change speed.{key} in "
+                "policy.yaml.",
             )
     return None
 
@@ -231,23 +253,14 @@ def _number(value: object) -> float:
         return math.inf
 
 
-def _against_way(situation: Situation) -> Refused | None:
-    if situation.objection is None:
-        return None
-    return Refused(
-        rule="keep_out",
-        reason=situation.objection,
-        hint="Publish a velocity that leads away, or use navigate_to, which leads round.",
-    )
-
-
 def _against_rate(command: Command, policy: Policy, situation: Situation) -> Refused | None:
     most = policy.rates.get(command.kind)
     if most is None or situation.n_in_last_minute < most:
         return None
+    key = f"rates.{RATE_KEYS[command.kind]}"
     return Refused(
-        rule=f"rates.{command.kind}",
+        rule=key,
         reason=f"{situation.n_in_last_minute} commands of the kind {command.kind} were given in "
         f"the last minute, the policy allows {most}.",
-        hint="Wait, or do more with each command.",
+        hint=f"Wait, or do more with each command; a person can change {key} in policy.yaml.",
     )

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 
 from mapspeak.errors import GoalError, PolicyError
+from mapspeak.navigation.hold import Hold
 from mapspeak.navigation.safety.approvals import Approvals
 from mapspeak.navigation.safety.audit import AuditLog
 from mapspeak.navigation.safety.caller import Caller, current_caller
@@ -19,11 +20,10 @@ from mapspeak.navigation.safety.deciding import (
     decide,
 )
 from mapspeak.navigation.safety.errands import Errand, Errands, current_errand
-from mapspeak.navigation.safety.hold import Hold
 from mapspeak.navigation.safety.policy import Otherwise, Policy
 from mapspeak.navigation.safety.rates import RateLog
 
-__all__ = ["ApprovalNeededError", "Clearance", "Guard"]
+__all__ = ["ApprovalNeededError", "Guard", "Permit"]
 
 logger = logging.getLogger(__name__)
 
@@ -43,7 +43,7 @@ class ApprovalNeededError(PolicyError):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Clearance:
+class Permit:
     """A command that was allowed.
 
     Attributes:
@@ -79,13 +79,15 @@ class Guard:
     _rates: RateLog = field(default_factory=RateLog)
     _errands: Errands = field(default_factory=Errands)
 
-    def clear(self, command: Command, *, robot_s: float, objection: str | None = None) -> Clearance:
+    def clear(
+        self, command: Command, *, robot_s: float, objection: Refused | None = None
+    ) -> Permit:
         """Allows a command, and notes that; between this and the command nothing may wait.
 
         Args:
             command: What is wanted.
             robot_s: Robot time.
-            objection: What is against it by where it would take the robot.
+            objection: What is against it by where it leads.
 
         Raises:
             ApprovalNeededError: A person has to agree first.
@@ -93,10 +95,10 @@ class Guard:
             PolicyError: It is not allowed, or could not be noted.
         """
         caller = current_caller()
-        cleared = Clearance(number=self.audit.next_number(), command=command, caller=caller)
+        permit = Permit(number=self.audit.next_number(), command=command, caller=caller)
         decision = self._decide(command, caller, robot_s, objection)
         verdict, said = _say_decision(decision)
-        self._note("decision", cleared, robot_s=robot_s, verdict=verdict, said=said)
+        self._note("decision", permit, robot_s=robot_s, verdict=verdict, said=said)
         match decision:
             case Refused(reason=reason, hint=hint):
                 kind_of_error = GoalError if decision.is_of_the_goal else PolicyError
@@ -105,23 +107,23 @@ class Guard:
                 raise self._ask(command, question, caller)
             case Allowed():
                 self._rates.note(command.kind, robot_s)
-        return cleared
+        return permit
 
-    def note_result(self, cleared: Clearance, said: str, *, robot_s: float) -> None:
+    def note_result(self, permit: Permit, said: str, *, robot_s: float) -> None:
         """Notes what the robot answered to a command that was allowed."""
-        self._note_after("result", cleared, robot_s=robot_s, said=said)
+        self._note_after("result", permit, robot_s=robot_s, said=said)
 
-    def note_end(self, cleared: Clearance, said: str, *, robot_s: float) -> None:
+    def note_end(self, permit: Permit, said: str, *, robot_s: float) -> None:
         """Notes how something that took a while has ended."""
-        self._note_after("ended", cleared, robot_s=robot_s, said=said)
+        self._note_after("ended", permit, robot_s=robot_s, said=said)
 
-    def note_leg(self, cleared: Clearance, said: str, *, robot_s: float) -> None:
+    def note_leg(self, permit: Permit, said: str, *, robot_s: float) -> None:
         """Notes that the robot is sent on within a drive that was allowed.
 
         Raises:
             PolicyError: The line could not be written.
         """
-        self._note("leg", cleared, robot_s=robot_s, said=said)
+        self._note("leg", permit, robot_s=robot_s, said=said)
 
     def note_event(self, event: str, said: str, *, robot_s: float) -> None:
         """Notes what is no command: a stop, a hold. It never fails: stopping goes first."""
@@ -137,7 +139,7 @@ class Guard:
             logger.error("%s", error)  # noqa: TRY400 - it says all there is to say
 
     def _decide(
-        self, command: Command, caller: Caller, robot_s: float, objection: str | None
+        self, command: Command, caller: Caller, robot_s: float, objection: Refused | None
     ) -> Decision:
         situation = replace(self._situation(command, robot_s), objection=objection)
         decision = decide(command, policy=self.policy, situation=situation)
@@ -181,22 +183,22 @@ class Guard:
         return ApprovalNeededError(question, wish_id=wish_id, hint=hint)
 
     def _note(
-        self, event: str, cleared: Clearance, *, robot_s: float, verdict: str = "", said: str
+        self, event: str, permit: Permit, *, robot_s: float, verdict: str = "", said: str
     ) -> None:
         self.audit.write(
             event,
-            number=cleared.number,
-            caller=cleared.caller,
+            number=permit.number,
+            caller=permit.caller,
             robot_s=robot_s,
-            command=cleared.command,
+            command=permit.command,
             verdict=verdict,
             said=said,
         )
 
-    def _note_after(self, event: str, cleared: Clearance, *, robot_s: float, said: str) -> None:
+    def _note_after(self, event: str, permit: Permit, *, robot_s: float, said: str) -> None:
         """Notes what has happened already: an error here could only hide it."""
         try:
-            self._note(event, cleared, robot_s=robot_s, said=said)
+            self._note(event, permit, robot_s=robot_s, said=said)
         except PolicyError as error:
             logger.error("%s", error)  # noqa: TRY400 - it says all there is to say
 

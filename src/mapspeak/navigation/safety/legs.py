@@ -9,7 +9,7 @@ import numpy as np
 from mapspeak.geometry import Point, Pose
 from mapspeak.navigation.closures import MARGIN_M, ClosedArea, distance_to_line
 from mapspeak.navigation.revision import MapRevision
-from mapspeak.navigation.safety.lookout import KEEP_M
+from mapspeak.navigation.safety.monitor import KEEP_M
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import Path, find_path
 

@@ -1,12 +1,15 @@
 """What a robot may be told to do, as a value; `policyfile` reads it from policy.yaml."""
 
 import fnmatch
+import itertools
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from datetime import datetime, time, timedelta
 from enum import StrEnum
 
 from mapspeak.geometry import Point
 from mapspeak.navigation.safety.commands import Kind
+from mapspeak.navigation.safety.denials import USUAL_DENIALS, USUAL_TYPES
 
 __all__ = ["Approval", "AreaRule", "Hours", "Otherwise", "Patterns", "Policy", "Speeds", "WhenBusy"]
 
@@ -74,25 +77,54 @@ class AreaRule:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Denial:
+    """What in a policy is against a name.
+
+    Attributes:
+        key: Of the rule, below that of the kind of command.
+        patterns: What is written there.
+    """
+
+    key: str
+    patterns: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Patterns:
     """Names that are allowed and denied, with * and ?; a denied name is never allowed.
 
     Attributes:
-        allow: What may be used.
+        allow: What may be used; a name without * and ? is free of the usual denials.
         deny: What may not, though it is allowed.
+        usual: Likewise, unless it is allowed by its own name.
+        usual_types: Likewise, by its type, as "package/Type".
     """
 
     allow: tuple[str, ...] = ("*",)
     deny: tuple[str, ...] = ()
+    usual: tuple[str, ...] = ()
+    usual_types: tuple[str, ...] = ()
 
-    def find_denial(self, name: str) -> str | None:
-        """Gives why a name may not be used; None where it may."""
-        plain = "/" + name.strip().strip("/")
-        denied = next((each for each in self.deny if _fits(plain, each)), None)
-        if denied is not None:
-            return f"the policy denies {denied}"
-        is_allowed = any(_fits(plain, each) for each in self.allow)
-        return None if is_allowed else f"the policy allows only {', '.join(self.allow) or 'none'}"
+    def find_denial(self, name: str, types: Collection[str] = ()) -> Denial | None:
+        """Return what is against a name, or against one of its types; None when it may be used."""
+        full = _full(name)
+        known = [_full(each) for each in types]
+        for pattern in self.deny:
+            if any(_fits(each, pattern) for each in (full, *known)):
+                return Denial(key="deny", patterns=(pattern,))
+        if full not in map(_full, self.allow):
+            by_name = (pattern for pattern in self.usual if _fits(full, pattern))
+            by_type = (
+                pattern
+                for pattern in self.usual_types
+                if any(_fits(each, pattern) for each in known)
+            )
+            found = next(itertools.chain(by_name, by_type), None)
+            if found is not None:
+                return Denial(key="usual_denials", patterns=(found,))
+        if any(_fits(full, pattern) for pattern in self.allow):
+            return None
+        return Denial(key="allow", patterns=self.allow)
 
 
 class Otherwise(StrEnum):
@@ -123,31 +155,6 @@ class Approval:
     otherwise: Otherwise = Otherwise.REFUSE
 
 
-USUAL_DENIALS = {
-    Kind.PUBLISH: (
-        *("*/tf", "*/tf_static", "*/clock", "*/map", "*/odom", "*/scan", "*/initialpose"),
-        *("*/robot_description", "*/parameter_events", "*/rosout"),
-        *("*/goal_pose", "*/goal", "*/move_base_simple/*", "*/move_base/*", "*/_action/*"),
-    ),
-    Kind.CALL: (
-        *("*set_param*", "*delete_param*", "*shutdown*", "*change_state*", "*manage_nodes*"),
-        *("*load_node", "*unload_node", "*kill*", "*/_action/*", "*set_pose*", "*set_logger_*"),
-        # These end or hang the rosapi of ROS 2, and with it all questions to the robot.
-        *("*/message_details", "*/service_re*_details", "*/get_param_names"),
-    ),
-    Kind.ACT: (
-        *("*navigate_to_pose*", "*navigate_through_poses*", "*follow_path*", "*move_base*"),
-        *("*follow_waypoints*", "*drive_on_heading*", "*backup*", "*spin*", "*dock_robot*"),
-    ),
-    Kind.SET_PARAMETER: (
-        *("*vel*", "*speed*", "*footprint*", "*radius*", "*costmap*", "*keepout*"),
-        # With these a robot loses itself: its frames, its clock, what it listens to, its place.
-        *("*frame*", "*use_sim_time", "*topic*", "*initial_pose*", "*map_server*"),
-        *("*publish_tf*", "*tf_broadcast*", "*tf_prefix*"),
-    ),
-}
-"""What would go around this policy, or around the robot's own safety."""
-
 USUAL_RATES = {
     Kind.DRIVE: 60,
     Kind.PUBLISH: 1200,
@@ -155,10 +162,21 @@ USUAL_RATES = {
     Kind.ACT: 60,
     Kind.SET_PARAMETER: 30,
 }
+RATE_KEYS = {
+    Kind.DRIVE: "drives_per_minute",
+    Kind.PUBLISH: "publishes_per_minute",
+    Kind.CALL: "calls_per_minute",
+    Kind.ACT: "actions_per_minute",
+    Kind.SET_PARAMETER: "parameters_per_minute",
+}
+"""What policy.yaml calls them."""
 
 
 def _usual_patterns() -> dict[Kind, Patterns]:
-    return {kind: Patterns(deny=denied) for kind, denied in USUAL_DENIALS.items()}
+    return {
+        kind: Patterns(usual=usual, usual_types=USUAL_TYPES[kind])
+        for kind, usual in USUAL_DENIALS.items()
+    }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -190,6 +208,10 @@ class Policy:
     patterns: dict[Kind, Patterns] = field(default_factory=_usual_patterns)
     approval: Approval = Approval()
     rates: dict[Kind, int] = field(default_factory=lambda: dict(USUAL_RATES))
+
+
+def _full(name: str) -> str:
+    return "/" + name.strip().strip("/")
 
 
 def _fits(name: str, pattern: str) -> bool:

@@ -17,10 +17,11 @@ from mapspeak.errors import MapError
 from mapspeak.geometry import Point
 from mapspeak.navigation.closures import Outline
 from mapspeak.navigation.safety.commands import Kind
+from mapspeak.navigation.safety.denials import USUAL_DENIALS, USUAL_TYPES
 from mapspeak.navigation.safety.masks import load_mask
 from mapspeak.navigation.safety.policy import (
     DAYS,
-    USUAL_DENIALS,
+    RATE_KEYS,
     USUAL_RATES,
     Approval,
     AreaRule,
@@ -131,8 +132,12 @@ class _WrittenPatterns(_Written):
     usual_denials: bool = True
 
     def patterns(self, kind: Kind) -> Patterns:
-        usual = USUAL_DENIALS[kind] if self.usual_denials else ()
-        return Patterns(allow=tuple(self.allow), deny=(*self.deny, *usual))
+        return Patterns(
+            allow=tuple(self.allow),
+            deny=tuple(self.deny),
+            usual=USUAL_DENIALS[kind] if self.usual_denials else (),
+            usual_types=USUAL_TYPES[kind] if self.usual_denials else (),
+        )
 
 
 class _WrittenApproval(_Written):
@@ -163,13 +168,7 @@ class _WrittenRates(_Written):
     parameters_per_minute: _PerMinute = USUAL_RATES[Kind.SET_PARAMETER]
 
     def rates(self) -> dict[Kind, int]:
-        return {
-            Kind.DRIVE: self.drives_per_minute,
-            Kind.PUBLISH: self.publishes_per_minute,
-            Kind.CALL: self.calls_per_minute,
-            Kind.ACT: self.actions_per_minute,
-            Kind.SET_PARAMETER: self.parameters_per_minute,
-        }
+        return {kind: getattr(self, key) for kind, key in RATE_KEYS.items()}
 
 
 class _PolicyFile(_Written):

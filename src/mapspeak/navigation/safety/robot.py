@@ -2,23 +2,21 @@
 
 import logging
 from collections import OrderedDict
-from contextlib import suppress
 from dataclasses import replace
 
 import anyio
-import anyio.to_thread
 
 from mapspeak.errors import ConfigError, LinkError, MapspeakError, PolicyError
 from mapspeak.geometry import Pose
-from mapspeak.navigation.goals import GoalVerdict, check_goal
+from mapspeak.navigation.hold import say_hold
 from mapspeak.navigation.safety.caller import NOBODY, current_caller
 from mapspeak.navigation.safety.commands import Drive, say_command
-from mapspeak.navigation.safety.guard import Clearance, Guard
-from mapspeak.navigation.safety.hold import say_hold
-from mapspeak.navigation.safety.legs import plan_legs
-from mapspeak.navigation.safety.lookout import Lookout
+from mapspeak.navigation.safety.guard import Guard, Permit
+from mapspeak.navigation.safety.monitor import GoalMonitor, KeepOutMonitor, Mover
+from mapspeak.navigation.safety.planning import Plan, Planner
+from mapspeak.navigation.safety.standing import HoldKeeper, StandingCheck
 from mapspeak.navigation.safety.surveying import Surveyor
-from mapspeak.navigation.safety.underway import GuardedDrive, Plan
+from mapspeak.navigation.safety.underway import GuardedDrive
 from mapspeak.navigation.safety.velocities import HandDriving
 from mapspeak.robot import (
     CameraPicture,
@@ -39,8 +37,8 @@ WATCH_S = 0.1
 EPSILON_S = 1e-6
 BLIND_S = 2.0
 """Wall time without a pose after which a robot that must keep off some area is stopped."""
-SAME_PLACE_M = 0.1
-"""A goal no farther away than this is a turn."""
+REPEAT_S = 0.5
+"""Wall time between two looks whether a held robot stands."""
 N_KEPT = 200
 
 logger = logging.getLogger(__name__)
@@ -53,23 +51,36 @@ class GuardedRobot:
         robot: The robot itself; nobody else may have it.
         guard: Decides and notes.
         surveyor: Knows what is closed now.
+        repeat_s: Between two looks whether a held robot stands, in wall time.
 
     Attributes:
-        by_hand: Looks after the robot while published velocities drive it.
+        planner: Checks goals, and plans the legs to them.
+        by_hand: Knows the velocities that were published.
     """
 
-    def __init__(self, robot: Robot, *, guard: Guard, surveyor: Surveyor) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        guard: Guard,
+        surveyor: Surveyor,
+        repeat_s: float = REPEAT_S,
+    ) -> None:
         self._robot = robot
         self._guard = guard
         self._surveyor = surveyor
         self._drive: GuardedDrive | None = None
         self._verdicts: OrderedDict[str, GoalStatus] = OrderedDict()
         self._n_stops = 0
-        self._answered_hold: str | None = None
         self._watching = anyio.Lock()
         self._stepping = anyio.Lock()
         self._seen_at_s = float("-inf")
-        self.by_hand = HandDriving(robot, surveyor=surveyor, radius_m=self.description.radius_m)
+        self._hold_keeper = HoldKeeper(guard.hold, StandingCheck(robot), repeat_s=repeat_s)
+        self.planner = Planner(robot, surveyor=surveyor, policy=guard.policy)
+        self.by_hand = HandDriving(
+            robot, planner=self.planner, surveyor=surveyor, radius_m=self.description.radius_m
+        )
+        self._monitor = KeepOutMonitor(radius_m=self.description.radius_m)
 
     @property
     def description(self) -> RobotDescription:
@@ -85,12 +96,16 @@ class GuardedRobot:
     async def sleep(self, duration_s: float) -> None:
         """Returns when that much robot time has passed; a drive is watched meanwhile."""
         deadline_s = self.now_s + duration_s
-        while self._is_moving and self.now_s < deadline_s - EPSILON_S:
+        while self._is_watched and self.now_s < deadline_s - EPSILON_S:
             await self._robot.sleep(min(WATCH_S, deadline_s - self.now_s))
             await self.obey_hold()
             await self.watch()
             await self.watch_map()
         await self._robot.sleep(max(deadline_s - self.now_s, 0.0))
+
+    @property
+    def _is_watched(self) -> bool:
+        return self._drive is not None or self.by_hand.is_under_way or self._surveyor.has_rules
 
     async def fetch_map(self) -> OccupancyGrid:
         """Gives the latest map."""
@@ -123,23 +138,23 @@ class GuardedRobot:
             PolicyError: The policy, a hold or a person does not allow it, or it was stopped.
         """
         n_stops = self._n_stops
-        plan = await self._plan(goal)
-        cleared = self._guard.clear(Drive(goal=goal, check=plan.check), robot_s=self.now_s)
+        plan = await self.planner.plan(goal)
+        permit = self._guard.clear(Drive(goal=goal, check=plan.check), robot_s=self.now_s)
         if n_stops != self._n_stops:
-            raise self._overtaken(cleared)
+            raise self._overtaken(permit)
         try:
             robot_goal_id = await self._robot.send_goal(plan.legs[0])
         except BaseException as error:
             # Whether the robot took the goal is unknown: it must not drive with nobody knowing.
             with anyio.CancelScope(shield=True):
-                self._guard.note_result(cleared, _say_error(error), robot_s=self.now_s)
+                self._guard.note_result(permit, _say_error(error), robot_s=self.now_s)
                 await self.stop()
             raise
-        self._take_up(robot_goal_id, plan, cleared)
+        self._take_up(robot_goal_id, plan, permit)
         if n_stops != self._n_stops:
             with anyio.CancelScope(shield=True):
                 await self.stop()
-            raise self._overtaken(cleared)
+            raise self._overtaken(permit)
         return robot_goal_id
 
     async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
@@ -175,89 +190,76 @@ class GuardedRobot:
         return self._guard.robot or self._robot.description.name
 
     async def obey_hold(self) -> None:
-        """Stops the robot for a hold; to be called often, and apart from what asks the robot.
+        """Stop the robot for a hold, and again when it moves; to be called often, and apart.
 
         Stops that fail are tried again at the next call.
         """
-        held_by = self._guard.hold.read()
-        if held_by is None or held_by == self._answered_hold:
-            self._answered_hold = held_by
-            return
-        if self._drive is not None:
-            await self._end(
-                self._drive, GoalState.CANCELLED, f"The robot is held: {say_hold(held_by)}."
-            )
-        else:
-            await self._stop("held")
-        self._answered_hold = held_by
-        self._guard.hold.answer(self.name, held_by=held_by)
+        await self._hold_keeper.obey(self.name, stop=self._stop_for_hold, repeat=self._repeat_stop)
 
     async def watch(self) -> None:
-        """Stops the robot before it enters a closed area; to be called often."""
+        """Stop the robot before it enters a closed area, whatever moves it; to be called often."""
         async with self._watching:
-            await self._watch_hand_driving()
             drive = self._drive
-            if drive is None:
+            fault = await self._find_fault(self._mover)
+            if drive is not self._drive:
                 return
-            fault = await self._find_fault(drive)
-            if fault is not None and drive is self._drive:
+            if fault is None:
+                if drive is not None and drive.legs:
+                    await self._follow(drive)
+            elif drive is not None:
                 await self._end(drive, GoalState.BLOCKED, fault)
-            elif drive.legs and drive is self._drive:
-                await self._follow(drive)
+            else:
+                logger.warning("%s", fault)
+                with anyio.CancelScope(shield=True):
+                    await self._stop(fault)
 
     async def watch_map(self) -> None:
-        """Stops the robot when its goal is closed or full by now; to be called often.
+        """Notice what closes, and stop the robot when its goal is closed or full by now.
 
         A map may take long to come and to be looked through: `watch` must not wait for it.
         """
         drive = self._drive
-        if drive is None or not drive.lookout.is_map_due(self.now_s):
+        if drive is None and not self._surveyor.has_rules:
             return
         try:
-            grid = await self._robot.fetch_map()
+            revision = await self.planner.survey_lately()
         except LinkError as error:
-            logger.warning("While watching the map: %s", error)
+            logger.log(
+                logging.DEBUG if drive is None else logging.WARNING,
+                "While watching the map: %s",
+                error,
+            )
             return
-        revision = await self._surveyor.survey(grid, radius_m=self.description.radius_m)
-        fault = drive.lookout.judge_goal(revision, now_s=self.now_s)
+        if drive is None:
+            return
+        fault = drive.goal_monitor.judge(revision, now_s=self.now_s)
         if fault is not None and drive is self._drive:
             await self._end(drive, GoalState.BLOCKED, fault)
 
     # --- inside ---
 
     @property
-    def _is_moving(self) -> bool:
-        return self._drive is not None or self.by_hand.is_under_way
+    def _mover(self) -> Mover:
+        if self._drive is not None:
+            return Mover.NAVIGATION
+        return Mover.VELOCITY if self.by_hand.is_under_way else Mover.OTHERS
 
-    async def _watch_hand_driving(self) -> None:
-        """Stops a robot that published velocities drive towards what is closed."""
-        fault = None
-        # While nobody knows where the robot is, the next message is refused, and a stand follows.
-        with suppress(LinkError):
-            fault = await self.by_hand.find_fault()
-        if fault is not None:
-            logger.warning("%s", fault)
-            with anyio.CancelScope(shield=True):
-                self.by_hand.stand()
-                await self._stop(fault)
-
-    def _take_up(self, robot_goal_id: str, plan: Plan, cleared: Clearance) -> None:
+    def _take_up(self, robot_goal_id: str, plan: Plan, permit: Permit) -> None:
         """Begins to look after a drive that the robot has accepted."""
         self._note_replaced()
         self._seen_at_s = anyio.current_time()
         first, *others = plan.legs
-        lookout = Lookout(goal=plan.legs[-1], radius_m=self.description.radius_m)
-        lookout.begin_at(plan.here, now_s=self.now_s)
+        self._monitor.begin_at(plan.here, now_s=self.now_s)
         self._drive = GuardedDrive(
             goal_id=robot_goal_id,
             leg_id=robot_goal_id,
             leg=first,
             legs=others,
-            cleared=cleared,
-            lookout=lookout,
+            permit=permit,
+            goal_monitor=GoalMonitor(goal=plan.legs[-1], radius_m=self.description.radius_m),
         )
         said = f", in {len(plan.legs)} legs round what is closed" if others else ""
-        self._guard.note_result(cleared, f"accepted as {robot_goal_id}{said}", robot_s=self.now_s)
+        self._guard.note_result(permit, f"accepted as {robot_goal_id}{said}", robot_s=self.now_s)
 
     async def _follow(self, drive: GuardedDrive) -> GoalStatus:
         """Gives how a drive stands, and sends the robot on where a leg of it has ended."""
@@ -278,47 +280,32 @@ class GuardedRobot:
             return
         drive.leg = drive.legs.pop(0)
         said = f"on to ({drive.leg.x:.2f}, {drive.leg.y:.2f})"
-        self._guard.note_leg(drive.cleared, said, robot_s=self.now_s)
+        self._guard.note_leg(drive.permit, said, robot_s=self.now_s)
         drive.leg_id = await self._robot.send_goal(drive.leg)
         if n_stops != self._n_stops:
             with anyio.CancelScope(shield=True):
                 await self.stop()
 
-    async def _plan(self, goal: Pose) -> Plan:
-        """Judges a goal, and gives the legs by which the robot would get there."""
-        grid = await self._robot.fetch_map()
-        here = (await self._robot.fetch_pose()).pose
-        revision = await self._surveyor.survey(grid, radius_m=self.description.radius_m)
-        check = await anyio.to_thread.run_sync(
-            lambda: check_goal(revision.grid, revision.distances_from(here.point), goal)
-        )
-        if check.is_ok:
-            legs = await anyio.to_thread.run_sync(lambda: plan_legs(revision, here.point, goal))
-            return Plan(check=check, legs=legs, here=here)
-        is_turn = goal.is_finite() and here.point.distance_to(goal.point) <= SAME_PLACE_M
-        is_over = any(area.distance_to(here.point) < revision.radius_m for area in revision.areas)
-        if is_turn and not is_over:
-            # Where it stands it can stand, however tight the map shows that place to be.
-            check = replace(check, verdict=GoalVerdict.OK, path_m=0.0, nearest=None)
-        return Plan(check=check, legs=(goal,), here=here)
+    async def _find_fault(self, mover: Mover) -> str | None:
+        """Return why the robot must not go on; that nothing can be seen is a reason after a while.
 
-    async def _find_fault(self, drive: GuardedDrive) -> str | None:
-        """Finds why a drive must not go on; that nothing can be seen is a reason after a while."""
-        try:
-            return await self._judge(drive)
-        except LinkError as error:
-            blind_s = anyio.current_time() - self._seen_at_s
-            if blind_s < BLIND_S:
-                return None
-            return f"The robot was stopped: where it is was unknown for {blind_s:.0f} s. {error}"
-
-    async def _judge(self, drive: GuardedDrive) -> str | None:
+        The blind robot is stopped on a drive of ours only: what others do with it is not known.
+        """
         revision = self._surveyor.latest
         if revision is None or not revision.areas:
             return None
-        pose = (await self._robot.fetch_pose()).pose
+        try:
+            pose = (await self._robot.fetch_pose()).pose
+        except LinkError as error:
+            blind_s = anyio.current_time() - self._seen_at_s
+            if mover is not Mover.NAVIGATION or blind_s < BLIND_S:
+                return None
+            return f"The robot was stopped: where it is was unknown for {blind_s:.0f} s. {error}"
         self._seen_at_s = anyio.current_time()
-        return drive.lookout.judge_motion(revision, pose, now_s=self.now_s)
+        fault = self._monitor.judge(revision, pose, now_s=self.now_s, mover=mover)
+        if fault is not None:
+            self._monitor.begin_at(pose, now_s=self.now_s)
+        return fault
 
     async def _end(self, drive: GuardedDrive, state: GoalState, reason: str) -> None:
         """Stops the robot and remembers why, whatever its navigation will say of the drive."""
@@ -333,13 +320,24 @@ class GuardedRobot:
                 raise
         self._note_end(drive.goal_id, self._verdicts[drive.goal_id])
 
+    async def _stop_for_hold(self, held_by: str) -> None:
+        if self._drive is None:
+            await self._stop("held")
+            return
+        reason = f"The robot is held: {say_hold(held_by)}."
+        await self._end(self._drive, GoalState.CANCELLED, reason)
+
+    async def _repeat_stop(self) -> None:
+        self.by_hand.stand()
+        await self._robot.stop()
+
     async def _stop(self, why: str) -> None:
         self._n_stops += 1
         self._guard.end_errands()
         if self._drive is not None:
             self._give_up_legs(self._drive, "The robot was stopped.")
         try:
-            await self._robot.stop()
+            await self._repeat_stop()
         except MapspeakError as error:
             why = f"{why}, but: {error}"
             raise
@@ -368,7 +366,7 @@ class GuardedRobot:
         while len(self._verdicts) > N_KEPT:
             self._verdicts.popitem(last=False)
         said = f"{status.state}: {status.reason}" if status.reason else str(status.state)
-        self._guard.note_end(drive.cleared, said, robot_s=self.now_s)
+        self._guard.note_end(drive.permit, said, robot_s=self.now_s)
 
     def _give_up_legs(self, drive: GuardedDrive, reason: str) -> None:
         """Ends a drive that was to go on after its present leg: its end is not the goal."""
@@ -382,9 +380,9 @@ class GuardedRobot:
             status = GoalStatus(state=GoalState.PREEMPTED, reason="A newer goal took its place.")
             self._note_end(self._drive.goal_id, status)
 
-    def _overtaken(self, cleared: Clearance) -> PolicyError:
-        what = say_command(cleared.command)
-        self._guard.note_result(cleared, "given up: the robot was stopped", robot_s=self.now_s)
+    def _overtaken(self, permit: Permit) -> PolicyError:
+        what = say_command(permit.command)
+        self._guard.note_result(permit, "given up: the robot was stopped", robot_s=self.now_s)
         return PolicyError(
             f"The robot was stopped before it could {what}.",
             hint="Call navigate_to again when it may drive.",

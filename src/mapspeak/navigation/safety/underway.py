@@ -4,26 +4,10 @@ import itertools
 from dataclasses import dataclass
 
 from mapspeak.geometry import Pose
-from mapspeak.navigation.goals import GoalCheck
-from mapspeak.navigation.safety.guard import Clearance
-from mapspeak.navigation.safety.lookout import Lookout
+from mapspeak.navigation.safety.guard import Permit
+from mapspeak.navigation.safety.monitor import GoalMonitor
 
-__all__ = ["GuardedDrive", "Plan"]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Plan:
-    """How the robot would get to a goal.
-
-    Attributes:
-        check: What the map says of the goal.
-        legs: The poses to send it to, the goal last.
-        here: Where it is.
-    """
-
-    check: GoalCheck
-    legs: tuple[Pose, ...]
-    here: Pose
+__all__ = ["GuardedDrive"]
 
 
 @dataclass(slots=True, kw_only=True)
@@ -34,14 +18,16 @@ class GuardedDrive:
         goal_id: The id it is known by: that of its first leg.
         leg_id: What the robot calls the leg that it drives now.
         legs: Those after it.
+        permit: By which it was allowed.
+        goal_monitor: Watches its goal.
     """
 
     goal_id: str
     leg_id: str
     legs: list[Pose]
     leg: Pose
-    cleared: Clearance
-    lookout: Lookout
+    permit: Permit
+    goal_monitor: GoalMonitor
 
     @property
     def further_m(self) -> float:

@@ -11,21 +11,24 @@ import anyio
 
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Point, Pose
-from mapspeak.navigation.safety.deciding import find_speeds
-from mapspeak.navigation.safety.lookout import BRAKING_MPS2, REACTION_S, Lookout, find_entered
+from mapspeak.navigation.safety.deciding import Refused, find_speeds
+from mapspeak.navigation.safety.monitor import BRAKING_MPS2, REACTION_S, find_entered
+from mapspeak.navigation.safety.planning import Planner
 from mapspeak.navigation.safety.surveying import Surveyor
 from mapspeak.robot import Robot
 
-__all__ = ["HandDriving", "publishing_for", "stand_of"]
+__all__ = [
+    "HandDriving",
+    "is_zero_velocity",
+    "publishing_for",
+    "refuse_velocity",
+    "zero_velocity_of",
+]
 
 LEAST_S = 0.5
 """A single message is taken to move the robot for so long: drivers wait about that for the next."""
 STEP_M = 0.05
 MOST_STEPS = 400
-SURVEY_EVERY_S = 1.0
-"""Robot time after which map and hours are looked at again."""
-CULPRIT = "a published velocity"
-ADVICE = "Drive it away from there, or use navigate_to, which leads round."
 
 Message = Mapping[str, Any]
 
@@ -64,21 +67,24 @@ class Velocity:
 
 
 class HandDriving:
-    """Looks after a robot that is driven by published velocities.
+    """Knows the velocities that were published, and judges those that are to be.
 
     Args:
         robot: The robot itself.
+        planner: Surveys the map.
         surveyor: Knows what is closed now.
         radius_m: Of the robot, with the clearance it must keep.
     """
 
-    def __init__(self, robot: Robot, *, surveyor: Surveyor, radius_m: float) -> None:
+    def __init__(
+        self, robot: Robot, *, planner: Planner, surveyor: Surveyor, radius_m: float
+    ) -> None:
         self._robot = robot
+        self._planner = planner
         self._surveyor = surveyor
         self._radius_m = radius_m
-        self._surveyed_s = -math.inf
-        self._lookout: Lookout | None = None
-        self._stands: dict[str, Callable[[], object]] = {}
+        self._zeros: dict[str, Callable[[], object]] = {}
+        self._moving: set[str] = set()
 
     @property
     def knows_areas(self) -> bool:
@@ -87,10 +93,10 @@ class HandDriving:
 
     @property
     def is_under_way(self) -> bool:
-        """True from a velocity on until a stand was published on its topic."""
-        return bool(self._stands)
+        """True from a velocity on until zero velocity was published on its topic."""
+        return bool(self._moving)
 
-    async def find_objection(self, message: Message) -> str | None:
+    async def find_objection(self, message: Message) -> Refused | None:
         """Gives which closed area a velocity would take the robot into; None where into none.
 
         That nobody knows where the robot is counts as an objection.
@@ -99,56 +105,35 @@ class HandDriving:
             return None
         try:
             here = (await self._robot.fetch_pose()).pose
-            await self._survey()
+            await self._planner.survey_lately()
         except LinkError as error:
-            return (
+            return refuse_velocity(
                 "The policy closes areas, and where the robot is cannot be known now: "
                 f"{error.message}"
             )
         return self._find_objection(message, here)
 
-    def begin(self, topic: str, *, stand: Callable[[], object]) -> None:
-        """Notes that a velocity was let go; from now on the robot is watched.
+    def begin(self, topic: str, *, publish_zero: Callable[[], object]) -> None:
+        """Note that a velocity was let go.
 
         Args:
             topic: Where it was published.
-            stand: Publishes the stand there.
+            publish_zero: Publishes zero velocity there.
         """
-        if self._surveyor.has_rules:
-            self._stands[topic] = stand
+        self._zeros[topic] = publish_zero
+        self._moving.add(topic)
 
     def end(self, topic: str) -> None:
-        """Notes that a stand was published."""
-        self._stands.pop(topic, None)
-        if not self._stands:
-            self._lookout = None
-
-    async def find_fault(self) -> str | None:
-        """Gives why the robot must be stopped now; to be asked often while it is under way."""
-        revision = self._surveyor.latest
-        if not self._stands or revision is None or not revision.areas:
-            return None
-        here = (await self._robot.fetch_pose()).pose
-        if self._lookout is None:
-            self._lookout = Lookout(
-                goal=here, radius_m=self._radius_m, culprit=CULPRIT, advice=ADVICE
-            )
-        return self._lookout.judge_motion(revision, here, now_s=self._robot.now_s)
+        """Note that zero velocity was published."""
+        self._moving.discard(topic)
 
     def stand(self) -> None:
-        """Publishes a stand wherever a velocity was published."""
-        for topic, stand in list(self._stands.items()):
-            stand()
+        """Publish zero velocity on every topic on which a velocity was ever published."""
+        for topic, publish_zero in self._zeros.items():
+            publish_zero()
             self.end(topic)
 
-    async def _survey(self) -> None:
-        now_s = self._robot.now_s
-        if self._surveyor.latest is None or not 0 <= now_s - self._surveyed_s < SURVEY_EVERY_S:
-            grid = await self._robot.fetch_map()
-            await self._surveyor.survey(grid, radius_m=self._radius_m)
-            self._surveyed_s = now_s
-
-    def _find_objection(self, message: Message, here: Pose) -> str | None:
+    def _find_objection(self, message: Message, here: Pose) -> Refused | None:
         revision = self._surveyor.latest
         areas = () if revision is None else revision.areas
         lasts_s = max(LEAST_S, _UNTIL_S.get() - anyio.current_time()) + REACTION_S
@@ -164,20 +149,47 @@ class HandDriving:
         if entered is None:
             return None
         off_m = max(entered.distance_to(here.point) - self._radius_m, 0.0)
-        return (
+        return refuse_velocity(
             f"This velocity would take the robot into the {entered.title}, {off_m:.2f} m from its "
             f"edge, within {lasts_s:.1f} s."
         )
 
 
-def stand_of(message: Message) -> dict[str, Any]:
+def refuse_velocity(reason: str) -> Refused:
+    """Return the refusal of a velocity for where it leads."""
+    return Refused(
+        rule="keep_out",
+        reason=reason,
+        hint="Publish a velocity that leads away, or use navigate_to, which leads round.",
+    )
+
+
+def zero_velocity_of(message: Message) -> dict[str, Any]:
     """Gives a velocity message with every number at zero; header and texts stay."""
     return {name: value if name == "header" else _zero_of(value) for name, value in message.items()}
 
 
+def is_zero_velocity(message: Message) -> bool:
+    """Return True when a velocity says that the robot stands, with every field at zero.
+
+    A speed of zero beside an acceleration or a steering angle is none.
+    """
+    return any(True for _ in find_speeds(message)) and _is_zero(message)
+
+
+def _is_zero(value: object) -> bool:
+    match value:
+        case Mapping():
+            return all(name == "header" or _is_zero(each) for name, each in value.items())
+        case int() | float():
+            return value == 0
+        case _:
+            return False
+
+
 def _zero_of(value: Any) -> Any:  # noqa: ANN401 - ROS JSON
     if isinstance(value, Mapping):
-        return stand_of(value)
+        return zero_velocity_of(value)
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     return type(value)(0) if is_number else value
 

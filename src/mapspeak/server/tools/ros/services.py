@@ -91,6 +91,7 @@ class ServiceTools:
         Use ros_service first for its fields: the request is checked against its type.
         """
         name = full_name(service)
+        self._commands.check_name(Call(service=name, type="", arguments=arguments or {}))
         type_name = await self._inquiry.fetch_service_type(name)
         said = await self._inquiry.said(type_name, kind="srv")
         self._commands.check_name(Call(service=name, type=said, arguments=arguments or {}))

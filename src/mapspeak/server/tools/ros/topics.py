@@ -183,8 +183,10 @@ class TopicTools:
         velocity needs duration_s, goes out alone and ends with a stand; stop_robot ends it too.
         """
         name = full_name(topic)
-        type_name = await self._type_to_publish(name, type)
-        self._commands.check_name(Publish(topic=name, type=type_name, message=message))
+        known = await self._inquiry.find_topic_type(name)
+        command = Publish(topic=name, type=known or type or "", message=message)
+        self._commands.check_name(command)
+        type_name = await self._type_to_publish(name, known, type)
         described = await self._inquiry.describe(await self._inquiry.said(type_name))
         checked = check_message(described.book, type_name, message)
         is_moving = type_name in VELOCITIES and stand_of(checked) != checked
@@ -212,9 +214,8 @@ class TopicTools:
             return f"Who heard it is not known: {error.message}"
         return f"Heard by: {hearers.say()}."
 
-    async def _type_to_publish(self, topic: str, given: str | None) -> str:
-        """Gives the topic's own type; the one that was given only where there is no topic yet."""
-        known = await self._inquiry.find_topic_type(topic)
+    async def _type_to_publish(self, topic: str, known: str | None, given: str | None) -> str:
+        """Return the topic's own type; the one that was given only where there is no topic yet."""
         if known is None and given is None:
             return await self._inquiry.fetch_topic_type(topic)
         if known is None or given is None:

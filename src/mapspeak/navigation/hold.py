@@ -69,25 +69,34 @@ class Hold:
         self._do(lambda: self.file.unlink(missing_ok=True))
         return was_held
 
-    def answer(self, robot: str, *, held_by: str) -> None:
-        """Tells that a robot was commanded to stand because of this hold; never raises.
+    def answer(self, robot: str, *, held_by: str, failure: str = "") -> None:
+        """Tell what became of a robot because of this hold; never raises.
 
         A server that cannot answer has stopped its robot all the same.
+
+        Args:
+            robot: What the operator calls it.
+            held_by: What `read` gave.
+            failure: Why it could not be stopped; empty when it was.
         """
         path = self.folder / ANSWERS / _file_of(robot)
-        try:
-            self._write(path, json.dumps({"robot": robot, "held_by": held_by}))
-        except OSError:
-            return
+        told = {"robot": robot, "held_by": held_by, "failure": failure}
+        with suppress(OSError):
+            self._write(path, json.dumps(told))
 
     def answers(self) -> tuple[str, ...]:
-        """Gives the robots that were commanded to stand because of the present hold."""
+        """Return the robots that were stopped because of the present hold."""
+        return tuple(robot for robot, failure in self._told() if not failure)
+
+    def failures(self) -> tuple[tuple[str, str], ...]:
+        """Return the robots that could not be stopped for the present hold, each with why."""
+        return tuple((robot, failure) for robot, failure in self._told() if failure)
+
+    def _told(self) -> Iterator[tuple[str, str]]:
         held_by = self.read()
-        return tuple(
-            str(told.get("robot"))
-            for _, told in _read_all(self.folder / ANSWERS)
-            if told.get("held_by") == held_by
-        )
+        for path, told in _read_all(self.folder / ANSWERS):
+            if told.get("held_by") == held_by:
+                yield str(told.get("robot", path.stem)), str(told.get("failure") or "")
 
     def join(self, robot: str) -> None:
         """Tells that a robot is served from here, so that a stop knows whose answer it awaits."""

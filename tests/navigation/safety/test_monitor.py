@@ -1,4 +1,5 @@
 import math
+from collections.abc import Callable
 
 import pytest
 
@@ -7,11 +8,16 @@ from guarding import corners
 from mapspeak.geometry import Point, Pose
 from mapspeak.navigation.closures import MARGIN_M, ClosedArea
 from mapspeak.navigation.revision import MapRevision
-from mapspeak.navigation.safety.lookout import Lookout
+from mapspeak.navigation.safety.monitor import GoalMonitor, KeepOutMonitor, Mover
 
 RADIUS_M = 0.3
 PIT = ClosedArea(name="pit", outline=corners((5.0, 0.0), (6.0, 2.0)))
 FLOOR = MapRevision(grid_from_text("....\n....", resolution_m=3.0), radius_m=RADIUS_M, areas=(PIT,))
+
+
+def watching() -> Callable[..., str | None]:
+    monitor = KeepOutMonitor(radius_m=RADIUS_M)
+    return lambda here, *, now_s: monitor.judge(FLOOR, here, now_s=now_s, mover=Mover.OTHERS)
 
 
 def judge(
@@ -24,12 +30,12 @@ def judge(
     every_s: float = 0.1,
 ) -> Point | None:
     """Gives where a robot that drives on is told to stop; None where it is not."""
-    lookout = Lookout(goal=Pose(11.0, 5.0), radius_m=RADIUS_M)
+    watch = watching()
     x, y = start.x, start.y
     for tick in range(round(seconds / 0.01)):
         yaw_rad = heading_rad + turn_radps * tick * 0.01
         is_look = tick % round(every_s / 0.01) == 0
-        if is_look and lookout.judge_motion(FLOOR, Pose(x, y, yaw_rad), now_s=tick * 0.01):
+        if is_look and watch(Pose(x, y, yaw_rad), now_s=tick * 0.01):
             return Point(x, y)
         x += 0.01 * speed_mps * math.cos(yaw_rad)
         y += 0.01 * speed_mps * math.sin(yaw_rad)
@@ -50,11 +56,11 @@ def test_a_robot_is_stopped_early_enough_to_brake_and_not_much_earlier(
 
 
 def test_a_robot_that_comes_to_a_stand_where_goals_may_be_is_let_go() -> None:
-    lookout = Lookout(goal=Pose(11.0, 5.0), radius_m=RADIUS_M)
+    watch = watching()
     left_m = 2.0
     for tick in range(200):
         here = Pose(5.0 - RADIUS_M - MARGIN_M - left_m, 1.0, 0.0)
-        assert lookout.judge_motion(FLOOR, here, now_s=tick / 10) is None
+        assert watch(here, now_s=tick / 10) is None
         left_m -= min(0.1 * min(math.sqrt(left_m), 0.8), left_m)
 
 
@@ -79,17 +85,15 @@ def test_a_robot_that_turns_towards_an_area_beside_it_is_stopped_in_time() -> No
 
 @pytest.mark.parametrize("turned_rad", [-3.0, -0.4, 0.4, 3.0])
 def test_a_robot_that_turned_on_the_spot_is_expected_to_go_straight_on(turned_rad: float) -> None:
-    lookout = Lookout(goal=Pose(11.0, 5.0), radius_m=RADIUS_M)
+    watch = watching()
     for pose, now_s in ((Pose(5.5, 2.6, turned_rad), 0.0), (Pose(5.6, 2.6, 0.0), 0.1)):
-        assert lookout.judge_motion(FLOOR, pose, now_s=now_s) is None
+        assert watch(pose, now_s=now_s) is None
 
 
 def test_a_robot_that_turns_towards_an_area_as_it_backs_is_stopped_in_time() -> None:
-    lookout = Lookout(goal=Pose(11.0, 5.0), radius_m=RADIUS_M)
+    watch = watching()
     backwards = (Pose(6.0, 2.6, 0.0), Pose(5.9, 2.595, 0.1), Pose(5.801, 2.58, 0.2))
-    said = [
-        lookout.judge_motion(FLOOR, pose, now_s=tick / 10) for tick, pose in enumerate(backwards)
-    ]
+    said = [watch(pose, now_s=tick / 10) for tick, pose in enumerate(backwards)]
     assert said[-1] is not None
 
 
@@ -103,10 +107,10 @@ def test_a_robot_that_leaves_an_area_is_let_go() -> None:
 
 
 def test_a_robot_that_has_left_an_area_may_not_come_back_to_where_it_began() -> None:
-    lookout = Lookout(goal=Pose(11.0, 5.0), radius_m=RADIUS_M)
+    watch = watching()
     for tick, x in enumerate((4.8, 4.7, 4.6, 4.5)):
-        assert lookout.judge_motion(FLOOR, Pose(x, 1.0, math.pi), now_s=tick / 10) is None
-    assert lookout.judge_motion(FLOOR, Pose(4.6, 1.0, math.pi), now_s=0.4) is not None
+        assert watch(Pose(x, 1.0, math.pi), now_s=tick / 10) is None
+    assert watch(Pose(4.6, 1.0, math.pi), now_s=0.4) is not None
 
 
 def test_a_robot_that_goes_deeper_into_an_area_is_stopped() -> None:
@@ -116,10 +120,10 @@ def test_a_robot_that_goes_deeper_into_an_area_is_stopped() -> None:
 
 @pytest.mark.parametrize("x", [4.6, 4.7, 4.75])
 def test_a_robot_that_stands_beside_an_area_may_turn_and_its_pose_may_waver(x: float) -> None:
-    lookout = Lookout(goal=Pose(11.0, 5.0), radius_m=RADIUS_M)
+    watch = watching()
     for tick in range(40):
         here = Pose(x + 0.004 * (-1) ** tick, 1.0, 0.1 * tick)
-        assert lookout.judge_motion(FLOOR, here, now_s=tick / 10) is None
+        assert watch(here, now_s=tick / 10) is None
 
 
 @pytest.mark.parametrize("x", [4.6, 4.7, 4.75])
@@ -128,13 +132,31 @@ def test_a_robot_that_stands_beside_an_area_may_not_go_nearer(x: float) -> None:
 
 
 def test_a_robot_in_an_area_that_was_not_seen_for_long_is_stopped() -> None:
-    lookout = Lookout(goal=Pose(11.0, 5.0), radius_m=RADIUS_M)
-    assert lookout.judge_motion(FLOOR, Pose(4.0, 1.0, 0.0), now_s=0.0) is None
-    assert lookout.judge_motion(FLOOR, Pose(4.9, 1.0, 0.0), now_s=9.0) is not None
+    watch = watching()
+    assert watch(Pose(4.0, 1.0, 0.0), now_s=0.0) is None
+    assert watch(Pose(4.9, 1.0, 0.0), now_s=9.0) is not None
 
 
-def test_a_clock_that_jumps_back_still_asks_for_the_map() -> None:
-    lookout = Lookout(goal=Pose(1.0, 1.0), radius_m=RADIUS_M)
-    assert lookout.is_map_due(1000.0)
-    assert not lookout.is_map_due(1000.5)
-    assert lookout.is_map_due(3.0)
+def test_a_pose_that_localisation_corrects_is_no_speed() -> None:
+    watch = watching()
+    assert watch(Pose(1.0, 1.0, 0.0), now_s=0.0) is None
+    assert watch(Pose(2.0, 1.0, 0.0), now_s=0.1) is None
+    assert watch(Pose(4.9, 1.0, 0.0), now_s=0.2) is not None
+
+
+@pytest.mark.parametrize("mover", Mover)
+def test_who_is_told_of_a_stop_is_told_what_drove_the_robot(mover: Mover) -> None:
+    monitor = KeepOutMonitor(radius_m=RADIUS_M)
+    monitor.begin_at(Pose(4.6, 1.0), now_s=0.0)
+    said = monitor.judge(FLOOR, Pose(4.68, 1.0), now_s=0.2, mover=mover)
+    assert said is not None
+    assert f"before the keep-out area 'pit': {mover} was about to drive into it. " in said
+
+
+def test_a_goal_that_closes_or_fills_up_is_no_goal_any_more() -> None:
+    assert "now lies in" in str(
+        GoalMonitor(goal=Pose(5.5, 1.0), radius_m=RADIUS_M).judge(FLOOR, now_s=0.0)
+    )
+    off = GoalMonitor(goal=Pose(-3.0, 1.0), radius_m=RADIUS_M)
+    assert off.judge(FLOOR, now_s=0.0) is None
+    assert "is off the map now" in str(off.judge(FLOOR, now_s=6.0))

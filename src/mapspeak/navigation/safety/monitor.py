@@ -1,16 +1,23 @@
-"""What is looked out for while a robot drives: closed areas ahead, and a goal that went bad."""
+"""What is watched while a robot moves: closed areas ahead, and a goal that went bad."""
 
 import math
 from collections.abc import Sequence
+from enum import StrEnum
 
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.navigation.closures import ClosedArea
 from mapspeak.navigation.revision import MapRevision
 
-__all__ = ["BRAKING_MPS2", "KEEP_M", "REACTION_S", "Lookout", "find_entered"]
+__all__ = [
+    "BRAKING_MPS2",
+    "KEEP_M",
+    "REACTION_S",
+    "GoalMonitor",
+    "KeepOutMonitor",
+    "Mover",
+    "find_entered",
+]
 
-MAP_EVERY_S = 1.0
-"""Robot time between two looks at the map; so late may a closing hour be noticed."""
 OCCUPIED_FOR_S = 5.0
 """A person who walks over the goal does not spoil it."""
 REACTION_S = 0.2
@@ -23,53 +30,46 @@ WAVER_M = 0.01
 LEAST_STEP_S = 0.05
 LOST_TRACK_S = 2.0
 """What lies longer ago says nothing about how fast the robot drives now."""
+FASTEST_MPS = 5.0
+"""What seems to go faster was not driven: localisation has corrected itself."""
 N_STEPS = 8
 """At so many places of the way to a stand is looked how near the areas are."""
 
 
-class Lookout:
-    """Watches one drive; it only judges what it is told.
+class Mover(StrEnum):
+    """What moves a robot, in words."""
+
+    NAVIGATION = "its own navigation"
+    VELOCITY = "a published velocity"
+    OTHERS = "something that mapspeak did not start"
+
+
+ADVICE = {
+    Mover.NAVIGATION: "Lead it round by goals on the way.",
+    Mover.VELOCITY: "Drive it away from there, or use navigate_to, which leads round.",
+    Mover.OTHERS: "Find out what drives it: another client's goal, or velocities of its own.",
+}
+
+
+class GoalMonitor:
+    """Watches whether a drive's goal still is one; it only judges what it is told.
 
     Args:
         goal: Where the drive leads.
         radius_m: Of the robot.
-        culprit: What drives it, in words.
-        advice: What to do instead when it was stopped.
     """
 
-    def __init__(
-        self,
-        *,
-        goal: Pose,
-        radius_m: float,
-        culprit: str = "its own navigation",
-        advice: str = "Lead it round by goals on the way.",
-    ) -> None:
+    def __init__(self, *, goal: Pose, radius_m: float) -> None:
         self._goal = goal
-        self._culprit = culprit
-        self._advice = advice
         self._radius_m = radius_m
-        self._next_map_s = 0.0
         self._occupied_since_s: float | None = None
-        self._before: tuple[Pose, float] | None = None
-        self._least_m: dict[ClosedArea, float] = {}
 
-    def begin_at(self, here: Pose, *, now_s: float) -> None:
-        """Notes where the robot stands before it is sent off."""
-        self._before = (here, now_s)
-
-    def is_map_due(self, now_s: float) -> bool:
-        """True when it is time to look at the map again."""
-        if now_s < self._next_map_s <= now_s + MAP_EVERY_S:
-            return False
-        self._next_map_s = now_s + MAP_EVERY_S
-        return True
-
-    def judge_goal(self, revision: MapRevision, *, now_s: float) -> str | None:
-        """Gives why the goal is no longer a goal; None while it is one."""
+    def judge(self, revision: MapRevision, *, now_s: float) -> str | None:
+        """Return why the goal is no longer a goal; None while it is one."""
         here = self._goal.point
         # The way to the goal was checked; only what closes or fills up since then matters here.
-        area = self._closest(revision, here)
+        near = (area for area in revision.areas if area.distance_to(here) < self._radius_m)
+        area = next(near, None)
         if area is not None:
             return f"The goal now lies in the {area.title}; the robot was stopped."
         cell = revision.grid.cell_at(here)
@@ -83,8 +83,26 @@ class Lookout:
         what = "is off the map now" if is_off else "has an obstacle on it now"
         return f"The map has changed: the goal {what}; the robot was stopped."
 
-    def judge_motion(self, revision: MapRevision, here: Pose, *, now_s: float) -> str | None:
-        """Gives which closed area the robot is about to enter; None where it enters none.
+
+class KeepOutMonitor:
+    """Watches a robot, whatever moves it, for the closed areas ahead; judges what it is told.
+
+    Args:
+        radius_m: Of the robot.
+    """
+
+    def __init__(self, *, radius_m: float) -> None:
+        self._radius_m = radius_m
+        self._before: tuple[Pose, float] | None = None
+        self._least_m: dict[ClosedArea, float] = {}
+
+    def begin_at(self, here: Pose, *, now_s: float) -> None:
+        """Begin anew where the robot stands: what it came too near to before is forgotten."""
+        self._before = (here, now_s)
+        self._least_m = {}
+
+    def judge(self, revision: MapRevision, here: Pose, *, now_s: float, mover: Mover) -> str | None:
+        """Return which closed area the robot is about to enter; None when it enters none.
 
         One that stands too near may drive along the area and away, and no nearer.
         """
@@ -95,22 +113,18 @@ class Lookout:
                 edge_m = max(left_m - self._radius_m, 0.0)
                 return (
                     f"The robot was stopped {edge_m:.2f} m before the {area.title}: "
-                    f"{self._culprit} was about to drive into it. {self._advice}"
+                    f"{mover} was about to drive into it. {ADVICE[mover]}"
                 )
         return None
 
     def _find_least(self, area: ClosedArea, left_m: float) -> float:
-        """Gives how near to an area the robot's centre may come: as near as it is, if too near."""
+        """Return how near to an area the robot's centre may come: as near as it is, if too near."""
         least_m = min(self._radius_m + KEEP_M, left_m - WAVER_M)
         self._least_m[area] = max(least_m, self._least_m.get(area, least_m))
         return self._least_m[area]
 
-    def _closest(self, revision: MapRevision, point: Point) -> ClosedArea | None:
-        near = (area for area in revision.areas if area.distance_to(point) < self._radius_m)
-        return next(near, None)
-
     def _find_way_to_stand(self, here: Pose, now_s: float) -> tuple[Point, ...]:
-        """Gives the way that the robot would still go if the next look told it to stop."""
+        """Return the way that the robot would still go if the next look told it to stop."""
         before, self._before = self._before, (here, now_s)
         if before is None:
             return ()
@@ -123,6 +137,8 @@ class Lookout:
         if passed_s > LOST_TRACK_S or moved_m <= WAVER_M:
             return ()
         speed_mps = moved_m / passed_s
+        if speed_mps > FASTEST_MPS:
+            return ()
         # The next look is as far away as the last one was.
         further_m = speed_mps * (passed_s + REACTION_S + speed_mps / (2 * BRAKING_MPS2))
         turned_rad = _find_turn(then, here)
