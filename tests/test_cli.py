@@ -30,7 +30,6 @@ def run_main(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
     ("arguments", "says"),
     [
         (["serve", "--robot", "rover"], "sim:WORLD"),
-        (["serve", "--robot", "ws://127.0.0.1:1"], "rosbridge"),
         (["serve", "--robot", "ws://127.0.0.1:1", "--detector"], "--robot sim"),
         (["serve", "--robot-file", "robot.yaml"], "--robot ws://"),
         (["doctor", "--robot", "ws://127.0.0.1:1"], "ros2 launch"),

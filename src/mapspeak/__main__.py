@@ -1,5 +1,19 @@
-"""`python -m mapspeak` is `mapspeak`."""
+"""Where mapspeak starts, as `mapspeak` and as `python -m mapspeak`."""
 
-from mapspeak.cli import main
+import os
 
-main()
+from mapspeak.installation import prefer_own_packages
+
+__all__ = ["main"]
+
+
+def main() -> None:
+    """Run the command line with the packages of its own environment."""
+    prefer_own_packages(os.environ.get("PYTHONPATH", ""))
+    from mapspeak.cli import main as run  # noqa: PLC0415 - only now its packages are the right ones
+
+    run()
+
+
+if __name__ == "__main__":
+    main()

@@ -339,12 +339,16 @@ class Session:
             tasks.start_soon(self.warm_memory)
 
     async def _again_and_again(self, look: Callable[[], Awaitable[None]], every_s: float) -> None:
+        told = ""
         while True:
             await anyio.sleep(every_s)
             try:
                 await look()
+                told = ""
             except MapspeakError as error:
-                logger.warning("While watching the robot: %s", error)
+                if str(error) != told:
+                    logger.warning("While watching the robot: %s", error)
+                told = str(error)
 
     async def _watch(self) -> None:
         if self._lease.is_over and self.drives.is_busy:

@@ -12,9 +12,10 @@ import pytest
 from drawing import grid_from_text
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
+from mapspeak.links.arrival import Arrival
 from mapspeak.links.ros import RosRobot
 from mapspeak.links.ros2 import open_ros2_connection, open_ros2_robot
-from mapspeak.robot import GoalState, GoalStatus
+from mapspeak.robot import GoalState, GoalStatus, Robot
 from mapspeak.ros import NodeLinks, RosConnection, RosGraph
 from mapspeak.ros.messages import Dialect, FramedPose, write_pose_stamped
 from ros2.conftest import START, TWO_ROOMS
@@ -44,7 +45,7 @@ async def connected() -> AsyncGenerator[RosConnection]:
             yield connection
 
 
-async def until_over(robot: RosRobot, goal_id: str) -> GoalStatus:
+async def until_over(robot: Robot, goal_id: str) -> GoalStatus:
     while not (status := await robot.fetch_goal_status(goal_id)).state.is_final:
         await robot.sleep(0.05)
     return status
@@ -107,11 +108,21 @@ async def test_a_renewed_subscription_hears_what_is_latched_again(robot: RobotPr
 
 
 async def test_a_robot_that_is_started_later_is_found(domain: dict[str, str]) -> None:
-    async with linked() as link:
+    arrival = Arrival(open_ros2_robot)
+    link = arrival.robot
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(arrival.keep_looking)
         with pytest.raises(LinkError, match="No other node of ROS 2"):
             await link.fetch_map()
         with open_robot_process(TWO_ROOMS, pose=START, speed_mps=2.0, environment=domain):
-            assert (await link.fetch_map()).n_cols == 23
+
+            async def has_come() -> bool:
+                try:
+                    return (await link.fetch_map()).n_cols == 23
+                except LinkError:
+                    return False
+
+            await eventually(has_come)
 
             async def is_localised() -> bool:
                 try:
@@ -122,6 +133,7 @@ async def test_a_robot_that_is_started_later_is_found(domain: dict[str, str]) ->
             await eventually(is_localised)
             goal_id = await link.send_goal(NEXT_ROOM)
             assert (await until_over(link, goal_id)).state is GoalState.ARRIVED
+        tasks.cancel_scope.cancel()
 
 
 # --- goals

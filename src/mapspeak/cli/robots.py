@@ -1,23 +1,30 @@
 """The robot that a command is about: simulated, behind a rosbridge, or in a ROS 2 domain."""
 
 import os
-from collections.abc import AsyncGenerator, Mapping
-from contextlib import asynccontextmanager
+from collections.abc import AsyncGenerator, Callable, Mapping
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import anyio
+
 from mapspeak.cli.options import DEFAULT_WORLD
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Pose
+from mapspeak.installation import say_install
 
 if TYPE_CHECKING:
     from mapspeak.links.dds import DdsNetwork
+    from mapspeak.links.ros import RobotOverrides, RosRobot
     from mapspeak.robot import Robot
     from mapspeak.ros import RosConnection
 
-__all__ = ["RobotChoice", "find_connection", "open_robot"]
+    OpenLink = Callable[[], AbstractAsyncContextManager[RosRobot]]
+
+__all__ = ["RobotChoice", "ServedRobot", "open_robot", "open_served_robot"]
 
 ROBOT_TOKEN_VARIABLE = "MAPSPEAK_ROBOT_TOKEN"  # noqa: S105 - the variable's name, not a token
 ROSBRIDGE_SCHEMES = ("ws://", "wss://")
@@ -67,6 +74,21 @@ class RobotChoice:
         return RobotAddress(url=self.robot).shown
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServedRobot:
+    """A robot for a server, which may not be there yet.
+
+    Attributes:
+        robot: The robot.
+        ros: The connection of one that speaks ROS.
+        map_name: Which map or building it drives in; empty where nobody says.
+    """
+
+    robot: "Robot"
+    ros: "RosConnection | None"
+    map_name: str
+
+
 @asynccontextmanager
 async def open_robot(choice: RobotChoice) -> AsyncGenerator["Robot"]:
     """Offers the chosen robot while the context lasts.
@@ -75,16 +97,49 @@ async def open_robot(choice: RobotChoice) -> AsyncGenerator["Robot"]:
         ConfigError: There is no such link, or something was asked of it that it has not.
         LinkError: The robot cannot be reached.
     """
-    kind, _, world = choice.robot.partition(":")
-    if choice.robot.startswith(ROSBRIDGE_SCHEMES):
-        opened = _open_rosbridge(choice)
-    elif kind == "sim":
-        opened = _open_simulated(choice, world or DEFAULT_WORLD)
-    elif kind == "ros2":
-        opened = _open_ros2(choice, world)
-    elif kind == "dds":
-        opened = _open_dds(choice, world)
+    if _is_simulated(choice):
+        async with _open_simulated(choice) as simulated:
+            yield simulated
     else:
+        open_link, _ = choose_link(choice)
+        async with open_link() as robot:
+            yield robot
+
+
+@asynccontextmanager
+async def open_served_robot(choice: RobotChoice) -> AsyncGenerator[ServedRobot]:
+    """Offers the chosen robot at once while the context lasts; one that speaks ROS may come later.
+
+    Raises:
+        ConfigError: As with `open_robot`.
+    """
+    if _is_simulated(choice):
+        async with _open_simulated(choice) as robot:
+            yield ServedRobot(robot=robot, ros=None, map_name=robot.description.map_name)
+        return
+    from mapspeak.links.arrival import Arrival  # noqa: PLC0415 - heavy; help must be quick
+
+    open_link, overrides = choose_link(choice)
+    arrival = Arrival(open_link)
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(arrival.keep_looking)
+        yield ServedRobot(
+            robot=arrival.robot, ros=arrival.connection, map_name=overrides.map_name or ""
+        )
+        tasks.cancel_scope.cancel()
+
+
+def choose_link(choice: RobotChoice) -> "tuple[OpenLink, RobotOverrides]":
+    """Return what opens the link to a robot that speaks ROS, and what robot.yaml says.
+
+    Raises:
+        ConfigError: There is no such link, or something was asked of it that it has not.
+    """
+    from mapspeak.links.ros import RobotOverrides, load_robot_file  # noqa: PLC0415 - heavy
+
+    kind, _, domain = choice.robot.partition(":")
+    is_rosbridge = choice.robot.startswith(ROSBRIDGE_SCHEMES)
+    if not is_rosbridge and kind not in ("ros2", "dds"):
         from mapspeak.links.rosbridge import quote_address  # noqa: PLC0415 - heavy
 
         raise ConfigError(
@@ -92,71 +147,64 @@ async def open_robot(choice: RobotChoice) -> AsyncGenerator["Robot"]:
             hint="Use sim, sim:WORLD, sim:PATH to a world file, ws://HOST:9090 for a rosbridge, or "
             "for ROS 2 without one ros2 (as a node of it) or dds (without ROS here).",
         )
-    async with opened as robot:
-        yield robot
-
-
-@asynccontextmanager
-async def _open_rosbridge(choice: RobotChoice) -> AsyncGenerator["Robot"]:
-    from mapspeak.links.ros import RobotOverrides, load_robot_file  # noqa: PLC0415 - heavy
-    from mapspeak.links.rosbridge import RobotAddress, open_rosbridge_robot  # noqa: PLC0415
-
     _refuse_simulators_options(choice)
+    if not is_rosbridge and choice.ca_file is not None:
+        raise ConfigError("--ca-file is for wss://.", hint="Leave it away: DDS has no such thing.")
+    overrides = load_robot_file(choice.robot_file) if choice.robot_file else RobotOverrides()
+    if is_rosbridge:
+        return _choose_rosbridge(choice, overrides), overrides
+    # Where ROS is asked for, what is there is taken: rclpy, else DDS without ROS.
+    if kind == "ros2" and (find_spec("rclpy") is not None or find_spec("cyclonedds") is None):
+        return _choose_ros2(domain, overrides), overrides
+    return _choose_dds(domain, overrides), overrides
+
+
+def _choose_rosbridge(choice: RobotChoice, overrides: "RobotOverrides") -> "OpenLink":
+    from mapspeak.links.rosbridge import (  # noqa: PLC0415 - heavy; help must be quick
+        RobotAddress,
+        open_rosbridge_robot,
+    )
+
     token = os.environ.get(ROBOT_TOKEN_VARIABLE)
     address = RobotAddress(
         url=choice.robot,
         headers={"Authorization": f"Bearer {token}"} if token else {},
         ca_file=choice.ca_file,
     )
-    overrides = load_robot_file(choice.robot_file) if choice.robot_file else RobotOverrides()
-    async with open_rosbridge_robot(address, overrides=overrides) as robot:
-        yield robot
+    return partial(open_rosbridge_robot, address, overrides=overrides)
 
 
-@asynccontextmanager
-async def _open_ros2(choice: RobotChoice, domain: str) -> AsyncGenerator["Robot"]:
-    """Takes what is there: rclpy, else DDS without ROS."""
-    if find_spec("rclpy") is None and find_spec("cyclonedds") is not None:
-        async with _open_dds(choice, domain) as robot:
-            yield robot
-        return
-    _refuse_simulators_options(choice)
-    if choice.ca_file is not None:
-        raise ConfigError("--ca-file is for wss://.", hint="Leave it away: DDS has no such thing.")
-    if domain and not (domain.isascii() and domain.isdigit() and int(domain) <= LARGEST_DOMAIN):
-        raise ConfigError(
-            f"{domain[:40]!r} is no ROS domain.",
-            hint=f"Use ros2, or ros2:DOMAIN with a number from 0 to {LARGEST_DOMAIN}.",
-        )
-    from mapspeak.links.ros import RobotOverrides, load_robot_file  # noqa: PLC0415 - heavy
-    from mapspeak.links.ros2 import open_ros2_robot  # noqa: PLC0415
+def _choose_ros2(domain: str, overrides: "RobotOverrides") -> "OpenLink":
+    from mapspeak.links.ros2 import open_ros2_robot  # noqa: PLC0415 - heavy; help must be quick
 
-    overrides = load_robot_file(choice.robot_file) if choice.robot_file else RobotOverrides()
-    async with open_ros2_robot(
-        domain_id=int(domain) if domain else None,
+    return partial(
+        open_ros2_robot,
+        domain_id=_read_domain(domain, "ros2") if domain else overrides.ros.domain_id,
         distro=os.environ.get("ROS_DISTRO", ""),
+        variables=overrides.ros.variables,
         overrides=overrides,
-    ) as robot:
-        yield robot
+    )
 
 
-@asynccontextmanager
-async def _open_dds(choice: RobotChoice, domain: str) -> AsyncGenerator["Robot"]:
-    _refuse_simulators_options(choice)
-    if choice.ca_file is not None:
-        raise ConfigError("--ca-file is for wss://.", hint="Leave it away: DDS has no such thing.")
+def _choose_dds(domain: str, overrides: "RobotOverrides") -> "OpenLink":
     if find_spec("cyclonedds") is None:
         raise ConfigError(
             "--robot dds needs a package that is not installed.",
-            hint='Install it: pip install "mapspeak[dds]". It is there for Python 3.11 to 3.13.',
+            hint=f"Install it, for Python 3.11 to 3.13: {say_install('dds')}",
         )
     from mapspeak.links.dds import open_dds_robot  # noqa: PLC0415 - optional, and heavy
-    from mapspeak.links.ros import RobotOverrides, load_robot_file  # noqa: PLC0415
 
-    network = read_network(domain, os.environ)
-    overrides = load_robot_file(choice.robot_file) if choice.robot_file else RobotOverrides()
-    async with open_dds_robot(network, overrides=overrides) as robot:
-        yield robot
+    network = read_network(domain, {**os.environ, **overrides.ros.variables})
+    return partial(open_dds_robot, network, overrides=overrides)
+
+
+def _read_domain(said: str, kind: str) -> int:
+    if not (said.isascii() and said.isdigit() and int(said) <= LARGEST_DOMAIN):
+        raise ConfigError(
+            f"{said[:40]!r} is no ROS domain.",
+            hint=f"Use {kind}, or {kind}:DOMAIN with a number from 0 to {LARGEST_DOMAIN}.",
+        )
+    return int(said)
 
 
 def read_network(domain: str, environment: Mapping[str, str]) -> "DdsNetwork":
@@ -171,18 +219,13 @@ def read_network(domain: str, environment: Mapping[str, str]) -> "DdsNetwork":
     """
     from mapspeak.links.dds import DdsNetwork  # noqa: PLC0415 - optional, and heavy
 
-    said = domain or environment.get("ROS_DOMAIN_ID") or "0"
-    if not (said.isascii() and said.isdigit() and int(said) <= LARGEST_DOMAIN):
-        raise ConfigError(
-            f"{said[:40]!r} is no ROS domain.",
-            hint=f"Use dds, or dds:DOMAIN with a number from 0 to {LARGEST_DOMAIN}.",
-        )
     peers = environment.get("ROS_STATIC_PEERS", "")
     return DdsNetwork(
-        domain_id=int(said),
+        domain_id=_read_domain(domain or environment.get("ROS_DOMAIN_ID") or "0", "dds"),
         is_local=environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() == "LOCALHOST"
         or environment.get("ROS_LOCALHOST_ONLY") == "1",
         peers=tuple(peer.strip() for peer in peers.split(";") if peer.strip()),
+        cyclonedds_uri=environment.get("CYCLONEDDS_URI", ""),
     )
 
 
@@ -196,8 +239,12 @@ def _refuse_simulators_options(choice: RobotChoice) -> None:
         )
 
 
+def _is_simulated(choice: RobotChoice) -> bool:
+    return choice.robot.partition(":")[0] == "sim"
+
+
 @asynccontextmanager
-async def _open_simulated(choice: RobotChoice, world: str) -> AsyncGenerator["Robot"]:
+async def _open_simulated(choice: RobotChoice) -> AsyncGenerator["Robot"]:
     from mapspeak.links.simulated import Clock, open_simulated_robot  # noqa: PLC0415
     from mapspeak.simulator import Simulation, StateLog, load_world  # noqa: PLC0415
     from mapspeak.spatial.mapfiles import MapMode, load_map, write_map  # noqa: PLC0415
@@ -208,7 +255,7 @@ async def _open_simulated(choice: RobotChoice, world: str) -> AsyncGenerator["Ro
             hint="Leave them away, or name the robot with --robot ws://HOST:9090 or dds.",
         )
     simulation = Simulation(
-        load_world(world),
+        load_world(choice.robot.partition(":")[2] or DEFAULT_WORLD),
         seed=choice.seed,
         known=load_map(choice.known_map).grid if choice.known_map else None,
         start=choice.start,
@@ -227,12 +274,3 @@ async def _open_simulated(choice: RobotChoice, world: str) -> AsyncGenerator["Ro
             log.close()
         if choice.final_map is not None:
             write_map(simulation.map(), choice.final_map, mode=MapMode.RAW)
-
-
-def find_connection(robot: "Robot", choice: RobotChoice) -> "RosConnection | None":
-    """Gives the connection of a robot that speaks ROS; None for the simulated one."""
-    if choice.robot.partition(":")[0] == "sim":
-        return None
-    from mapspeak.links.ros import RosRobot  # noqa: PLC0415 - heavy
-
-    return robot.connection if isinstance(robot, RosRobot) else None

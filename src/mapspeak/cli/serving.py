@@ -18,7 +18,7 @@ from mapspeak.cli.fleet import file_for, name_robots, split_files
 from mapspeak.cli.guarding import GUARD_OPTIONS, GuardChoice, build_guard, data_folder
 from mapspeak.cli.memory.files import rename_memory
 from mapspeak.cli.options import DEFAULT_WORLD, FILE, ROBOT_HELP, ROBOT_OPTIONS, add_options
-from mapspeak.cli.robots import RobotChoice, find_connection, open_robot
+from mapspeak.cli.robots import RobotChoice, open_served_robot
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Pose
 
@@ -325,15 +325,13 @@ async def _open_session(
     from mapspeak.session import Session  # noqa: PLC0415
 
     guard = build_guard(start.guard, robot=name or start.choice.shown)
-    robot = await links.enter_async_context(open_robot(start.choice))
-    map_name = robot.description.map_name
-    path = start.semantic_map or usual_semantic_map(map_name, start.choice.shown)
-    rename_memory(usual_semantic_map(map_name, start.choice.robot), path)
+    served = await links.enter_async_context(open_served_robot(start.choice))
+    path = start.semantic_map or usual_semantic_map(served.map_name, start.choice.shown)
+    rename_memory(usual_semantic_map(served.map_name, start.choice.robot), path)
     # A client on stdio cannot vanish unnoticed: its end of the pipe closes.
     lease_s = math.inf if options.http is None else options.lease_s
-    memory = SemanticMapStore(path, map_id=map_name or None)
-    ros = find_connection(robot, start.choice)
-    return Session(robot, memory, lease_s=lease_s, guard=guard, ros=ros)
+    memory = SemanticMapStore(path, map_id=served.map_name or None)
+    return Session(served.robot, memory, lease_s=lease_s, guard=guard, ros=served.ros)
 
 
 def _build_server(

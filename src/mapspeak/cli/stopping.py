@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from mapspeak.cli.guarding import CONTROL_OPTION, control_folder, wall_clock
+from mapspeak.installation import shell_command
 
 if TYPE_CHECKING:
     from mapspeak.navigation.safety import Hold
@@ -33,7 +34,9 @@ def stop(control: Path | None, reason: str, wait_s: float) -> None:
     hold = Hold(control_folder(control))
     stopped, unanswered = hold_robots(hold, reason=" ".join(reason.split()), wait_s=wait_s)
     if stopped:
-        click.echo(f"Stopped and held: {', '.join(stopped)}. `mapspeak release` lets them go on.")
+        click.echo(
+            f"Stopped and held: {', '.join(stopped)}. `{shell_command('release')}` lets them go on."
+        )
     if stopped and not unanswered:
         return
     said = "no server has answered"

@@ -12,6 +12,7 @@ from mapspeak.links.ros.discovery import (
     PoseSource,
     RobotOverrides,
     RobotProfile,
+    RosSettings,
     choose_profile,
     load_robot_file,
 )
@@ -184,7 +185,7 @@ def load(tmp_path: Path, text: str) -> RobotOverrides:
 
 def test_robot_yaml_is_read(tmp_path: Path) -> None:
     said = load(tmp_path, "name: Ada  # after the countess\nros: 2\nradius_m: 0.17\n")
-    assert said == RobotOverrides(name="Ada", ros=2, radius_m=0.17)
+    assert said == RobotOverrides(name="Ada", ros=RosSettings(version=2), radius_m=0.17)
     assert load(tmp_path, "# nothing\n") == RobotOverrides()
 
 
@@ -195,7 +196,7 @@ def test_robot_yaml_is_read(tmp_path: Path) -> None:
         ("name: Ada\n\nmap_topic: no topic\n", "line 3: 'map_topic' cannot be 'no topic'"),
         ("radius_m: -1\n", "line 1: 'radius_m' cannot be '-1'"),
         ("radius_m: .nan\n", "line 1: 'radius_m'"),
-        ("ros: 3\n", "line 1: 'ros' cannot be '3'"),
+        ("ros: 3\n", "line 1: 'ros.version' cannot be '3'"),
         ("navigation: fly\n", "line 1: 'navigation' cannot be 'fly'"),
         ("- a\n- b\n", "not a list of keys"),
         ("name: [\n", "line 2 is no YAML"),
@@ -206,6 +207,23 @@ def test_a_wrong_line_of_robot_yaml_is_named(tmp_path: Path, text: str, told: st
     with pytest.raises(ConfigError) as raised:
         load(tmp_path, text)
     assert told in raised.value.message
+
+
+def test_the_section_ros_says_how_the_robot_is_found(tmp_path: Path) -> None:
+    section = "ros:\n  version: 2\n  domain_id: 41\n  static_peers: [10.0.0.7, robot.local]\n"
+    said = load(tmp_path, section + "  discovery_range: LOCALHOST\n").ros
+    assert said.version == 2
+    assert said.variables == {
+        "ROS_DOMAIN_ID": "41",
+        "ROS_STATIC_PEERS": "10.0.0.7;robot.local",
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+    }
+
+
+def test_a_misspelt_key_of_the_section_ros_is_answered_with_the_right_one(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="line 2") as raised:
+        load(tmp_path, "ros:\n  domain: 41\n")
+    assert "`domain_id`" in raised.value.hint
 
 
 def test_a_misspelt_key_is_answered_with_the_right_one(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from PIL import Image
 from drawing import grid_from_text, text_from_grid
 from mapspeak.errors import GoalError, LinkError, MapError
 from mapspeak.geometry import Pose
-from mapspeak.links.ros import RobotOverrides, RosRobot
+from mapspeak.links.ros import RobotOverrides, RosRobot, RosSettings
 from mapspeak.links.ros.discovery import PoseSource
 from mapspeak.links.ros.driving import DrivingPatience
 from mapspeak.links.ros.maps import MapKeeper
@@ -671,7 +671,9 @@ async def test_without_rosapi_robot_yaml_is_enough() -> None:
     scripted = ScriptedRobot()
     scripted.services.clear()
     scripted.latched["/floor"] = scripted.map_message(grid_from_text(ROOM))
-    overrides = RobotOverrides(ros=2, map_topic="/floor", pose_topic="tf", navigation="nav2")
+    overrides = RobotOverrides(
+        ros=RosSettings(version=2), map_topic="/floor", pose_topic="tf", navigation="nav2"
+    )
     async with connected(scripted, overrides=overrides) as robot:
         assert (await robot.fetch_map()).n_cols == 4
         assert (await robot.fetch_pose()).pose.x == pytest.approx(1.0)

@@ -16,7 +16,7 @@ FLOOR = MapRevision(grid_from_text("....\n....", resolution_m=3.0), radius_m=RAD
 
 
 def watching() -> Callable[..., str | None]:
-    monitor = KeepOutMonitor(radius_m=RADIUS_M)
+    monitor = KeepOutMonitor()
     return lambda here, *, now_s: monitor.judge(FLOOR, here, now_s=now_s, mover=Mover.OTHERS)
 
 
@@ -146,7 +146,7 @@ def test_a_pose_that_localisation_corrects_is_no_speed() -> None:
 
 @pytest.mark.parametrize("mover", Mover)
 def test_who_is_told_of_a_stop_is_told_what_drove_the_robot(mover: Mover) -> None:
-    monitor = KeepOutMonitor(radius_m=RADIUS_M)
+    monitor = KeepOutMonitor()
     monitor.begin_at(Pose(4.6, 1.0), now_s=0.0)
     said = monitor.judge(FLOOR, Pose(4.68, 1.0), now_s=0.2, mover=mover)
     assert said is not None

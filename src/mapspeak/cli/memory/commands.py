@@ -12,6 +12,7 @@ from mapspeak.cli.memory.exchange import export, import_, merge
 from mapspeak.cli.memory.files import JSON_OPTION, MEMORY_OPTION, open_memory, read_places
 from mapspeak.cli.options import FILE
 from mapspeak.errors import SemanticMapError
+from mapspeak.installation import say_install, shell_command
 
 if TYPE_CHECKING:
     from mapspeak.semantic import SemanticMap, Waypoint
@@ -103,7 +104,7 @@ def find(
             place = f" at {each['place']}" if each["place"] else ""
             click.echo(f"  {each['score']:.2f}  {each['name']}{place}: {each['text']}")
         if answer.limits:
-            click.echo(answer.limits)
+            click.echo(f"{answer.limits} To change that: {say_install('semantic')}")
     sys.exit(1 if answer.verdict is Verdict.NOT_REMEMBERED else 0)
 
 
@@ -164,7 +165,7 @@ def _named(name: str, places: "SemanticMap") -> "Waypoint":
     if place is None:
         names = [each.name for each in places.waypoints]
         near = ", ".join(map(quote_name, difflib.get_close_matches(name, names, cutoff=0.5)))
-        hint = f"Near to it: {near}." if near else "mapspeak memory list shows the names."
+        hint = f"Near to it: {near}." if near else f"See `{shell_command('memory list')}`."
         raise SemanticMapError(f"No place is called {quote_name(name)}.", hint=hint)
     return place
 

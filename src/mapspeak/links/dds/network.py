@@ -20,15 +20,17 @@ class DdsNetwork:
         is_local: Members are on this machine only, as with
             ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST.
         peers: Addresses of other machines that multicast does not reach, as in ROS_STATIC_PEERS.
+        cyclonedds_uri: What else Cyclone DDS is told, as in CYCLONEDDS_URI.
     """
 
     domain_id: int = 0
     is_local: bool = False
     peers: Sequence[str] = ()
+    cyclonedds_uri: str = ""
 
     @property
     def configuration(self) -> str:
-        """As Cyclone DDS takes it, after what CYCLONEDDS_URI says already.
+        """All that Cyclone DDS is told, as in CYCLONEDDS_URI.
 
         A robot on this machine that keeps to itself listens to no multicast: it is looked for at
         the ports it would have, and looks for us at such. Fast DDS describes its types in a way
@@ -37,6 +39,7 @@ class DdsNetwork:
         peers = "".join(f"<Peer address={quoteattr(each)}/>" for each in ("localhost", *self.peers))
         local = '<Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces>'
         return (
+            f"{self.cyclonedds_uri}{',' if self.cyclonedds_uri else ''}"
             '<CycloneDDS><Domain id="any">'
             f"<General>{local if self.is_local else ''}</General>"
             "<Discovery><ParticipantIndex>auto</ParticipantIndex>"

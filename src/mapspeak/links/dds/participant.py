@@ -6,10 +6,8 @@ busy, DDS keeps the newest samples and forgets the rest.
 """
 
 import logging
-import os
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from typing import Any
 
 import anyio
@@ -39,6 +37,7 @@ from mapspeak.links.dds.endpoints import (
 )
 from mapspeak.links.dds.names import dds_type
 from mapspeak.links.dds.network import DdsNetwork
+from mapspeak.links.ros import environment_with
 
 logger = logging.getLogger(__name__)
 
@@ -59,7 +58,7 @@ class Participant:
     def __init__(self, network: DdsNetwork) -> None:
         try:
             # The library reads its configuration there, and when a process enters a domain only.
-            with _environment(CONFIGURATION_VARIABLE, network.configuration):
+            with environment_with({CONFIGURATION_VARIABLE: network.configuration}):
                 self._participant = DomainParticipant(network.domain_id)
             self._publisher = Publisher(self._participant)
             self._waitset = WaitSet(self._participant)
@@ -241,16 +240,3 @@ def _unusable(topic: str, type_name: str, error: DDSException) -> LinkError:
         f"{topic} cannot be used as {type_name}: {error}",
         hint="A topic has one type: look it up on the robot.",
     )
-
-
-@contextmanager
-def _environment(name: str, value: str) -> Iterator[None]:
-    before = os.environ.get(name)
-    os.environ[name] = f"{before},{value}" if before else value
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[name]
-        else:
-            os.environ[name] = before

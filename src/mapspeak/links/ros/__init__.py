@@ -3,10 +3,12 @@
 from mapspeak.links.ros.discovery import (
     RobotOverrides,
     RobotProfile,
+    RosSettings,
     describe_profile,
     load_robot_file,
 )
 from mapspeak.links.ros.driving import DrivingPatience
+from mapspeak.links.ros.environment import environment_with
 from mapspeak.links.ros.errors import plain_errors
 from mapspeak.links.ros.goal import PursuedGoal
 from mapspeak.links.ros.late import NOTICE_S, Announcements, say_again
@@ -27,11 +29,13 @@ __all__ = [
     "RobotOverrides",
     "RobotProfile",
     "RosRobot",
+    "RosSettings",
     "TopicSubscription",
     "build_ros_robot",
     "check_name",
     "describe_pose_source",
     "describe_profile",
+    "environment_with",
     "load_robot_file",
     "plain_errors",
     "say_again",

@@ -174,13 +174,14 @@ async def _shows_all_nodes(system: Surroundings) -> bool:
 
 @asynccontextmanager
 async def open_connection(
-    *, domain_id: int | None = None, distro: str = ""
+    *, domain_id: int | None = None, distro: str = "", variables: Mapping[str, str]
 ) -> AsyncGenerator[Ros2Connection]:
     """Keeps a node of ours in a domain while the context lasts.
 
     Args:
         domain_id: As in ROS_DOMAIN_ID; None takes what that says.
         distro: Such as "jazzy"; empty where that is unknown.
+        variables: Stand before those of the environment while the domain is entered.
 
     Raises:
         LinkError: ROS cannot be started.
@@ -188,7 +189,7 @@ async def open_connection(
     with plain_errors():
         async with (
             BlockingPortal() as portal,
-            _open_participant(domain_id, portal) as participant,
+            _open_participant(domain_id, portal, variables) as participant,
             anyio.create_task_group() as tasks,
         ):
             connection = Ros2Connection(participant, tasks, distro=distro)
@@ -203,9 +204,9 @@ async def open_connection(
 
 @asynccontextmanager
 async def _open_participant(
-    domain_id: int | None, portal: BlockingPortal
+    domain_id: int | None, portal: BlockingPortal, variables: Mapping[str, str]
 ) -> AsyncGenerator[Participant]:
-    participant = Participant(domain_id=domain_id, portal=portal)
+    participant = Participant(domain_id=domain_id, portal=portal, variables=variables)
     await participant.start()
     try:
         yield participant

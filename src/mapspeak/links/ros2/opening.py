@@ -1,7 +1,8 @@
 """A robot on ROS 2, through rclpy; nothing here needs that before a robot is opened."""
 
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Mapping
 from contextlib import asynccontextmanager
+from types import MappingProxyType
 
 from mapspeak.errors import ConfigError
 from mapspeak.links.ros import DrivingPatience, RobotOverrides, RosRobot, build_ros_robot
@@ -9,6 +10,7 @@ from mapspeak.ros import RosConnection
 
 USUAL_PATIENCE = DrivingPatience()
 NOTHING_SAID = RobotOverrides()
+NO_VARIABLES: Mapping[str, str] = MappingProxyType({})
 HINT = (
     "Source ROS 2 (`source /opt/ros/$ROS_DISTRO/setup.sh`) and start mapspeak with its Python, or "
     "install ROS's wheels in an environment of their own on Python 3.12: see "
@@ -18,13 +20,17 @@ HINT = (
 
 @asynccontextmanager
 async def open_ros2_connection(
-    *, domain_id: int | None = None, distro: str = ""
+    *,
+    domain_id: int | None = None,
+    distro: str = "",
+    variables: Mapping[str, str] = NO_VARIABLES,
 ) -> AsyncGenerator[RosConnection]:
     """Keeps a node of ours in a ROS 2 domain while the context lasts.
 
     Args:
         domain_id: As in ROS_DOMAIN_ID; None takes what that says.
         distro: Such as "jazzy"; empty where that is unknown.
+        variables: Stand before those of the environment while the domain is entered.
 
     Raises:
         ConfigError: This Python has no rclpy.
@@ -35,7 +41,9 @@ async def open_ros2_connection(
     except ImportError as error:
         # Without its libraries rclpy fails as if it were not there, and says which one is missing.
         raise ConfigError(f"This Python has no rclpy: {error}.", hint=HINT) from error
-    async with open_connection(domain_id=domain_id, distro=distro) as connection:
+    async with open_connection(
+        domain_id=domain_id, distro=distro, variables=variables
+    ) as connection:
         yield connection
 
 
@@ -44,6 +52,7 @@ async def open_ros2_robot(
     *,
     domain_id: int | None = None,
     distro: str = "",
+    variables: Mapping[str, str] = NO_VARIABLES,
     overrides: RobotOverrides = NOTHING_SAID,
     patience: DrivingPatience = USUAL_PATIENCE,
 ) -> AsyncGenerator[RosRobot]:
@@ -54,12 +63,17 @@ async def open_ros2_robot(
     Args:
         domain_id: As in ROS_DOMAIN_ID; None takes what that says.
         distro: Such as "jazzy"; empty where that is unknown.
+        variables: Stand before those of the environment while the domain is entered.
         overrides: What robot.yaml says.
         patience: Time limits of navigation.
 
     Raises:
         ConfigError: This Python has no rclpy.
-        LinkError: ROS cannot be started.
+        LinkError: ROS cannot be started, or no robot is found there.
     """
-    async with open_ros2_connection(domain_id=domain_id, distro=distro) as connection:
+    async with open_ros2_connection(
+        domain_id=domain_id, distro=distro, variables=variables
+    ) as connection:
+        if connection.connected_for_s is None:
+            await connection.wait_until_connected()
         yield await build_ros_robot(connection, overrides=overrides, patience=patience)

@@ -2,7 +2,7 @@
 
 import logging
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from typing import Any
@@ -17,6 +17,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from mapspeak.errors import LinkError
+from mapspeak.links.ros import environment_with
 from mapspeak.ros import new_id
 
 LOG = logging.getLogger(__name__)
@@ -38,12 +39,16 @@ class Participant:
     Args:
         domain_id: As in ROS_DOMAIN_ID; None takes what that says.
         portal: To the event loop.
+        variables: Stand before those of the environment while the domain is entered.
     """
 
-    def __init__(self, *, domain_id: int | None, portal: BlockingPortal) -> None:
+    def __init__(
+        self, *, domain_id: int | None, portal: BlockingPortal, variables: Mapping[str, str]
+    ) -> None:
         self.name = f"mapspeak_{new_id()[:N_DIGITS]}"
         self._domain_id = domain_id
         self._portal = portal
+        self._variables = variables
         self._context = Context()
         self._end = Future()
         self._pause = threading.Event()
@@ -98,7 +103,8 @@ class Participant:
             return future.result()
 
     def _enter(self) -> None:
-        with errors_of_ros("ROS 2 cannot be started"):
+        # ROS and its middleware read their variables only when a domain is entered.
+        with errors_of_ros("ROS 2 cannot be started"), environment_with(self._variables):
             rclpy.init(
                 args=[],
                 context=self._context,

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from mapspeak.installation import shell_command
 from mapspeak.navigation.goals import GoalCheck, GoalVerdict
 from mapspeak.navigation.hold import say_hold
 from mapspeak.navigation.safety.commands import (
@@ -127,7 +128,7 @@ def _against_everything(policy: Policy, situation: Situation) -> Refused | None:
         return Refused(
             rule="hold",
             reason=f"The robot is held: {say_hold(situation.held_by)}.",
-            hint="Tell the person at the robot; only `mapspeak release` lets it drive again.",
+            hint=f"Tell the person at the robot: `{shell_command('release')}` lets it drive again.",
         )
     return None
 

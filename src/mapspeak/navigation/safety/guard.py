@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 
 from mapspeak.errors import GoalError, PolicyError
+from mapspeak.installation import shell_command
 from mapspeak.navigation.hold import Hold
 from mapspeak.navigation.safety.approvals import Approvals
 from mapspeak.navigation.safety.audit import AuditLog
@@ -179,7 +180,7 @@ class Guard:
         hint = "The client cannot ask anybody: tell the person that the policy wants their word."
         if self.policy.approval.otherwise is Otherwise.QUEUE:
             self.approvals.queue(wish_id)
-            hint = f"Call again once a person has typed `mapspeak approve {wish_id}`."
+            hint = f"Call again once a person has typed `{shell_command(f'approve {wish_id}')}`."
         return ApprovalNeededError(question, wish_id=wish_id, hint=hint)
 
     def _note(

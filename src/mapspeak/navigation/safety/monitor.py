@@ -85,14 +85,9 @@ class GoalMonitor:
 
 
 class KeepOutMonitor:
-    """Watches a robot, whatever moves it, for the closed areas ahead; judges what it is told.
+    """Watches a robot, whatever moves it, for the closed areas ahead; judges what it is told."""
 
-    Args:
-        radius_m: Of the robot.
-    """
-
-    def __init__(self, *, radius_m: float) -> None:
-        self._radius_m = radius_m
+    def __init__(self) -> None:
         self._before: tuple[Pose, float] | None = None
         self._least_m: dict[ClosedArea, float] = {}
 
@@ -109,17 +104,17 @@ class KeepOutMonitor:
         way = (here.point, *self._find_way_to_stand(here, now_s))
         for area in revision.areas:
             left_m = area.distance_to_border(here.point)
-            if any(area.distance_to_border(each) < self._find_least(area, left_m) for each in way):
-                edge_m = max(left_m - self._radius_m, 0.0)
+            least_m = self._find_least(area, min(revision.radius_m + KEEP_M, left_m - WAVER_M))
+            if any(area.distance_to_border(each) < least_m for each in way):
+                edge_m = max(left_m - revision.radius_m, 0.0)
                 return (
                     f"The robot was stopped {edge_m:.2f} m before the {area.title}: "
                     f"{mover} was about to drive into it. {ADVICE[mover]}"
                 )
         return None
 
-    def _find_least(self, area: ClosedArea, left_m: float) -> float:
+    def _find_least(self, area: ClosedArea, least_m: float) -> float:
         """Return how near to an area the robot's centre may come: as near as it is, if too near."""
-        least_m = min(self._radius_m + KEEP_M, left_m - WAVER_M)
         self._least_m[area] = max(least_m, self._least_m.get(area, least_m))
         return self._least_m[area]
 

@@ -77,10 +77,8 @@ class GuardedRobot:
         self._seen_at_s = float("-inf")
         self._hold_keeper = HoldKeeper(guard.hold, StandingCheck(robot), repeat_s=repeat_s)
         self.planner = Planner(robot, surveyor=surveyor, policy=guard.policy)
-        self.by_hand = HandDriving(
-            robot, planner=self.planner, surveyor=surveyor, radius_m=self.description.radius_m
-        )
-        self._monitor = KeepOutMonitor(radius_m=self.description.radius_m)
+        self.by_hand = HandDriving(robot, planner=self.planner, surveyor=surveyor)
+        self._monitor = KeepOutMonitor()
 
     @property
     def description(self) -> RobotDescription:

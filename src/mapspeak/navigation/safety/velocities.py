@@ -73,16 +73,12 @@ class HandDriving:
         robot: The robot itself.
         planner: Surveys the map.
         surveyor: Knows what is closed now.
-        radius_m: Of the robot, with the clearance it must keep.
     """
 
-    def __init__(
-        self, robot: Robot, *, planner: Planner, surveyor: Surveyor, radius_m: float
-    ) -> None:
+    def __init__(self, robot: Robot, *, planner: Planner, surveyor: Surveyor) -> None:
         self._robot = robot
         self._planner = planner
         self._surveyor = surveyor
-        self._radius_m = radius_m
         self._zeros: dict[str, Callable[[], object]] = {}
         self._moving: set[str] = set()
 
@@ -135,20 +131,22 @@ class HandDriving:
 
     def _find_objection(self, message: Message, here: Pose) -> Refused | None:
         revision = self._surveyor.latest
-        areas = () if revision is None else revision.areas
+        if revision is None:
+            return None
+        areas, radius_m = revision.areas, revision.radius_m
         lasts_s = max(LEAST_S, _UNTIL_S.get() - anyio.current_time()) + REACTION_S
         velocity = _read_velocity(message)
         if velocity is None:
             speeds = (speed for part, speed in find_speeds(message) if part != "angular")
             fastest_mps = max(speeds, default=0.0)
-            reach_m = _reach_m(fastest_mps, lasts_s) + self._radius_m
+            reach_m = _reach_m(fastest_mps, lasts_s) + radius_m
             entered = next((each for each in areas if each.distance_to(here.point) < reach_m), None)
         else:
             way = _predict(here, velocity, lasts_s)
-            entered = find_entered(areas, here.point, way, radius_m=self._radius_m)
+            entered = find_entered(areas, here.point, way, radius_m=radius_m)
         if entered is None:
             return None
-        off_m = max(entered.distance_to(here.point) - self._radius_m, 0.0)
+        off_m = max(entered.distance_to(here.point) - radius_m, 0.0)
         return refuse_velocity(
             f"This velocity would take the robot into the {entered.title}, {off_m:.2f} m from its "
             f"edge, within {lasts_s:.1f} s."

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mapspeak.errors import SemanticMapError
+from mapspeak.installation import shell_command
 from mapspeak.semantic.episodes.moving import has_plans
 from mapspeak.semantic.episodes.store import EpisodeStore, memory_folder
 
@@ -57,5 +58,5 @@ def _require_settled(store: EpisodeStore) -> None:
     if store.database.exists() and has_plans(store.database):
         raise SemanticMapError(
             f"The observations in {store.folder} have not followed their map yet.",
-            hint="Start mapspeak serve with that memory once, then merge again.",
+            hint=f"Start `{shell_command('serve --memory FILE')}` with it once, then merge again.",
         )

@@ -15,6 +15,7 @@ from collections.abc import Iterator
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
+from mapspeak.installation import shell_command
 from mapspeak.semantic.exchange.records import Facts, facts_of, map_from, place_of
 from mapspeak.semantic.waypoint import SemanticMap, Waypoint, name_key
 
@@ -142,5 +143,6 @@ def _point(line: int, row: dict[str, str]) -> Point:
 def _refusal(line: int, said: str) -> SemanticMapError:
     return SemanticMapError(
         f"This is no memory as CSV: line {line}: {said}.",
-        hint="Mend that line, or write the file anew with mapspeak memory export --format csv.",
+        hint="Mend that line, or write the file anew with "
+        f"`{shell_command('memory export --format csv')}`.",
     )

@@ -13,6 +13,7 @@ from pydantic import BaseModel, FiniteFloat, ValidationError
 
 from mapspeak.errors import MapError, SemanticMapError
 from mapspeak.geometry import Point
+from mapspeak.installation import shell_command
 from mapspeak.semantic.exchange.records import (
     FILE_VERSION,
     Facts,
@@ -86,7 +87,7 @@ def from_osm(text: str) -> SemanticMap:
     if root is None or root.place is None:
         raise SemanticMapError(
             "This OSM file has no root node of a memory, so nothing says where (0, 0) lies.",
-            hint="Give a file that mapspeak memory export --format osm wrote.",
+            hint=f"Give a file that `{shell_command('memory export --format osm')}` wrote.",
         )
     try:
         own = _Root.model_validate(

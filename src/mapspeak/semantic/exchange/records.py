@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
+from mapspeak.installation import shell_command
 from mapspeak.semantic.mapfile.schema import record_data, waypoint_from
 from mapspeak.semantic.waypoint import SemanticMap, Waypoint, name_key
 
@@ -74,7 +75,7 @@ def refusal_of(error: ValidationError, form: str, what: str) -> SemanticMapError
     place = ".".join(map(str, first["loc"])) or "the whole of it"
     return SemanticMapError(
         f"This is no memory as {form}: {what}: at {place!a}: {first['msg']}.",
-        hint="Mend that place, or write the file anew with mapspeak memory export.",
+        hint=f"Mend that place, or write the file anew with `{shell_command('memory export')}`.",
     )
 
 

@@ -33,7 +33,7 @@ _Key = TypeVar("_Key")
 
 __all__ = ["WORDS_ONLY", "EntryIndex"]
 
-WORDS_ONLY = "The search compares words only; install mapspeak[semantic] to compare meanings."
+WORDS_ONLY = "The search compares words only, no meanings."
 
 WORD_THRESHOLDS = Thresholds(least_ratio=0.05, sure_ratio=1.1, same_ratio=0.02, absent_ratio=0.3)
 """Chosen on the requests for tuning; benchmarks/requests/README.md says by which rule."""

@@ -13,6 +13,7 @@ from pydantic import FiniteFloat, ValidationError
 
 from mapspeak.errors import MapError
 from mapspeak.geometry import Point
+from mapspeak.installation import shell_command
 from mapspeak.spatial.areagraph.anchor import MapAnchor
 from mapspeak.spatial.areagraph.graph import Area, AreaGraph, Line, Passage, Polygon, Ring
 from mapspeak.spatial.areagraph.osm_xml import (
@@ -256,7 +257,8 @@ def _find_root(nodes: Iterable[OsmElement]) -> OsmElement:
             return node
     raise MapError(
         "This OSM file has no root node of ours, so nothing says where the map's (0, 0) lies.",
-        hint="Give a file that mapspeak map --osm wrote; other osmAG files lack what it needs.",
+        hint=f"Give a file that `{shell_command('map --osm')}` wrote; other osmAG files lack "
+        "what it needs.",
     )
 
 

@@ -13,6 +13,7 @@ from xml.parsers import expat
 from pydantic import BaseModel, Field, FiniteFloat, ValidationError
 
 from mapspeak.errors import MapError
+from mapspeak.installation import shell_command
 from mapspeak.spatial.areagraph.anchor import DEGREE_DECIMALS, LatLon
 
 GENERATOR = "mapspeak"
@@ -86,7 +87,7 @@ def read_osm_xml(text: str) -> OsmDocument:
     except expat.ExpatError as error:
         raise MapError(
             f"This is no area graph as OSM: line {error.lineno}: {expat.ErrorString(error.code)}.",
-            hint="Write it anew with mapspeak map --osm, or mend that line.",
+            hint=f"Write it anew with `{shell_command('map --osm')}`, or mend that line.",
         ) from error
     except UnicodeError as error:
         raise MapError(
@@ -139,7 +140,7 @@ class _Reader:
         if len(self._path) == 1 and name != "osm":
             raise MapError(
                 f"This is no area graph as OSM: it begins with {name!a}.",
-                hint="Give a file that mapspeak map --osm wrote.",
+                hint=f"Give a file that `{shell_command('map --osm')}` wrote.",
             )
         if len(self._path) == 2:
             self._begin(attributes)

@@ -6,6 +6,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from mapspeak.errors import MapError
 from mapspeak.geometry import Point
+from mapspeak.installation import shell_command
 from mapspeak.spatial.areagraph.graph import Polygon, Ring, signed_area_m2
 from mapspeak.spatial.rooms import Door, Region, RoomClass
 
@@ -121,5 +122,5 @@ def refusal_of(error: ValidationError, form: str) -> MapError:
     place = ".".join(map(str, fault["loc"])) or "the whole of it"
     return MapError(
         f"This is no area graph as {form}: at {place!a}: {fault['msg']}.",
-        hint="Write it anew with mapspeak map, or mend that place.",
+        hint=f"Write it anew with `{shell_command('map')}`, or mend that place.",
     )

@@ -16,6 +16,7 @@ from mapspeak.errors import ConfigError, LinkError
 from mapspeak.evaluation.agents.models.mind import Ending, Reply, Talk, Thinking, Usage, Wish
 from mapspeak.evaluation.agents.models.mock import count_mock_tokens, decide
 from mapspeak.evaluation.client import Answer
+from mapspeak.installation import say_install, shell_command
 
 if TYPE_CHECKING:
     from inspect_ai.model import ChatMessage, GenerateConfig, Model, ModelOutput, ModelUsage
@@ -57,7 +58,7 @@ def open_mind(name: str, thinking: Thinking | None) -> "InspectMind":
 
 def _say_install(name: str) -> str:
     client = find_client(name)
-    return f"pip install 'mapspeak[eval]'{'' if client == CLIENT else f' {client}'}"
+    return say_install("eval", *([] if client == CLIENT else [client]))
 
 
 def find_client(name: str) -> str:
@@ -164,7 +165,8 @@ class _InspectTalk:
         except Exception as error:  # each provider has errors of its own, of no common kind
             raise LinkError(
                 f"{self.model} cannot be asked: {_say_cause(error)}",
-                hint="See the provider's own words; mapspeak eval --retry runs what broke again.",
+                hint="See the provider's own words; "
+                f"`{shell_command('eval --retry')}` runs what broke again.",
             ) from error
 
     def tell(self, wish: Wish, answer: Answer) -> None:

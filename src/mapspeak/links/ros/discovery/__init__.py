@@ -2,7 +2,11 @@
 
 from mapspeak.links.ros.discovery.finding import FRAMES_S, discover_robot, look_at_robot
 from mapspeak.links.ros.discovery.findings import describe_profile
-from mapspeak.links.ros.discovery.overrides import RobotOverrides, load_robot_file
+from mapspeak.links.ros.discovery.overrides import (
+    RobotOverrides,
+    RosSettings,
+    load_robot_file,
+)
 from mapspeak.links.ros.discovery.profile import (
     NavigationKind,
     PoseSource,
@@ -16,6 +20,7 @@ __all__ = [
     "PoseSource",
     "RobotOverrides",
     "RobotProfile",
+    "RosSettings",
     "choose_profile",
     "describe_profile",
     "discover_robot",

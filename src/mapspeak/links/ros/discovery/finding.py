@@ -83,7 +83,7 @@ async def _with_radius(
 
 
 async def _fetch_graph(connection: RosConnection, overrides: RobotOverrides) -> RosGraph:
-    said = {1: Dialect.ROS1, 2: Dialect.ROS2}.get(overrides.ros or 0)
+    said = {1: Dialect.ROS1, 2: Dialect.ROS2}.get(overrides.ros.version or 0)
     try:
         graph = await connection.fetch_graph()
     except LinkError:

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from mapspeak.ros import NAME, TYPE
 from mapspeak.settings import read_settings
@@ -14,12 +14,54 @@ FrameName = Annotated[str, Field(pattern=r"^/?[\w/.-]+$")]
 Words = Annotated[str, Field(pattern=r"\S", max_length=200)]
 
 
+PlainWord = Annotated[str, Field(pattern=r"^[\w.:%-]+$", max_length=200)]
+
+
+class RosSettings(BaseModel):
+    """The section `ros` of robot.yaml: the ROS that the robot runs, and how it is found over DDS.
+
+    Attributes:
+        version: 1 or 2.
+        domain_id: As in ROS_DOMAIN_ID.
+        discovery_range: As in ROS_AUTOMATIC_DISCOVERY_RANGE.
+        static_peers: Addresses of machines that multicast does not reach, as in ROS_STATIC_PEERS.
+        rmw_implementation: As in RMW_IMPLEMENTATION; for `--robot ros2` only.
+        cyclonedds_uri: As in CYCLONEDDS_URI: the path of a file, or the settings themselves.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    version: Literal[1, 2] | None = None
+    domain_id: Annotated[int, Field(ge=0, le=232)] | None = None
+    discovery_range: Literal["SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT"] | None = None
+    static_peers: tuple[PlainWord, ...] = ()
+    rmw_implementation: PlainWord | None = None
+    cyclonedds_uri: Annotated[str, Field(pattern=r"\S", max_length=20_000)] | None = None
+
+    @property
+    def variables(self) -> dict[str, str]:
+        """What is said here, as the variables that ROS reads."""
+        said = {
+            "ROS_DOMAIN_ID": None if self.domain_id is None else str(self.domain_id),
+            "ROS_AUTOMATIC_DISCOVERY_RANGE": self.discovery_range,
+            "ROS_STATIC_PEERS": ";".join(self.static_peers) or None,
+            "RMW_IMPLEMENTATION": self.rmw_implementation,
+            "CYCLONEDDS_URI": self.cyclonedds_uri,
+        }
+        return {name: value for name, value in said.items() if value is not None}
+
+
+def _as_section(said: object) -> object:
+    """Return the section that a bare number stands for."""
+    return {"version": said} if isinstance(said, int) else said
+
+
 class RobotOverrides(BaseModel):
     """The keys of robot.yaml; what is left away is found by asking the robot.
 
     Attributes:
         name: How people call the robot.
-        ros: 1 or 2.
+        ros: Which ROS it runs, 1 or 2, or a section that says more; see `RosSettings`.
         namespace: Looks for topics below this name first, such as /robot1.
         radius_m: Of the smallest circle around the robot.
         map_name: Which map or building it drives in.
@@ -42,7 +84,7 @@ class RobotOverrides(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: Words | None = None
-    ros: Literal[1, 2] | None = None
+    ros: Annotated[RosSettings, BeforeValidator(_as_section)] = RosSettings()
     namespace: TopicName | None = None
     radius_m: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] | None = None
     map_name: Words | None = None

