@@ -12,6 +12,7 @@ from drawing import grid_from_text
 from fakes import FakeRobot
 from guarding import audit_of, make_guard
 from mapspeak.geometry import Pose
+from mapspeak.installation import shell_command
 from mapspeak.navigation.safety import Approval, Guard, Kind, Otherwise, Policy
 from served import MODES, connect, report_of, text_of
 
@@ -167,7 +168,7 @@ async def test_a_search_waits_for_an_operators_word_where_nobody_can_be_asked(
         ((wish_id, what),) = guard.approvals.room.list_waiting().items()
         guard.approvals.room.approve(wish_id)
         answer = await client.call_tool("search_for", {**arguments, "seen": False})
-    assert "mapspeak approve" in text_of(refused)
+    assert shell_command("approve") in text_of(refused)
     assert what.startswith("search for 'ladder', up to 40 m, up to 5 drives within 600 s, asked by")
     assert report_of(answer)["state"] != "refused"
     assert robot.goals

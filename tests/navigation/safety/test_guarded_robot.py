@@ -10,6 +10,7 @@ from fakes import FakeRobot, scan_of, two_rooms
 from guarding import WallClock, audit_of, corners, make_guard, rectangle
 from mapspeak.errors import GoalError, LinkError, PolicyError
 from mapspeak.geometry import Pose
+from mapspeak.installation import shell_command
 from mapspeak.navigation.closures import ClosedArea
 from mapspeak.navigation.safety import (
     Approval,
@@ -553,7 +554,7 @@ async def test_a_drive_that_waits_for_a_persons_word_gets_it_once(tmp_path: Path
     robot = guarded(FakeRobot(two_rooms()), tmp_path, Policy(approval=approval))
     room = make_guard(tmp_path).approvals.room
     with calling(Caller(client="tester")):
-        assert "mapspeak approve" in await refusal_of(robot, NEAR)
+        assert shell_command("approve") in await refusal_of(robot, NEAR)
         (wish_id,) = room.list_waiting()
         assert "tester" in room.list_waiting()[wish_id]
         room.approve(wish_id)
