@@ -166,12 +166,14 @@ class GoalStatus:
         distance_left_m: Along the planned path; None where the robot does not say.
         n_recoveries: How often it had to try again.
         reason: Why it ended as it did; empty while it drives.
+        is_unanswered: It is rejected because the navigation has not answered at all.
     """
 
     state: GoalState
     distance_left_m: float | None = None
     n_recoveries: int = 0
     reason: str = ""
+    is_unanswered: bool = False
 
 
 class Health(StrEnum):

@@ -212,3 +212,17 @@ async def test_a_watching_session_stops_a_robot_that_jumps(tmp_path: Path) -> No
             while not robot.n_stops:
                 await anyio.lowlevel.checkpoint()
         tasks.cancel_scope.cancel()
+
+
+class SlowToAccept(FakeRobot):
+    """A robot that takes goals only after a while."""
+
+    async def send_goal(self, goal: Pose) -> str:
+        await self.sleep(4.0)
+        return await super().send_goal(goal)
+
+
+async def test_the_time_of_a_drive_counts_from_when_it_was_sent() -> None:
+    drives = DriveBook(SlowToAccept(two_rooms()))
+    drive = await start(drives, FAR)
+    assert (await drives.report(drive.goal_id)).elapsed_s == pytest.approx(4.0)

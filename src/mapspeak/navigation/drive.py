@@ -134,8 +134,9 @@ class DriveBook:
             begun_at = await self._find_begin()
             self._check_ticket(ticket)
             if busy is None or self._choose(busy, client, when_busy) is WhenBusy.REPLACE:
+                sent_s = self._robot.now_s
                 drive = self._note(goal, place, client, await self._robot.send_goal(goal))
-                drive = self._keep(replace(drive, begun_at=begun_at))
+                drive = self._keep(replace(drive, begun_at=begun_at, started_s=sent_s))
                 self._vigil.begin(drive.goal_id, now_s=self._robot.now_s)
                 self._end_all("A newer goal took its place.", but=drive)
                 return drive
@@ -297,15 +298,14 @@ class DriveBook:
         async with self._starting:
             if await self._find_busy() is not None or not self._waiting():
                 return
-            drive = self._waiting()[0]
+            drive, sent_s = self._waiting()[0], self._robot.now_s
             try:
                 robot_goal_id = await self._robot.send_goal(drive.goal)
             except MapspeakError as error:
                 self._note_end(drive, GoalStatus(state=GoalState.REJECTED, reason=str(error)))
                 return
-            now_s = self._robot.now_s
-            self._keep(replace(drive, robot_goal_id=robot_goal_id, started_s=now_s))
-            self._vigil.begin(drive.goal_id, now_s=now_s)
+            self._keep(replace(drive, robot_goal_id=robot_goal_id, started_s=sent_s))
+            self._vigil.begin(drive.goal_id, now_s=self._robot.now_s)
 
     async def _fetch_status(self, drive: Drive) -> GoalStatus:
         if drive.robot_goal_id is None:

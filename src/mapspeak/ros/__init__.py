@@ -8,6 +8,7 @@ from mapspeak.ros.definitions import split_definition
 from mapspeak.ros.graph import NodeLinks, OwnEnds, RosGraph
 from mapspeak.ros.names import NAME, TYPE, find_nearest, new_id
 from mapspeak.ros.port import ActionEnd, ActionGoal, Listener, RosConnection, Subscription
+from mapspeak.ros.started import Startable, Started
 
 __all__ = [
     "NAME",
@@ -19,6 +20,8 @@ __all__ = [
     "OwnEnds",
     "RosConnection",
     "RosGraph",
+    "Startable",
+    "Started",
     "Subscription",
     "find_nearest",
     "new_id",

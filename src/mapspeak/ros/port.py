@@ -6,6 +6,7 @@ from typing import Any, Protocol
 
 from mapspeak.ros.graph import NodeLinks, OwnEnds, RosGraph
 from mapspeak.ros.messages import Message
+from mapspeak.ros.started import Started
 
 Listener = Callable[[Message], None]
 
@@ -136,6 +137,11 @@ class RosConnection(Protocol):
         """What of the system is our own doing: answers about it do not take it for others'."""
         ...
 
+    @property
+    def started(self) -> Started:
+        """Everything that was started over this connection: a stop ends it."""
+        ...
+
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Runs something in the background until the connection is closed."""
         ...
@@ -224,11 +230,11 @@ class RosConnection(Protocol):
         ...
 
     def cancel_goal(self, goal: ActionGoal) -> None:
-        """Asks for the end of a goal; its `end` tells whether that worked."""
+        """Asks for the end of a goal that the server has taken; its `end` tells if that worked."""
         ...
 
     def give_up_goal(self, goal: ActionGoal) -> None:
-        """Waits no longer for a goal that shows no sign of life."""
+        """Lets a goal without a sign of life hold up nothing; what is heard of it is told on."""
         ...
 
     def clear_the_way(self) -> None:

@@ -12,7 +12,7 @@ from mapspeak.navigation.atlas import RememberedPlace, number_places
 from mapspeak.navigation.choosing import CheckedGoal
 from mapspeak.navigation.drive import DriveReport
 from mapspeak.navigation.goals import GoalVerdict
-from mapspeak.robot import GoalState, StampedPose
+from mapspeak.robot import GoalState, GoalStatus, StampedPose
 from mapspeak.semantic import Landmark, Merge, SemanticMap, WriteReceipt, name_key
 from mapspeak.semantic.quoting import quote_name
 from mapspeak.server.memory.remembering import say_landmarks, say_replaced
@@ -97,10 +97,18 @@ NEXT_STEP = {
 }
 
 
+UNANSWERED = (
+    "The robot's navigation does not answer: another place would not help. Check that it runs and "
+    "is active, then send the same goal again."
+)
 FOREIGN_DRIVE = (
     "Another client's goal drives the robot now: wait for its end, or call stop_robot, which ends "
     "it too."
 )
+
+
+def _say_next_step(status: GoalStatus) -> str:
+    return UNANSWERED if status.is_unanswered else NEXT_STEP[status.state]
 
 
 class DriveAnswer(Report):
@@ -132,7 +140,7 @@ class DriveAnswer(Report):
             distance_left_m=None if left_m is None else round(left_m, 2),
             elapsed_s=round(report.elapsed_s, 1),
             reason=report.status.reason,
-            next_step=FOREIGN_DRIVE if foreign_goals else NEXT_STEP[report.status.state],
+            next_step=FOREIGN_DRIVE if foreign_goals else _say_next_step(report.status),
         )
 
 

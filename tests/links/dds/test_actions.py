@@ -10,15 +10,20 @@ import pytest
 pytest.importorskip("cyclonedds", reason="has no wheel for this Python")
 
 from dds_node import LATCHED, DdsNode, Reply, Request, open_dds_node, open_here, some_network
+from dds_node import until as until_so
 from mapspeak.errors import LinkError
 from mapspeak.links.dds import DdsConnection
 from mapspeak.links.dds.discovery import Framing
+from mapspeak.links.ros.actions import ActionPatience, ActionState, open_action
 from mapspeak.ros import ActionGoal
+from mapspeak.ros.messages import Dialect
 
 pytestmark = pytest.mark.anyio
 
 ACTION, TYPE = "/count", "example_interfaces/action/Fibonacci"
 CANCEL_TYPE = "action_msgs/srv/CancelGoal"
+UNKNOWN_GOAL = 2
+BRIEF = ActionPatience(acceptance_s=0.3, listing_s=0.0)
 EXECUTING, SUCCEEDED, CANCELED, ABORTED = 2, 4, 5, 6
 
 
@@ -28,6 +33,8 @@ class Counter:
     def __init__(self, node: DdsNode, *, framing: Framing) -> None:
         self.node = node
         self.accepts = True
+        self.is_slow = False
+        self.late: list[tuple[Request, Reply]] = []
         self.statuses: dict[bytes, int] = {}
         self._waiting: list[tuple[bytes, Reply]] = []
         self._results: dict[bytes, Request] = {}
@@ -42,7 +49,16 @@ class Counter:
         ):
             node.serve(f"{ACTION}/_action/{part}", type_name, answer, framing=framing)
 
+    def take_late(self) -> None:
+        """Takes the goals that have waited."""
+        self.is_slow = False
+        for request, reply in self.late:
+            self._judge(request, reply)
+
     def _judge(self, request: Request, reply: Reply) -> None:
+        if self.is_slow:
+            self.late.append((request, reply))
+            return
         if self.accepts:
             self.statuses[request["goal_id"]["uuid"]] = EXECUTING
         reply({"accepted": self.accepts})
@@ -57,6 +73,9 @@ class Counter:
 
     def _cancel(self, request: Request, reply: Reply) -> None:
         uuid = request["goal_info"]["goal_id"]["uuid"]
+        if uuid not in self.statuses:
+            reply({"return_code": UNKNOWN_GOAL})
+            return
         reply({"return_code": 0, "goals_canceling": [{"goal_id": {"uuid": uuid}}]})
         self.end(uuid, CANCELED)
 
@@ -214,14 +233,39 @@ async def test_a_goal_is_lost_with_its_server_though_another_was_started_since()
     assert goal.end is None
 
 
-async def test_a_goal_that_was_given_up_is_heard_of_no_more(framing: Framing) -> None:
+@pytest.mark.parametrize("is_stopped", [False, True])
+async def test_a_goal_that_is_taken_too_late_is_cancelled_at_once(
+    framing: Framing, *, is_stopped: bool
+) -> None:
     async with open_counter(framing) as (counter, connection):
-        given_up, other = await send(connection), await send(connection)
-        connection.give_up_goal(given_up)
-        counter.end(uuid_of(given_up), SUCCEEDED)
-        counter.end(uuid_of(other), SUCCEEDED)
-        await until(other, lambda goal: goal.end)
-    assert given_up.end is None
+        counter.is_slow = True
+        client = open_action(
+            connection, ACTION, dialect=Dialect.ROS2, type_name=TYPE, patience=BRIEF
+        )
+        goal = await client.send({"order": 3}, through=connection)
+        await client.wait_until_taken(goal)
+        assert goal.state is ActionState.REJECTED
+        if is_stopped:
+            await client.end()
+        counter.take_late()
+        assert await goal.wait_until_settled(within_s=5.0)
+    assert counter.statuses == {bytes.fromhex(goal.id): CANCELED}
+    assert "cancelled at once" in goal.afterwards
+
+
+async def test_a_goal_that_was_ended_before_it_was_taken_is_cancelled_when_it_is(
+    framing: Framing,
+) -> None:
+    async with open_counter(framing) as (counter, connection):
+        counter.is_slow = True
+        client = open_action(connection, ACTION, dialect=Dialect.ROS2, type_name=TYPE)
+        goal = await client.send({"order": 3}, through=connection)
+        await client.end()
+        assert goal.state is ActionState.CANCELLED
+        await until_so(lambda: counter.late)
+        counter.take_late()
+        assert await goal.wait_until_settled(within_s=5.0)
+    assert counter.statuses == {bytes.fromhex(goal.id): CANCELED}
 
 
 async def test_a_goal_that_does_not_fit_or_goes_nowhere_is_an_error() -> None:

@@ -3,7 +3,7 @@
 import pytest
 
 from mapspeak.links.ros import DrivingPatience
-from mapspeak.server.tools.ros.pursuing import ActionPatience
+from mapspeak.links.ros.actions import ActionPatience
 
 FAST_DDS_REPEATS_S = 3.0
 """The period of its heartbeats, unless a robot's profile says otherwise."""

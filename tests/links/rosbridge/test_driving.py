@@ -180,12 +180,13 @@ async def test_cancelling_names_the_goal_and_stopping_names_all() -> None:
     scripted = ScriptedRobot(ros=1)
     async with connected(scripted) as robot:
         goal_id = await send(scripted, robot)
-        await robot.cancel_goal(goal_id)
-        await robot.stop()
+        for end in (partial(robot.cancel_goal, goal_id), robot.stop):
+            with pytest.raises(LinkError, match="was told to end its goal, but has not"):
+                await end()
         await scripted.until(lambda: published(scripted, "/cmd_vel"))
     cancels = published(scripted, "/move_base/cancel")
     assert cancels[0]["msg"]["id"] == goal_id
-    assert {each["msg"]["id"] for each in cancels[1:]} == {""}
+    assert cancels[-1]["msg"]["id"] == ""
     assert all(each["msg"]["stamp"] == {"secs": 0, "nsecs": 0} for each in cancels)
 
 

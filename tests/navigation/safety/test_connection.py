@@ -22,6 +22,7 @@ READING = {
     "connected_for_s",
     "lost_for_s",
     "own_ends",
+    "started",
     "start_soon",
     "wait_until_connected",
     "subscribe",

@@ -103,11 +103,6 @@ class Calls:
         if goal.action in self._actions:
             self._actions[goal.action].cancel_goal(goal.goal_id)
 
-    def give_up_goal(self, goal: ActionGoal) -> None:
-        """Waits no longer for a goal."""
-        if goal.action in self._actions:
-            self._actions[goal.action].give_up_goal(goal.goal_id)
-
     def note_change(self, dds_name: str) -> None:
         """Takes in that others have begun or ended to read or write a topic."""
         news, self._news = self._news, anyio.Event()

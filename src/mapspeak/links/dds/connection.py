@@ -58,6 +58,7 @@ class DdsConnection(GraphQuestions, NativeConnection):
             self._participant.key, on_change=self._note_change, framing_of=framing_of
         )
         super().__init__(discovery, Types())
+        NativeConnection.__init__(self)
         self._tasks: TaskGroup | None = None
         self._found_s: float | None = None
         self._topics = Topics(
@@ -167,10 +168,6 @@ class DdsConnection(GraphQuestions, NativeConnection):
     def cancel_goal(self, goal: ActionGoal) -> None:
         """Asks for the end of a goal; its `end` tells whether that worked."""
         self._calls.cancel_goal(goal)
-
-    def give_up_goal(self, goal: ActionGoal) -> None:
-        """Waits no longer for a goal that shows no sign of life."""
-        self._calls.give_up_goal(goal)
 
     # --- who is there
 

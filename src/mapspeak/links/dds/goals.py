@@ -75,10 +75,6 @@ class ActionClient:
         """Asks for the end of a goal."""
         self._cancel.post({"goal_info": {"goal_id": _uuid(goal_id)}})
 
-    def give_up_goal(self, goal_id: str) -> None:
-        """Waits no longer for a goal."""
-        self._goals.pop(goal_id, None)
-
     def note_servers(self, keys: list[bytes]) -> None:
         """Takes in who serves the action now; goals are lost with the one that took them."""
         if self._server not in keys:

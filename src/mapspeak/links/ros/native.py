@@ -8,7 +8,7 @@ from typing import Any, Generic, Protocol, TypeVar
 from mapspeak.errors import LinkError
 from mapspeak.links.ros.late import Announcements, say_again
 from mapspeak.links.ros.subscription import TopicSubscription
-from mapspeak.ros import NAME, OwnEnds, Subscription
+from mapspeak.ros import NAME, ActionGoal, OwnEnds, Started, Subscription
 from mapspeak.ros.messages import Message, bare_type
 
 
@@ -105,7 +105,14 @@ class NativeTopics(ABC, Generic[Request]):
 
 
 class NativeConnection(ABC):
-    """The part of the port that is about topics."""
+    """The part of the port that is about topics, and what needs no network at all.
+
+    Attributes:
+        started: Everything that was started over this connection.
+    """
+
+    def __init__(self) -> None:
+        self.started = Started()
 
     @property
     def lost_for_s(self) -> float | None:
@@ -179,6 +186,9 @@ class NativeConnection(ABC):
 
     def clear_the_way(self) -> None:  # noqa: B027 - nothing is to be done, by anybody
         """Does nothing: in ROS 2 itself, nothing is held up by what was sent before."""
+
+    def give_up_goal(self, goal: ActionGoal) -> None:  # noqa: B027 - as above
+        """Does nothing: in ROS 2 itself, a goal holds up nothing."""
 
 
 def check_name(name: str) -> None:

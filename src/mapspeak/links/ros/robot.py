@@ -20,17 +20,19 @@ from mapspeak.links.ros.discovery import (
     look_at_robot,
 )
 from mapspeak.links.ros.driving import (
+    MOVE_BASE,
+    NAV2,
+    ActionDriver,
     Driver,
     DrivingPatience,
     GoalRecord,
     GoalTopicDriver,
-    MoveBaseDriver,
-    Nav2Driver,
 )
 from mapspeak.links.ros.frames import FrameListener
 from mapspeak.links.ros.laser import Laser
 from mapspeak.links.ros.maps import MapKeeper
 from mapspeak.links.ros.poses import PoseKeeper
+from mapspeak.links.ros.stopping import stop_everything
 from mapspeak.links.ros.velocity import Brake
 from mapspeak.robot import (
     CameraPicture,
@@ -88,7 +90,7 @@ class RosRobot:
         self._camera = self._build_camera()
         self._laser = self._build_laser()
         self._poses = PoseKeeper(connection, profile, frames)
-        self._brake = Brake(connection, profile)
+        self._brake = self._build_brake()
         self._driver = self._build_driver()
 
     @property
@@ -181,16 +183,22 @@ class RosRobot:
             await self._wanted_driver().cancel(record)
 
     async def stop(self) -> None:
-        """Ends every drive, those of other clients too, and commands zero velocity."""
+        """Ends all that we have started, and every drive of others; commands zero velocity.
+
+        Raises:
+            LinkError: Names what could not be told, or goes on.
+        """
         if not self.connection.is_open:
             await self.connection.wait_until_connected()
         self._brake.pull()
         if self._driver is None:
             # Others may have sent goals to a navigation that we have not found yet.
+            brake = self._brake
             with suppress(LinkError):
                 await self._look_again()
-        if self._driver is not None:
-            await self._driver.cancel_all()
+            if self._brake is not brake:
+                self._brake.pull()
+        await stop_everything(self.connection, brake=self._brake)
 
     async def _look_until(self, is_found: Callable[[], bool]) -> None:
         """Looks for what was not found yet: once, and right after connecting for a while."""
@@ -216,7 +224,7 @@ class RosRobot:
         if before.scan_topic is None and self.profile.scan_topic is not None:
             self._laser = self._build_laser()
         if before.velocity_topic is None:
-            self._brake = Brake(self.connection, self.profile)
+            self._brake = self._build_brake()
         if self._driver is None:
             self._driver = self._build_driver()
         if before.pose_source is not self.profile.pose_source:
@@ -240,24 +248,26 @@ class RosRobot:
         self.connection.start_soon(laser.close_when_idle)
         return laser
 
+    def _build_brake(self) -> Brake:
+        return Brake(self.connection, self.profile, latest_pose=lambda: self._poses.latest)
+
+    def _stand(self) -> None:
+        """Stops the base itself: whoever drove it has gone, and some keep to the last velocity."""
+        self._brake.pull()
+
     def _build_driver(self) -> Driver | None:
         profile, name = self.profile, self.profile.navigation_name
         if name is None:
             return None
         match profile.navigation:
-            case NavigationKind.NAV2:
-                return Nav2Driver(
+            case NavigationKind.NAV2 | NavigationKind.MOVE_BASE:
+                return ActionDriver(
                     self.connection,
                     name,
+                    NAV2 if profile.navigation is NavigationKind.NAV2 else MOVE_BASE,
                     map_frame=profile.map_frame,
                     patience=self._patience,
-                )
-            case NavigationKind.MOVE_BASE:
-                return MoveBaseDriver(
-                    self.connection,
-                    name,
-                    map_frame=profile.map_frame,
-                    patience=self._patience,
+                    on_lost=self._stand,
                 )
             case NavigationKind.GOAL_TOPIC:
                 return GoalTopicDriver(

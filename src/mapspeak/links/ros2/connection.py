@@ -47,6 +47,7 @@ class Ros2Connection(GraphQuestions, NativeConnection):
 
     def __init__(self, participant: Participant, tasks: TaskGroup, *, distro: str) -> None:
         super().__init__(participant, distro=distro)
+        NativeConnection.__init__(self)
         self._tasks = tasks
         self._found_s: float | None = None
         self._topics = Topics(participant)
@@ -115,10 +116,6 @@ class Ros2Connection(GraphQuestions, NativeConnection):
     def cancel_goal(self, goal: ActionGoal) -> None:
         """Asks for the end of a goal; its `end` tells whether that worked."""
         self._goals.cancel(goal)
-
-    def give_up_goal(self, goal: ActionGoal) -> None:
-        """Waits no longer for a goal that shows no sign of life."""
-        self._goals.give_up(goal)
 
     # --- who is there
 

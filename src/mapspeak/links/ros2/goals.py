@@ -52,15 +52,11 @@ class _Pursuit:
         servers: The ids in ROS of what published feedback when it was sent: a server that was
             killed and started again has the same name, and knows nothing of the goal.
         scope: Of what waits for its answers.
-        is_unwanted: It is to be cancelled as soon as the server has taken it.
-        is_given_up: Nobody listens any more.
     """
 
     goal: PursuedGoal
     servers: frozenset[bytes]
     scope: anyio.CancelScope = field(default_factory=anyio.CancelScope)
-    is_unwanted: bool = False
-    is_given_up: bool = False
 
 
 class Goals:
@@ -100,18 +96,10 @@ class Goals:
         return goal
 
     def cancel(self, goal: ActionGoal) -> None:
-        """Asks for the end of a goal, now or as soon as the server has taken it."""
+        """Asks for the end of a goal that the server has taken."""
         pursuit = self._pursuits.get(goal.goal_id)
-        if pursuit is not None:
-            pursuit.is_unwanted = True
-            if pursuit.goal.is_accepted:
-                self._start_soon(partial(self._ask_to_cancel, pursuit.goal))
-
-    def give_up(self, goal: ActionGoal) -> None:
-        """Says nothing more of a goal."""
-        pursuit = self._pursuits.get(goal.goal_id)
-        if pursuit is not None:
-            pursuit.is_given_up = True
+        if pursuit is not None and pursuit.goal.is_accepted:
+            self._start_soon(partial(self._ask_to_cancel, pursuit.goal))
 
     def refresh(self) -> None:
         """Takes in that servers have gone: nobody will tell how their goals end."""
@@ -120,8 +108,7 @@ class Goals:
                 continue
             del self._pursuits[pursuit.goal.goal_id]
             pursuit.scope.cancel()
-            if not pursuit.is_given_up:
-                pursuit.goal.take_loss()
+            pursuit.goal.take_loss()
 
     def _is_served(self, pursuit: _Pursuit) -> bool:
         servers = self._servers_of(pursuit.goal.action)
@@ -182,8 +169,7 @@ class Goals:
             except LinkError as error:
                 end = ActionEnd(status=None, is_result=False, values=error.message)
             self._pursuits.pop(goal.goal_id, None)
-            if not pursuit.is_given_up:
-                goal.take_end(end)
+            goal.take_end(end)
 
     async def _wait_for_result(self, used: _Action, goal_id: Any) -> ActionEnd:  # noqa: ANN401
         question = used.action_class.Impl.GetResultService.Request()
@@ -197,8 +183,6 @@ class Goals:
         if pursuit.goal.is_accepted:
             return
         pursuit.goal.take_acceptance()
-        if pursuit.is_unwanted:
-            self._start_soon(partial(self._ask_to_cancel, pursuit.goal))
 
     async def _ask_to_cancel(self, goal: PursuedGoal) -> None:
         arguments = {"goal_info": {"goal_id": _uuid(goal.goal_id)}}
@@ -222,7 +206,7 @@ class Goals:
 
     def _give_feedback(self, goal_id: str, feedback: Message) -> None:
         pursuit = self._pursuits.get(goal_id)
-        if pursuit is not None and not pursuit.is_given_up:
+        if pursuit is not None:
             self._accept(pursuit)
             pursuit.goal.take_feedback(feedback)
 

@@ -23,7 +23,15 @@ from mapspeak.navigation.safety.velocities import (
     refuse_velocity,
     zero_velocity_of,
 )
-from mapspeak.ros import ActionGoal, NodeLinks, OwnEnds, RosConnection, RosGraph, Subscription
+from mapspeak.ros import (
+    ActionGoal,
+    NodeLinks,
+    OwnEnds,
+    RosConnection,
+    RosGraph,
+    Started,
+    Subscription,
+)
 from mapspeak.ros.messages import Message
 
 __all__ = ["GuardedConnection"]
@@ -224,12 +232,12 @@ class GuardedConnection:
     # --- what ends something: never refused ---
 
     def cancel_goal(self, goal: ActionGoal) -> None:
-        """Asks for the end of a goal; its `end` tells whether that worked."""
+        """Asks for the end of a goal that the server has taken; its `end` tells if that worked."""
         self._connection.cancel_goal(goal)
         self._guard.note_event("stop", f"cancelled {goal.goal_id}", robot_s=self._now_s())
 
     def give_up_goal(self, goal: ActionGoal) -> None:
-        """Waits no longer for a goal that shows no sign of life."""
+        """Lets a goal without a sign of life hold up nothing; what is heard of it is told on."""
         self._connection.give_up_goal(goal)
 
     def clear_the_way(self) -> None:
@@ -257,6 +265,11 @@ class GuardedConnection:
     def own_ends(self) -> OwnEnds:
         """What of the system is our own doing."""
         return self._connection.own_ends
+
+    @property
+    def started(self) -> Started:
+        """Everything that was started over this connection."""
+        return self._connection.started
 
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Runs something in the background until the connection is closed."""

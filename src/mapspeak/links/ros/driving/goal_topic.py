@@ -56,6 +56,17 @@ class GoalTopicDriver:
         self._current: GoalRecord | None = None
         self._progress: _Progress | None = None
         connection.advertise(topic, type_name=dialect.type_name("geometry_msgs/PoseStamped"))
+        connection.started.actions[topic] = self
+
+    @property
+    def is_busy(self) -> bool:
+        """True while a goal of ours is under way."""
+        return self._current is not None and not self._current.is_over
+
+    @property
+    def owners(self) -> frozenset[str]:
+        """None: whoever drives sees to the end."""
+        return frozenset()
 
     @property
     def foreign_goals(self) -> tuple[GoalState, ...]:
@@ -65,6 +76,7 @@ class GoalTopicDriver:
     async def send(self, goal: Pose) -> GoalRecord:
         """Publishes a goal; nobody confirms it."""
         record = GoalRecord(new_id(), goal)
+        self._connection.started.n_begun += 1
         await self._publish(goal)
         if self._current is not None:
             self._current.end(GoalState.PREEMPTED, "A newer goal replaced it.")
@@ -95,7 +107,7 @@ class GoalTopicDriver:
             await self._publish((await self._fetch_pose()).pose)
             record.end(GoalState.CANCELLED)
 
-    async def cancel_all(self) -> None:
+    async def end(self) -> None:
         """Sends the robot to where it is."""
         await self._publish((await self._fetch_pose()).pose)
         if self._current is not None:

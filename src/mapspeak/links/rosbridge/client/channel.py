@@ -48,6 +48,8 @@ class Channel:
         self._wanted = anyio.Event()
         self._up_since_s = 0.0
         self._lost_since_s: float | None = None
+        self.was_replaced = False
+        """The latest loss was our own doing: the robot and its rosbridge went on."""
         self.n_connections = 0
         """How often it has been connected; more than one means that it was lost in between."""
 
@@ -143,6 +145,7 @@ class Channel:
         """Gives up a socket that does not answer for a fresh one; calls under way may finish."""
         stuck = connection or self._connection
         if stuck is not None and stuck is self._connection:
+            self.was_replaced = True
             stuck.retire()
 
     async def say_goodbye(self) -> None:
@@ -190,6 +193,7 @@ class Channel:
         self.n_connections += 1
         self._fault = self._lost_since_s = None
         tasks.start_soon(connection.serve)
+        self.was_replaced = False
         self._up_since_s = anyio.current_time()
         self._is_up.set()
 

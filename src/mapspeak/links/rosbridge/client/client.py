@@ -33,7 +33,7 @@ from mapspeak.links.rosbridge.protocol import (
     Published,
     StatusNoted,
 )
-from mapspeak.ros import ActionEnd, ActionGoal, OwnEnds, Subscription, new_id
+from mapspeak.ros import ActionEnd, ActionGoal, OwnEnds, Started, Subscription, new_id
 from mapspeak.ros.messages import Message
 
 N_REMARKS_KEPT = 50
@@ -58,12 +58,14 @@ class RosbridgeClient(Rosapi):
         super().__init__()
         self.address = address
         self.timing = timing
+        self.started = Started()
+        """Everything that was started over this connection."""
         self._control = self._channel()
         self._urgent = self._channel()
         self._caller = ServiceCaller(self._free_for_calls)
         self._requests: dict[str, TopicRequest] = {}
         self._announcements = Announcements(self._announce, self._take_back)
-        self._goals: dict[str, tuple[PursuedGoal, Channel]] = {}
+        self._goals: dict[str, tuple[PursuedGoal, Channel | None]] = {}
         self._tasks: TaskGroup | None = None
         self._published_s = float("-inf")
         self.n_frames_refused = 0
@@ -278,10 +280,10 @@ class RosbridgeClient(Rosapi):
         self._free_for_calls().send_if_up(text)
 
     def give_up_goal(self, goal: ActionGoal) -> None:
-        """Waits no longer for a goal that shows no sign of life; it may block its socket."""
-        known = self._goals.pop(goal.goal_id, None)
-        if known is not None:
-            _, channel = known
+        """Replaces the socket of a goal without a sign of life, which it may block."""
+        pursued, channel = self._goals.get(goal.goal_id, (None, None))
+        if pursued is not None and channel is not None:
+            self._goals[goal.goal_id] = (pursued, None)
             channel.replace()
 
     def clear_the_way(self) -> None:
@@ -358,7 +360,13 @@ class RosbridgeClient(Rosapi):
                 self.remarks.append(f"refused: {event.reason}")
 
     def _lose_goals(self, channel: Channel) -> None:
-        lost = [goal for goal, carrier in self._goals.values() if carrier is channel]
+        # rosbridge itself may have gone, and with it what it knew of goals that were given up.
+        is_alone = channel.was_replaced
+        lost = [
+            goal
+            for goal, carrier in self._goals.values()
+            if carrier is channel or (carrier is None and not is_alone)
+        ]
         for goal in lost:
             del self._goals[goal.goal_id]
             goal.take_loss()

@@ -3,17 +3,19 @@
 from typing import Annotated, Any
 
 import anyio
+from mcp.server.mcpserver import Context
 from pydantic import Field
 
 from mapspeak.errors import GoalError, LinkError
+from mapspeak.links.ros.actions import ActionState, SentGoal
 from mapspeak.navigation.safety import Act
 from mapspeak.ros.definitions import check_message
 from mapspeak.ros.messages import bare_type
+from mapspeak.server.callers import client_of
 from mapspeak.server.rosreports import cut, show_message
 from mapspeak.server.tools.ros.commands import RosCommands
-from mapspeak.server.tools.ros.goals import ActionBook
+from mapspeak.server.tools.ros.goals import ActionBook, Job
 from mapspeak.server.tools.ros.inquiry import RosInquiry, full_name
-from mapspeak.server.tools.ros.jobs import ActionState, Job
 from mapspeak.server.tools.ros.lists import Filter, Page, choose, say_page
 from mapspeak.server.tools.ros.losses import say_loss
 from mapspeak.server.toolset import Effect, Tool
@@ -48,6 +50,10 @@ NEXT_STEP = {
     ActionState.REJECTED: "It was not taken: check its values, and that the server is active.",
     ActionState.LOST: "Nobody knows how it ended: look at the robot, then send it again.",
 }
+UNANSWERED = (
+    "Should it be taken later, it is cancelled at once. Check that the server is active; what has "
+    "just started may not be found yet by all: then send it again."
+)
 GOES_ON = "It goes on: ros_goal_status waits for it, ros_cancel_goal ends it."
 
 
@@ -96,6 +102,7 @@ class ActionTools:
 
     async def ros_send_goal(
         self,
+        context: Context,
         action: Action,
         goal: GoalFields,
         wait_s: Wait = 5.0,
@@ -111,7 +118,8 @@ class ActionTools:
         said = await self._find_type(name, type)
         described = await self._inquiry.describe(said)
         checked = check_message(described.book, described.part(0), goal)
-        job = await self._book.send(name, checked, type_name=described.type)
+        client = client_of(context)
+        job = await self._book.send(name, checked, type_name=described.type, client=client)
         try:
             await self._book.wait(job, wait_s=wait_s)
         except anyio.get_cancelled_exc_class():
@@ -145,20 +153,19 @@ class ActionTools:
                 hint="goal_id ends one goal of ros_send_goal, action every goal of that action.",
             )
         if action is not None:
-            return f"{full_name(action)}: {await self._book.cancel_all(full_name(action))}."
+            n_cancelled = await self._book.cancel_all(full_name(action))
+            return f"{full_name(action)}: {say_count(n_cancelled, 'goal')} being cancelled."
         job = self._book.find(goal_id)
-        if job.is_over:
+        if job.goal.is_over:
             return f"{job.handle} was over already, nothing was cancelled.\n{self._say_job(job)}"
         await self._book.cancel(job)
         return self._say_job(job)
 
     async def _say_listed(self, action: str) -> str:
         listed = await self._book.fetch_listed(action)
-        lines = [
-            f"{goal.id}: {goal.state}, {f'ours, {goal.handle}' if goal.handle else 'not ours'}"
-            for goal in listed
-        ]
-        loss = say_loss(self._inquiry.connection, since_s=self._book.heard_s(action))
+        lines = [f"{goal.id}: {goal.state}, {goal.said}" for goal in listed]
+        heard_s = await self._book.fetch_heard_s(action)
+        loss = say_loss(self._inquiry.connection, since_s=heard_s)
         head = f"{say_count(len(lines), 'goal')}, by the server's ids:"
         return "\n".join([head, *(lines[-MOST_LISTED:] or ["none"]), *([loss] if loss else [])])
 
@@ -177,15 +184,21 @@ class ActionTools:
             return "(its type is not told)"
 
     def _say_job(self, job: Job) -> str:
-        passed_s = (job.ended_s or anyio.current_time()) - job.sent_s
-        parts = [f"{job.handle} ({job.action}): {job.state} after {passed_s:.1f} s."]
-        connection = self._inquiry.connection
-        loss = "" if job.is_over else say_loss(connection, since_s=job.sent_s)
-        said = [part for part in (loss, job.reason, NEXT_STEP.get(job.state, GOES_ON)) if part]
-        if said:
-            parts.append(" ".join(said))
-        if job.result is not None:
-            parts.append(f"result:\n{show_message(job.result)}")
-        elif job.feedback is not None:
-            parts.append(f"latest feedback of {job.n_feedback}:\n{show_message(job.feedback)}")
-        return cut("\n".join(parts))
+        goal = job.goal
+        passed_s = (goal.ended_s or anyio.current_time()) - goal.sent_s
+        parts = [f"{job.handle} ({goal.action}): {goal.state} after {passed_s:.1f} s."]
+        loss = "" if goal.is_over else say_loss(self._inquiry.connection, since_s=goal.sent_s)
+        reason = f"{goal.reason.rstrip('. ')}." if goal.reason else ""
+        said = [part for part in (loss, reason, goal.afterwards, _say_next_step(goal)) if part]
+        parts.append(" ".join(said))
+        if goal.result is not None:
+            parts.append(f"result:\n{show_message(goal.result)}")
+        elif goal.feedback is not None:
+            parts.append(f"latest feedback of {goal.n_feedback}:\n{show_message(goal.feedback)}")
+        return cut("\n".join(part for part in parts if part))
+
+
+def _say_next_step(goal: SentGoal) -> str:
+    if goal.state is ActionState.REJECTED and goal.is_withdrawn:
+        return UNANSWERED
+    return NEXT_STEP.get(goal.state, GOES_ON)

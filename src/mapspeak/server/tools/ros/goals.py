@@ -6,19 +6,37 @@ from dataclasses import dataclass
 import anyio
 
 from mapspeak.errors import GoalError
+from mapspeak.links.ros.actions import (
+    ActionClient,
+    ActionPatience,
+    ActionState,
+    SentGoal,
+    open_action,
+)
 from mapspeak.ros.messages import Dialect, Message
 from mapspeak.server.tools.ros.commands import RosCommands
-from mapspeak.server.tools.ros.goals1 import Ros1Pursuer
-from mapspeak.server.tools.ros.goals2 import Ros2Pursuer
 from mapspeak.server.tools.ros.inquiry import RosInquiry
-from mapspeak.server.tools.ros.jobs import ActionState, Job
-from mapspeak.server.tools.ros.pursuing import ActionPatience, Pursuer
 
-__all__ = ["ActionBook"]
+__all__ = ["ActionBook", "Job"]
 
 MOST_KEPT = 200
 POLL_S = 0.2
 USUAL_PATIENCE = ActionPatience()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Job:
+    """A goal with the handle that a model calls it by.
+
+    Attributes:
+        handle: Such as A1.
+        goal: As its action client knows it.
+        action: That client.
+    """
+
+    handle: str
+    goal: SentGoal
+    action: ActionClient
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,12 +46,12 @@ class ListedGoal:
     Attributes:
         id: The server's.
         state: As the server says.
-        handle: What a model calls it; None for one of others.
+        said: Whose it is.
     """
 
     id: str
     state: ActionState
-    handle: str | None
+    said: str
 
 
 class ActionBook:
@@ -56,7 +74,6 @@ class ActionBook:
         self._commands = commands
         self._patience = patience
         self._jobs: OrderedDict[str, Job] = OrderedDict()
-        self._pursuers: dict[str, Pursuer] = {}
         self._n_sent = 0
 
     @property
@@ -64,26 +81,31 @@ class ActionBook:
         """The handles of the goals that are kept."""
         return list(self._jobs)
 
-    async def send(self, action: str, goal: Message, *, type_name: str) -> Job:
-        """Sends a goal, and waits until the action server has taken or refused it.
+    async def send(self, action: str, goal: Message, *, type_name: str, client: str = "") -> Job:
+        """Send a goal, and wait until the action server has taken or refused it.
 
         Args:
             action: Its full name.
             goal: Fits its type.
             type_name: Of the action, as "package/Type".
+            client: Who has it sent: when that client is gone, the goal ends.
         """
-        pursuer = await self._pursuer_of(action)
-        said = await self._inquiry.said(type_name, kind="action")
+        await self._inquiry.check_action(action)
+        opened = await self._open(action, await self._inquiry.said(type_name, kind="action"))
+        connection = self._inquiry.connection
+        for topic, topic_type in opened.advertise(connection).items():
+            await self._commands.prepare(topic, topic_type)
+        sent = await opened.send(goal, through=connection, owner=client)
         self._n_sent += 1
-        job = Job(handle=f"A{self._n_sent}", action=action, type_name=said)
-        await pursuer.send(job, goal)
+        job = Job(handle=f"A{self._n_sent}", goal=sent, action=opened)
         self._jobs[job.handle] = job
         while len(self._jobs) > MOST_KEPT:
             self._jobs.popitem(last=False)
+        await opened.wait_until_taken(sent)
         return job
 
     def find(self, handle: str | None) -> Job:
-        """Gives a goal as it stands now; the latest when no handle is given.
+        """Return a goal as it stands now; the latest when no handle is given.
 
         Raises:
             GoalError: No goal has that handle.
@@ -96,60 +118,67 @@ class ActionBook:
                 f"There is no goal {handle[:40]!r}." if handle else "No goal has been sent yet.",
                 hint=f"The latest are {known}." if known else "ros_send_goal sends one.",
             )
-        self._pursuers[job.action].look_at(job)
+        job.action.look()
         return job
 
     async def wait(self, job: Job, *, wait_s: float) -> None:
-        """Waits until a goal is over, or so long in wall time."""
+        """Wait until a goal is over, or so long in wall time."""
         until_s = anyio.current_time() + wait_s
-        while not job.is_over and (left_s := until_s - anyio.current_time()) > 0:
-            await job.wait_until_over(within_s=min(left_s, POLL_S))
-            self._pursuers[job.action].look_at(job)
+        while not job.goal.is_over and (left_s := until_s - anyio.current_time()) > 0:
+            await job.goal.wait_until_over(within_s=min(left_s, POLL_S))
+            job.action.look()
 
     async def cancel(self, job: Job) -> None:
-        """Ends a goal, and waits a moment for its end."""
-        with anyio.CancelScope(shield=True):
-            await self._pursuers[job.action].cancel(job)
-        self._pursuers[job.action].look_at(job)
+        """End a goal, and wait a moment for its end.
 
-    async def cancel_all(self, action: str) -> str:
-        """Ends every goal of an action, whoever sent it, and says what came of it."""
-        pursuer = await self._pursuer_of(action)
-        await pursuer.wait_for_list()
-        said = await pursuer.cancel_all()
-        ours = [job for job in self._jobs.values() if job.action == action and not job.is_over]
-        for job in ours:
-            await job.wait_until_over(within_s=self._patience.end_s)
-        return said
+        Raises:
+            LinkError: The action server refuses, or goes on.
+        """
+        with anyio.CancelScope(shield=True):
+            await job.action.cancel(job.goal)
+
+    async def cancel_all(self, action: str) -> int:
+        """End every goal of an action, whoever sent it; return how many there were."""
+        client = await self._find_client(action)
+        await client.wait_for_list()
+        n_cancelled = await client.cancel_all(self._inquiry.connection)
+        for goal in client.open_goals:
+            await goal.wait_until_over(within_s=self._patience.end_s)
+        return n_cancelled
 
     async def fetch_listed(self, action: str) -> list[ListedGoal]:
-        """Gives each goal that an action server knows, ours and others'."""
-        pursuer = await self._pursuer_of(action)
-        await pursuer.wait_for_list()
-        ours = pursuer.handles
+        """Return each goal that an action server knows, ours and others'."""
+        client = await self._find_client(action)
+        await client.wait_for_list()
+        handles = {job.goal.id: job.handle for job in self._jobs.values()}
+        ours = {
+            server_id: f"ours, {handles.get(goal.id, 'of a drive')}"
+            for server_id, goal in client.ours.items()
+        }
         return [
-            ListedGoal(id=goal_id, state=state, handle=ours.get(goal_id))
-            for goal_id, state in pursuer.listed.items()
+            ListedGoal(id=goal_id, state=state, said=ours.get(goal_id, "not ours"))
+            for goal_id, state in client.listed.items()
         ]
 
-    def heard_s(self, action: str) -> float:
-        """Gives when an action server's list of goals came, by the event loop's clock."""
-        return self._pursuers[action].listed_s
+    async def fetch_heard_s(self, action: str) -> float:
+        """Return when an action server's list of goals came, by the event loop's clock."""
+        return (await self._find_client(action)).listed_s
 
-    async def _pursuer_of(self, action: str) -> Pursuer:
-        if action not in self._pursuers:
-            await self._inquiry.check_action(action)
-            self._pursuers[action] = await self._build_pursuer(action)
-        return self._pursuers[action]
+    async def _find_client(self, action: str) -> ActionClient:
+        known = self._inquiry.connection.started.actions.get(action)
+        if isinstance(known, ActionClient):
+            return known
+        await self._inquiry.check_action(action)
+        is_ros2 = await self._inquiry.fetch_dialect() is Dialect.ROS2
+        # In ROS 2 all that is asked here is of one type, whatever the action's is.
+        type_name = "" if is_ros2 else await self._inquiry.fetch_action_type(action)
+        return await self._open(action, type_name)
 
-    async def _build_pursuer(self, action: str) -> Pursuer:
-        connection = self._inquiry.connection
-        if await self._inquiry.fetch_dialect() is Dialect.ROS2:
-            return Ros2Pursuer(connection, self._commands, action, patience=self._patience)
-        return Ros1Pursuer(
-            connection,
-            self._commands,
+    async def _open(self, action: str, type_name: str) -> ActionClient:
+        return open_action(
+            self._inquiry.connection,
             action,
-            type_name=await self._inquiry.fetch_action_type(action),
+            dialect=await self._inquiry.fetch_dialect(),
+            type_name=type_name,
             patience=self._patience,
         )
