@@ -232,8 +232,13 @@ async def test_without_frames_the_pose_comes_from_odometry() -> None:
     }
     scripted.topics["/odom"] = "nav_msgs/msg/Odometry"
     async with connected(scripted, timing=replace(QUICK, frames_s=0.01)) as robot:
-        assert (await robot.fetch_pose()).pose == Pose(1.0, 0.0, 0.0)
+        found = await robot.fetch_pose()
+        assert found.pose == Pose(1.0, 0.0, 0.0)
+        assert found.is_odometry
         assert robot.profile.pose_topic == "/odom"
+        poses = PoseKeeper(robot.connection, robot.profile, robot._frames, silence_s=0.0)
+        with pytest.raises(LinkError, match="no odometry has come"):
+            await poses.fetch(timeout_s=0.01)
 
 
 async def test_transforms_that_are_none_are_left_away() -> None:

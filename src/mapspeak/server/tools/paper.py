@@ -18,7 +18,7 @@ from mapspeak.server.memory.lasers import fetch_ring
 from mapspeak.server.memory.remembering import say_far
 from mapspeak.server.reports import MemoryAnswer, WriteAnswer
 from mapspeak.server.toolset import Effect, Tool
-from mapspeak.server.wording import say_pose
+from mapspeak.server.wording import say_pose, say_pose_doubt
 from mapspeak.session import Session
 from mapspeak.spatial.picture import (
     draw_map_axis,
@@ -114,9 +114,10 @@ class PaperTools:
         Use it after draw_map_axis, or alone.
         """
         grid = await self._session.robot.fetch_map()
-        pose = (await self._session.robot.fetch_pose()).pose
-        picture = await self._session.compute(lambda: draw_robot_pose(grid, pose))
-        text = f"{say_axes(grid, picture)} Robot: {say_pose(pose)}."
+        here = await self._session.robot.fetch_pose()
+        picture = await self._session.compute(lambda: draw_robot_pose(grid, here.pose))
+        doubt = say_pose_doubt(here.find_doubt(self._session.robot.now_s))
+        text = f"{say_axes(grid, picture)} Robot: {say_pose(here.pose)}. {doubt}".rstrip()
         return [text, Image(data=picture.png, format="png")]
 
     async def write_semantic_data(
@@ -139,7 +140,8 @@ class PaperTools:
         _check_name(name)
         annotator = Annotator(pictures=self._session.pictures)
         origin = annotator.find_origin(safety_landmarks, functional_landmarks)
-        here = (await self._session.robot.fetch_pose()).pose
+        stamped = await self._session.robot.fetch_pose()
+        here, doubt = stamped.pose, stamped.find_doubt(self._session.robot.now_s)
         pose = _observation_pose(here if origin is None else origin.pose, x, y, yaw_deg)
         if x is not None:
             await self._require_on_map(pose)
@@ -163,11 +165,15 @@ class PaperTools:
             lambda: self._session.memory.remember(waypoint, gone=gone or ())
         )
         kept = await self._session.compute(lambda: self._session.diary.keep_record(waypoint))
-        far = await self._say_far(receipt)
-        warnings = filter(None, (*far, kept.fault, await self._session.keep_map()))
+        warnings = [*await self._say_far(receipt), kept.fault, await self._session.keep_map()]
+        warnings += [say_pose_doubt(doubt)] if pose.point == here.point else []
         places = await self._session.compute(self._session.memory.read)
         return WriteAnswer.of(
-            receipt, places, merge=merge, refused=annotator.refused, warnings=tuple(warnings)
+            receipt,
+            places,
+            merge=merge,
+            refused=annotator.refused,
+            warnings=tuple(filter(None, warnings)),
         )
 
     async def get_semantic_data(
