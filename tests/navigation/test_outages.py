@@ -224,7 +224,7 @@ class StandingClock(FakeRobot):
     """A simulation that is paused: its clock cannot be waited for."""
 
     async def sleep(self, duration_s: float) -> None:
-        raise LinkError("The robot's simulated clock stands still.", hint="Unpause it.")
+        raise LinkError(f"{duration_s} s cannot be waited for: the clock stands.", hint="Unpause.")
 
 
 async def test_waiting_ends_when_the_robots_clock_stands() -> None:

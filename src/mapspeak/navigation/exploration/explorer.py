@@ -152,9 +152,8 @@ class Explorer:
                 ExplorationState.INTERRUPTED,
                 self._trips.why_ended or "Something ended the drive.",
             )
-        if state is TripState.ARRIVED:
-            if self._bounds.stops_at_goals:
-                return ExplorationState.AT_GOAL, "The robot stands at a frontier."
+        if state is TripState.ARRIVED and self._bounds.stops_at_goals:
+            return ExplorationState.AT_GOAL, "The robot stands at a frontier."
         return (ExplorationState.DRIVING, "There is more to explore.") if is_late else None
 
     def _find_seen_from_here(self, atlas: Atlas) -> str | None:
