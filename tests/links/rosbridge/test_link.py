@@ -785,15 +785,17 @@ async def test_a_clock_that_is_told_and_does_not_move_on_is_not_waited_for_witho
     scripted.latched["/clock"] = paused
     async with connected(scripted) as robot:
         clock = RobotClock(robot.connection, standstill_s=0.2)
-        await clock.start("/clock")
+        ticks = robot.connection.subscribe("/clock")
 
         async def go_on_telling() -> None:
             while True:
+                n_before = ticks.n_received
                 await scripted.publish("/clock", paused)
-                await anyio.lowlevel.checkpoint()
+                await ticks.wait_for_more_than(n_before, timeout_s=PATIENCE_S)
 
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(go_on_telling)
+            await clock.start("/clock")
             with pytest.raises(LinkError, match="has stood still"):
                 await clock.sleep(1.0)
             tasks.cancel_scope.cancel()
