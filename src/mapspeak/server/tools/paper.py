@@ -11,6 +11,7 @@ from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.navigation.goals import FARTHEST_M
 from mapspeak.navigation.places import is_taken_name
 from mapspeak.navigation.recall import find_speaking_places
+from mapspeak.robot import PoseDoubt
 from mapspeak.semantic import TakenPicture, Waypoint, WriteReceipt
 from mapspeak.server.mapview.captions import say_axes, say_plain
 from mapspeak.server.memory.annotating import Annotator, Landmarks
@@ -114,10 +115,11 @@ class PaperTools:
         Use it after draw_map_axis, or alone.
         """
         grid = await self._session.robot.fetch_map()
-        here = await self._session.robot.fetch_pose()
-        picture = await self._session.compute(lambda: draw_robot_pose(grid, here.pose))
-        doubt = say_pose_doubt(here.find_doubt(self._session.robot.now_s))
-        text = f"{say_axes(grid, picture)} Robot: {say_pose(here.pose)}. {doubt}".rstrip()
+        here, doubt = await self._find_robot()
+        picture = await self._session.compute(lambda: draw_robot_pose(grid, here))
+        text = (
+            f"{say_axes(grid, picture)} Robot: {say_pose(here)}. {say_pose_doubt(doubt)}".rstrip()
+        )
         return [text, Image(data=picture.png, format="png")]
 
     async def write_semantic_data(
@@ -140,8 +142,7 @@ class PaperTools:
         _check_name(name)
         annotator = Annotator(pictures=self._session.pictures)
         origin = annotator.find_origin(safety_landmarks, functional_landmarks)
-        stamped = await self._session.robot.fetch_pose()
-        here, doubt = stamped.pose, stamped.find_doubt(self._session.robot.now_s)
+        here, doubt = await self._find_robot()
         pose = _observation_pose(here if origin is None else origin.pose, x, y, yaw_deg)
         if x is not None:
             await self._require_on_map(pose)
@@ -167,10 +168,9 @@ class PaperTools:
         kept = await self._session.compute(lambda: self._session.diary.keep_record(waypoint))
         warnings = [*await self._say_far(receipt), kept.fault, await self._session.keep_map()]
         warnings += [say_pose_doubt(doubt)] if pose.point == here.point else []
-        places = await self._session.compute(self._session.memory.read)
         return WriteAnswer.of(
             receipt,
-            places,
+            await self._session.compute(self._session.memory.read),
             merge=merge,
             refused=annotator.refused,
             warnings=tuple(filter(None, warnings)),
@@ -193,6 +193,10 @@ class PaperTools:
         atlas = await self._session.fetch_atlas()
         shown, answer = await self._session.compute(lambda: find_speaking_places(atlas, query))
         return MemoryAnswer.of_places(atlas.memory, shown, advice=[answer.advice])
+
+    async def _find_robot(self) -> tuple[Pose, PoseDoubt | None]:
+        here = await self._session.robot.fetch_pose()
+        return here.pose, here.find_doubt(self._session.robot.now_s)
 
     async def _add_laser(
         self,
