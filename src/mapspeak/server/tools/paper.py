@@ -166,15 +166,11 @@ class PaperTools:
             lambda: self._session.memory.remember(waypoint, gone=gone or ())
         )
         kept = await self._session.compute(lambda: self._session.diary.keep_record(waypoint))
-        warnings = [*await self._say_far(receipt), kept.fault, await self._session.keep_map()]
-        warnings += [say_pose_doubt(doubt)] if pose.point == here.point else []
-        return WriteAnswer.of(
-            receipt,
-            await self._session.compute(self._session.memory.read),
-            merge=merge,
-            refused=annotator.refused,
-            warnings=tuple(filter(None, warnings)),
-        )
+        unsure = say_pose_doubt(doubt) if pose.point == here.point else ""
+        far, moved = await self._say_far(receipt), await self._session.keep_map()
+        places = await self._session.compute(self._session.memory.read)
+        told, refused = filter(None, (*far, unsure, kept.fault, moved)), annotator.refused
+        return WriteAnswer.of(receipt, places, merge=merge, refused=refused, warnings=(*told,))
 
     async def get_semantic_data(
         self, name: WaypointName = None, query: Query = None
