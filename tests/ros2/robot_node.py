@@ -50,7 +50,7 @@ class RobotNode:
         self.motion = motion
         self.topics = Topics(self.node, motion.faults)
         self._read_map = map_texts
-        self._contexts: list[Any] = []
+        self._bystanders: list[Any] = []
         declare_parameters(self.node)
         self.topics.offer_motor_switch(self.switch_motors)
         self.navigation = self._start_navigation()
@@ -75,8 +75,7 @@ class RobotNode:
         """Add a participant to the domain: a process more, as far as DDS can tell."""
         context = rclpy.Context()
         context.init()
-        self._contexts.append(context)
-        rclpy.create_node(f"bystander_{number}", context=context)
+        self._bystanders.append(rclpy.create_node(f"bystander_{number}", context=context))
 
     # --- at each step
 

@@ -74,10 +74,14 @@ async def test_a_velocity_ends_with_a_stand(
 ) -> None:
     async with tools(rosbridge_url, tmp_path) as caller:
         message = {"linear": {"x": 0.2}}
-        await caller.ask("ros_publish", topic="/cmd_vel", message=message, duration_s=0.5)
-        # Between rosbridge and the robot lies ROS, which takes its own time.
+
+        async def is_heard() -> bool:
+            await caller.ask("ros_publish", topic="/cmd_vel", message=message, duration_s=0.5)
+            return (0.2, 0.0) in robot.velocities
+
+        # Between rosbridge and the robot lies ROS, where a new publisher is not heard at once.
+        await eventually(is_heard)
         await eventually(lambda: is_told_to_stand(robot))
-    assert (0.2, 0.0) in robot.velocities
 
 
 async def is_told_to_stand(robot: RobotProcess) -> bool:

@@ -1,7 +1,6 @@
 """The MCP server around a session: chosen tools, readable errors, lean schemas."""
 
 import json
-import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -37,9 +36,6 @@ __all__ = ["DEFAULT_TOOLSETS", "MapspeakServer", "build_server"]
 DEFAULT_TOOLSETS = ("look", "places", "drive", "paper")
 
 
-ARGUMENT = re.compile(r"(?!(?:str|int|float|bool|none)$)[a-z0-9_]+")
-"""A name of an argument, or the number of an item; pydantic names the tried types among them."""
-INSTANCE = re.compile(r"a valid dictionary or instance of \w+")
 MOST_BYTES = 1_000_000
 """Of the arguments of one call, written as JSON; no model writes a hundredth of that."""
 
@@ -312,13 +308,11 @@ def _explain(name: str, cause: BaseException | None) -> str | None:
             return str(cause)
         case ValidationError():
             faults = [_fault(error["loc"], error["msg"]) for error in cause.errors()]
-            return f"{name} was called with wrong arguments: {'; '.join(dict.fromkeys(faults))}."
+            return f"{name} was called with wrong arguments: {'; '.join(faults)}."
         case _:
             return None
 
 
 def _fault(location: tuple[int | str, ...], message: str) -> str:
-    """Says where something is wrong, by the names that the caller gave and no class of ours."""
-    named = [str(part) for part in location if ARGUMENT.fullmatch(str(part))]
-    said = INSTANCE.sub("an object", message)
-    return f"{'.'.join(named) or 'arguments'}: {said[:1].lower()}{said[1:]}"
+    where = ".".join(str(part) for part in location) or "arguments"
+    return f"{where}: {message[:1].lower()}{message[1:]}"

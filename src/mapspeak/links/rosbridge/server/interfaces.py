@@ -19,9 +19,7 @@ from mapspeak.ros.definitions import (
 )
 from mapspeak.ros.messages import Dialect, bare_type
 
-__all__ = ["ROS2_DISTRIBUTION", "Interfaces"]
-
-ROS2_DISTRIBUTION = "jazzy"
+__all__ = ["Interfaces"]
 
 KIND_OF_GENERATED = {
     **dict.fromkeys(("Request", "Response"), "srv"),
@@ -42,7 +40,7 @@ class Interfaces:
 
     def __init__(self, dialect: Dialect, *, more: Mapping[str, str] = NO_MORE) -> None:
         self._dialect = dialect
-        self._book = TypeBook({**known_definitions(dialect, distro=ROS2_DISTRIBUTION), **more})
+        self._book = TypeBook({**known_definitions(dialect), **more})
         self._fixed_arrays: dict[str, bool] = {}
 
     @property
