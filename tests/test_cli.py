@@ -6,7 +6,7 @@ from click.testing import CliRunner
 
 from drawing import grid_from_text
 from mapspeak.cli import cli, main
-from mapspeak.cli.serving import usual_semantic_map
+from mapspeak.cli.memory.files import usual_memory
 from mapspeak.spatial.mapfiles import write_map
 
 ROOM = """
@@ -84,7 +84,7 @@ def test_a_check_up_of_the_simulated_robot_finds_nothing_missing() -> None:
 
 
 def test_robots_that_do_not_name_their_map_remember_in_files_of_their_own() -> None:
-    one, other = (usual_semantic_map("", f"ws://10.0.0.{n}:9090") for n in (1, 2))
+    one, other = (usual_memory(Path(), "", f"ws://10.0.0.{n}:9090") for n in (1, 2))
     assert one != other
     assert not one.name.startswith(".")
-    assert usual_semantic_map("hall 3", "ws://10.0.0.1:9090").name == "hall_3.yaml"
+    assert usual_memory(Path(), "hall 3", "ws://10.0.0.1:9090").name == "hall_3.yaml"

@@ -1,4 +1,4 @@
-"""The errors mapspeak raises on purpose, and nothing else.
+"""The errors mapspeak raises on purpose, and how causes are told.
 
 MapspeakError           everything below; carries what is wrong and what to do next
 |- ConfigError          a flag, a world file or a setting that cannot be used
@@ -8,6 +8,11 @@ MapspeakError           everything below; carries what is wrong and what to do n
 |- PolicyError          what the policy, a hold or a person does not allow
 `- SemanticMapError     the semantic map file or a record in it is wrong
 """
+
+
+def say_cause(error: Exception) -> str:
+    """Return what is wrong in words, without the number and the path that an OSError puts there."""
+    return error.strerror if isinstance(error, OSError) and error.strerror else str(error)
 
 
 class MapspeakError(Exception):

@@ -6,15 +6,25 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-from mapspeak.errors import ConfigError
+from mapspeak.errors import ConfigError, say_cause
 
 __all__ = ["read_settings"]
 
 MAX_FILE_BYTES = 1_000_000
+
+PLAIN = {
+    "too_short": "it needs at least {min_length} parts, and has {actual_length}",
+    "too_long": "it may have {max_length} parts, and has {actual_length}",
+    "string_too_short": "it is empty",
+    "string_too_long": "it is longer than {max_length} characters",
+    "string_pattern_mismatch": "it is not of the form it has to have",
+}
+"""What is wrong with a value, by what pydantic calls it."""
 
 Settings = TypeVar("Settings", bound=BaseModel)
 Location = tuple[int | str, ...]
@@ -70,7 +80,8 @@ def _load(path: Path, name: str) -> Any:  # noqa: ANN401 - whatever a person wro
         ) from error
     except (OSError, UnicodeDecodeError, YAMLError, RecursionError, ValueError) as error:
         raise ConfigError(
-            f"{path} cannot be read: {error}.", hint="Check the path, and that it is a text file."
+            f"{path} cannot be read: {say_cause(error)}.",
+            hint="Check the path, and that it is a text file.",
         ) from error
 
 
@@ -93,9 +104,17 @@ def _fault_in(
         what = f"'{key}' is not a key of {name}."
         hint = f"Did you mean `{near[0]}`?" if near else f"Here belong: {', '.join(known)}."
     else:
-        what = f"'{key or name}' cannot be {str(first['input'])[:80]!r}: {first['msg']}."
+        what = f"'{key or name}' cannot be {str(first['input'])[:80]!r}: {_say_fault(first)}."
         hint = advice
     return ConfigError(f"{path}, line {_line_of(tree, location)}: {what}{more}", hint=hint)
+
+
+def _say_fault(fault: ErrorDetails) -> str:
+    """Return what is wrong with a value; the library speaks to programmers of some of it."""
+    told = PLAIN.get(fault["type"])
+    return (
+        told.format(**fault["ctx"]) if told else fault["msg"].replace("Input should", "it should")
+    )
 
 
 def _keys_beside(model: Any, location: Location) -> list[str]:  # noqa: ANN401 - see below

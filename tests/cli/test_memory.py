@@ -303,7 +303,7 @@ def test_the_only_memory_of_the_user_needs_no_name(
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     (tmp_path / "mapspeak").mkdir()
     refused(monkeypatch, "list")
-    assert "--semantic-map" in capsys.readouterr().err
+    assert "--memory" in capsys.readouterr().err
     places.rename(tmp_path / "mapspeak" / "hall.yaml")
     assert "2 places on the map hall." in told("list")
 

@@ -1,9 +1,12 @@
 """`mapspeak serve`: its help, and what it writes and tells."""
 
 import os
+import pty
 import re
 import shlex
+import socket
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import anyio
@@ -22,6 +25,7 @@ from mapspeak.server.tools import build_toolsets
 from mapspeak.session import Session
 from rosbridge_robot import ScriptedRobot
 from rosbridge_script import PATIENCE_S, running
+from served import text_of
 
 
 def test_the_help_names_every_toolset_and_those_that_are_there_by_default(tmp_path: Path) -> None:
@@ -123,3 +127,115 @@ def test_a_memory_that_is_named_by_a_password_never_takes_the_place_of_another(
     said = capsys.readouterr().err
     assert "Remove it" in said
     assert "s3cr3tpw" not in said
+
+
+def environment(folder: Path) -> dict[str, str]:
+    return {"XDG_DATA_HOME": str(folder), "TMPDIR": str(folder), "PATH": os.environ["PATH"]}
+
+
+def memories_in(folder: Path) -> list[Path]:
+    """Return every memory, and every folder for the time of a run."""
+    kinds = ("*.yaml", "*.memory", "mapspeak-*")
+    return [path for kind in kinds for path in folder.rglob(kind)]
+
+
+def in_office(folder: Path, *options: str) -> Client:
+    arguments = ["-m", "mapspeak", "serve", "--robot", "sim:office", *options]
+    server = StdioServerParameters(command=sys.executable, args=arguments, env=environment(folder))
+    return Client(stdio_client(server))
+
+
+@pytest.mark.anyio
+async def test_a_simulated_robot_remembers_nothing_of_an_earlier_one(tmp_path: Path) -> None:
+    with anyio.fail_after(PATIENCE_S):
+        async with in_office(tmp_path) as client:
+            assert not (await client.call_tool("write_semantic_data", FACTS)).is_error
+            assert memories_in(tmp_path)
+        async with in_office(tmp_path) as client:
+            remembered = text_of(await client.call_tool("get_semantic_data", {}))
+    assert "desk" not in remembered
+    assert not memories_in(tmp_path)
+
+
+@pytest.mark.anyio
+@pytest.mark.parametrize("option", ["--memory", "--semantic-map"])
+async def test_a_simulated_robot_keeps_the_memory_that_it_is_given(
+    tmp_path: Path, option: str
+) -> None:
+    file = tmp_path / "kept.yaml"
+    with anyio.fail_after(PATIENCE_S):
+        async with in_office(tmp_path, option, str(file)) as client:
+            await client.call_tool("write_semantic_data", FACTS)
+    assert [each.name for each in SemanticMapStore(file).read().waypoints] == ["desk"]
+
+
+@pytest.mark.anyio
+@pytest.mark.parametrize(
+    ("toolsets", "has", "lacks"),
+    [
+        ("+explore", {"explore", "look_at_map", "stop_robot"}, set()),
+        ("explore", {"explore", "stop_robot"}, {"look_at_map", "navigate_to"}),
+        ("look", {"look_at_map"}, {"stop_robot"}),
+    ],
+)
+async def test_toolsets_are_replaced_or_added_to_and_who_drives_can_stop(
+    tmp_path: Path, toolsets: str, has: set[str], lacks: set[str]
+) -> None:
+    with anyio.fail_after(PATIENCE_S):
+        async with in_office(tmp_path, "--toolsets", toolsets) as client:
+            names = {tool.name for tool in (await client.list_tools()).tools}
+    assert names >= has
+    assert not names & lacks
+
+
+@pytest.mark.anyio
+async def test_over_http_it_says_where_it_answers_once_it_does(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    command = [sys.executable, "-m", "mapspeak", "serve", "--robot", "sim:office"]
+    with anyio.fail_after(PATIENCE_S):
+        async with await anyio.open_process(
+            [*command, "--http", f"127.0.0.1:{port}"], env=environment(tmp_path)
+        ) as process:
+            assert process.stderr is not None
+            said = (await process.stderr.receive()).decode()
+            where = await ask_for(port, "/")
+            process.terminate()
+            await process.wait()
+    assert said == f"mapspeak: sim:office at http://127.0.0.1:{port}/mcp (Ctrl-C ends it)\n"
+    assert "/mcp" in where
+    assert "/health" in where
+    assert not memories_in(tmp_path)
+
+
+async def ask_for(port: int, path: str) -> str:
+    answer = b""
+    async with await anyio.connect_tcp("127.0.0.1", port) as stream:
+        await stream.send(
+            f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nConnection: close\r\n\r\n".encode()
+        )
+        with suppress(anyio.EndOfStream):
+            while True:
+                answer += await stream.receive()
+    assert answer.startswith(b"HTTP/1.1 200")
+    return answer.decode()
+
+
+@pytest.mark.anyio
+async def test_a_person_who_types_it_is_told_that_it_waits_for_a_client(tmp_path: Path) -> None:
+    ours, terminal = pty.openpty()
+    command = [sys.executable, "-m", "mapspeak", "serve", "--robot", "sim:office"]
+    try:
+        with anyio.fail_after(PATIENCE_S):
+            async with await anyio.open_process(
+                command, stdin=terminal, env=environment(tmp_path)
+            ) as process:
+                assert process.stderr is not None
+                said = (await process.stderr.receive()).decode()
+                process.terminate()
+                await process.wait()
+    finally:
+        os.close(ours)
+        os.close(terminal)
+    assert said.startswith("mapspeak: sim:office for an MCP client on standard input")
+    assert "serve --http` serves it at an address" in said

@@ -307,3 +307,29 @@ def test_a_map_called_by_control_characters_is_refused(
     assert run_map(monkeypatch, "of\x07fice.yaml", "--osm", "x.osm") == 1
     assert "control characters" in capsys.readouterr().err
     assert not Path("x.osm").exists()
+
+
+def test_a_text_file_is_told_to_be_no_picture(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "README.md").write_text("# A house\n")
+    assert run_map(monkeypatch, "README.md") == 2
+    assert "README.md is no picture, and no map's .yaml file." in capsys.readouterr().err
+
+
+def test_results_of_several_maps_do_not_go_to_what_looks_like_one_file(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("hall", "yard"):
+        put_map(folder / "maps" / f"{name}.yaml")
+    assert run_map(monkeypatch, "maps", "--out", "depot.png") == 2
+    assert "There are 2 maps" in capsys.readouterr().err
+    assert names_in(folder) == ["maps"]
+
+
+def test_what_was_written_is_told(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    put_map(folder / "hall.yaml")
+    assert run_map(monkeypatch, "hall.yaml", "--out", "pictures", "--json", "facts.json") == 0
+    assert "Written: pictures, facts.json\n" in capsys.readouterr().out

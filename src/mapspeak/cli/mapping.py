@@ -91,6 +91,8 @@ def _show_maps(jobs: "list[MapJob]") -> int:
         tell(f"{number} of {len(jobs)}: {job.file}")
         try:
             said, is_error = show_map(job), False
+            if job.outputs:
+                said += f"\nWritten: {', '.join(map(str, job.outputs.values()))}"
         except MapError as error:
             said, is_error = f"mapspeak: {job.file}: {error}", True
         tell("")

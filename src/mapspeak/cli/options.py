@@ -1,10 +1,13 @@
-"""Options that several commands have."""
+"""Options that several commands have, and what is read from them."""
 
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
+
+from mapspeak.geometry import Pose
 
 __all__ = [
     "DEFAULT_WORLD",
@@ -14,6 +17,7 @@ __all__ = [
     "SEED_OPTION",
     "WORLD_OPTION",
     "add_options",
+    "read_pose",
 ]
 
 Command = Callable[..., Any]
@@ -55,3 +59,19 @@ def add_options(options: Sequence[Decorator]) -> Decorator:
         return function
 
     return add
+
+
+def read_pose(
+    _context: click.Context, _parameter: click.Parameter, value: str | None
+) -> Pose | None:
+    """Return the pose that an option gives as X,Y,YAW_DEG."""
+    if value is None:
+        return None
+    try:
+        x, y, yaw_deg = (float(part) for part in value.split(","))
+        pose = Pose(x, y, math.radians(yaw_deg))
+    except ValueError:
+        raise click.BadParameter("write three numbers, such as 2.5,1,90") from None
+    if not pose.is_finite():
+        raise click.BadParameter("the numbers have to be finite")
+    return pose

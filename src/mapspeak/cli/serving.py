@@ -3,12 +3,15 @@
 import gc
 import math
 import os
-import re
+import shutil
 import signal
+import sys
 from collections.abc import Collection, Mapping
 from contextlib import AsyncExitStack
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import anyio
@@ -16,17 +19,25 @@ import click
 
 from mapspeak.cli.fleet import file_for, name_robots, split_files
 from mapspeak.cli.guarding import GUARD_OPTIONS, GuardChoice, build_guard, data_folder
-from mapspeak.cli.memory.files import rename_memory
-from mapspeak.cli.options import DEFAULT_WORLD, FILE, ROBOT_HELP, ROBOT_OPTIONS, add_options
+from mapspeak.cli.memory.files import rename_memory, usual_memory
+from mapspeak.cli.options import (
+    DEFAULT_WORLD,
+    FILE,
+    ROBOT_HELP,
+    ROBOT_OPTIONS,
+    add_options,
+    read_pose,
+)
 from mapspeak.cli.robots import RobotChoice, open_served_robot
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Pose
+from mapspeak.installation import shell_command
 
 if TYPE_CHECKING:
     from mapspeak.server import CallLog, MapspeakServer, Representation
     from mapspeak.session import Session
 
-__all__ = ["serve", "usual_semantic_map"]
+__all__ = ["serve"]
 
 TOKEN_VARIABLE = "MAPSPEAK_HTTP_TOKEN"  # noqa: S105 - the variable's name, not a token
 DEFAULT_HTTP = "127.0.0.1:8766"
@@ -79,21 +90,6 @@ def _split_names(
     return tuple(name.strip() for name in value.split(",") if name.strip())
 
 
-def _read_pose(
-    _context: click.Context, _parameter: click.Parameter, value: str | None
-) -> Pose | None:
-    if value is None:
-        return None
-    try:
-        x, y, yaw_deg = (float(part) for part in value.split(","))
-        pose = Pose(x, y, math.radians(yaw_deg))
-    except ValueError:
-        raise click.BadParameter("write three numbers, such as 2.5,1,90") from None
-    if not pose.is_finite():
-        raise click.BadParameter("the numbers have to be finite")
-    return pose
-
-
 def _read_representation(
     _context: click.Context, _parameter: click.Parameter, value: str | None
 ) -> "Representation | None":
@@ -137,23 +133,27 @@ def _read_representation(
     is_flag=False,
     flag_value=DEFAULT_HTTP,
     metavar="[HOST:PORT]",
-    help=f"Streaming HTTP instead of stdio; {DEFAULT_HTTP} unless said otherwise.",
+    help=f"Streaming HTTP instead of stdio, at /mcp; {DEFAULT_HTTP} unless said otherwise. GET "
+    f"/health answers ok. Beyond this machine clients must send the bearer token in "
+    f"{TOKEN_VARIABLE}.",
 )
 @click.option(
     "--toolsets",
     callback=_split_names,
     default=None,
     help="Groups of tools, comma-separated, in place of look,places,drive,paper; others are "
-    "explore, routes, memory and ros.",
+    "explore, routes, memory and ros. +NAME adds one to these, as in +explore.",
 )
 @click.option("--tools", callback=_split_names, default=None, help="Single tools besides.")
 @click.option("--read-only", "is_read_only", is_flag=True, help="No tool that changes anything.")
 @click.option(
+    "--memory",
     "--semantic-map",
     "semantic_maps",
     multiple=True,
     metavar="[NAME=]FILE",
-    help="The YAML file of remembered places; one per map in the user's data folder unless given.",
+    help="The YAML file of remembered places. Unless given a simulated robot begins with an empty "
+    "one that is removed in the end, and others have one per map in the user's data folder.",
 )
 @click.option(
     "--state-log", type=FILE, help="Write the simulator's truth here, as JSON lines, for scoring."
@@ -171,7 +171,7 @@ def _read_representation(
 )
 @click.option(
     "--start",
-    callback=_read_pose,
+    callback=read_pose,
     metavar="X,Y,YAW_DEG",
     help="Where the simulated robot stands at first, as the world file counts.",
 )
@@ -259,7 +259,7 @@ def _read_starts(
     """
     named = name_robots(given.robots)
     files = split_files(given.robot_files, named, "--robot-file")
-    maps = split_files(given.semantic_maps, named, "--semantic-map")
+    maps = split_files(given.semantic_maps, named, "--memory")
     limits = split_files(given.policies, named, "--policy")
     if len(named) > 1 and _is_for_one(choice):
         raise ConfigError(
@@ -268,8 +268,8 @@ def _read_starts(
         )
     if len(named) > 1 and file_for("", maps) is not None:
         raise ConfigError(
-            "--semantic-map needs a robot's name: places belong to one map.",
-            hint="Write --semantic-map NAME=FILE for each robot.",
+            "--memory needs a robot's name: places belong to one map.",
+            hint="Write --memory NAME=FILE for each robot.",
         )
     return {
         name: RobotStart(
@@ -290,8 +290,9 @@ async def _serve(options: ServeOptions) -> None:
     from mapspeak.server import CallLog, FleetServer, serve_http, serve_stdio  # noqa: PLC0415
 
     async with AsyncExitStack() as links:
+        scratch = links.enter_context(TemporaryDirectory(prefix="mapspeak-"))
         sessions = {
-            name: await _open_session(name, start, options, links)
+            name: await _open_session(name, start, options, links, Path(scratch))
             for name, start in options.robots.items()
         }
         call_log = None if options.call_log is None else CallLog(options.call_log)
@@ -304,30 +305,51 @@ async def _serve(options: ServeOptions) -> None:
         gc.collect()
         gc.freeze()
         async with anyio.create_task_group() as tasks:
-            tasks.start_soon(_end_on_signal, sessions.values())
+            tasks.start_soon(_end_on_signal, sessions.values(), Path(scratch))
             for session in sessions.values():
                 tasks.start_soon(session.keep_watch)
             try:
+                what = ", ".join(start.choice.shown for start in options.robots.values())
                 if options.http is None:
+                    _tell_typist(what)
                     await serve_stdio(server)
                 else:
                     token = os.environ.get(TOKEN_VARIABLE) or None
-                    await serve_http(server, options.http, token=token)
+                    tell = partial(_tell_address, what)
+                    await serve_http(server, options.http, token=token, on_ready=tell)
             finally:
                 await _close_all(sessions.values())
                 tasks.cancel_scope.cancel()
 
 
+def _tell_address(what: str, url: str) -> None:
+    click.echo(f"mapspeak: {what} at {url} (Ctrl-C ends it)", err=True)
+
+
+def _tell_typist(what: str) -> None:
+    """Tell a person who has typed the command that it waits for a program and not for them."""
+    if sys.stdin.isatty():
+        other = shell_command("serve --http")
+        click.echo(
+            f"mapspeak: {what} for an MCP client on standard input (Ctrl-C ends it); "
+            f"`{other}` serves it at an address.",
+            err=True,
+        )
+
+
 async def _open_session(
-    name: str, start: RobotStart, options: ServeOptions, links: AsyncExitStack
+    name: str, start: RobotStart, options: ServeOptions, links: AsyncExitStack, scratch: Path
 ) -> "Session":
     from mapspeak.semantic import SemanticMapStore  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.session import Session  # noqa: PLC0415
 
     guard = build_guard(start.guard, robot=name or start.choice.shown)
     served = await links.enter_async_context(open_served_robot(start.choice))
-    path = start.semantic_map or usual_semantic_map(served.map_name, start.choice.shown)
-    rename_memory(usual_semantic_map(served.map_name, start.choice.robot), path)
+    path = start.semantic_map
+    if path is None:
+        folder = scratch / name if served.ros is None else data_folder()
+        path = usual_memory(folder, served.map_name, start.choice.shown)
+        rename_memory(usual_memory(folder, served.map_name, start.choice.robot), path)
     # A client on stdio cannot vanish unnoticed: its end of the pipe closes.
     lease_s = math.inf if options.http is None else options.lease_s
     memory = SemanticMapStore(path, map_id=served.map_name or None)
@@ -344,7 +366,10 @@ def _build_server(
     )
     from mapspeak.server.tools import require_ros  # noqa: PLC0415
 
-    toolsets = DEFAULT_TOOLSETS if options.toolsets is None else options.toolsets
+    named = options.toolsets or ()
+    added = tuple(name.removeprefix("+") for name in named if name.startswith("+"))
+    others = tuple(name for name in named if not name.startswith("+"))
+    toolsets = (*(others or DEFAULT_TOOLSETS), *added)
     require_ros(session, toolsets=toolsets, tools=options.tools)
     return build_server(
         session,
@@ -356,10 +381,11 @@ def _build_server(
     )
 
 
-async def _end_on_signal(sessions: "Collection[Session]") -> None:
+async def _end_on_signal(sessions: "Collection[Session]", scratch: Path) -> None:
     with anyio.open_signal_receiver(signal.SIGINT, signal.SIGTERM) as signals:
         async for number in signals:
             await _close_all(sessions)
+            shutil.rmtree(scratch, ignore_errors=True)
             # A thread may wait for standard input for ever; there is nothing left to wait for.
             os._exit(128 + number)
 
@@ -370,14 +396,3 @@ async def _close_all(sessions: "Collection[Session]") -> None:
         async with anyio.create_task_group() as tasks:
             for session in sessions:
                 tasks.start_soon(session.close)
-
-
-def usual_semantic_map(map_name: str, robot: str) -> Path:
-    """Gives a file that stays when an MCP client starts the server in another folder.
-
-    Args:
-        map_name: Of the robot's map; empty where it does not say.
-        robot: The robot as it is shown, whose file it is then.
-    """
-    name = map_name or robot
-    return data_folder() / f"{re.sub(r'[^A-Za-z0-9_.-]+', '_', name)}.yaml"

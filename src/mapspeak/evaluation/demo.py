@@ -87,7 +87,7 @@ def _server(options: DemoOptions) -> StdioServerParameters:
             "--detector",
             "--tools",
             "explore",
-            "--semantic-map",
+            "--memory",
             str(options.folder / "semantic_map.yaml"),
             "--state-log",
             str(options.folder / "state.jsonl"),

@@ -36,6 +36,7 @@ __all__ = ["DEFAULT_TOOLSETS", "MapspeakServer", "build_server"]
 DEFAULT_TOOLSETS = ("look", "places", "drive", "paper")
 
 
+STOP = "stop_robot"
 MOST_BYTES = 1_000_000
 """Of the arguments of one call, written as JSON; no model writes a hundredth of that."""
 
@@ -268,7 +269,7 @@ def choose_tools(
     tools: Iterable[str],
     is_read_only: bool,
 ) -> list[Tool]:
-    """Gives the chosen tools in their fixed order.
+    """Gives the chosen tools in their fixed order, with stop_robot where one moves the robot.
 
     Raises:
         ConfigError: There is no such toolset or tool.
@@ -283,6 +284,13 @@ def choose_tools(
         if (toolset in chosen_sets or tool.name in chosen_tools)
         and (not is_read_only or tool.effect in (Effect.READS, Effect.STOPS))
     ]
+    if any(tool.effect is Effect.MOVES for tool in chosen) and STOP not in {
+        tool.name for tool in chosen
+    }:
+        # Whoever can start the robot can stop it.
+        return choose_tools(
+            known, toolsets=chosen_sets, tools={*chosen_tools, STOP}, is_read_only=is_read_only
+        )
     # find_place stands in two toolsets.
     return list({tool.name: tool for tool in reversed(chosen)}.values())[::-1]
 

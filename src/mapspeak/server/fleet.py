@@ -16,14 +16,12 @@ from mcp_types import Tool as ListedTool
 
 from mapspeak import __version__
 from mapspeak.errors import ConfigError
-from mapspeak.server.app import MapspeakServer
+from mapspeak.server.app import STOP, MapspeakServer
 from mapspeak.server.prompts import add_prompts
 
 __all__ = ["FleetServer"]
 
 ARGUMENT = "robot"
-STOP = "stop_robot"
-"""Without a robot's name it stops all of them: nobody should have to think in a hurry."""
 
 
 class FleetServer(MCPServer[Any]):
@@ -86,7 +84,10 @@ class FleetServer(MCPServer[Any]):
     async def _stop_all(
         self, arguments: dict[str, Any], context: Context[Any, Any] | None
     ) -> CallToolResult | InputRequiredResult:
-        """Stops all at once: one that does not answer holds up none of the others."""
+        """Stops all at once: one that does not answer holds up none of the others.
+
+        It takes no robot's name, so that nobody has to think in a hurry.
+        """
         said: dict[str, str] = {}
 
         async def stop(name: str, server: MapspeakServer) -> None:

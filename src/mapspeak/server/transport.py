@@ -5,6 +5,7 @@ import logging
 import secrets
 import socket
 from collections.abc import Awaitable, Callable
+from functools import partial
 from http import HTTPStatus
 
 import uvicorn
@@ -20,6 +21,7 @@ from mapspeak.server.fleet import FleetServer
 __all__ = ["serve_http", "serve_stdio"]
 
 HEALTH = "/health"
+PUBLIC = ("/", HEALTH)
 HTTP_LOGGERS = ("mcp.server.streamable_http", "uvicorn.error")
 
 
@@ -29,9 +31,15 @@ async def serve_stdio(server: MapspeakServer | FleetServer) -> None:
 
 
 async def serve_http(
-    server: MapspeakServer | FleetServer, address: str, *, token: str | None = None
+    server: MapspeakServer | FleetServer,
+    address: str,
+    *,
+    token: str | None = None,
+    on_ready: Callable[[str], None] = lambda _: None,
 ) -> None:
     """Serves clients over streaming HTTP at `/mcp`; `/health` answers "ok".
+
+    Once clients are answered, `on_ready` is called with the address to give them.
 
     Foreign Host and Origin headers are refused. Outside this machine a bearer token is demanded.
 
@@ -48,13 +56,16 @@ async def serve_http(
     # Cancellation is lost with json_response or stateless_http: never use either for a robot.
     app = server.streamable_http_app(transport_security=security, host=host)
     app.add_route(HEALTH, _say_ok)
+    app.add_route("/", _say_where)
     watched: ASGIApp = HostGuard(HangUpWatch(app, server.note_hang_up), security)
     guarded = watched if token is None else TokenGuard(watched, token)
     config = uvicorn.Config(guarded, log_level="warning")
     for name in HTTP_LOGGERS:
         logging.getLogger(name).addFilter(shorten_disconnect)
     with _listen(host, port) as listener:
-        await uvicorn.Server(config).serve(sockets=[listener])
+        shown = f"[{host}]" if ":" in host else host
+        tell = partial(on_ready, f"http://{shown}:{port}/mcp")
+        await _ReadyServer(config, tell).serve(sockets=[listener])
 
 
 def shorten_disconnect(record: logging.LogRecord) -> bool:
@@ -67,6 +78,19 @@ def shorten_disconnect(record: logging.LogRecord) -> bool:
         )
         record.levelno, record.levelname = logging.WARNING, "WARNING"
     return True
+
+
+class _ReadyServer(uvicorn.Server):
+    """Says when it answers."""
+
+    def __init__(self, config: uvicorn.Config, on_ready: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._on_ready = on_ready
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Begin to answer."""
+        await super().startup(sockets)
+        self._on_ready()
 
 
 class HangUpWatch:
@@ -146,11 +170,18 @@ class TokenGuard:
         scheme, _, given = dict(scope["headers"]).get(b"authorization", b"").partition(b" ")
         is_bearer = scheme.lower() == b"bearer"
         is_right = secrets.compare_digest(given.strip(), self._token)
-        return scope["path"] == HEALTH or (is_bearer and is_right)
+        return scope["path"] in PUBLIC or (is_bearer and is_right)
 
 
 async def _say_ok(_request: object) -> PlainTextResponse:
     return PlainTextResponse("ok")
+
+
+async def _say_where(_request: object) -> PlainTextResponse:
+    return PlainTextResponse(
+        "This is mapspeak, a robot for language models.\n"
+        "MCP clients connect to /mcp on this address (streaming HTTP); /health answers ok.\n"
+    )
 
 
 def _security(host: str, port: int) -> TransportSecuritySettings:

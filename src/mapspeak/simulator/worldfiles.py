@@ -31,7 +31,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
-from mapspeak.errors import ConfigError
+from mapspeak.errors import ConfigError, say_cause
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.simulator.mapworld import build_map_world
 from mapspeak.simulator.models import KINDS
@@ -185,7 +185,7 @@ def _read_text(name_or_path: str | Path) -> tuple[str, str, str]:
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(
             f"There is no world {name!r}: it is no shipped world, and as a file it cannot be read"
-            f" ({error}).",
+            f" ({say_cause(error)}).",
             hint=f"Name one of {', '.join(world_names())}, or give the path of a world file.",
         ) from error
 

@@ -19,7 +19,7 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import AliasEvent
 
-from mapspeak.errors import MapError
+from mapspeak.errors import MapError, say_cause
 from mapspeak.geometry import Pose
 from mapspeak.spatial.grid import FREE_MAX, UNKNOWN, OccupancyGrid
 from mapspeak.spatial.opening import open_regular
@@ -327,7 +327,7 @@ def _read_picture(path: Path) -> tuple[Grey, Grey | None]:
         raise _say_too_large(path, "far more") from error
     except (OSError, SyntaxError, ValueError, EOFError) as error:
         raise MapError(
-            f"The map's picture {path.name} cannot be read: {error}.",
+            f"The map's picture {path.name} cannot be read: {say_cause(error)}.",
             hint="It may be cut off or of another type; a .pgm or .png is wanted.",
         ) from error
 

@@ -115,8 +115,16 @@ def test_a_mistake_is_named_with_its_line_and_key(tmp_path: Path, text: str, say
     assert "policy.yaml" in str(raised.value)
 
 
+def test_what_is_wrong_with_a_list_is_said_in_plain_words(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError) as raised:
+        policy_of(tmp_path, "keep_out:\n- name: a\n  outline: [[0, 0], [1, 0]]\n")
+    assert "it needs at least 3 parts, and has 2." in raised.value.message
+
+
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"missing\.yaml"):
+        load_policy(tmp_path / "missing.yaml")
+    with pytest.raises(ConfigError, match=r"missing\.yaml cannot be read: No such file"):
         load_policy(tmp_path / "missing.yaml")
 
 

@@ -14,7 +14,7 @@ from mapspeak.cli.memory.files import (
     write_out,
 )
 from mapspeak.cli.options import FILE
-from mapspeak.errors import ConfigError
+from mapspeak.errors import ConfigError, say_cause
 
 if TYPE_CHECKING:
     from mapspeak.semantic.exchange import ExchangeFormat, Union
@@ -73,7 +73,9 @@ def import_(file: Path, form: str | None, semantic_map: Path | None) -> None:
         # Line ends within a cell of CSV are the cell's own.
         text = file.read_bytes().decode("utf-8-sig")
     except (OSError, UnicodeError) as error:
-        raise ConfigError(f"{file} cannot be read: {error}.", hint="Check its path.") from error
+        raise ConfigError(
+            f"{file} cannot be read: {say_cause(error)}.", hint="Check its path."
+        ) from error
     store = SemanticMapStore(find_memory(semantic_map))
     _tell(merge_into(store, import_text(text, wanted)), store.path)
 

@@ -1,5 +1,6 @@
 """Which memory a command is about."""
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,11 +20,14 @@ __all__ = [
     "open_memory",
     "read_places",
     "rename_memory",
+    "usual_memory",
     "write_out",
 ]
 
 MEMORY_OPTION = click.option(
+    "--memory",
     "--semantic-map",
+    "semantic_map",
     type=FILE,
     help="The semantic map file; the one in the user's data folder, if there is but one.",
 )
@@ -42,7 +46,7 @@ def find_memory(given: Path | None) -> Path:
     if len(found) == 1:
         return found[0]
     names = ", ".join(map(str, found)) or f"none in {data_folder()}"
-    raise ConfigError("It is not clear which memory.", hint=f"Name one: --semantic-map; {names}.")
+    raise ConfigError("It is not clear which memory.", hint=f"Name one: --memory; {names}.")
 
 
 def open_memory(given: Path | None) -> "SemanticMapStore":
@@ -55,7 +59,7 @@ def open_memory(given: Path | None) -> "SemanticMapStore":
 
     path = find_memory(given)
     if not path.exists():
-        raise ConfigError(f"There is no file {path}.", hint="Name one with --semantic-map.")
+        raise ConfigError(f"There is no file {path}.", hint="Name one with --memory.")
     return SemanticMapStore(path)
 
 
@@ -65,6 +69,17 @@ def read_places(store: "SemanticMapStore") -> "SemanticMap":
     for warning in places.warnings:
         click.echo(f"mapspeak: {warning}", err=True)
     return places
+
+
+def usual_memory(folder: Path, map_name: str, robot: str) -> Path:
+    """Return the file of a robot's memory; the same one whatever folder the server is started in.
+
+    Args:
+        folder: Where memories lie.
+        map_name: Of the robot's map; empty where it does not say.
+        robot: The robot as it is shown, whose file it is then.
+    """
+    return folder / f"{re.sub(r'[^A-Za-z0-9_.-]+', '_', map_name or robot)}.yaml"
 
 
 def rename_memory(old: Path, new: Path) -> None:

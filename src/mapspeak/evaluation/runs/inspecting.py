@@ -73,7 +73,7 @@ def serve_command(url: str, *, toolsets: tuple[str, ...], folder: Path) -> tuple
     return (
         *(sys.executable, "-m", "mapspeak", "serve", "--robot", url, "--read-only"),
         *("--toolsets", ",".join(toolsets)),
-        *("--semantic-map", str(folder / MEMORY)),
+        *("--memory", str(folder / MEMORY)),
         *("--audit", str(folder / "audit.jsonl")),
         *("--control", str(folder / "control")),
     )

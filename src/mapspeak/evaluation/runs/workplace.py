@@ -84,7 +84,7 @@ class Workshop:
             *("--toolsets", ",".join(self.toolsets)),
             *tools,
             *("--representation", self.trial.representation),
-            *("--semantic-map", str(self.folder / MEMORY)),
+            *("--memory", str(self.folder / MEMORY)),
             *("--state-log", str(self.folder / STATES)),
             *("--final-map", str(self.folder / MAP)),
             *("--audit", str(self.folder / AUDIT)),

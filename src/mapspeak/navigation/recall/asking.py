@@ -54,7 +54,13 @@ def recall(atlas: Atlas, query: RecallQuery) -> Recall:
         doubt = find_doubt(candidates[0], room_id=query.room_id)
     return Recall(
         verdict=Verdict.LIKELY if doubt else answer.verdict,
-        advice=say_advice(answer, candidates, n_searched=len(among), doubt=doubt),
+        advice=say_advice(
+            answer,
+            candidates,
+            n_searched=len(among),
+            is_empty=not (atlas.recollection.places or atlas.things),
+            doubt=doubt,
+        ),
         candidates=candidates,
         n_meant=answer.n_meant,
         n_searched=len(among),

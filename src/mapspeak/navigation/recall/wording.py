@@ -53,7 +53,12 @@ def _say_words(evidence: Sequence[MatchEvidence]) -> Iterator[str]:
 
 
 def say_advice(
-    answer: Answer, candidates: Sequence[RecallCandidate], *, n_searched: int, doubt: str
+    answer: Answer,
+    candidates: Sequence[RecallCandidate],
+    *,
+    n_searched: int,
+    is_empty: bool,
+    doubt: str,
 ) -> str:
     """Gives the verdict in words, with what to do next.
 
@@ -61,13 +66,13 @@ def say_advice(
         answer: What the search says.
         candidates: Those that are shown, the likeliest first.
         n_searched: How many places and things were searched.
+        is_empty: Nothing is remembered at all.
         doubt: Why the first may still be wrong; empty where nothing speaks for that.
     """
     if not n_searched:
-        return (
-            "Not remembered: nothing passes these filters, or nothing is remembered at all. Leave "
-            "filters out, or search_for it."
-        )
+        if is_empty:
+            return "Not remembered: nothing is remembered yet. Look for it with search_for."
+        return "Not remembered: nothing passes these filters. Leave filters out, or search_for it."
     match answer.verdict:
         case Verdict.NOT_REMEMBERED:
             missing = answer.missing

@@ -11,7 +11,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from mapspeak.errors import ConfigError, PolicyError
+from mapspeak.errors import ConfigError, PolicyError, say_cause
 from mapspeak.navigation.safety.caller import Caller
 from mapspeak.navigation.safety.commands import Command, Drive, say_command
 
@@ -143,7 +143,7 @@ def read_audit(path: Path) -> Iterator[AuditLine]:
         lines = path.read_text(encoding="utf-8").removesuffix("\n").split("\n")
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(
-            f"{path} cannot be read: {error}.", hint="Give the file of an audit log."
+            f"{path} cannot be read: {say_cause(error)}.", hint="Give the file of an audit log."
         ) from error
     for number, line in enumerate(lines, start=1):
         try:

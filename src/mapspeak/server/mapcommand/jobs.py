@@ -5,7 +5,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from mapspeak.errors import ConfigError
+from PIL import Image, UnidentifiedImageError
+
+from mapspeak.errors import ConfigError, say_cause
 from mapspeak.server.mapcommand.selection import MapSelection, find_image, is_description
 from mapspeak.spatial.areagraph import MapAnchor
 
@@ -60,6 +62,13 @@ def plan_jobs(
             overwrite a map or another result.
     """
     _check_resolution(selection, resolution_m)
+    for output, target in outputs.items():
+        if len(selection.names) > 1 and target.suffix and not target.is_dir():
+            raise ConfigError(
+                f"There are {len(selection.names)} maps, and {target} is the name of one file.",
+                hint=f"Name a folder, such as {target.with_suffix('')}: each map gets its own file "
+                f"NAME{output} in it.",
+            )
     if anchor is not None and not outputs.keys() & {Output.GEOJSON, Output.OSM}:
         raise ConfigError(
             "--anchor would change nothing: it is for --geojson and --osm.",
@@ -85,6 +94,11 @@ def plan_jobs(
 def _check_resolution(selection: MapSelection, resolution_m: float | None) -> None:
     pictures = selection.pictures
     if resolution_m is None and pictures:
+        if not _is_picture(pictures[0]):
+            raise ConfigError(
+                f"{pictures[0]} is no picture, and no map's .yaml file.",
+                hint="Give a map's .yaml file, or its .pgm or .png.",
+            )
         others = f" and {len(pictures) - 1} more" if len(pictures) > 1 else ""
         raise ConfigError(
             f"{pictures[0]}{others}: a bare picture, and nothing says how large its pixels are.",
@@ -95,6 +109,20 @@ def _check_resolution(selection: MapSelection, resolution_m: float | None) -> No
             f"--resolution {resolution_m:g} would change nothing: it is for bare pictures.",
             hint="A map's .yaml says it itself: correct its line 'resolution:', or give its image.",
         )
+
+
+def _is_picture(file: Path) -> bool:
+    try:
+        with Image.open(file):
+            return True
+    except UnidentifiedImageError:
+        return False
+    except (Image.DecompressionBombError, Image.DecompressionBombWarning):
+        return True
+    except OSError as error:
+        raise ConfigError(
+            f"{file} cannot be read: {say_cause(error)}.", hint="Check who may read it."
+        ) from error
 
 
 def _is_folder(target: Path, selection: MapSelection) -> bool:
