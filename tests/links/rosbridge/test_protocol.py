@@ -27,6 +27,7 @@ from mapspeak.links.rosbridge.protocol import (
     ServiceAnswered,
     StatusNoted,
 )
+from mapspeak.links.rosbridge.protocol.decoding import BARE_NUMBER
 from mapspeak.ros import new_id
 
 
@@ -179,10 +180,29 @@ def test_a_long_list_with_a_fault_in_it_is_no_message(spoilt: str) -> None:
     assert "JSON" in refused(Conversation().receive_text(text.encode()))
 
 
-def test_a_long_list_that_belongs_to_another_message_within_is_left_there() -> None:
-    inner = {"data": [1] * 30_000}
-    text = frame({"op": "publish", "topic": "/maps", "msg": {"first": inner, "data": [2]}})
-    assert published(Conversation().receive_text(text)).message == {"first": inner, "data": [2]}
+def test_long_lists_find_their_places_wherever_they_stand() -> None:
+    told = {"first": {"data": [1] * 30_000}, "all": [[0.5] * 9_000, [300] * 9_000], "data": [2]}
+    text = frame({"op": "service_response", "id": "1", "values": told})
+    event = Conversation().receive_text(text)
+    assert isinstance(event, ServiceAnswered)
+    assert event.values["data"] == [2]
+    assert event.values["first"]["data"].tolist() == [1] * 30_000
+    assert [each.tolist() for each in event.values["all"]] == told["all"]
+    assert event.values["first"]["data"].nbytes == 30_000
+
+
+def test_a_long_list_may_hold_what_is_no_number() -> None:
+    ranges = "Infinity, 1.5, NaN, -Infinity, " * 10_000 + "2e3"
+    text = f'{{"op": "publish", "topic": "/scan", "msg": {{"ranges": [{ranges}]}}}}'
+    read = published(Conversation().receive_text(text.encode())).message["ranges"]
+    assert read[[0, 1, 3, -1]].tolist() == [math.inf, 1.5, -math.inf, 2000.0]
+    assert math.isnan(read[2])
+
+
+def test_a_long_list_within_a_text_stays_there() -> None:
+    said = f"[{'1,' * 20_000}1]"
+    text = frame({"op": "publish", "topic": "/log", "msg": {"said": said, "list": [1] * 20_000}})
+    assert published(Conversation().receive_text(text)).message["said"] == said
 
 
 def test_pieces_are_put_together_in_any_order_with_a_fraction_for_a_total() -> None:
@@ -192,7 +212,7 @@ def test_pieces_are_put_together_in_any_order_with_a_fraction_for_a_total() -> N
     events = [conversation.receive_text(piece) for piece in [*reversed(pieces[1:]), pieces[0]]]
     assert events[:-1] == [None] * 4
     assert published(events[-1]).message == {"data": "hello"}
-    assert conversation.n_characters_held == 0
+    assert conversation.n_bytes_held == 0
 
 
 def test_a_piece_that_comes_twice_changes_nothing() -> None:
@@ -215,7 +235,7 @@ def test_pieces_that_are_never_complete_do_not_fill_the_memory() -> None:
     for number in range(1_000):
         piece = {"op": "fragment", "id": number, "num": 0, "total": 2, "data": "x" * 1_000}
         assert conversation.receive_text(frame(piece)) is None
-        assert conversation.n_characters_held <= 10_000
+        assert conversation.n_bytes_held <= 10_000
 
 
 @pytest.mark.parametrize("total", [0, 0.9, -1, 1e300, "3", None, True])
@@ -241,10 +261,63 @@ def test_a_frame_beyond_the_limit_is_refused_unread() -> None:
     assert "limit" in refused(Conversation(max_bytes=len(text) - 1).receive_text(text))
 
 
-def test_deep_nesting_is_refused() -> None:
-    deep = b'{"op": "publish", "topic": "/x", "msg": {"a": ' + b"[" * 100_000 + b"nan"
+@pytest.mark.parametrize("depth", [70, 900, 1_100, 20_000])
+def test_deep_nesting_is_refused(depth: int) -> None:
+    deep = b'{"op": "publish", "topic": "/x", "msg": {"a": ' + b"[" * depth + b"nan"
     assert "JSON" in refused(Conversation().receive_text(deep))
-    assert "CBOR" in refused(Conversation().receive_binary(b"\x81" * 100_000))
+    assert "JSON" in refused(Conversation().receive_text(deep + b"]" * depth + b"}}"))
+    assert "CBOR" in refused(Conversation().receive_binary(b"\x81" * depth + b"\0"))
+    assert "CBOR" in refused(Conversation().receive_binary(b"\xc6" * depth + b"\0"))
+
+
+def bomb_of(n_lists: int) -> bytes:
+    return b'{"op": "publish", "topic": "/x", "msg": {"a": [' + b"[]," * n_lists + b"[]]}}"
+
+
+def test_a_frame_with_too_many_lists_is_refused_unread() -> None:
+    assert "100000 lists" in refused(Conversation().receive_text(bomb_of(2_000_000)))
+    assert "100000 lists" in refused(Conversation().receive_binary(cbor2.dumps([[]] * 200_000)))
+    endless = b"\x9f" + b"\x80" * 200_000
+    assert "100000 lists" in refused(Conversation().receive_binary(endless))
+
+
+def test_a_frame_with_too_many_values_is_refused_unread() -> None:
+    names = frame({"op": "publish", "topic": "/x", "msg": {"a": [None] * 500_000}})
+    assert "400000 values" in refused(Conversation().receive_text(names))
+    assert "400000 values" in refused(
+        Conversation().receive_binary(cbor2.dumps([None] * 500_000))
+    )
+
+
+def test_a_list_that_claims_to_be_longer_than_its_frame_is_refused() -> None:
+    claim = b"\x9b" + (2**60).to_bytes(8) + b"\x00" * 20_000
+    assert "longer than its frame" in refused(Conversation().receive_binary(claim))
+
+
+def test_a_small_picture_that_unfolds_into_too_much_is_refused() -> None:
+    wrapped = frame({"op": "png", "data": as_png(bomb_of(1_000_000))})
+    assert len(wrapped) < 50_000
+    assert "100000 lists" in refused(Conversation().receive_text(wrapped))
+
+
+def test_a_large_path_is_read_in_json_and_in_cbor() -> None:
+    point = {"position": {"x": 1.5, "y": 2.5, "z": 0.0}, "orientation": {"w": 1.0}}
+    poses = [{"header": {"frame_id": "map"}, "pose": point}] * 10_000
+    path = {"op": "publish", "topic": "/plan", "msg": {"poses": poses}}
+    assert published(Conversation().receive_text(frame(path))).message == {"poses": poses}
+    event = Conversation().receive_binary(cbor2.dumps(path))
+    assert published(event).message == {"poses": poses}
+
+
+@pytest.mark.parametrize("tail", [b'\\"' * 100_000, b"nan " * 100_000, b'"nan' * 100_000])
+@pytest.mark.parametrize("end", [b"", b"\\", b'"'])
+def test_a_text_without_an_end_is_read_once(tail: bytes, end: bytes) -> None:
+    text = b'x"' + tail + end
+    n_read = sum(len(found[0]) for found in BARE_NUMBER.finditer(text))
+    strings = [found for found in BARE_NUMBER.finditer(text) if found[0][:1] == b'"']
+    assert n_read <= len(text)
+    assert strings[-1].end() == len(text) or strings[-1][0][-1:] == b'"'
+    assert "JSON" in refused(Conversation().receive_text(text))
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
@@ -320,7 +393,7 @@ def test_any_operation_gives_an_event_and_never_an_exception(
     for operation in operations:
         check_that_it_is_an_event(conversation.receive_text(json.dumps(operation).encode()))
         check_that_it_is_an_event(conversation.receive_binary(cbor2.dumps(operation)))
-        assert conversation.n_characters_held <= 10_000
+        assert conversation.n_bytes_held <= 10_000
 
 
 @settings(max_examples=100, deadline=None)

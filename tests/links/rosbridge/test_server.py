@@ -63,7 +63,7 @@ async def test_ros_1_hides_a_map_in_a_png() -> None:
         await client.send(op="subscribe", topic="/map", compression="png")
         packed = await client.receive()
     assert packed["op"] == "png"
-    grid = read_grid(json.loads(decode_png(packed["data"]))["msg"])
+    grid = read_grid(json.loads(bytes(decode_png(packed["data"])))["msg"])
     assert robot.grid is not None
     assert np.array_equal(grid.cells, robot.grid.cells)
 

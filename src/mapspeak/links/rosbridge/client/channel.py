@@ -1,5 +1,6 @@
 """One socket to the robot that is always there: made anew when it dies, with all it carried."""
 
+import logging
 from collections.abc import Callable
 
 import anyio
@@ -12,6 +13,8 @@ from mapspeak.links.rosbridge.client.connection import Connection
 from mapspeak.links.rosbridge.client.timing import Timing
 from mapspeak.links.rosbridge.client.websocket import open_websocket
 from mapspeak.links.rosbridge.protocol import Event, ServiceAnswered, authenticate
+
+logger = logging.getLogger(__name__)
 
 SERVICE_HINT = (
     "Check that the node which offers it is alive; the connection is kept, asking again is fine."
@@ -50,6 +53,7 @@ class Channel:
         self._lost_since_s: float | None = None
         self.was_replaced = False
         """The latest loss was our own doing: the robot and its rosbridge went on."""
+        self._fault_pause_s = 0.0
         self.n_connections = 0
         """How often it has been connected; more than one means that it was lost in between."""
 
@@ -163,10 +167,24 @@ class Channel:
             self._is_up = anyio.Event()
             self._lost_since_s = anyio.current_time()
             self._on_loss(self)
-            await self._connect_again(tasks)
+            await self._connect_again(tasks, fault=self._connection.fault)
 
-    async def _connect_again(self, tasks: TaskGroup) -> None:
-        pause_s = 0.0
+    async def _connect_again(self, tasks: TaskGroup, *, fault: str) -> None:
+        """Try again and again, with longer and longer pauses.
+
+        Args:
+            tasks: Where the new connection is served.
+            fault: What the other end did to the last one; an end that does so gets its pauses too.
+        """
+        pause_s = self._pause_after(self._fault_pause_s) if fault else 0.0
+        self._fault_pause_s = pause_s
+        if fault:
+            logger.warning(
+                "The connection to %s is made anew, after %g s: %s.",
+                self._address.shown,
+                pause_s,
+                fault,
+            )
         while True:
             with anyio.move_on_after(pause_s):
                 # Whoever waits for the robot learns at once whether it is back.
@@ -176,11 +194,12 @@ class Channel:
                 await self._connect(tasks)
             except LinkError as error:
                 self._fault = error
-                pause_s = min(
-                    max(2 * pause_s, self._timing.first_pause_s), self._timing.longest_pause_s
-                )
+                pause_s = self._pause_after(pause_s)
             else:
                 return
+
+    def _pause_after(self, pause_s: float) -> float:
+        return min(max(2 * pause_s, self._timing.first_pause_s), self._timing.longest_pause_s)
 
     async def _connect(self, tasks: TaskGroup) -> None:
         socket = await open_websocket(self._address, timeout_s=self._timing.connect_s)

@@ -380,7 +380,9 @@ async def open_client(
 
     Raises:
         LinkError: It cannot be reached.
+        ConfigError: An old package stands before one that is needed.
     """
+    protocol.require_cbor()
     client = RosbridgeClient(address, timing=timing)
     with plain_errors():
         async with anyio.create_task_group() as tasks:

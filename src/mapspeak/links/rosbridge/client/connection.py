@@ -10,13 +10,20 @@ import anyio.to_thread
 
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge.client.timing import Timing
-from mapspeak.links.rosbridge.client.websocket import SocketClosed, WebSocket
-from mapspeak.links.rosbridge.protocol import Conversation, Event, ServiceAnswered
+from mapspeak.links.rosbridge.client.websocket import Received, SocketClosed, WebSocket
+from mapspeak.links.rosbridge.protocol import (
+    LIGHT_BYTES,
+    Conversation,
+    Event,
+    FrameRefused,
+    ServiceAnswered,
+)
 
 logger = logging.getLogger(__name__)
 
 MAX_UNSENT = 10_000
-WORTH_A_THREAD_BYTES = 500_000
+MAX_REFUSED = 1_000
+"""Frames in a row that could not be understood, after which a new connection is tried."""
 
 
 class Pending:
@@ -56,6 +63,10 @@ class Connection:
         self.is_over = anyio.Event()
         """Set when nothing more can be sent here."""
         self.n_answers = 0
+        self.fault = ""
+        """Why the other end is not worth another connection at once; empty where it is."""
+        self._n_refused = 0
+        self._is_warned = False
 
     @property
     def is_waiting(self) -> bool:
@@ -125,6 +136,7 @@ class Connection:
     ) -> None:
         with suppress(SocketClosed):
             await part()
+        self.fault = self.fault or self._socket.fault
         scope.cancel()
 
     async def _write(self) -> None:
@@ -135,23 +147,37 @@ class Connection:
 
     async def _read(self) -> None:
         while True:
-            received = await self._socket.receive()
-            understand = (
-                self._conversation.receive_text
-                if received.is_text
-                else self._conversation.receive_binary
-            )
-            if len(received.data) < WORTH_A_THREAD_BYTES:
-                event = understand(received.data)
-            else:
-                # A stop must not wait until a large map is read.
-                event = await anyio.to_thread.run_sync(understand, received.data)
+            event = await self._understand(await self._socket.receive())
+            self._judge(event)
             if isinstance(event, ServiceAnswered):
                 self._answer(event)
             elif event is not None:
                 self._tell(event)
             # Whoever waited for this message sees it before the next one comes.
             await anyio.lowlevel.checkpoint()
+
+    async def _understand(self, received: Received) -> Event | None:
+        if received.n_bytes <= LIGHT_BYTES and self._conversation.is_light(
+            frame := received.join()
+        ):
+            return self._conversation.receive(frame, is_text=received.is_text)
+        # A stop must not wait until a large map is read.
+        return await anyio.to_thread.run_sync(
+            lambda: self._conversation.receive(received.join(), is_text=received.is_text)
+        )
+
+    def _judge(self, event: Event | None) -> None:
+        """Warn of a frame that was refused, once; give up an end that sends nothing else."""
+        if not isinstance(event, FrameRefused):
+            self._n_refused = 0
+            return
+        self._n_refused += 1
+        if not self._is_warned:
+            self._is_warned = True
+            logger.warning("A message of the robot was left away: %s.", event.reason)
+        if self._n_refused > MAX_REFUSED:
+            self.fault = f"{MAX_REFUSED} messages in a row could not be understood"
+            raise SocketClosed
 
     def _tell(self, event: Event) -> None:
         try:

@@ -3,21 +3,27 @@
 import socket
 import ssl
 from collections import deque
+from collections.abc import Generator
 from dataclasses import dataclass
 
 import anyio
+import anyio.lowlevel
 from anyio.abc import ByteStream
 from websockets.client import ClientProtocol
 from websockets.exceptions import ConnectionClosed, InvalidStatus
-from websockets.extensions.permessage_deflate import ClientPerMessageDeflateFactory
 from websockets.frames import Frame, Opcode
 from websockets.protocol import State
+from websockets.streams import StreamReader
 
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge.client.address import RobotAddress
 from mapspeak.links.rosbridge.protocol import MAX_FRAME_BYTES
 
 READ_BYTES = 262_144
+FED_BYTES = 4_096
+"""What is understood in one go: 2,000 empty frames take some 20 ms."""
+MAX_PARTS = 10_000
+"""Frames of one message; the size of all together has its own limit."""
 NOT_ALLOWED = (401, 403)
 START_HINT = (
     "Start rosbridge on the robot (ROS 2: `ros2 launch rosbridge_server "
@@ -31,16 +37,51 @@ class Received:
     """One whole websocket message.
 
     Attributes:
-        data: Its bytes.
+        parts: Its bytes, as they came; putting large ones together takes a moment.
         is_text: UTF-8 text, not binary data.
     """
 
-    data: bytes
+    parts: tuple[bytes | bytearray, ...]
     is_text: bool
+
+    @property
+    def n_bytes(self) -> int:
+        """Of all parts."""
+        return sum(len(part) for part in self.parts)
+
+    def join(self) -> bytes | bytearray:
+        """Return all bytes; a message in one part as it is."""
+        if len(self.parts) == 1:
+            return self.parts[0]
+        whole = bytearray()
+        for part in self.parts:
+            whole += part
+        return whole
 
 
 class SocketClosed(Exception):  # noqa: N818 - an event, never shown
     """The other end has gone; never leaves the client."""
+
+
+class _Reader(StreamReader):
+    """Hands a large frame on as it is, where the library copies it."""
+
+    def read_exact(self, n: int) -> Generator[None, None, bytearray]:
+        if n < READ_BYTES:
+            return (yield from super().read_exact(n))
+        while len(self.buffer) < n and not self.eof:
+            yield
+        if self.eof:
+            return (yield from super().read_exact(n))
+        whole, self.buffer = self.buffer, self.buffer[n:]
+        del whole[n:]
+        return whole
+
+
+class _Protocol(ClientProtocol):
+    def parse(self) -> Generator[None]:
+        self.reader = _Reader()
+        yield from super().parse()
 
 
 class WebSocket:
@@ -52,8 +93,15 @@ class WebSocket:
         self._sending = anyio.Lock()
         self._arrived: deque[Received] = deque()
         self._parts: list[Frame] = []
+        self._fault = ""
         self.n_bytes_received = 0
         """Of any kind, pongs included: an end that is alive makes it grow."""
+
+    @property
+    def fault(self) -> str:
+        """What the other end did against the protocol; empty where it did nothing."""
+        error = self._protocol.parser_exc
+        return self._fault or ("" if error is None or isinstance(error, EOFError) else str(error))
 
     async def receive(self) -> Received:
         """Gives the next whole message.
@@ -107,10 +155,15 @@ class WebSocket:
         except (anyio.EndOfStream, anyio.BrokenResourceError, anyio.ClosedResourceError, OSError):
             raise SocketClosed from None
         self.n_bytes_received += len(data)
-        self._protocol.receive_data(data)
-        for event in self._protocol.events_received():
-            if isinstance(event, Frame):
-                self._take(event)
+        for start in range(0, len(data), FED_BYTES):
+            self._protocol.receive_data(data[start : start + FED_BYTES])
+            events = self._protocol.events_received()
+            for event in events:
+                if isinstance(event, Frame):
+                    self._take(event)
+            if len(events) > 1:
+                # Many small frames must not keep a stop waiting.
+                await anyio.lowlevel.checkpoint()
         await self._flush()
         is_over = self._protocol.close_rcvd is not None or self._protocol.parser_exc is not None
         if is_over and not self._arrived:
@@ -120,10 +173,14 @@ class WebSocket:
         if frame.opcode not in (Opcode.TEXT, Opcode.BINARY, Opcode.CONT):
             return
         self._parts.append(frame)
+        if len(self._parts) > MAX_PARTS:
+            self._fault = f"a message in more than {MAX_PARTS} frames"
+            raise SocketClosed
         if frame.fin:
             parts, self._parts = self._parts, []
-            data = bytes(parts[0].data) if len(parts) == 1 else b"".join(p.data for p in parts)
-            self._arrived.append(Received(data, parts[0].opcode is Opcode.TEXT))
+            self._arrived.append(
+                Received(tuple(_bytes_of(each) for each in parts), parts[0].opcode is Opcode.TEXT)
+            )
 
     async def _flush(self) -> None:
         # Bytes leave in the order in which they were made, whoever made them.
@@ -135,6 +192,10 @@ class WebSocket:
                 await self._stream.send(data)
             except (anyio.BrokenResourceError, anyio.ClosedResourceError, OSError):
                 raise SocketClosed from None
+
+
+def _bytes_of(frame: Frame) -> bytes | bytearray:
+    return bytes(frame.data) if isinstance(frame.data, memoryview) else frame.data
 
 
 async def open_websocket(address: RobotAddress, *, timeout_s: float) -> WebSocket:
@@ -193,11 +254,8 @@ async def _connect(address: RobotAddress, context: ssl.SSLContext | None) -> Byt
 
 
 async def _shake_hands(address: RobotAddress, stream: ByteStream) -> WebSocket:
-    protocol = ClientProtocol(
-        address.uri,
-        extensions=[ClientPerMessageDeflateFactory(client_max_window_bits=True)],
-        max_size=MAX_FRAME_BYTES,
-    )
+    # Compression is not offered: a small frame could unfold into a large one on the event loop.
+    protocol = _Protocol(address.uri, max_size=MAX_FRAME_BYTES)
     request = protocol.connect()
     for name, value in address.headers.items():
         request.headers[name] = value

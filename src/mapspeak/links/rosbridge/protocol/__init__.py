@@ -1,7 +1,8 @@
 """The rosbridge protocol without I/O: frames in, events out; operations as text."""
 
-from mapspeak.links.rosbridge.protocol.conversation import Conversation
-from mapspeak.links.rosbridge.protocol.decoding import MAX_FRAME_BYTES
+from mapspeak.links.rosbridge.protocol.bounds import MAX_FRAME_BYTES
+from mapspeak.links.rosbridge.protocol.conversation import LIGHT_BYTES, Conversation
+from mapspeak.links.rosbridge.protocol.decoding import require_cbor
 from mapspeak.links.rosbridge.protocol.events import (
     Event,
     FrameRefused,
@@ -25,6 +26,7 @@ from mapspeak.links.rosbridge.protocol.operations import (
 )
 
 __all__ = [
+    "LIGHT_BYTES",
     "MAX_FRAME_BYTES",
     "Conversation",
     "Encoding",
@@ -40,6 +42,7 @@ __all__ = [
     "call_service",
     "cancel_action_goal",
     "publish",
+    "require_cbor",
     "send_action_goal",
     "subscribe",
     "unadvertise",

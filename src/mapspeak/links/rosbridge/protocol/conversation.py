@@ -2,13 +2,8 @@
 
 from typing import Any
 
-from mapspeak.links.rosbridge.protocol.decoding import (
-    MAX_FRAME_BYTES,
-    FrameError,
-    decode_cbor,
-    decode_json,
-    decode_png,
-)
+from mapspeak.links.rosbridge.protocol.bounds import MAX_FRAME_BYTES, FrameError, Raw
+from mapspeak.links.rosbridge.protocol.decoding import decode_cbor, decode_json, decode_png
 from mapspeak.links.rosbridge.protocol.events import (
     Event,
     FrameRefused,
@@ -23,6 +18,8 @@ from mapspeak.links.rosbridge.protocol.fragments import FragmentStore
 MAX_WRAPPINGS = 3
 """A fragmented png is two layers of wrapping; nothing needs more."""
 MAX_REASON_LENGTH = 200
+LIGHT_BYTES = 32_768
+"""A frame up to this size is read within a few milliseconds, unless more is wrapped in it."""
 
 
 class Conversation:
@@ -37,25 +34,38 @@ class Conversation:
         self._fragments = FragmentStore(max_bytes=max_bytes)
 
     @property
-    def n_characters_held(self) -> int:
+    def n_bytes_held(self) -> int:
         """Of messages that have come in part."""
-        return self._fragments.n_characters
+        return self._fragments.n_bytes
 
-    def receive_text(self, frame: bytes) -> Event | None:
+    def is_light(self, frame: bytes | bytearray) -> bool:
+        """Return whether reading a frame is a matter of milliseconds at the worst.
+
+        The last piece of a message completes all of it, and a small picture may hold a large text;
+        an escape may hide that it does.
+        """
+        is_small = len(frame) <= LIGHT_BYTES and not self._fragments.n_bytes
+        return is_small and b"png" not in frame and b"\\u" not in frame
+
+    def receive(self, frame: Raw, *, is_text: bool) -> Event | None:
+        """Return what a frame says; None while the message is incomplete."""
+        return self.receive_text(frame) if is_text else self.receive_binary(frame)
+
+    def receive_text(self, frame: Raw) -> Event | None:
         """Gives what a text frame (JSON, UTF-8) says; None while the message is incomplete."""
         try:
             return self._understand(self._checked(frame, decode_json), n_wrappings=0)
         except FrameError as error:
             return FrameRefused(str(error)[:MAX_REASON_LENGTH])
 
-    def receive_binary(self, frame: bytes) -> Event | None:
+    def receive_binary(self, frame: Raw) -> Event | None:
         """Gives what a binary frame (CBOR) says; None while the message is incomplete."""
         try:
             return self._understand(self._checked(frame, decode_cbor), n_wrappings=0)
         except FrameError as error:
             return FrameRefused(str(error)[:MAX_REASON_LENGTH])
 
-    def _checked(self, frame: bytes, decode: Any) -> Any:  # noqa: ANN401 - ROS data enters here
+    def _checked(self, frame: Raw, decode: Any) -> Any:  # noqa: ANN401 - ROS data enters here
         if len(frame) > self._max_bytes:
             raise FrameError(f"a frame of {len(frame)} bytes, the limit is {self._max_bytes}")
         return decode(frame)
@@ -80,11 +90,11 @@ class Conversation:
                 raise FrameError(f"an operation {str(other)[:40]!r} that is not known")
 
     def _unwrap(self, operation: dict[str, Any], *, n_wrappings: int) -> Event | None:
+        frame: Raw | None
         if operation["op"] == "fragment":
-            text = self._fragments.add(operation)
-            if text is None:
+            frame = self._fragments.add(operation)
+            if frame is None:
                 return None
-            frame = text.encode("utf-8", "surrogatepass")
         else:
             frame = decode_png(_text(operation, "data"))
         return self._understand(self._checked(frame, decode_json), n_wrappings=n_wrappings)

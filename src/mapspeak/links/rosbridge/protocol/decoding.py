@@ -5,7 +5,8 @@ import io
 import json
 import re
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import cbor2
@@ -14,13 +15,25 @@ import orjson
 from numpy.typing import NDArray
 from PIL import Image
 
-MAX_FRAME_BYTES = 256 * 1024 * 1024
-"""The largest message that is taken: a map of 8000x8000 cells as JSON fits, 10 GB do not."""
+from mapspeak.errors import ConfigError
+from mapspeak.links.rosbridge.protocol.bounds import (
+    MAX_DEPTH,
+    MAX_FRAME_BYTES,
+    FrameError,
+    Raw,
+    check_cbor,
+    check_json,
+)
+from mapspeak.links.rosbridge.protocol.numberlists import (
+    WORTH_CUTTING_BYTES,
+    Numbers,
+    cut_out_numbers,
+    marker_of,
+)
+
 MAX_FRAME_PIXELS = MAX_FRAME_BYTES // 3
-MAX_DEPTH = 64
-"""Of CBOR containers within each other; ROS messages stay below ten."""
-WORTH_CUTTING_BYTES = 16_384
-"""Below this size, taking the numbers out first saves nothing."""
+MAX_LENIENT_BYTES = 1_000_000
+"""Of a text that only the slower parser reads; long lists of numbers apart."""
 
 TYPED_ARRAYS = {
     65: ">u2", 66: ">u4", 67: ">u8", 69: "<u2", 70: "<u4", 71: "<u8",
@@ -34,48 +47,65 @@ OTHER_TAGS = (0, 1, 2, 3, 4, 5, 25, 28, 29, 30, 35, 36, 37, 52, 54, 100, 256, 25
 """Tags the library turns into objects of its own, some of which can hold themselves."""
 
 BARE_NUMBER = re.compile(
-    rb'"(?:[^"\\]|\\.)*"|(?<![\w.])([+-]?)(?:(nan)|inf(?:inity)?)(?![\w.])',
+    rb'"(?:[^"\\]++|\\.?)*+(?:"|\Z)'
+    rb"|(?<![\w.])([+-]?)(?:(nan)|inf(?:inity)?)(?![\w.])",
     re.IGNORECASE | re.DOTALL,
 )
-PART_BYTES = 500_000
-DATA_ARRAY = re.compile(rb'"data"\s*:\s*\[')
-CUT_OUT = "\x00cut out\x00"
+"""A string, also one without an end, or a number that JSON does not have.
+
+Nothing is read twice: a string is taken to its end or to that of the text, never given back.
+"""
 
 
-class FrameError(Exception):
-    """A frame that cannot be understood; never leaves the protocol."""
-
-
-def decode_json(frame: bytes) -> Any:  # noqa: ANN401 - ROS JSON enters here
-    """Gives what a JSON text says; a long list of whole numbers in `msg.data` as a numpy array.
+def decode_json(frame: Raw) -> Any:  # noqa: ANN401 - ROS JSON enters here
+    """Return what a JSON text says; long lists of numbers as read-only numpy arrays.
 
     Raises:
-        FrameError: It is no JSON, not even as Python or JavaScript programs write it.
+        FrameError: It is no JSON, not even as Python or JavaScript programs write it, or it holds
+            too much.
     """
-    if len(frame) >= WORTH_CUTTING_BYTES:
-        value = _decode_with_data_apart(frame)
-        if value is not None:
-            return value
+    if len(frame) < WORTH_CUTTING_BYTES:
+        return _parse_json(bytes(frame))
+    rest, lists = cut_out_numbers(frame)
+    if not lists:
+        return _parse_json(rest)
     try:
-        return orjson.loads(frame)
-    except orjson.JSONDecodeError as error:
-        return _decode_lenient_json(frame, str(error))
+        return _put_back(_parse_json(rest), lists)
+    except FrameError:
+        # A list may have stood within a string.
+        return _parse_json(bytes(frame))
 
 
-def decode_cbor(frame: bytes) -> Any:  # noqa: ANN401 - ROS data enters here
+def decode_cbor(frame: Raw) -> Any:  # noqa: ANN401 - ROS data enters here
     """Gives what a CBOR item says; typed arrays as read-only numpy arrays, uint8[] as bytes.
 
     Raises:
         FrameError: It is no CBOR, or uses tags that no ROS message needs.
     """
+    check_cbor(frame)
     try:
         return cbor2.loads(frame, semantic_decoders=_DECODERS, max_depth=MAX_DEPTH)
     except (cbor2.CBORDecodeError, ValueError, TypeError, OverflowError, RecursionError) as error:
         raise FrameError(f"no CBOR: {error}") from error
 
 
-def decode_png(text: str) -> bytes:
-    """Gives the text that rosbridge hid in the pixels of a picture.
+def require_cbor() -> None:
+    """Check that the CBOR library in use is one that `decode_cbor` can call.
+
+    Raises:
+        ConfigError: It is not: another one stands before it on Python's path.
+    """
+    try:
+        cbor2.loads(cbor2.dumps(None), semantic_decoders=_DECODERS, max_depth=MAX_DEPTH)
+    except TypeError as error:
+        raise ConfigError(
+            f"The Python package cbor2 in {Path(cbor2.__file__).parent} is too old: {error}.",
+            hint="A sourced ROS puts its packages first: start mapspeak with PYTHONPATH unset.",
+        ) from error
+
+
+def decode_png(text: str) -> memoryview:
+    """Return the text that rosbridge hid in the pixels of a picture.
 
     Raises:
         FrameError: It is no such picture.
@@ -84,19 +114,58 @@ def decode_png(text: str) -> bytes:
         with Image.open(io.BytesIO(base64.b64decode(text)), formats=["PNG"]) as picture:
             if picture.width * picture.height > MAX_FRAME_PIXELS:
                 raise FrameError(f"a png of {picture.width}x{picture.height} pixels")
-            pixels = picture.convert("RGB").tobytes()
+            pixels = (picture if picture.mode == "RGB" else picture.convert("RGB")).tobytes()
     except (OSError, ValueError, SyntaxError, zlib.error, Image.DecompressionBombError) as error:
         raise FrameError(f"no png: {error}") from error
     # The last row is filled up with line ends.
-    return pixels.rstrip(b"\n\x00")
+    n_filled = 3 * picture.width
+    end = len(pixels) - n_filled + len(pixels[-n_filled:].rstrip(b"\n\x00"))
+    return memoryview(pixels)[:end]
 
 
-def _decode_lenient_json(frame: bytes, complaint: str) -> Any:  # noqa: ANN401 - as above
-    """Reads NaN and Infinity too, however a server spells them."""
+def _parse_json(text: bytes) -> Any:  # noqa: ANN401 - as above
+    check_json(text)
     try:
-        return json.loads(BARE_NUMBER.sub(_as_python_writes, frame))
+        value = orjson.loads(text)
+    except orjson.JSONDecodeError as error:
+        value = _parse_lenient_json(text, str(error))
+    if text.count(b"[") + text.count(b"{") > MAX_DEPTH:
+        _put_back(value, [])
+    return value
+
+
+def _parse_lenient_json(text: bytes, complaint: str) -> Any:  # noqa: ANN401 - as above
+    """Read NaN and Infinity too, however a server spells them."""
+    if len(text) > MAX_LENIENT_BYTES:
+        raise FrameError(f"no JSON: {complaint}")
+    try:
+        return json.loads(BARE_NUMBER.sub(_as_python_writes, text))
     except (ValueError, RecursionError) as error:
         raise FrameError(f"no JSON: {complaint}") from error
+
+
+def _put_back(value: Any, lists: Sequence[Numbers]) -> Any:  # noqa: ANN401 - as above
+    """Put lists where their markers are, and check how deep the value is nested.
+
+    Raises:
+        FrameError: It is nested too deep.
+    """
+    places = {marker_of(number): each for number, each in enumerate(lists)}
+    level = [value]
+    for _ in range(MAX_DEPTH):
+        inner = []
+        for container in level:
+            each = enumerate(container) if isinstance(container, list) else container.items()
+            for key, child in each:
+                if isinstance(child, dict | list):
+                    inner.append(child)
+                elif places and isinstance(child, str) and child[:1] == "\x00":
+                    inner_list = places.get(child)
+                    container[key] = child if inner_list is None else inner_list
+        level = inner
+    if level:
+        raise FrameError(f"JSON that is nested more than {MAX_DEPTH} levels deep")
+    return value
 
 
 def _as_python_writes(found: re.Match[bytes]) -> bytes:
@@ -105,49 +174,6 @@ def _as_python_writes(found: re.Match[bytes]) -> bytes:
     if found.group(2) is not None:
         return b"NaN"
     return (b"-" if found.group(1) == b"-" else b"") + b"Infinity"
-
-
-def _decode_with_data_apart(frame: bytes) -> Any | None:  # noqa: ANN401 - as above
-    """Reads the numbers of `msg.data` apart, which takes half the time; None where it cannot."""
-    opening = DATA_ARRAY.search(frame)
-    if opening is None:
-        return None
-    start, end = opening.end(), frame.find(b"]", opening.end())
-    numbers = frame[start:end]
-    if len(numbers) < WORTH_CUTTING_BYTES // 2 or numbers.translate(None, b"-0123456789, \n"):
-        return None
-    try:
-        rest = orjson.loads(b"".join((frame[: start - 1], orjson.dumps(CUT_OUT), frame[end + 1 :])))
-        data = _read_numbers(numbers)
-    except ValueError:
-        return None
-    message = rest.get("msg") if isinstance(rest, dict) else None
-    if data is None or not isinstance(message, dict) or message.get("data") != CUT_OUT:
-        return None
-    message["data"] = data
-    return rest
-
-
-def _read_numbers(numbers: bytes) -> NDArray[np.int64] | None:
-    signs = np.frombuffer(numbers, dtype=np.uint8)
-    # A sign without a digit behind it is 0 to numpy.
-    if signs[-1] == ord("-") or ((signs[:-1] == ord("-")) & (signs[1:] < ord("0"))).any():
-        return None
-    data = np.concatenate(
-        [np.fromstring(part, dtype=np.int64, sep=",") for part in _parts_of(numbers)]
-    )
-    # What follows the last comma is the other thing that numpy does not insist on.
-    return data if data.size == numbers.count(b",") + 1 else None
-
-
-def _parts_of(numbers: bytes) -> Iterator[bytes]:
-    """Cuts at commas: numpy lets no other thread run before it has read all it was given."""
-    start = 0
-    while start < len(numbers):
-        comma = numbers.find(b",", start + PART_BYTES)
-        end = len(numbers) if comma < 0 else comma
-        yield numbers[start:end]
-        start = end + 1
 
 
 def _as_array(dtype: str) -> Callable[[Any, bool], NDArray[Any]]:

@@ -5,7 +5,7 @@ from collections import OrderedDict
 from dataclasses import dataclass, field
 from typing import Any, TypeGuard
 
-from mapspeak.links.rosbridge.protocol.decoding import MAX_FRAME_BYTES, FrameError
+from mapspeak.links.rosbridge.protocol.bounds import MAX_FRAME_BYTES, FrameError
 
 MAX_PIECES = 10_000
 MAX_UNFINISHED = 8
@@ -15,8 +15,8 @@ MAX_UNFINISHED = 8
 class _Unfinished:
     """One message of which some pieces have come."""
 
-    pieces: dict[int, str] = field(default_factory=dict)
-    n_characters: int = 0
+    pieces: dict[int, bytes] = field(default_factory=dict)
+    n_bytes: int = 0
 
 
 class FragmentStore:
@@ -31,12 +31,12 @@ class FragmentStore:
         self._unfinished: OrderedDict[tuple[str, int], _Unfinished] = OrderedDict()
 
     @property
-    def n_characters(self) -> int:
+    def n_bytes(self) -> int:
         """Held at present."""
-        return sum(message.n_characters for message in self._unfinished.values())
+        return sum(message.n_bytes for message in self._unfinished.values())
 
-    def add(self, operation: dict[str, Any]) -> str | None:
-        """Takes one piece and gives the whole text once it is complete.
+    def add(self, operation: dict[str, Any]) -> bytes | None:
+        """Take one piece, and return the whole text once it is complete.
 
         Raises:
             FrameError: It is no piece.
@@ -50,19 +50,19 @@ class FragmentStore:
             message = self._unfinished[key] = _Unfinished()
         if number not in message.pieces:
             message.pieces[number] = text
-            message.n_characters += len(text)
+            message.n_bytes += len(text)
         if len(message.pieces) == n_pieces:
             del self._unfinished[key]
-            return "".join(message.pieces[index] for index in range(n_pieces))
+            return b"".join(message.pieces[index] for index in range(n_pieces))
         self._forget_what_is_too_much()
         return None
 
     def _forget_what_is_too_much(self) -> None:
-        while len(self._unfinished) > MAX_UNFINISHED or self.n_characters > self._max_bytes:
+        while len(self._unfinished) > MAX_UNFINISHED or self.n_bytes > self._max_bytes:
             self._unfinished.popitem(last=False)
 
 
-def _read_piece(operation: dict[str, Any]) -> tuple[int, int, str]:
+def _read_piece(operation: dict[str, Any]) -> tuple[int, int, bytes]:
     number, total, text = (operation.get(key) for key in ("num", "total", "data"))
     if not (_is_number(number) and _is_number(total) and isinstance(text, str)):
         raise FrameError("a fragment without num, total and data")
@@ -70,7 +70,7 @@ def _read_piece(operation: dict[str, Any]) -> tuple[int, int, str]:
     n_pieces = math.floor(total)
     if not 1 <= n_pieces <= MAX_PIECES or number not in range(n_pieces):
         raise FrameError(f"fragment {number} of {total}")
-    return int(number), n_pieces, text
+    return int(number), n_pieces, text.encode("utf-8", "surrogatepass")
 
 
 def _is_number(value: object) -> TypeGuard[int | float]:

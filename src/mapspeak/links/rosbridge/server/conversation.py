@@ -8,7 +8,8 @@ from typing import Any
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError, MapspeakError
-from mapspeak.links.rosbridge.protocol.decoding import FrameError, decode_json
+from mapspeak.links.rosbridge.protocol.bounds import FrameError
+from mapspeak.links.rosbridge.protocol.decoding import decode_json
 from mapspeak.links.rosbridge.server.actions import GoalOperations
 from mapspeak.links.rosbridge.server.outbox import Outbox
 from mapspeak.links.rosbridge.server.publication import (

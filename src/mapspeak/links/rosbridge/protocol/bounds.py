@@ -1,0 +1,116 @@
+"""What a frame may hold: checked by counting, before anything is built from it."""
+
+from collections.abc import Iterator
+
+__all__ = [
+    "MAX_CONTAINERS",
+    "MAX_DEPTH",
+    "MAX_ELEMENTS",
+    "MAX_FRAME_BYTES",
+    "MAX_REST_BYTES",
+    "FrameError",
+    "Raw",
+    "check_cbor",
+    "check_json",
+    "parts_of",
+]
+
+MAX_FRAME_BYTES = 100_000_000
+"""The largest message that is taken: a map of 16 million cells as JSON has 35 to 80 MB."""
+MAX_REST_BYTES = 24_000_000
+"""Of a JSON text without its long lists of numbers; 16 million cells as base64 fit."""
+MAX_CONTAINERS = 100_000
+"""Lists and objects of one message; a path of 10,000 poses has 60,000."""
+MAX_ELEMENTS = 400_000
+"""Values of one message, long lists of numbers apart."""
+MAX_DEPTH = 64
+"""Of containers within each other; ROS messages stay below ten."""
+SMALL_BYTES = 16_384
+"""A frame below this size cannot hold enough to be worth counting."""
+COUNTED_BYTES = 1_000_000
+"""Other threads may run between two parts."""
+
+
+Raw = bytes | bytearray | memoryview
+"""A large frame is handed on as it came: copying it takes longer than other calls may wait."""
+
+
+class FrameError(Exception):
+    """A frame that cannot be understood; never leaves the protocol."""
+
+
+def check_json(text: bytes) -> None:
+    """Check that a JSON text is quick to parse; what stands in its strings counts too.
+
+    Raises:
+        FrameError: It holds too much.
+    """
+    if len(text) < SMALL_BYTES:
+        return
+    n_containers = n_elements = 0
+    for start, end in parts_of(len(text)):
+        n_containers += text.count(b"[", start, end) + text.count(b"{", start, end)
+        n_elements += text.count(b",", start, end)
+        _check_counts(n_containers, n_elements)
+
+
+def check_cbor(frame: Raw) -> None:
+    """Check that a CBOR item is quick to decode, by stepping from head to head.
+
+    Raises:
+        FrameError: It holds too much, or says so.
+    """
+    if len(frame) < SMALL_BYTES:
+        return
+    n_containers = n_elements = position = 0
+    open_ends: list[float] = [1]
+    while open_ends and position < len(frame):
+        if open_ends[-1] == 0:
+            open_ends.pop()
+            continue
+        major, short = frame[position] >> 5, frame[position] & 31
+        if frame[position] == _BREAK:
+            open_ends.pop()
+            position += 1
+            continue
+        length, position = _read_length(frame, position, short)
+        n_elements += 1
+        open_ends[-1] -= major != _TAG
+        if major in _STRINGS and short != _INDEFINITE:
+            position += int(length)
+        elif major in _STRINGS or major in _CONTAINERS:
+            n_containers += 1
+            n_values = length * _CONTAINERS.get(major, 1)
+            if short != _INDEFINITE and n_values > len(frame) - position:
+                raise FrameError("no CBOR: a list that is longer than its frame")
+            open_ends.append(n_values)
+            if len(open_ends) > MAX_DEPTH:
+                raise FrameError(f"CBOR that is nested more than {MAX_DEPTH} levels deep")
+        _check_counts(n_containers, n_elements)
+
+
+_STRINGS, _CONTAINERS, _TAG = (2, 3), {4: 1, 5: 2}, 6
+_BREAK, _INDEFINITE, _FIRST_LONG = 0xFF, 31, 24
+
+
+def _read_length(frame: Raw, position: int, short: int) -> tuple[float, int]:
+    """Return the argument of a head (RFC 8949, section 3), and where its content begins."""
+    position += 1
+    if short < _FIRST_LONG:
+        return short, position
+    if short == _INDEFINITE:
+        return float("inf"), position
+    n_bytes = 1 << (short - _FIRST_LONG) if short < _FIRST_LONG + 4 else 0
+    return int.from_bytes(frame[position : position + n_bytes]), position + n_bytes
+
+
+def _check_counts(n_containers: int, n_elements: int) -> None:
+    if n_containers > MAX_CONTAINERS or n_elements > MAX_ELEMENTS:
+        raise FrameError(
+            f"more than {MAX_CONTAINERS} lists and objects, or {MAX_ELEMENTS} values, in one frame"
+        )
+
+
+def parts_of(length: int, size: int = COUNTED_BYTES) -> Iterator[tuple[int, int]]:
+    """Return where each part of a long text begins and ends."""
+    return ((start, min(start + size, length)) for start in range(0, length, size))
