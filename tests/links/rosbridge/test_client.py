@@ -1,15 +1,22 @@
 """The rosbridge client: one robot, two sockets, whatever the network does."""
 
+import random
+import subprocess
+import sys
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 from dataclasses import replace
+from pathlib import Path
 
 import anyio
 import orjson
 import pytest
 
+from benchmarks.mutations import mutate, seed_frames
 from mapspeak.errors import ConfigError, LinkError
 from mapspeak.links.rosbridge.client import RobotAddress, RosbridgeClient, Timing, open_client
+from mapspeak.links.rosbridge.client.connection import MAX_REFUSED
+from mapspeak.links.rosbridge.client.websocket import MAX_PARTS
 from rosbridge_script import (
     PATIENCE_S,
     Operation,
@@ -23,6 +30,13 @@ pytestmark = pytest.mark.anyio
 
 QUICK = Timing(first_pause_s=0.001, longest_pause_s=0.01, linger_s=0.0, goodbye_s=1.0)
 TWIST = "geometry_msgs/msg/Twist"
+OLD_CBOR = """
+class CBOREncoder: ...
+class CBORTag: ...
+class CBORDecodeError(Exception): ...
+def dumps(value, default=None): return b"\\xf6"
+def loads(data, tag_hook=None): return None
+"""
 
 
 @asynccontextmanager
@@ -412,3 +426,108 @@ def test_what_is_no_address_is_refused_without_showing_its_secrets(url: str) -> 
 def test_what_is_no_address_is_refused(url: str) -> None:
     with pytest.raises(ConfigError, match="not the address"):
         RobotAddress(url=url)
+
+
+async def test_a_robot_that_sends_nothing_but_garbage_gets_another_connection(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    server = ScriptedServer({"call_service": echo})
+    async with connected(server) as client:
+        garbage = next(iter(server.present))
+        for _ in range(MAX_REFUSED):
+            await garbage.send_text(b"{no json")
+        await garbage.send({"op": "status", "level": "info", "msg": "an honest word"})
+        for _ in range(MAX_REFUSED + 1):
+            await garbage.send_text(b"{no json")
+        await server.until(lambda: len(server.visitors) == 3)
+        assert await client.call_service("/echo", {"a": 1}) == {"a": 1}
+    warnings = [each.message for each in caplog.records]
+    assert len([each for each in warnings if "left away" in each]) == 1
+    assert len([each for each in warnings if "made anew" in each]) == 1
+
+
+async def test_a_message_in_countless_empty_frames_costs_the_connection() -> None:
+    server = ScriptedServer({"call_service": echo})
+    async with connected(server) as client:
+        begun, more = b"\x01\x00", b"\x00\x00"
+        await next(iter(server.present)).send_raw(begun + more * (MAX_PARTS + 10))
+        await server.until(lambda: len(server.visitors) == 3)
+        assert await client.call_service("/echo", {"a": 1}) == {"a": 1}
+
+
+async def test_a_message_in_many_frames_is_put_together() -> None:
+    server = ScriptedServer()
+    async with connected(server) as client:
+        heard = client.subscribe("/pose")
+        await server.until(lambda: server.asked("subscribe"))
+        text = orjson.dumps({"op": "publish", "topic": "/pose", "msg": {"data": "x" * 1_000}})
+        frames = [bytes([0, 1, each]) for each in text]
+        raw = b"".join([b"\x01\x00", *frames, b"\x80\x00"])
+        for visitor in server.present:
+            await visitor.send_raw(raw)
+        assert await heard.wait_for_more_than(0, timeout_s=PATIENCE_S) == {"data": "x" * 1_000}
+
+
+@pytest.mark.parametrize("n_behind", [0, 10])
+async def test_a_large_frame_is_taken_with_what_comes_behind_it(n_behind: int) -> None:
+    server = ScriptedServer()
+    async with connected(server) as client:
+        heard = client.subscribe("/map")
+        await server.until(lambda: server.asked("subscribe"))
+        for number in range(n_behind + 1):
+            await server.publish("/map", {"data": [number] * 300_000})
+        cells = (await heard.wait_for_more_than(n_behind, timeout_s=PATIENCE_S))["data"]
+        assert cells.tolist() == [n_behind] * 300_000
+
+
+async def test_compression_is_not_offered() -> None:
+    server = ScriptedServer()
+    async with connected(server):
+        for visitor in server.present:
+            assert visitor.request is not None
+            assert "Sec-WebSocket-Extensions" not in visitor.request.headers
+
+
+def test_an_old_cbor_library_before_ours_is_named(tmp_path: Path) -> None:
+    (tmp_path / "cbor2.py").write_text(OLD_CBOR)
+    program = f"""
+import sys
+sys.path.insert(0, {str(tmp_path)!r})
+import anyio
+from mapspeak.errors import ConfigError
+from mapspeak.links.rosbridge.client import RobotAddress, open_client
+async def connect():
+    async with open_client(RobotAddress(url="ws://127.0.0.1:1")): pass
+try:
+    anyio.run(connect)
+except ConfigError as error:
+    print(error)
+"""
+    said = subprocess.run(  # noqa: S603 - our own program
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    ).stdout
+    assert f"cbor2 in {tmp_path} is too old" in said
+    assert "PYTHONPATH" in said
+
+
+@pytest.mark.parametrize("seed", range(4))
+async def test_whatever_is_sent_other_calls_are_answered(
+    seed: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    server = ScriptedServer({"call_service": echo})
+    chance = random.Random(seed)  # noqa: S311 - no secret
+    seeds = seed_frames("/pose")
+    async with connected(server) as client:
+        heard = client.subscribe("/pose")
+        await server.until(lambda: server.asked("subscribe"))
+        for number in range(200):
+            is_text, data = mutate(chance.choice(seeds), chance.choice(seeds), chance)
+            for visitor in server.present:
+                await (visitor.send_text(data) if is_text else visitor.send_binary(data))
+            if number % 50 == 0:
+                assert await client.call_service("/echo", {"a": number}) == {"a": number}
+        n_received = heard.n_received
+        await server.publish("/pose", {"data": 1})
+        await heard.wait_for_more_than(n_received, timeout_s=PATIENCE_S)
+        assert client.n_connections == 1
+    assert not [each for each in caplog.records if each.exc_info]

@@ -1,5 +1,7 @@
 """The robot's map: the whole of it once, and what changes."""
 
+import anyio.to_thread
+
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.links.ros.discovery import RobotProfile
 from mapspeak.links.ros.discovery.ranking import MAP, MAP_UPDATE
@@ -55,6 +57,9 @@ class MapKeeper:
         """
         maps = self._subscribe()
         await self._wait_for_first(maps)
+        if maps.latest is not None and isinstance(maps.latest.get("data"), str):
+            # Base64 takes long enough to hold up a stop.
+            return await anyio.to_thread.run_sync(self._read_latest, maps)
         return self._read_latest(maps)
 
     def _subscribe(self) -> Subscription:

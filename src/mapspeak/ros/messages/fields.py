@@ -1,5 +1,6 @@
 """The fields of a ROS message, taken out one by one: what does not fit is a `LinkError`."""
 
+import base64
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,6 +14,20 @@ Message = Mapping[str, Any]
 """A ROS message as rosbridge gives it: fields by name, arrays as lists, bytes or numpy arrays."""
 
 HINT = "The topic may be of another type than expected: look its type up on the robot."
+
+
+BASE64_PART = 400_000
+"""Characters decoded in one go, a multiple of four: other threads may run in between."""
+
+
+def decode_base64(text: str) -> bytes:
+    """Return the bytes of a base64 text.
+
+    Raises:
+        ValueError: It holds other characters.
+    """
+    parts = (text[start : start + BASE64_PART] for start in range(0, len(text), BASE64_PART))
+    return b"".join(base64.b64decode(part, validate=True) for part in parts)
 
 
 def misfit(name: str, value: object, wanted: str) -> LinkError:

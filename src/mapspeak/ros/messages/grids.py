@@ -1,6 +1,5 @@
 """Occupancy grids of ROS messages, and the updates that change a part of one."""
 
-import base64
 import binascii
 from array import array
 from typing import Any
@@ -15,7 +14,14 @@ from mapspeak.ros.messages.dialect import (
     write_header,
     write_stamp,
 )
-from mapspeak.ros.messages.fields import Message, misfit, number_of, part_of, whole_of
+from mapspeak.ros.messages.fields import (
+    Message,
+    decode_base64,
+    misfit,
+    number_of,
+    part_of,
+    whole_of,
+)
 from mapspeak.ros.messages.poses import read_pose, write_pose
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import MAX_CELLS
@@ -117,7 +123,7 @@ def _flat_cells(data: object) -> Cells:
             case bytes() | bytearray() | memoryview():
                 return np.frombuffer(data, dtype=np.int8)
             case str():
-                return np.frombuffer(base64.b64decode(data, validate=True), dtype=np.int8)
+                return np.frombuffer(decode_base64(data), dtype=np.int8)
             case list() | tuple():
                 # `array` refuses fractions and texts, which numpy would quietly cut or parse.
                 return np.frombuffer(array("b", data), dtype=np.int8)

@@ -1,6 +1,5 @@
 """The pixels of sensor_msgs/Image: every usual encoding, padded rows, either byte order."""
 
-import base64
 import binascii
 from array import array
 from typing import Any
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 
 from mapspeak.errors import LinkError
 from mapspeak.ros.messages.depth import MILLIMETRE_M, Depth
-from mapspeak.ros.messages.fields import Message, misfit, text_of, whole_of
+from mapspeak.ros.messages.fields import Message, decode_base64, misfit, text_of, whole_of
 
 LARGEST_SIDE_PX = 20_000
 LARGEST_STEP = 2**31
@@ -92,7 +91,7 @@ def bytes_of(message: Message) -> bytes:
     try:
         match data:
             case str():
-                return base64.b64decode(data, validate=True)
+                return decode_base64(data)
             case bytes() | bytearray() | memoryview():
                 return bytes(data)
             case np.ndarray() if data.dtype.itemsize == 1:

@@ -2,6 +2,9 @@
 
 from collections.abc import Iterator
 
+import numpy as np
+from numpy.typing import NDArray
+
 __all__ = [
     "MAX_CONTAINERS",
     "MAX_DEPTH",
@@ -19,16 +22,16 @@ MAX_FRAME_BYTES = 100_000_000
 """The largest message that is taken: a map of 16 million cells as JSON has 35 to 80 MB."""
 MAX_REST_BYTES = 24_000_000
 """Of a JSON text without its long lists of numbers; 16 million cells as base64 fit."""
-MAX_CONTAINERS = 100_000
+MAX_CONTAINERS = 80_000
 """Lists and objects of one message; a path of 10,000 poses has 60,000."""
-MAX_ELEMENTS = 400_000
+MAX_ELEMENTS = 350_000
 """Values of one message, long lists of numbers apart."""
 MAX_DEPTH = 64
 """Of containers within each other; ROS messages stay below ten."""
 SMALL_BYTES = 16_384
 """A frame below this size cannot hold enough to be worth counting."""
-COUNTED_BYTES = 1_000_000
-"""Other threads may run between two parts."""
+PART_BYTES = 1_000_000
+"""What is counted in one go: other threads may run between two parts."""
 
 
 Raw = bytes | bytearray | memoryview
@@ -39,19 +42,43 @@ class FrameError(Exception):
     """A frame that cannot be understood; never leaves the protocol."""
 
 
-def check_json(text: bytes) -> None:
-    """Check that a JSON text is quick to parse; what stands in its strings counts too.
+def check_json(text: Raw) -> int:
+    """Check that a JSON text is quick to parse, and return how many lists it has at most.
+
+    Objects count as lists.
 
     Raises:
         FrameError: It holds too much.
     """
+    if len(text) > MAX_REST_BYTES:
+        raise FrameError(f"{len(text)} bytes besides numbers, the limit is {MAX_REST_BYTES}")
     if len(text) < SMALL_BYTES:
-        return
+        small = bytes(text)
+        return small.count(b"[") + small.count(b"{")
     n_containers = n_elements = 0
+    is_inside, escape = False, b""
     for start, end in parts_of(len(text)):
-        n_containers += text.count(b"[", start, end) + text.count(b"{", start, end)
-        n_elements += text.count(b",", start, end)
+        # Without escaped quotes, each quote begins or ends a string.
+        part = (escape + bytes(text[start:end])).replace(b"\\\\", b"").replace(b'\\"', b"")
+        escape = b"\\" if part.endswith(b"\\") else b""
+        codes = np.frombuffer(part, dtype=np.uint8)
+        quotes = np.flatnonzero(codes == ord('"'))
+        n_containers += sum(_count_outside(codes, sign, quotes, is_inside) for sign in b"[{")
+        n_elements += _count_outside(codes, ord(","), quotes, is_inside)
+        is_inside ^= bool(quotes.size % 2)
         _check_counts(n_containers, n_elements)
+    return n_containers
+
+
+def _count_outside(
+    codes: NDArray[np.uint8],
+    sign: int,
+    quotes: NDArray[np.intp],
+    is_inside: bool,  # noqa: FBT001
+) -> int:
+    """Return how often a sign stands outside strings."""
+    n_quotes_before = np.searchsorted(quotes, np.flatnonzero(codes == sign))
+    return int(np.count_nonzero(n_quotes_before % 2 == is_inside))
 
 
 def check_cbor(frame: Raw) -> None:
@@ -111,6 +138,6 @@ def _check_counts(n_containers: int, n_elements: int) -> None:
         )
 
 
-def parts_of(length: int, size: int = COUNTED_BYTES) -> Iterator[tuple[int, int]]:
+def parts_of(length: int, size: int = PART_BYTES) -> Iterator[tuple[int, int]]:
     """Return where each part of a long text begins and ends."""
     return ((start, min(start + size, length)) for start in range(0, length, size))

@@ -32,7 +32,7 @@ from mapspeak.links.rosbridge.protocol.numberlists import (
 )
 
 MAX_FRAME_PIXELS = MAX_FRAME_BYTES // 3
-MAX_LENIENT_BYTES = 1_000_000
+MAX_LENIENT_BYTES = 500_000
 """Of a text that only the slower parser reads; long lists of numbers apart."""
 
 TYPED_ARRAYS = {
@@ -65,7 +65,7 @@ def decode_json(frame: Raw) -> Any:  # noqa: ANN401 - ROS JSON enters here
             too much.
     """
     if len(frame) < WORTH_CUTTING_BYTES:
-        return _parse_json(bytes(frame))
+        return _parse_json(frame)
     rest, lists = cut_out_numbers(frame)
     if not lists:
         return _parse_json(rest)
@@ -73,7 +73,7 @@ def decode_json(frame: Raw) -> Any:  # noqa: ANN401 - ROS JSON enters here
         return _put_back(_parse_json(rest), lists)
     except FrameError:
         # A list may have stood within a string.
-        return _parse_json(bytes(frame))
+        return _parse_json(frame)
 
 
 def decode_cbor(frame: Raw) -> Any:  # noqa: ANN401 - ROS data enters here
@@ -123,18 +123,18 @@ def decode_png(text: str) -> memoryview:
     return memoryview(pixels)[:end]
 
 
-def _parse_json(text: bytes) -> Any:  # noqa: ANN401 - as above
-    check_json(text)
+def _parse_json(text: Raw) -> Any:  # noqa: ANN401 - as above
+    n_containers = check_json(text)
     try:
         value = orjson.loads(text)
     except orjson.JSONDecodeError as error:
         value = _parse_lenient_json(text, str(error))
-    if text.count(b"[") + text.count(b"{") > MAX_DEPTH:
+    if n_containers > MAX_DEPTH:
         _put_back(value, [])
     return value
 
 
-def _parse_lenient_json(text: bytes, complaint: str) -> Any:  # noqa: ANN401 - as above
+def _parse_lenient_json(text: Raw, complaint: str) -> Any:  # noqa: ANN401 - as above
     """Read NaN and Infinity too, however a server spells them."""
     if len(text) > MAX_LENIENT_BYTES:
         raise FrameError(f"no JSON: {complaint}")

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from mapspeak.links.rosbridge.protocol.bounds import (
     MAX_CONTAINERS,
     MAX_REST_BYTES,
-    FrameError,
     Raw,
     parts_of,
 )
@@ -34,28 +33,25 @@ def marker_of(number: int) -> str:
     return f"\x00list {number}"
 
 
-def cut_out_numbers(frame: Raw) -> tuple[bytes, list[Numbers]]:
+def cut_out_numbers(frame: Raw) -> tuple[Raw, list[Numbers]]:
     """Return a JSON text with a marker in place of each long list of numbers, and those lists.
 
     A list with a fault in it stays where it is, for the parser to complain about. A marker within
     a string ends that string, so that the parser complains too.
-
-    Raises:
-        FrameError: The text has too many lists, or is too long besides them.
     """
     codes, view = np.frombuffer(frame, dtype=np.uint8), memoryview(frame)
     kept: list[bytes | memoryview] = []
     lists: list[Numbers] = []
-    done, n_kept = 0, len(frame)
+    done = 0
     for start, end in _find_long_stretches(codes):
         numbers = _read_numbers(view[start + 1 : end])
         if numbers is not None:
             kept += [view[done:start], b'"\\u0000list %d"' % len(lists)]
             lists.append(numbers)
-            done, n_kept = end + 1, n_kept - (end + 1 - start)
-    if n_kept > MAX_REST_BYTES:
-        raise FrameError(f"{n_kept} bytes besides numbers, the limit is {MAX_REST_BYTES}")
-    return b"".join([*kept, view[done:]]), lists
+            done = end + 1
+    kept.append(view[done:])
+    is_long = sum(map(len, kept)) > MAX_REST_BYTES
+    return frame if is_long or not lists else b"".join(kept), lists
 
 
 def _find_long_stretches(codes: NDArray[np.uint8]) -> list[tuple[int, int]]:
@@ -73,12 +69,13 @@ def _find_long_stretches(codes: NDArray[np.uint8]) -> list[tuple[int, int]]:
 
 
 def _find(codes: NDArray[np.uint8], sign: bytes) -> NDArray[np.intp]:
+    """Return where a sign stands; nowhere where that is too often to be worth cutting."""
     found, n_found = [np.empty(0, dtype=np.intp)], 0
     for start, end in parts_of(codes.size):
         places = np.flatnonzero(codes[start:end] == ord(sign)) + start
         n_found += places.size
         if n_found > MAX_CONTAINERS:
-            raise FrameError(f"more than {MAX_CONTAINERS} lists in one frame")
+            return np.empty(0, dtype=np.intp)
         found.append(places)
     return np.concatenate(found)
 
