@@ -1,5 +1,7 @@
 """./run makes the environment once, and again when it must; a fake uv stands for the network."""
 
+import os
+import re
 import shutil
 import signal
 import subprocess
@@ -7,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+
+from mapspeak.cli import cli
 
 CHECKOUT = Path(__file__).parents[2]
 SYSTEM_TOOLS = "cat chmod cksum dirname ls mkdir rm rmdir sed sh"
@@ -23,6 +27,7 @@ venv)
     ;;
 pip)
     echo "uv speaks on stdout"
+    [ ! -p "$UV_LOG.gate" ] || cat "$UV_LOG.gate"
     [ ! -e "$UV_LOG.kill" ] || kill -KILL 0
     ;;
 esac
@@ -152,10 +157,36 @@ def test_a_lock_that_a_killed_call_left_behind_is_freed(desk: Desk) -> None:
     assert not (desk.checkout / ".venv.lock").exists()
 
 
-def test_help_needs_no_environment(desk: Desk) -> None:
-    code, stdout, _ = desk.run("help")
+def test_a_client_that_kills_a_call_too_soon_finds_the_environment_next_time(desk: Desk) -> None:
+    (desk.tools / "setsid").symlink_to(shutil.which("setsid") or pytest.fail("no setsid here"))
+    gate = Path(f"{desk.uv_log}.gate")
+    os.mkfifo(gate)
+    call = desk.start("python", "first")
+    with gate.open("w"):
+        os.killpg(call.pid, signal.SIGKILL)
+        gate.unlink()
+    call.communicate(timeout=30)
+    assert call.returncode == -signal.SIGKILL
+    assert not (desk.checkout / ".venv.lock").exists()
+    assert desk.calls_of_uv() == MADE
+    assert desk.run("python", "second") == (0, "python second\n", "")
+    assert desk.calls_of_uv() == []
+
+
+def test_what_could_not_be_installed_ends_the_call(desk: Desk) -> None:
+    (desk.tools / "setsid").symlink_to(shutil.which("setsid") or pytest.fail("no setsid here"))
+    (desk.tools / "uv").unlink()
+    assert desk.run("python")[0] == 1
+
+
+@pytest.mark.parametrize("word", ["help", "--help", "-h"])
+def test_help_is_of_the_product_first_and_needs_no_environment(desk: Desk, word: str) -> None:
+    code, stdout, _ = desk.run(word)
     assert code == 0
-    assert "./run demo" in stdout
+    products, developers = stdout.split("For those who change mapspeak:")
+    told = dict(re.findall(r"^  \./run (\w+) +(.+)$", products, re.MULTILINE))
+    assert told == {name: command.short_help for name, command in cli.commands.items()}
+    assert "./run check" in developers
     assert not (desk.checkout / ".venv").exists()
 
 

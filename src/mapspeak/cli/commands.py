@@ -34,20 +34,21 @@ def cli(context: click.Context) -> None:
         context.invoke(serve)
 
 
-COMMANDS = (
-    serve,
-    demo,
-    evaluate,
-    doctor,
-    simulate,
-    map_command,
-    memory,
-    stop,
-    release,
-    approve,
-    replay,
-)
-for command in COMMANDS:
+COMMANDS = {
+    demo: "watch a script do three tasks with the simulated robot",
+    serve: "offer a robot to a language model, over MCP",
+    doctor: "check a robot: what was found, what is missing, how to start it",
+    map_command: "show map files as a model sees a map; no robot is needed",
+    memory: "look at, edit, check and share what a robot remembers",
+    stop: "stop every robot that is served from here, and hold it",
+    release: "let held robots drive again",
+    approve: "agree to a command that waits for a person's word",
+    replay: "show an audit log: who wanted what, and what became of it",
+    simulate: "offer the simulated robot to any rosbridge client",
+    evaluate: "run and score tasks in simulated worlds",
+}
+for command, what in COMMANDS.items():
+    command.short_help = what
     cli.add_command(command)
 
 
