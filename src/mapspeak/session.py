@@ -24,7 +24,7 @@ from mapspeak.navigation.memory.recollection import Recollector
 from mapspeak.navigation.revision import MapRevision
 from mapspeak.navigation.safety import Guard, GuardedConnection, GuardedRobot, Surveyor, WhenBusy
 from mapspeak.robot import CameraPicture, Robot
-from mapspeak.ros import RosConnection
+from mapspeak.ros import RosConnection, started_over
 from mapspeak.semantic import PictureBook, SemanticMap, SemanticMapStore
 from mapspeak.semantic.alignment import MapComparison, MapKeeper, MapRelation
 from mapspeak.semantic.episodes import (
@@ -132,9 +132,15 @@ class Session:
     async def client_is_gone(self, client: str) -> None:
         """Stops the robot when the client that sent it somewhere has gone away."""
         drive = self.drives.under_way
-        if self.drives.is_busy and (drive is None or drive.client == client):
+        is_drivers = self.drives.is_busy and (drive is None or drive.client == client)
+        if is_drivers or client in started_over(self.ros).owners:
             logger.warning("The client hung up during its drive: stopping the robot.")
             await self.drives.stop("The client that sent the robot hung up.")
+
+    @property
+    def _is_busy(self) -> bool:
+        """True while something goes on that was started here."""
+        return self.drives.is_busy or started_over(self.ros).is_busy
 
     async def compute(self, work: Callable[[], T]) -> T:
         """Does heavy work in a thread, so that a stop is answered meanwhile."""
@@ -351,7 +357,7 @@ class Session:
                 told = str(error)
 
     async def _watch(self) -> None:
-        if self._lease.is_over and self.drives.is_busy:
+        if self._lease.is_over and self._is_busy:
             logger.warning("No client for %.0f s: stopping the robot.", self._lease.duration_s)
             await self.drives.stop(f"No client was heard for {self._lease.duration_s:.0f} s.")
         await self.drives.watch()
@@ -361,7 +367,7 @@ class Session:
         if self.guard is not None:
             self.guard.approvals.close()
         with anyio.CancelScope(shield=True):
-            if self.drives.is_busy:
+            if self._is_busy:
                 await self.drives.stop("The server ended.")
 
 

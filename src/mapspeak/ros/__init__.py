@@ -7,7 +7,14 @@ works with any ROS robot is written against it. Messages are mappings as rosbrid
 from mapspeak.ros.definitions import split_definition
 from mapspeak.ros.graph import NodeLinks, OwnEnds, RosGraph
 from mapspeak.ros.names import NAME, TYPE, find_nearest, new_id
-from mapspeak.ros.port import ActionEnd, ActionGoal, Listener, RosConnection, Subscription
+from mapspeak.ros.port import (
+    ActionEnd,
+    ActionGoal,
+    Listener,
+    RosConnection,
+    Subscription,
+    started_over,
+)
 from mapspeak.ros.started import Startable, Started
 
 __all__ = [
@@ -26,4 +33,5 @@ __all__ = [
     "find_nearest",
     "new_id",
     "split_definition",
+    "started_over",
 ]

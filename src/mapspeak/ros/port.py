@@ -4,6 +4,7 @@ from collections.abc import Callable, Coroutine, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from mapspeak.errors import LinkError
 from mapspeak.ros.graph import NodeLinks, OwnEnds, RosGraph
 from mapspeak.ros.messages import Message
 from mapspeak.ros.started import Started
@@ -310,3 +311,11 @@ class RosConnection(Protocol):
             LinkError: The node refuses it, and says why.
         """
         ...
+
+
+def started_over(connection: RosConnection | None) -> Started:
+    """Return what was started over a connection; nothing where there is none, or not yet."""
+    try:
+        return Started() if connection is None else connection.started
+    except LinkError:
+        return Started()

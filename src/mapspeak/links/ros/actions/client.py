@@ -208,13 +208,12 @@ class ActionClient(ABC):
         for goal in self.open_goals:
             if goal not in taken:
                 self._withdraw(goal, ActionState.CANCELLED, TOO_EARLY)
-            else:
+            elif self.ends_others:
                 self._ask_to_cancel(goal)
         if self.ends_others:
             await self.cancel_all()
         else:
-            for goal in taken:
-                await self._cancel(goal)
+            await self._cancel_each(taken)
         await self._check_ended(taken)
         self._tell()
 
@@ -288,6 +287,17 @@ class ActionClient(ABC):
             if await goal.wait_until_settled(within_s=pause_s):
                 break
         self._being_ended.discard(goal.id)
+
+    async def _cancel_each(self, goals: Iterable[SentGoal]) -> None:
+        """Ask for the end of all goals; raise `LinkError` when one of them was refused."""
+        faults: list[LinkError] = []
+        for goal in goals:
+            try:
+                await self._cancel(goal)
+            except LinkError as error:
+                faults.append(error)
+        if faults:
+            raise faults[0]
 
     async def _check_ended(self, goals: Iterable[SentGoal]) -> None:
         with anyio.move_on_after(self._patience.end_s):

@@ -8,7 +8,7 @@ import anyio
 
 from mapspeak.errors import LinkError
 from mapspeak.navigation.safety import Act, Call, GuardedConnection, Publish, SetParameter
-from mapspeak.ros import ActionGoal, RosConnection
+from mapspeak.ros import RosConnection
 from mapspeak.ros.messages import Message
 
 __all__ = ["VELOCITIES", "RosCommands", "stand_of"]
@@ -89,6 +89,10 @@ class RosCommands:
             )
         await connection.publish(topic, message)
 
+    def note_velocity(self, topic: str, message: Message) -> None:
+        """Let every stop from now on publish zero velocity on a topic too."""
+        self._connection().started.note_velocity(topic, zero=stand_of(message))
+
     async def stand(self, topic: str, message: Message) -> bool:
         """Publishes the stand for a velocity, whatever happens to the call that moved the robot.
 
@@ -103,18 +107,6 @@ class RosCommands:
                 await anyio.sleep(PAUSE_S)
         return n_sent > 0
 
-    async def tell_everywhere(self, topic: str, message: Message) -> None:
-        """Publishes by every way there is: for a cancellation.
-
-        Raises:
-            LinkError: There is no way.
-        """
-        if self._connection().publish_everywhere(topic, message) == 0:
-            raise LinkError(
-                f"Nothing could be sent on {topic}: there is no connection.",
-                hint="Try again: the connection is made anew by itself.",
-            )
-
     async def call(
         self, service: str, arguments: Mapping[str, Any], *, type_name: str, timeout_s: float
     ) -> dict[str, Any]:
@@ -122,18 +114,6 @@ class RosCommands:
         return await self._connection().call_service(
             service, arguments, type_name=type_name, timeout_s=timeout_s
         )
-
-    async def send_goal(self, action: str, goal: Message, *, type_name: str) -> ActionGoal:
-        """Sends a goal to an action of ROS 2."""
-        return await self._connection().send_goal(action, goal, type_name=type_name)
-
-    def cancel_goal(self, goal: ActionGoal) -> None:
-        """Asks for the end of a goal."""
-        self._connection().cancel_goal(goal)
-
-    def give_up_goal(self, goal: ActionGoal) -> None:
-        """Waits no longer for a goal without a sign of life."""
-        self._connection().give_up_goal(goal)
 
     async def set_parameter(
         self,

@@ -203,7 +203,8 @@ class RosInquiry:
             texts = self._taught
         parts = _find_parts(texts, bare)
         if not parts:
-            near = await self._find_types(type_name)
+            # What mapspeak knows may still be missing in the ROS that this connection uses.
+            near = [each for each in await self._find_types(type_name) if bare_type(each) != bare]
             meant = f" The nearest that are known: {', '.join(near)}." if near else ""
             raise LinkError(
                 f"Nobody knows what a {type_name} looks like: the robot does not describe it, and "

@@ -77,6 +77,7 @@ class Publisher:
                 said = await self._send(wanted, ticket)
                 return f"{said}{self._say_what_moves(wanted.topic)}"
             await self._check_that_nothing_moves(wanted.topic)
+            self._commands.note_velocity(wanted.topic, wanted.message)
             with self._moving(wanted):
                 return f"{await self._send(wanted, ticket)}."
 

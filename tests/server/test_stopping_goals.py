@@ -1,0 +1,183 @@
+"""A stop ends what the ROS tools have started, whoever stops and whatever became of it."""
+
+from collections.abc import AsyncGenerator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import anyio
+import pytest
+from mcp.client import Client
+
+from faulty import Faults
+from faulty_bridge import NEXT_ROOM, FaultyBridge, open_faulty_bridge
+from mapspeak.links.ros import DrivingPatience
+from mapspeak.links.rosbridge import open_rosbridge_robot
+from mapspeak.ros.messages import Dialect
+from mapspeak.semantic import SemanticMapStore
+from mapspeak.server import build_server
+from mapspeak.session import Session
+from rosbridge_robot import CANCELED, ScriptedRobot, connect_scripted
+from rosbridge_script import PATIENCE_S, Operation, Visitor
+from rosserved import QUICK, Caller
+
+pytestmark = pytest.mark.anyio
+
+RATE = 5.0
+SHORT = DrivingPatience(acceptance_s=0.5, end_s=2.0, settling_s=0.0)
+LONG = DrivingPatience(acceptance_s=PATIENCE_S, end_s=2.0, settling_s=0.0)
+PATROL = "/patrol"
+TYPE = "nav2_msgs/action/FollowWaypoints"
+STILL_M = 0.2
+
+
+@asynccontextmanager
+async def serving(robot: object, folder: Path) -> AsyncGenerator[tuple[Session, Caller]]:
+    memory = SemanticMapStore(folder / "map.yaml")
+    session = Session(
+        robot,  # type: ignore[arg-type]
+        memory,
+        lease_s=60.0,
+        ros=robot.connection,  # type: ignore[attr-defined]
+        find_model=lambda: None,
+    )
+    server = build_server(session, toolsets=("drive", "ros"))
+    async with Client(server) as client:
+        yield session, Caller(client)
+
+
+class Patrol:
+    """An action beside navigation, whose goals end only when they are cancelled."""
+
+    def __init__(self, scripted: ScriptedRobot) -> None:
+        self.cancelled: list[str] = []
+        self._scripted = scripted
+        scripted.services["/rosapi/action_type"] = lambda _: {"type": TYPE}
+        scripted.server.answers["cancel_action_goal"] = self._cancel
+
+    async def _cancel(self, _visitor: Visitor, operation: Operation) -> None:
+        for number, (_, goal) in enumerate(self._scripted.goals):
+            if goal["id"] == operation["id"]:
+                self.cancelled.append(goal["action"])
+                await self._scripted.end_goal(CANCELED, goal=number)
+
+
+@pytest.mark.parametrize("stop", ["stop_robot", "lost client", "end of the server"])
+async def test_a_stop_ends_goals_of_any_action(tmp_path: Path, stop: str) -> None:
+    scripted = ScriptedRobot(actions=("/navigate_to_pose", PATROL))
+    patrol = Patrol(scripted)
+    async with (
+        connect_scripted(scripted, timing=QUICK, patience=LONG) as robot,
+        serving(robot, tmp_path) as (session, caller),
+    ):
+        running = await caller.ask("ros_send_goal", action=PATROL, goal={}, wait_s=0)
+        if stop == "stop_robot":
+            await caller.ask("stop_robot")
+        elif stop == "lost client":
+            await session.client_is_gone("")
+        else:
+            await session.close()
+        ended = await caller.ask("ros_goal_status", wait_s=5)
+    assert "running" in running
+    assert "cancelled after" in ended
+    assert patrol.cancelled == [PATROL]
+
+
+async def test_a_stop_that_cannot_end_a_goal_says_which(tmp_path: Path) -> None:
+    scripted = ScriptedRobot(actions=("/navigate_to_pose", PATROL))
+    scripted.services["/rosapi/action_type"] = lambda _: {"type": TYPE}
+    brief = DrivingPatience(acceptance_s=PATIENCE_S, end_s=0.1, settling_s=0.0)
+    async with (
+        connect_scripted(scripted, timing=QUICK, patience=brief) as robot,
+        serving(robot, tmp_path) as (_, caller),
+    ):
+        await caller.ask("ros_send_goal", action=PATROL, goal={}, wait_s=0)
+        said = await caller.refuse("stop_robot")
+    assert "NOT STOPPED" in said
+    assert PATROL in said
+
+
+async def test_a_stop_publishes_zero_velocity_wherever_a_velocity_was_published(
+    tmp_path: Path,
+) -> None:
+    scripted = ScriptedRobot()
+    scripted.topics["/arm/cmd_vel"] = "geometry_msgs/msg/Twist"
+    async with (
+        connect_scripted(scripted, timing=QUICK, patience=LONG) as robot,
+        serving(robot, tmp_path) as (_, caller),
+    ):
+        message = {"linear": {"x": 0.2}}
+        await caller.ask(
+            "ros_publish", topic="/arm/cmd_vel", message=message, duration_s=0.1, rate_hz=20
+        )
+        n_before = len(velocities(scripted, "/arm/cmd_vel"))
+        await caller.ask("stop_robot")
+        await scripted.until(lambda: len(velocities(scripted, "/arm/cmd_vel")) > n_before)
+    assert velocities(scripted, "/arm/cmd_vel")[-1] == 0.0
+
+
+def velocities(scripted: ScriptedRobot, topic: str) -> list[float]:
+    sent = [each for each in scripted.server.asked("publish") if each["topic"] == topic]
+    return [each["msg"]["linear"]["x"] for each in sent]
+
+
+# --- a base that drives
+
+
+@asynccontextmanager
+async def driving(
+    folder: Path, *, patience: DrivingPatience, faults: Faults
+) -> AsyncGenerator[tuple[FaultyBridge, Caller]]:
+    with anyio.fail_after(PATIENCE_S):
+        async with (
+            open_faulty_bridge(Dialect.ROS1, rate=RATE, faults=faults) as bridge,
+            open_rosbridge_robot(bridge.url, timing=QUICK, patience=patience) as robot,
+            serving(robot, folder) as (_, caller),
+        ):
+            yield bridge, caller
+
+
+async def send(caller: Caller, tool: str) -> str:
+    if tool == "navigate_to":
+        return await caller.ask(tool, x=NEXT_ROOM.x, y=NEXT_ROOM.y, wait_s=0)
+    pose = {"position": {"x": NEXT_ROOM.x, "y": NEXT_ROOM.y}, "orientation": {"w": 1.0}}
+    target = {"header": {"frame_id": "map"}, "pose": pose}
+    goal = {"target_pose": target}
+    return await caller.ask(tool, action="/move_base", goal=goal, wait_s=0)
+
+
+@pytest.mark.parametrize("tool", ["navigate_to", "ros_send_goal"])
+async def test_a_goal_that_was_called_rejected_does_not_drive_the_robot_later(
+    tmp_path: Path, tool: str
+) -> None:
+    async with driving(tmp_path, patience=SHORT, faults=Faults(acceptance_s=5.0)) as (
+        bridge,
+        caller,
+    ):
+        said = await send(caller, tool)
+        before_m = bridge.robot.base.driven_m
+        await until(lambda: bridge.robot.cancelled)
+        await bridge.robot.sleep(3.0)
+        after_m = bridge.robot.base.driven_m
+    assert "rejected" in said
+    assert after_m - before_m < STILL_M
+
+
+async def test_the_base_is_stopped_when_navigation_dies_under_a_drive(tmp_path: Path) -> None:
+    watchful = DrivingPatience(acceptance_s=PATIENCE_S, return_s=0.3, settling_s=0.0)
+    faults = Faults(has_watchdog=False)
+    async with driving(tmp_path, patience=watchful, faults=faults) as (bridge, caller):
+        await send(caller, "navigate_to")
+        await until(lambda: bridge.robot.base.velocity[0] > 0.2)
+        bridge.ros.kill(bridge.ros.navigator)
+        said = await caller.ask("wait_for_goal", wait_s=20)
+        await until(lambda: bridge.robot.base.velocity == (0.0, 0.0))
+        before_m = bridge.robot.base.driven_m
+        await bridge.robot.sleep(3.0)
+        after_m = bridge.robot.base.driven_m
+    assert '"lost"' in said
+    assert after_m == before_m
+
+
+async def until(is_so: object) -> None:
+    while not is_so():  # type: ignore[operator] # noqa: ASYNC110 - the robot tells nobody
+        await anyio.sleep(0.01)
