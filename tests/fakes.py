@@ -105,6 +105,10 @@ class FakeRobot:
     def now_s(self) -> float:
         return self._now_s
 
+    def set_clock(self, now_s: float) -> None:
+        """Sets robot time, as a simulation does that is begun anew."""
+        self._now_s = now_s
+
     async def sleep(self, duration_s: float) -> None:
         self._now_s += duration_s
         self._advance(duration_s)

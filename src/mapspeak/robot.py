@@ -15,6 +15,7 @@ from mapspeak.geometry import Pose
 from mapspeak.spatial import OccupancyGrid
 
 __all__ = [
+    "OLD_POSE_S",
     "SCAN_PATIENCE_S",
     "CameraPicture",
     "Detection",
@@ -22,12 +23,15 @@ __all__ = [
     "GoalState",
     "GoalStatus",
     "Health",
+    "PoseDoubt",
     "RangeScan",
     "Robot",
     "RobotDescription",
     "StampedPose",
 ]
 
+OLD_POSE_S = 3.0
+"""A pose that is older is no sure answer to where a robot is: it drives on meanwhile."""
 SCAN_PATIENCE_S = 0.5
 """A scan is evidence on the side: nobody waits longer for one, in wall time."""
 
@@ -55,6 +59,16 @@ class RobotDescription:
     map_frame: str = "map"
 
 
+class PoseDoubt(StrEnum):
+    """Why a robot may not be where it is said to be."""
+
+    NO_ANSWER = "no_answer"
+    NO_POSE = "no_pose"
+    OLD_POSE = "old_pose"
+    CLOCK_STANDS = "clock_stands"
+    ODOMETRY = "odometry"
+
+
 @dataclass(frozen=True, slots=True)
 class StampedPose:
     """Where the robot believes it is, and since when.
@@ -62,10 +76,26 @@ class StampedPose:
     Attributes:
         pose: In the map frame.
         stamp_s: Robot time of the estimate.
+        silent_s: Wall time since its source said anything new; 0 for one that need not.
+        is_odometry: It was taken from odometry, which drifts, for want of a pose on the map.
     """
 
     pose: Pose
     stamp_s: float
+    silent_s: float = 0.0
+    is_odometry: bool = False
+
+    def measure_age_s(self, now_s: float) -> float:
+        """Return how old the estimate is, by robot time or, while that stands, by the wall."""
+        return max(now_s - self.stamp_s, self.silent_s, 0.0)
+
+    def find_doubt(self, now_s: float) -> PoseDoubt | None:
+        """Return why the robot may be elsewhere; None for a fresh pose on the map."""
+        if now_s - self.stamp_s > OLD_POSE_S:
+            return PoseDoubt.OLD_POSE
+        if self.silent_s > OLD_POSE_S:
+            return PoseDoubt.CLOCK_STANDS
+        return PoseDoubt.ODOMETRY if self.is_odometry else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,6 +110,7 @@ class CameraPicture:
         horizontal_fov_rad: The angle between the left and the right edge; None where unknown.
         pose: Where the robot believed it stood, in the map frame.
         stamp_s: Robot time of the exposure.
+        pose_doubt: Why it may have stood elsewhere; None for a fresh pose on the map.
     """
 
     data: bytes
@@ -89,6 +120,7 @@ class CameraPicture:
     horizontal_fov_rad: float | None
     pose: Pose
     stamp_s: float
+    pose_doubt: PoseDoubt | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

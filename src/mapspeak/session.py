@@ -122,6 +122,7 @@ class Session:
         self.drives = DriveBook(self.robot, when_busy=when_busy)
         self._lease = Lease(lease_s)
         self._atlas: Atlas | None = None
+        self._looked_s = 0.0
         self._learned_from = ""
         self._surveying = anyio.Lock()
 
@@ -178,7 +179,9 @@ class Session:
                 previous=self._atlas,
                 revision=revision,
                 recollector=self.recollector,
+                pose_doubt=stamped.find_doubt(self.robot.now_s),
             )
+            self._looked_s = self.robot.now_s
             return self._atlas
 
     async def find_room_id(self, point: Point) -> str | None:
@@ -189,7 +192,10 @@ class Session:
         Raises:
             LinkError: The robot has no map yet.
         """
-        atlas = self._atlas or await self.fetch_atlas()
+        atlas = self._atlas
+        if atlas is None or self.robot.now_s < self._looked_s:
+            # A simulation that was begun anew may show another world.
+            atlas = await self.fetch_atlas()
         return await self.compute(lambda: atlas.find_room_id(point))
 
     async def keep_picture(self, picture: CameraPicture, *, labels: tuple[str, ...]) -> Keeping:

@@ -4,12 +4,11 @@ import anyio
 import pytest
 
 from fakes import FakeRobot, two_rooms
-from mapspeak.errors import GoalError, LinkError
+from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose
 from mapspeak.navigation.drive import Drive, DriveBook
 from mapspeak.navigation.safety import WhenBusy
-from mapspeak.navigation.vigil import SILENT_FOR_S, Vigil
-from mapspeak.robot import GoalState, GoalStatus, StampedPose
+from mapspeak.robot import GoalState, GoalStatus
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.session import Session
 
@@ -104,7 +103,8 @@ async def test_a_goal_that_is_refused_leaves_the_drive_under_way_as_it_is() -> N
     robot.refuses = True
     with pytest.raises(GoalError):
         await start(drives, NEAR)
-    assert drives.under_way == first
+    assert drives.under_way is not None
+    assert drives.under_way.goal_id == first.goal_id
     assert await state_of(drives, first) is GoalState.DRIVING
 
 
@@ -148,58 +148,6 @@ async def test_a_drive_that_goes_on_does_not_time_out() -> None:
     assert ended.status.state is GoalState.ARRIVED
 
 
-async def test_a_robot_whose_pose_jumps_is_stopped_and_its_drive_is_lost() -> None:
-    robot = FakeRobot(two_rooms())
-    drives = DriveBook(robot)
-    drive = await start(drives, FAR)
-    waiting = await start(drives, NEAR, when_busy=WhenBusy.WAIT)
-    await drives.watch()
-    robot.pose = Pose(5.9, 0.7)
-    await drives.watch()
-    report = await drives.report(drive.goal_id)
-    assert report.status.state is GoalState.LOST
-    assert "jumped by 4.5 m" in report.status.reason
-    assert robot.n_stops == 1
-    assert await state_of(drives, waiting) is GoalState.CANCELLED
-
-
-class SilentRobot(FakeRobot):
-    """Stops answering when a test says so."""
-
-    is_silent = False
-
-    async def fetch_pose(self) -> StampedPose:
-        if self.is_silent:
-            raise LinkError("The line is dead.", hint="Wait.")
-        return await super().fetch_pose()
-
-
-async def test_a_silent_robot_is_an_error_at_first_and_a_lost_drive_at_last() -> None:
-    robot = SilentRobot(two_rooms())
-    drives = DriveBook(robot)
-    drive = await start(drives, FAR)
-    await drives.watch()
-    robot.is_silent = True
-    await drives.watch()
-    with pytest.raises(LinkError):
-        await drives.report(drive.goal_id)
-    drives._vigil._silent_since_s = anyio.current_time() - SILENT_FOR_S
-    await drives.watch()
-    report = await drives.report(drive.goal_id)
-    assert report.status.state is GoalState.LOST
-    assert "The line is dead." in report.status.reason
-    assert report.pose == robot.pose
-
-
-async def test_one_answer_ends_the_silence() -> None:
-    vigil = Vigil(patience_s=60.0)
-    status = GoalStatus(state=GoalState.DRIVING)
-    vigil.note_silence(LinkError("Silence.", hint="Wait."))
-    vigil._silent_since_s = anyio.current_time() - SILENT_FOR_S
-    vigil.judge(status, NEAR, now_s=0.0)
-    assert vigil.note_silence(LinkError("Silence.", hint="Wait.")) is None
-
-
 async def test_a_watching_session_stops_a_robot_that_jumps(tmp_path: Path) -> None:
     robot = FakeRobot(two_rooms())
     session = Session(robot, SemanticMapStore(tmp_path / "m.yaml"), lease_s=60.0)
@@ -208,6 +156,7 @@ async def test_a_watching_session_stops_a_robot_that_jumps(tmp_path: Path) -> No
         tasks.start_soon(session.keep_watch)
         await session.drives.watch()
         robot.pose = Pose(5.9, 0.7)
+        await robot.sleep(0.1)
         with anyio.fail_after(20.0):
             while not robot.n_stops:
                 await anyio.lowlevel.checkpoint()
@@ -226,3 +175,51 @@ async def test_the_time_of_a_drive_counts_from_when_it_was_sent() -> None:
     drives = DriveBook(SlowToAccept(two_rooms()))
     drive = await start(drives, FAR)
     assert (await drives.report(drive.goal_id)).elapsed_s == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize(
+    ("state", "n_stops"),
+    [
+        (GoalState.ARRIVED, 0),
+        (GoalState.CANCELLED, 0),
+        (GoalState.PREEMPTED, 0),
+        (GoalState.BLOCKED, 1),
+        (GoalState.REJECTED, 1),
+        (GoalState.TIMED_OUT, 1),
+        (GoalState.LOST, 1),
+    ],
+)
+async def test_a_drive_that_ends_badly_is_stopped_whoever_says_so(
+    state: GoalState, n_stops: int
+) -> None:
+    robot = FakeRobot(two_rooms())
+    drives = DriveBook(robot)
+    drive = await start(drives, FAR)
+    robot.ended[drive.robot_goal_id or ""] = GoalStatus(state=state)
+    await drives.watch()
+    await drives.watch()
+    assert robot.n_stops == n_stops
+    assert await state_of(drives, drive) is state
+    assert not drives.is_busy
+
+
+async def test_the_metres_driven_are_counted_also_while_nobody_waits() -> None:
+    robot = FakeRobot(two_rooms())
+    drives = DriveBook(robot)
+    await start(drives, FAR)
+    for _ in range(9):
+        await robot.sleep(0.5)
+        await drives.watch()
+    assert drives.driven_m == pytest.approx(4.5, abs=0.01)
+
+
+async def test_a_drive_from_before_the_clock_was_set_back_has_no_negative_time() -> None:
+    robot = FakeRobot(two_rooms())
+    await robot.sleep(100.0)
+    drives = DriveBook(robot)
+    drive = await start(drives, NEAR)
+    await robot.sleep(3.0)
+    robot.set_clock(0.0)
+    report = await drives.report(drive.goal_id)
+    assert report.elapsed_s == 0.0
+    assert report.pose_age_s == 0.0

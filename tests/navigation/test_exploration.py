@@ -123,7 +123,23 @@ async def test_what_lies_behind_a_slit_is_left_and_cannot_be_reached(tmp_path: P
 async def test_a_frontier_seen_from_afar_is_not_driven_to_its_end(tmp_path: Path) -> None:
     robot = RoamingRobot(world_from_text(THREE_ROOMS, start=START))
     progress = await _explore(Explorer(session_of(robot, tmp_path)))
-    assert progress.n_arrived < progress.n_goals
+    assert progress.n_seen > 0
+    assert progress.n_goals == progress.n_arrived + progress.n_seen + progress.n_blocked
+
+
+async def test_the_way_driven_between_two_calls_is_counted(tmp_path: Path) -> None:
+    robot = RoamingRobot(world_from_text(THREE_ROOMS, start=START))
+    session = session_of(robot, tmp_path)
+    explorer = Explorer(session)
+    before = await explorer.advance(None, wait_s=1.0, on_trip=_tell_nobody)
+    truth_m = robot.simulation.truth.driven_m
+    for _ in range(20):
+        await robot.sleep(0.5)
+        await session.drives.watch()
+    truth_m = robot.simulation.truth.driven_m - truth_m
+    after = await explorer.advance(None, wait_s=1.0, on_trip=_tell_nobody)
+    assert truth_m > 1.0
+    assert after.driven_m - before.driven_m >= 0.9 * truth_m
 
 
 async def test_a_call_ends_in_time_and_the_next_one_goes_on_with_the_same_drive(
@@ -244,6 +260,7 @@ async def test_exploring_ends_after_so_many_goals_and_goes_on_when_called_again(
     one = await _explore(explorer, Bounds(n_goals=1))
     assert one.state is ExplorationState.BOUND_REACHED
     assert (one.n_goals, one.n_arrived) == (1, 1)
+    assert one.sentence == "1 goal was tried: 1 reached, 0 seen from afar, 0 blocked."
     rest = await _explore(explorer)
     assert rest.state is ExplorationState.NOTHING_LEFT
 

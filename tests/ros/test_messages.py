@@ -33,6 +33,7 @@ from mapspeak.ros.messages import (
     read_twist,
     write_camera_info,
     write_grid,
+    write_header,
     write_odometry,
     write_pose,
     write_pose_stamped,
@@ -174,6 +175,18 @@ def test_a_beam_that_met_nothing_is_told_from_one_that_says_nothing(dialect: Dia
     )
     message = decode_cbor(to_cbor(write_scan(scan, dialect=dialect)))
     assert read_scan(message).is_open.tolist() == met_nothing.tolist()
+
+
+@pytest.mark.parametrize("largest_m", [8.0, 12.1, 3.3000001])
+def test_a_beam_at_its_limit_met_nothing(largest_m: float) -> None:
+    message = {
+        "header": write_header("laser", 1.0, dialect=Dialect.ROS1),
+        "angle_min": 0.0, "angle_increment": 0.1, "range_min": 0.1, "range_max": largest_m,
+        "ranges": np.array([largest_m, 0.999 * largest_m, np.inf], dtype=np.float32),
+    }  # fmt: skip
+    scan = read_scan(message)
+    assert scan.is_open.tolist() == [True, False, True]
+    assert np.isfinite(scan.ranges_m).tolist() == [False, True, False]
 
 
 @given(fov_rad=st.none() | st.floats(0.1, 3.0), dialect=DIALECTS)

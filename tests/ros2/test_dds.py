@@ -31,6 +31,7 @@ PATIENCE_S = 30.0
 NEXT_ROOM = Pose(8.0, 2.25)
 INSIDE_THE_WALL = Pose(5.25, 3.0)
 NAVIGATE, NAVIGATE_TYPE = "/navigate_to_pose", "nav2_msgs/action/NavigateToPose"
+SPIN, SPIN_TYPE = "/spin", "nav2_msgs/action/Spin"
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 
 
@@ -164,7 +165,7 @@ async def test_the_graph_is_the_robots(robot: RobotProcess) -> None:
     async with connected(robot) as connection:
         graph = await connection.fetch_graph()
         assert graph.types["/map"] == "nav_msgs/OccupancyGrid"
-        assert graph.actions == (NAVIGATE,)
+        assert graph.actions == (NAVIGATE, SPIN)
         assert await connection.fetch_action_type(NAVIGATE) == "nav2_msgs/NavigateToPose"
         assert await connection.fetch_nodes() == ("/bt_navigator", "/robot")
         node = await connection.fetch_node("/robot")
@@ -227,3 +228,14 @@ async def test_robot_time_is_told(robot: RobotProcess) -> None:
         stamp = (await odometry.wait_for_more_than(0, timeout_s=PATIENCE_S))["header"]["stamp"]
         now_s = await connection.fetch_time_s()
     assert now_s == pytest.approx(stamp["sec"], abs=60.0)
+
+
+async def test_kilteds_spin_turns_the_robot(robot: RobotProcess) -> None:
+    async with connected(robot) as connection:
+        goal = await connection.send_goal(SPIN, {"target_yaw": 1.5}, type_name=SPIN_TYPE)
+        await until(goal, lambda goal: goal.end)
+        definition = await connection.fetch_definitions(SPIN_TYPE)
+    assert goal.end is not None
+    assert goal.end.status == SUCCEEDED
+    assert robot.pose.yaw_rad == pytest.approx(1.5, abs=0.1)
+    assert "disable_collision_checks" in definition["nav2_msgs/Spin_Goal"]

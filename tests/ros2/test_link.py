@@ -373,7 +373,7 @@ async def test_the_graph_is_the_robots_and_not_ours(robot: RobotProcess) -> None
         connection.subscribe("/ours_too", type_name="std_msgs/msg/String")
         graph = await connection.fetch_graph()
         assert graph.types["/map"] == "nav_msgs/OccupancyGrid"
-        assert graph.actions == (NAVIGATION,)
+        assert graph.actions == (NAVIGATION, "/spin")
         assert not [topic for topic in graph.types if topic.startswith("/ours")]
         assert await connection.fetch_nodes() == ("/bt_navigator", "/robot")
         assert "/map" in (await connection.fetch_node("/robot")).publishes

@@ -82,6 +82,19 @@ async def test_wrong_arguments_are_explained_without_a_link_to_a_library(tmp_pat
     assert "pydantic" not in text_of(result)
 
 
+async def test_wrong_arguments_are_named_as_the_caller_named_them(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        result = await client.call_tool(
+            "write_semantic_data",
+            {"name": "closet", "description": "small", "safety_landmarks": [7, {"label": ""}]},
+        )
+    text = text_of(result)
+    assert "safety_landmarks.0: input should be a valid string; safety_landmarks.0" in text
+    assert "safety_landmarks.1.label: " in text
+    assert "constrained" not in text
+    assert "Landmark" not in text
+
+
 async def test_the_papers_prompts_are_offered(tmp_path: Path) -> None:
     async with connect(FakeRobot(two_rooms()), tmp_path) as client:
         prompt = await client.get_prompt("exploration")

@@ -4,15 +4,29 @@ import anyio
 import pytest
 from mcp_types import CallToolResult
 
+from drawing import grid_from_text
+from failing_robot import FailingRobot
 from fakes import FakeRobot, two_rooms
 from mapspeak.geometry import Pose
 from mapspeak.navigation.drive import DriveReport
 from mapspeak.robot import GoalState, StampedPose
 from mapspeak.semantic import SemanticMapStore
+from mapspeak.server import DEFAULT_TOOLSETS
 from mapspeak.session import Session
 from served import MODES, connect, report_of, text_of
 
 pytestmark = pytest.mark.anyio
+
+ONE_ROOM = """
+##############################
+#################............#
+#################............#
+#################............#
+#################............#
+#################............#
+#################............#
+##############################
+"""
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -189,7 +203,7 @@ async def test_a_drive_that_somebody_else_has_begun_is_told(tmp_path: Path) -> N
     async with connect(robot, tmp_path) as client:
         answer = await client.call_tool("wait_for_goal", {"wait_s": 0})
     assert answer.is_error
-    assert "somebody else has sent: driving" in text_of(answer)
+    assert "it follows another goal: driving" in text_of(answer)
 
 
 async def test_a_robot_that_another_client_drives_on_does_not_stand_at_the_goal(
@@ -215,6 +229,106 @@ async def test_a_pose_that_is_old_by_robot_time_is_doubted(tmp_path: Path) -> No
         fresh = report_of(await client.call_tool("get_robot_pose", {}))
         await robot.sleep(12.0)
         old = report_of(await client.call_tool("get_robot_pose", {}))
-    assert fresh["doubt"] == ""
+    assert fresh["pose_uncertain"] == ""
     assert old["age_s"] == 12.0
-    assert "Robot time has gone on for 12 s since this estimate" in old["doubt"]
+    assert old["pose_uncertain"].startswith("old_pose: the pose is 12 s old")
+
+
+async def test_a_robot_that_was_moved_after_it_arrived_does_not_stand_at_the_goal(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        await client.call_tool("navigate_to", {"x": 2.0, "y": 1.4})
+        robot.pose = Pose(2.0, 0.6)
+        later = report_of(await client.call_tool("wait_for_goal", {}))
+    assert later["distance_left_m"] == 0.8
+    assert "0.80 m from the goal now" in later["next_step"]
+
+
+async def test_a_wait_that_is_too_long_is_shortened(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        answer = report_of(await client.call_tool("navigate_to", {"place": "R2", "wait_s": 3600}))
+        waited = await client.call_tool("wait_for_goal", {"wait_s": 30})
+        wrong = await client.call_tool("wait_for_goal", {"wait_s": "long"})
+    assert answer["state"] == "arrived"
+    assert not waited.is_error
+    assert wrong.is_error
+
+
+async def test_a_drive_whose_robot_falls_silent_is_told_with_its_id_and_why(
+    tmp_path: Path,
+) -> None:
+    robot = FailingRobot()
+    async with connect(robot, tmp_path) as client:
+        begun = report_of(await client.call_tool("navigate_to", {"place": "R2", "wait_s": 2}))
+        robot.tells_pose = False
+        blind = report_of(await client.call_tool("wait_for_goal", {"wait_s": 1}))
+        robot.is_reachable = False
+        away = report_of(await client.call_tool("wait_for_goal", {"wait_s": 1}))
+    assert (begun["pose_uncertain"], begun["pose_age_s"]) == ("", 0.0)
+    for answer, code in ((blind, "no_pose: "), (away, "no_answer: ")):
+        assert (answer["goal_id"], answer["state"]) == ("G1", "driving")
+        assert answer["pose_uncertain"].startswith(code)
+    assert "No transform has come." in blind["pose_uncertain"]
+    assert away["pose_age_s"] == 2.0
+
+
+async def test_a_robot_that_has_to_be_stopped_and_cannot_be_is_told_so(tmp_path: Path) -> None:
+    robot = FailingRobot()
+    async with connect(robot, tmp_path) as client:
+        await client.call_tool("navigate_to", {"place": "R2", "wait_s": 0})
+        robot.is_reachable = False
+        stopped = await client.call_tool("stop_robot", {})
+        answer = report_of(await client.call_tool("wait_for_goal", {"wait_s": 0}))
+    assert "NOT STOPPED" in text_of(stopped)
+    assert "NOT STOPPED" in answer["next_step"]
+
+
+async def test_odometry_for_want_of_a_pose_is_told_wherever_the_pose_is(tmp_path: Path) -> None:
+    robot = FailingRobot()
+    robot.has_map_pose = False
+    async with connect(robot, tmp_path, toolsets=(*DEFAULT_TOOLSETS, "explore")) as client:
+        looked = text_of(await client.call_tool("look_at_map", {}))
+        pose = report_of(await client.call_tool("get_robot_pose", {}))
+        drive = report_of(await client.call_tool("navigate_to", {"place": "R2", "wait_s": 0}))
+        cancelled = text_of(await client.call_tool("cancel_goal", {}))
+        explored = report_of(await client.call_tool("explore", {"wait_s": 1}))
+        written = report_of(
+            await client.call_tool("write_semantic_data", {"name": "Dock", "description": "a dock"})
+        )
+        drawn = text_of(await client.call_tool("draw_robot_pose", {}))
+    for told in (pose, drive, explored):
+        assert told["pose_uncertain"].startswith("odometry: ")
+    for text in (looked, cancelled, *written["warnings"], drawn):
+        assert "odometry: it is odometry, which drifts" in text
+
+
+async def test_arriving_is_not_told_as_standing_there_while_the_pose_is_uncertain(
+    tmp_path: Path,
+) -> None:
+    robot = FailingRobot()
+    async with connect(robot, tmp_path) as client:
+        begun = report_of(await client.call_tool("navigate_to", {"x": 2.0, "y": 1.4, "wait_s": 0}))
+        robot.freeze_pose()
+        await robot.sleep(15.0)
+        ended = report_of(await client.call_tool("wait_for_goal", {}))
+    assert begun["state"] == "driving"
+    assert ended["state"] == "arrived"
+    assert ended["pose_uncertain"].startswith("old_pose: the pose is 15 s old")
+    assert "the pose is uncertain" in ended["next_step"]
+
+
+async def test_the_room_is_that_of_the_new_world_after_a_simulation_was_begun_anew(
+    tmp_path: Path,
+) -> None:
+    robot = FakeRobot(two_rooms())
+    await robot.sleep(100.0)
+    async with connect(robot, tmp_path) as client:
+        before = report_of(await client.call_tool("get_robot_pose", {}))
+        robot.grid = grid_from_text(ONE_ROOM, resolution_m=0.25)
+        robot.set_clock(1.0)
+        after = report_of(await client.call_tool("get_robot_pose", {}))
+    assert before["place"] == "R2"
+    assert after["place"] == "no room"

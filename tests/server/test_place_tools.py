@@ -145,5 +145,5 @@ async def test_a_stop_says_which_drive_it_ended(tmp_path: Path) -> None:
         idle = text_of(await client.call_tool("stop_robot", {}))
         await client.call_tool("navigate_to", {"place": "R1", "wait_s": 0})
         driving = text_of(await client.call_tool("stop_robot", {}))
-    assert idle == "The robot was told to stop, whoever had sent it."
+    assert idle == "The robot was told to stop, and to give up every goal, whoever sent it."
     assert "G1 was ended" in driving

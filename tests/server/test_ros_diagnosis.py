@@ -56,7 +56,8 @@ async def test_topics_are_counted_by_their_ends_in_one_call(tmp_path: Path) -> N
     # Of the topic that another client of rosbridge hears, we are no hearer.
     assert "/map nav_msgs/msg/OccupancyGrid published by 1, heard by 1" in lines
     assert "published by nobody: /cmd_vel, /scan, /tf_static" in lines
-    assert "heard by nobody: /odom, /tf, /tf_static" in lines
+    assert "heard by nobody: /odom, /tf_static" in lines
+    assert "heard by mapspeak alone: /tf" in lines
     asked = [call["service"] for call in scripted.server.asked("call_service")]
     assert asked.count("/rosapi/node_details") == len(NODES)
     assert "/rosapi/publishers" not in asked
@@ -256,6 +257,17 @@ async def test_a_topic_is_told_as_silent_since_we_listen(tmp_path: Path) -> None
     async with on_script(scripted, tmp_path) as caller:
         text = await caller.refuse("ros_read", topic="/battery", wait_s=0.2)
     assert re.search(r"yet nothing came in the 0\.\d s since we listen", text)
+
+
+async def test_where_there_is_a_clock_robot_time_is_the_clocks(tmp_path: Path) -> None:
+    scripted = with_nodes(ScriptedRobot())
+    scripted.services["/rosapi/services"] = lambda _: {"services": []}
+    scripted.services["/rosapi/get_time"] = lambda _: {"time": {"sec": 1795362623, "nanosec": 0}}
+    async with at_time(scripted, tmp_path, 32.0) as (_, caller):
+        assert "robot time 1795362623" in await caller.ask("ros_overview")
+    scripted.topics["/clock"] = "rosgraph_msgs/msg/Clock"
+    async with at_time(scripted, tmp_path, 32.0) as (_, caller):
+        assert "robot time 32.0 s" in await caller.ask("ros_overview")
 
 
 async def test_what_a_node_does_for_us_is_marked(tmp_path: Path) -> None:

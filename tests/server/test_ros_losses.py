@@ -47,6 +47,13 @@ async def come_back(scripted: ScriptedRobot, client: RosbridgeClient) -> None:
         await anyio.lowlevel.checkpoint()
 
 
+async def test_right_after_the_start_no_connection_was_lost(tmp_path: Path) -> None:
+    scripted = ScriptedRobot()
+    async with losing(scripted, tmp_path) as (_, caller):
+        listed = await caller.ask("ros_goal_status", action=ACTION)
+    assert "lost" not in listed
+
+
 async def test_a_goals_state_is_told_with_the_loss_of_the_connection(tmp_path: Path) -> None:
     scripted = ScriptedRobot()
     async with losing(scripted, tmp_path) as (client, caller):

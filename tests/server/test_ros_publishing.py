@@ -248,17 +248,38 @@ async def test_parameters_are_listed_set_and_deleted(dialect: Dialect, tmp_path:
 
 
 @both
-async def test_a_misspelt_parameter_or_node_is_not_made_up(
-    dialect: Dialect, tmp_path: Path
-) -> None:
+async def test_a_misspelt_node_is_not_made_up(dialect: Dialect, tmp_path: Path) -> None:
     async with on_our_server(dialect, tmp_path) as (_, caller):
-        parameter = await caller.refuse(
-            "ros_set_parameter", node="/robot_base", parameter="robot_radios", value=0.3
-        )
         await caller.refuse(
             "ros_set_parameter", node="/robot_bas", parameter="robot_radius", value=0.3
         )
-    assert "such as robot_radius" in parameter
+
+
+async def test_ros_2_makes_up_no_parameter(tmp_path: Path) -> None:
+    async with on_our_server(Dialect.ROS2, tmp_path) as (_, caller):
+        text = await caller.refuse(
+            "ros_set_parameter", node="/robot_base", parameter="robot_radios", value=0.3
+        )
+    assert "such as robot_radius" in text
+
+
+async def test_ros_1_makes_a_parameter_and_says_that_it_is_new(tmp_path: Path) -> None:
+    async with on_our_server(Dialect.ROS1, tmp_path) as (_, caller):
+        text = await caller.ask(
+            "ros_set_parameter", node="/robot_base", parameter="robot_radios", value=0.3
+        )
+        assert "robot_radios: 0.3" in await caller.ask("ros_parameters", node="/robot_base")
+    assert "It is new: the nearest that it had is robot_radius." in text
+    assert "started again" in text
+
+
+async def test_ros_1_keeps_the_kind_of_a_parameter(tmp_path: Path) -> None:
+    asked = {"node": "/robot_base", "parameter": "robot_radius"}
+    async with on_our_server(Dialect.ROS1, tmp_path) as (_, caller):
+        text = await caller.refuse("ros_set_parameter", **asked, value="wide")
+        whole = await caller.ask("ros_set_parameter", **asked, value=1)
+    assert "is a number (0.2), not a text" in text
+    assert "is 1 now" in whole
 
 
 async def test_ros_2_describes_its_parameters(tmp_path: Path) -> None:

@@ -43,6 +43,12 @@ async def test_a_scan_with_one_wrong_field_is_told_without_it(
     assert rest in text
 
 
+async def test_a_path_without_a_frame_is_said_to_have_none(tmp_path: Path) -> None:
+    message = {"header": write_header("", 1.0, dialect=Dialect.ROS2), "poses": []}
+    text = await read(tmp_path, "nav_msgs/msg/Path", message)
+    assert "Path without a frame: no poses." in text
+
+
 @pytest.mark.parametrize(("encoding", "kind"), [("rgb8", "u1"), ("16UC1", "<u2")])
 async def test_only_of_depth_it_is_said_that_depth_is_shaded(
     tmp_path: Path, encoding: str, kind: str

@@ -20,6 +20,7 @@ from mapspeak.navigation.memory.recollection import (
     number_places,
 )
 from mapspeak.navigation.revision import MapRevision
+from mapspeak.robot import PoseDoubt
 from mapspeak.semantic import SemanticMap
 from mapspeak.semantic.consistency import check_memory
 from mapspeak.semantic.things import (
@@ -105,10 +106,12 @@ class Atlas:
         previous: The atlas before, whose ids are kept and whose parts are used where they hold.
         revision: The state of the map, where somebody has made it already.
         recollector: Keeps what is made of the memory; that of the atlas before where None.
+        pose_doubt: Why the robot may be elsewhere.
 
     Attributes:
         map: The state of the map.
         robot: Where the robot is.
+        pose_doubt: Why it may be elsewhere; None for a fresh pose on the map.
         memory: What is remembered.
         places: Remembered places.
         recollector: Keeps what is made of the memory.
@@ -126,6 +129,7 @@ class Atlas:
         previous: "Atlas | None" = None,
         revision: MapRevision | None = None,
         recollector: Recollector | None = None,
+        pose_doubt: PoseDoubt | None = None,
     ) -> None:
         before = None if previous is None else previous.map
         is_unchanged = before is not None and before.is_of(grid)
@@ -135,6 +139,7 @@ class Atlas:
             else MapRevision(grid, radius_m=radius_m, previous=before, leaves_pockets=True)
         )
         self.robot = robot
+        self.pose_doubt = pose_doubt
         self.memory = memory
         self.places: tuple[RememberedPlace, ...] = (
             previous.places

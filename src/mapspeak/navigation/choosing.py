@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.navigation.atlas import Atlas, RememberedPlace, RememberedThing
-from mapspeak.navigation.goals import GoalCheck, check_goal
+from mapspeak.navigation.goals import GoalCheck, check_goal, say_refusal
 from mapspeak.navigation.places import Place, Spot, find_place, is_taken_name, say_spot
 from mapspeak.navigation.standing import (
     arrival_pose,
@@ -65,7 +65,7 @@ def choose_goal(
     if not goal.check.is_ok:
         has_heading = yaw_deg is not None or _has_heading(meant)
         hint = _what_instead(goal.check, has_heading=has_heading)
-        raise GoalError(f"{goal.name}: {goal.check.sentence}", hint=hint)
+        raise GoalError(say_refusal(goal.name, goal.check), hint=hint)
     return goal
 
 

@@ -3,8 +3,12 @@
 A drive's state is the robot's own account of it, fetched when somebody asks; nothing runs in the
 background, so a simulated robot's time stands still between two questions. `watch` asks where
 nobody else does, so that a drive ends also when the robot falls silent, jumps or does not move.
+
+A drive that ends otherwise than by arriving, or by the navigation's own word that it was cancelled
+or replaced, is stopped; where the robot cannot be reached, as soon as it can.
 """
 
+import logging
 import re
 from collections.abc import Awaitable, Callable, Generator
 from contextlib import contextmanager
@@ -14,10 +18,11 @@ import anyio
 
 from mapspeak.errors import GoalError, LinkError, MapspeakError
 from mapspeak.geometry import Point, Pose
-from mapspeak.navigation.drivereport import Drive, DriveReport
+from mapspeak.navigation.drivemonitor import DriveMonitor, Look
+from mapspeak.navigation.drivereport import JUST_SENT, Drive, DriveReport
+from mapspeak.navigation.owedstop import NEEDS_NO_STOP, OwedStop
 from mapspeak.navigation.safety import WhenBusy
-from mapspeak.navigation.vigil import Vigil
-from mapspeak.robot import GoalState, GoalStatus, Robot, StampedPose
+from mapspeak.robot import GoalState, GoalStatus, PoseDoubt, Robot
 
 __all__ = ["Drive", "DriveBook", "DriveReport"]
 
@@ -30,6 +35,8 @@ FRONTIER = re.compile(r"F\d+")
 
 OnProgress = Callable[[DriveReport], Awaitable[None]]
 
+logger = logging.getLogger(__name__)
+
 
 class DriveBook:
     """Every drive of one robot, the latest last.
@@ -38,6 +45,7 @@ class DriveBook:
         robot: The robot.
         when_busy: What becomes of a drive while one of another client is under way.
         patience_s: Robot time without any movement after which a drive has timed out.
+        wall_s: Tells wall time.
     """
 
     def __init__(
@@ -46,11 +54,12 @@ class DriveBook:
         *,
         when_busy: WhenBusy = WhenBusy.REPLACE,
         patience_s: float = 60.0,
+        wall_s: Callable[[], float] = anyio.current_time,
     ) -> None:
         self._robot = robot
         self._when_busy = when_busy
-        self._vigil = Vigil(patience_s=patience_s)
-        self._last_seen: StampedPose | None = None
+        self._monitor = DriveMonitor(robot, patience_s=patience_s, wall_s=wall_s)
+        self._owed = OwedStop(robot, wall_s=wall_s)
         self._drives: dict[str, Drive] = {}
         self._n_started = 0
         self._n_stops = 0
@@ -93,8 +102,13 @@ class DriveBook:
 
     @property
     def is_busy(self) -> bool:
-        """True while a drive is under way, waits its turn or is being prepared."""
-        return bool(self._open()) or self._n_preparing > 0
+        """True while a drive may be under way, waits its turn or is being prepared."""
+        return bool(self._open()) or self._owed.goal_id is not None or self._n_preparing > 0
+
+    @property
+    def driven_m(self) -> float:
+        """How far the robot has come on its drives, by its own poses."""
+        return self._monitor.driven_m
 
     @contextmanager
     def preparing(self) -> Generator[int]:
@@ -127,58 +141,50 @@ class DriveBook:
         Raises:
             GoalError: The robot was stopped after the ticket was given, or another drive is under
                 way that must not be replaced.
+            LinkError: The robot cannot be reached, or nobody knows where it is.
             PolicyError: The robot must not drive there.
         """
         async with self._starting:
             busy = await self._find_busy()
-            begun_at = await self._find_begin()
+            await self._monitor.find_robot()
             self._check_ticket(ticket)
+            drive = self._make(goal, place, client)
             if busy is None or self._choose(busy, client, when_busy) is WhenBusy.REPLACE:
-                sent_s = self._robot.now_s
-                drive = self._note(goal, place, client, await self._robot.send_goal(goal))
-                drive = self._keep(replace(drive, begun_at=begun_at, started_s=sent_s))
-                self._vigil.begin(drive.goal_id, now_s=self._robot.now_s)
+                drive = await self._send(replace(drive, begun_at=self._monitor.here.point))
                 self._end_all("A newer goal took its place.", but=drive)
                 return drive
             if self._choose(busy, client, when_busy) is WhenBusy.WAIT:
-                return self._note(goal, place, client, None)
+                return self._keep(drive)
             raise GoalError(
                 f"{busy.goal_id} to {busy.place} is under way.",
                 hint="Wait for its end with wait_for_goal, or end it with cancel_goal.",
             )
 
     async def report(self, goal_id: str | None = None) -> DriveReport:
-        """Gives how a drive stands; the latest one when no id is given.
+        """Return how a drive stands, or stood when the robot was heard last; by default the latest.
 
         Raises:
             GoalError: No drive has that id.
-            LinkError: The robot does not answer.
         """
         if goal_id is None and not self._drives:
             await self._check_foreign_goals()
         drive = self._find(goal_id)
-        status = drive.final or await self._fetch_status(drive)
-        drive = self._note_end(drive, status)
-        stamped = await self._fetch_pose(is_over=status.state.is_final)
-        if drive.final is not None and drive.ended_at is None:
-            drive = self._keep(replace(drive, ended_at=stamped.pose.point))
-        if drive.final is None and drive.robot_goal_id is not None:
-            fault = self._vigil.judge(status, stamped.pose, now_s=self._robot.now_s)
-            if fault is not None:
-                return await self._give_up(drive, fault)
-        elapsed_s = self._robot.now_s - drive.started_s
-        return DriveReport(drive=drive, status=status, pose=stamped.pose, elapsed_s=elapsed_s)
+        look = await self._monitor.look(drive)
+        drive = self._drives.get(drive.goal_id, drive)
+        if drive.final is None:
+            await self._note(drive, look)
+            drive = self._drives.get(drive.goal_id, drive)
+        if drive.final is not None and drive.ended_at is None and self._monitor.knows_place(look):
+            drive = self._keep(replace(drive, ended_at=self._monitor.here.point))
+        is_owed = self._owed.goal_id == drive.goal_id
+        return self._monitor.tell(drive, look, is_stop_owed=is_owed)
 
     async def watch(self) -> None:
-        """Looks after the drive under way, and starts the next one; to be called now and then."""
+        """Look after the drive under way, and start the next one; to be called now and then."""
         drive = self.under_way
         if drive is not None:
-            try:
-                await self.report(drive.goal_id)
-            except LinkError as error:
-                fault = self._vigil.note_silence(error)
-                if fault is not None:
-                    self._note_end(drive, fault)
+            await self.report(drive.goal_id)
+        await self._settle()
         await self._start_next()
 
     async def wait(
@@ -192,7 +198,7 @@ class DriveBook:
             return await self._wait(goal_id, wait_s, on_progress)
         except anyio.get_cancelled_exc_class():
             with anyio.CancelScope(shield=True):
-                await self.cancel(goal_id)
+                await self._abandon(goal_id)
             raise
 
     async def _wait(
@@ -203,7 +209,11 @@ class DriveBook:
         report = await self.report(goal_id)
         while not report.status.state.is_final and self._robot.now_s < deadline_s:
             left_s = deadline_s - self._robot.now_s
-            await self._robot.sleep(min(POLL_S, max(left_s, 0.01)))
+            try:
+                await self._robot.sleep(min(POLL_S, max(left_s, 0.01)))
+            except LinkError:
+                # The robot's clock stands: its time would be waited for without end.
+                return await self.report(report.drive.goal_id)
             await self._start_next()
             report = await self.report(report.drive.goal_id)
             if self._robot.now_s >= next_progress_s:
@@ -211,27 +221,47 @@ class DriveBook:
                 await on_progress(report)
         return report
 
+    async def _abandon(self, goal_id: str | None) -> None:
+        """End a drive that nobody waits for any more; one out of reach when it is back."""
+        drive = self._find(goal_id)
+        try:
+            await self.cancel(drive.goal_id)
+        except LinkError as error:
+            logger.warning("%s could not be cancelled yet: %s", drive.goal_id, error)
+            self._owed.owe(drive.goal_id)
+
     async def cancel(self, goal_id: str | None = None) -> DriveReport:
-        """Ends a drive; one that has already ended is reported as it ended."""
+        """End a drive; one that has already ended is reported as it ended.
+
+        Raises:
+            GoalError: No drive has that id.
+            LinkError: The robot could not be told.
+        """
         report = await self.report(goal_id)
         if report.status.state.is_final:
             return report
         if report.drive.robot_goal_id is None:
             status = GoalStatus(state=GoalState.CANCELLED, reason="It was cancelled.")
-            self._note_end(report.drive, status)
+            self._end(report.drive, status)
         else:
             with anyio.CancelScope(shield=True):
                 await self._robot.cancel_goal(report.drive.robot_goal_id)
         return await self.report(report.drive.goal_id)
 
     async def stop(self, reason: str = "The robot was stopped.") -> None:
-        """Stops the robot and ends what was under way; what is being prepared does not start."""
+        """Stop the robot and end what was under way; what is being prepared does not start.
+
+        Raises:
+            LinkError: The robot could not be told; it is as soon as it can be reached.
+        """
         self._n_stops += 1
         with anyio.CancelScope(shield=True):
-            await self._robot.stop()
-            drive = self.under_way
             self._dismiss(reason)
-            if drive is not None:
+            if (drive := self.under_way) is not None:
+                self._owed.owe(drive.goal_id)
+            await self._robot.stop()
+            self._owed.forgive()
+            if (drive := self.under_way) is not None:
                 report = await self.report(drive.goal_id)
                 if report.status.state is GoalState.CANCELLED:
                     self._keep(replace(report.drive, final=replace(report.status, reason=reason)))
@@ -249,7 +279,7 @@ class DriveBook:
     def _dismiss(self, reason: str) -> None:
         """Ends the drives that wait."""
         for drive in self._waiting():
-            self._note_end(drive, GoalStatus(state=GoalState.CANCELLED, reason=reason))
+            self._end(drive, GoalStatus(state=GoalState.CANCELLED, reason=reason))
 
     async def _find_busy(self) -> Drive | None:
         """Finds the drive that is under way, after asking the robot whether it has ended."""
@@ -270,26 +300,31 @@ class DriveBook:
             return when_busy
         return WhenBusy.REPLACE if busy.client == client else self._when_busy
 
-    def _note(self, goal: Pose, place: str, client: str, robot_goal_id: str | None) -> Drive:
-        self._n_started += 1
-        drive = Drive(
-            goal_id=f"G{self._n_started}",
+    def _make(self, goal: Pose, place: str, client: str) -> Drive:
+        return Drive(
+            goal_id=f"G{self._n_started + 1}",
             goal=goal,
             place=place,
-            robot_goal_id=robot_goal_id,
+            robot_goal_id=None,
             started_s=self._robot.now_s,
             client=client,
         )
-        self._drives[drive.goal_id] = drive
-        self._forget_old()
-        return drive
+
+    async def _send(self, drive: Drive) -> Drive:
+        """Send a drive to the robot, which gives up whatever it was doing."""
+        await self._owed.wait_for_stop()
+        drive = replace(drive, started_s=self._robot.now_s)
+        drive = replace(drive, robot_goal_id=await self._robot.send_goal(drive.goal))
+        self._owed.forgive()
+        self._monitor.begin()
+        return self._keep(replace(drive, heard=JUST_SENT))
 
     def _end_all(self, reason: str, *, but: Drive) -> None:
         """Notes that all drives but one are over: the robot has one goal."""
         status = GoalStatus(state=GoalState.PREEMPTED, reason=reason)
         for drive in self._open():
             if drive.goal_id != but.goal_id:
-                self._note_end(drive, status)
+                self._end(drive, status)
 
     async def _start_next(self) -> None:
         """Sends the next drive that waits, once the one before it has ended."""
@@ -298,51 +333,46 @@ class DriveBook:
         async with self._starting:
             if await self._find_busy() is not None or not self._waiting():
                 return
-            drive, sent_s = self._waiting()[0], self._robot.now_s
+            drive = self._waiting()[0]
             try:
-                robot_goal_id = await self._robot.send_goal(drive.goal)
+                await self._send(drive)
             except MapspeakError as error:
-                self._note_end(drive, GoalStatus(state=GoalState.REJECTED, reason=str(error)))
-                return
-            self._keep(replace(drive, robot_goal_id=robot_goal_id, started_s=sent_s))
-            self._vigil.begin(drive.goal_id, now_s=self._robot.now_s)
+                self._end(drive, GoalStatus(state=GoalState.REJECTED, reason=str(error)))
 
-    async def _fetch_status(self, drive: Drive) -> GoalStatus:
-        if drive.robot_goal_id is None:
-            return GoalStatus(state=GoalState.PLANNED, reason="It waits for the drive before it.")
-        return await self._robot.fetch_goal_status(drive.robot_goal_id)
+    async def _note(self, drive: Drive, look: Look) -> None:
+        """Note what a look has shown of a drive, and end one that is over or must not go on."""
+        drive = self._keep(replace(drive, heard=look.status))
+        end = look.status if look.status.state.is_final else None
+        if end is None and drive.robot_goal_id is not None:
+            end = self._monitor.judge(look)
+            if end is not None:
+                self._dismiss(f"The drive before it has ended: {end.reason}")
+        if end is None:
+            return
+        self._end(drive, end)
+        if end.state not in NEEDS_NO_STOP:
+            self._owed.owe(drive.goal_id)
+            # A goal that is being sent takes over from it; a robot out of reach is stopped later.
+            if not self._starting.locked() and look.doubt is not PoseDoubt.NO_ANSWER:
+                await self._owed.stop()
 
-    async def _fetch_pose(self, *, is_over: bool) -> StampedPose:
-        """Gives where the robot is; of a drive that is over, where it was seen last will do."""
-        try:
-            self._last_seen = await self._robot.fetch_pose()
-        except LinkError:
-            if not is_over or self._last_seen is None:
-                raise
-        return self._last_seen
-
-    async def _find_begin(self) -> Point | None:
-        """Gives where a drive begins; None of a robot that does not say."""
-        try:
-            return (await self._fetch_pose(is_over=False)).pose.point
-        except LinkError:
-            return None
-
-    async def _give_up(self, drive: Drive, fault: GoalStatus) -> DriveReport:
-        """Ends a drive that must not go on; the robot comes to a stand."""
-        self._note_end(drive, fault)
-        self._dismiss(f"The drive before it has ended: {fault.reason}")
-        with anyio.CancelScope(shield=True):
-            await self._robot.stop()
-        return await self.report(drive.goal_id)
+    async def _settle(self) -> None:
+        """Stop what could not be stopped before, or note that it has ended by itself."""
+        drive = self._drives.get(self._owed.goal_id or "")
+        if drive is None or self._starting.locked():
+            return
+        truth = await self._owed.settle(drive)
+        drive = self._drives.get(drive.goal_id, drive)
+        if truth is not None and (drive.final is None or drive.final.state is GoalState.LOST):
+            self._keep(replace(drive, final=truth))
 
     async def _check_foreign_goals(self) -> None:
         goals = await self._robot.fetch_foreign_goals()
         if goals:
             raise GoalError(
-                f"No drive of ours is under way, but {len(goals)} that somebody else has sent: "
+                f"navigate_to has sent the robot nowhere, but it follows another goal: "
                 f"{', '.join(goals)}.",
-                hint="The robot moves by itself: wait, or end it with stop_robot.",
+                hint="Wait for its end, or end it with stop_robot.",
             )
 
     def _find(self, goal_id: str | None) -> Drive:
@@ -351,22 +381,20 @@ class DriveBook:
             return drive
         if not self._drives:
             raise GoalError(
-                "The robot has not been sent anywhere yet.", hint="Call navigate_to first."
+                "navigate_to has sent the robot nowhere yet.", hint="Call navigate_to first."
             )
         raise GoalError(
             f"There is no goal {str(goal_id)[:40]!r}.",
             hint=f"Known goals are {', '.join(list(self._drives)[-5:])}.",
         )
 
-    def _note_end(self, drive: Drive, status: GoalStatus) -> Drive:
-        if drive.final is None and status.state.is_final:
-            return self._keep(replace(drive, final=status))
-        return drive
+    def _end(self, drive: Drive, status: GoalStatus) -> None:
+        """Note how a drive ended; the first word counts."""
+        self._keep(replace(drive, final=drive.final or status))
 
     def _keep(self, drive: Drive) -> Drive:
+        self._n_started += drive.goal_id not in self._drives
         self._drives[drive.goal_id] = drive
-        return drive
-
-    def _forget_old(self) -> None:
         while len(self._drives) > N_KEPT:
             del self._drives[next(iter(self._drives))]
+        return drive

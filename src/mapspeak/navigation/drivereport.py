@@ -3,9 +3,11 @@
 from dataclasses import dataclass
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.robot import GoalStatus
+from mapspeak.robot import GoalState, GoalStatus, PoseDoubt
 
-__all__ = ["Drive", "DriveReport"]
+__all__ = ["JUST_SENT", "Drive", "DriveReport"]
+
+JUST_SENT = GoalStatus(state=GoalState.ACCEPTED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,7 +22,9 @@ class Drive:
         started_s: Robot time at which it was sent.
         client: Who asked for it; empty where there can be only one.
         begun_at: Where the robot was when it was sent; None where it waited its turn.
-        ended_at: Where the robot was when it was heard that the drive had ended.
+        ended_at: Where the robot was when it was heard that the drive had ended; None where that
+            is not known.
+        heard: How it stood when the robot was heard last.
         final: How it ended, once it has.
     """
 
@@ -32,6 +36,7 @@ class Drive:
     client: str = ""
     begun_at: Point | None = None
     ended_at: Point | None = None
+    heard: GoalStatus = JUST_SENT
     final: GoalStatus | None = None
 
 
@@ -41,12 +46,20 @@ class DriveReport:
 
     Attributes:
         drive: The drive.
-        status: How it stands.
+        status: How it stands, or stood when the robot was heard last.
         pose: Where the robot is now, or was last seen.
+        pose_age_s: How old that pose is.
+        pose_doubt: Why the robot may be elsewhere; None for a fresh pose on the map.
+        silence: What is missing of the robot, in words; empty where nothing is.
+        is_stop_owed: It has to be stopped, and the robot could not be told so yet.
         elapsed_s: Robot time since the drive was sent.
     """
 
     drive: Drive
     status: GoalStatus
     pose: Pose
+    pose_age_s: float
+    pose_doubt: PoseDoubt | None
+    silence: str
+    is_stop_owed: bool
     elapsed_s: float

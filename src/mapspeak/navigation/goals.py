@@ -13,7 +13,7 @@ from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, Mask
 from mapspeak.spatial.paths import DistanceField, distances_from
 
-__all__ = ["GoalCheck", "GoalVerdict", "check_goal", "judge_goal"]
+__all__ = ["GoalCheck", "GoalVerdict", "check_goal", "judge_goal", "say_refusal"]
 
 Opened = Callable[[Point], DistanceField]
 
@@ -83,6 +83,11 @@ def check_goal(
     if check.is_ok or check.verdict is GoalVerdict.NOT_FINITE:
         return check
     return replace(check, nearest=_find_nearest(grid, distances, goal))
+
+
+def say_refusal(name: str, check: GoalCheck) -> str:
+    """Return why a place is no goal, with its name where the sentence does not say it."""
+    return check.sentence if name in check.sentence else f"{name}: {check.sentence}"
 
 
 def judge_goal(

@@ -1,6 +1,7 @@
 """The MCP server around a session: chosen tools, readable errors, lean schemas."""
 
 import json
+import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -37,6 +38,9 @@ DEFAULT_TOOLSETS = ("look", "places", "drive", "paper")
 
 
 STOP = "stop_robot"
+ARGUMENT = re.compile(r"(?!(?:str|int|float|bool|none)$)[a-z0-9_]+")
+"""A name of an argument, or the number of an item; pydantic names the tried types among them."""
+INSTANCE = re.compile(r"a valid dictionary or instance of \w+")
 MOST_BYTES = 1_000_000
 """Of the arguments of one call, written as JSON; no model writes a hundredth of that."""
 
@@ -316,11 +320,13 @@ def _explain(name: str, cause: BaseException | None) -> str | None:
             return str(cause)
         case ValidationError():
             faults = [_fault(error["loc"], error["msg"]) for error in cause.errors()]
-            return f"{name} was called with wrong arguments: {'; '.join(faults)}."
+            return f"{name} was called with wrong arguments: {'; '.join(dict.fromkeys(faults))}."
         case _:
             return None
 
 
 def _fault(location: tuple[int | str, ...], message: str) -> str:
-    where = ".".join(str(part) for part in location) or "arguments"
-    return f"{where}: {message[:1].lower()}{message[1:]}"
+    """Says where something is wrong, by the names that the caller gave and no class of ours."""
+    named = [str(part) for part in location if ARGUMENT.fullmatch(str(part))]
+    said = INSTANCE.sub("an object", message)
+    return f"{'.'.join(named) or 'arguments'}: {said[:1].lower()}{said[1:]}"

@@ -1,10 +1,25 @@
 """Who calls a tool, and how they hear of a drive while they wait."""
 
+from typing import Any
+
 from mcp.server.mcpserver import Context
+from pydantic import BeforeValidator
 
 from mapspeak.navigation.drive import DriveReport, OnProgress
 
-__all__ = ["client_of", "tell_progress"]
+__all__ = ["AT_MOST_LONGEST_WAIT", "LONGEST_WAIT_S", "client_of", "tell_progress"]
+
+LONGEST_WAIT_S = 25.0
+"""Clients give up on a call that takes much longer."""
+
+
+def _shorten_wait(wait_s: Any) -> Any:  # noqa: ANN401 - what is no number is refused later
+    is_number = isinstance(wait_s, int | float) and not isinstance(wait_s, bool)
+    return min(wait_s, LONGEST_WAIT_S) if is_number else wait_s
+
+
+AT_MOST_LONGEST_WAIT = BeforeValidator(_shorten_wait)
+"""Who would wait longer is answered sooner, and can call again."""
 
 
 def client_of(context: Context) -> str:

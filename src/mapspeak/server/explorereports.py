@@ -7,7 +7,7 @@ from pydantic import Field
 from mapspeak.navigation.exploration import BlockedPlace, ExplorationState, Progress
 from mapspeak.navigation.search import Candidate, SearchState, Standing
 from mapspeak.server.reports import PoseReport, Report
-from mapspeak.server.wording import say_point
+from mapspeak.server.wording import say_point, say_pose_doubt
 from mapspeak.spatial.frontiers import RefusedFrontier
 
 __all__ = ["ExploreAnswer", "SearchAnswer"]
@@ -34,7 +34,9 @@ class ExploreAnswer(Report):
     state: ExplorationState = Field(description="driving and at_goal go on with the next call")
     reason: str
     n_goals: int = Field(description="frontiers it set out to")
-    n_arrived: int = Field(description="the others were seen from afar, or blocked")
+    n_arrived: int
+    n_seen: int = Field(description="left on the way: seen from afar")
+    n_blocked: int
     driven_m: float
     elapsed_s: float = Field(description="robot time of all calls of this exploration")
     known_area_m2: float = Field(description="free floor on the map")
@@ -44,6 +46,7 @@ class ExploreAnswer(Report):
     next: str = Field(description="the frontier under way, and why it was chosen")
     goal_id: str | None
     robot: PoseReport
+    pose_uncertain: str = Field(description="why the robot may be elsewhere; empty if it is not")
     cannot_reach: list[str] = Field(description="what is left, where, and why")
     next_step: str
 
@@ -56,6 +59,8 @@ class ExploreAnswer(Report):
             reason=progress.sentence,
             n_goals=progress.n_goals,
             n_arrived=progress.n_arrived,
+            n_seen=progress.n_seen,
+            n_blocked=progress.n_blocked,
             driven_m=round(progress.driven_m, 1),
             elapsed_s=round(progress.elapsed_s, 1),
             known_area_m2=round(progress.known_area_m2, 1),
@@ -65,6 +70,7 @@ class ExploreAnswer(Report):
             next=_say_next(progress),
             goal_id=None if trip is None else trip.goal_id,
             robot=PoseReport.of(progress.pose),
+            pose_uncertain=say_pose_doubt(progress.pose_doubt),
             cannot_reach=_say_rest(progress),
             next_step=NEXT_STEP[progress.state],
         )
@@ -122,6 +128,7 @@ class SearchAnswer(Report):
     places_seen: list[str] = Field(description="in the end: how much of each room was seen")
     cannot_reach: list[str]
     robot: PoseReport
+    pose_uncertain: str = Field(description="why the robot may be elsewhere; empty if it is not")
     next_step: str
 
     @classmethod
@@ -143,6 +150,7 @@ class SearchAnswer(Report):
             ],
             cannot_reach=[_say_blocked(place) for place in standing.blocked][:MOST_NAMED],
             robot=PoseReport.of(standing.pose),
+            pose_uncertain=say_pose_doubt(standing.pose_doubt),
             next_step=SEARCH_STEP[standing.state],
         )
 

@@ -12,11 +12,11 @@ from mapspeak.navigation.atlas import RememberedPlace, number_places
 from mapspeak.navigation.choosing import CheckedGoal
 from mapspeak.navigation.drive import DriveReport
 from mapspeak.navigation.goals import GoalVerdict
-from mapspeak.robot import GoalState, GoalStatus, StampedPose
+from mapspeak.robot import GoalState, StampedPose
 from mapspeak.semantic import Landmark, Merge, SemanticMap, WriteReceipt, name_key
 from mapspeak.semantic.quoting import quote_name
 from mapspeak.server.memory.remembering import say_landmarks, say_replaced
-from mapspeak.server.wording import say_pose
+from mapspeak.server.wording import say_pose, say_pose_doubt
 
 __all__ = [
     "DriveAnswer",
@@ -31,8 +31,8 @@ __all__ = [
 
 
 MOST_NAMED = 12
-OLD_POSE_S = 5.0
-"""Robot time after which an estimate is no sure answer to where a robot is."""
+AT_GOAL_M = 0.5
+"""Navigation ends a drive within its tolerance, usually 0.25 m; farther off is worth a word."""
 
 
 class Report(BaseModel):
@@ -64,38 +64,37 @@ class PoseAnswer(Report):
     pose: PoseReport
     place: str = Field(description="the room or corridor it stands in, by id")
     age_s: float = Field(description="seconds since the estimate")
-    doubt: str = Field(description="why the robot may be elsewhere; empty for a fresh estimate")
+    pose_uncertain: str = Field(
+        description="why the robot may be elsewhere; empty for a fresh pose on the map"
+    )
 
     @classmethod
     def of(cls, stamped: StampedPose, *, place: str, now_s: float) -> Self:
         """Makes the report of a stamped pose."""
-        age_s = max(0.0, round(now_s - stamped.stamp_s, 2))
-        pose, doubt = PoseReport.of(stamped.pose), _say_doubt(age_s)
-        return cls(pose=pose, place=place, age_s=age_s, doubt=doubt)
-
-
-def _say_doubt(age_s: float) -> str:
-    if age_s <= OLD_POSE_S:
-        return ""
-    return (
-        f"Robot time has gone on for {age_s:.0f} s since this estimate: unless the robot stood "
-        "still, it is elsewhere. Check that localisation runs and that the clocks agree."
-    )
+        age_s = stamped.measure_age_s(now_s)
+        return cls(
+            pose=PoseReport.of(stamped.pose),
+            place=place,
+            age_s=round(age_s, 2),
+            pose_uncertain=say_pose_doubt(stamped.find_doubt(now_s), age_s),
+        )
 
 
 NEXT_STEP = {
     GoalState.PLANNED: "Call wait_for_goal; it starts when the drive before it has ended.",
     GoalState.ACCEPTED: "Call wait_for_goal; stop_robot or cancel_goal end it.",
     GoalState.DRIVING: "Call wait_for_goal; stop_robot or cancel_goal end it.",
-    GoalState.ARRIVED: "The robot stands at the goal.",
     GoalState.BLOCKED: "Call look_at_map, then choose another place or another way.",
     GoalState.CANCELLED: "The robot stands still; send a new goal when ready.",
     GoalState.PREEMPTED: "A newer goal is under way; ask for that one.",
     GoalState.REJECTED: "Call look_at_map and choose a place inside known free space.",
-    GoalState.TIMED_OUT: "Check the robot's navigation; stop_robot, then send a new goal.",
-    GoalState.LOST: "The robot no longer answers for this goal; check it, then send a new one.",
+    GoalState.TIMED_OUT: "The robot was told to stop. Check its navigation, then send a new goal.",
+    GoalState.LOST: "The robot was told to stop. Check where it is, then send a new goal.",
 }
-
+STOP_OWED = (
+    "NOT STOPPED: the robot could not be told yet and may drive on. It is told as soon as it can "
+    "be reached; press its own stop button if it must stand now."
+)
 
 UNANSWERED = (
     "The robot's navigation does not answer: another place would not help. Check that it runs and "
@@ -107,10 +106,6 @@ FOREIGN_DRIVE = (
 )
 
 
-def _say_next_step(status: GoalStatus) -> str:
-    return UNANSWERED if status.is_unanswered else NEXT_STEP[status.state]
-
-
 class DriveAnswer(Report):
     """How a drive stands."""
 
@@ -120,8 +115,12 @@ class DriveAnswer(Report):
     state: GoalState = Field(
         description="planned, accepted and driving go on, all others are final"
     )
-    robot: PoseReport = Field(description="where it is now")
-    distance_left_m: float | None = Field(description="by path")
+    robot: PoseReport = Field(description="where it is now, or was seen last")
+    pose_age_s: float
+    pose_uncertain: str = Field(
+        description="why the robot may be elsewhere; empty for a fresh pose on the map"
+    )
+    distance_left_m: float | None = Field(description="by path; straight once it has arrived")
     elapsed_s: float
     reason: str
     next_step: str
@@ -129,19 +128,41 @@ class DriveAnswer(Report):
     @classmethod
     def of(cls, report: DriveReport, *, foreign_goals: Sequence[GoalState] = ()) -> Self:
         """Makes the report of a drive, with the goals of others that drive the robot after it."""
-        is_there = report.status.state is GoalState.ARRIVED
-        left_m = 0.0 if is_there else report.status.distance_left_m
+        left_m = _distance_left_m(report)
         return cls(
             goal_id=report.drive.goal_id,
             state=report.status.state,
             place=report.drive.place,
             goal=PoseReport.of(report.drive.goal),
             robot=PoseReport.of(report.pose),
+            pose_age_s=round(report.pose_age_s, 1),
+            pose_uncertain=say_pose_doubt(report.pose_doubt, report.pose_age_s, report.silence),
             distance_left_m=None if left_m is None else round(left_m, 2),
             elapsed_s=round(report.elapsed_s, 1),
             reason=report.status.reason,
-            next_step=FOREIGN_DRIVE if foreign_goals else _say_next_step(report.status),
+            next_step=FOREIGN_DRIVE if foreign_goals else _say_next_step(report),
         )
+
+
+def _distance_left_m(report: DriveReport) -> float | None:
+    if report.status.state is not GoalState.ARRIVED:
+        return report.status.distance_left_m
+    return report.pose.point.distance_to(report.drive.goal.point)
+
+
+def _say_next_step(report: DriveReport) -> str:
+    if report.is_stop_owed:
+        return STOP_OWED
+    if report.status.is_unanswered:
+        return UNANSWERED
+    if report.status.state is not GoalState.ARRIVED:
+        return NEXT_STEP[report.status.state]
+    off_m = report.pose.point.distance_to(report.drive.goal.point)
+    if report.pose_doubt is not None:
+        return "Navigation says that it arrived, but the pose is uncertain: look before going on."
+    if off_m > AT_GOAL_M:
+        return f"Navigation says that it arrived, but the robot is {off_m:.2f} m from the goal now."
+    return "The robot stands at the goal."
 
 
 class GoalAnswer(Report):

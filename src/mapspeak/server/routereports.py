@@ -6,6 +6,7 @@ from pydantic import Field
 
 from mapspeak.navigation.routes import RoutePlan, RouteProgress, RouteState, Stop, StopState
 from mapspeak.server.reports import PoseReport, Report
+from mapspeak.server.wording import say_pose_doubt
 
 __all__ = ["RouteAnswer"]
 
@@ -39,6 +40,7 @@ class RouteAnswer(Report):
         description="the total if the nearest candidate were taken each time, where that is more"
     )
     robot: PoseReport
+    pose_uncertain: str = Field(description="why the robot may be elsewhere; empty if it is not")
     next_step: str
 
     @classmethod
@@ -62,6 +64,7 @@ class RouteAnswer(Report):
             total_m=round(plan.total_m, 1),
             greedy_m=round(plan.greedy_m, 1) if _is_better(plan) else None,
             robot=PoseReport.of(progress.pose),
+            pose_uncertain=say_pose_doubt(progress.pose_doubt),
             next_step=NEXT_STEP[progress.state],
         )
 

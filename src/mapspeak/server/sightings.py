@@ -9,7 +9,7 @@ from mcp.server.mcpserver import Image
 from mapspeak.robot import CameraPicture, Detection
 from mapspeak.semantic import Reading
 from mapspeak.server.memory.lasers import fetch_ring
-from mapspeak.server.wording import say_pose
+from mapspeak.server.wording import say_pose, say_pose_doubt
 from mapspeak.session import Session
 
 __all__ = ["Sighting", "look_ahead"]
@@ -65,6 +65,7 @@ async def look_ahead(session: Session) -> Sighting:
         reported=None if detector is None else labels,
     )
     lines = [_say_picture(taken.id, picture)]
+    lines += [say_pose_doubt(picture.pose_doubt)] if picture.pose_doubt else []
     lines += [] if detector is None else _say_detections(detector, detections)
     lines += [kept.fault] if kept.fault else []
     return Sighting(text="\n".join(lines), picture=picture, detections=detections)

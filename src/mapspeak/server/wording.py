@@ -8,6 +8,7 @@ from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.closures import ClosedArea, ClosedFloor
 from mapspeak.navigation.standing import find_standing_point
+from mapspeak.robot import PoseDoubt
 from mapspeak.semantic.events import tell_place
 from mapspeak.spatial.rooms import Door, Region
 
@@ -24,6 +25,8 @@ __all__ = [
     "say_path",
     "say_point",
     "say_pose",
+    "say_pose_doubt",
+    "say_warnings",
     "shorten",
 ]
 
@@ -42,6 +45,16 @@ DIRECTIONS = (
 )
 """Eighths of a turn from the robot's heading, counter-clockwise."""
 HERE_M = 0.1
+
+POSE_DOUBTS = {
+    PoseDoubt.NO_ANSWER: "the robot does not answer; state and pose are those heard last",
+    PoseDoubt.NO_POSE: "the robot does not say where it is; the pose is the last one",
+    PoseDoubt.OLD_POSE: "unless the robot stood still since, it is elsewhere; check that "
+    "localisation runs and that the clocks agree",
+    PoseDoubt.CLOCK_STANDS: "the robot's clock stands; check that a simulation is not paused",
+    PoseDoubt.ODOMETRY: "it is odometry, which drifts away from the map; start SLAM or "
+    "localisation",
+}
 
 COMPASS = (
     "east",
@@ -64,6 +77,22 @@ def say_count(number: int, what: str) -> str:
 def say_pose(pose: Pose) -> str:
     """Gives a pose in metres and degrees."""
     return f"x {_number(pose.x)}, y {_number(pose.y)}, yaw {pose.yaw_deg + 0.0:.0f} deg"
+
+
+def say_pose_doubt(doubt: PoseDoubt | None, age_s: float | None = None, silence: str = "") -> str:
+    """Return why the robot may be elsewhere: a code, how old the pose is, and what to do."""
+    if doubt is None:
+        return ""
+    is_age_told = age_s is not None and doubt is not PoseDoubt.ODOMETRY
+    old = f"the pose is {age_s:.0f} s old: " if is_age_told else ""
+    return " ".join(filter(None, (f"{doubt}: {old}{POSE_DOUBTS[doubt]}.", silence)))
+
+
+def say_warnings(atlas: Atlas) -> list[str]:
+    """Return what a reader of a map should know first: of the memory, and of the robot's pose."""
+    doubt = say_pose_doubt(atlas.pose_doubt)
+    of_pose = [f"The robot's pose is uncertain: {doubt}"] if doubt else []
+    return [f"Warning: {warning}" for warning in (*atlas.warnings, *of_pose)]
 
 
 def say_point(point: Point) -> str:

@@ -6,7 +6,6 @@ from typing import Any
 import pytest
 
 from mapspeak.errors import ConfigError
-from mapspeak.links.ros import describe_pose_source
 from mapspeak.links.ros.discovery import (
     NavigationKind,
     PoseSource,
@@ -94,13 +93,6 @@ def test_the_pose_comes_from_the_best_source_and_is_said_which(
     profile = choose({each: TURTLEBOT_4[each] for each in topics}, frames=frames)
     assert profile.pose_source is source
     assert profile.pose_topic == topic
-
-
-def test_where_the_pose_comes_from_is_said_in_words() -> None:
-    drifting = choose({"/odom": "nav_msgs/Odometry"}, frames=frozenset())
-    assert "base_footprint in map by TF" in describe_pose_source(choose(TURTLEBOT_4))
-    assert "odometry from /odom: it drifts" in describe_pose_source(drifting)
-    assert "does not say" in describe_pose_source(choose({}, frames=frozenset()))
 
 
 def test_move_base_is_found_by_its_goal_topic() -> None:

@@ -44,6 +44,14 @@ def test_a_latecomer_does_not_replace_what_is_newer() -> None:
     assert grown.find(outer="map", inner="base_link").outer_from_inner.x == 1.0
 
 
+def test_a_transform_that_is_told_again_as_it_was_is_no_news() -> None:
+    frozen = transform("map", "base_link", Pose(1.0, 0.0), stamp_s=5.0)
+    grown = TransformTree()
+    assert grown.take([frozen], is_static=False)
+    assert not grown.take([frozen], is_static=False)
+    assert grown.take([transform("map", "base_link", Pose(1.0, 0.0), stamp_s=5.1)], is_static=False)
+
+
 def test_a_clock_that_was_set_back_does_not_freeze_the_pose() -> None:
     grown = tree(transform("map", "base_link", Pose(1.0, 0.0), stamp_s=5_000.0))
     grown.take([transform("map", "base_link", Pose(2.0, 0.0), stamp_s=0.5)], is_static=False)

@@ -15,6 +15,7 @@ from drawing import grid_from_text, text_from_grid
 from mapspeak.errors import GoalError, LinkError, MapError
 from mapspeak.geometry import Pose
 from mapspeak.links.ros import RobotOverrides, RosRobot, RosSettings
+from mapspeak.links.ros.clock import RobotClock
 from mapspeak.links.ros.discovery import PoseSource
 from mapspeak.links.ros.driving import DrivingPatience
 from mapspeak.links.ros.maps import MapKeeper
@@ -232,8 +233,13 @@ async def test_without_frames_the_pose_comes_from_odometry() -> None:
     }
     scripted.topics["/odom"] = "nav_msgs/msg/Odometry"
     async with connected(scripted, timing=replace(QUICK, frames_s=0.01)) as robot:
-        assert (await robot.fetch_pose()).pose == Pose(1.0, 0.0, 0.0)
+        found = await robot.fetch_pose()
+        assert found.pose == Pose(1.0, 0.0, 0.0)
+        assert found.is_odometry
         assert robot.profile.pose_topic == "/odom"
+        poses = PoseKeeper(robot.connection, robot.profile, robot._frames, silence_s=0.0)
+        with pytest.raises(LinkError, match="no odometry has come"):
+            await poses.fetch(timeout_s=0.01)
 
 
 async def test_transforms_that_are_none_are_left_away() -> None:
@@ -770,6 +776,29 @@ async def test_a_simulations_clock_decides_how_long_a_sleep_takes() -> None:
             # Set back in between, as by a simulation begun anew.
             await scripted.publish("/clock", {"clock": {"sec": second, "nanosec": 0}})
     assert robot.now_s == 9.0
+
+
+async def test_a_clock_that_is_told_and_does_not_move_on_is_not_waited_for_without_end() -> None:
+    scripted = ScriptedRobot()
+    scripted.topics["/clock"] = "rosgraph_msgs/msg/Clock"
+    paused = {"clock": {"sec": 50, "nanosec": 0}}
+    scripted.latched["/clock"] = paused
+    async with connected(scripted) as robot:
+        clock = RobotClock(robot.connection, standstill_s=0.2)
+        ticks = robot.connection.subscribe("/clock")
+
+        async def go_on_telling() -> None:
+            while True:
+                n_before = ticks.n_received
+                await scripted.publish("/clock", paused)
+                await ticks.wait_for_more_than(n_before, timeout_s=PATIENCE_S)
+
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(go_on_telling)
+            await clock.start("/clock")
+            with pytest.raises(LinkError, match="has stood still"):
+                await clock.sleep(1.0)
+            tasks.cancel_scope.cancel()
 
 
 async def test_the_cost_of_a_robot_is_two_sockets() -> None:

@@ -14,7 +14,6 @@ from mapspeak.links.ros.goal import PursuedGoal
 from mapspeak.links.ros.late import NOTICE_S, Announcements, say_again
 from mapspeak.links.ros.native import NativeConnection, NativeTopics, check_name, wrong_type
 from mapspeak.links.ros.parameters import NodeParameters
-from mapspeak.links.ros.poses import describe_pose_source
 from mapspeak.links.ros.robot import RosRobot, build_ros_robot
 from mapspeak.links.ros.subscription import TopicSubscription
 
@@ -33,7 +32,6 @@ __all__ = [
     "TopicSubscription",
     "build_ros_robot",
     "check_name",
-    "describe_pose_source",
     "describe_profile",
     "environment_with",
     "load_robot_file",

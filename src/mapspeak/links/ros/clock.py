@@ -6,7 +6,7 @@ from mapspeak.errors import LinkError
 from mapspeak.ros import RosConnection
 from mapspeak.ros.messages import Message, read_stamp
 
-STANDSTILL_S = 30.0
+STANDSTILL_S = 5.0
 """Of the wall clock; a simulation that slow is paused or has ended."""
 FIRST_TICK_S = 1.0
 """A clock topic that stays silent for so long is left over from something else."""
@@ -18,10 +18,12 @@ class RobotClock:
 
     Args:
         connection: Connected to the robot.
+        standstill_s: Wall time after which a clock that does not move on stands still.
     """
 
-    def __init__(self, connection: RosConnection) -> None:
+    def __init__(self, connection: RosConnection, *, standstill_s: float = STANDSTILL_S) -> None:
         self._connection = connection
+        self._standstill_s = standstill_s
         self._offset_s: float | None = None
         self._simulated_s: float | None = None
         self._moved_on = anyio.Event()
@@ -71,11 +73,11 @@ class RobotClock:
             self._offset_s = robot_s - anyio.current_time()
 
     async def _wait_for_tick(self) -> None:
-        with anyio.move_on_after(STANDSTILL_S):
+        with anyio.move_on_after(self._standstill_s):
             await self._moved_on.wait()
             return
         raise LinkError(
-            f"The robot's simulated clock has stood still for {STANDSTILL_S:g} s.",
+            f"The robot's simulated clock has stood still for {self._standstill_s:g} s.",
             hint="Unpause the simulation, or check that /clock is still published.",
         )
 
@@ -83,9 +85,12 @@ class RobotClock:
         stamp = message.get("clock")
         if not isinstance(stamp, dict):
             return
+        before_s = self._simulated_s
         try:
             self._simulated_s = read_stamp(stamp)
         except LinkError:
+            return
+        if self._simulated_s == before_s:
             return
         moved_on, self._moved_on = self._moved_on, anyio.Event()
         moved_on.set()

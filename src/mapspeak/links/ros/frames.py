@@ -20,7 +20,7 @@ class FrameListener:
     def __init__(self, connection: RosConnection) -> None:
         self.tree = TransformTree()
         self.arrived_s: float | None = None
-        """When the newest that moves came, by the event loop's clock; None before the first."""
+        """When something new was told of one that moves, by the event loop's clock; None before."""
         self.n_refused = 0
         """Messages that were no transforms."""
         self._connection = connection
@@ -56,8 +56,7 @@ class FrameListener:
         except LinkError:
             self.n_refused += 1
             return
-        self.tree.take(transforms, is_static=is_static)
-        if not is_static and transforms:
+        if self.tree.take(transforms, is_static=is_static) and not is_static:
             self.arrived_s = anyio.current_time()
         news, self._news = self._news, anyio.Event()
         news.set()

@@ -1,5 +1,7 @@
 """Where the robot believes it is."""
 
+from dataclasses import replace
+
 import anyio
 
 from mapspeak.errors import LinkError
@@ -26,7 +28,8 @@ class PoseKeeper:
         connection: Connected to the robot.
         profile: Says where the pose comes from.
         frames: Listens to the tree.
-        silence_s: Without any moving transform, in wall time, after which the pose is too old.
+        silence_s: Without anything new from a source that speaks all the time, in wall time, after
+            which the pose is too old.
     """
 
     def __init__(
@@ -74,34 +77,47 @@ class PoseKeeper:
                 hint="Start localisation (AMCL, slam_toolbox), or name another pose_topic in "
                 "robot.yaml.",
             )
-        return self._from_topic(self._topic.latest)
+        return self._from_topic(self._topic, self._topic.latest)
 
     def _from_frames(self, frame: str) -> StampedPose:
         found = self._frames.tree.find(outer=self._profile.map_frame, inner=frame)
-        self._check_that_frames_move()
-        return StampedPose(found.outer_from_inner, found.stamp_s)
+        silent_s = self._measure_silence(self._frames.arrived_s, what="transform")
+        return StampedPose(found.outer_from_inner, found.stamp_s, silent_s=silent_s)
 
-    def _check_that_frames_move(self) -> None:
-        if self._frames.arrived_s is None:
-            return
-        silent_s = anyio.current_time() - self._frames.arrived_s
+    def _measure_silence(self, arrived_s: float | None, *, what: str) -> float:
+        """Return the wall time since the source of the pose said anything new.
+
+        Raises:
+            LinkError: It is too long ago.
+        """
+        if arrived_s is None:
+            return 0.0
+        silent_s = max(anyio.current_time() - arrived_s, 0.0)
         if silent_s > self._silence_s:
             raise LinkError(
-                f"The robot's pose is old: no transform has come for {silent_s:.0f} s.",
+                f"The robot's pose is old: no {what} has come for {silent_s:.0f} s.",
                 hint="Check that SLAM or localisation and the robot's drivers still run, and that "
                 "a simulation is not paused.",
             )
+        return silent_s
 
-    def _from_topic(self, message: Message) -> StampedPose:
+    def _from_topic(self, topic: Subscription, message: Message) -> StampedPose:
         framed = self._read(message)
         outer = self._profile.map_frame
-        if framed.frame_id in ("", outer) or not self._frames.has_way(
-            outer=outer, inner=framed.frame_id
-        ):
-            # Odometry without a map has no other frame: it is taken for the map's.
+        is_on_map = framed.frame_id in ("", outer)
+        if not is_on_map and self._frames.has_way(outer=outer, inner=framed.frame_id):
+            outer_from_frame = self._from_frames(framed.frame_id)
+            return replace(
+                outer_from_frame,
+                pose=outer_from_frame.pose @ framed.pose,
+                stamp_s=framed.stamp_s,
+            )
+        if self._profile.pose_source is not PoseSource.ODOMETRY:
+            # Localisation speaks when the robot has moved: its silence says nothing.
             return StampedPose(framed.pose, framed.stamp_s)
-        map_from_frame = self._from_frames(framed.frame_id).pose
-        return StampedPose(map_from_frame @ framed.pose, framed.stamp_s)
+        # Odometry without a map has no other frame: it is taken for the map's.
+        silent_s = self._measure_silence(topic.arrived_s, what="odometry")
+        return StampedPose(framed.pose, framed.stamp_s, silent_s=silent_s, is_odometry=True)
 
     def _read(self, message: Message) -> FramedPose:
         if self._profile.pose_type == POSE_STAMPED:
@@ -113,16 +129,3 @@ class PoseKeeper:
             await self._frames.wait_for_news()
         else:
             await self._topic.wait_for_more_than(self._topic.n_received, timeout_s=PATIENCE_S)
-
-
-def describe_pose_source(profile: RobotProfile) -> str:
-    """Says in a sentence where the pose comes from."""
-    match profile.pose_source:
-        case PoseSource.TF:
-            return f"The pose is that of {profile.base_frame} in {profile.map_frame} by TF."
-        case PoseSource.POSE_TOPIC:
-            return f"The pose comes from {profile.pose_topic}."
-        case PoseSource.ODOMETRY:
-            return f"The pose is odometry from {profile.pose_topic}: it drifts away from the map."
-        case PoseSource.NONE:
-            return "The robot does not say where it is."

@@ -133,14 +133,16 @@ class RosRobot:
         await self.connection.wait_until_connected()
         await self._look_until(lambda: self.profile.camera_topic is not None)
         picture = await self._camera.fetch()
+        here = await self._poses.fetch()
         return CameraPicture(
             data=picture.data,
             media_type=picture.media_type,
             width_px=picture.width_px,
             height_px=picture.height_px,
             horizontal_fov_rad=await self._camera.fetch_fov_rad(),
-            pose=(await self._poses.fetch()).pose,
+            pose=here.pose,
             stamp_s=picture.stamp_s,
+            pose_doubt=here.find_doubt(self.now_s),
         )
 
     async def fetch_detections(self) -> tuple[Detection, ...]:

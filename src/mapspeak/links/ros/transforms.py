@@ -47,14 +47,20 @@ class TransformTree:
         parents = (known.transform.parent for known in self._to_parent.values())
         return frozenset(self._to_parent) | frozenset(parents)
 
-    def take(self, transforms: Iterable[FrameTransform], *, is_static: bool) -> None:
-        """Keeps transforms, each of them unless a newer one of the same frame is known."""
+    def take(self, transforms: Iterable[FrameTransform], *, is_static: bool) -> bool:
+        """Keep transforms, and return whether any of them says something new.
+
+        Each is kept unless a newer one of the same frame is known.
+        """
+        is_news = False
         for transform in transforms:
             known = self._to_parent.get(transform.child)
             if known is None and len(self._to_parent) >= MAX_FRAMES:
                 continue
             if known is None or not _is_latecomer(transform, known):
+                is_news = is_news or known is None or known.transform != transform
                 self._to_parent[transform.child] = _Known(transform, is_static)
+        return is_news
 
     def find(self, *, outer: str, inner: str) -> FoundTransform:
         """Gives where a frame lies in one that is above it in the tree.

@@ -81,7 +81,6 @@ class Explorer:
         self._state = ExplorationState.NOTHING_KNOWN
         self._bounds = Bounds()
         self._paused_at: Point | None = None
-        self._n_arrived = 0
         self._elapsed_s = 0.0
 
     @property
@@ -118,7 +117,6 @@ class Explorer:
     def _begin(self) -> None:
         self._trips.begin_count()
         self._paused_at = None
-        self._n_arrived = 0
         self._elapsed_s = 0.0
         self._bounds = Bounds()
 
@@ -127,12 +125,11 @@ class Explorer:
         while True:
             with self._site.drives.preparing() as ticket:
                 atlas = await self._site.fetch_atlas()
-                self._trips.note_pose(atlas.robot)
                 if (told := self._bound_reached(atlas)) is not None:
                     await self._trips.give_up()
                     return await self._end(atlas, ExplorationState.BOUND_REACHED, told)
                 if (seen := self._find_seen_from_here(atlas)) is not None:
-                    await self._trips.give_up()
+                    await self._trips.give_up(is_seen=True)
                     return await self._end(atlas, ExplorationState.AT_GOAL, seen)
                 state = await self._choose(atlas, ticket, client)
             if state is None:
@@ -155,10 +152,8 @@ class Explorer:
                 ExplorationState.INTERRUPTED,
                 self._trips.why_ended or "Something ended the drive.",
             )
-        if state is TripState.ARRIVED:
-            self._n_arrived += 1
-            if self._bounds.stops_at_goals:
-                return ExplorationState.AT_GOAL, "The robot stands at a frontier."
+        if state is TripState.ARRIVED and self._bounds.stops_at_goals:
+            return ExplorationState.AT_GOAL, "The robot stands at a frontier."
         return (ExplorationState.DRIVING, "There is more to explore.") if is_late else None
 
     def _find_seen_from_here(self, atlas: Atlas) -> str | None:
@@ -183,7 +178,7 @@ class Explorer:
             return TripState.UNDER_WAY
         target = await self._site.compute(lambda: self._find_target(atlas))
         if target is None:
-            await self._trips.give_up()
+            await self._trips.give_up(is_seen=True)
             return None
         if trip is not None and trip.target.pose == target.pose:
             return TripState.UNDER_WAY
@@ -243,14 +238,13 @@ class Explorer:
         if self._trips.current is not None:
             return None
         if bounds.n_goals is not None and self._trips.n_begun >= bounds.n_goals:
-            return f"{bounds.n_goals} goals were driven to."
+            return _say_tried(self._trips)
         if bounds.known_ratio is not None and known_ratio(atlas) >= bounds.known_ratio:
             return f"{100 * bounds.known_ratio:.0f} % of the floor to be expected are known."
         return None
 
     async def _end(self, atlas: Atlas, state: ExplorationState, sentence: str) -> Progress:
         self._state = state
-        self._trips.note_pose(atlas.robot)
         if state is ExplorationState.AT_GOAL:
             self._paused_at = atlas.robot.point
         return await self._site.compute(lambda: self._report(atlas, sentence))
@@ -260,7 +254,9 @@ class Explorer:
             state=self._state,
             sentence=sentence,
             n_goals=self._trips.n_begun,
-            n_arrived=self._n_arrived,
+            n_arrived=self._trips.n_arrived,
+            n_seen=self._trips.n_seen,
+            n_blocked=self._trips.n_blocked,
             driven_m=self._trips.driven_m,
             elapsed_s=self._elapsed_s,
             known_area_m2=known_area_m2(atlas),
@@ -268,9 +264,19 @@ class Explorer:
             frontiers=atlas.frontiers.frontiers,
             trip=self._trips.current,
             pose=atlas.robot,
+            pose_doubt=atlas.pose_doubt,
             unreachable=find_unreachable(atlas),
             blocked=self._blocked(atlas),
         )
+
+
+def _say_tried(trips: Trips) -> str:
+    """Return what became of the goals."""
+    goals = "goal was" if trips.n_begun == 1 else "goals were"
+    return (
+        f"{trips.n_begun} {goals} tried: {trips.n_arrived} reached, {trips.n_seen} seen from "
+        f"afar, {trips.n_blocked} blocked."
+    )
 
 
 def _path_m(atlas: Atlas, place: BlockedPlace) -> float:

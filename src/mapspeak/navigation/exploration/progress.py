@@ -11,6 +11,7 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.exploration.blocked import BlockedPlace
 from mapspeak.navigation.exploration.trips import Trip
+from mapspeak.robot import PoseDoubt
 from mapspeak.spatial.frontiers import (
     Frontier,
     FrontierReport,
@@ -61,7 +62,9 @@ class Progress:
         state: See `ExplorationState`.
         sentence: The same in words with numbers.
         n_goals: Frontiers the robot was sent to since the exploration began.
-        n_arrived: How many of them it has come to; others were seen from afar or blocked.
+        n_arrived: How many of them it has come to.
+        n_seen: How many it left on the way, since what they were for had been seen from afar.
+        n_blocked: How many it could not get to.
         driven_m: How far it has driven meanwhile, by its own poses.
         elapsed_s: Robot time of all calls.
         known_area_m2: Free floor on the map.
@@ -69,6 +72,7 @@ class Progress:
         frontiers: Where one could still go, best first.
         trip: The drive under way.
         pose: Where the robot is.
+        pose_doubt: Why it may be elsewhere.
         unreachable: Borders with the unknown that the robot cannot get to.
         blocked: Places that it was sent to in vain.
     """
@@ -77,6 +81,8 @@ class Progress:
     sentence: str
     n_goals: int
     n_arrived: int
+    n_seen: int
+    n_blocked: int
     driven_m: float
     elapsed_s: float
     known_area_m2: float
@@ -84,6 +90,7 @@ class Progress:
     frontiers: tuple[Frontier, ...]
     trip: Trip | None
     pose: Pose
+    pose_doubt: PoseDoubt | None
     unreachable: tuple[RefusedFrontier, ...]
     blocked: tuple[BlockedPlace, ...]
 

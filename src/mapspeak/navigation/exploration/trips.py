@@ -23,9 +23,6 @@ __all__ = ["OnTrip", "Target", "Trip", "TripState", "Trips"]
 
 OnTrip = Callable[[DriveReport], Awaitable[None]]
 
-JUMP_M = 3.0
-"""A pose that is this far from the last one was corrected, not driven."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Target:
@@ -73,7 +70,9 @@ class Trips:
         current: The trip under way; None between two.
         blocked: Places that could not be reached.
         n_begun: How many trips there were.
-        driven_m: How far the robot has come on them, by its own poses.
+        n_arrived: How many of them ended where they led to.
+        n_seen: How many were left on the way, since what they were for had been seen from afar.
+        n_blocked: How many could not be driven to their end.
         why_ended: Why the latest trip ended as it did; empty when it arrived.
     """
 
@@ -81,23 +80,19 @@ class Trips:
         self._site = site
         self.current: Trip | None = None
         self.blocked = BlockedPlaces()
-        self.n_begun = 0
-        self.driven_m = 0.0
+        self.n_begun = self.n_arrived = self.n_seen = self.n_blocked = 0
         self.why_ended = ""
-        self._last_pose: Pose | None = None
+        self._driven_before_m = 0.0
+
+    @property
+    def driven_m(self) -> float:
+        """How far the robot has come, also between two calls, by its own poses."""
+        return self._site.drives.driven_m - self._driven_before_m
 
     def begin_count(self) -> None:
-        """Counts trips and metres from zero again; what was blocked stays remembered."""
-        self.n_begun = 0
-        self.driven_m = 0.0
-        self._last_pose = None
-
-    def note_pose(self, pose: Pose) -> None:
-        """Adds the way from the last pose to this one."""
-        if self._last_pose is not None:
-            step_m = self._last_pose.point.distance_to(pose.point)
-            self.driven_m += step_m if step_m < JUMP_M else 0.0
-        self._last_pose = pose
+        """Count trips and metres from zero again; what was blocked stays remembered."""
+        self.n_begun = self.n_arrived = self.n_seen = self.n_blocked = 0
+        self._driven_before_m = self._site.drives.driven_m
 
     async def set_out(
         self, target: Target, *, ticket: int, client: str, grid: OccupancyGrid
@@ -119,6 +114,7 @@ class Trips:
             )
         except GoalError as error:
             return self._take_in_refusal(target, error.message, ticket=ticket, grid=grid)
+        self.n_seen += self.current is not None
         self.current = Trip(target, drive.goal_id)
         self.n_begun += 1
         return TripState.UNDER_WAY
@@ -135,17 +131,20 @@ class Trips:
         if trip is None:
             return TripState.INTERRUPTED
         report = await self._site.drives.wait(trip.goal_id, wait_s=wait_s, on_progress=_tell_nobody)
-        self.note_pose(report.pose)
         await on_trip(report)
         return self._take_in(trip, report, grid)
 
-    async def give_up(self) -> None:
-        """Brings the robot to a stand, where it is on a trip."""
+    async def give_up(self, *, is_seen: bool = False) -> None:
+        """Bring the robot to a stand, where it is on a trip.
+
+        Args:
+            is_seen: What the trip was for has been seen from afar.
+        """
         trip, self.current = self.current, None
         if trip is not None:
+            self.n_seen += is_seen
             with anyio.CancelScope(shield=True):
-                report = await self._site.drives.cancel(trip.goal_id)
-                self.note_pose(report.pose)
+                await self._site.drives.cancel(trip.goal_id)
 
     def _take_in(self, trip: Trip, report: DriveReport, grid: OccupancyGrid) -> TripState:
         status = report.status
@@ -154,11 +153,13 @@ class Trips:
         self.current = None
         self.why_ended = status.reason
         if status.state is GoalState.ARRIVED:
+            self.n_arrived += 1
             self.blocked.forget(trip.target.pose.point)
             return TripState.ARRIVED
         if status.state in (GoalState.CANCELLED, GoalState.PREEMPTED):
             self.why_ended = status.reason or f"{trip.goal_id} was {status.state}."
             return TripState.INTERRUPTED
+        self.n_blocked += 1
         self.why_ended = status.reason or f"The drive ended as {status.state}."
         self._remember_blocked(trip.target, report.pose, grid)
         return TripState.BLOCKED

@@ -7,6 +7,7 @@ from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.choosing import CheckedGoal, check_place
+from mapspeak.navigation.goals import say_refusal
 from mapspeak.navigation.naming import AmbiguousPlaceError, Place
 from mapspeak.navigation.places import find_place
 from mapspeak.navigation.relations import Nearest, find_all_near, parse_relation
@@ -48,7 +49,7 @@ def find_candidates(atlas: Atlas, words: str) -> tuple[Candidate, ...]:
     good = [goal for goal in goals if goal.check.is_ok]
     if not good:
         raise GoalError(
-            f"{goals[0].name}: {goals[0].check.sentence}",
+            say_refusal(goals[0].name, goals[0].check),
             hint="Leave this stop out, or call check_goal to find a pose near it that works.",
         )
     unique = {(goal.pose.x, goal.pose.y): _candidate_of(goal) for goal in reversed(good)}

@@ -19,7 +19,7 @@ from mapspeak.navigation.goals import GoalCheck, check_goal
 from mapspeak.navigation.routes.candidates import Candidate
 from mapspeak.navigation.routes.planning import RoutePlan, plan_route
 from mapspeak.navigation.standing import arrival_pose
-from mapspeak.robot import GoalState
+from mapspeak.robot import GoalState, PoseDoubt
 
 __all__ = ["RouteBook", "RouteProgress", "RouteState", "Stop", "StopState", "WhenBlocked"]
 
@@ -80,6 +80,7 @@ class RouteProgress:
         plan: The route as planned.
         stops: All of them.
         pose: Where the robot is.
+        pose_doubt: Why it may be elsewhere.
         left_m: Of the path to the stop under way; None where none is.
         sentence: Why the call ended so.
     """
@@ -88,6 +89,7 @@ class RouteProgress:
     plan: RoutePlan
     stops: tuple[Stop, ...]
     pose: Pose
+    pose_doubt: PoseDoubt | None
     sentence: str
     left_m: float | None = None
 
@@ -258,12 +260,17 @@ class RouteBook:
         self, state: RouteState, sentence: str, report: DriveReport | None = None
     ) -> RouteProgress:
         assert self._plan is not None  # noqa: S101 - only a route that was begun is told of
-        pose = report.pose if report else (await self._site.robot.fetch_pose()).pose
+        if report is not None:
+            pose, doubt = report.pose, report.pose_doubt
+        else:
+            here = await self._site.robot.fetch_pose()
+            pose, doubt = here.pose, here.find_doubt(self._site.robot.now_s)
         return RouteProgress(
             state=state,
             plan=self._plan,
             stops=tuple(self._stops),
             pose=pose,
+            pose_doubt=doubt,
             sentence=sentence,
             left_m=None if report is None else report.status.distance_left_m,
         )

@@ -202,7 +202,6 @@ class Searcher:
         """Drives on for a moment; gives how the call ends, None where it goes on."""
         with self._site.drives.preparing() as ticket:
             atlas = await self._site.fetch_atlas()
-            self._trips.note_pose(atlas.robot)
             if (told := self._what_is_spent(budget)) is not None:
                 await self._trips.give_up()
                 return SearchState.BUDGET_SPENT, told
@@ -333,7 +332,6 @@ class Searcher:
     async def _end(self, state: SearchState, sentence: str) -> Standing:
         self._state = state
         atlas = await self._site.fetch_atlas()
-        self._trips.note_pose(atlas.robot)
         return await self._site.compute(lambda: self._report(atlas, sentence))
 
     def _report(self, atlas: Atlas, sentence: str) -> Standing:
@@ -355,6 +353,7 @@ class Searcher:
             seen_ratio=int(np.count_nonzero(seen)) / n_free,
             blocked=tuple(self._trips.blocked),
             pose=atlas.robot,
+            pose_doubt=atlas.pose_doubt,
         )
 
 

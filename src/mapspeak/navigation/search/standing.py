@@ -10,6 +10,7 @@ from mapspeak.geometry import Pose
 from mapspeak.navigation.atlas import Atlas
 from mapspeak.navigation.exploration import BlockedPlace
 from mapspeak.navigation.search.candidates import Candidate
+from mapspeak.robot import PoseDoubt
 
 __all__ = ["SearchState", "SeenRegion", "Standing", "find_seen_regions"]
 
@@ -67,6 +68,7 @@ class Standing:
         seen_ratio: Of all free floor that is known.
         blocked: Places that the robot could not get to.
         pose: Where the robot is.
+        pose_doubt: Why it may be elsewhere.
     """
 
     state: SearchState
@@ -82,6 +84,7 @@ class Standing:
     seen_ratio: float
     blocked: tuple[BlockedPlace, ...]
     pose: Pose
+    pose_doubt: PoseDoubt | None
 
 
 def find_seen_regions(atlas: Atlas, seen: NDArray[np.bool_]) -> tuple[SeenRegion, ...]:

@@ -129,7 +129,7 @@ def _stranger(name: str, message: MessageType, path: str) -> LinkError:
     meant = f" Did you mean {_join(path, near[0])}?" if near else ""
     return LinkError(
         f"{message.name} has no field {_join(path, name)[:MOST_SHOWN]!r}.{meant}",
-        hint=f"Its fields are {say_fields(message)}.",
+        hint=say_fields(message),
     )
 
 
@@ -137,7 +137,7 @@ def _misfit(path: str, wanted: str, value: object, kind: MessageType | None = No
     shown = repr(value)
     if len(shown) > MOST_SHOWN:
         shown = f"{shown[: MOST_SHOWN - 3]}..."
-    hint = f"Its fields are {say_fields(kind)}." if kind else "Correct that field and send again."
+    hint = say_fields(kind) if kind else "Correct that field and send again."
     return LinkError(f"{path} wants {wanted}, not {shown}.", hint=hint)
 
 

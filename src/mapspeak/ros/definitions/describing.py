@@ -16,8 +16,9 @@ def describe_type(book: TypeBook, name: str) -> list[str]:
 
 
 def say_fields(message: MessageType) -> str:
-    """Gives a type's own fields on one line: "x: float64, y: float64"."""
-    return ", ".join(map(_say_field, message.fields)) or "no fields"
+    """Gives a type's own fields in a sentence: "Its fields are x: float64, y: float64."."""
+    fields = ", ".join(map(_say_field, message.fields))
+    return f"Its fields are {fields}." if fields else "It has no fields."
 
 
 class _Describer:
@@ -42,7 +43,7 @@ class _Describer:
             return [f"{head} (not described)"]
         inner = self._book[field.type]
         if _is_short(inner):
-            return [f"{head} {{{say_fields(inner)}}}"]
+            return [f"{head} {{{', '.join(map(_say_field, inner.fields))}}}"]
         if field.type in self._told or depth > MOST_NESTED:
             return [f"{head} (as above)"]
         self._told.add(field.type)

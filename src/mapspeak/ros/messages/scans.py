@@ -20,6 +20,7 @@ from mapspeak.ros.messages.fields import (
 
 LARGEST_SIDE_PX = 65535
 MOST_BEAMS = 1_000_000
+FLOAT32_STEP = float(np.finfo(np.float32).eps)
 SAYING_NOTHING: dict[str, Any] = {
     "header": {"frame_id": "(not said)", "stamp": {"sec": 0, "nanosec": 0}},
     "angle_min": 0.0,
@@ -92,7 +93,8 @@ class CameraInfo:
 def read_scan(message: Message) -> LaserScan:
     """Reads sensor_msgs/LaserScan; ranges outside its own limits become NaN.
 
-    A beam that met nothing is infinite or beyond the limit (REP 117). Zero, NaN and what is too
+    A beam that met nothing is infinite (REP 117), or at its limit or beyond, as Stage and some
+    drivers of ROS 1 write it, and as AMCL reads it. Zero, NaN and what is too
     near say nothing: drivers write them for dark things, glass, and the robot's own posts.
 
     Raises:
@@ -103,7 +105,8 @@ def read_scan(message: Message) -> LaserScan:
     if ranges_m.size > MOST_BEAMS:
         raise misfit("ranges", f"{ranges_m.size} long", f"at most {MOST_BEAMS} beams")
     least_m, largest_m = number_of(message, "range_min"), number_of(message, "range_max")
-    is_valid = (ranges_m >= least_m) & (ranges_m <= largest_m)
+    met_nothing = ranges_m >= largest_m * (1.0 - FLOAT32_STEP)
+    is_valid = (ranges_m >= least_m) & ~met_nothing
     return LaserScan(
         ranges_m=np.where(is_valid, ranges_m, np.nan),
         first_angle_rad=number_of(message, "angle_min"),
@@ -112,7 +115,7 @@ def read_scan(message: Message) -> LaserScan:
         largest_range_m=largest_m,
         frame_id=frame_id,
         stamp_s=stamp_s,
-        met_nothing=ranges_m > largest_m,
+        met_nothing=met_nothing,
     )
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from mapspeak.errors import MapError
 from mapspeak.server.mapview.views import MapView
+from mapspeak.server.wording import say_warnings
 from mapspeak.spatial import FREE_MAX, UNKNOWN, OccupancyGrid
 from mapspeak.spatial.picture import Zoom
 
@@ -52,7 +53,7 @@ def _say_meaning(view: MapView, grid: OccupancyGrid, n_side: int) -> str:
             "most are unknown: narrow gaps may look closed; around and radius_m show fewer cells "
             "more finely."
         )
-    parts += (f"Warning: {warning}" for warning in view.atlas.warnings)
+    parts += say_warnings(view.atlas)
     return " ".join(parts)
 
 

@@ -13,7 +13,7 @@ from mapspeak.server.mapview.drawing import draw_atlas
 from mapspeak.server.mapview.rawgrid import describe_raw_grid
 from mapspeak.server.mapview.tables import describe_atlas
 from mapspeak.server.mapview.views import MapView
-from mapspeak.server.wording import say_pose
+from mapspeak.server.wording import say_pose, say_warnings
 from mapspeak.spatial.picture import NORTH_UP_RAD, draw_robot_pose
 
 __all__ = ["Representation", "Shown", "show"]
@@ -87,8 +87,7 @@ def _show_raw_grid(view: MapView) -> Shown:
 
 def _say_robot(view: MapView) -> str:
     """Gives what a picture alone cannot be relied upon to say: where the robot is."""
-    warnings = (f"Warning: {warning}" for warning in view.atlas.warnings)
-    return "\n".join([*warnings, f"Robot: {say_pose(view.atlas.robot)}."])
+    return "\n".join([*say_warnings(view.atlas), f"Robot: {say_pose(view.atlas.robot)}."])
 
 
 _WAYS: dict[Representation, Callable[[MapView], Shown]] = {

@@ -16,6 +16,7 @@ from mapspeak.server.wording import (
     say_path,
     say_point,
     say_pose,
+    say_warnings,
     shorten,
 )
 from mapspeak.spatial.frontiers import Frontier
@@ -51,7 +52,7 @@ def _summary(atlas: Atlas, look: MapLook) -> str:
     low, high = grid.bounds()
     extent = f"x {low.x:.1f} to {high.x:.1f}, y {low.y:.1f} to {high.y:.1f}"
     lines = [
-        *(f"Warning: {warning}" for warning in atlas.warnings),
+        *say_warnings(atlas),
         f"Robot: {say_pose(robot)}, in {room_id}, {2 * atlas.radius_m:.2f} m wide.",
         f"Map: {extent}, {grid.resolution_m:g} m per cell. {AXES} {MEANINGS}",
         f"Explored: {free_m2:.1f} m2 of free floor. {atlas.frontiers.sentence}",

@@ -6,15 +6,13 @@ from mcp.server.mcpserver import Context
 from pydantic import Field
 
 from mapspeak.errors import LinkError
-from mapspeak.server.callers import client_of, tell_progress
+from mapspeak.server.callers import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S, client_of, tell_progress
 from mapspeak.server.reports import DriveAnswer
 from mapspeak.server.toolset import Effect, Tool
-from mapspeak.server.wording import say_pose
+from mapspeak.server.wording import say_pose, say_pose_doubt
 from mapspeak.session import Session
 
 __all__ = ["DriveTools"]
-
-LONGEST_WAIT_S = 25.0
 
 Place = Annotated[
     str | None,
@@ -32,7 +30,9 @@ Degrees = Annotated[
     ),
 ]
 Wait = Annotated[
-    float, Field(description="seconds to wait for the end of the drive", ge=0, le=LONGEST_WAIT_S)
+    float,
+    Field(description="seconds to wait for the end of the drive", ge=0, le=LONGEST_WAIT_S),
+    AT_MOST_LONGEST_WAIT,
 ]
 GoalId = Annotated[str | None, Field(description="such as G1; the latest when left out")]
 
@@ -107,10 +107,14 @@ class DriveTools:
         Use stop_robot instead when anything is urgent.
         """
         report = await self._session.drives.cancel(goal_id)
-        return (
-            f"{report.drive.goal_id} to {report.drive.place}: {report.status.state}. "
-            f"The robot is at {say_pose(report.pose)}."
-        )
+        lines = [
+            f"{report.drive.goal_id} to {report.drive.place}: {report.status.state}.",
+            f"The robot is at {say_pose(report.pose)}.",
+            say_pose_doubt(report.pose_doubt, report.pose_age_s, report.silence),
+        ]
+        if not report.status.state.is_final:
+            lines.append("NOT CANCELLED: navigation goes on with it. Call stop_robot.")
+        return " ".join(filter(None, lines))
 
     async def stop_robot(self) -> str:
         """Stops the robot at once and ends every drive.
@@ -126,7 +130,7 @@ class DriveTools:
                 hint=f"The robot may still move: press its own stop button. {error.hint}",
             ) from error
         told = "" if ended is None else f" {ended.goal_id} was ended."
-        return f"The robot was told to stop, whoever had sent it.{told}"
+        return f"The robot was told to stop, and to give up every goal, whoever sent it.{told}"
 
     async def _wait(self, context: Context, goal_id: str | None, wait_s: float) -> DriveAnswer:
         report = await self._session.drives.wait(

@@ -22,7 +22,7 @@ from mapspeak.navigation.safety import Errand, on_errand
 from mapspeak.navigation.search import Budget, Judgement, Searcher, leave_out_shown
 from mapspeak.robot import CameraPicture, GoalState
 from mapspeak.semantic import TakenPicture
-from mapspeak.server.callers import client_of, tell_progress
+from mapspeak.server.callers import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S, client_of, tell_progress
 from mapspeak.server.explorereports import ExploreAnswer, SearchAnswer
 from mapspeak.server.reports import DriveAnswer, Report
 from mapspeak.server.sightings import Sighting, look_ahead
@@ -32,7 +32,6 @@ from mapspeak.session import Session
 
 __all__ = ["ExploreTools"]
 
-LONGEST_WAIT_S = 25.0
 LEAST_TURN_S = 0.5
 MOST_PICTURES = 12
 OVERLAP_RATIO = 1.1
@@ -61,6 +60,7 @@ StopsAtGoals = Annotated[
 Wait = Annotated[
     float,
     Field(description="seconds until it answers, still driving", ge=1, le=LONGEST_WAIT_S),
+    AT_MOST_LONGEST_WAIT,
 ]
 TurnBy = Annotated[
     float | None,

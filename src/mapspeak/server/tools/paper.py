@@ -11,6 +11,7 @@ from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.navigation.goals import FARTHEST_M
 from mapspeak.navigation.places import is_taken_name
 from mapspeak.navigation.recall import find_speaking_places
+from mapspeak.robot import PoseDoubt
 from mapspeak.semantic import TakenPicture, Waypoint, WriteReceipt
 from mapspeak.server.mapview.captions import say_axes, say_plain
 from mapspeak.server.memory.annotating import Annotator, Landmarks
@@ -18,7 +19,7 @@ from mapspeak.server.memory.lasers import fetch_ring
 from mapspeak.server.memory.remembering import say_far
 from mapspeak.server.reports import MemoryAnswer, WriteAnswer
 from mapspeak.server.toolset import Effect, Tool
-from mapspeak.server.wording import say_pose
+from mapspeak.server.wording import say_pose, say_pose_doubt
 from mapspeak.session import Session
 from mapspeak.spatial.picture import (
     draw_map_axis,
@@ -114,9 +115,11 @@ class PaperTools:
         Use it after draw_map_axis, or alone.
         """
         grid = await self._session.robot.fetch_map()
-        pose = (await self._session.robot.fetch_pose()).pose
-        picture = await self._session.compute(lambda: draw_robot_pose(grid, pose))
-        text = f"{say_axes(grid, picture)} Robot: {say_pose(pose)}."
+        here, doubt = await self._find_robot()
+        picture = await self._session.compute(lambda: draw_robot_pose(grid, here))
+        text = (
+            f"{say_axes(grid, picture)} Robot: {say_pose(here)}. {say_pose_doubt(doubt)}".rstrip()
+        )
         return [text, Image(data=picture.png, format="png")]
 
     async def write_semantic_data(
@@ -139,7 +142,7 @@ class PaperTools:
         _check_name(name)
         annotator = Annotator(pictures=self._session.pictures)
         origin = annotator.find_origin(safety_landmarks, functional_landmarks)
-        here = (await self._session.robot.fetch_pose()).pose
+        here, doubt = await self._find_robot()
         pose = _observation_pose(here if origin is None else origin.pose, x, y, yaw_deg)
         if x is not None:
             await self._require_on_map(pose)
@@ -163,12 +166,11 @@ class PaperTools:
             lambda: self._session.memory.remember(waypoint, gone=gone or ())
         )
         kept = await self._session.compute(lambda: self._session.diary.keep_record(waypoint))
-        far = await self._say_far(receipt)
-        warnings = filter(None, (*far, kept.fault, await self._session.keep_map()))
+        unsure = say_pose_doubt(doubt) if pose.point == here.point else ""
+        far, moved = await self._say_far(receipt), await self._session.keep_map()
         places = await self._session.compute(self._session.memory.read)
-        return WriteAnswer.of(
-            receipt, places, merge=merge, refused=annotator.refused, warnings=tuple(warnings)
-        )
+        told, refused = filter(None, (*far, unsure, kept.fault, moved)), annotator.refused
+        return WriteAnswer.of(receipt, places, merge=merge, refused=refused, warnings=(*told,))
 
     async def get_semantic_data(
         self, name: WaypointName = None, query: Query = None
@@ -187,6 +189,10 @@ class PaperTools:
         atlas = await self._session.fetch_atlas()
         shown, answer = await self._session.compute(lambda: find_speaking_places(atlas, query))
         return MemoryAnswer.of_places(atlas.memory, shown, advice=[answer.advice])
+
+    async def _find_robot(self) -> tuple[Pose, PoseDoubt | None]:
+        here = await self._session.robot.fetch_pose()
+        return here.pose, here.find_doubt(self._session.robot.now_s)
 
     async def _add_laser(
         self,

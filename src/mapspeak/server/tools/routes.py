@@ -9,7 +9,7 @@ from pydantic import Field
 
 from mapspeak.navigation.routes import RouteBook, RouteState, WhenBlocked
 from mapspeak.navigation.safety import Errand, on_errand
-from mapspeak.server.callers import client_of, tell_progress
+from mapspeak.server.callers import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S, client_of, tell_progress
 from mapspeak.server.routereports import RouteAnswer
 from mapspeak.server.sightings import Sighting, look_ahead
 from mapspeak.server.toolset import Effect, Tool
@@ -18,7 +18,6 @@ from mapspeak.session import Session
 
 __all__ = ["RouteTools"]
 
-LONGEST_WAIT_S = 25.0
 MOST_STOPS = 20
 ERRAND_S = 1800.0
 """A person's word for a route is good for so much robot time."""
@@ -36,7 +35,9 @@ Blocked = Annotated[
     WhenBlocked, Field(description="a stop that cannot be reached: wait for you, or skip it")
 ]
 Wait = Annotated[
-    float, Field(description="seconds until it answers, still driving", ge=0, le=LONGEST_WAIT_S)
+    float,
+    Field(description="seconds until it answers, still driving", ge=0, le=LONGEST_WAIT_S),
+    AT_MOST_LONGEST_WAIT,
 ]
 
 

@@ -19,7 +19,9 @@ from mapspeak.ros.definitions import (
 )
 from mapspeak.ros.messages import Dialect, bare_type
 
-__all__ = ["Interfaces"]
+__all__ = ["ROS2_DISTRIBUTION", "Interfaces"]
+
+ROS2_DISTRIBUTION = "jazzy"
 
 KIND_OF_GENERATED = {
     **dict.fromkeys(("Request", "Response"), "srv"),
@@ -40,7 +42,7 @@ class Interfaces:
 
     def __init__(self, dialect: Dialect, *, more: Mapping[str, str] = NO_MORE) -> None:
         self._dialect = dialect
-        self._book = TypeBook({**known_definitions(dialect), **more})
+        self._book = TypeBook({**known_definitions(dialect, distro=ROS2_DISTRIBUTION), **more})
         self._fixed_arrays: dict[str, bool] = {}
 
     @property

@@ -9,6 +9,7 @@ from typing import Any
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge.server.graph import ROSAPI_NODE
 from mapspeak.links.rosbridge.server.hub import ROSBRIDGE_NODE, Topic
+from mapspeak.links.rosbridge.server.interfaces import ROS2_DISTRIBUTION
 from mapspeak.links.rosbridge.server.parameters import Parameters
 from mapspeak.links.rosbridge.server.services import Service
 from mapspeak.links.rosbridge.server.system import RosSystem
@@ -18,7 +19,6 @@ __all__ = ["add_rosapi"]
 
 Values = dict[str, Any]
 Answer = Callable[[Values], Values]
-ROS2_DISTRIBUTION = "jazzy"
 HIDDEN = "/_action/"
 
 

@@ -36,6 +36,16 @@ class Nodes:
     others: tuple[str, ...]
     ours: str | None
 
+    @property
+    def is_empty(self) -> bool:
+        """True when nobody is there, not even we."""
+        return not self.others and self.ours is None
+
+    @property
+    def is_ours_alone(self) -> bool:
+        """True when only we are there."""
+        return not self.others and self.ours is not None
+
     def say(self) -> str:
         """Names them, with a mark on ours."""
         ours = () if self.ours is None else (self.ours,)

@@ -91,6 +91,11 @@ class RosInquiry:
             raise LinkError(NO_ROS, hint=_say_how_to_get_ros())
         return connection
 
+    @property
+    def now_s(self) -> float:
+        """Robot time."""
+        return self._session.robot.now_s
+
     async def fetch_graph(self) -> RosGraph:
         """Gives the topics and actions there are, as they were a second ago at most."""
         if self._graph is None or anyio.current_time() > self._asked_s + KEPT_S:
@@ -203,16 +208,26 @@ class RosInquiry:
             texts = self._taught
         parts = _find_parts(texts, bare)
         if not parts:
-            # What mapspeak knows may still be missing in the ROS that this connection uses.
-            near = [each for each in await self._find_types(type_name) if bare_type(each) != bare]
-            meant = f" The nearest that are known: {', '.join(near)}." if near else ""
-            raise LinkError(
-                f"Nobody knows what a {type_name} looks like: the robot does not describe it, and "
-                f"it is none of the types that come with mapspeak.{meant}",
-                hint="Give its definition to ros_type, as `ros2 interface show` (ROS 1: `rosmsg "
-                "show -r`, `rossrv show -r`) prints it on the robot, with --- between the parts.",
-            )
+            raise await self._unknown_type(type_name)
         return Described(type=bare, parts=parts, book=TypeBook({**self._taught, **texts}))
+
+    async def _unknown_type(self, type_name: str) -> LinkError:
+        graph = self._graph or await self.fetch_graph()
+        package = bare_type(type_name).partition("/")[0]
+        if bare_type(type_name) in kinds_of(known_definitions(graph.dialect)):
+            # Only rclpy says nothing of what mapspeak could describe: it could not send it.
+            return LinkError(
+                f"Unknown type {type_name}: the ROS on this machine does not have it.",
+                hint=f"Install it: `sudo apt install ros-$ROS_DISTRO-{package.replace('_', '-')}`, "
+                "or source the workspace that has it, and start mapspeak again.",
+            )
+        near = await self._find_types(type_name)
+        meant = f" The nearest that are known: {', '.join(near)}." if near else ""
+        return LinkError(
+            f"Unknown type {type_name}: neither the robot nor mapspeak describes it.{meant}",
+            hint="Give its definition to ros_type, as `ros2 interface show` (ROS 1: `rosmsg "
+            "show -r`, `rossrv show -r`) prints it on the robot, with --- between the parts.",
+        )
 
     async def teach(self, type_name: str, definition: str) -> None:
         """Keeps the definition of a type that nobody else knows, while the session lasts.

@@ -23,6 +23,7 @@ __all__ = ["NodeTools"]
 MOST_DESCRIBED = 5
 MOST_AT_ONCE = 8
 MOST_NAMED = 40
+CLOCK = "/clock"
 DESCRIBE = "rcl_interfaces/srv/DescribeParameters"
 KINDS = (
     "not set", "bool", "integer", "double", "string",
@@ -36,6 +37,9 @@ NOTABLE = {
     "scans and clouds": ("sensor_msgs/LaserScan", "sensor_msgs/PointCloud2"),
     "pictures": ("sensor_msgs/Image", "sensor_msgs/CompressedImage"),
 }
+
+READ_AT_START = "A node of ROS 1 that runs may notice only when it is started again."
+PLAIN = {bool: "true or false", int: "a number", float: "a number", str: "a text"}
 
 Node = Annotated[str, Field(description="full name, such as /bt_navigator", max_length=200)]
 ParameterNode = Annotated[
@@ -71,7 +75,7 @@ class NodeTools:
         graph = await self._inquiry.fetch_graph()
         connection = self._inquiry.connection
         nodes, services = await connection.fetch_nodes(), await connection.fetch_services()
-        actions, time_s = await self._inquiry.fetch_actions(), await connection.fetch_time_s()
+        actions, time_s = await self._inquiry.fetch_actions(), await self._fetch_time_s(graph)
         number = "1" if graph.dialect is Dialect.ROS1 else "2"
         lines = [
             f"ROS {number} {graph.distro}".rstrip()
@@ -81,6 +85,12 @@ class NodeTools:
             f"actions: {list_some(actions, most=MOST_NAMED) or 'none'}",
         ]
         return cut("\n".join(lines))
+
+    async def _fetch_time_s(self, graph: RosGraph) -> float | None:
+        """Gives robot time: that of /clock where there is one, for all nodes go by it then."""
+        if CLOCK in graph.types:
+            return self._inquiry.now_s
+        return await self._inquiry.connection.fetch_time_s()
 
     async def ros_nodes(self, filter: Filter = None, page: Page = 1) -> str:  # noqa: A002
         """Lists the robot's ROS nodes.
@@ -148,30 +158,40 @@ class NodeTools:
             await self._delete(name, parameter)
             return f"{parameter} of {name} is deleted."
         connection = self._inquiry.connection
+        is_ros1 = await self._inquiry.fetch_dialect() is Dialect.ROS1
         before = await connection.fetch_parameter(name, parameter)
+        notes: list[str] = []
         if before is None and name != "/":
-            await self._check_parameter(name, parameter)
+            notes = await self._say_missing(name, parameter, is_made=is_ros1)
+        if is_ros1:
+            value = keep_kind(before, value, name=f"{parameter} of {name}")
+            notes.append(READ_AT_START)
         await self._commands.set_parameter(name, parameter, value)
         after = await connection.fetch_parameter(name, parameter)
-        return f"{parameter} of {name} was {show_value(before)}, is {show_value(after)} now."
+        said = f"{parameter} of {name} was {show_value(before)}, is {show_value(after)} now."
+        return " ".join([said, *notes])
 
-    async def _check_parameter(self, node: str, parameter: str) -> None:
-        """Returns when there is such a parameter: ROS 1 takes any name, and nobody ever reads it.
+    async def _say_missing(self, node: str, parameter: str, *, is_made: bool) -> list[str]:
+        """Says of a parameter that is not set whether it is new, and which are like it.
 
         Raises:
-            LinkError: There is none; names those most like it.
+            LinkError: There is no such node, or it has no such parameter and makes none.
         """
         connection = self._inquiry.connection
         known = await connection.fetch_parameter_names(node)
         if parameter in known:
-            return
+            return []
         nodes = await connection.fetch_nodes()
         if not known and node not in nodes:
             raise self._inquiry.stranger("node", node, nodes)
-        near = find_nearest(parameter, known) or list(known[:5])
+        near = find_nearest(parameter, known)
+        if is_made:
+            like = f": the nearest that it had is {near[0]}" if near else ""
+            return [f"It is new{like}."]
+        shown = near or list(known[:5])
         raise LinkError(
             f"{node} has no parameter {parameter[:80]!r}.",
-            hint=f"It has {len(known)}, such as {', '.join(near)}." if near else "It has none.",
+            hint=f"It has {len(known)}, such as {', '.join(shown)}." if shown else "It has none.",
         )
 
     async def _delete(self, node: str, parameter: str) -> None:
@@ -220,6 +240,23 @@ class NodeTools:
         entries = answer.get("descriptors")
         described = [each for each in entries or [] if isinstance(each, Mapping)]
         return {str(each.get("name")): _say_descriptor(each) for each in described}
+
+
+def keep_kind(before: object, value: object, *, name: str) -> object:
+    """Gives a new value of the kind that the old one has, which ROS 1 itself would not keep.
+
+    Raises:
+        LinkError: It is of another kind.
+    """
+    if before is None:
+        return value
+    kinds = [PLAIN.get(type(each), "a list or a table") for each in (before, value)]
+    if kinds[0] != kinds[1]:
+        raise LinkError(
+            f"{name} is {kinds[0]} ({show_value(before)}), not {kinds[1]}.",
+            hint="Give a value of that kind; to change the kind, delete it first with null.",
+        )
+    return float(value) if type(before) is float and type(value) is int else value
 
 
 def _node_name(node: str) -> str:

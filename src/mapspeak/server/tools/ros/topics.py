@@ -298,11 +298,14 @@ def _say_heard(heard: Heard, duration_s: float) -> str:
 def _say_loose_ends(census: Census, topics: Sequence[str]) -> list[str]:
     """Names the topics with an end where nobody is, and the nodes that did not tell."""
     unsaid = [topic for topic in topics if not census.publishers_of(topic).others]
-    unheard = [topic for topic in topics if not census.hearers_of(topic).others]
+    unheard = [topic for topic in topics if census.hearers_of(topic).is_empty]
+    ours = [topic for topic in topics if census.hearers_of(topic).is_ours_alone]
     lines = [
         f"published by nobody: {list_some(unsaid, most=MOST_NAMED) or 'none'}",
         f"heard by nobody: {list_some(unheard, most=MOST_NAMED) or 'none'}",
     ]
+    if ours:
+        lines.append(f"heard by mapspeak alone: {list_some(ours, most=MOST_NAMED)}")
     if census.mute:
         lines.append(f"not counted, they did not answer: {list_some(census.mute, most=MOST_NAMED)}")
     return lines

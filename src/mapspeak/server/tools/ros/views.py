@@ -127,7 +127,7 @@ def _view_scan(message: Message) -> View:
 
 def _say_beams(scan: LaserScan, faults: Container[str]) -> str:
     """Gives how many beams there are and where they point, as far as that is said rightly."""
-    head = f"Laser scan in frame {scan.frame_id}: {scan.ranges_m.size} beams"
+    head = f"Laser scan {_say_frame(scan.frame_id)}: {scan.ranges_m.size} beams"
     head += f", {int(np.isfinite(scan.ranges_m).sum())} met something"
     if not any(name in faults for name in RANGE_LIMITS):
         head += f" between {scan.least_range_m:g} and {scan.largest_range_m:g} m"
@@ -165,8 +165,8 @@ def _nearest(ranges_m: NDArray[np.float64], bearings: NDArray[np.float64], at_ra
 def _view_cloud(message: Message) -> View:
     cloud = read_cloud(message)
     head = (
-        f"Point cloud in frame {cloud.frame_id}: {cloud.n_points:,} points, {len(cloud.points):,} "
-        f"of them finite; fields {', '.join(cloud.fields)}."
+        f"Point cloud {_say_frame(cloud.frame_id)}: {cloud.n_points:,} points, "
+        f"{len(cloud.points):,} of them finite; fields {', '.join(cloud.fields)}."
     )
     if not len(cloud.points):
         return View(head)
@@ -184,15 +184,19 @@ def _view_path(message: Message) -> View:
     poses = message.get("poses")
     read = [read_pose_stamped(pose).pose for pose in (poses if isinstance(poses, list) else [])]
     if not read:
-        return View(f"Path in frame {frame}: no poses.")
+        return View(f"Path {_say_frame(frame)}: no poses.")
     length_m = sum(a.point.distance_to(b.point) for a, b in pairwise(read))
     corner = Point(max(pose.x for pose in read), max(pose.y for pose in read))
     least = Point(min(pose.x for pose in read), min(pose.y for pose in read))
     return View(
-        f"Path in frame {frame}: {len(read)} poses, {length_m:.2f} m long, from "
+        f"Path {_say_frame(frame)}: {len(read)} poses, {length_m:.2f} m long, from "
         f"({say_pose(read[0])}) to ({say_pose(read[-1])}), within ({say_point(least)}) and "
         f"({say_point(corner)})."
     )
+
+
+def _say_frame(frame: str) -> str:
+    return f"in frame {frame}" if frame else "without a frame"
 
 
 def _view_transforms(message: Message) -> View:
