@@ -51,10 +51,18 @@ async def _examine(choice: RobotChoice) -> "list[Finding]":
         describe_profile,
     )
     from mapspeak.navigation.checkup import examine  # noqa: PLC0415
+    from mapspeak.ros import LinkKind  # noqa: PLC0415
 
     async with open_robot(choice) as robot:
-        lines = describe_profile(robot.profile) if isinstance(robot, RosRobot) else ()
-        return [*lines, *await examine(robot)]
+        if not isinstance(robot, RosRobot):
+            return [*await examine(robot)]
+        await robot.settle()
+        found = await examine(robot)
+        link = robot.connection.link
+        is_second_choice = choice.robot.startswith("ros2") and link.kind is LinkKind.DDS
+        reason = "because this Python has no rclpy" if is_second_choice else ""
+        lines = describe_profile(robot.profile, link, reason=reason, map_age_s=robot.map_age_s)
+        return [*lines, *found]
 
 
 def _show(findings: "Sequence[Finding]") -> None:

@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Awaitable, Callable
+from functools import partial
 
 import numpy as np
 
-from mapspeak.errors import LinkError, MapError
+from mapspeak.errors import LinkError, MapError, MapspeakError
 from mapspeak.robot import Finding, Health, RangeScan, Robot
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import clearance_m
@@ -22,16 +23,23 @@ LEAST_ON_MAP_RATIO = 0.5
 
 async def examine(robot: Robot) -> tuple[Finding, ...]:
     """Asks a robot for its map, its pose and a picture, and judges what comes."""
-    found = [await _ask("map", lambda: _look_at_map(robot))]
+    # A map that does not come is waited for once.
+    grid: OccupancyGrid | None = None
+    try:
+        grid = await robot.fetch_map()
+    except (LinkError, MapError) as error:
+        found = [_missing("map", error)]
+    else:
+        found = [_judge_map(grid)]
     found.append(await _ask("pose", lambda: _look_at_pose(robot)))
-    if found[0].health is not Health.MISSING and found[1].health is not Health.MISSING:
-        found.append(await _ask("place", lambda: _look_at_place(robot)))
+    if grid is not None and found[1].health is not Health.MISSING:
+        found.append(await _ask("place", partial(_look_at_place, robot, grid)))
     if goals := await robot.fetch_foreign_goals():
         found.append(_busy(len(goals)))
     if robot.description.has_camera:
         found.append(await _ask("picture", lambda: _look_at_picture(robot)))
     if robot.description.has_laser:
-        found.append(await _ask("laser", lambda: _look_at_laser(robot)))
+        found.append(await _ask("laser", lambda: _look_at_laser(robot, grid)))
     return tuple(found)
 
 
@@ -48,11 +56,18 @@ async def _ask(what: str, look: Callable[[], Awaitable[Finding]]) -> Finding:
     try:
         return await look()
     except (LinkError, MapError) as error:
-        return Finding(what=what, health=Health.MISSING, said=error.message, hint=error.hint)
+        return _missing(what, error)
 
 
-async def _look_at_map(robot: Robot) -> Finding:
-    grid = await robot.fetch_map()
+def _missing(what: str, error: MapspeakError) -> Finding:
+    return Finding(what=what, health=Health.MISSING, said=error.message, hint=error.hint)
+
+
+def _say_age(robot: Robot, stamp_s: float) -> str:
+    return f"{max(robot.now_s - stamp_s, 0.0):.1f} s old"
+
+
+def _judge_map(grid: OccupancyGrid) -> Finding:
     free_m2 = float(grid.free.sum()) * grid.resolution_m**2
     size = f"{grid.width_m:.1f} x {grid.height_m:.1f} m in cells of {grid.resolution_m:g} m"
     said = f"{size}, {free_m2:.1f} m2 of free floor"
@@ -80,8 +95,7 @@ async def _look_at_pose(robot: Robot) -> Finding:
     )
 
 
-async def _look_at_place(robot: Robot) -> Finding:
-    grid = await robot.fetch_map()
+async def _look_at_place(robot: Robot, grid: OccupancyGrid) -> Finding:
     cell = grid.cell_at((await robot.fetch_pose()).pose.point)
     if not grid.contains(cell):
         return _misplaced("the robot stands off its map")
@@ -114,10 +128,11 @@ async def _look_at_picture(robot: Robot) -> Finding:
     size = f"{picture.width_px} x {picture.height_px} px, {len(picture.data) / 1000:.0f} kB"
     fov_rad = picture.horizontal_fov_rad
     wide = ", angle unknown" if fov_rad is None else f", {math.degrees(fov_rad):.0f} deg wide"
-    return Finding(what="picture", health=Health.FINE, said=f"{picture.media_type}, {size}{wide}")
+    said = f"{picture.media_type}, {size}{wide}, {_say_age(robot, picture.stamp_s)}"
+    return Finding(what="picture", health=Health.FINE, said=said)
 
 
-async def _look_at_laser(robot: Robot) -> Finding:
+async def _look_at_laser(robot: Robot, grid: OccupancyGrid | None) -> Finding:
     scan = await robot.fetch_scan()
     if scan is None:
         return Finding(
@@ -129,7 +144,12 @@ async def _look_at_laser(robot: Robot) -> Finding:
         )
     met = np.isfinite(scan.ranges_m)
     said = f"{np.count_nonzero(met)} of {met.size} beams met something"
-    ratio = _share_on_map(await robot.fetch_map(), scan)
+    age = _say_age(robot, scan.stamp_s)
+    if grid is None:
+        said += f", {age}; there is no map to compare with"
+        return Finding(what="laser", health=Health.FINE, said=said)
+    said += f", {age}"
+    ratio = _share_on_map(grid, scan)
     if ratio is None:
         return Finding(what="laser", health=Health.DOUBTFUL, said=said, hint="Is it covered?")
     said += f", {100 * ratio:.0f} % of that is on the map"

@@ -5,7 +5,7 @@ works with any ROS robot is written against it. Messages are mappings as rosbrid
 """
 
 from mapspeak.ros.definitions import split_definition
-from mapspeak.ros.graph import NodeLinks, OwnEnds, RosGraph
+from mapspeak.ros.graph import LinkKind, LinkName, NodeLinks, OwnEnds, RosGraph
 from mapspeak.ros.names import NAME, TYPE, find_nearest, new_id
 from mapspeak.ros.port import (
     ActionEnd,
@@ -22,6 +22,8 @@ __all__ = [
     "TYPE",
     "ActionEnd",
     "ActionGoal",
+    "LinkKind",
+    "LinkName",
     "Listener",
     "NodeLinks",
     "OwnEnds",

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 from mapspeak.ros.messages import Dialect
 
@@ -40,6 +41,27 @@ class NodeLinks:
     publishes: tuple[str, ...] = ()
     subscribes: tuple[str, ...] = ()
     serves: tuple[str, ...] = ()
+
+
+class LinkKind(StrEnum):
+    """What connects us to a ROS system."""
+
+    ROSBRIDGE = "rosbridge"
+    RCLPY = "rclpy"
+    DDS = "DDS"
+
+
+@dataclass(frozen=True, slots=True)
+class LinkName:
+    """How we are connected.
+
+    Attributes:
+        kind: Through what.
+        place: Where to, without secrets: an address or a domain.
+    """
+
+    kind: LinkKind
+    place: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

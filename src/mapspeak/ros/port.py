@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.graph import NodeLinks, OwnEnds, RosGraph
+from mapspeak.ros.graph import LinkName, NodeLinks, OwnEnds, RosGraph
 from mapspeak.ros.messages import Message
 from mapspeak.ros.started import Started
 
@@ -117,6 +117,11 @@ class RosConnection(Protocol):
     Methods raise `LinkError` when the system cannot be reached or does not answer, and when a
     message, a name or a type is none.
     """
+
+    @property
+    def link(self) -> LinkName:
+        """How we are connected."""
+        ...
 
     @property
     def is_open(self) -> bool:

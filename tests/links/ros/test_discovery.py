@@ -15,6 +15,7 @@ from mapspeak.links.ros.discovery import (
     choose_profile,
     load_robot_file,
 )
+from mapspeak.links.ros.discovery.parts import NAVIGATION
 from mapspeak.ros import RosGraph
 from mapspeak.ros.messages import Dialect
 
@@ -48,10 +49,15 @@ def choose(
     dialect: Dialect = Dialect.ROS2,
     actions: tuple[str, ...] = (),
     frames: frozenset[str] = FRAMES,
+    dead: tuple[str, ...] = (),
+    services: tuple[str, ...] | None = None,
     **said: Any,  # noqa: ANN401 - the keys of robot.yaml
 ) -> RobotProfile:
     graph = RosGraph(dialect=dialect, types=types, actions=actions)
-    return choose_profile(graph, RobotOverrides(**said), frames=frames)
+    listed = None if services is None else frozenset(services)
+    return choose_profile(
+        graph, RobotOverrides(**said), frames=frames, dead=frozenset(dead), services=listed
+    )
 
 
 def test_a_turtlebot_4_is_understood() -> None:
@@ -104,6 +110,70 @@ def test_move_base_is_found_by_its_goal_topic() -> None:
     assert profile.navigation is NavigationKind.MOVE_BASE
     assert profile.navigation_name == "/move_base"
     assert profile.planner_name == "/move_base/make_plan"
+
+
+def test_a_move_base_that_tells_no_status_gives_way_to_a_topic_for_goals() -> None:
+    types = {
+        "/move_base/goal": "move_base_msgs/MoveBaseActionGoal",
+        "/robot/goal": "geometry_msgs/PoseStamped",
+    }
+    dead = choose(types, dialect=Dialect.ROS1, dead=("/move_base/status",))
+    assert dead.navigation is NavigationKind.GOAL_TOPIC
+    alone = choose(types, dialect=Dialect.ROS1, dead=("/move_base/status", "/robot/goal"))
+    assert alone.navigation is NavigationKind.MOVE_BASE
+    assert not NAVIGATION.is_alive(alone)
+
+
+def test_move_bases_planner_is_named_only_where_it_answers() -> None:
+    types = {"/move_base/goal": "move_base_msgs/MoveBaseActionGoal"}
+    for services, found in (((), None), (("/move_base/make_plan",), "/move_base/make_plan")):
+        profile = choose(types, dialect=Dialect.ROS1, services=services)
+        assert profile.planner_name == found
+
+
+def test_a_topic_that_somebody_publishes_comes_before_a_better_name() -> None:
+    types = {"/scan": "sensor_msgs/LaserScan", "/other_scan": "sensor_msgs/LaserScan"}
+    assert choose(types, dead=("/scan",)).scan_topic == "/other_scan"
+    assert choose(types, dead=("/scan", "/other_scan")).scan_topic == "/scan"
+
+
+def test_an_action_that_robot_yaml_names_and_nobody_serves_is_not_alive() -> None:
+    assert not NAVIGATION.is_alive(choose(TURTLEBOT_4, navigation="nav2"))
+    served = choose(TURTLEBOT_4, navigation="nav2", actions=("/navigate_to_pose",))
+    assert NAVIGATION.is_alive(served)
+
+
+def in_namespaces(*robots: str) -> dict[str, str]:
+    return {
+        f"/{robot}{topic}": type_name
+        for robot in robots
+        for topic, type_name in TURTLEBOT_4.items()
+    }
+
+
+def test_the_only_robot_is_found_in_its_namespace() -> None:
+    profile = choose(in_namespaces("robot1"))
+    assert profile.namespace == "/robot1"
+    assert profile.tf_topics == ("/robot1/tf", "/robot1/tf_static")
+    assert profile.name == "robot1"
+
+
+def test_a_name_of_frames_that_nobody_publishes_hides_no_namespace() -> None:
+    types = {**in_namespaces("robot1"), "/tf": "tf2_msgs/TFMessage"}
+    assert choose(types).namespace == ""
+    assert choose(types, dead=("/tf",)).namespace == "/robot1"
+
+
+@pytest.mark.parametrize("said", ["robot1", "/robot1", "/robot1/"])
+def test_a_namespace_is_the_same_with_a_slash_and_without(said: str) -> None:
+    profile = choose(in_namespaces("robot1", "robot2"), namespace=said)
+    assert profile.namespace == "/robot1"
+    assert profile.tf_topics == ("/robot1/tf", "/robot1/tf_static")
+    assert profile.other_namespaces == ()
+
+
+def test_of_several_robots_none_is_chosen_silently() -> None:
+    assert choose(in_namespaces("a", "b")).other_namespaces == ("/a", "/b")
 
 
 def test_a_goal_topic_serves_where_there_is_no_action() -> None:

@@ -617,7 +617,7 @@ async def test_a_robot_without_rosapi_says_how_to_start_it() -> None:
     scripted.services.clear()
     async with running(scripted.server) as server:
         with pytest.raises(LinkError, match="does not list its topics") as raised:
-            async with open_rosbridge_robot(server.url):
+            async with open_rosbridge_robot(server.url, patience=BRIEF):
                 pass
     assert "rosapi" in raised.value.hint
 

@@ -18,6 +18,7 @@ STAND = {"linear": ZERO, "angular": ZERO}
 CREEP = {"linear": {**ZERO, "x": 0.2}, "angular": ZERO}
 RUSH = {"linear": {**ZERO, "x": 2.0}, "angular": ZERO}
 READING = {
+    "link",
     "is_open",
     "connected_for_s",
     "lost_for_s",

@@ -19,7 +19,7 @@ from mapspeak.links.dds.timing import DdsTiming
 from mapspeak.links.dds.topics import Topics
 from mapspeak.links.dds.types import Types
 from mapspeak.links.ros import NativeConnection, PursuedGoal, plain_errors
-from mapspeak.ros import ActionGoal
+from mapspeak.ros import ActionGoal, LinkKind, LinkName
 from mapspeak.ros.messages import Message
 
 NODES_QUALITY = Quality(is_reliable=True, is_latched=True, depth=1000)
@@ -76,6 +76,12 @@ class DdsConnection(GraphQuestions, NativeConnection):
             learn=self.learn,
             start_soon=self.start_soon,
         )
+
+    @property
+    def link(self) -> LinkName:
+        """How we are connected."""
+        reach = ", on this machine only" if self.network.is_local else ""
+        return LinkName(LinkKind.DDS, f"ROS domain {self.network.domain_id}{reach}")
 
     @property
     def is_open(self) -> bool:

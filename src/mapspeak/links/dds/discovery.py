@@ -28,6 +28,7 @@ from mapspeak.ros.messages import Message, bare_type
 TYPE_HASH = re.compile(rb"typehash=(RIHS\d+_[0-9a-f]+)")
 PREFIX_BYTES = 12
 CYCLONE_VENDOR = b"\x01\x10"
+UNNAMED = "/_NODE_NAME_UNKNOWN_"
 STATUS, SEND_GOAL = "/_action/status", "/_action/send_goal"
 
 
@@ -233,8 +234,11 @@ class Discovery:
         return next((name for name, keys in self.nodes.items() if key in keys), None)
 
     def nodes_with(self, endpoints: list[Endpoint]) -> tuple[str, ...]:
-        """Gives the full names of the nodes that have some readers or writers."""
-        return _names(self.node_with(each.key) for each in endpoints)
+        """Return the full names of the nodes that have some readers or writers.
+
+        Names come seconds after readers and writers: until then, ROS has this name for a node.
+        """
+        return _names(self.node_with(each.key) or UNNAMED for each in endpoints)
 
     def publishers(self, topic: str) -> tuple[str, ...]:
         """Gives the nodes that publish on a topic of ROS."""

@@ -1,7 +1,10 @@
 """Pictures of the front camera, subscribed to only while somebody looks."""
 
+import anyio
+
 from mapspeak.errors import LinkError
 from mapspeak.links.ros.discovery import RobotProfile
+from mapspeak.links.ros.discovery.parts import CAMERA
 from mapspeak.links.ros.discovery.profile import COMPRESSED_IMAGE, RAW_IMAGE
 from mapspeak.links.ros.lingering import THROTTLE_MS, Lingering
 from mapspeak.ros import RosConnection, Subscription
@@ -13,7 +16,10 @@ from mapspeak.ros.messages import (
     read_image,
 )
 
-PATIENCE_S = 5.0
+PATIENCE_S, LONGEST_PATIENCE_S = 5.0, 30.0
+FIRST_PATIENCE_S = 15.0
+"""For a camera that is published and has said nothing yet: some give a picture in ten seconds."""
+TIMES_SLOWEST = 3.0
 INFO_PATIENCE_S = 1.0
 CAMERA_HINT = "Check that the camera's driver runs, or name another camera_topic in robot.yaml."
 
@@ -24,15 +30,24 @@ class Camera:
     Args:
         connection: Connected to the robot.
         profile: Says which topic.
-        patience_s: How long to wait for a picture, in wall time.
+        patience_s: How long to wait for a picture, in wall time; longer for a slow camera.
+        first_patience_s: How long to wait for the first.
     """
 
     def __init__(
-        self, connection: RosConnection, profile: RobotProfile, *, patience_s: float = PATIENCE_S
+        self,
+        connection: RosConnection,
+        profile: RobotProfile,
+        *,
+        patience_s: float = PATIENCE_S,
+        first_patience_s: float = FIRST_PATIENCE_S,
     ) -> None:
         self._connection = connection
         self._profile = profile
         self._patience_s = patience_s
+        is_alive = CAMERA.is_alive(profile)
+        self._next_patience_s = first_patience_s if is_alive else patience_s
+        self._slowest_s = 0.0
         self._lingering = Lingering(connection, self._subscribe)
 
     async def fetch(self) -> EncodedPicture:
@@ -75,11 +90,16 @@ class Camera:
         return pictures, infos
 
     async def _next_message(self, pictures: Subscription) -> Message:
-        before = pictures.n_received
+        before, asked_s = pictures.n_received, anyio.current_time()
+        patience_s, self._next_patience_s = self._next_patience_s, self._patience_s
         try:
-            return await pictures.wait_for_more_than(before, timeout_s=self._patience_s)
+            message = await pictures.wait_for_more_than(before, timeout_s=patience_s)
         except LinkError as error:
             raise LinkError(error.message, hint=CAMERA_HINT) from error
+        self._slowest_s = max(self._slowest_s, anyio.current_time() - asked_s)
+        enough_s = max(self._patience_s, TIMES_SLOWEST * self._slowest_s)
+        self._next_patience_s = min(enough_s, LONGEST_PATIENCE_S)
+        return message
 
     def _read(self, message: Message) -> EncodedPicture:
         if self._profile.camera_type == COMPRESSED_IMAGE:

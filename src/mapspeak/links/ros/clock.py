@@ -10,6 +10,8 @@ STANDSTILL_S = 5.0
 """Of the wall clock; a simulation that slow is paused or has ended."""
 FIRST_TICK_S = 1.0
 """A clock topic that stays silent for so long is left over from something else."""
+ASK_AGAIN_S = 1.0
+"""Whoever could tell the time may be found only after we have connected."""
 EPSILON_S = 1e-6
 
 
@@ -47,6 +49,12 @@ class RobotClock:
             self._connection.subscribe(clock_topic).listen(self._take)
             with anyio.move_on_after(FIRST_TICK_S):
                 await self._moved_on.wait()
+
+    async def set_late(self) -> None:
+        """Ask until the robot has said what time it is; for the background."""
+        while not self.is_set:
+            await anyio.sleep(ASK_AGAIN_S)
+            await self._ask_the_time()
 
     async def sleep(self, duration_s: float) -> None:
         """Returns when that much robot time has passed.

@@ -4,7 +4,7 @@ import anyio
 
 from mapspeak.errors import LinkError
 from mapspeak.links.ros.transforms import TransformTree
-from mapspeak.ros import RosConnection
+from mapspeak.ros import RosConnection, Subscription
 from mapspeak.ros.messages import Dialect, Message, read_transforms
 
 
@@ -24,13 +24,20 @@ class FrameListener:
         self.n_refused = 0
         """Messages that were no transforms."""
         self._connection = connection
+        self._subscriptions: dict[str, Subscription] = {}
         self._news = anyio.Event()
 
     def listen(self, moving_topic: str, static_topic: str, *, dialect: Dialect) -> None:
-        """Subscribes to both topics, also before anybody publishes them."""
+        """Subscribe to both topics, also before anybody publishes them, and to no others."""
+        wanted = {moving_topic: self._take_moving, static_topic: self._take_static}
+        for topic in self._subscriptions.keys() - wanted.keys():
+            self._connection.unsubscribe(self._subscriptions.pop(topic))
         type_name = dialect.type_name("tf2_msgs/TFMessage")
-        self._connection.subscribe(moving_topic, type_name=type_name).listen(self._take_moving)
-        self._connection.subscribe(static_topic, type_name=type_name).listen(self._take_static)
+        for topic, take in wanted.items():
+            if topic not in self._subscriptions:
+                subscription = self._connection.subscribe(topic, type_name=type_name)
+                subscription.listen(take)
+                self._subscriptions[topic] = subscription
 
     def has_way(self, *, outer: str, inner: str) -> bool:
         """True when the tree leads from one frame to the other."""

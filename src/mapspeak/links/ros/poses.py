@@ -40,6 +40,7 @@ class PoseKeeper:
         *,
         silence_s: float = SILENCE_S,
     ) -> None:
+        self._connection = connection
         self._silence_s = silence_s
         self._profile = profile
         self._frames = frames
@@ -47,6 +48,11 @@ class PoseKeeper:
         if profile.pose_topic is not None:
             type_name = profile.dialect.type_name(profile.pose_type or POSE_WITH_COVARIANCE)
             self._topic = connection.subscribe(profile.pose_topic, type_name=type_name)
+
+    def close(self) -> None:
+        """End the subscription."""
+        if self._topic is not None:
+            self._connection.unsubscribe(self._topic)
 
     async def fetch(self, *, timeout_s: float = PATIENCE_S) -> StampedPose:
         """Gives the latest pose in the map frame; waits for the first.

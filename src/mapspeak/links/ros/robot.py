@@ -1,10 +1,8 @@
 """The port implemented over any connection to ROS 1 or ROS 2."""
 
 from collections import OrderedDict
-from collections.abc import Callable
 from contextlib import suppress
-
-import anyio
+from functools import partial
 
 from mapspeak.errors import GoalError, LinkError
 from mapspeak.geometry import Pose
@@ -13,11 +11,19 @@ from mapspeak.links.ros.clock import RobotClock
 from mapspeak.links.ros.discovery import (
     FRAMES_S,
     NavigationKind,
-    PoseSource,
     RobotOverrides,
     RobotProfile,
-    discover_robot,
-    look_at_robot,
+    RobotWatch,
+)
+from mapspeak.links.ros.discovery.parts import (
+    CAMERA,
+    LASER,
+    MAP,
+    NAVIGATION,
+    POSE,
+    RADIUS,
+    VELOCITY,
+    Part,
 )
 from mapspeak.links.ros.driving import (
     MOVE_BASE,
@@ -47,10 +53,6 @@ from mapspeak.ros import RosConnection
 from mapspeak.spatial import OccupancyGrid
 
 MOST_GOALS_KEPT = 1_000
-LOOK_AGAIN_S = 5.0
-"""Between two looks for a better source of the pose while no new frames appear, in wall time."""
-SETTLING_PAUSE_S = 0.2
-"""Between two looks right after connecting, when a robot is still found bit by bit."""
 USUAL_PATIENCE = DrivingPatience()
 NOTHING_SAID = RobotOverrides()
 
@@ -60,38 +62,42 @@ class RosRobot:
 
     Args:
         connection: Connected to the robot.
-        profile: What the robot offers.
+        watch: Has looked at the robot, and goes on while something is missing.
         frames: Listens to its coordinate frames.
         clock: Tells its time.
-        overrides: What robot.yaml says, for what is found only later.
         patience: How long to wait for what it offers, and for its navigation.
     """
 
     def __init__(
         self,
         connection: RosConnection,
-        profile: RobotProfile,
+        watch: RobotWatch,
         *,
         frames: FrameListener,
         clock: RobotClock,
-        overrides: RobotOverrides = NOTHING_SAID,
         patience: DrivingPatience = USUAL_PATIENCE,
     ) -> None:
-        self.profile = profile
         self.connection = connection
+        self._watch = watch
         self._frames = frames
         self._clock = clock
-        self._overrides = overrides
         self._patience = patience
-        self._looked_s = float("-inf")
-        self._frames_looked_at = frames.tree.frames
         self._goals: OrderedDict[str, GoalRecord] = OrderedDict()
+        self._n_sending = 0
+        profile = watch.profile
         self._maps = MapKeeper(connection, profile)
         self._camera = self._build_camera()
         self._laser = self._build_laser()
         self._poses = PoseKeeper(connection, profile, frames)
         self._brake = self._build_brake()
         self._driver = self._build_driver()
+        watch.is_driving = self._is_driving
+        watch.on_change = self._take_change
+
+    @property
+    def profile(self) -> RobotProfile:
+        """What the robot offers, as far as it has been found."""
+        return self._watch.profile
 
     @property
     def description(self) -> RobotDescription:
@@ -100,11 +106,19 @@ class RosRobot:
             name=self.profile.name,
             radius_m=self.profile.radius_m,
             map_name=self.profile.map_name,
-            has_camera=self.profile.camera_topic is not None,
-            has_laser=self.profile.scan_topic is not None,
+            has_camera=CAMERA.is_alive(self.profile),
+            has_laser=LASER.is_alive(self.profile),
             detector=None,
             map_frame=self.profile.map_frame,
         )
+
+    @property
+    def map_age_s(self) -> float | None:
+        """Since the stamp of the latest map; None where that is not known."""
+        stamp_s = self._maps.stamp_s
+        if stamp_s is None or not self._clock.is_set:
+            return None
+        return max(self.now_s - stamp_s, 0.0)
 
     @property
     def now_s(self) -> float:
@@ -118,20 +132,21 @@ class RosRobot:
     async def fetch_map(self) -> OccupancyGrid:
         """Gives the latest map; the same value as long as it has not changed."""
         await self.connection.wait_until_connected()
-        await self._look_until(lambda: self.profile.map_topic is not None)
+        await self._watch.find(MAP)
+        # Where the robot fits on it depends on that.
+        await self._watch.wait_for(RADIUS)
         return await self._maps.fetch()
 
     async def fetch_pose(self) -> StampedPose:
         """Gives where the robot believes it is; see the profile for how it is known."""
         await self.connection.wait_until_connected()
-        if self.profile.pose_source in (PoseSource.ODOMETRY, PoseSource.NONE):
-            await self._look_for_better_pose()
+        await self._watch.wait_for(POSE)
         return await self._poses.fetch()
 
     async def fetch_picture(self) -> CameraPicture:
         """Takes a picture with the front camera."""
         await self.connection.wait_until_connected()
-        await self._look_until(lambda: self.profile.camera_topic is not None)
+        await self._watch.find(CAMERA)
         picture = await self._camera.fetch()
         here = await self._poses.fetch()
         return CameraPicture(
@@ -156,10 +171,14 @@ class RosRobot:
     async def send_goal(self, goal: Pose) -> str:
         """Starts a drive; returns when navigation has taken or refused it."""
         await self.connection.wait_until_connected()
-        await self._look_until(lambda: self._driver is not None)
+        await self._watch.find(NAVIGATION)
         # Whoever drives may have to stop before long.
         self.connection.advertise_early()
-        record = await self._wanted_driver().send(goal)
+        self._n_sending += 1
+        try:
+            record = await self._wanted_driver().send(goal)
+        finally:
+            self._n_sending -= 1
         self._goals[record.goal_id] = record
         while len(self._goals) > MOST_GOALS_KEPT:
             self._goals.popitem(last=False)
@@ -197,48 +216,43 @@ class RosRobot:
             # Others may have sent goals to a navigation that we have not found yet.
             brake = self._brake
             with suppress(LinkError):
-                await self._look_again()
+                await self._watch.look()
             if self._brake is not brake:
                 self._brake.pull()
         await stop_everything(self.connection, brake=self._brake)
 
-    async def _look_until(self, is_found: Callable[[], bool]) -> None:
-        """Looks for what was not found yet: once, and right after connecting for a while."""
-        is_settling = True
-        while not is_found() and is_settling:
-            is_settling = (self.connection.connected_for_s or 0.0) < self._patience.settling_s
-            await self._look_again()
-            if is_settling and not is_found():
-                await anyio.sleep(SETTLING_PAUSE_S)
+    async def settle(self) -> None:
+        """Return when all that the robot offers counts as found."""
+        await self._watch.settle()
 
-    async def _look_again(self) -> None:
-        """Takes in what has been started since: people start rosbridge first and SLAM later."""
-        before = self.profile
-        self.profile = await look_at_robot(
-            self.connection, self._frames, self._overrides, before=before
-        )
-        if self.profile == before:
-            return
-        if before.map_topic is None:
-            self._maps = MapKeeper(self.connection, self.profile)
-        if before.camera_topic is None:
+    def _is_driving(self) -> bool:
+        is_under_way = any(not record.is_over for record in self._goals.values())
+        return is_under_way or self._n_sending > 0
+
+    def _take_change(self, before: RobotProfile) -> None:
+        """Use what has been found since; what has stayed the same goes on being used."""
+        now = self.profile
+
+        def is_new(part: Part) -> bool:
+            return part.values(before) != part.values(now)
+
+        if is_new(MAP):
+            self._maps.close()
+            self._maps = MapKeeper(self.connection, now)
+        if is_new(CAMERA):
             self._camera = self._build_camera()
-        if before.scan_topic is None and self.profile.scan_topic is not None:
+        if is_new(LASER) or is_new(POSE):
             self._laser = self._build_laser()
-        if before.velocity_topic is None:
+        if is_new(POSE):
+            self._poses.close()
+            self._poses = PoseKeeper(self.connection, now, self._frames)
+        if is_new(VELOCITY):
             self._brake = self._build_brake()
-        if self._driver is None:
+        is_elsewhere = now.map_frame != before.map_frame and not self._is_driving()
+        if is_new(NAVIGATION) or is_elsewhere:
             self._driver = self._build_driver()
-        if before.pose_source is not self.profile.pose_source:
-            self._poses = PoseKeeper(self.connection, self.profile, self._frames)
-
-    async def _look_for_better_pose(self) -> None:
-        frames, now_s = self._frames.tree.frames, anyio.current_time()
-        if frames != self._frames_looked_at or now_s - self._looked_s > LOOK_AGAIN_S:
-            self._frames_looked_at, self._looked_s = frames, now_s
-            # What is there goes on being used where nothing better can be found.
-            with suppress(LinkError):
-                await self._look_again()
+        if now.clock_topic != before.clock_topic:
+            self.connection.start_soon(partial(self._clock.start, now.clock_topic))
 
     def _build_camera(self) -> Camera:
         camera = Camera(self.connection, self.profile)
@@ -324,28 +338,10 @@ async def build_ros_robot(
     connection.advertise_late()
     frames = FrameListener(connection)
     clock = RobotClock(connection)
-    profile = await _discover_soon(
-        connection, frames, overrides, frames_s=frames_s, settling_s=patience.settling_s
-    )
-    await clock.start(profile.clock_topic)
-    return RosRobot(
-        connection, profile, frames=frames, clock=clock, overrides=overrides, patience=patience
-    )
-
-
-async def _discover_soon(
-    connection: RosConnection,
-    frames: FrameListener,
-    overrides: RobotOverrides,
-    *,
-    frames_s: float,
-    settling_s: float,
-) -> RobotProfile:
-    """Asks again right after connecting: who would say what there is may not be found yet."""
-    while True:
-        try:
-            return await discover_robot(connection, frames, overrides, frames_s=frames_s)
-        except LinkError:
-            if (connection.connected_for_s or 0.0) >= settling_s:
-                raise
-        await anyio.sleep(SETTLING_PAUSE_S)
+    watch = RobotWatch(connection, frames, overrides, settling_s=patience.settling_s)
+    await watch.begin(frames_s=frames_s)
+    await clock.start(watch.profile.clock_topic)
+    robot = RosRobot(connection, watch, frames=frames, clock=clock, patience=patience)
+    connection.start_soon(watch.run)
+    connection.start_soon(clock.set_late)
+    return robot

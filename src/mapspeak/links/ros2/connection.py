@@ -15,7 +15,7 @@ from mapspeak.links.ros2.graph import GraphQuestions
 from mapspeak.links.ros2.participant import Participant, errors_of_ros, wait_until
 from mapspeak.links.ros2.services import Services
 from mapspeak.links.ros2.topics import Topics
-from mapspeak.ros import ActionGoal, NodeLinks, RosGraph
+from mapspeak.ros import ActionGoal, LinkKind, LinkName, NodeLinks, RosGraph
 from mapspeak.ros.messages import Message
 
 ANSWER_S = 5.0
@@ -53,6 +53,11 @@ class Ros2Connection(GraphQuestions, NativeConnection):
         self._topics = Topics(participant)
         self._services = Services(participant)
         self._goals = Goals(participant, self._services, start_soon=self.start_soon)
+
+    @property
+    def link(self) -> LinkName:
+        """How we are connected."""
+        return LinkName(LinkKind.RCLPY, self._participant.place)
 
     @property
     def is_open(self) -> bool:

@@ -15,6 +15,7 @@ from rclpy.exceptions import NameValidationException, NoTypeSupportImportedExcep
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+from rclpy.utilities import get_rmw_implementation_identifier
 
 from mapspeak.errors import LinkError
 from mapspeak.links.ros import environment_with
@@ -55,6 +56,12 @@ class Participant:
         self._loop_thread = threading.get_ident()
         self._thread = threading.Thread(target=self._run, name=self.name, daemon=True)
         self.node: Node = None
+
+    @property
+    def place(self) -> str:
+        """The domain, and the middleware."""
+        middleware = get_rmw_implementation_identifier()
+        return f"ROS domain {self._context.get_domain_id()}, {middleware}"
 
     async def start(self) -> None:
         """Enters the domain.

@@ -25,6 +25,7 @@ from mapspeak.navigation.safety.velocities import (
 )
 from mapspeak.ros import (
     ActionGoal,
+    LinkName,
     NodeLinks,
     OwnEnds,
     RosConnection,
@@ -260,6 +261,11 @@ class GuardedConnection:
     def lost_for_s(self) -> float | None:
         """Since when the connection has been lost, in wall time; None while there is one."""
         return self._connection.lost_for_s
+
+    @property
+    def link(self) -> LinkName:
+        """How we are connected."""
+        return self._connection.link
 
     @property
     def own_ends(self) -> OwnEnds:

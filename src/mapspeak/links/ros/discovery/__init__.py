@@ -1,6 +1,5 @@
 """What a robot offers, found by asking it, and overridden where a person knows better."""
 
-from mapspeak.links.ros.discovery.finding import FRAMES_S, discover_robot, look_at_robot
 from mapspeak.links.ros.discovery.findings import describe_profile
 from mapspeak.links.ros.discovery.overrides import (
     RobotOverrides,
@@ -13,6 +12,7 @@ from mapspeak.links.ros.discovery.profile import (
     RobotProfile,
     choose_profile,
 )
+from mapspeak.links.ros.discovery.watch import FRAMES_S, RobotWatch
 
 __all__ = [
     "FRAMES_S",
@@ -20,10 +20,9 @@ __all__ = [
     "PoseSource",
     "RobotOverrides",
     "RobotProfile",
+    "RobotWatch",
     "RosSettings",
     "choose_profile",
     "describe_profile",
-    "discover_robot",
     "load_robot_file",
-    "look_at_robot",
 ]

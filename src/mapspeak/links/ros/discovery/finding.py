@@ -1,85 +1,79 @@
-"""Asking a connected robot what it is."""
+"""One look at what a connected robot is."""
 
 from dataclasses import replace
 
 import anyio
 
 from mapspeak.errors import LinkError
+from mapspeak.links.ros.discovery import ranking
+from mapspeak.links.ros.discovery.liveness import Liveness
 from mapspeak.links.ros.discovery.overrides import RobotOverrides
+from mapspeak.links.ros.discovery.parts import PARTS, RADIUS
 from mapspeak.links.ros.discovery.profile import RobotProfile, choose_profile
 from mapspeak.links.ros.discovery.size import find_radius_m
-from mapspeak.links.ros.frames import FrameListener
 from mapspeak.ros import RosConnection, RosGraph
 from mapspeak.ros.messages import Dialect
 
-FRAMES_S = 2.0
+__all__ = ["look_at_robot"]
 
-
-async def discover_robot(
-    connection: RosConnection,
-    frames: FrameListener,
-    overrides: RobotOverrides,
-    *,
-    frames_s: float = FRAMES_S,
-) -> RobotProfile:
-    """Gives what the robot offers, or what robot.yaml says it does; waits for its frames.
-
-    Args:
-        connection: To the robot.
-        frames: Listens to its frames.
-        overrides: What robot.yaml says.
-        frames_s: In wall time, for the robot's frames to lead from the map to its base; static ones
-            come at once, moving ones many times a second.
-
-    Raises:
-        LinkError: rosapi is missing, and robot.yaml does not say which ROS it is.
-    """
-    graph = await _fetch_graph(connection, overrides)
-    profile = choose_profile(graph, overrides)
-    frames.listen(*profile.tf_topics, dialect=profile.dialect)
-    with anyio.move_on_after(frames_s):
-        while not frames.has_way(outer=profile.map_frame, inner=profile.base_frame):
-            await frames.wait_for_news()
-            profile = choose_profile(graph, overrides, frames=frames.tree.frames)
-    profile = choose_profile(graph, overrides, frames=frames.tree.frames)
-    return await _with_radius(connection, profile, overrides)
+MOST_ROUNDS = 8
+"""Of asking who serves the best topics, and, where nobody does, choosing the next best."""
+RADIUS_S = 3.0
+"""For navigation to tell the radius, in wall time: one that hangs holds up nothing else."""
 
 
 async def look_at_robot(
-    connection: RosConnection,
-    frames: FrameListener,
-    overrides: RobotOverrides,
-    *,
-    before: RobotProfile,
-) -> RobotProfile:
-    """Gives what the robot offers by now, waiting for no frames.
+    connection: RosConnection, frames: frozenset[str], overrides: RobotOverrides
+) -> tuple[RobotProfile, frozenset[str]]:
+    """Return what the robot offers now, or what robot.yaml says, and all names that it lists.
 
     Args:
         connection: To the robot.
-        frames: Listens to its frames.
+        frames: The coordinate frames that were heard of.
         overrides: What robot.yaml says.
-        before: What it offered when it was last looked at.
 
     Raises:
         LinkError: rosapi is missing, and robot.yaml does not say which ROS it is.
     """
     graph = await _fetch_graph(connection, overrides)
-    profile = choose_profile(graph, overrides, frames=frames.tree.frames)
-    if before.radius_source:
-        return replace(profile, radius_m=before.radius_m, radius_source=before.radius_source)
-    return await _with_radius(connection, profile, overrides)
+    services = await _fetch_services(connection) if graph.types else None
+    profile = await _choose_alive(connection, graph, overrides, frames, services)
+    names = frozenset(graph.types) | frozenset(graph.actions) | (services or frozenset())
+    if profile.radius_source or not graph.types:
+        return profile, names
+    with anyio.move_on_after(RADIUS_S):
+        found = await find_radius_m(
+            connection, profile.dialect, namespace=profile.namespace, services=services
+        )
+        if found is not None:
+            profile = replace(profile, radius_m=found[0], radius_source=found[1])
+    return profile, names
 
 
-async def _with_radius(
-    connection: RosConnection, profile: RobotProfile, overrides: RobotOverrides
+async def _choose_alive(
+    connection: RosConnection,
+    graph: RosGraph,
+    overrides: RobotOverrides,
+    frames: frozenset[str],
+    services: frozenset[str] | None,
 ) -> RobotProfile:
-    if profile.radius_source:
-        return profile
-    found = await find_radius_m(connection, profile.dialect, namespace=overrides.namespace or "")
-    if found is None:
-        return profile
-    radius_m, source = found
-    return replace(profile, radius_m=radius_m, radius_source=source)
+    """Return the best of what somebody serves, then of what is there by name."""
+    liveness = Liveness(connection)
+    trees = ranking.find_namespaces(graph, frozenset())
+    for namespace in trees if len(trees) > 1 else ():
+        await liveness.ask(f"{namespace}/tf", is_heard=False)
+    for _ in range(MOST_ROUNDS):
+        before = liveness.dead
+        profile = choose_profile(graph, overrides, frames=frames, dead=before, services=services)
+        for part in PARTS if graph.types else ():
+            topic = part.topic(profile)
+            if topic is not None and part is not RADIUS and topic not in graph.actions:
+                await liveness.ask(topic, is_heard=part.is_heard(profile))
+        if liveness.dead == before:
+            break
+    profile = choose_profile(graph, overrides, frames=frames, dead=liveness.dead, services=services)
+    used = {part.topic(profile) for part in PARTS}
+    return replace(profile, dead_topics=frozenset(profile.dead_topics & used))
 
 
 async def _fetch_graph(connection: RosConnection, overrides: RobotOverrides) -> RosGraph:
@@ -91,3 +85,10 @@ async def _fetch_graph(connection: RosConnection, overrides: RobotOverrides) -> 
             raise
         return RosGraph(dialect=said)
     return graph if said is None else replace(graph, dialect=said)
+
+
+async def _fetch_services(connection: RosConnection) -> frozenset[str] | None:
+    try:
+        return frozenset(await connection.fetch_services())
+    except LinkError:
+        return None

@@ -9,6 +9,7 @@ from mapspeak.ros import NAME, TYPE
 from mapspeak.settings import read_settings
 
 TopicName = Annotated[str, Field(pattern=rf"^{NAME.pattern}$")]
+Namespace = Annotated[str, Field(pattern=rf"^{NAME.pattern}/?$")]
 TypeName = Annotated[str, Field(pattern=rf"^{TYPE.pattern}$")]
 FrameName = Annotated[str, Field(pattern=r"^/?[\w/.-]+$")]
 Words = Annotated[str, Field(pattern=r"\S", max_length=200)]
@@ -62,7 +63,7 @@ class RobotOverrides(BaseModel):
     Attributes:
         name: How people call the robot.
         ros: Which ROS it runs, 1 or 2, or a section that says more; see `RosSettings`.
-        namespace: Looks for topics below this name first, such as /robot1.
+        namespace: Looks for topics and frames below this name first: robot1, or /robot1.
         radius_m: Of the smallest circle around the robot.
         map_name: Which map or building it drives in.
         map_topic: Of nav_msgs/OccupancyGrid.
@@ -85,7 +86,7 @@ class RobotOverrides(BaseModel):
 
     name: Words | None = None
     ros: Annotated[RosSettings, BeforeValidator(_as_section)] = RosSettings()
-    namespace: TopicName | None = None
+    namespace: Namespace | None = None
     radius_m: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] | None = None
     map_name: Words | None = None
     map_topic: TopicName | None = None

@@ -67,6 +67,10 @@ class RobotProfile:
         velocity_topic: Takes velocities.
         velocity_type: Twist or TwistStamped, as "package/Type".
         clock_topic: Where a simulation tells its time.
+        namespace: Where the robot's topics are, such as /robot1; empty where they are in none.
+        other_namespaces: Of further robots, among which nobody has chosen.
+        dead_topics: Those of the above, and actions, that exist by name only: nobody publishes
+            them, or, of those that we would publish, nobody listens.
     """
 
     name: str
@@ -94,19 +98,31 @@ class RobotProfile:
     velocity_topic: str | None = None
     velocity_type: str | None = None
     clock_topic: str | None = None
+    namespace: str = ""
+    other_namespaces: tuple[str, ...] = ()
+    dead_topics: frozenset[str] = frozenset()
 
 
 def choose_profile(
-    graph: RosGraph, overrides: RobotOverrides, *, frames: frozenset[str] = frozenset()
+    graph: RosGraph,
+    overrides: RobotOverrides,
+    *,
+    frames: frozenset[str] = frozenset(),
+    dead: frozenset[str] = frozenset(),
+    services: frozenset[str] | None = None,
 ) -> RobotProfile:
-    """Gives the best use of what there is; what a person said is taken as it stands.
+    """Return the best use of what there is; what a person said is taken as it stands.
 
     Args:
         graph: What the robot lists.
         overrides: What robot.yaml says.
         frames: The frames of the TF tree.
+        dead: Topics known to exist by name only.
+        services: Those of ROS 1; None where they are not known.
     """
-    near = ranking.Nearness(overrides.namespace)
+    namespaces = ranking.find_namespaces(graph, dead)
+    namespace = _choose_namespace(overrides, namespaces)
+    near = ranking.Nearness(namespace, dead)
     maps = ranking.rank_maps(graph, near)
     map_topic = overrides.map_topic or (maps[0] if maps else None)
     source, pose_topic, pose_type = _choose_pose(graph, overrides, near, frames)
@@ -114,7 +130,7 @@ def choose_profile(
     navigation, navigation_name = _choose_navigation(graph, overrides, near)
     velocity_topic, velocity_type = _choose_velocity(graph, overrides, near)
     return RobotProfile(
-        name=overrides.name or (overrides.namespace or "").strip("/") or "robot",
+        name=overrides.name or namespace.strip("/") or "robot",
         dialect=graph.dialect,
         distro=graph.distro,
         radius_m=overrides.radius_m or USUAL_RADIUS_M,
@@ -137,11 +153,27 @@ def choose_profile(
         scan_topic=overrides.scan_topic or ranking.best(graph, ranking.SCANS, near),
         navigation=navigation,
         navigation_name=navigation_name,
-        planner_name=_choose_planner(graph, near, navigation, navigation_name),
+        planner_name=_choose_planner(graph, near, navigation, navigation_name, services),
         velocity_topic=velocity_topic,
         velocity_type=velocity_type,
         clock_topic="/clock" if "/clock" in graph.types else None,
+        namespace=namespace,
+        other_namespaces=() if namespace or "" in namespaces else namespaces,
+        dead_topics=dead | _find_dead_action(graph, navigation, navigation_name),
     )
+
+
+def _choose_namespace(overrides: RobotOverrides, found: tuple[str, ...]) -> str:
+    """Return the one that was said, with a slash before it, else that of the only robot."""
+    if overrides.namespace is not None:
+        return f"/{overrides.namespace.strip('/')}".rstrip("/")
+    return found[0] if len(found) == 1 else ""
+
+
+def _find_dead_action(graph: RosGraph, kind: NavigationKind, name: str | None) -> frozenset[str]:
+    """Return an action that robot.yaml names and nobody serves."""
+    is_listed = kind is not NavigationKind.NAV2 or not graph.types or name in graph.actions
+    return frozenset() if is_listed or name is None else frozenset({name})
 
 
 def _choose_pose(
@@ -191,18 +223,30 @@ def _choose_navigation(
         NavigationKind.GOAL_TOPIC: ranking.best(graph, ranking.GOALS, near),
     }
     if overrides.navigation is None:
-        kind = next((each for each in found if found[each] is not None), NavigationKind.NONE)
+        named = [kind for kind, name in found.items() if name is not None]
+        alive = [kind for kind in named if end_of_goals(kind, found[kind]) not in near.dead]
+        kind = next(iter([*alive, *named]), NavigationKind.NONE)
         return kind, overrides.navigation_name or found.get(kind)
     kind = NavigationKind(overrides.navigation)
     return kind, overrides.navigation_name or found.get(kind) or _usual_name(kind, graph.dialect)
 
 
+def end_of_goals(kind: NavigationKind, name: str | None) -> str | None:
+    """Return the topic that shows whether navigation runs: move_base always tells its status."""
+    return f"{name}/status" if kind is NavigationKind.MOVE_BASE and name is not None else name
+
+
 def _choose_planner(
-    graph: RosGraph, near: ranking.Nearness, navigation: NavigationKind, name: str | None
+    graph: RosGraph,
+    near: ranking.Nearness,
+    navigation: NavigationKind,
+    name: str | None,
+    services: frozenset[str] | None,
 ) -> str | None:
-    """Gives Nav2's ComputePathToPose, or the service that every move_base has."""
+    """Return Nav2's ComputePathToPose, or move_base's service."""
     if navigation is NavigationKind.MOVE_BASE and name is not None:
-        return f"{name}/make_plan"
+        service = f"{name}/make_plan"
+        return service if services is None or service in services else None
     return near.first(
         action for action in graph.actions if action.endswith("/compute_path_to_pose")
     )

@@ -8,18 +8,21 @@ from mapspeak.ros import RosGraph
 MAP = "nav_msgs/OccupancyGrid"
 MAP_UPDATE = "map_msgs/OccupancyGridUpdate"
 MOVE_BASE_GOAL = "move_base_msgs/MoveBaseActionGoal"
+FRAMES = ("tf2_msgs/TFMessage", "tf/tfMessage")
 NO_MAPS = ("costmap", "cost_map")
 
 
 @dataclass(frozen=True, slots=True)
 class Nearness:
-    """Prefers topics of one robot among several.
+    """Prefers topics of one robot among several, and those that somebody serves.
 
     Attributes:
-        namespace: Such as /robot1; empty or None for none.
+        namespace: Such as /robot1; empty for none.
+        dead: Topics known to exist by name only.
     """
 
-    namespace: str | None
+    namespace: str
+    dead: frozenset[str] = frozenset()
 
     def first(self, names: Iterable[str]) -> str | None:
         """Gives the first of the names that lies in the namespace, else the first."""
@@ -31,7 +34,7 @@ class Nearness:
         return sorted(names, key=lambda name: not self._is_near(name))
 
     def _is_near(self, name: str) -> bool:
-        prefix = (self.namespace or "").strip("/")
+        prefix = self.namespace.strip("/")
         return bool(prefix) and name.strip("/").startswith(f"{prefix}/")
 
 
@@ -95,6 +98,7 @@ def best(graph: RosGraph, wanted: Wanted, near: Nearness) -> str | None:
     ranked = sorted(
         (topic for topic in graph.topics_of(*wanted.types) if _may_be(topic, wanted)),
         key=lambda topic: (
+            topic in near.dead,
             _place_of(topic, wanted),
             wanted.types.index(graph.types[topic]),
             topic.count("/"),
@@ -113,6 +117,7 @@ def rank_maps(graph: RosGraph, near: Nearness) -> list[str]:
     ]
     maps.sort(
         key=lambda topic: (
+            topic in near.dead,
             not topic.endswith("/map"),
             "map" not in topic.rpartition("/")[2],
             topic.count("/"),
@@ -126,7 +131,18 @@ def best_move_base(graph: RosGraph, near: Nearness) -> str | None:
     """Gives the name of the ROS 1 action that drives to a pose, such as /move_base."""
     goals = graph.topics_of(MOVE_BASE_GOAL)
     names = [topic.removesuffix("/goal") for topic in goals if topic.endswith("/goal")]
-    return near.first(sorted(names, key=lambda name: (name.count("/"), name)))
+    return near.first(
+        sorted(names, key=lambda name: (f"{name}/status" in near.dead, name.count("/"), name))
+    )
+
+
+def find_namespaces(graph: RosGraph, dead: frozenset[str]) -> tuple[str, ...]:
+    """Return where robots are: each publishes its frames; "" stands for no namespace."""
+    return tuple(
+        topic.removesuffix("/tf")
+        for topic in graph.topics_of(*FRAMES)
+        if topic.endswith("/tf") and topic not in dead
+    )
 
 
 def _may_be(topic: str, wanted: Wanted) -> bool:

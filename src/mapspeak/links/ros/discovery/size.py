@@ -20,26 +20,37 @@ COSTMAPS = {
 
 
 async def find_radius_m(
-    connection: RosConnection, dialect: Dialect, *, namespace: str = ""
+    connection: RosConnection,
+    dialect: Dialect,
+    *,
+    namespace: str = "",
+    services: frozenset[str] | None = None,
 ) -> tuple[float, str] | None:
-    """Finds the radius of the smallest circle around the robot, and which parameter says so.
+    """Find the radius of the smallest circle around the robot, and which parameter says so.
 
     Navigation knows it as `footprint`, a polygon around the base, which counts where it is given,
     or as `robot_radius`. None where neither is to be had.
+
+    Args:
+        connection: To the robot.
+        dialect: Which ROS: each keeps parameters in its own way.
+        namespace: Where the robot's nodes are.
+        services: Those that the robot lists; None where it does not. Nodes are known by them
+            before they are by name.
     """
-    try:
-        nodes = set(await connection.fetch_nodes())
-        for node, prefix in COSTMAPS[dialect]:
-            full = f"{namespace.rstrip('/')}{node}"
-            if full not in nodes:
-                continue
-            for name, read in (("footprint", _radius_of_outline), ("robot_radius", _plausible)):
+    for node, prefix in COSTMAPS[dialect]:
+        full = f"{namespace}{node}"
+        asked = f"{full}/get_parameters"
+        if dialect is Dialect.ROS2 and services is not None and asked not in services:
+            continue
+        for name, read in (("footprint", _radius_of_outline), ("robot_radius", _plausible)):
+            try:
                 radius_m = read(await connection.fetch_parameter(full, f"{prefix}{name}"))
-                if radius_m is not None:
-                    return radius_m, f"{full} {prefix}{name}"
-    except LinkError:
-        # A robot whose navigation does not tell is used as one that has none.
-        return None
+            except LinkError:
+                # A robot whose navigation does not tell is used as one that has none.
+                break
+            if radius_m is not None:
+                return radius_m, f"{full} {prefix}{name}"
     return None
 
 

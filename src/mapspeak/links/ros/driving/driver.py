@@ -17,10 +17,10 @@ class DrivingPatience(ActionPatience):
     """How long to wait for the robot's navigation, in wall time; a test shortens it.
 
     Attributes:
-        settling_s: After connecting, for all that the robot offers to be found.
+        settling_s: After connecting, without anything new, until all that is there is found.
     """
 
-    settling_s: float = 3.0
+    settling_s: float = 5.0
 
 
 class Driver(Protocol):

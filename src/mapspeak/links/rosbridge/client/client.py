@@ -33,7 +33,16 @@ from mapspeak.links.rosbridge.protocol import (
     Published,
     StatusNoted,
 )
-from mapspeak.ros import ActionEnd, ActionGoal, OwnEnds, Started, Subscription, new_id
+from mapspeak.ros import (
+    ActionEnd,
+    ActionGoal,
+    LinkKind,
+    LinkName,
+    OwnEnds,
+    Started,
+    Subscription,
+    new_id,
+)
 from mapspeak.ros.messages import Message
 
 N_REMARKS_KEPT = 50
@@ -72,6 +81,11 @@ class RosbridgeClient(Rosapi):
         """Frames that could not be understood and were left away."""
         self.remarks: deque[str] = deque(maxlen=N_REMARKS_KEPT)
         """What the server remarked, and why frames were refused; the newest last."""
+
+    @property
+    def link(self) -> LinkName:
+        """How we are connected."""
+        return LinkName(LinkKind.ROSBRIDGE, self.address.shown)
 
     @property
     def is_open(self) -> bool:
