@@ -120,11 +120,9 @@ def choose_profile(
         dead: Topics known to exist by name only.
         services: Those of ROS 1; None where they are not known.
     """
-    namespaces = ranking.find_namespaces(graph, dead)
-    namespace = _choose_namespace(overrides, namespaces)
+    namespace, others = _choose_namespace(overrides, ranking.find_namespaces(graph, dead))
     near = ranking.Nearness(namespace, dead)
-    maps = ranking.rank_maps(graph, near)
-    map_topic = overrides.map_topic or (maps[0] if maps else None)
+    map_topic, updates_topic, other_maps = _choose_map(graph, overrides, near)
     source, pose_topic, pose_type = _choose_pose(graph, overrides, near, frames)
     camera_topic, camera_type, info_topic = _choose_camera(graph, overrides, near)
     navigation, navigation_name = _choose_navigation(graph, overrides, near)
@@ -137,10 +135,8 @@ def choose_profile(
         radius_source="robot.yaml" if overrides.radius_m else "",
         map_name=overrides.map_name or "",
         map_topic=map_topic,
-        map_updates_topic=overrides.map_updates_topic or _updates_of(graph, map_topic),
-        other_map_topics=tuple(
-            topic for topic in graph.topics_of(ranking.MAP) if topic != map_topic
-        ),
+        map_updates_topic=updates_topic,
+        other_map_topics=other_maps,
         map_frame=(overrides.map_frame or _choose_frame(("map",), frames, near)).lstrip("/"),
         base_frame=(overrides.base_frame or _choose_frame(BASE_FRAMES, frames, near)).lstrip("/"),
         pose_source=source,
@@ -158,22 +154,37 @@ def choose_profile(
         velocity_type=velocity_type,
         clock_topic="/clock" if "/clock" in graph.types else None,
         namespace=namespace,
-        other_namespaces=() if namespace or "" in namespaces else namespaces,
+        other_namespaces=others,
         dead_topics=dead | _find_dead_action(graph, navigation, navigation_name),
     )
 
 
-def _choose_namespace(overrides: RobotOverrides, found: tuple[str, ...]) -> str:
-    """Return the one that was said, with a slash before it, else that of the only robot."""
+def _choose_namespace(
+    overrides: RobotOverrides, found: tuple[str, ...]
+) -> tuple[str, tuple[str, ...]]:
+    """Return the one that was said or of the only robot, and those among which nobody chose."""
     if overrides.namespace is not None:
-        return f"/{overrides.namespace.strip('/')}".rstrip("/")
-    return found[0] if len(found) == 1 else ""
+        return f"/{overrides.namespace.strip('/')}", ()
+    if len(found) == 1:
+        return found[0], ()
+    return "", () if "" in found else found
 
 
 def _find_dead_action(graph: RosGraph, kind: NavigationKind, name: str | None) -> frozenset[str]:
     """Return an action that robot.yaml names and nobody serves."""
     is_listed = kind is not NavigationKind.NAV2 or not graph.types or name in graph.actions
     return frozenset() if is_listed or name is None else frozenset({name})
+
+
+def _choose_map(
+    graph: RosGraph, overrides: RobotOverrides, near: ranking.Nearness
+) -> tuple[str | None, str | None, tuple[str, ...]]:
+    """Return the map's topic, that of its updates, and other topics of the same type."""
+    found = next(iter(ranking.rank_maps(graph, near)), None)
+    topic = overrides.map_topic or found
+    listed = f"{topic}_updates" if f"{topic}_updates" in graph.types else None
+    others = tuple(each for each in graph.topics_of(ranking.MAP) if each != topic)
+    return topic, overrides.map_updates_topic or listed, others
 
 
 def _choose_pose(
@@ -285,8 +296,3 @@ def _choose_frame(names: tuple[str, ...], frames: frozenset[str], near: ranking.
 def _choose_tf_topics(graph: RosGraph, near: ranking.Nearness) -> tuple[str, str]:
     own = f"{near.namespace}/tf"
     return (own, f"{own}_static") if own in graph.types else ("/tf", "/tf_static")
-
-
-def _updates_of(graph: RosGraph, map_topic: str | None) -> str | None:
-    topic = f"{map_topic}_updates"
-    return topic if topic in graph.types else None

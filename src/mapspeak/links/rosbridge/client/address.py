@@ -11,6 +11,7 @@ from websockets.exceptions import InvalidURI
 from websockets.uri import WebSocketURI, parse_uri
 
 from mapspeak.errors import ConfigError
+from mapspeak.ros import LinkKind, LinkName
 
 DEFAULT_PORT = 9090
 SECRET_KEY = re.compile("token|key|auth|pass|secret|sig", re.IGNORECASE)
@@ -49,6 +50,11 @@ class RobotAddress:
     def uri(self) -> WebSocketURI:
         """The URL in parts."""
         return _parse(self.url)
+
+    @property
+    def link(self) -> LinkName:
+        """How one who is connected to it says so."""
+        return LinkName(LinkKind.ROSBRIDGE, self.shown)
 
     @property
     def shown(self) -> str:

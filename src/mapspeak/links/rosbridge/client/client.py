@@ -33,16 +33,7 @@ from mapspeak.links.rosbridge.protocol import (
     Published,
     StatusNoted,
 )
-from mapspeak.ros import (
-    ActionEnd,
-    ActionGoal,
-    LinkKind,
-    LinkName,
-    OwnEnds,
-    Started,
-    Subscription,
-    new_id,
-)
+from mapspeak.ros import ActionEnd, ActionGoal, LinkName, OwnEnds, Started, Subscription, new_id
 from mapspeak.ros.messages import Message
 
 N_REMARKS_KEPT = 50
@@ -85,7 +76,7 @@ class RosbridgeClient(Rosapi):
     @property
     def link(self) -> LinkName:
         """How we are connected."""
-        return LinkName(LinkKind.ROSBRIDGE, self.address.shown)
+        return self.address.link
 
     @property
     def is_open(self) -> bool:
