@@ -1,12 +1,14 @@
 import json
 import re
 import socket
+import sys
 from collections.abc import AsyncGenerator, Iterable
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 
 import anyio
 import pytest
+from anyio.streams.buffered import BufferedByteReceiveStream
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from fakes import FakeRobot, two_rooms
@@ -22,6 +24,16 @@ START: Message = {"type": "http.response.start", "status": 200, "headers": []}
 MORE: Message = {"type": "http.response.body", "body": b"so far", "more_body": True}
 END: Message = {"type": "http.response.body", "body": b"", "more_body": False}
 HANG_UP: Message = {"type": "http.disconnect"}
+HELLO = {
+    "jsonrpc": "2.0",
+    "id": 1,
+    "method": "initialize",
+    "params": {
+        "protocolVersion": "2025-06-18",
+        "capabilities": {},
+        "clientInfo": {"name": "test", "version": "0"},
+    },
+}
 JSON = {"Content-Type": "application/json", "Accept": "application/json, text/event-stream"}
 
 
@@ -149,20 +161,10 @@ async def request(address: str, method: str, headers: dict[str, str], body: str 
 
 async def begin_session(address: str) -> str:
     """Return the id of a new session, once the server listens."""
-    hello = {
-        "jsonrpc": "2.0",
-        "id": 1,
-        "method": "initialize",
-        "params": {
-            "protocolVersion": "2025-06-18",
-            "capabilities": {},
-            "clientInfo": {"name": "test", "version": "0"},
-        },
-    }
     answer = ""
     while not answer:
         await anyio.lowlevel.checkpoint()
-        answer = await request(address, "POST", JSON, json.dumps(hello))
+        answer = await request(address, "POST", JSON, json.dumps(HELLO))
     found = re.search(r"mcp-session-id: (\w+)", answer)
     assert found is not None, answer
     return found[1]
@@ -200,3 +202,21 @@ async def test_a_client_that_leaves_in_mid_request_costs_one_line(
             await anyio.lowlevel.checkpoint()
     assert "Traceback" not in capfd.readouterr().err
     assert not [each for each in caplog.records if each.exc_info]
+
+
+async def test_a_line_that_is_no_message_is_answered_and_the_talk_goes_on() -> None:
+    ping = {"jsonrpc": "2.0", "id": 4, "method": "ping"}
+    lines = ["{oops", "", json.dumps(HELLO), '{"jsonrpc": "2.0", "id": 2, "params": []}']
+    program = [sys.executable, "-m", "mapspeak", "serve"]
+    with anyio.fail_after(120.0):
+        async with await anyio.open_process(program, stderr=None) as process:
+            assert process.stdin is not None
+            assert process.stdout is not None
+            await process.stdin.send("\n".join([*lines, json.dumps(ping), ""]).encode())
+            answers = BufferedByteReceiveStream(process.stdout)
+            told = [json.loads(await answers.receive_until(b"\n", 1_000_000)) for _ in range(4)]
+            await process.stdin.aclose()
+            assert await process.wait() == 0
+    codes = [each["error"]["code"] for each in told if each["id"] is None]
+    assert codes == [-32700, -32600]
+    assert {each["id"] for each in told if "result" in each} == {1, 4}

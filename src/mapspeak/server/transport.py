@@ -4,12 +4,18 @@ import ipaddress
 import logging
 import secrets
 import socket
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterable, Awaitable, Callable
 from functools import partial
 from http import HTTPStatus
 
+import anyio
 import uvicorn
+from anyio.streams.memory import MemoryObjectSendStream
+from mcp.server.stdio import stdio_server
 from mcp.server.transport_security import TransportSecurityMiddleware, TransportSecuritySettings
+from mcp.shared.message import SessionMessage
+from mcp_types import INVALID_REQUEST, PARSE_ERROR, ErrorData, JSONRPCError
+from pydantic import ValidationError
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -26,8 +32,38 @@ HTTP_LOGGERS = ("mcp.server.streamable_http", "uvicorn.error")
 
 
 async def serve_stdio(server: MapspeakServer | FleetServer) -> None:
-    """Serves one client over standard input and output until it hangs up."""
-    await server.run_stdio_async()
+    """Serve one client over standard input and output until it hangs up.
+
+    A line that is no message is answered, where the SDK keeps silent.
+    """
+    lowlevel = server._lowlevel_server  # noqa: SLF001 - what `run_stdio_async` runs
+    async with stdio_server() as (received, to_send), anyio.create_task_group() as tasks:
+        forward, messages = anyio.create_memory_object_stream[SessionMessage | Exception](0)
+        tasks.start_soon(_answer_unreadable, received, forward, to_send.send)
+        await lowlevel.run(messages, to_send, lowlevel.create_initialization_options())
+        tasks.cancel_scope.cancel()
+
+
+async def _answer_unreadable(
+    received: AsyncIterable[SessionMessage | Exception],
+    forward: MemoryObjectSendStream[SessionMessage | Exception],
+    send: Callable[[SessionMessage], Awaitable[None]],
+) -> None:
+    async with forward:
+        async for each in received:
+            if isinstance(each, ValidationError):
+                fault = each.errors(include_url=False, include_context=False)[0]
+                if not str(fault["input"]).strip():
+                    continue
+                is_json = fault["type"] != "json_invalid"
+                error = ErrorData(
+                    code=INVALID_REQUEST if is_json else PARSE_ERROR,
+                    message="Not a JSON-RPC message." if is_json else "Not JSON.",
+                )
+                answer = JSONRPCError(jsonrpc="2.0", id=None, error=error)
+                await send(SessionMessage(answer))
+            else:
+                await forward.send(each)
 
 
 async def serve_http(

@@ -17,6 +17,7 @@ from mapspeak.errors import ConfigError, LinkError
 from mapspeak.links.rosbridge.client import RobotAddress, RosbridgeClient, Timing, open_client
 from mapspeak.links.rosbridge.client.connection import MAX_REFUSED
 from mapspeak.links.rosbridge.client.websocket import MAX_PARTS
+from mapspeak.links.rosbridge.protocol import MAX_FRAME_BYTES
 from rosbridge_script import (
     PATIENCE_S,
     Operation,
@@ -444,6 +445,15 @@ async def test_a_robot_that_sends_nothing_but_garbage_gets_another_connection(
     warnings = [each.message for each in caplog.records]
     assert len([each for each in warnings if "left away" in each]) == 1
     assert len([each for each in warnings if "made anew" in each]) == 1
+
+
+async def test_a_frame_that_claims_to_be_too_large_costs_the_connection() -> None:
+    server = ScriptedServer({"call_service": echo})
+    async with connected(server) as client:
+        head = b"\x82\x7f" + (MAX_FRAME_BYTES + 1).to_bytes(8)
+        await next(iter(server.present)).send_raw(head)
+        await server.until(lambda: len(server.visitors) == 3)
+        assert await client.call_service("/echo", {"a": 1}) == {"a": 1}
 
 
 async def test_a_message_in_countless_empty_frames_costs_the_connection() -> None:
