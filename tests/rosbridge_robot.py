@@ -106,7 +106,13 @@ class ScriptedRobot:
         )
 
     async def end_goal(
-        self, status: int, *, goal: int = -1, error: str = "", is_result: bool = True
+        self,
+        status: int,
+        *,
+        goal: int = -1,
+        error: str = "",
+        is_result: bool = True,
+        values: dict[str, Any] | None = None,
     ) -> None:
         visitor, operation = self.goals[goal]
         await visitor.send(
@@ -116,7 +122,7 @@ class ScriptedRobot:
                 "id": operation["id"],
                 "status": status,
                 "result": is_result,
-                "values": {"error_code": 103 if error else 0, "error_msg": error},
+                "values": values or {"error_code": 103 if error else 0, "error_msg": error},
             }
         )
 

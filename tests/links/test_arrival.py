@@ -83,8 +83,8 @@ async def test_a_server_whose_robot_is_not_there_lists_its_tools(tmp_path: Path)
         ("write_semantic_data", {"name": "dock", "description": "a dock"}),
         ("ros_overview", {}),
         ("ros_read", {"topic": "/map"}),
-        ("ros_publish", {"topic": "/cmd_vel", "message": {}, "type": "geometry_msgs/msg/Twist"}),
-        ("ros_send_goal", {"action": "/dance", "goal": {}, "type": "shows/action/Dance"}),
+        ("ros_publish", {"topic": "/cmd_vel", "fields": {}, "type": "geometry_msgs/msg/Twist"}),
+        ("ros_send_goal", {"action": "/dance", "fields": {}, "type": "shows/action/Dance"}),
     ],
 )
 async def test_a_tool_that_needs_the_robot_says_why_it_is_not_there_and_what_to_do(

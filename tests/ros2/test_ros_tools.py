@@ -76,7 +76,7 @@ async def test_a_velocity_ends_with_a_stand(
         message = {"linear": {"x": 0.2}}
 
         async def is_heard() -> bool:
-            await caller.ask("ros_publish", topic="/cmd_vel", message=message, duration_s=0.5)
+            await caller.ask("ros_publish", topic="/cmd_vel", fields=message, duration_s=0.5)
             return (0.2, 0.0) in robot.velocities
 
         # Between rosbridge and the robot lies ROS, where a new publisher is not heard at once.
@@ -91,7 +91,7 @@ async def is_told_to_stand(robot: RobotProcess) -> bool:
 async def send(caller: Caller, goal: dict[str, Any], *, wait_s: float) -> str:
     """Sends a goal until it arrives: rosbridge sends it also to a server it has not found yet."""
     while "gave no sign" in (
-        said := await caller.ask("ros_send_goal", action=ACTION, goal=goal, wait_s=wait_s)
+        said := await caller.ask("ros_send_goal", action=ACTION, fields=goal, wait_s=wait_s)
     ):
         pass
     return said
@@ -126,7 +126,7 @@ async def test_goals_are_told_apart_by_how_they_end(rosbridge_url: str, tmp_path
 
 async def test_services_and_parameters_answer(rosbridge_url: str, tmp_path: Path) -> None:
     async with tools(rosbridge_url, tmp_path) as caller:
-        called = await caller.ask("ros_call", service="/switch_motors", arguments={"data": True})
+        called = await caller.ask("ros_call", service="/switch_motors", fields={"data": True})
         said = await caller.ask(
             "ros_set_parameter", node="/robot", parameter="robot_radius", value=0.3
         )

@@ -10,10 +10,11 @@ import pytest
 
 from fakes import FakeRobot, two_rooms
 from guarding import audit_of, make_guard
+from mapspeak.geometry import Pose
 from mapspeak.links.ros.actions import ActionPatience, ActionState, SentGoal
 from mapspeak.links.rosbridge.client import RobotAddress, RosbridgeClient, open_client
 from mapspeak.navigation.safety import Kind, Policy
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages import Dialect, write_header, write_pose
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.goals import ActionBook
@@ -39,7 +40,7 @@ def with_types(scripted: ScriptedRobot) -> ScriptedRobot:
 
 
 async def send(caller: Caller, **arguments: Any) -> str:  # noqa: ANN401
-    return await caller.ask("ros_send_goal", action=ACTION, goal=GOAL, **arguments)
+    return await caller.ask("ros_send_goal", action=ACTION, fields=GOAL, **arguments)
 
 
 # --- over our own server
@@ -53,7 +54,7 @@ async def test_a_goal_is_sent_and_its_end_is_told(dialect: Dialect, tmp_path: Pa
         assert action in await caller.ask("ros_actions")
         fields = await caller.ask("ros_action", action=action)
         async with time_passing(robot):
-            text = await caller.ask("ros_send_goal", action=action, goal=goal, wait_s=20)
+            text = await caller.ask("ros_send_goal", action=action, fields=goal, wait_s=20)
     assert "goal:\n  pose: " in fields or "goal:\n  target_pose: " in fields
     assert "A1" in text
     assert "succeeded" in text
@@ -68,7 +69,7 @@ async def test_a_goal_is_cancelled_by_its_handle(dialect: Dialect, tmp_path: Pat
     async with on_our_server(dialect, tmp_path) as (robot, caller), time_passing(robot):
         far = {"pose": {"position": {"x": 6.0, "y": 1.4}, "orientation": {"w": 1.0}}}
         goal = {name: {**POSE, **far} for name in goal}
-        text = await caller.ask("ros_send_goal", action=action, goal=goal, wait_s=0)
+        text = await caller.ask("ros_send_goal", action=action, fields=goal, wait_s=0)
         cancelled = await caller.ask("ros_cancel_goal", goal_id="a1")
         again = await caller.ask("ros_cancel_goal", goal_id="A1")
     assert "It goes on" in text
@@ -82,8 +83,61 @@ async def test_an_action_that_is_not_there_is_answered_with_the_nearest(
     dialect: Dialect, tmp_path: Path
 ) -> None:
     async with on_our_server(dialect, tmp_path) as (_, caller):
-        text = await caller.refuse("ros_send_goal", action="/navigate", goal={})
+        text = await caller.refuse("ros_send_goal", action="/navigate", fields={})
     assert "The robot has no action '/navigate'" in text
+
+
+@both
+async def test_a_goal_in_a_frame_that_tf_does_not_have_is_refused(
+    dialect: Dialect, tmp_path: Path
+) -> None:
+    lost = {**POSE, "header": {"frame_id": "nix"}}
+    goal = {"pose": lost} if dialect is Dialect.ROS2 else {"target_pose": lost}
+    action = ACTION if dialect is Dialect.ROS2 else "/move_base"
+    kind = dialect.type_name("geometry_msgs/PoseStamped")
+    async with on_our_server(dialect, tmp_path) as (robot, caller), time_passing(robot):
+        sent = await caller.refuse("ros_send_goal", action=action, fields=goal)
+        published = await caller.refuse("ros_publish", topic="/goal", type=kind, fields=lost)
+        await caller.ask("ros_publish", topic="/goal", type=kind, fields=POSE)
+    assert "TF has no frame 'nix'" in sent
+    assert "map" in sent
+    assert "TF has no frame 'nix'" in published
+
+
+@both
+async def test_siblings_take_the_names_that_their_arguments_had_before(
+    dialect: Dialect, tmp_path: Path
+) -> None:
+    action = ACTION if dialect is Dialect.ROS2 else "/move_base"
+    goal = GOAL if dialect is Dialect.ROS2 else {"target_pose": POSE}
+    kind = dialect.type_name("std_msgs/String")
+    async with on_our_server(dialect, tmp_path) as (_, caller):
+        await caller.ask("ros_send_goal", action=action, goal=goal, wait_s=0)
+        await caller.ask("ros_publish", topic="/chat", type=kind, message={"data": "a"})
+        await caller.ask("ros_call", service="/rosapi/topic_type", arguments={"topic": "/map"})
+        text = await caller.refuse(
+            "ros_call", service="/rosapi/topic_type", fields={"topic": "/map"}, arguments={}
+        )
+    assert "ros_call has no argument arguments; it has: fields, service, timeout_s." in text
+
+
+async def test_a_path_in_a_result_is_told_by_its_length(tmp_path: Path) -> None:
+    scripted = with_types(ScriptedRobot())
+    kind = {"type": "nav2_msgs/action/ComputePathToPose"}
+    scripted.services["/rosapi/action_type"] = lambda _: kind
+    header = write_header("map", 0.0, dialect=Dialect.ROS2)
+    pose = write_pose(Pose(0.0, 0.0, 0.0))
+    poses = [
+        {"header": header, "pose": {**pose, "position": {"x": float(x), "y": 0.0, "z": 0.0}}}
+        for x in range(200)
+    ]
+    path = {"header": header, "poses": poses}
+    async with on_script(scripted, tmp_path) as caller:
+        await caller.ask("ros_send_goal", action=ACTION, fields={}, wait_s=0)
+        await scripted.end_goal(SUCCEEDED, values={"path": path, "error_code": 0})
+        text = await caller.ask("ros_goal_status", wait_s=20)
+    assert "path: Path in frame map: 200 poses, 199.00 m long" in text
+    assert "error_code: 0" in text
 
 
 # --- told apart
@@ -231,7 +285,7 @@ async def test_a_goal_that_does_not_fit_is_not_sent(tmp_path: Path) -> None:
     scripted = with_types(ScriptedRobot())
     async with on_script(scripted, tmp_path) as caller:
         goal = {"pose": {"pose": {"position": {"x": "here"}}}}
-        text = await caller.refuse("ros_send_goal", action=ACTION, goal=goal)
+        text = await caller.refuse("ros_send_goal", action=ACTION, fields=goal)
     assert "pose.pose.position.x wants a number (float64), not 'here'" in text
     assert scripted.goals == []
 
@@ -360,7 +414,7 @@ async def test_on_ros_1_replies_are_matched_by_the_goals_id(tmp_path: Path) -> N
 
         async def ask() -> None:
             goal = {"target_pose": POSE}
-            text = await caller.ask("ros_send_goal", action="/move_base", goal=goal, wait_s=20)
+            text = await caller.ask("ros_send_goal", action="/move_base", fields=goal, wait_s=20)
             said.append(text)
 
         tasks.start_soon(ask)

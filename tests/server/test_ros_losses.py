@@ -57,7 +57,7 @@ async def test_right_after_the_start_no_connection_was_lost(tmp_path: Path) -> N
 async def test_a_goals_state_is_told_with_the_loss_of_the_connection(tmp_path: Path) -> None:
     scripted = ScriptedRobot()
     async with losing(scripted, tmp_path) as (client, caller):
-        whole = await caller.ask("ros_send_goal", action=ACTION, goal=GOAL, wait_s=0)
+        whole = await caller.ask("ros_send_goal", action=ACTION, fields=GOAL, wait_s=0)
         await lose(scripted, client)
         lost = await caller.ask("ros_goal_status")
         listed = await caller.ask("ros_goal_status", action=ACTION)
@@ -107,7 +107,7 @@ async def test_what_is_too_large_is_refused_before_it_cuts_the_connection(tmp_pa
             "ros_publish",
             topic="/chat",
             type="std_msgs/msg/String",
-            message={"data": "x" * 10_000_000},
+            fields={"data": "x" * 10_000_000},
         )
         await caller.ask("ros_topics")
         assert client.n_connections == 1

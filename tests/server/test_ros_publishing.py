@@ -42,7 +42,7 @@ async def test_publishing_a_velocity_for_a_time_ends_when_it_says_with_a_stand(
     scripted = listening(ScriptedRobot())
     async with on_script(scripted, tmp_path) as caller:
         text = await caller.ask(
-            "ros_publish", topic="/cmd_vel", message=FORWARD, duration_s=0.2, rate_hz=20
+            "ros_publish", topic="/cmd_vel", fields=FORWARD, duration_s=0.2, rate_hz=20
         )
         messages = published(scripted)
     assert "Published 4 times in 0.2" in text
@@ -64,7 +64,7 @@ async def test_nothing_is_published_before_the_robot_knows_that_somebody_will(
 
     scripted.services["/rosapi/publishers"] = tell
     async with on_script(scripted, tmp_path) as caller:
-        await caller.ask("ros_publish", topic="/cmd_vel", message=STAND)
+        await caller.ask("ros_publish", topic="/cmd_vel", fields=STAND)
         await scripted.until(lambda: published(scripted))
     assert before == [0, 0, 0]
 
@@ -72,8 +72,8 @@ async def test_nothing_is_published_before_the_robot_knows_that_somebody_will(
 async def test_a_velocity_without_an_end_is_refused(tmp_path: Path) -> None:
     scripted = listening(ScriptedRobot())
     async with on_script(scripted, tmp_path) as caller:
-        text = await caller.refuse("ros_publish", topic="/cmd_vel", message={"linear": {"x": 99}})
-        await caller.ask("ros_publish", topic="/cmd_vel", message=STAND)
+        text = await caller.refuse("ros_publish", topic="/cmd_vel", fields={"linear": {"x": 99}})
+        await caller.ask("ros_publish", topic="/cmd_vel", fields=STAND)
         await scripted.until(lambda: published(scripted))
     assert "Give duration_s" in text
     assert published(scripted) == [STAND]
@@ -106,7 +106,7 @@ async def test_stopping_the_robot_ends_what_is_being_published(tmp_path: Path) -
 
 async def publish_long(caller: Caller) -> str:
     return await caller.ask(
-        "ros_publish", topic="/cmd_vel", message=FORWARD, duration_s=20, rate_hz=50
+        "ros_publish", topic="/cmd_vel", fields=FORWARD, duration_s=20, rate_hz=50
     )
 
 
@@ -114,7 +114,7 @@ async def publish_long(caller: Caller) -> str:
 async def test_the_robot_hears_what_is_published(dialect: Dialect, tmp_path: Path) -> None:
     async with on_our_server(dialect, tmp_path) as (robot, caller):
         text = await caller.ask(
-            "ros_publish", topic="cmd_vel", message=FORWARD, duration_s=0.1, rate_hz=50
+            "ros_publish", topic="cmd_vel", fields=FORWARD, duration_s=0.1, rate_hz=50
         )
     assert "Heard by: /robot_base" in text
     assert robot.n_stops >= 1, "the stand at the end is what our robot understands"
@@ -138,7 +138,7 @@ async def test_a_message_that_does_not_fit_is_refused_with_its_path(
     dialect: Dialect, tmp_path: Path, message: dict[str, Any], said: str
 ) -> None:
     async with on_our_server(dialect, tmp_path) as (_, caller):
-        text = await caller.refuse("ros_publish", topic="/cmd_vel", message=message, duration_s=1)
+        text = await caller.refuse("ros_publish", topic="/cmd_vel", fields=message, duration_s=1)
     assert said in text
 
 
@@ -148,7 +148,7 @@ async def test_numbers_that_are_none_are_refused(tmp_path: Path) -> None:
         for odd in (float("nan"), float("inf")):
             message = {"linear": {"x": odd}}
             text = await caller.refuse(
-                "ros_publish", topic="/cmd_vel", message=message, duration_s=1
+                "ros_publish", topic="/cmd_vel", fields=message, duration_s=1
             )
             assert "linear.x wants a" in text
     assert published(scripted) == []
@@ -158,11 +158,11 @@ async def test_numbers_that_are_none_are_refused(tmp_path: Path) -> None:
 async def test_a_topic_has_one_type(dialect: Dialect, tmp_path: Path) -> None:
     async with on_our_server(dialect, tmp_path) as (_, caller):
         text = await caller.refuse(
-            "ros_publish", topic="/cmd_vel", message={"data": "x"}, type="std_msgs/msg/String"
+            "ros_publish", topic="/cmd_vel", fields={"data": "x"}, type="std_msgs/msg/String"
         )
-        unknown = await caller.refuse("ros_publish", topic="/cmd_val", message=FORWARD)
+        unknown = await caller.refuse("ros_publish", topic="/cmd_val", fields=FORWARD)
         new = await caller.ask(
-            "ros_publish", topic="/chat", message={"data": "x"}, type="std_msgs/msg/String"
+            "ros_publish", topic="/chat", fields={"data": "x"}, type="std_msgs/msg/String"
         )
     assert f"/cmd_vel is a {dialect.type_name('geometry_msgs/Twist')}, not a std_msgs" in text
     assert "/cmd_vel" in unknown
@@ -177,11 +177,11 @@ async def test_a_service_that_fails_is_an_error_with_its_words(tmp_path: Path) -
     scripted.services["/rosapi/service_type"] = lambda _: {"type": "std_srvs/srv/SetBool"}
     async with on_script(scripted, tmp_path) as caller:
         gone = await caller.refuse(
-            "ros_call", service="/lamp", arguments={"data": True}, timeout_s=0.1
+            "ros_call", service="/lamp", fields={"data": True}, timeout_s=0.1
         )
-        wrong = await caller.refuse("ros_call", service="/lamp", arguments={"data": 1})
+        wrong = await caller.refuse("ros_call", service="/lamp", fields={"data": 1})
         scripted.services["/lamp"] = lambda _: {"success": True, "message": "on"}
-        answer = await caller.ask("ros_call", service="/lamp", arguments={"data": True})
+        answer = await caller.ask("ros_call", service="/lamp", fields={"data": True})
     assert "/lamp does not exist" in gone
     assert "data wants true or false (bool), not 1" in wrong
     assert 'success: true\nmessage: "on"' in answer
@@ -191,7 +191,7 @@ async def test_a_service_that_fails_is_an_error_with_its_words(tmp_path: Path) -
 async def test_the_services_of_rosapi_itself_are_called(dialect: Dialect, tmp_path: Path) -> None:
     async with on_our_server(dialect, tmp_path) as (_, caller):
         answer = await caller.ask(
-            "ros_call", service="/rosapi/topic_type", arguments={"topic": "/map"}
+            "ros_call", service="/rosapi/topic_type", fields={"topic": "/map"}
         )
         details = await caller.ask("ros_service", service="/rosapi/message_details")
         parameter = await caller.ask("ros_service", service="/rosapi/get_param")
@@ -214,7 +214,7 @@ async def test_a_service_that_rosbridge_finds_later_than_rosapi_is_called_all_th
 
     scripted.services["/rosapi/service_type"] = tell
     async with on_script(scripted, tmp_path) as caller:
-        answer = await caller.ask("ros_call", service="/lamp", arguments={"data": True})
+        answer = await caller.ask("ros_call", service="/lamp", fields={"data": True})
     assert "success: true" in answer
 
 
@@ -306,8 +306,8 @@ async def test_a_speed_above_the_operators_limit_is_refused_and_the_robot_left_s
     guard = make_guard(tmp_path)
     async with on_script(scripted, tmp_path, guard=guard) as caller:
         message = {"linear": {"x": 99.0}}
-        text = await caller.refuse("ros_publish", topic="/cmd_vel", message=message, duration_s=1)
-        await caller.ask("ros_publish", topic="/cmd_vel", message=STAND)
+        text = await caller.refuse("ros_publish", topic="/cmd_vel", fields=message, duration_s=1)
+        await caller.ask("ros_publish", topic="/cmd_vel", fields=STAND)
     assert "99 m/s" in text
     assert all(each == STAND for each in published(scripted))
 
@@ -350,9 +350,9 @@ async def test_what_is_denied_is_said_before_anything_else_is_wrong_with_it(
     scripted.services["/rosapi/service_type"] = lambda _: {"type": "odd_msgs/srv/Odd"}
     async with on_script(scripted, tmp_path, guard=make_guard(tmp_path)) as caller:
         called = await caller.refuse("ros_call", service="/base/shutdown")
-        published = await caller.refuse("ros_publish", topic="/map", message={"odd": 1})
-        sent = await caller.refuse("ros_send_goal", action="/navigate_to_pose", goal={"x": 1})
-        nowhere = await caller.refuse("ros_publish", topic="/initialpose", message={})
+        published = await caller.refuse("ros_publish", topic="/map", fields={"odd": 1})
+        sent = await caller.refuse("ros_send_goal", action="/navigate_to_pose", fields={"x": 1})
+        nowhere = await caller.refuse("ros_publish", topic="/initialpose", fields={})
         gone = await caller.refuse("ros_call", service="/reinitialize_global_localization")
     assert "(call.usual_denials: *shutdown*)" in called
     assert "(publish.usual_denials: */map)" in published

@@ -21,7 +21,7 @@ def is_moving(scripted: ScriptedRobot) -> bool:
 async def move(caller: Caller, said: list[str], duration_s: float = 20.0) -> None:
     result = await caller.client.call_tool(
         "ros_publish",
-        {"topic": "/cmd_vel", "message": FORWARD, "duration_s": duration_s, "rate_hz": 50},
+        {"topic": "/cmd_vel", "fields": FORWARD, "duration_s": duration_s, "rate_hz": 50},
     )
     said.append(result.content[0].text)  # type: ignore[union-attr]
 
@@ -33,8 +33,8 @@ async def test_a_second_velocity_is_refused_while_the_first_moves_the_robot(
     async with on_script(scripted, tmp_path) as caller, anyio.create_task_group() as tasks:
         tasks.start_soon(move, caller, said)
         await scripted.until(lambda: is_moving(scripted))
-        second = await caller.refuse("ros_publish", topic="/cmd_vel", message=FORWARD, duration_s=1)
-        stand = await caller.ask("ros_publish", topic="/cmd_vel", message=STAND)
+        second = await caller.refuse("ros_publish", topic="/cmd_vel", fields=FORWARD, duration_s=1)
+        stand = await caller.ask("ros_publish", topic="/cmd_vel", fields=STAND)
         await caller.ask("stop_robot")
     assert "Another ros_publish moves the robot on /cmd_vel for 1" in second
     assert "end it with stop_robot" in second
@@ -45,9 +45,9 @@ async def test_a_second_velocity_is_refused_while_the_first_moves_the_robot(
 async def test_a_velocity_is_refused_during_a_drive_of_our_own(tmp_path: Path) -> None:
     async with on_our_server(Dialect.ROS2, tmp_path) as (_, caller):
         await caller.ask("navigate_to", x=2.0, y=1.0, wait_s=0)
-        text = await caller.refuse("ros_publish", topic="/cmd_vel", message=FORWARD, duration_s=1)
+        text = await caller.refuse("ros_publish", topic="/cmd_vel", fields=FORWARD, duration_s=1)
         await caller.ask("cancel_goal")
-        later = await caller.ask("ros_publish", topic="/cmd_vel", message=FORWARD, duration_s=0.1)
+        later = await caller.ask("ros_publish", topic="/cmd_vel", fields=FORWARD, duration_s=0.1)
     assert "G1 to " in text
     assert "is under way: a velocity on /cmd_vel would work against it" in text
     assert "Published once in 0.1" in later

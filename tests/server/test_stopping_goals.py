@@ -69,7 +69,7 @@ async def test_a_stop_ends_goals_of_any_action(tmp_path: Path, stop: str) -> Non
         connect_scripted(scripted, timing=QUICK, patience=LONG) as robot,
         serving(robot, tmp_path) as (session, caller),
     ):
-        running = await caller.ask("ros_send_goal", action=PATROL, goal={}, wait_s=0)
+        running = await caller.ask("ros_send_goal", action=PATROL, fields={}, wait_s=0)
         if stop == "stop_robot":
             await caller.ask("stop_robot")
         elif stop == "lost client":
@@ -90,7 +90,7 @@ async def test_a_stop_that_cannot_end_a_goal_says_which(tmp_path: Path) -> None:
         connect_scripted(scripted, timing=QUICK, patience=brief) as robot,
         serving(robot, tmp_path) as (_, caller),
     ):
-        await caller.ask("ros_send_goal", action=PATROL, goal={}, wait_s=0)
+        await caller.ask("ros_send_goal", action=PATROL, fields={}, wait_s=0)
         said = await caller.refuse("stop_robot")
     assert "NOT STOPPED" in said
     assert PATROL in said
@@ -107,7 +107,7 @@ async def test_a_stop_publishes_zero_velocity_wherever_a_velocity_was_published(
     ):
         message = {"linear": {"x": 0.2}}
         await caller.ask(
-            "ros_publish", topic="/arm/cmd_vel", message=message, duration_s=0.1, rate_hz=20
+            "ros_publish", topic="/arm/cmd_vel", fields=message, duration_s=0.1, rate_hz=20
         )
         n_before = len(velocities(scripted, "/arm/cmd_vel"))
         await caller.ask("stop_robot")
@@ -142,7 +142,7 @@ async def send(caller: Caller, tool: str) -> str:
     pose = {"position": {"x": NEXT_ROOM.x, "y": NEXT_ROOM.y}, "orientation": {"w": 1.0}}
     target = {"header": {"frame_id": "map"}, "pose": pose}
     goal = {"target_pose": target}
-    return await caller.ask(tool, action="/move_base", goal=goal, wait_s=0)
+    return await caller.ask(tool, action="/move_base", fields=goal, wait_s=0)
 
 
 @pytest.mark.parametrize("tool", ["navigate_to", "ros_send_goal"])

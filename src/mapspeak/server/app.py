@@ -75,6 +75,7 @@ class MapspeakServer(MCPServer[Any]):
         self._missing = frozenset(missing)
         self._arguments: dict[str, frozenset[str]] = {}
         self._numbers: dict[str, frozenset[str]] = {}
+        self._former: dict[str, Mapping[str, str]] = {}
         self._remembering: set[str] = set()
 
     @property
@@ -86,6 +87,11 @@ class MapspeakServer(MCPServer[Any]):
         self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None = None
     ) -> CallToolResult | InputRequiredResult:
         """Calls a tool; what went wrong on purpose reaches the model with its hint."""
+        former = self._former.get(name, {})
+        arguments = {
+            key if former.get(key, key) in arguments else former[key]: value
+            for key, value in arguments.items()
+        }
         if self._call_log is None:
             return await self._call_readably(name, arguments, context)
         with self._call_log.noting(name, arguments) as note:
@@ -153,6 +159,7 @@ class MapspeakServer(MCPServer[Any]):
         """Adds a tool to those that can be called; its description leads to no missing one."""
         self._arguments[tool.name] = tool.arguments
         self._numbers[tool.name] = tool.numbers
+        self._former[tool.name] = tool.former
         if tool.effect is Effect.REMEMBERS:
             self._remembering.add(tool.name)
         self.add_tool(

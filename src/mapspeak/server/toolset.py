@@ -1,8 +1,8 @@
 """A tool as mapspeak declares it: a function, what it does to the world, how it is found."""
 
 import inspect
-from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any, get_args, get_type_hints
 
@@ -30,6 +30,7 @@ class Tool:
         effect: What it changes.
         has_report: It answers with a pydantic report; else with text and pictures.
         is_entry: A model should see it at once, even where tools are searched for.
+        former: The names that its arguments had before, which are taken too, with today's.
     """
 
     function: Callable[..., Awaitable[Any]]
@@ -37,6 +38,7 @@ class Tool:
     effect: Effect
     has_report: bool = False
     is_entry: bool = False
+    former: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def name(self) -> str:

@@ -10,14 +10,16 @@ from mapspeak.errors import GoalError, LinkError
 from mapspeak.links.ros.actions import ActionState, SentGoal
 from mapspeak.navigation.safety import Act
 from mapspeak.ros.definitions import check_message
-from mapspeak.ros.messages import bare_type
+from mapspeak.ros.messages import Message, bare_type
 from mapspeak.server.callers import client_of
 from mapspeak.server.rosreports import cut, show_message
 from mapspeak.server.tools.ros.commands import RosCommands
+from mapspeak.server.tools.ros.frames import check_frames
 from mapspeak.server.tools.ros.goals import ActionBook, Job
-from mapspeak.server.tools.ros.inquiry import RosInquiry, full_name
+from mapspeak.server.tools.ros.inquiry import Described, RosInquiry, full_name
 from mapspeak.server.tools.ros.lists import Filter, Page, choose, say_page
 from mapspeak.server.tools.ros.losses import say_loss
+from mapspeak.server.tools.ros.views import view_fields
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.server.wording import say_count
 
@@ -64,13 +66,19 @@ class ActionTools:
         self._inquiry = inquiry
         self._commands = commands
         self._book = book
+        self._described: dict[str, Described] = {}
 
     def tools(self) -> list[Tool]:
         """Gives the tools in their order."""
         return [
             Tool(function=self.ros_actions, title="List ROS actions", effect=Effect.READS),
             Tool(function=self.ros_action, title="One ROS action", effect=Effect.READS),
-            Tool(function=self.ros_send_goal, title="Send a ROS goal", effect=Effect.MOVES),
+            Tool(
+                function=self.ros_send_goal,
+                title="Send a ROS goal",
+                effect=Effect.MOVES,
+                former={"goal": "fields"},
+            ),
             Tool(function=self.ros_goal_status, title="How a ROS goal stands", effect=Effect.READS),
             Tool(function=self.ros_cancel_goal, title="Cancel a ROS goal", effect=Effect.STOPS),
         ]
@@ -104,7 +112,7 @@ class ActionTools:
         self,
         context: Context,
         action: Action,
-        goal: GoalFields,
+        fields: GoalFields,
         wait_s: Wait = 5.0,
         type: ActionType = None,  # noqa: A002
     ) -> str:
@@ -114,10 +122,12 @@ class ActionTools:
         refused goal is told as rejected. Call ros_action first for the fields.
         """
         name = full_name(action)
-        self._commands.check_name(Act(action=name, type=type or "", goal=goal))
+        self._commands.check_name(Act(action=name, type=type or "", goal=fields))
         said = await self._find_type(name, type)
         described = await self._inquiry.describe(said)
-        checked = check_message(described.book, described.part(0), goal)
+        checked = check_message(described.book, described.part(0), fields)
+        await check_frames(self._inquiry, checked)
+        self._described[name] = described
         client = client_of(context)
         job = await self._book.send(name, checked, type_name=described.type, client=client)
         try:
@@ -192,10 +202,17 @@ class ActionTools:
         said = [part for part in (loss, reason, goal.afterwards, _say_next_step(goal)) if part]
         parts.append(" ".join(said))
         if goal.result is not None:
-            parts.append(f"result:\n{show_message(goal.result)}")
+            parts.append(f"result:\n{self._show_result(goal.action, goal.result)}")
         elif goal.feedback is not None:
             parts.append(f"latest feedback of {goal.n_feedback}:\n{show_message(goal.feedback)}")
         return cut("\n".join(part for part in parts if part))
+
+    def _show_result(self, action: str, result: Message) -> str:
+        described = self._described.get(action)
+        fields = () if described is None else described.book[described.part(1)].fields
+        views, plain = view_fields(fields, result)
+        shown = [f"{name}: {view.text}" for name, view in views.items()]
+        return "\n".join([*shown, *([show_message(plain)] if plain or not shown else [])])
 
 
 def _say_next_step(goal: SentGoal) -> str:

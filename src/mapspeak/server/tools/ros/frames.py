@@ -1,18 +1,24 @@
 """The tree of coordinate frames as the topics of TF tell it, with what is wrong with it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.ros import RosConnection
+from mapspeak.ros import RosConnection, find_nearest
 from mapspeak.ros.messages import Message, read_transforms
+from mapspeak.server.tools.ros.inquiry import RosInquiry
 from mapspeak.server.tools.ros.reading import say_rate
 from mapspeak.server.tools.ros.stamps import say_lag
 from mapspeak.server.wording import list_some, say_count
 
-__all__ = ["FrameLink", "hear_frames", "say_frames"]
+__all__ = ["TRANSFORMS", "FrameLink", "check_frames", "hear_frames", "say_frames"]
+
+TRANSFORMS = "tf2_msgs/TFMessage"
+FRAMES_COME_S = 2.0
+"""For a frame that somebody sends to come, in wall time."""
 
 LATE_PERIODS = 3.0
 LEAST_LATE_S = 1.0
@@ -52,6 +58,10 @@ class _Listener:
     def __init__(self) -> None:
         self.links: dict[tuple[str, str, bool], FrameLink] = {}
 
+    @property
+    def frames(self) -> set[str]:
+        return {frame for parent, child, _ in self.links for frame in (parent, child)}
+
     def take(self, message: Message, *, is_static: bool, now_s: float) -> None:
         try:
             transforms = read_transforms(message)
@@ -76,7 +86,11 @@ class _Listener:
 
 
 async def hear_frames(
-    connection: RosConnection, topics: Sequence[tuple[str, str, bool]], *, duration_s: float
+    connection: RosConnection,
+    topics: Sequence[tuple[str, str, bool]],
+    *,
+    duration_s: float,
+    wanted: AbstractSet[str] = frozenset(),
 ) -> list[FrameLink]:
     """Gives the transforms that come in a time, those that are kept for latecomers too.
 
@@ -84,6 +98,7 @@ async def hear_frames(
         connection: To listen with.
         topics: Name, type as this ROS writes it, and whether what comes never changes.
         duration_s: In wall time.
+        wanted: Once all these frames have come, it ends; empty to listen for the whole time.
     """
     listener = _Listener()
 
@@ -98,6 +113,8 @@ async def hear_frames(
                 message = await subscription.wait_for_more_than(n_seen, timeout_s=2 * duration_s)
                 n_seen = subscription.n_received
                 listener.take(message, is_static=is_static, now_s=subscription.arrived_s)
+                if wanted and wanted <= listener.frames:
+                    tasks.cancel_scope.cancel()
         except LinkError:
             return
         finally:
@@ -108,6 +125,46 @@ async def hear_frames(
             for topic, type_name, is_static in topics:
                 tasks.start_soon(listen, topic, type_name, is_static)
     return list(listener.links.values())
+
+
+async def check_frames(inquiry: RosInquiry, message: Message) -> None:
+    """Return when TF has every frame that a goal is given in, or tells nothing that moves.
+
+    Raises:
+        LinkError: It has not; the goal would wait for ever, or be dropped without a word.
+    """
+    graph = await inquiry.fetch_topics()
+    topics = graph.topics_of(TRANSFORMS)
+    wanted = set(_frames_in(message))
+    if not topics or not wanted:
+        return
+    type_name = graph.dialect.type_name(TRANSFORMS)
+    links = await hear_frames(
+        inquiry.connection,
+        [(topic, type_name, topic.endswith("_static")) for topic in topics],
+        duration_s=FRAMES_COME_S,
+        wanted=wanted,
+    )
+    known = sorted({frame for link in links for frame in (link.parent, link.child)})
+    strangers = sorted(wanted - set(known))
+    if strangers and not all(link.is_static for link in links):
+        near = find_nearest(strangers[0], known) or known[:MOST_NAMED]
+        raise LinkError(
+            f"TF has no frame {strangers[0][:80]!r}: a goal given in it would never be reached.",
+            hint=f"Its {len(known)} frames are such as {', '.join(near)}; ros_frames lists all.",
+        )
+
+
+def _frames_in(value: object) -> Iterator[str]:
+    """Yield the frames in the headers of a message and of all within, without a leading slash."""
+    if isinstance(value, list):
+        for each in value:
+            yield from _frames_in(each)
+    if isinstance(value, Mapping):
+        for name, each in value.items():
+            if name == "frame_id" and isinstance(each, str) and each.strip("/"):
+                yield each.strip("/")
+            yield from _frames_in(each)
 
 
 def say_frames(links: Sequence[FrameLink], *, now_s: float, heard_s: float) -> str:

@@ -8,7 +8,7 @@ from pydantic import Field
 from mapspeak.errors import LinkError
 from mapspeak.server.rosreports import cut
 from mapspeak.server.tools.ros.census import fetch_publishers
-from mapspeak.server.tools.ros.frames import hear_frames, say_frames
+from mapspeak.server.tools.ros.frames import TRANSFORMS, hear_frames, say_frames
 from mapspeak.server.tools.ros.inquiry import RosInquiry, full_name
 from mapspeak.server.tools.ros.reading import Heard, hear, say_rate
 from mapspeak.server.tools.ros.stamps import say_stamp
@@ -19,7 +19,6 @@ from mapspeak.session import Session
 __all__ = ["MeasuringTools"]
 
 MOST_TOPICS = 20
-TRANSFORMS = "tf2_msgs/TFMessage"
 
 Topics = Annotated[
     list[Annotated[str, Field(max_length=200)]],

@@ -16,14 +16,14 @@ from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.inquiry import Described, RosInquiry, full_name
 from mapspeak.server.tools.ros.lists import Filter, Page, choose, say_page
 from mapspeak.server.tools.ros.stamps import say_stamp
-from mapspeak.server.tools.ros.views import VIEWED, view_message
+from mapspeak.server.tools.ros.views import view_fields
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.session import Session
 
 __all__ = ["ServiceTools"]
 
 Service = Annotated[str, Field(description="full name, such as /reset", max_length=200)]
-Arguments = Annotated[
+RequestFields = Annotated[
     dict[str, Any] | None,
     Field(description="the request's fields as ros_service shows them; those left out: defaults"),
 ]
@@ -55,7 +55,12 @@ class ServiceTools:
         return [
             Tool(function=self.ros_services, title="List ROS services", effect=Effect.READS),
             Tool(function=self.ros_service, title="One ROS service", effect=Effect.READS),
-            Tool(function=self.ros_call, title="Call a ROS service", effect=Effect.MOVES),
+            Tool(
+                function=self.ros_call,
+                title="Call a ROS service",
+                effect=Effect.MOVES,
+                former={"arguments": "fields"},
+            ),
         ]
 
     async def ros_services(self, filter: Filter = None, page: Page = 1) -> str:  # noqa: A002
@@ -84,19 +89,19 @@ class ServiceTools:
         return cut(f"{name} {said}\noffered by: {node}\n{fields}")
 
     async def ros_call(
-        self, service: Service, arguments: Arguments = None, timeout_s: Timeout = 5.0
+        self, service: Service, fields: RequestFields = None, timeout_s: Timeout = 5.0
     ) -> list[str | Image]:
         """Calls a ROS service, which may move the robot or change it, and gives its response.
 
         Use ros_service first for its fields: the request is checked against its type.
         """
         name = full_name(service)
-        self._commands.check_name(Call(service=name, type="", arguments=arguments or {}))
+        self._commands.check_name(Call(service=name, type="", arguments=fields or {}))
         type_name = await self._inquiry.fetch_service_type(name)
         said = await self._inquiry.said(type_name, kind="srv")
-        self._commands.check_name(Call(service=name, type=said, arguments=arguments or {}))
+        self._commands.check_name(Call(service=name, type=said, arguments=fields or {}))
         described = await self._inquiry.describe(said)
-        request = check_message(described.book, described.part(0), arguments or {})
+        request = check_message(described.book, described.part(0), fields or {})
         answer = await self._commands.call(name, request, type_name=said, timeout_s=timeout_s)
         return await self._show(f"{name} ({said}) answered:", described, answer)
 
@@ -105,19 +110,14 @@ class ServiceTools:
     ) -> list[str | Image]:
         """Gives the response; maps and the like within it as they are shown elsewhere."""
         fields = described.book[described.part(1)].fields
-        seen = {each.name: each.type for each in fields if each.type in VIEWED}
-        plain = {name: value for name, value in answer.items() if name not in seen}
+        views, plain = await self._session.compute(partial(view_fields, fields, answer))
         parts: list[str] = [head]
-        pictures: list[Image] = []
-        for name, kind in seen.items():
-            value = answer.get(name)
-            if isinstance(value, dict):
-                view = await self._session.compute(partial(view_message, kind, value))
-                stamp = say_stamp(value, now_s=self._session.robot.now_s)
-                parts += [f"{name}: {view.text}", *([stamp] if stamp else [])]
-                pictures += [] if view.picture is None else [view.picture]
-        if plain or not seen:
+        for name, view in views.items():
+            stamp = say_stamp(answer[name], now_s=self._session.robot.now_s)
+            parts += [f"{name}: {view.text}", *([stamp] if stamp else [])]
+        if plain or not views:
             parts.append(show_message(plain))
+        pictures = [view.picture for view in views.values() if view.picture is not None]
         return [cut("\n".join(parts)), *pictures]
 
 

@@ -15,7 +15,8 @@ from mapspeak.ros.messages import Message, bare_type
 from mapspeak.server.rosreports import cut
 from mapspeak.server.tools.ros.census import Census, fetch_hearers, fetch_publishers, take_census
 from mapspeak.server.tools.ros.commands import VELOCITIES, RosCommands, stand_of
-from mapspeak.server.tools.ros.inquiry import RosInquiry, full_name
+from mapspeak.server.tools.ros.frames import check_frames
+from mapspeak.server.tools.ros.inquiry import ACTION_GOAL, RosInquiry, full_name
 from mapspeak.server.tools.ros.lists import Filter, Page, choose, say_page
 from mapspeak.server.tools.ros.losses import say_loss
 from mapspeak.server.tools.ros.measuring import say_silence
@@ -68,6 +69,9 @@ PublishFor = Annotated[
 Rate = Annotated[float, Field(description="messages a second", ge=0.1, le=50)]
 
 
+GOAL_POSE = "geometry_msgs/PoseStamped"
+
+
 class TopicTools:
     """Listing, describing, hearing and publishing."""
 
@@ -85,7 +89,12 @@ class TopicTools:
             Tool(function=self.ros_topic, title="One ROS topic", effect=Effect.READS),
             Tool(function=self.ros_type, title="What a ROS type looks like", effect=Effect.READS),
             Tool(function=self.ros_read, title="Read a ROS topic", effect=Effect.READS),
-            Tool(function=self.ros_publish, title="Publish on a ROS topic", effect=Effect.MOVES),
+            Tool(
+                function=self.ros_publish,
+                title="Publish on a ROS topic",
+                effect=Effect.MOVES,
+                former={"message": "fields"},
+            ),
         ]
 
     async def ros_topics(
@@ -172,7 +181,7 @@ class TopicTools:
     async def ros_publish(
         self,
         topic: Topic,
-        message: MessageFields,
+        fields: MessageFields,
         type: PublishedType = None,  # noqa: A002
         duration_s: PublishFor = None,
         rate_hz: Rate = 10.0,
@@ -184,11 +193,13 @@ class TopicTools:
         """
         name = full_name(topic)
         known = await self._inquiry.find_topic_type(name)
-        command = Publish(topic=name, type=known or type or "", message=message)
+        command = Publish(topic=name, type=known or type or "", message=fields)
         self._commands.check_name(command)
         type_name = await self._type_to_publish(name, known, type)
         described = await self._inquiry.describe(await self._inquiry.said(type_name))
-        checked = check_message(described.book, type_name, message)
+        checked = check_message(described.book, type_name, fields)
+        if type_name == GOAL_POSE or type_name.endswith(ACTION_GOAL):
+            await check_frames(self._inquiry, checked)
         is_moving = type_name in VELOCITIES and stand_of(checked) != checked
         if is_moving and duration_s is None:
             raise LinkError(

@@ -2,9 +2,10 @@
 
 import io
 import math
-from collections.abc import Callable, Container, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from mcp.server.mcpserver import Image
@@ -13,6 +14,7 @@ from PIL import Image as Picture
 
 from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Point
+from mapspeak.ros.definitions import Field
 from mapspeak.ros.messages import (
     EncodedPicture,
     LaserScan,
@@ -31,7 +33,7 @@ from mapspeak.server.tools.ros.clouds import read_cloud
 from mapspeak.server.wording import say_point, say_pose
 from mapspeak.spatial.picture import draw_map_axis
 
-__all__ = ["BULKY", "VIEWED", "View", "view_message"]
+__all__ = ["BULKY", "VIEWED", "View", "view_fields", "view_message"]
 
 EDGE_PX = 1000
 LARGEST_BYTES = 700_000
@@ -223,3 +225,22 @@ VIEWED: frozenset[str] = frozenset(VIEWS)
 """Types that are shown in a way of their own."""
 BULKY: frozenset[str] = VIEWED - {"tf2_msgs/TFMessage", "nav_msgs/Path"}
 """Types of large arrays, none of them of fixed length: these come faster in binary."""
+
+
+def view_fields(
+    fields: Iterable[Field], values: Mapping[str, Any]
+) -> tuple[dict[str, View], dict[str, Any]]:
+    """Return the views of the fields that are shown in a way of their own, and the other fields.
+
+    Args:
+        fields: Of the type of a response or a result.
+        values: What it holds.
+    """
+    views = {
+        field.name: view_message(field.type, values[field.name])
+        for field in fields
+        if field.length is None
+        and field.type in VIEWED
+        and isinstance(values.get(field.name), Mapping)
+    }
+    return views, {name: value for name, value in values.items() if name not in views}
