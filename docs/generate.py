@@ -1,13 +1,16 @@
-"""Writes what the documents say about tools, from the tools themselves: `./run docs`.
+"""Writes what the documents say about tools and errors, from the source: `./run docs`.
 
 A table stands between `<!-- tools -->` and `<!-- /tools -->` in each document that has one, and
+likewise one for the messages of each group in `docs/howto/troubleshooting.md`;
 `docs/reference/tools.md` is written whole.
 """
 
+import ast
 import asyncio
 import json
 import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +28,17 @@ ROOT = Path(__file__).parents[1]
 REFERENCE = ROOT / "docs" / "reference" / "tools.md"
 SNAPSHOT = ROOT / "tests" / "snapshots" / "tools.json"
 WITH_TABLES = (ROOT / "README.md",)
+TROUBLES = ROOT / "docs" / "howto" / "troubleshooting.md"
+SOURCES = {
+    "robot": ("links", "server/tools/ros/inquiry.py"),
+    "start": ("cli", "settings.py", "server/transport.py", "server/app.py"),
+    "refused": ("navigation/safety", "navigation/goals.py", "navigation/drive.py"),
+    "files": ("spatial/mapfiles.py", "simulator/worldfiles.py", "server/mapcommand"),
+}
+"""Where the messages of each group are written, below src/mapspeak."""
+ERRORS = {"ConfigError", "LinkError", "MapError", "GoalError", "PolicyError", "Refused"}
+LEFT_OUT = "…"
+LEAST_WORDS = 3
 TABLE = re.compile(r"(?<=<!-- tools -->\n).*?(?=<!-- /tools -->)", re.DOTALL)
 
 
@@ -46,9 +60,56 @@ def write_documents() -> dict[Path, str]:
     by_name = {tool.name: tool for tool in listed}
     toolsets = {name: [by_name[tool.name] for tool in tools] for name, tools in groups.items()}
     documents = {path: TABLE.sub(_table(toolsets), _read(path)) for path in WITH_TABLES}
+    documents[TROUBLES] = _read(TROUBLES)
+    for group in SOURCES:
+        between = re.compile(rf"(?<=<!-- {group} -->\n).*?(?=<!-- /{group} -->)", re.DOTALL)
+        rows = "\n".join(f"| {said} | {hint} |" for said, hint in sorted(set(_messages(group))))
+        told = f"| message | what to do |\n|---|---|\n{rows}\n"
+        documents[TROUBLES] = between.sub(lambda _, told=told: told, documents[TROUBLES])  # type: ignore[misc]
     documents[REFERENCE] = _reference(toolsets)
     documents[SNAPSHOT] = _snapshot(listed)
     return documents
+
+
+def _messages(group: str) -> Iterator[tuple[str, str]]:
+    """Find the messages that source files raise, each with its hint."""
+    for place in SOURCES[group]:
+        path = ROOT / "src" / "mapspeak" / place
+        for file in [path] if path.is_file() else sorted(path.rglob("*.py")):
+            tree = ast.parse(_read(file))
+            texts = {
+                target.id: node.value
+                for node in tree.body
+                if isinstance(node, ast.Assign)
+                for target in node.targets
+                if isinstance(target, ast.Name)
+            }
+            for node in ast.walk(tree):
+                if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ERRORS:
+                    named = {each.arg: each.value for each in node.keywords}
+                    said = node.args[0] if node.args else named.get("reason")
+                    told = _say(said, texts), _say(named.get("hint"), texts)
+                    if all(len(re.findall(r"[a-z]{2,}", text)) >= LEAST_WORDS for text in told):
+                        yield told
+
+
+def _say(node: ast.expr | None, texts: dict[str, ast.expr]) -> str:
+    """Return what an expression says; what only a run knows is left out."""
+    if isinstance(node, ast.Name):
+        node = texts.get(node.id)
+    match node:
+        case ast.Constant(value=str(text)):
+            return text.replace("|", "\\|").replace("<", "&lt;")
+        case ast.JoinedStr(values=parts):
+            return "".join(_say(part, texts) for part in parts)
+        case ast.FormattedValue(value=ast.Call(func=ast.Name(id="shell_command"), args=[words])):
+            return f"mapspeak {_say(words, texts)}"
+        case ast.FormattedValue(value=ast.Call(func=ast.Name(id="say_install"))):
+            return "(the exact command)"
+        case ast.FormattedValue(value=value):
+            return _say(value, texts)
+        case _:
+            return LEFT_OUT
 
 
 def _table(toolsets: dict[str, list[Tool]]) -> str:

@@ -28,6 +28,19 @@ def test_a_log_grows_and_is_never_begun_anew(tmp_path: Path) -> None:
     assert len(audit_of(tmp_path)) == 2
 
 
+def test_a_log_that_has_grown_large_is_set_aside_in_place_of_the_one_before(
+    tmp_path: Path,
+) -> None:
+    log = AuditLog(tmp_path / "audit.jsonl", wall_clock=WallClock(), most_bytes=1_000)
+    for number in range(20):
+        log.write("stop", number=number, caller=NOBODY, robot_s=1.0, said="x" * 100)
+    files = [tmp_path / "audit.jsonl.1", tmp_path / "audit.jsonl"]
+    kept = [line.number for file in files if file.exists() for line in read_audit(file)]
+    assert kept == list(range(kept[0], 20))
+    assert 0 < kept[0] <= 19
+    assert all(file.stat().st_size < 2_000 for file in tmp_path.iterdir())
+
+
 def test_a_log_is_for_its_owner_alone(tmp_path: Path) -> None:
     make_guard(tmp_path).clear(publish("on"), robot_s=1.0)
     mode = stat.S_IMODE((tmp_path / "audit.jsonl").stat().st_mode)

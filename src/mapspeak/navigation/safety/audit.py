@@ -1,11 +1,13 @@
 """The audit log: append-only JSON lines, one for each decision and one for each result."""
 
+import fcntl
 import itertools
 import json
 import math
 import os
 import secrets
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -63,10 +65,19 @@ class AuditLog:
         path: The file; its folder is made.
         wall_clock: The operator's.
         robot: What the robot is called in the lines.
+        most_bytes: A file that has grown larger is renamed to "NAME.1", in place of the one before.
     """
 
-    def __init__(self, path: Path, *, wall_clock: Callable[[], datetime], robot: str = "") -> None:
+    def __init__(
+        self,
+        path: Path,
+        *,
+        wall_clock: Callable[[], datetime],
+        robot: str = "",
+        most_bytes: int = 20_000_000,
+    ) -> None:
         self.path = path
+        self._most_bytes = most_bytes
         self._robot = robot
         self._wall_clock = wall_clock
         self._run = f"{wall_clock():%Y%m%dT%H%M%S}-{os.getpid()}-{secrets.token_hex(2)}"
@@ -118,12 +129,22 @@ class AuditLog:
             descriptor = os.open(self.path, flags, 0o600)
             try:
                 n_written = os.write(descriptor, line)
+                self._begin_anew_if_large(descriptor)
             finally:
                 os.close(descriptor)
         except OSError as error:
             raise self._broken(error.strerror or str(error)) from error
         if n_written != len(line):
             raise self._broken("there is no room")
+
+    def _begin_anew_if_large(self, descriptor: int) -> None:
+        if os.fstat(descriptor).st_size <= self._most_bytes:
+            return
+        # Of several servers one renames the file; the others find that it is another one by then.
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(descriptor), self.path.stat()):
+                self.path.replace(f"{self.path}.1")
 
     def _broken(self, reason: str) -> PolicyError:
         return PolicyError(
