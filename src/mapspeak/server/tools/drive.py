@@ -25,16 +25,16 @@ Metres = Annotated[float | None, Field(description="metres, map frame", allow_in
 Degrees = Annotated[
     float | None,
     Field(
-        description="heading on arrival, counter-clockwise from +x; goes with place too",
+        description="heading on arrival, counter-clockwise from +x; also with place",
         allow_inf_nan=False,
     ),
 ]
 Wait = Annotated[
     float,
-    Field(description="seconds to wait for the end of the drive", ge=0, le=LONGEST_WAIT_S),
+    Field(description="seconds", ge=0, le=LONGEST_WAIT_S),
     AT_MOST_LONGEST_WAIT,
 ]
-GoalId = Annotated[str | None, Field(description="such as G1; the latest when left out")]
+GoalId = Annotated[str | None, Field(description="such as G1; else the latest")]
 
 
 class DriveTools:
@@ -95,16 +95,16 @@ class DriveTools:
     async def wait_for_goal(
         self, context: Context, goal_id: GoalId = None, wait_s: Wait = 20.0
     ) -> DriveAnswer:
-        """Waits until a drive ends, or wait_s, and says how it stands.
+        """Waits for a drive's end, wait_s at most, and says how it stands.
 
-        Use it after navigate_to; with wait_s=0 it only asks.
+        Use it after navigate_to; wait_s=0 only asks.
         """
         return await self._wait(context, goal_id, wait_s)
 
     async def cancel_goal(self, goal_id: GoalId = None) -> str:
         """Ends one drive; the robot comes to a stand.
 
-        Use stop_robot instead when anything is urgent.
+        Use stop_robot when anything is urgent.
         """
         report = await self._session.drives.cancel(goal_id)
         lines = [

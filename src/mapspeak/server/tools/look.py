@@ -101,7 +101,7 @@ class LookTools:
         return [sighting.text, sighting.image]
 
     async def get_robot_pose(self) -> PoseAnswer:
-        """Says where the robot is: pose in the map frame, and the room it stands in.
+        """Says where the robot is: its pose on the map, and the room.
 
         Use look_at_map instead to see what is around it.
         """
