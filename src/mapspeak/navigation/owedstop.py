@@ -11,7 +11,7 @@ from mapspeak.robot import GoalState, GoalStatus, Robot
 
 __all__ = ["NEEDS_NO_STOP", "OwedStop"]
 
-NEWS_S = 1.0
+NEWS_S = 0.5
 """Wall time from the robot's return until its navigation has told how goals stand."""
 NEEDS_NO_STOP = (GoalState.ARRIVED, GoalState.CANCELLED, GoalState.PREEMPTED)
 """Navigation has ended these itself; what a newer goal has replaced, that drives on with."""

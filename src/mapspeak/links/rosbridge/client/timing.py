@@ -26,7 +26,7 @@ class Timing:
     answer_s: float = 5.0
     attempt_s: float = 0.5
     first_pause_s: float = 0.1
-    longest_pause_s: float = 5.0
+    longest_pause_s: float = 1.0
     ping_s: float = 5.0
     silence_s: float = 20.0
     linger_s: float = 0.15
