@@ -82,7 +82,7 @@ class DriveTools:
 
         Use it to go anywhere. The goal is checked first; a refused goal comes with one that works.
         Answers `arrived` or, after wait_s, a goal_id for wait_for_goal. A newer goal replaces the
-        older one.
+        older.
         """
         drives = self._session.drives
         with drives.preparing() as ticket:
@@ -95,7 +95,7 @@ class DriveTools:
     async def wait_for_goal(
         self, context: Context, goal_id: GoalId = None, wait_s: Wait = 20.0
     ) -> DriveAnswer:
-        """Waits for a drive's end, wait_s at most, and says how it stands.
+        """Waits for a drive's end, at most wait_s; says how it stands.
 
         Use it after navigate_to; wait_s=0 only asks.
         """

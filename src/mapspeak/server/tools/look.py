@@ -103,7 +103,7 @@ class LookTools:
     async def get_robot_pose(self) -> PoseAnswer:
         """Says where the robot is: its pose on the map, and the room.
 
-        Use look_at_map instead to see what is around it.
+        Use look_at_map to see what is around it.
         """
         robot = self._session.robot
         stamped = await robot.fetch_pose()
