@@ -31,6 +31,8 @@ WATCHDOG_S = 0.5
 REACHED_M = 0.1
 REACHED_RAD = 0.05
 TURN_RADPS = 1.5
+TURN_GAIN = 4.0
+"""In rad/s for each radian that the robot is off; more would make it weave."""
 AT_REST = (0.0, 0.0)
 N_BEAMS, REACH_M = 72, 10.0
 
@@ -147,11 +149,11 @@ def steer(here: Pose, goal: Pose, *, speed_mps: float) -> Velocity | None:
     if left_m > REACHED_M:
         off_rad = wrap_angle(here.point.bearing_to(goal.point) - here.yaw_rad)
         forward_mps = min(speed_mps, left_m / STEP_S) * max(math.cos(off_rad), 0.0)
-        return forward_mps, max(-TURN_RADPS, min(off_rad / STEP_S, TURN_RADPS))
+        return forward_mps, max(-TURN_RADPS, min(TURN_GAIN * off_rad, TURN_RADPS))
     off_rad = wrap_angle(goal.yaw_rad - here.yaw_rad)
     if abs(off_rad) < REACHED_RAD:
         return None
-    return 0.0, max(-TURN_RADPS, min(off_rad / STEP_S, TURN_RADPS))
+    return 0.0, max(-TURN_RADPS, min(TURN_GAIN * off_rad, TURN_RADPS))
 
 
 @dataclass(slots=True)
