@@ -16,7 +16,7 @@ from benchmarks.mutations import mutate, seed_frames
 from mapspeak.errors import ConfigError, LinkError
 from mapspeak.links.rosbridge.client import RobotAddress, RosbridgeClient, Timing, open_client
 from mapspeak.links.rosbridge.client.connection import MAX_REFUSED
-from mapspeak.links.rosbridge.client.websocket import MAX_PARTS
+from mapspeak.links.rosbridge.client.websocket import MAX_PARTS, MAX_SKIPPED_BYTES
 from mapspeak.links.rosbridge.protocol import MAX_FRAME_BYTES
 from rosbridge_script import (
     PATIENCE_S,
@@ -447,13 +447,36 @@ async def test_a_robot_that_sends_nothing_but_garbage_gets_another_connection(
     assert len([each for each in warnings if "made anew" in each]) == 1
 
 
-async def test_a_frame_that_claims_to_be_too_large_costs_the_connection() -> None:
+async def test_a_frame_that_claims_to_be_far_too_large_costs_the_connection() -> None:
     server = ScriptedServer({"call_service": echo})
     async with connected(server) as client:
-        head = b"\x82\x7f" + (MAX_FRAME_BYTES + 1).to_bytes(8)
+        head = b"\x82\x7f" + (MAX_SKIPPED_BYTES + 1).to_bytes(8)
         await next(iter(server.present)).send_raw(head)
         await server.until(lambda: len(server.visitors) == 3)
         assert await client.call_service("/echo", {"a": 1}) == {"a": 1}
+
+
+async def test_a_message_that_is_too_large_is_left_away_and_the_connection_stays(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    server = ScriptedServer()
+    half = MAX_FRAME_BYTES // 2 + 1
+    async with connected(server) as client:
+        heard = client.subscribe("/pose")
+        await server.until(lambda: server.asked("subscribe"))
+        for visitor in (each for each in server.present if each.asked("subscribe")):
+            await visitor.send_raw(b"\x82\x7f" + (2 * half).to_bytes(8))
+            for _ in range(2):
+                await visitor.send_raw(bytes(half))
+            await visitor.send_raw(b"\x02\x7f" + half.to_bytes(8))
+            await visitor.send_raw(bytes(half))
+            await visitor.send_raw(b"\x80\x7f" + half.to_bytes(8))
+            await visitor.send_raw(bytes(half))
+        await server.publish("/pose", {"data": 1})
+        assert await heard.wait_for_more_than(0, timeout_s=PATIENCE_S) == {"data": 1}
+        assert client.n_connections == 1
+        assert client.n_frames_refused >= 2
+    assert [each for each in caplog.records if f"the limit is {MAX_FRAME_BYTES}" in each.message]
 
 
 async def test_a_message_in_countless_empty_frames_costs_the_connection() -> None:

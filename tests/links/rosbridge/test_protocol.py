@@ -17,6 +17,7 @@ from PIL import Image
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge import protocol
 from mapspeak.links.rosbridge.protocol import (
+    LIGHT_BYTES,
     Conversation,
     Encoding,
     Event,
@@ -421,3 +422,12 @@ def test_a_damaged_frame_gives_an_event_and_never_an_exception(
         spoilt = whole[:start] + bytes(damage) + whole[start + len(damage) :]
         check_that_it_is_an_event(receive(spoilt))
         check_that_it_is_an_event(receive(whole[:start]))
+
+
+def test_only_a_small_frame_with_nothing_wrapped_in_it_is_light() -> None:
+    conversation = Conversation()
+    assert conversation.is_light(frame(HELLO))
+    assert not conversation.is_light(frame(HELLO) + b" " * LIGHT_BYTES)
+    assert not conversation.is_light(pieces_of(json.dumps(HELLO), 1)[0])
+    assert not conversation.is_light(frame({"op": "png", "data": as_png(frame(HELLO))}))
+    assert not conversation.is_light(b'{"op": "p\\u006eg", "data": ""}')

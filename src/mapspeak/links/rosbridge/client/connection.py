@@ -13,6 +13,7 @@ from mapspeak.links.rosbridge.client.timing import Timing
 from mapspeak.links.rosbridge.client.websocket import Received, SocketClosed, WebSocket
 from mapspeak.links.rosbridge.protocol import (
     LIGHT_BYTES,
+    MAX_FRAME_BYTES,
     Conversation,
     Event,
     FrameRefused,
@@ -157,6 +158,8 @@ class Connection:
             await anyio.lowlevel.checkpoint()
 
     async def _understand(self, received: Received) -> Event | None:
+        if received.n_bytes > MAX_FRAME_BYTES:
+            return FrameRefused(f"{received.n_bytes} bytes, the limit is {MAX_FRAME_BYTES}")
         if received.n_bytes <= LIGHT_BYTES and self._conversation.is_light(
             frame := received.join()
         ):

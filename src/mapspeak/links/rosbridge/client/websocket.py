@@ -23,7 +23,9 @@ READ_BYTES = 262_144
 FED_BYTES = 4_096
 """What is understood in one go: 2,000 empty frames take some 20 ms."""
 MAX_PARTS = 10_000
-"""Frames of one message; the size of all together has its own limit."""
+"""Frames of one message, beyond which the connection is given up."""
+MAX_SKIPPED_BYTES = 1_000_000_000
+"""A larger message is not worth waiting for its end."""
 NOT_ALLOWED = (401, 403)
 START_HINT = (
     "Start rosbridge on the robot (ROS 2: `ros2 launch rosbridge_server "
@@ -37,17 +39,15 @@ class Received:
     """One whole websocket message.
 
     Attributes:
-        parts: Its bytes, as they came; putting large ones together takes a moment.
+        parts: Its bytes, as they came; putting large ones together takes a moment. What is too
+            large has none.
         is_text: UTF-8 text, not binary data.
+        n_bytes: Of all of it.
     """
 
     parts: tuple[bytes | bytearray, ...]
     is_text: bool
-
-    @property
-    def n_bytes(self) -> int:
-        """Of all parts."""
-        return sum(len(part) for part in self.parts)
+    n_bytes: int
 
     def join(self) -> bytes | bytearray:
         """Return all bytes; a message in one part as it is."""
@@ -64,11 +64,15 @@ class SocketClosed(Exception):  # noqa: N818 - an event, never shown
 
 
 class _Reader(StreamReader):
-    """Hands a large frame on as it is, where the library copies it."""
+    """Hands a large frame on as it is, where the library copies it; skips one that is too large."""
+
+    n_skipped = 0
 
     def read_exact(self, n: int) -> Generator[None, None, bytearray]:
         if n < READ_BYTES:
             return (yield from super().read_exact(n))
+        if n > MAX_FRAME_BYTES:
+            return (yield from self._skip(n))
         while len(self.buffer) < n and not self.eof:
             yield
         if self.eof:
@@ -77,8 +81,19 @@ class _Reader(StreamReader):
         del whole[n:]
         return whole
 
+    def _skip(self, n: int) -> Generator[None, None, bytearray]:
+        self.n_skipped += n
+        while n > len(self.buffer) and not self.eof:
+            n -= len(self.buffer)
+            self.buffer.clear()
+            yield
+        yield from super().read_exact(n)
+        return bytearray()
+
 
 class _Protocol(ClientProtocol):
+    reader: _Reader
+
     def parse(self) -> Generator[None]:
         self.reader = _Reader()
         yield from super().parse()
@@ -87,12 +102,14 @@ class _Protocol(ClientProtocol):
 class WebSocket:
     """An open websocket. One task may receive while others send."""
 
-    def __init__(self, protocol: ClientProtocol, stream: ByteStream) -> None:
+    def __init__(self, protocol: _Protocol, stream: ByteStream) -> None:
         self._protocol = protocol
         self._stream = stream
         self._sending = anyio.Lock()
         self._arrived: deque[Received] = deque()
-        self._parts: list[Frame] = []
+        self._parts: list[bytes | bytearray] = []
+        self._n_frames = self._n_bytes = 0
+        self._is_text = True
         self._fault = ""
         self.n_bytes_received = 0
         """Of any kind, pongs included: an end that is alive makes it grow."""
@@ -172,15 +189,21 @@ class WebSocket:
     def _take(self, frame: Frame) -> None:
         if frame.opcode not in (Opcode.TEXT, Opcode.BINARY, Opcode.CONT):
             return
-        self._parts.append(frame)
-        if len(self._parts) > MAX_PARTS:
+        if frame.opcode is not Opcode.CONT:
+            self._is_text = frame.opcode is Opcode.TEXT
+            self._parts, self._n_frames, self._n_bytes = [], 0, 0
+        self._parts.append(_bytes_of(frame))
+        self._n_frames += 1
+        self._n_bytes += len(frame.data) + self._protocol.reader.n_skipped
+        self._protocol.reader.n_skipped = 0
+        if self._n_frames > MAX_PARTS:
             self._fault = f"a message in more than {MAX_PARTS} frames"
             raise SocketClosed
+        if self._n_bytes > MAX_FRAME_BYTES:
+            self._parts = []
         if frame.fin:
-            parts, self._parts = self._parts, []
-            self._arrived.append(
-                Received(tuple(_bytes_of(each) for each in parts), parts[0].opcode is Opcode.TEXT)
-            )
+            parts, self._parts = tuple(self._parts), []
+            self._arrived.append(Received(parts, self._is_text, self._n_bytes))
 
     async def _flush(self) -> None:
         # Bytes leave in the order in which they were made, whoever made them.
@@ -255,7 +278,7 @@ async def _connect(address: RobotAddress, context: ssl.SSLContext | None) -> Byt
 
 async def _shake_hands(address: RobotAddress, stream: ByteStream) -> WebSocket:
     # Compression is not offered: a small frame could unfold into a large one on the event loop.
-    protocol = _Protocol(address.uri, max_size=MAX_FRAME_BYTES)
+    protocol = _Protocol(address.uri, max_size=MAX_SKIPPED_BYTES)
     request = protocol.connect()
     for name, value in address.headers.items():
         request.headers[name] = value

@@ -20,6 +20,7 @@ MAX_WRAPPINGS = 3
 MAX_REASON_LENGTH = 200
 LIGHT_BYTES = 32_768
 """A frame up to this size is read within a few milliseconds, unless more is wrapped in it."""
+SIGNS_OF_MORE = (b"fragment", b"png", b"\\u")
 
 
 class Conversation:
@@ -44,8 +45,7 @@ class Conversation:
         The last piece of a message completes all of it, and a small picture may hold a large text;
         an escape may hide that it does.
         """
-        is_small = len(frame) <= LIGHT_BYTES and not self._fragments.n_bytes
-        return is_small and b"png" not in frame and b"\\u" not in frame
+        return len(frame) <= LIGHT_BYTES and not any(sign in frame for sign in SIGNS_OF_MORE)
 
     def receive(self, frame: Raw, *, is_text: bool) -> Event | None:
         """Return what a frame says; None while the message is incomplete."""

@@ -32,7 +32,7 @@ from mapspeak.links.rosbridge.protocol.numberlists import (
 )
 
 MAX_FRAME_PIXELS = MAX_FRAME_BYTES // 3
-MAX_LENIENT_BYTES = 500_000
+MAX_LENIENT_BYTES = 200_000
 """Of a text that only the slower parser reads; long lists of numbers apart."""
 
 TYPED_ARRAYS = {
