@@ -1,0 +1,31 @@
+"""A stop over DDS, where being connected does not mean that anybody hears it."""
+
+import pytest
+
+pytest.importorskip("cyclonedds", reason="has no wheel for this Python")
+
+from dds_node import open_both, until
+from mapspeak.errors import LinkError
+from mapspeak.links.ros import DrivingPatience, build_ros_robot
+
+pytestmark = pytest.mark.anyio
+
+AT_ONCE = DrivingPatience(settling_s=0.0)
+
+
+async def test_a_stop_with_no_robot_there_says_that_nobody_was_told() -> None:
+    async with open_both() as (_, connection):
+        robot = await build_ros_robot(connection, patience=AT_ONCE, frames_s=0.0)
+        with pytest.raises(LinkError, match="Nobody could be told"):
+            await robot.stop()
+
+
+async def test_a_stop_of_a_robot_that_hears_velocities_is_enough() -> None:
+    async with open_both(lambda node: node.listen("/cmd_vel", "geometry_msgs/msg/Twist")) as (
+        node,
+        connection,
+    ):
+        robot = await build_ros_robot(connection, patience=AT_ONCE, frames_s=0.0)
+        await robot.stop()
+        await until(lambda: node.heard["/cmd_vel"])
+    assert node.heard["/cmd_vel"][0]["linear"] == {"x": 0.0, "y": 0.0, "z": 0.0}

@@ -1,0 +1,105 @@
+"""Goals that a robot on real ROS 2 accepts too late do not drive it, over every link."""
+
+from collections.abc import AsyncGenerator, Callable
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+
+import anyio
+import pytest
+
+from mapspeak.cli.robots import read_network
+from mapspeak.errors import LinkError
+from mapspeak.geometry import Pose
+from mapspeak.links.ros import DrivingPatience, RosRobot
+from mapspeak.links.ros2 import open_ros2_robot
+from mapspeak.links.rosbridge import open_rosbridge_robot
+from mapspeak.robot import GoalState
+from ros2.robot_process import RobotProcess
+
+pytestmark = [pytest.mark.ros2, pytest.mark.anyio]
+
+NEXT_ROOM = Pose(8.0, 2.25)
+SHORT = DrivingPatience(acceptance_s=0.5)
+LATE_S = 2.0
+PATIENCE_S = 30.0
+STILL_M = 0.2
+
+OpenLink = Callable[[RobotProcess], AbstractAsyncContextManager[RosRobot]]
+
+
+@asynccontextmanager
+async def over_rclpy(_: RobotProcess) -> AsyncGenerator[RosRobot]:
+    async with open_ros2_robot(patience=SHORT) as robot:
+        yield robot
+
+
+@asynccontextmanager
+async def over_dds(process: RobotProcess) -> AsyncGenerator[RosRobot]:
+    pytest.importorskip("cyclonedds", reason="has no wheel for this Python")
+    from mapspeak.links.dds import open_dds_robot  # noqa: PLC0415 - optional
+
+    async with open_dds_robot(read_network("", process.environment), patience=SHORT) as robot:
+        yield robot
+
+
+@pytest.fixture(params=["rclpy", "dds", "rosbridge"])
+def open_link(request: pytest.FixtureRequest) -> OpenLink:
+    if request.param != "rosbridge":
+        return over_rclpy if request.param == "rclpy" else over_dds
+    url = request.getfixturevalue("rosbridge_url")
+
+    @asynccontextmanager
+    async def over_rosbridge(_: RobotProcess) -> AsyncGenerator[RosRobot]:
+        async with open_rosbridge_robot(url, patience=SHORT) as opened:
+            yield opened
+
+    return over_rosbridge
+
+
+async def reason_of(robot: RosRobot, goal_id: str) -> str:
+    return (await robot.fetch_goal_status(goal_id)).reason
+
+
+async def until_cancelled(robot: RosRobot, goal_id: str) -> None:
+    with anyio.fail_after(PATIENCE_S):
+        while "cancelled at once" not in await reason_of(robot, goal_id):  # noqa: ASYNC110 - asked for
+            await anyio.sleep(0.05)
+
+
+@pytest.mark.parametrize("is_stopped", [False, True])
+async def test_a_goal_that_was_called_rejected_does_not_drive_the_robot_later(
+    robot: RobotProcess, open_link: OpenLink, *, is_stopped: bool
+) -> None:
+    robot.set_faults(acceptance_s=LATE_S)
+    async with open_link(robot) as opened:
+        goal_id = await opened.send_goal(NEXT_ROOM)
+        state = (await opened.fetch_goal_status(goal_id)).state
+        if is_stopped:
+            await opened.stop()
+        before_m = robot.driven_m
+        await until_cancelled(opened, goal_id)
+        await anyio.sleep(1.0)
+        after_m = robot.driven_m
+    assert state is GoalState.REJECTED
+    assert not robot.is_driving
+    assert after_m - before_m < STILL_M
+
+
+async def test_a_cancellation_that_navigation_refuses_is_told_as_refused(
+    robot: RobotProcess, open_link: OpenLink
+) -> None:
+    robot.set_faults(ignores_cancels=True)
+    async with open_link(robot) as opened:
+        goal_id = await opened.send_goal(NEXT_ROOM)
+        with pytest.raises(LinkError, match=r"refused to cancel|was told to end its goal"):
+            await opened.cancel_goal(goal_id)
+        robot.set_faults(ignores_cancels=False)
+        await opened.stop()
+
+
+async def test_a_stop_with_no_robot_there_says_that_nobody_was_told(
+    domain: dict[str, str],
+) -> None:
+    assert domain
+    async with open_ros2_robot(patience=SHORT) as opened:
+        with pytest.raises(LinkError):
+            await opened.stop()
