@@ -196,6 +196,8 @@ async def _ask(client: Client, tool: str) -> str:
             # A drive that was stopped before it began is none.
             return "cancelled" if "sent anywhere yet" in said else said
     said = _text(await client.call_tool("ros_goal_status", {}))
+    if "No goal has been sent" in said:
+        return "cancelled"
     return said.partition("): ")[2].partition(" ")[0] or said
 
 

@@ -181,3 +181,33 @@ async def test_the_base_is_stopped_when_navigation_dies_under_a_drive(tmp_path: 
 async def until(is_so: object) -> None:
     while not is_so():  # type: ignore[operator] # noqa: ASYNC110 - the robot tells nobody
         await anyio.sleep(0.01)
+
+
+async def test_a_goal_that_is_still_being_prepared_at_a_stop_is_not_sent(tmp_path: Path) -> None:
+    scripted = ScriptedRobot(actions=("/navigate_to_pose", PATROL))
+    types = anyio.Event()
+    async with (
+        connect_scripted(scripted, timing=QUICK, patience=LONG) as robot,
+        serving(robot, tmp_path) as (_, caller),
+    ):
+        said: list[str] = []
+
+        def ask_for_type(_: Operation) -> None:
+            types.set()
+
+        scripted.services["/rosapi/action_type"] = ask_for_type
+        async with anyio.create_task_group() as tasks:
+
+            async def send_goal() -> None:
+                said.append(await caller.refuse("ros_send_goal", action=PATROL, goal={}))
+
+            tasks.start_soon(send_goal)
+            await types.wait()
+            await caller.ask("stop_robot")
+            scripted.services["/rosapi/action_type"] = lambda _: {"type": TYPE}
+            call = scripted.server.asked("call_service")
+            question = next(each for each in call if each["service"] == "/rosapi/action_type")
+            for visitor in scripted.server.present:
+                await visitor.answer(question, {"type": TYPE})
+    assert "was stopped before the goal was sent" in said[0]
+    assert scripted.goals == []

@@ -36,12 +36,14 @@ class Started:
         actions: By name, each with our goals.
         velocities: The zero velocity of each topic on which a velocity was published.
         n_begun: How often something was begun; zero velocity is not repeated beyond that.
+        n_stops: Grows with every stop; what was wanted before a stop is not begun after it.
     """
 
     def __init__(self) -> None:
         self.actions: dict[str, Startable] = {}
         self.velocities: dict[str, Message] = {}
         self.n_begun = 0
+        self.n_stops = 0
 
     @property
     def is_busy(self) -> bool:

@@ -19,6 +19,7 @@ async def stop_everything(connection: RosConnection, *, brake: Brake) -> None:
     Raises:
         LinkError: Names all that could not be told, or goes on.
     """
+    connection.started.n_stops += 1
     connection.clear_the_way()
     actions = list(connection.started.actions.values())
     faults: list[LinkError] = []

@@ -8,7 +8,7 @@ from functools import partial
 
 import anyio
 
-from mapspeak.errors import LinkError
+from mapspeak.errors import GoalError, LinkError
 from mapspeak.links.ros.actions.goal import ActionState, SentGoal
 from mapspeak.ros import RosConnection
 from mapspeak.ros.messages import Message
@@ -17,6 +17,7 @@ __all__ = ["GONE", "RESULT_LATE", "ActionClient", "ActionPatience"]
 
 NOT_TAKEN = "The action server gave no sign of taking the goal within {:g} s; it was withdrawn."
 GIVEN_UP = "Its sender gave up waiting."
+STOPPED = "The robot was stopped before the goal was sent."
 TOO_EARLY = "It was ended before the action server took it."
 GONE = "The connection was lost meanwhile, and the action server does not know the goal any more."
 SILENT = "The action server has said nothing for {:.0f} s."
@@ -87,7 +88,6 @@ class ActionClient(ABC):
         self._patience = patience
         self._goals: dict[str, SentGoal] = {}
         self._being_ended: set[str] = set()
-        self._n_ends = 0
         self._statuses: dict[str, ActionState] = {}
 
     # --- what is known
@@ -150,7 +150,12 @@ class ActionClient(ABC):
         return {}
 
     async def send(
-        self, arguments: Message, *, through: RosConnection, owner: str | None = None
+        self,
+        arguments: Message,
+        *,
+        through: RosConnection,
+        owner: str | None = None,
+        n_stops: int | None = None,
     ) -> SentGoal:
         """Send a goal; `wait_until_taken` has to follow.
 
@@ -158,18 +163,23 @@ class ActionClient(ABC):
             arguments: The goal's fields.
             through: The connection to send it over, and to cancel it; it may be guarded.
             owner: The client with whom it ends; None where somebody else sees to that.
+            n_stops: Those that there had been when the goal was wanted; None for up to now.
 
         Raises:
+            GoalError: There was a stop since the goal was wanted.
             LinkError: It could not be sent.
         """
+        started = self._connection.started
+        n_stops = started.n_stops if n_stops is None else n_stops
         await self.wait_for_list()
-        n_ends = self._n_ends
-        self._connection.started.n_begun += 1
+        if n_stops != started.n_stops:
+            raise GoalError(STOPPED, hint="Send it again when the robot may move.")
+        started.n_begun += 1
         goal = await self._begin(arguments, through, anyio.current_time())
         goal.owner = owner
         self._forget_settled()
         self._goals[goal.id] = goal
-        if n_ends != self._n_ends:
+        if n_stops != started.n_stops:
             self._withdraw(goal, ActionState.CANCELLED, TOO_EARLY)
         return goal
 
@@ -203,7 +213,7 @@ class ActionClient(ABC):
         Raises:
             LinkError: Says what could not be ended.
         """
-        self._n_ends += 1
+        self._connection.started.n_stops += 1
         taken = [goal for goal in self.open_goals if goal.state is not ActionState.SENT]
         for goal in self.open_goals:
             if goal not in taken:

@@ -121,6 +121,7 @@ class ActionTools:
         Use navigate_to to drive somewhere. Answers how it ended or, after wait_s, its goal_id; a
         refused goal is told as rejected. Call ros_action first for the fields.
         """
+        n_stops = self._inquiry.connection.started.n_stops
         name = full_name(action)
         self._commands.check_name(Act(action=name, type=type or "", goal=fields))
         said = await self._find_type(name, type)
@@ -129,7 +130,9 @@ class ActionTools:
         await check_frames(self._inquiry, checked)
         self._described[name] = described
         client = client_of(context)
-        job = await self._book.send(name, checked, type_name=described.type, client=client)
+        job = await self._book.send(
+            name, checked, type_name=described.type, client=client, n_stops=n_stops
+        )
         try:
             await self._book.wait(job, wait_s=wait_s)
         except anyio.get_cancelled_exc_class():

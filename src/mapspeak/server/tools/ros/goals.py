@@ -81,7 +81,15 @@ class ActionBook:
         """The handles of the goals that are kept."""
         return list(self._jobs)
 
-    async def send(self, action: str, goal: Message, *, type_name: str, client: str = "") -> Job:
+    async def send(
+        self,
+        action: str,
+        goal: Message,
+        *,
+        type_name: str,
+        client: str = "",
+        n_stops: int | None = None,
+    ) -> Job:
         """Send a goal, and wait until the action server has taken or refused it.
 
         Args:
@@ -89,13 +97,17 @@ class ActionBook:
             goal: Fits its type.
             type_name: Of the action, as "package/Type".
             client: Who has it sent: when that client is gone, the goal ends.
+            n_stops: Those that there had been when the goal was wanted.
+
+        Raises:
+            GoalError: There was a stop since the goal was wanted.
         """
         await self._inquiry.check_action(action)
         opened = await self._open(action, await self._inquiry.said(type_name, kind="action"))
         connection = self._inquiry.connection
         for topic, topic_type in opened.advertise(connection).items():
             await self._commands.prepare(topic, topic_type)
-        sent = await opened.send(goal, through=connection, owner=client)
+        sent = await opened.send(goal, through=connection, owner=client, n_stops=n_stops)
         self._n_sent += 1
         job = Job(handle=f"A{self._n_sent}", goal=sent, action=opened)
         self._jobs[job.handle] = job
