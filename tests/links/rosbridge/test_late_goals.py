@@ -272,3 +272,22 @@ async def eventually_so(is_so: Any) -> None:  # noqa: ANN401
         return bool(is_so())
 
     await eventually(look)
+
+
+async def test_a_cancellation_is_not_lost_while_its_socket_is_being_replaced() -> None:
+    scripted = ScriptedRobot()
+    scripted.services["/slow"] = lambda _: None
+    async with connected(scripted, patience=LONG) as robot, anyio.create_task_group() as tasks:
+        goal_id = await robot.send_goal(GOAL)
+        tasks.start_soon(ask_in_vain, robot)
+        await scripted.until(lambda: "/slow" in str(scripted.server.asked("call_service")))
+        robot.connection.clear_the_way()
+        tasks.start_soon(robot.cancel_goal, goal_id)
+        await scripted.until(lambda: scripted.server.asked("cancel_action_goal"))
+        await scripted.end_goal(CANCELED)
+        await until_state(robot, goal_id, GoalState.CANCELLED)
+        tasks.cancel_scope.cancel()
+
+
+async def ask_in_vain(robot: RosRobot) -> None:
+    await robot.connection.call_service("/slow", timeout_s=PATIENCE_S)

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable
+from contextlib import suppress
 
 import anyio
 import anyio.lowlevel
@@ -96,10 +97,17 @@ class Channel:
         if self._standing.pop(operation_id, None) is not None:
             self.send_if_up(text)
 
-    def send_if_up(self, text: bytes) -> None:
-        """Sends something that is of no use later."""
-        if self.is_up and self._connection is not None and not self._connection.is_over.is_set():
-            self._connection.send(text)
+    def send_if_up(self, text: bytes) -> bool:
+        """Sends something that is of no use later; True when it could be sent."""
+        if self._connection is None or not self.is_up or self._connection.is_over.is_set():
+            return False
+        self._connection.send(text)
+        return True
+
+    async def send_when_up(self, text: bytes) -> None:
+        """Sends something that must not be lost while the socket is being replaced."""
+        with suppress(LinkError):
+            await self.send(text, timeout_s=self._timing.answer_s)
 
     async def wait_until_up(self, timeout_s: float) -> None:
         """Returns at once, or when there is a connection again.

@@ -282,7 +282,7 @@ class RosbridgeClient(Rosapi):
     def cancel_goal(self, goal: ActionGoal) -> None:
         """Cancels a goal over the socket it does not block; its end tells whether that worked."""
         text = protocol.cancel_action_goal(goal.action, operation_id=goal.goal_id)
-        self._free_for_calls().send_if_up(text)
+        self.start_soon(partial(self._free_for_calls().send_when_up, text))
 
     def give_up_goal(self, goal: ActionGoal) -> None:
         """Replaces the socket of a goal without a sign of life, which it may block."""
