@@ -5,9 +5,11 @@ import pytest
 
 from alignment_maps import HOUSE, fine
 from fakes import START, FakeRobot, scan_of, two_rooms
+from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.navigation.checkup import examine
 from mapspeak.robot import Finding, Health, RangeScan
+from mapspeak.spatial import OccupancyGrid
 
 pytestmark = pytest.mark.anyio
 
@@ -76,6 +78,36 @@ async def test_a_laser_that_gives_no_scan_is_doubted_and_no_more() -> None:
     laser = (await _examine(robot))["laser"]
     assert laser.health is Health.DOUBTFUL
     assert "all else works without" in laser.said
+
+
+async def test_a_map_that_does_not_come_is_waited_for_once_and_is_not_the_lasers_fault() -> None:
+    class MaplessRobot(FakeRobot):
+        n_waits = 0
+
+        async def fetch_map(self) -> OccupancyGrid:
+            self.n_waits += 1
+            raise LinkError("No map has come.", hint="Start SLAM.")
+
+    robot = MaplessRobot(two_rooms())
+    robot.scan = scan_of(two_rooms(), START)
+    found = await _examine(robot)
+    assert robot.n_waits == 1
+    assert found["map"].health is Health.MISSING
+    assert found["laser"].health is Health.FINE
+    assert "no map to compare with" in found["laser"].said
+
+
+async def test_picture_and_scan_tell_their_age() -> None:
+    class LateRobot(FakeRobot):
+        @property
+        def now_s(self) -> float:
+            return super().now_s + 3.0
+
+    robot = LateRobot(two_rooms())
+    robot.scan = scan_of(two_rooms(), START)
+    found = await _examine(robot)
+    assert "3.0 s old" in found["picture"].said
+    assert "3.0 s old" in found["laser"].said
 
 
 async def test_a_pose_that_is_old_is_doubted() -> None:

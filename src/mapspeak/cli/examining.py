@@ -16,7 +16,7 @@ from mapspeak.cli.robots import RobotChoice, open_robot
 if TYPE_CHECKING:
     from mapspeak.robot import Finding
 
-__all__ = ["doctor"]
+__all__ = ["doctor", "examine_choice"]
 
 SIGNS = {"fine": "ok", "doubtful": "??", "missing": "--"}
 
@@ -37,7 +37,7 @@ def doctor(
     reached.
     """
     choice = RobotChoice(robot=robot, robot_file=robot_file, ca_file=ca_file, seed=seed)
-    findings = anyio.run(_examine, choice)
+    findings = anyio.run(examine_choice, choice)
     if as_json:
         click.echo(json.dumps([asdict(finding) for finding in findings], indent=2))
     else:
@@ -45,7 +45,8 @@ def doctor(
     sys.exit(1 if any(finding.health == "missing" for finding in findings) else 0)
 
 
-async def _examine(choice: RobotChoice) -> "list[Finding]":
+async def examine_choice(choice: RobotChoice) -> "list[Finding]":
+    """Return what the robot offers, once all of it has been found, and what it really gives."""
     from mapspeak.links.ros import (  # noqa: PLC0415 - heavy; help must be quick
         RosRobot,
         describe_profile,

@@ -113,12 +113,7 @@ def choose_profile(
 ) -> RobotProfile:
     """Return the best use of what there is; what a person said is taken as it stands.
 
-    Args:
-        graph: What the robot lists.
-        overrides: What robot.yaml says.
-        frames: The frames of the TF tree.
-        dead: Topics known to exist by name only.
-        services: Those of ROS 1; None where they are not known.
+    Topics known to exist by name only are `dead`; `services` are None where they are not known.
     """
     namespace, others = _choose_namespace(overrides, ranking.find_namespaces(graph, dead))
     near = ranking.Nearness(namespace, dead)
