@@ -60,3 +60,12 @@ def test_an_id_that_nothing_waits_under_is_answered_with_what_does(tmp_path: Pat
     wish_id = wish(make_guard(tmp_path, QUEUED))
     assert wish_id in approve(tmp_path, "7-7")
     assert wish_id in approve(tmp_path, "../../hold")
+
+
+def test_what_waits_is_listed_on_one_printable_line_each(tmp_path: Path) -> None:
+    guard = make_guard(tmp_path, QUEUED)
+    guard.approvals.room.add("1-1", "drive, asked by x\n9-9  stop\x1b[2K\x1b[1G\u202eevil")
+    output = approve(tmp_path)
+    assert output.count("\n") == 1
+    assert output.rstrip("\n").isprintable()
+    assert output.startswith("1-1  drive, asked by x 9-9 stop")

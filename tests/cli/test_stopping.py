@@ -1,4 +1,6 @@
 import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +12,8 @@ from click.testing import CliRunner, Result
 from fakes import FakeRobot, two_rooms
 from guarding import make_guard
 from mapspeak.cli import cli
+from mapspeak.cli.stopping import hold_robots
+from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.session import Session
@@ -64,6 +68,51 @@ async def test_a_stop_names_each_robot_that_stands_and_each_that_has_not_answere
     assert result.exit_code == 1
     assert "Stopped and held: hall, yard" in result.output or "yard, hall" in result.output
     assert "NOT KNOWN TO STAND: frozen; no answer" in result.output
+
+
+def test_a_robot_whose_stop_failed_is_no_success(tmp_path: Path) -> None:
+    control = tmp_path / "control"
+    hold = make_guard(tmp_path).hold
+    stopped, failing = hold_robots(hold, reason="smoke", wait_s=0.0)
+    held_by = hold.read()
+    assert held_by is not None
+    hold.answer("hall", held_by=held_by, failure="The line is dead.")
+    assert (stopped, failing, hold.answers()) == ((), (), ())
+    assert hold.failures() == (("hall", "The line is dead."),)
+    assert control.exists()
+
+
+@pytest.mark.anyio
+async def test_a_stop_that_fails_is_told_with_why(tmp_path: Path) -> None:
+    class DeafRobot(FakeRobot):
+        async def stop(self) -> None:
+            raise LinkError("The line is dead.", hint="Wait.")
+
+    guard = make_guard(tmp_path)
+    memory = SemanticMapStore(tmp_path / "m.yaml")
+    session = Session(DeafRobot(two_rooms()), memory, lease_s=60.0, guard=guard)
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(session.keep_watch)
+        result = await anyio.to_thread.run_sync(
+            lambda: run("stop", "--control", str(tmp_path / "control"), "--wait-s", "1")
+        )
+        tasks.cancel_scope.cancel()
+    assert result.exit_code == 1
+    assert "Stopped and held" not in result.output
+    assert "NOT KNOWN TO STAND: fake robot" in result.output
+
+
+def test_a_stop_loads_nothing_heavy(tmp_path: Path) -> None:
+    program = (
+        "import sys; from mapspeak.cli import cli\n"
+        f"try: cli(['stop', '--control', {str(tmp_path)!r}, '--wait-s', '0'])\n"
+        "except SystemExit: pass\n"
+        "print(sorted({'cv2', 'numpy', 'pydantic', 'mcp'} & set(sys.modules)))"
+    )
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)  # noqa: S603
+    assert done.stdout.strip() == "[]"
+    assert (tmp_path / "hold").exists()
 
 
 def test_a_server_that_was_killed_is_waited_for_no_more(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from datetime import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -22,10 +23,13 @@ from mapspeak.navigation.safety import (
     GuardedRobot,
     Hours,
     Kind,
+    Otherwise,
     Policy,
+    Publish,
     load_policy,
 )
 from mapspeak.semantic import SemanticMapStore
+from mapspeak.server.app import name_client
 from mapspeak.server.tools import build_toolsets
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.session import Session
@@ -270,6 +274,51 @@ async def test_a_rule_about_a_region_that_is_not_there_is_told(tmp_path: Path) -
     assert "The policy closes R77 (the archive), which is not on this map." in answer
 
 
+async def test_an_area_off_the_map_is_told(tmp_path: Path) -> None:
+    policy = Policy(areas=(rectangle("quay", (900.0, 900.0), (901.0, 901.0)),))
+    robot = FakeRobot(HALL, pose=START)
+    async with connect(robot, tmp_path, guard=make_guard(tmp_path, policy)) as client:
+        answer = text_of(await client.call_tool("look_at_map", {}))
+    assert "The policy's area 'quay' lies off this map: it closes nothing here." in answer
+
+
+@pytest.mark.parametrize("mode", MODES)
+async def test_a_client_is_never_asked_for_what_waits_for_an_operator(
+    tmp_path: Path, mode: str
+) -> None:
+    async def agree(
+        context: ClientRequestContext,  # noqa: ARG001 - named so by the protocol
+        params: ElicitRequestParams,  # noqa: ARG001
+    ) -> ElicitResult:
+        return ElicitResult(action="accept", content={"agree": True})
+
+    robot = FakeRobot(HALL, pose=START)
+    approval = Approval(kinds=frozenset({Kind.DRIVE}), otherwise=Otherwise.QUEUE)
+    guard = make_guard(tmp_path, Policy(approval=approval))
+    async with connect(robot, tmp_path, guard=guard, mode=mode, on_question=agree) as client:
+        result = await client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
+        assert "once a person has typed" in text_of(result)
+        (wish_id,) = guard.approvals.room.list_waiting()
+        guard.approvals.room.approve(wish_id)
+        await client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
+    assert len(robot.goals) == 1
+
+
+def test_a_word_is_taken_only_from_the_client_that_was_asked_for_it(tmp_path: Path) -> None:
+    approvals = make_guard(tmp_path).approvals
+    wanted = Publish(topic="/lamp", type="std_msgs/msg/Bool", message={"data": True})
+    wish_id = approvals.ask(wanted, client="a")
+    assert not approvals.grant(wish_id, client="a", secret="")
+    secret = approvals.ask_client(wish_id)
+    assert not approvals.grant(wish_id, client="b", secret=secret)
+    assert not approvals.grant(wish_id, client="a", secret="")
+    assert not approvals.grant("other", client="a", secret=secret)
+    assert approvals.take_word(wanted, client="a") is None
+    assert approvals.grant(wish_id, client="a", secret=secret)
+    assert not approvals.grant(wish_id, client="a", secret=secret)
+    assert approvals.take_word(wanted, client="a") == wish_id
+
+
 async def test_what_is_remembered_is_in_the_log(tmp_path: Path) -> None:
     robot = FakeRobot(HALL, pose=START)
     async with connect(robot, tmp_path, guard=make_guard(tmp_path)) as client:
@@ -311,3 +360,13 @@ async def test_a_hostile_caller_breaks_no_rule(tmp_path: Path) -> None:
     assert [line.number for line in lines if line.event == "result"] == [
         line.number for line in allowed
     ]
+
+
+def test_a_clients_name_is_one_printable_line_in_the_log() -> None:
+    info = SimpleNamespace(name="good\n9-9  drive\x1b[2K\u202e" + "x" * 300)
+    session = SimpleNamespace(client_params=SimpleNamespace(client_info=info))
+    context = SimpleNamespace(session=session, headers={"mcp-session-id": "a\nb"})
+    named = name_client(context)  # type: ignore[arg-type]
+    assert named.isprintable()
+    assert named.startswith("good 9-9 drive")
+    assert len(named) <= 70

@@ -19,6 +19,7 @@ __all__ = ["replay"]
 def replay(file: Path, only_refused: bool) -> None:  # noqa: FBT001 - a flag
     """Shows an audit log: who wanted what, what became of it, and why."""
     from mapspeak.navigation.safety import read_audit  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.semantic.waypoint import clean_line  # noqa: PLC0415
 
     n_shown = n_refused = 0
     run = ""
@@ -28,8 +29,8 @@ def replay(file: Path, only_refused: bool) -> None:  # noqa: FBT001 - a flag
             continue
         if line.run != run:
             run = line.run
-            click.echo(f"--- server {run} {line.robot}".rstrip())
-        click.echo(_say(line))
+            click.echo(clean_line(f"--- server {run} {line.robot}"))
+        click.echo(clean_line(_say(line)))
         n_shown += 1
     click.echo(f"{n_shown} lines shown; {n_refused} commands were refused.")
 

@@ -3,15 +3,14 @@
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from mapspeak.cli.guarding import CONTROL_OPTION, control_folder, wall_clock
 from mapspeak.installation import shell_command
 
-if TYPE_CHECKING:
-    from mapspeak.navigation.safety import Hold
+# Nothing heavier may be imported here: a stop waits for it.
+from mapspeak.navigation.hold import Hold
 
 __all__ = ["hold_robots", "release", "stop"]
 
@@ -29,8 +28,6 @@ def stop(control: Path | None, reason: str, wait_s: float) -> None:
 
     Ends with 1 when a robot has not answered, or none; the hold is there all the same.
     """
-    from mapspeak.navigation.safety import Hold  # noqa: PLC0415 - heavy; help must be quick
-
     hold = Hold(control_folder(control))
     stopped, unanswered = hold_robots(hold, reason=" ".join(reason.split()), wait_s=wait_s)
     if stopped:
@@ -41,7 +38,7 @@ def stop(control: Path | None, reason: str, wait_s: float) -> None:
         return
     said = "no server has answered"
     if unanswered:
-        said = f"NOT KNOWN TO STAND: {', '.join(unanswered)}; no answer"
+        said = f"NOT KNOWN TO STAND: {', '.join(unanswered)}; no answer that it stopped"
     click.echo(
         f"Held, but {said} within {wait_s:g} s. If a robot moves, press its own stop button.",
         err=True,
@@ -53,16 +50,14 @@ def stop(control: Path | None, reason: str, wait_s: float) -> None:
 @CONTROL_OPTION
 def release(control: Path | None) -> None:
     """Lets robots that were held by `mapspeak stop`, or by a client's stop, drive again."""
-    from mapspeak.navigation.safety import Hold  # noqa: PLC0415 - heavy; help must be quick
-
     was_held = Hold(control_folder(control)).lift()
     click.echo("Released." if was_held else "Nothing was held.")
 
 
 def hold_robots(
-    hold: "Hold", *, reason: str, wait_s: float
+    hold: Hold, *, reason: str, wait_s: float
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Holds every robot of a folder, and gives those that stand and those that did not answer.
+    """Hold every robot of a folder; return those that stopped, and those that did not say so.
 
     Args:
         hold: Of that folder.
@@ -74,11 +69,14 @@ def hold_robots(
     """
     hold.put(reason, at=wall_clock())
     _wait_for_answers(hold, wait_s=wait_s)
-    return hold.answers(), hold.unanswered()
+    failed = tuple(f"{robot} ({failure})" for robot, failure in hold.failures())
+    return hold.answers(), (*failed, *hold.unanswered())
 
 
-def _wait_for_answers(hold: "Hold", *, wait_s: float) -> None:
-    """Returns when every robot that is served has answered, or after so long."""
+def _wait_for_answers(hold: Hold, *, wait_s: float) -> None:
+    """Return when every robot that is served has stopped, or after so long."""
     deadline_s = time.monotonic() + wait_s
-    while time.monotonic() < deadline_s and (hold.unanswered() or not hold.answers()):
+    while time.monotonic() < deadline_s:
+        if hold.answers() and not hold.unanswered() and not hold.failures():
+            return
         time.sleep(POLL_S)

@@ -16,6 +16,7 @@ from pydantic import ValidationError
 from mapspeak import __version__
 from mapspeak.errors import ConfigError, MapspeakError
 from mapspeak.navigation.safety import ApprovalNeededError, Caller, calling
+from mapspeak.semantic.waypoint import clean_line
 from mapspeak.server.asking import Asking
 from mapspeak.server.calllog import CallLog
 from mapspeak.server.leanness import lean_input, lean_output
@@ -136,9 +137,10 @@ class MapspeakServer(MCPServer[Any]):
         self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None
     ) -> CallToolResult | InputRequiredResult:
         """Calls a tool, and once more when a person has agreed to what it needs their word for."""
-        guard, asking = self._session.guard, Asking(context)
+        guard = self._session.guard
         if guard is None:
             return await super().call_tool(name, arguments, context)
+        asking = Asking(context, approval=guard.policy.approval, client=name_client(context))
         if not asking.take_answers(guard.approvals):
             raise _disagreed()
         try:
@@ -147,12 +149,11 @@ class MapspeakServer(MCPServer[Any]):
             needed = error.__cause__
             if not isinstance(needed, ApprovalNeededError) or not asking.can_ask:
                 raise
-            question = asking.ask_by_answer(needed)
+            question = asking.ask_by_answer(needed, guard.approvals)
             if question is not None:
                 return question
-            if not await asking.ask_at_once(needed):
+            if not await asking.ask_at_once(needed, guard.approvals):
                 raise _disagreed() from error
-            guard.approvals.grant(needed.wish_id)
         return await super().call_tool(name, arguments, context)
 
     def offer(self, tool: Tool) -> None:
@@ -228,7 +229,7 @@ def name_client(context: Context[Any, Any] | None) -> str:
     about = context.session.client_params
     name = "client" if about is None else about.client_info.name
     session_id = (context.headers or {}).get("mcp-session-id", "")
-    return f"{name[:60]} {session_id[:8]}".strip()
+    return f"{clean_line(name)[:60]} {clean_line(session_id)[:8]}".strip()
 
 
 def build_server(

@@ -14,9 +14,14 @@ from mcp_types import (
     InputRequiredResult,
 )
 from mcp_types.version import is_version_at_least
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, StrictBool
 
-from mapspeak.navigation.safety import ApprovalNeededError, Approvals
+from mapspeak.navigation.safety import (
+    Approval,
+    ApprovalNeededError,
+    Approvals,
+    Otherwise,
+)
 
 __all__ = ["Asking"]
 
@@ -28,34 +33,51 @@ KEY = "approval-"
 class Agreement(BaseModel):
     """What a person is asked for."""
 
-    agree: bool = Field(description="true to let the robot do it")
+    agree: StrictBool = Field(description="true to let the robot do it")
 
 
 class Asking:
-    """Asks the person at one client."""
+    """Asks the person at one client, and takes answers to what was asked of that client alone.
 
-    def __init__(self, context: Context[Any, Any] | None) -> None:
+    Args:
+        context: Of the call.
+        approval: Who may be asked: with `queue` no client is.
+        client: Who calls.
+    """
+
+    def __init__(
+        self, context: Context[Any, Any] | None, *, approval: Approval, client: str
+    ) -> None:
         self._context = context
+        self._approval = approval
+        self._client = client
 
     def take_answers(self, approvals: Approvals) -> bool:
-        """Grants what the person agreed to; False when they were asked and did not agree."""
+        """Grant what the person agreed to; False when they were asked and did not agree."""
         given = self._context.input_responses if self._context is not None else None
         answers = {key: each for key, each in (given or {}).items() if key.startswith(KEY)}
         for key, answer in answers.items():
             if not isinstance(answer, ElicitResult) or not _is_yes(answer):
                 return False
-            approvals.grant(key.removeprefix(KEY))
+            if not self.can_ask:
+                return False
+            state = self._context.request_state if self._context is not None else None
+            wish_id = key.removeprefix(KEY)
+            if not approvals.grant(wish_id, client=self._client, secret=state or ""):
+                return False
         return True
 
     @property
     def can_ask(self) -> bool:
         """True when the client has a person whom it can ask."""
-        if self._context is None:
+        if self._context is None or self._approval.otherwise is Otherwise.QUEUE:
             return False
         wanted = ClientCapabilities(elicitation=ElicitationCapability())
         return bool(self._context.session.check_client_capability(wanted))
 
-    def ask_by_answer(self, needed: ApprovalNeededError) -> InputRequiredResult | None:
+    def ask_by_answer(
+        self, needed: ApprovalNeededError, approvals: Approvals
+    ) -> InputRequiredResult | None:
         """Gives the answer that makes a client ask and call again; None for an older client."""
         version = None if self._context is None else self._context.protocol_version
         if version is None or not is_version_at_least(version, CALLS_AGAIN):
@@ -64,10 +86,13 @@ class Asking:
             message=needed.question, requested_schema=render_elicitation_schema(Agreement)
         )
         key = f"{KEY}{needed.wish_id}"
-        return InputRequiredResult(input_requests={key: ElicitRequest(params=form)})
+        return InputRequiredResult(
+            input_requests={key: ElicitRequest(params=form)},
+            request_state=approvals.ask_client(needed.wish_id),
+        )
 
-    async def ask_at_once(self, needed: ApprovalNeededError) -> bool:
-        """Asks within the call, and gives whether the person agreed."""
+    async def ask_at_once(self, needed: ApprovalNeededError, approvals: Approvals) -> bool:
+        """Ask within the call, and return whether the person agreed."""
         if self._context is None:
             return False
         try:
@@ -75,7 +100,10 @@ class Asking:
         except (MCPError, ValueError):
             # A client that promised to ask, and did not, has no word to give.
             return False
-        return isinstance(answer, AcceptedElicitation) and bool(answer.data.agree)
+        if not isinstance(answer, AcceptedElicitation) or answer.data.agree is not True:
+            return False
+        secret = approvals.ask_client(needed.wish_id)
+        return approvals.grant(needed.wish_id, client=self._client, secret=secret)
 
 
 def _is_yes(answer: ElicitResult) -> bool:

@@ -710,3 +710,17 @@ async def test_a_session_that_ends_leaves_nothing_waiting_for_approval(tmp_path:
     assert guard.approvals.room.list_waiting()
     await session.close()
     assert not guard.approvals.room.list_waiting()
+
+
+async def test_an_approval_is_for_the_pose_that_was_asked_for(tmp_path: Path) -> None:
+    approval = Approval(kinds=frozenset({Kind.DRIVE}), otherwise=Otherwise.QUEUE)
+    robot = guarded(FakeRobot(two_rooms()), tmp_path, Policy(approval=approval))
+    room = make_guard(tmp_path).approvals.room
+    with calling(Caller(client="tester")):
+        await refusal_of(robot, NEAR)
+        (wish_id,) = room.list_waiting()
+        room.approve(wish_id)
+        for other in (Pose(NEAR.x + 0.2, NEAR.y), Pose(NEAR.x, NEAR.y, 0.5)):
+            with pytest.raises(ApprovalNeededError):
+                await robot.send_goal(other)
+        await robot.send_goal(Pose(NEAR.x + 0.05, NEAR.y, 0.1))

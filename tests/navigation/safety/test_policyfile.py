@@ -95,6 +95,8 @@ def test_the_usual_denials_can_be_left_away_altogether(tmp_path: Path) -> None:
             "line 3: 'keep_out.0.outline.2.1' cannot be 'x'",
         ),
         ("keep_out:\n- name: a\n", "line 2: 'keep_out.0"),
+        ("keep_out:\n- name: a\n  outline: [[0, 0], [1, 1], [2, 2]]\n", "'a' closes nothing"),
+        ("keep_out:\n- name: a\n  outline: [[1, 1], [1, 1], [1, 1]]\n", "'a' closes nothing"),
         ("keep_out:\n- {name: a, region: C1, area: 1}\n", "line 2: 'keep_out.0.area' is not a key"),
         ('closed:\n- {name: a, region: C1, until: "25:00"}\n', "line 2: 'closed.0.until"),
         ("closed:\n- {name: a, region: C1, untill: 8}\n", "Did you mean `until`"),

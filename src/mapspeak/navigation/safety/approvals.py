@@ -9,6 +9,7 @@ from pathlib import Path
 from mapspeak.errors import ConfigError
 from mapspeak.navigation.safety.commands import Command, is_same, say_command
 from mapspeak.navigation.safety.errands import Errand
+from mapspeak.semantic.waypoint import clean_line
 
 __all__ = ["Approvals", "WaitingRoom"]
 
@@ -30,12 +31,14 @@ class _Wish:
         wanted: What for.
         client: Who asked.
         asked_s: When, by the same clock as all times here.
+        secret: What an answer of that client must know, beside the id.
     """
 
     id: str
     wanted: Wanted
     client: str
     asked_s: float
+    secret: str = field(default_factory=lambda: secrets.token_hex(16), repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,11 +57,12 @@ class WaitingRoom:
         self._file(wish_id, "waiting").write_text(json.dumps({"what": said}), encoding="utf-8")
 
     def list_waiting(self) -> dict[str, str]:
-        """Gives what waits, by its id."""
+        """Return what waits, each on one line, by its id."""
         waiting = {}
         for path in sorted(self.folder.glob("*.waiting")):
             try:
-                waiting[path.stem] = str(json.loads(path.read_text(encoding="utf-8"))["what"])
+                what = str(json.loads(path.read_text(encoding="utf-8"))["what"])
+                waiting[clean_line(path.stem)] = clean_line(what)
             except (OSError, ValueError, KeyError, TypeError):
                 continue
         return waiting
@@ -107,6 +111,7 @@ class Approvals:
     room: WaitingRoom
     now_s: Callable[[], float]
     _wishes: dict[str, _Wish] = field(default_factory=dict)
+    _asked: set[str] = field(default_factory=set)
     _granted: set[str] = field(default_factory=set)
     _n_wishes: int = 0
     _prefix: str = field(default_factory=lambda: secrets.token_hex(2))
@@ -130,11 +135,21 @@ class Approvals:
         who = f", asked by {wish.client}" if wish.client else ""
         self.room.add(wish_id, f"{_say(wish.wanted)}{who}")
 
-    def grant(self, wish_id: str) -> bool:
-        """Notes a person's word for a wish, and gives whether there is such a wish."""
-        if wish_id in self._wishes:
-            self._granted.add(wish_id)
-        return wish_id in self._wishes
+    def ask_client(self, wish_id: str) -> str:
+        """Note that the client is asked now, and return the secret that its answer must know."""
+        self._asked.add(wish_id)
+        return self._wishes[wish_id].secret
+
+    def grant(self, wish_id: str, *, client: str, secret: str) -> bool:
+        """Note a person's word for a wish, once; return False when that client was not asked."""
+        wish = self._wishes.get(wish_id)
+        if wish is None or wish_id not in self._asked or wish.client != client:
+            return False
+        if not secrets.compare_digest(wish.secret.encode(), secret.encode()):
+            return False
+        self._asked.discard(wish_id)
+        self._granted.add(wish_id)
+        return True
 
     def take_word(self, wanted: Wanted, *, client: str) -> str | None:
         """Gives the id of the word that a person gave for this wish of this client, once."""
@@ -161,6 +176,7 @@ class Approvals:
 
     def _forget(self, wish_id: str) -> None:
         del self._wishes[wish_id]
+        self._asked.discard(wish_id)
         self._granted.discard(wish_id)
         self.room.remove(wish_id)
 

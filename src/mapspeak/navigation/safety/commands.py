@@ -1,11 +1,12 @@
 """What somebody may want of the robot that moves or changes something, as values to judge."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.navigation.goals import GoalCheck
 
 __all__ = [
@@ -20,8 +21,9 @@ __all__ = [
     "say_command",
 ]
 
-SAME_GOAL_M = 0.5
+SAME_GOAL_M = 0.1
 """An approved goal stays approved while a changing map moves it by no more than this."""
+SAME_GOAL_RAD = math.radians(10)
 MOST_SHOWN = 200
 
 Message = Mapping[str, Any]
@@ -160,5 +162,7 @@ def _in_brackets(text: str) -> str:
 def is_same(one: Command, other: Command) -> bool:
     """True when what was approved of one holds for the other."""
     if isinstance(one, Drive) and isinstance(other, Drive):
-        return one.goal.point.distance_to(other.goal.point) <= SAME_GOAL_M
+        turned_rad = wrap_angle(one.goal.yaw_rad - other.goal.yaw_rad)
+        is_near = one.goal.point.distance_to(other.goal.point) <= SAME_GOAL_M
+        return is_near and abs(turned_rad) <= SAME_GOAL_RAD
     return one == other

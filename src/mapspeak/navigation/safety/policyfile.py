@@ -1,5 +1,7 @@
 """policy.yaml, read into a `Policy`; a mistake in it is named with its line and key."""
 
+import math
+from collections.abc import Sequence
 from datetime import time
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -36,6 +38,7 @@ from mapspeak.settings import read_settings
 
 __all__ = ["load_policy"]
 
+THINNEST_M = 0.001
 N_OTHER_WAYS = 2
 """An area is said in one of three ways, and not in the others."""
 
@@ -92,6 +95,14 @@ class _WrittenArea(_Written):
     def _is_somewhere(self) -> Self:
         if [self.outline, self.region, self.mask].count(None) != N_OTHER_WAYS:
             message = f"{self.name!r} needs one of: outline, region, mask"
+            raise ValueError(message)
+        return self
+
+    @model_validator(mode="after")
+    def _closes_something(self) -> Self:
+        corners = self.outline or ()
+        if corners and _is_a_line(corners):
+            message = f"{self.name!r} closes nothing: its corners lie on one line"
             raise ValueError(message)
         return self
 
@@ -222,6 +233,16 @@ def load_policy(path: Path) -> Policy:
         path, _PolicyFile, name="policy.yaml", advice=advice, context={"folder": path.parent}
     )
     return read.policy()
+
+
+def _is_a_line(corners: Sequence[Sequence[float]]) -> bool:
+    (x0, y0), *others = corners
+    off = [(x - x0, y - y0) for x, y in others]
+    along = max(off, key=lambda each: math.hypot(*each))
+    length_m = math.hypot(*along)
+    if length_m == 0.0:
+        return True
+    return all(abs(x * along[1] - y * along[0]) / length_m < THINNEST_M for x, y in off)
 
 
 def _read_time(text: str) -> time:

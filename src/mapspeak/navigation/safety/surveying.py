@@ -1,12 +1,13 @@
 """One revision of each map for all who plan on it, with the areas that are closed now."""
 
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from datetime import datetime
 
 import anyio
 import anyio.to_thread
 
-from mapspeak.navigation.closures import ClosedArea, Outline
+from mapspeak.navigation.closures import ClosedArea, Outline, mask_areas
 from mapspeak.navigation.events.footprints import outlines_of_region
 from mapspeak.navigation.events.notices import (
     close_floor_of,
@@ -20,6 +21,8 @@ from mapspeak.semantic.events import Effect, Event
 from mapspeak.spatial import OccupancyGrid
 
 __all__ = ["Surveyor"]
+
+logger = logging.getLogger(__name__)
 
 
 class Surveyor:
@@ -47,6 +50,7 @@ class Surveyor:
         self._leaves_pockets = leaves_pockets
         self._turn = anyio.Lock()
         self._latest: MapRevision | None = None
+        self._warned: set[str] = set()
 
     @property
     def has_rules(self) -> bool:
@@ -73,6 +77,16 @@ class Surveyor:
             for rule in self._rules
             if rule.region_id and revision.rooms.find_region(rule.region_id) is None
         )
+        off = tuple(
+            f"The policy's area {rule.name!r} lies off this map: it closes nothing here."
+            for rule in self._rules
+            if rule.outline and _is_off(rule, revision.grid)
+        )
+        unplaced = (*unplaced, *off)
+        for each in unplaced:
+            if each not in self._warned:
+                self._warned.add(each)
+                logger.warning("%s", each)
         return (*unplaced, *say_events(events, now), *say_unplaced(events, revision, now))
 
     def _survey(self, grid: OccupancyGrid, radius_m: float) -> MapRevision:
@@ -107,6 +121,11 @@ class Surveyor:
                     until=until,
                     reason=rule.reason,
                 )
+
+
+def _is_off(rule: AreaRule, grid: OccupancyGrid) -> bool:
+    area = ClosedArea(name=rule.name, outline=rule.outline, further_outlines=rule.further_outlines)
+    return bool(grid.cells.size) and not mask_areas(grid, [area]).any()
 
 
 def _outlines_of(rule: AreaRule, revision: MapRevision) -> Iterator[tuple[Outline, ...]]:
