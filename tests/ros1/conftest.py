@@ -3,14 +3,16 @@
 import os
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from queue import SimpleQueue
 
 import pytest
 
 from ros2.robot_process import RobotProcess, end, read_line
-from ros2.rosbridge_process import find_free_port
+from ros2.rosbridge_process import find_free_port, pass_lines, wait_for_line
 
 TESTS = Path(__file__).parents[1]
 
@@ -30,15 +32,21 @@ def ros1() -> Iterator[dict[str, str]]:
         ["roslaunch", *launch, f"port:={bridge}", "address:=127.0.0.1"],
         environment | {"PYTHONPATH": packages},
     ) as process:
-        wait_for(process, "server started at")
+        lines: SimpleQueue[str | None] = SimpleQueue()
+        reader = threading.Thread(target=pass_lines, args=(process, lines), daemon=True)
+        reader.start()
+        wait_for_line(lines, "server started at")
         yield environment
+        process.terminate()
+        reader.join()
 
 
 @pytest.fixture
 def robot(ros1: dict[str, str]) -> Iterator[RobotProcess]:
     """A robot whose navigation is a real action server, as a process of its own."""
     with running([sys.executable, "-m", "ros1.robot_node"], ros1) as process:
-        wait_for(process, "ready")
+        if (line := read_line(process)) != "ready\n":
+            raise AssertionError(line)
         robot = RobotProcess(process=process, environment=ros1)
         yield robot
         end(process)
@@ -65,14 +73,5 @@ def running(arguments: list[str], environment: dict[str, str]) -> "Iterator[subp
     finally:
         process.terminate()
         process.wait(30.0)
-        for stream in (process.stdin, process.stdout):
-            if stream is not None:
-                stream.close()
-
-
-def wait_for(process: "subprocess.Popen[str]", part: str) -> None:
-    said: list[str] = []
-    while not said or part not in said[-1]:
-        said.append(read_line(process))
-        if not said[-1]:
-            raise AssertionError(f"no {part!r} in:\n{''.join(said)}")
+        if process.stdin is not None:
+            process.stdin.close()
