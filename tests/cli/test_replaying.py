@@ -31,7 +31,7 @@ def test_a_log_is_shown_with_who_what_and_why(tmp_path: Path) -> None:
     assert asked.endswith("#1 publish by tester: publish std_msgs/msg/Bool on /lamp -> allowed")
     assert "1.5 s" in done
     assert done.endswith("result: published")
-    assert "refused: publish.names: The robot may not" in refused
+    assert "refused: publish.usual_denials: The policy denies" in refused
     assert stopped.endswith("#3 mapspeak: -> stop: stopped")
     assert summary == "4 lines shown; 1 commands were refused."
     assert len(replay(tmp_path, "--refused")) == 3

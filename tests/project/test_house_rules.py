@@ -21,7 +21,8 @@ PATH_OF_A_MACHINE = re.compile(r"(?<![\w.~])/(?:root|work|Users|home/(?!you\b|us
 def own_texts() -> Iterator[Path]:
     """Finds the project's text files, in the order of their names."""
     files = [path for folder in FOLDERS for path in (CHECKOUT / folder).rglob("*")]
-    files += CHECKOUT.glob("*")
+    # In a work tree of its own, ".git" is a file, and git's.
+    files += (path for path in CHECKOUT.glob("*") if path.name != ".git")
     for path in sorted(files):
         if path.is_file() and path.suffix in TEXT_SUFFIXES and "__pycache__" not in path.parts:
             yield path

@@ -15,7 +15,7 @@ import anyio
 from mapspeak.errors import LinkError
 from mapspeak.links.ros import RosRobot
 from mapspeak.robot import Robot
-from mapspeak.ros import RosConnection
+from mapspeak.ros import RosConnection, Started
 
 __all__ = ["Arrival"]
 
@@ -155,6 +155,12 @@ class LateRobot(LatePort):
 
 class LateConnection(LatePort):
     """A `RosConnection` that can be told before it is there what it is for."""
+
+    @property
+    def started(self) -> Started:
+        """Everything that was started over this connection: nothing before it is there."""
+        there = self._arrival.there
+        return Started() if there is None else there.connection.started
 
     def advertise_early(self) -> None:
         """Advertise at once, as soon as the robot is there, what may have to stop it."""
