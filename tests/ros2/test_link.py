@@ -186,16 +186,6 @@ async def test_a_cancelled_goal_leaves_the_robot_where_it_is(robot: RobotProcess
     assert not robot.is_driving
 
 
-async def test_a_goal_cancelled_before_it_was_taken_does_not_drive(robot: RobotProcess) -> None:
-    async with connected() as connection:
-        goal = await connection.send_goal(NAVIGATION, pose_in("map"), type_name=NAVIGATION_TYPE)
-        connection.cancel_goal(goal)
-        connection.give_up_goal(goal)
-        await until(lambda: goal.is_accepted and not robot.is_driving)
-    assert robot.pose.x < NEXT_ROOM.x - 1.0
-    assert goal.end is None
-
-
 async def test_a_goal_that_another_client_replaces_is_preempted(robot: RobotProcess) -> None:
     async with linked() as ours, linked() as other:
         first = await ours.send_goal(NEXT_ROOM)
