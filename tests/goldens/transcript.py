@@ -1,0 +1,119 @@
+"""Calls through an in-memory client, and everything that they answered, as text."""
+
+import base64
+import hashlib
+import io
+import json
+import re
+from collections.abc import AsyncGenerator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+from mcp.client import Client
+from mcp_types import CallToolResult, ImageContent
+from PIL import Image
+
+from guarding import audit_of, make_guard
+from mapspeak.navigation.safety import Policy
+from mapspeak.robot import Robot
+from mapspeak.ros import RosConnection
+from mapspeak.semantic import SemanticMapStore
+from mapspeak.server import build_server
+from mapspeak.session import Session
+from served import pictures_of, text_of
+
+IDS = re.compile(r"\b[RCODFWTE]\d+\b")
+SECONDS = re.compile(r"\b\d+(?:\.\d+)?(?= s\b)")
+EVERYTHING = ("look", "places", "drive", "explore", "routes", "paper", "memory")
+
+
+class Transcript:
+    """Calls tools, and keeps each call with its answer.
+
+    Args:
+        client: Connected to the server.
+        is_paced: Time passes by the wall clock: durations are left out of what is kept.
+    """
+
+    def __init__(self, client: Client, *, is_paced: bool = False) -> None:
+        self.entries: list[str] = []
+        self._client = client
+        self._is_paced = is_paced
+
+    async def call(self, tool: str, /, **arguments: Any) -> str:  # noqa: ANN401
+        """Call a tool; return its text."""
+        result = await self._client.call_tool(tool, arguments)
+        said = "! " if result.is_error else ""
+        head = f"[{len(self.entries) + 1}] {tool} {_compact(arguments)}"
+        body = [said + text_of(result), *_structure(result), *map(_digest, pictures_of(result))]
+        entry = "\n".join([head, *(part for part in body if part)])
+        self.entries.append(SECONDS.sub("#", entry) if self._is_paced else entry)
+        return text_of(result)
+
+    def note(self, title: str, lines: list[str]) -> None:
+        """Keep something that no tool answered."""
+        self.entries.append("\n".join([f"== {title}", *lines]))
+
+    @property
+    def text(self) -> str:
+        """All of it, one call after the other."""
+        return "\n\n".join(self.entries) + "\n"
+
+
+@asynccontextmanager
+async def playing(
+    robot: Robot,
+    folder: Path,
+    *,
+    toolsets: tuple[str, ...] = EVERYTHING,
+    policy: Policy | None = None,
+    ros: RosConnection | None = None,
+    is_paced: bool = False,
+) -> AsyncGenerator[Transcript]:
+    """Offer the transcript of a client of a server over that robot; the audit log ends it."""
+    memory = SemanticMapStore(folder / "memory.yaml", map_id=robot.description.map_name)
+    guard = make_guard(folder, policy)
+    session = Session(robot, memory, lease_s=60.0, guard=guard, ros=ros, find_model=lambda: None)
+    server = build_server(session, toolsets=toolsets)
+    async with Client(server) as client:
+        transcript = Transcript(client, is_paced=is_paced)
+        yield transcript
+    lines = [
+        " ".join(_compact(getattr(line, name, "")) for name in ("event", "tool", "verdict", "said"))
+        for line in audit_of(folder)
+    ]
+    transcript.note("audit", [SECONDS.sub("#", line) if is_paced else line for line in lines])
+
+
+def ids_in(text: str, letters: str) -> list[str]:
+    """Return the ids of some kinds that a text names, in their order."""
+    found = dict.fromkeys(match[0] for match in IDS.finditer(text))
+    return sorted((each for each in found if each[0] in letters), key=_order)
+
+
+def _order(place_id: str) -> tuple[str, int]:
+    return place_id[0], int(place_id[1:])
+
+
+def _structure(result: CallToolResult) -> list[str]:
+    """Return the structured answer where the text does not already say all of it."""
+    structured = result.structured_content
+    if structured is None or structured == {"result": text_of(result)}:
+        return []
+    try:
+        if json.loads(text_of(result)) == structured:
+            return []
+    except ValueError:
+        pass
+    return [f"= {_compact(structured)}"]
+
+
+def _digest(picture: ImageContent) -> str:
+    image = Image.open(io.BytesIO(base64.b64decode(picture.data)))
+    digest = hashlib.sha256(image.convert("RGB").tobytes()).hexdigest()[:16]
+    return f"picture {picture.mime_type} {image.width}x{image.height} {digest}"
+
+
+def _compact(value: object) -> str:
+    return json.dumps(value, separators=(",", ":"), default=str)
