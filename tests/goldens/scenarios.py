@@ -93,14 +93,12 @@ async def _play_help(folder: Path) -> str:
     return "\n\n".join(_help_of(cli, "mapspeak")) + "\n"
 
 
-def _help_of(command: click.Command, name: str) -> list[str]:
-    with click.Context(command, info_name=name, terminal_width=100, max_content_width=100) as said:
-        text = command.get_help(said)
-        group = command if isinstance(command, click.Group) else None
-        below = (
-            []
-            if group is None
-            else [(one, group.get_command(said, one)) for one in group.list_commands(said)]
-        )
-    parts = [_help_of(one, f"{name} {word}") for word, one in below if one is not None]
+def _help_of(command: click.Command, name: str, parent: click.Context | None = None) -> list[str]:
+    wide = {"terminal_width": 100, "max_content_width": 100, **command.context_settings}
+    said = command.context_class(command, parent=parent, info_name=name, **wide)
+    text = command.get_help(said)
+    if not isinstance(command, click.Group):
+        return [text]
+    below = [(word, command.get_command(said, word)) for word in command.list_commands(said)]
+    parts = [_help_of(one, word, said) for word, one in below if one is not None]
     return [text, *(part for each in parts for part in each)]
