@@ -1,19 +1,19 @@
 """Each thing that is played: a robot, its limits, and what is asked of it."""
 
+import sys
 import tempfile
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-import click
+import anyio
 
 from fakes import FakeRobot
 from goldens.rosside import inspect, ros_robot
 from goldens.tour import tour
 from goldens.transcript import playing
 from guarding import rectangle
-from mapspeak.cli import cli
 from mapspeak.geometry import Pose
 from mapspeak.links.simulated import SoloRobot
 from mapspeak.navigation.safety import Policy
@@ -90,15 +90,5 @@ async def _play_ros(dialect: Dialect, folder: Path) -> str:
 async def _play_help(folder: Path) -> str:
     """Return what every command says of itself."""
     del folder
-    return "\n\n".join(_help_of(cli, "mapspeak")) + "\n"
-
-
-def _help_of(command: click.Command, name: str, parent: click.Context | None = None) -> list[str]:
-    wide = {"terminal_width": 100, "max_content_width": 100, **command.context_settings}
-    said = command.context_class(command, parent=parent, info_name=name, **wide)
-    text = command.get_help(said)
-    if not isinstance(command, click.Group):
-        return [text]
-    below = [(word, command.get_command(said, word)) for word in command.list_commands(said)]
-    parts = [_help_of(one, word, said) for word, one in below if one is not None]
-    return [text, *(part for each in parts for part in each)]
+    said = await anyio.run_process([sys.executable, "-m", "goldens.helptexts"], cwd=MAPS.parent)
+    return said.stdout.decode()
