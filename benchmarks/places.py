@@ -22,7 +22,7 @@ from benchmarks.memory.sites import Site
 from benchmarks.talking import ServerProcess
 from mapspeak.geometry import Pose
 from mapspeak.semantic import Waypoint
-from mapspeak.semantic.mapfile.rendering import record_text
+from mapspeak.semantic.mapfile.editing import record_text
 from mapspeak.semantic.mapfile.schema import record_data
 from mapspeak.simulator import load_world
 from mapspeak.spatial.mapfiles import MapMode, write_map

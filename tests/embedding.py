@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.semantic.retrieval import Embedder, Thresholds, find_model
-from mapspeak.semantic.retrieval.words import split_words, stem
+from mapspeak.semantic.retrieval.wordindex import split_words, stem
 
 __all__ = ["ConceptEmbedder", "shipped_model"]
 

@@ -21,7 +21,7 @@ from mapspeak.semantic.retrieval import (
     Verdict,
     find_model,
 )
-from mapspeak.semantic.retrieval.words import split_words
+from mapspeak.semantic.retrieval.wordindex import split_words
 
 __all__ = ["FIRST", "Method", "Reply", "list_methods"]
 

@@ -11,7 +11,7 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point, Pose
 from mapspeak.semantic import Landmark, SemanticMapStore, Waypoint
 from mapspeak.semantic.alignment import Certainty, MapKeeper, MapRelation
-from mapspeak.semantic.alignment.snapshot import FIRST_NAME
+from mapspeak.semantic.alignment.comparing import FIRST_NAME
 from mapspeak.semantic.episodes import (
     EpisodeStore,
     Observation,

@@ -8,7 +8,7 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.semantic import Landmark, LaserFan, Waypoint
 from mapspeak.semantic.mapfile import MapDocument, moved, parse_document, with_waypoint
-from mapspeak.semantic.mapfile.plain import read_record
+from mapspeak.semantic.mapfile.layout import read_plain_record
 
 FAN = "from -4.0 to 4.0 deg at 2.2 2.1 - >20 3.4 m"
 FILE = f"""\
@@ -42,7 +42,7 @@ def test_what_a_laser_met_is_written_on_the_line_of_its_landmark_and_read_quickl
     text = with_waypoint(document(""), place).text
     assert f"- {{label: tap, bearing_deg: 0.0, laser: {FAN}}}\n" in text
     assert read(text).landmarks == (tap,)
-    assert read_record(text[text.index("  - name") :]) is not None
+    assert read_plain_record(text[text.index("  - name") :]) is not None
 
 
 def test_a_record_written_again_keeps_its_line_and_the_comment_on_it() -> None:

@@ -8,7 +8,7 @@ from mapspeak.geometry import Pose
 from mapspeak.semantic import Waypoint
 from mapspeak.semantic.events import Event
 from mapspeak.semantic.mapfile import parse_document, with_event, with_waypoint
-from mapspeak.semantic.mapfile.lineends import LineEnds
+from mapspeak.semantic.mapfile.layout import LineEnds
 
 RECORD = b"  - name: dock\n    pose: {x: 1.00, y: 2.00, yaw_deg: 0.0}\n"
 LIKE_UNIX = b"version: 1\r\n# own comment\nwaypoints:\n" + RECORD + b"other: x\r\nmine: y\n"

@@ -5,8 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapspeak.semantic import Waypoint
-from mapspeak.semantic.mapfile.plain import read_record
-from mapspeak.semantic.mapfile.rendering import record_text
+from mapspeak.semantic.mapfile.editing import record_text
+from mapspeak.semantic.mapfile.layout import read_plain_record
 from mapspeak.semantic.mapfile.schema import record_data
 from mapspeak.semantic.mapfile.tree import Data, ListNode, TextError, parse_tree
 from waypoints import waypoints
@@ -31,8 +31,8 @@ def read_slowly(block: str) -> Data:
 
 
 def test_a_record_as_mapspeak_lays_it_out_is_read_without_the_yaml_parser() -> None:
-    assert read_record(RECORD) == read_slowly(RECORD)
-    assert read_record(RECORD) is not None
+    assert read_plain_record(RECORD) == read_slowly(RECORD)
+    assert read_plain_record(RECORD) is not None
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_a_record_as_mapspeak_lays_it_out_is_read_without_the_yaml_parser() -> N
     ],
 )
 def test_what_is_more_than_plain_is_left_to_the_yaml_parser(line: str) -> None:
-    assert read_record(f"  - {line}\n") is None
+    assert read_plain_record(f"  - {line}\n") is None
 
 
 @settings(max_examples=40, deadline=None)
@@ -69,7 +69,7 @@ def test_what_is_more_than_plain_is_left_to_the_yaml_parser(line: str) -> None:
 def test_any_record_of_mapspeak_is_read_as_by_the_yaml_parser(waypoint: Waypoint) -> None:
     block = record_text(record_data(waypoint), indent=2)
 
-    assert read_record(block) in (None, read_slowly(block))
+    assert read_plain_record(block) in (None, read_slowly(block))
 
 
 @settings(max_examples=100, deadline=None)
@@ -81,7 +81,7 @@ def test_any_damaged_record_is_read_as_by_the_yaml_parser_or_not_at_all(
     end = data.draw(st.integers(start, min(len(RECORD), start + 8)))
     block = RECORD[:start] + data.draw(st.text(" \n-:#[]{},'\"|>&*a1.", max_size=4)) + RECORD[end:]
 
-    quick = read_record(block)
+    quick = read_plain_record(block)
 
     if quick is not None:
         try:

@@ -2,7 +2,7 @@ from collections import Counter
 
 import pytest
 
-from mapspeak.semantic.retrieval.knowledge import (
+from mapspeak.semantic.retrieval.kinds import (
     find_kinds,
     find_named_kinds,
     find_names,

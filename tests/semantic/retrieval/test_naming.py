@@ -13,7 +13,7 @@ from mapspeak.semantic.retrieval import (
     TextVectors,
     Verdict,
 )
-from mapspeak.semantic.retrieval.naming import calls_by_name, is_carrier, says_purpose
+from mapspeak.semantic.retrieval.kinds import calls_by_name, is_carrier, says_purpose
 
 OTHERS = ("desk", "whiteboard")
 

@@ -5,8 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapspeak.semantic.retrieval import MatchKind
-from mapspeak.semantic.retrieval.spelling import LookAlikes, Vocabulary
-from mapspeak.semantic.retrieval.words import content_words
+from mapspeak.semantic.retrieval.wordindex import LookAlikes, Vocabulary, content_words
 
 WORDS = Vocabulary(["charger", "charging", "dishwasher", "kitchen", "sink", "vegetable"])
 

@@ -11,8 +11,8 @@ from fakes import scan_of
 from mapspeak.geometry import Point, Pose
 from mapspeak.semantic import Landmark, SemanticMap, Waypoint, build_ring
 from mapspeak.semantic.things import NOISE, Thing, build_sight_map, find_things
+from mapspeak.semantic.things.laserchanges import find_log_priors
 from mapspeak.semantic.things.likelihood import ViewLikelihood, build_outlook, weigh_view
-from mapspeak.semantic.things.news import find_log_priors
 from mapspeak.semantic.things.sight import SightMap, look_around
 from mapspeak.spatial import OccupancyGrid
 

@@ -1,11 +1,14 @@
 """Which map remembered places belong to: told from its walls, and moved when the map moves."""
 
-from mapspeak.semantic.alignment.agreement import Agreement
-from mapspeak.semantic.alignment.comparing import MapComparison, MapRelation, compare_maps
+from mapspeak.semantic.alignment.comparing import (
+    MapComparison,
+    MapRelation,
+    SnapshotFolder,
+    compare_maps,
+)
 from mapspeak.semantic.alignment.fitting import Certainty, MapFit, find_fit
 from mapspeak.semantic.alignment.keeping import MapKeeper, RealignReceipt
-from mapspeak.semantic.alignment.snapshot import SnapshotFolder
-from mapspeak.semantic.alignment.surfaces import MapSurfaces, placed
+from mapspeak.semantic.alignment.surfaces import Agreement, MapSurfaces, placed
 
 __all__ = [
     "Agreement",

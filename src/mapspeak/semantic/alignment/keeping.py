@@ -7,13 +7,14 @@ from pathlib import Path
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.semantic.alignment.comparing import (
+    FIRST_NAME,
     LEAST_STILL_M,
     MapComparison,
     MapRelation,
+    SnapshotFolder,
     compare_maps,
 )
 from mapspeak.semantic.alignment.fitting import Certainty
-from mapspeak.semantic.alignment.snapshot import FIRST_NAME, SnapshotFolder
 from mapspeak.semantic.alignment.surfaces import MapSurfaces
 from mapspeak.semantic.episodes import EpisodeStore
 from mapspeak.semantic.mapfile import MapDocument, moved

@@ -1,17 +1,284 @@
-"""All checks, in the order in which a reader wants them: the map, the places, the views, things."""
+"""All checks in order: whether records agree with the map, with their rooms and with each other."""
 
-from mapspeak.semantic.consistency.company import check_company, check_duplicates
-from mapspeak.semantic.consistency.filing import find_misfiled
+import math
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby, pairwise
+
+import numpy as np
+
+from mapspeak.geometry import Point, wrap_angle
 from mapspeak.semantic.consistency.findings import Finding, FindingKind
-from mapspeak.semantic.consistency.poses import check_pose
-from mapspeak.semantic.consistency.rays import check_rays
-from mapspeak.semantic.consistency.roomsides import check_rooms
-from mapspeak.semantic.things import Things
-from mapspeak.semantic.waypoint import SemanticMap
+from mapspeak.semantic.consistency.sightlines import FARTHEST_M, check_pose, check_rays
+from mapspeak.semantic.quoting import quote_name
+from mapspeak.semantic.things import Thing, Things, name_the_same
+from mapspeak.semantic.waypoint import SemanticMap, Waypoint
+from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.paths import DistanceField
-from mapspeak.spatial.rooms import RoomMap
+from mapspeak.spatial.rooms import Region, RoomMap
 
-__all__ = ["check_memory"]
+TWIN_M = 0.3
+TWIN_RAD = math.radians(15)
+ONE_PLACE_M = 0.5
+NEAR_M = 4.0
+"""From no farther, who looks at a thing would name it."""
+CONE_MARGIN_RAD = math.radians(5)
+
+
+def check_duplicates(waypoints: Sequence[Waypoint]) -> Iterator[Finding]:
+    """Gives pairs of waypoints with nearly the same pose and landmarks."""
+    at = np.array([(each.pose.x, each.pose.y) for each in waypoints]).reshape(-1, 2)
+    for i, waypoint in enumerate(waypoints):
+        for j in np.flatnonzero(np.hypot(*(at[:i] - at[i]).T) <= TWIN_M).tolist():
+            other = waypoints[j]
+            turn_rad = abs(wrap_angle(waypoint.pose.yaw_rad - other.pose.yaw_rad))
+            named = _labels(waypoint)
+            if turn_rad <= TWIN_RAD and named and named == _labels(other):
+                yield Finding(
+                    kind=FindingKind.DUPLICATE,
+                    sentence=f"{quote_name(other.name)} and {quote_name(waypoint.name)} stand "
+                    f"{other.pose.point.distance_to(waypoint.pose.point):.2f} m apart and name "
+                    "the same things.",
+                    waypoints=(other.name, waypoint.name),
+                )
+
+
+def check_company(places: SemanticMap, found: Things) -> Iterator[Finding]:
+    """Gives things that some records speak against."""
+    placed = [thing for thing in found.things if thing.position is not None]
+    at = np.array([(t.position.x, t.position.y) for t in placed if t.position]).reshape(-1, 2)
+    yield from _two_labels(placed, at)
+    for thing in placed:
+        for view in thing.conflicting:
+            yield Finding(
+                kind=FindingKind.POINTS_PAST,
+                sentence=f"{quote_name(view.waypoint)} {view.why}, the {_say(thing)}.",
+                waypoints=(view.waypoint,),
+                label=view.landmark.label,
+                things=(thing,),
+            )
+    for waypoint in places.waypoints:
+        yield from _not_seen(found, waypoint, placed, at)
+
+
+def _two_labels(placed: Sequence[Thing], at: FloatArray) -> Iterator[Finding]:
+    """Gives things of different names in one place that nobody has seen beside each other."""
+    for i, thing in enumerate(placed):
+        for j in np.flatnonzero(np.hypot(*(at[:i] - at[i]).T) <= ONE_PLACE_M).tolist():
+            other = placed[j]
+            is_seen_beside = set(thing.waypoints) & set(other.waypoints)
+            if not is_seen_beside and not name_the_same(thing.label, other.label):
+                yield Finding(
+                    kind=FindingKind.TWO_LABELS,
+                    sentence=f"In one place stand a {_say(other)} by {_count(other)} and a "
+                    f"{_say(thing)} by {_count(thing)}.",
+                    waypoints=(*other.waypoints, *thing.waypoints),
+                    things=(other, thing),
+                )
+
+
+def _not_seen(
+    found: Things, waypoint: Waypoint, placed: Sequence[Thing], at: FloatArray
+) -> Iterator[Finding]:
+    """Gives things in plain sight between what a waypoint names, which it does not name."""
+    seen = waypoint.standpoints[0].landmarks
+    bearings = [each.bearing_rad for each in seen if each.bearing_rad is not None]
+    if len(bearings) < 2:
+        return
+    low, high = min(bearings) - CONE_MARGIN_RAD, max(bearings) + CONE_MARGIN_RAD
+    pose = waypoint.pose
+    for i in np.flatnonzero(np.hypot(*(at - (pose.x, pose.y)).T) <= NEAR_M).tolist():
+        thing = placed[i]
+        assert thing.position is not None, "these have a place"  # noqa: S101 - our belief
+        bearing_rad = wrap_angle(pose.point.bearing_to(thing.position) - pose.yaw_rad)
+        is_named = any(name_the_same(each.label, thing.label) for each in waypoint.landmarks)
+        if (
+            low <= bearing_rad <= high
+            and not is_named
+            and found.is_in_plain_sight(waypoint, thing.position)
+        ):
+            yield Finding(
+                kind=FindingKind.NOT_SEEN,
+                sentence=f"{quote_name(waypoint.name)} looked to where the {_say(thing)} should "
+                f"be, {pose.point.distance_to(thing.position):.1f} m away, and does not name it.",
+                waypoints=(waypoint.name,),
+                things=(thing,),
+            )
+
+
+def _labels(waypoint: Waypoint) -> list[str]:
+    return sorted(each.label.casefold() for each in waypoint.landmarks)
+
+
+def _say(thing: Thing) -> str:
+    assert thing.position is not None, "these have a place"  # noqa: S101 - our belief
+    return f"{quote_name(thing.label)} at ({thing.position.x:.2f}, {thing.position.y:.2f})"
+
+
+def _count(thing: Thing) -> str:
+    n = len(thing.supporting)
+    return "one view" if n == 1 else f"{n} views"
+
+
+BORDER_M = 1.0
+"""A border that is found anew moves no farther, and a pose is off by some of that."""
+DOOR_M = 1.5
+"""What is wider is no door: the two regions may have been one."""
+LEAST_OF_MANY = 3
+"""From so many records on, most of which are off, it is the ids that are others."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Filing:
+    """A record with the room that it names and the one that it stands in."""
+
+    waypoint: Waypoint
+    told: Region
+    here: Region
+
+    @property
+    def is_off(self) -> bool:
+        return self.told.id != self.here.id
+
+
+def find_misfiled(
+    rooms: RoomMap, waypoints: Iterable[Waypoint]
+) -> dict[str, tuple[Region, Region]]:
+    """Gives the records whose room is another one: the room that they name, and where they stand.
+
+    Args:
+        rooms: As they are cut now.
+        waypoints: All records, since together they tell whether ids have changed.
+    """
+    filed = [each for waypoint in waypoints for each in _file(rooms, waypoint)]
+    off = [each for each in filed if each.is_off]
+    if len(off) >= LEAST_OF_MANY and 2 * len(off) > len(filed):
+        return {}
+    moved = _find_moved(filed)
+    return {
+        each.waypoint.name: (each.told, each.here)
+        for each in off
+        if moved.get(each.told.id) != each.here.id and not _may_be_recut(rooms, each)
+    }
+
+
+def _file(rooms: RoomMap, waypoint: Waypoint) -> Iterable[_Filing]:
+    told = rooms.find_region(waypoint.room_id) if waypoint.room_id else None
+    point = waypoint.pose.point
+    is_near = max(abs(point.x), abs(point.y)) < FARTHEST_M
+    here = rooms.find_region_at(point) if is_near else None
+    if told is not None and here is not None:
+        yield _Filing(waypoint, told, here)
+
+
+def _find_moved(filed: Iterable[_Filing]) -> dict[str, str]:
+    """Gives the ids under which several records, and more than stand there, are in another room."""
+    standing: defaultdict[str, Counter[str]] = defaultdict(Counter)
+    for each in filed:
+        standing[each.told.id][each.here.id] += 1
+    commonest = {told: count.most_common(1)[0] for told, count in standing.items()}
+    return {
+        told: here
+        for told, (here, n) in commonest.items()
+        if n > 1 and n > standing[told][told] and here != told
+    }
+
+
+def _may_be_recut(rooms: RoomMap, filing: _Filing) -> bool:
+    """True where the border between both rooms is near, or is no more than a wide opening."""
+    doors = rooms.doors_between(filing.told.id, filing.here.id)
+    if any(door.width_m > DOOR_M for door in doors):
+        return True
+    return _distance_m(rooms, filing.told, filing.waypoint.pose.point) <= BORDER_M
+
+
+def _distance_m(rooms: RoomMap, region: Region, point: Point) -> float:
+    rows, cols = np.nonzero(rooms.labels == region.index)
+    centres = rooms.grid.points_at(rows, cols)
+    return float(np.hypot(centres[:, 0] - point.x, centres[:, 1] - point.y).min())
+
+
+DOOR_MARGIN_M = 0.6
+"""A line of sight that is off by 10 degrees passes a door by so much at 3 m."""
+_STEP_M = 0.2
+
+
+def check_rooms(
+    rooms: RoomMap,
+    found: Things,
+    waypoint: Waypoint,
+    misfiled: Mapping[str, tuple[Region, Region]],
+) -> Iterator[Finding]:
+    """Gives what is odd about the room that a record names; one without a room has nothing.
+
+    Args:
+        rooms: As they are cut now.
+        found: The things of the memory.
+        waypoint: The record.
+        misfiled: Of every record that is, by its name, the room that it names and its own.
+    """
+    if not waypoint.room_id:
+        return
+    if waypoint.name in misfiled:
+        told, here = misfiled[waypoint.name]
+        yield Finding(
+            kind=FindingKind.WRONG_ROOM,
+            sentence=f"{quote_name(waypoint.name)} is filed under {told.id}, but stands in "
+            f"{here.id}.",
+            waypoints=(waypoint.name,),
+        )
+        return
+    start = rooms.find_region_at(waypoint.pose.point) or rooms.find_region(waypoint.room_id)
+    for thing in found.seen_from(waypoint) if start is not None else ():
+        way = _regions_on(rooms, waypoint, thing)
+        if start is not None and not _sees_through(rooms, waypoint, thing, (start, *way)):
+            yield Finding(
+                kind=FindingKind.WRONG_ROOM,
+                sentence=f"{quote_name(thing.label)} of {quote_name(waypoint.name)} lies in "
+                f"{way[-1].id}, which no door on the line from {start.id} opens to.",
+                waypoints=(waypoint.name,),
+                label=thing.label,
+                things=(thing,),
+            )
+
+
+def _regions_on(rooms: RoomMap, waypoint: Waypoint, thing: Thing) -> tuple[Region, ...]:
+    """Gives the rooms on the line from a place to a thing: the thing itself may be in a wall."""
+    assert thing.position is not None, "only what has a place has a room"  # noqa: S101 - our belief
+    start, end = waypoint.pose.point, thing.position
+    n_steps = max(math.ceil(start.distance_to(end) / _STEP_M), 1)
+    shares = (step / n_steps for step in range(n_steps + 1))
+    points = (
+        Point(start.x + share * (end.x - start.x), start.y + share * (end.y - start.y))
+        for share in shares
+    )
+    passed = filter(None, map(rooms.find_region_at, points))
+    return tuple(region for region, _ in groupby(passed))
+
+
+def _sees_through(rooms: RoomMap, waypoint: Waypoint, thing: Thing, way: Sequence[Region]) -> bool:
+    """True when a door on the line leads from each room on it to the next."""
+    assert thing.position is not None, "only what has a place has a room"  # noqa: S101 - our belief
+    start, end = waypoint.pose.point, thing.position
+    return all(
+        one.id == other.id
+        or any(
+            _off_line(start, end, door.place) <= door.width_m / 2 + DOOR_MARGIN_M
+            for door in rooms.doors_between(one.id, other.id)
+        )
+        for one, other in pairwise(way)
+    )
+
+
+def _off_line(start: Point, end: Point, point: Point) -> float:
+    """Gives the metres from a point to the line between two others."""
+    length = max(start.distance_to(end), 1e-9)
+    turn = start.bearing_to(point) - start.bearing_to(end)
+    along = min(max(math.cos(turn) * start.distance_to(point), 0.0), length)
+    share = along / length
+    foot = Point(start.x + share * (end.x - start.x), start.y + share * (end.y - start.y))
+    return foot.distance_to(point)
 
 
 def check_memory(

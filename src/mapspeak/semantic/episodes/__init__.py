@@ -4,19 +4,20 @@ They lie beside the semantic map file, which stays the truth about places; episo
 about what was observed, when and from where.
 """
 
-from mapspeak.semantic.episodes.asking import (
+from mapspeak.semantic.episodes.observation import (
     EpisodeMatch,
     EpisodeOrder,
     EpisodePage,
     EpisodeQuery,
+    Observation,
+    ObservationKind,
     Rank,
+    named_pictures,
+    observations_from,
 )
-from mapspeak.semantic.episodes.observation import Observation, ObservationKind
-from mapspeak.semantic.episodes.recording import named_pictures, observations_from
-from mapspeak.semantic.episodes.store import EpisodeStore, memory_folder
-from mapspeak.semantic.episodes.thinning import StoredPicture, ThinningRule, choose_dropped
-from mapspeak.semantic.episodes.uniting import BroughtOver, bring_over
-from mapspeak.semantic.episodes.vectors import VectorRank
+from mapspeak.semantic.episodes.pictures import StoredPicture, ThinningRule, choose_dropped
+from mapspeak.semantic.episodes.store import BroughtOver, EpisodeStore, bring_over, memory_folder
+from mapspeak.semantic.episodes.textindex import VectorRank
 
 __all__ = [
     "BroughtOver",

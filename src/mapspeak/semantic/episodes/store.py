@@ -5,36 +5,48 @@ Reading and writing are synchronous, and safe between processes and threads.
 
 import contextlib
 import json
+import shutil
 import sqlite3
 from collections.abc import Callable, Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from types import MappingProxyType
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
-from mapspeak.semantic.episodes.asking import EpisodePage, EpisodeQuery, Rank
-from mapspeak.semantic.episodes.database import INDEX_VERSION, EpisodeDatabase
-from mapspeak.semantic.episodes.moving import finish_move, plan_move
+from mapspeak.installation import shell_command
+from mapspeak.semantic.episodes.database import (
+    INDEX_VERSION,
+    EpisodeDatabase,
+    finish_move,
+    has_plans,
+    plan_move,
+)
 from mapspeak.semantic.episodes.observation import (
+    EpisodePage,
+    EpisodeQuery,
     Observation,
     ObservationKind,
+    Rank,
     microseconds_of,
 )
-from mapspeak.semantic.episodes.pictures import PictureFolder, picture_name
-from mapspeak.semantic.episodes.scoring import TextScorer
+from mapspeak.semantic.episodes.pictures import (
+    PictureFolder,
+    StoredPicture,
+    ThinningRule,
+    choose_dropped,
+    picture_name,
+)
 from mapspeak.semantic.episodes.searching import (
     COLUMNS,
     Search,
+    TextScorer,
     find_observations,
     observation_from,
 )
-from mapspeak.semantic.episodes.thinning import StoredPicture, ThinningRule, choose_dropped
-from mapspeak.semantic.episodes.words import add_text, index_texts, text_hash
+from mapspeak.semantic.episodes.textindex import add_text, index_texts, text_hash
 from mapspeak.semantic.waypoint import name_key
-
-__all__ = ["EpisodeStore", "memory_folder"]
 
 LOCK_TIMEOUT_S = 5.0
 
@@ -321,3 +333,53 @@ def _note_fact(connection: sqlite3.Connection, name: str, value: str) -> None:
 
 def _hour(time: datetime) -> str:
     return time.astimezone(UTC).strftime("%Y-%m-%dT%H")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BroughtOver:
+    """What came over.
+
+    Attributes:
+        n_observations: Each once, in however many memories it was.
+        n_pictures: Files.
+    """
+
+    n_observations: int = 0
+    n_pictures: int = 0
+
+
+def bring_over(*memories: Path, to: Path) -> BroughtOver:
+    """Copies the observations of some semantic map files, with their pictures, for another one.
+
+    All of them or none; those of the memories stay as they are.
+
+    Args:
+        memories: Semantic map files of one map.
+        to: The file that they are for; it has no observations yet.
+
+    Raises:
+        SemanticMapError: It has some, or they cannot be read or written.
+    """
+    sources = [EpisodeStore(memory_folder(path)) for path in memories]
+    for source in sources:
+        _require_settled(source)
+    folder = memory_folder(to)
+    if folder.exists():
+        message = f"{folder} is there already."
+        raise SemanticMapError(message, hint="Give the new file another name, or remove it.")
+    target = EpisodeStore(folder)
+    try:
+        came = [target.take_over(source) for source in sources]
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    return BroughtOver(n_observations=sum(n for n, _ in came), n_pictures=sum(n for _, n in came))
+
+
+def _require_settled(store: EpisodeStore) -> None:
+    """Refuses observations that have not followed their records to a moved map yet."""
+    if store.database.exists() and has_plans(store.database):
+        raise SemanticMapError(
+            f"The observations in {store.folder} have not followed their map yet.",
+            hint=f"Start `{shell_command('serve --memory FILE')}` with it once, then merge again.",
+        )

@@ -4,9 +4,13 @@ Nothing here opens a file; `mapspeak.semantic.store` does.
 """
 
 from mapspeak.semantic.mapfile.document import MapDocument, parse_document
-from mapspeak.semantic.mapfile.eventrewriting import with_event
-from mapspeak.semantic.mapfile.moving import moved
-from mapspeak.semantic.mapfile.rewriting import bound_to, with_waypoint, without_waypoint
+from mapspeak.semantic.mapfile.rewriting import (
+    bound_to,
+    moved,
+    with_event,
+    with_waypoint,
+    without_waypoint,
+)
 
 __all__ = [
     "MapDocument",

@@ -13,11 +13,16 @@ from operator import add
 from pydantic import ValidationError
 
 from mapspeak.errors import SemanticMapError
-from mapspeak.semantic.events.event import Event
-from mapspeak.semantic.mapfile import plain
+from mapspeak.semantic.events import Event
 from mapspeak.semantic.mapfile.eventschema import read_events
-from mapspeak.semantic.mapfile.layout import Layout, find_changed_records, find_records, whole
-from mapspeak.semantic.mapfile.lineends import LineEnds
+from mapspeak.semantic.mapfile.layout import (
+    Layout,
+    LineEnds,
+    find_changed_records,
+    find_records,
+    read_plain_record,
+    whole,
+)
 from mapspeak.semantic.mapfile.schema import (
     fault_in,
     find_misspelt_keys,
@@ -267,7 +272,7 @@ def _listed_records(root: MappingNode | None, map_id: str | None) -> Iterator[Re
 
 
 def _read_block(block: str, map_id: str | None) -> Reading:
-    data = plain.read_record(block)
+    data = read_plain_record(block)
     if data is not None:
         try:
             return _reading(data, map_id)

@@ -16,7 +16,7 @@ from pydantic import (
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
-from mapspeak.semantic.events.event import ID_RULE, Effect, Event, Outline, is_event_id
+from mapspeak.semantic.events import ID_RULE, Effect, Event, Outline, is_event_id
 from mapspeak.semantic.mapfile.tree import Data, ListNode, MappingNode, Node, TextError
 from mapspeak.semantic.quoting import quote_name
 

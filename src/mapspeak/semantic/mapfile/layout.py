@@ -1,12 +1,14 @@
-"""Cuts the file into its records by the dashes of the list `waypoints`, without a YAML parser.
+"""Where records and line ends stand in a semantic map file, without a YAML parser."""
 
-The cut is right wherever YAML's own rule on indentation is kept: what belongs to an item stands
-further right than its dash. Each piece is still read by a YAML parser, which reports the others.
-"""
-
+import json
 import re
 from bisect import bisect_left, bisect_right
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from difflib import SequenceMatcher
+
+from mapspeak.semantic.mapfile.editing import is_plain, is_plain_in_flow
+from mapspeak.semantic.mapfile.tree import Data
 
 _LIST_KEY = re.compile(r"^waypoints:[ \t]*(?:#[^\n]*)?$", re.MULTILINE)
 _CONTENT = re.compile(r"^( *)([^ #\n])", re.MULTILINE)
@@ -133,3 +135,143 @@ def _content_end(text: str, start: int, end: int, indent: int) -> int:
         end = line_start
     line_end = text.find("\n", end)
     return len(text) if line_end < 0 else line_end + 1
+
+
+_ENTRY = re.compile(r"([a-z_]+):(?: +(\S.*))?")
+_NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
+_TIME = re.compile(r"\d{4}-\d\d-\d\dT[\d:.]+(?:Z|[+-]\d\d:\d\d)")
+_QUOTED = re.compile(r'"(?:[^"\\]|\\["\\n])*"')
+
+
+class _UnsureError(Exception):
+    """This text needs the YAML parser."""
+
+
+def read_plain_record(block: str) -> dict[str, Data] | None:
+    """Gives what one item of the list `waypoints` says; None when a YAML parser must decide."""
+    try:
+        return _read_lines(block.rstrip("\n").split("\n"))
+    except _UnsureError:
+        return None
+
+
+def _read_lines(lines: list[str]) -> dict[str, Data]:
+    margin, dash, first_entry = lines[0].partition("- ")
+    _sure(dash and not margin.strip(" "))
+    record: dict[str, Data] = {}
+    items: list[Data] | None = None
+    entry_margin, item_margin = f"{margin}  ", f"{margin}    - "
+    for line in (entry_margin + first_entry, *lines[1:]):
+        _sure(line.isprintable())
+        if line.startswith(item_margin) and items is not None:
+            items.append(_read_value(line.removeprefix(item_margin)))
+            continue
+        key, value = _read_entry(line, entry_margin)
+        _sure(items != [] and key not in record)
+        items = [] if value is None else None
+        record[key] = items if value is None else _read_value(value)
+    _sure(items != [])
+    return record
+
+
+def _read_entry(line: str, margin: str) -> tuple[str, str | None]:
+    entry = _ENTRY.fullmatch(line, len(margin))
+    if entry is None or not line.startswith(margin):
+        raise _UnsureError
+    return entry[1], entry[2]
+
+
+def _read_value(text: str) -> Data:
+    if text == "[]":
+        return []
+    if text.startswith("[") and text.endswith("]"):
+        return [_read_flow_scalar(item) for item in text[1:-1].split(", ")]
+    if text.startswith("{") and text.endswith("}"):
+        return _read_flow_mapping(text[1:-1])
+    if _QUOTED.fullmatch(text):
+        return str(json.loads(text))
+    _sure(is_plain(text) or _NUMBER.fullmatch(text) or _TIME.fullmatch(text))
+    return text
+
+
+def _read_flow_mapping(text: str) -> Data:
+    mapping: dict[str, Data] = {}
+    for part in text.split(", "):
+        entry = _ENTRY.fullmatch(part)
+        if entry is None or entry[2] is None or entry[1] in mapping:
+            raise _UnsureError
+        mapping[entry[1]] = _read_flow_scalar(entry[2])
+    return mapping
+
+
+def _read_flow_scalar(text: str) -> str:
+    _sure(is_plain_in_flow(text) or _NUMBER.fullmatch(text) or _TIME.fullmatch(text))
+    return text
+
+
+def _sure(is_sure: object) -> None:
+    if not is_sure:
+        raise _UnsureError
+
+
+LF, CRLF = "\n", "\r\n"
+
+
+@dataclass(frozen=True, slots=True)
+class LineEnds:
+    """The line ends of a file that was read.
+
+    Attributes:
+        usual: What most of its lines end in, and every new one.
+        lines: Its lines without their ends.
+        ends: What each of them ends in, but the last; both are empty where all end alike.
+    """
+
+    usual: str
+    lines: tuple[str, ...] = ()
+    ends: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, decoded: str) -> "LineEnds":
+        """Takes them from a file's text."""
+        if "\r" not in decoded:
+            # To look for one letter costs a hundredth of counting two.
+            return cls(LF)
+        n_lines, n_crlf = decoded.count(LF), decoded.count(CRLF)
+        usual = CRLF if 2 * n_crlf > n_lines else LF
+        if n_crlf in (0, n_lines):
+            return cls(usual)
+        *ended, last = decoded.split(LF)
+        ends = tuple(CRLF if line.endswith("\r") else LF for line in ended)
+        return cls(usual, (*(line.removesuffix("\r") for line in ended), last), ends)
+
+    def restored(self, text: str) -> str:
+        """Gives a text whose lines end in a line feed with the ends of this file.
+
+        Args:
+            text: What the file is to say; most of its lines stood in the file before.
+        """
+        if not self.lines:
+            return text if self.usual == LF else text.replace(LF, self.usual)
+        *ended, last = text.split(LF)
+        ends = [self.usual] * len(ended)
+        for before, after in _same_lines(self.lines[:-1], ended):
+            ends[after] = self.ends[before]
+        return "".join(line + end for line, end in zip(ended, ends, strict=True)) + last
+
+
+def _same_lines(before: Sequence[str], after: Sequence[str]) -> Iterator[tuple[int, int]]:
+    """Gives the numbers of lines that are the same, before and after."""
+    n_least = min(len(before), len(after))
+    n_top = next((i for i in range(n_least) if before[i] != after[i]), n_least)
+    n_most = n_least - n_top
+    n_end = next((i for i in range(n_most) if before[-1 - i] != after[-1 - i]), n_most)
+    yield from ((i, i) for i in range(n_top))
+    yield from ((len(before) - 1 - i, len(after) - 1 - i) for i in range(n_end))
+    old, new = before[n_top : len(before) - n_end], after[n_top : len(after) - n_end]
+    if len(old) == len(new):
+        # Values were changed in their places.
+        yield from ((n_top + i, n_top + i) for i in range(len(old)) if old[i] == new[i])
+        return
+    for block in SequenceMatcher(None, old, new).get_matching_blocks():
+        yield from ((n_top + block.a + i, n_top + block.b + i) for i in range(block.size))

@@ -1,11 +1,22 @@
-"""A changed file: one record written, replaced or taken out, every other character as it was."""
+"""A changed file: a record, an event or all places written; every other character as it was."""
+
+from dataclasses import replace
 
 from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import Pose
+from mapspeak.semantic.events import Event
 from mapspeak.semantic.mapfile.document import MapDocument, parse_document
-from mapspeak.semantic.mapfile.editing import edited_record
-from mapspeak.semantic.mapfile.rendering import entry_text, record_text
+from mapspeak.semantic.mapfile.editing import edited_record, entry_text, record_text
+from mapspeak.semantic.mapfile.eventschema import event_data
 from mapspeak.semantic.mapfile.schema import FILE_VERSION, record_data
-from mapspeak.semantic.mapfile.tree import Data, ListNode, line_and_column
+from mapspeak.semantic.mapfile.tree import (
+    Data,
+    ListNode,
+    MappingNode,
+    Node,
+    ScalarNode,
+    line_and_column,
+)
 from mapspeak.semantic.waypoint import Waypoint, name_key
 
 _GREETING = "# mapspeak semantic map. Edit freely: comments and order are kept.\n"
@@ -130,3 +141,168 @@ def _ended(text: str) -> str:
 def _line_end(text: str, offset: int) -> int:
     end = text.find("\n", offset)
     return len(text) if end < 0 else end
+
+
+_INDENT = 2
+
+
+def with_event(document: MapDocument, event: Event) -> tuple[MapDocument, Event]:
+    """Gives the file with an event written: in its own record if its id is there already.
+
+    Returns:
+        The file, and the event as it reads there, with its id.
+
+    Raises:
+        SemanticMapError: The file is laid out in a way that cannot be written to.
+    """
+    named = event if event.id else replace(event, id=_free_id(document))
+    if named.id in document.events:
+        text = changed_events(document, {named.id: named})
+    else:
+        text = _with_new(document, named)
+    changed = _reparsed_with_events(document, text)
+    written = changed.events.get(named.id)
+    if written is None or event_data(written.event) != event_data(named):
+        raise _events_layout_error(document)
+    return changed, written.event
+
+
+def changed_events(document: MapDocument, events: dict[str, Event]) -> str:
+    """Gives the file's text with some of its events changed."""
+    text = document.text
+    for record in sorted(document.events.values(), key=lambda each: -each.start):
+        new = events.get(record.event.id)
+        if new is None:
+            continue
+        # As an item of its own, indented as it was: comments and spelling stay.
+        line_start = text.rfind("\n", 0, record.start) + 1
+        before, block = text[line_start : record.start], text[record.start : record.end]
+        if before.strip(" -"):
+            raise _events_layout_error(document)
+        item = " " * len(before) + block
+        edited = edited_record(item, old=event_data(record.event), new=event_data(new))
+        text = text[:line_start] + before + edited[len(before) :] + text[record.end :]
+    return text
+
+
+def _with_new(document: MapDocument, event: Event) -> str:
+    text, root = document.text, document.root
+    ended = text if not text or text.endswith("\n") else text + "\n"
+    said = event_data(event)
+    key = root.find_key("events") if root else None
+    if root is None or key is None:
+        return f"{ended}events:\n{record_text(said, indent=_INDENT)}"
+    listed = root.find_value("events")
+    if isinstance(listed, ListNode) and listed.items:
+        return _behind_last(document, listed, event)
+    return _in_empty(document, key, listed, record_text(said, indent=_INDENT))
+
+
+def _in_empty(document: MapDocument, key: ScalarNode, listed: Node | None, record: str) -> str:
+    """Gives the text with a first record below the key, in place of `[]` or null."""
+    text = document.text
+    # Where nothing stands behind the key, a value has no place of its own.
+    is_written = listed is not None and listed.end > listed.start
+    node = listed if listed is not None and is_written else key
+    start, end = map(document.layout.offset_in_text, (node.start, node.end))
+    before, behind = (text[:start], end) if is_written else (text[:end], end)
+    if is_written and "#" in text[start:end]:
+        raise _events_layout_error(document)
+    line_end = _line_end(text, behind)
+    rest = text[behind:line_end].rstrip()
+    head = before if rest else before.rstrip(" \t")
+    return f"{head}{rest}\n{record}{text[line_end + 1 :]}"
+
+
+def _behind_last(document: MapDocument, listed: ListNode, event: Event) -> str:
+    last = listed.items[-1]
+    if listed.is_flow or not isinstance(last, MappingNode):
+        raise _events_layout_error(document)
+    text = document.text
+    start, end = map(document.layout.offset_in_text, (last.start, last.end))
+    line_start = text.rfind("\n", 0, start) + 1
+    dash = text[line_start:start].find("-")
+    if dash < 0:
+        raise _events_layout_error(document)
+    line_end = _line_end(text, end)
+    head = text[:line_end] + "\n"
+    return head + record_text(event_data(event), indent=dash) + text[line_end + 1 :]
+
+
+def _free_id(document: MapDocument) -> str:
+    numbers = [int(each[1:]) for each in document.events if each[:1] == "E" and each[1:].isdigit()]
+    return f"E{max(numbers, default=0) + 1}"
+
+
+def _reparsed_with_events(document: MapDocument, text: str) -> MapDocument:
+    try:
+        changed = parse_document(document.encoded(text), source=document.source, previous=document)
+    except SemanticMapError as error:
+        raise _events_layout_error(document) from error
+    if set(changed.records) != set(document.records):
+        raise _events_layout_error(document)
+    return changed
+
+
+def _events_layout_error(document: MapDocument) -> SemanticMapError:
+    return SemanticMapError(
+        f"mapspeak reads the events of {document.source}, but cannot write to them.",
+        hint="Put `events:` at the start of a line and each event below it as `- text: ...`, its "
+        "other keys on lines of their own. Nothing was written.",
+    )
+
+
+def moved(document: MapDocument, motion: Pose, *, entries: dict[str, str]) -> MapDocument:
+    """Gives the file with every waypoint and event moved.
+
+    Args:
+        document: The file.
+        motion: From the frame of its poses to the new one.
+        entries: Keys of the file itself that change with it, such as `map`.
+
+    Raises:
+        SemanticMapError: The file is laid out in a way that cannot be written to.
+    """
+    if document.records and not document.layout.spans:
+        raise _moved_layout_error(document)
+    after = document
+    for key, value in entries.items():
+        after = with_entry(after, key, value)
+    events = {each.event.id: _moved_event(each.event, motion) for each in after.events.values()}
+    after = _reparsed_moved(after, changed_events(after, events))
+    return _reparsed_moved(after, _with_moved_records(after, motion))
+
+
+def _with_moved_records(document: MapDocument, motion: Pose) -> str:
+    pieces, end = [], 0
+    for record in sorted(document.records.values(), key=lambda each: each.start):
+        waypoint = record.reading.waypoint
+        new = waypoint.moved(motion)
+        block = document.text[record.start : record.end]
+        changed = edited_record(block, old=record_data(waypoint), new=record_data(new))
+        pieces += [document.text[end : record.start], changed]
+        end = record.end
+    return "".join([*pieces, document.text[end:]])
+
+
+def _moved_event(event: Event, motion: Pose) -> Event:
+    return replace(
+        event,
+        at=None if event.at is None else motion.transform(event.at),
+        outlines=tuple(tuple(map(motion.transform, outline)) for outline in event.outlines),
+    )
+
+
+def _reparsed_moved(document: MapDocument, text: str) -> MapDocument:
+    changed = parse_document(document.encoded(text), source=document.source, previous=document)
+    if changed.records.keys() != document.records.keys():
+        raise _moved_layout_error(document)
+    return changed
+
+
+def _moved_layout_error(document: MapDocument) -> SemanticMapError:
+    return SemanticMapError(
+        f"mapspeak reads {document.source}, but cannot write to its layout.",
+        hint="Put `waypoints:` at the start of a line and each waypoint below it as `- name: ...`. "
+        "Nothing was written.",
+    )

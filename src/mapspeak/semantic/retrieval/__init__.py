@@ -1,12 +1,22 @@
 """Finds what is remembered by the words that people use for it."""
 
-from mapspeak.semantic.retrieval.answer import Answer, Basis, Candidate, Thresholds, Verdict
-from mapspeak.semantic.retrieval.embedder import Embedder, TextVectors
-from mapspeak.semantic.retrieval.entry import Entry, EntryKind, list_entries
-from mapspeak.semantic.retrieval.evidence import MatchEvidence, MatchField, MatchKind
+from mapspeak.semantic.retrieval.answer import (
+    Answer,
+    Basis,
+    Candidate,
+    Entry,
+    EntryKind,
+    MatchEvidence,
+    MatchField,
+    MatchKind,
+    Thresholds,
+    Verdict,
+    list_entries,
+)
 from mapspeak.semantic.retrieval.index import WORDS_ONLY, EntryIndex
-from mapspeak.semantic.retrieval.meaning import find_model
-from mapspeak.semantic.retrieval.naming import calls_by_name
+from mapspeak.semantic.retrieval.kinds import calls_by_name
+from mapspeak.semantic.retrieval.meaningindex import Embedder, TextVectors
+from mapspeak.semantic.retrieval.minilm import find_model
 
 __all__ = [
     "WORDS_ONLY",

@@ -16,17 +16,27 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.semantic.retrieval.answer import Answer, Basis, Candidate, Thresholds, Verdict
-from mapspeak.semantic.retrieval.embedder import TextVectors
-from mapspeak.semantic.retrieval.entry import Entry
-from mapspeak.semantic.retrieval.evidence import MatchEvidence, MatchField
-from mapspeak.semantic.retrieval.kindindex import KindIndex, Missing
-from mapspeak.semantic.retrieval.meaning import is_word
-from mapspeak.semantic.retrieval.meaningindex import Likeness, MeaningIndex
-from mapspeak.semantic.retrieval.naming import calls_by_name, says_purpose
-from mapspeak.semantic.retrieval.spelling import LookAlikes
-from mapspeak.semantic.retrieval.wordindex import Asked, WordIndex
-from mapspeak.semantic.retrieval.words import content_stems, content_words, stem
+from mapspeak.semantic.retrieval.answer import (
+    Answer,
+    Basis,
+    Candidate,
+    Entry,
+    MatchEvidence,
+    MatchField,
+    Thresholds,
+    Verdict,
+)
+from mapspeak.semantic.retrieval.kinds import KindIndex, Missing, calls_by_name, says_purpose
+from mapspeak.semantic.retrieval.meaningindex import Likeness, MeaningIndex, TextVectors
+from mapspeak.semantic.retrieval.minilm import is_word
+from mapspeak.semantic.retrieval.wordindex import (
+    Asked,
+    LookAlikes,
+    WordIndex,
+    content_stems,
+    content_words,
+    stem,
+)
 from mapspeak.semantic.waypoint import name_key
 
 _Key = TypeVar("_Key")

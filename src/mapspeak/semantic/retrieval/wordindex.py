@@ -1,24 +1,164 @@
-"""Compares the words of a phrase with those of many records, rare words counting more."""
+"""Compare the words of a phrase with those of many records, rare words counting more."""
 
+import difflib
 import math
+import re
+import unicodedata
+from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.semantic.retrieval.evidence import (
+from mapspeak.semantic.retrieval.answer import (
     FIELD_WEIGHTS,
     KIND_WEIGHTS,
     MatchEvidence,
     MatchField,
     MatchKind,
 )
-from mapspeak.semantic.retrieval.spelling import Vocabulary
-from mapspeak.semantic.retrieval.words import content_words, split_words
 
-__all__ = ["Asked", "Texts", "WordIndex"]
+_FILLERS = """
+    a an and any are at by can closest could drive find for from get go goto here i in is it its me
+    move my navigate near nearest of on or place please robot some take that the there this to was
+    we what where which with you your
+""".split()  # noqa: SIM905 - fifty words in quotes would hide what they are
+
+
+_ENDING = re.compile(r"(?<=\w)['\u2019](?:d|ll|m|re|s|t|ve)\b", re.IGNORECASE)
+"""What is left of a word in "I'm", "where's" and "won't"."""
+
+
+def split_words(text: str) -> Iterator[tuple[str, str]]:
+    """Gives each word as it stands and as it is compared: small letters without accents."""
+    for shown in re.findall(r"\w+", text):
+        yield shown, shown.lower() if shown.isascii() else _without_accents(shown)
+
+
+def _without_accents(word: str) -> str:
+    letters = unicodedata.normalize("NFKD", word.casefold())
+    return "".join(letter for letter in letters if not unicodedata.combining(letter))
+
+
+def content_words(text: str) -> Iterator[tuple[str, str]]:
+    """Gives the words that say what is meant, without "the", "where's" and "take me to"."""
+    words = list(split_words(_ENDING.sub("", text)))
+    for number, (shown, word) in enumerate(words, 1):
+        # "Aisle A" is not any aisle.
+        tells_apart = len(word) == 1 and 1 < number == len(words)
+        if tells_apart or word not in _FILLERS:
+            yield shown, word
+
+
+def content_stems(text: str) -> tuple[str, ...]:
+    """Gives the stems of the words that say what is meant."""
+    return tuple(stem(word) for _, word in content_words(text))
+
+
+def stem(word: str) -> str:
+    """Cuts an English ending off: plural, -ing, -ed, -er, a last e."""
+    if len(word) > 4 and word.endswith("ies"):
+        word = word[:-3] + "y"
+    elif len(word) > 4 and word.endswith(("ses", "xes", "zes", "ches", "shes")):
+        word = word[:-2]
+    elif len(word) > 3 and word.endswith("s") and not word.endswith("ss"):
+        word = word[:-1]
+    for ending, n_left in (("ing", 3), ("ed", 3), ("er", 5)):
+        if word.endswith(ending) and len(word) - len(ending) >= n_left:
+            word = word.removesuffix(ending)
+            return word[:-1] if word[-1] == word[-2] and word[-1] not in "ls" else word
+    return word.removesuffix("e") if len(word) > 3 else word
+
+
+_MIN_LETTERS = 4
+"""A shorter word has too many others near it."""
+
+_MIN_LIKENESS_RATIO = 0.8
+_MOST_MISSPELT = 3
+_N_BUCKETS = 32
+"""Letters are counted in so many; two in one bucket let more words through, never fewer."""
+
+
+class LookAlikes:
+    """Texts, ready to be asked for those that are spelt like another."""
+
+    def __init__(self, texts: Iterable[str]) -> None:
+        self._texts = sorted(set(texts))
+        self._letters = np.array([_letters(text) for text in self._texts]).reshape(-1, _N_BUCKETS)
+        self._lengths = np.array([len(text) for text in self._texts], dtype=int)
+
+    def find(self, text: str, *, least_ratio: float, limit: int) -> list[str]:
+        """Finds the texts whose spelling is at least so much like this one's, the likest first."""
+        # It is the bound that difflib calls quick_ratio, for all texts at once.
+        n_shared = np.minimum(self._letters, _letters(text)).sum(axis=1)
+        is_like = 2 * n_shared >= least_ratio * (self._lengths + len(text))
+        likely = [self._texts[number] for number in np.flatnonzero(is_like)]
+        return difflib.get_close_matches(text, likely, n=limit, cutoff=least_ratio)
+
+
+class Vocabulary:
+    """The words of all records, ready to be asked for one of them.
+
+    Args:
+        words: As they are compared.
+        is_known: Whether it is a word of the language, and so not a misspelt one.
+    """
+
+    def __init__(
+        self, words: Iterable[str], *, is_known: Callable[[str], bool] = lambda _: False
+    ) -> None:
+        self._words = sorted(set(words))
+        self._look_alikes = LookAlikes(self._words)
+        self._is_known = is_known
+        self._of_stem: dict[str, list[str]] = defaultdict(list)
+        for word in self._words:
+            self._of_stem[stem(word)].append(word)
+        self._stems = sorted(self._of_stem)
+        self._stems_backwards = sorted(own[::-1] for own in self._stems)
+
+    def is_doubtful(self, word: str) -> bool:
+        """Whether a word is neither one of these nor a known one, and so perhaps misspelt."""
+        ways = set(self.find_spellings(word).values())
+        return ways <= {MatchKind.MISSPELT} and not self._is_known(word)
+
+    def find_spellings(self, word: str) -> dict[str, MatchKind]:
+        """Finds the words that count as this one, each with how; none where no word does."""
+        found = dict.fromkeys(self._of_stem.get(stem(word), ()), MatchKind.FORM)
+        if word in found:
+            found[word] = MatchKind.SAME
+        found = dict.fromkeys(self._parts(stem(word)), MatchKind.PART) | found
+        return found or dict.fromkeys(self._misspelt(word), MatchKind.MISSPELT)
+
+    def _parts(self, asked: str) -> list[str]:
+        """Gives the words that begin or end with this stem, or that it begins or ends with."""
+        n = len(asked)
+        if n < _MIN_LETTERS:
+            return []
+        begins = {asked[:end] for end in range(_MIN_LETTERS, n + 1)}
+        ends = {asked[start:] for start in range(n - _MIN_LETTERS + 1)}
+        stems = {own for own in begins | ends if own in self._of_stem}
+        stems.update(_beginning_with(self._stems, asked))
+        stems.update(own[::-1] for own in _beginning_with(self._stems_backwards, asked[::-1]))
+        return sorted(word for own in stems for word in self._of_stem[own])
+
+    def _misspelt(self, word: str) -> list[str]:
+        if len(word) < _MIN_LETTERS or self._is_known(word):
+            return []
+        return self._look_alikes.find(word, least_ratio=_MIN_LIKENESS_RATIO, limit=_MOST_MISSPELT)
+
+
+def _beginning_with(words: Sequence[str], start: str) -> Iterator[str]:
+    """Gives the words that begin so, of words in order."""
+    behind = (words[number] for number in range(bisect_left(words, start), len(words)))
+    return takewhile(lambda word: word.startswith(start), behind)
+
+
+def _letters(word: str) -> NDArray[np.int64]:
+    return np.bincount([ord(letter) % _N_BUCKETS for letter in word], minlength=_N_BUCKETS)
+
 
 Texts = Sequence[tuple[MatchField, str]]
 """What a record says, each text with the part of the record it is."""

@@ -7,10 +7,8 @@ from mapspeak.semantic.things.approach import (
     measure_faced,
 )
 from mapspeak.semantic.things.finding import Things, find_things
-from mapspeak.semantic.things.labels import name_the_same
-from mapspeak.semantic.things.noise import NOISE, NoiseModel
 from mapspeak.semantic.things.sight import SightMap, build_sight_map
-from mapspeak.semantic.things.thing import Category, Thing, View
+from mapspeak.semantic.things.thing import NOISE, Category, NoiseModel, Thing, View, name_the_same
 
 __all__ = [
     "NOISE",

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapspeak.semantic.merging import SAME_SPOT_M
-from mapspeak.semantic.things.likelihood import ViewLikelihood
-from mapspeak.semantic.things.news import find_log_priors
+from mapspeak.semantic.things.laserchanges import find_log_priors
+from mapspeak.semantic.things.likelihood import Sighting, ViewLikelihood, are_apart
 from mapspeak.semantic.things.placing import (
     Posterior,
     build_posterior,
@@ -22,8 +22,6 @@ from mapspeak.semantic.things.placing import (
     measure_agreement,
 )
 from mapspeak.semantic.things.sight import SightMap
-from mapspeak.semantic.things.sighting import Sighting
-from mapspeak.semantic.things.spots import are_apart
 from mapspeak.semantic.waypoint import Waypoint
 from mapspeak.spatial.grid import FloatArray, IntArray
 

@@ -1,22 +1,71 @@
-"""What one view says of where its thing is: a likelihood over the cells in sight.
-
-Likelihoods are ratios to that of a view that says nothing: a direction any way round, and a range
-anywhere within reach. So 1 is no news, and what a view does not speak of needs no cell.
-"""
+"""What views say of where their thing is: a likelihood over the cells in sight."""
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Point, Pose
 from mapspeak.semantic.laserfan import LaserFan
-from mapspeak.semantic.things.news import LaserNews, read_news
-from mapspeak.semantic.things.sight import BODY_M, SightMap, bearing_index
-from mapspeak.semantic.waypoint import Landmark
+from mapspeak.semantic.things.laserchanges import LaserNews, read_news
+from mapspeak.semantic.things.sight import BODY_M, SightMap, bearing_index, look_around
+from mapspeak.semantic.things.thing import Category, NoiseModel
+from mapspeak.semantic.waypoint import Landmark, Waypoint
 from mapspeak.spatial.grid import FloatArray, IntArray
 
-__all__ = ["Outlook", "ViewLikelihood", "build_outlook", "weigh_view"]
+N_SIGMAS = 2.5
+"""Of views of one thing, one pair in twenty lies farther apart (chi-squared, two dimensions).
+
+One such pair in twenty splits a thing in two, which makes it ambiguous and so is told; joining two
+things makes one in a wrong place that nothing tells. Hence no wider; narrower splits ever more.
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spot:
+    """A point in the map frame, and its covariance in square metres.
+
+    Attributes:
+        point: The end of the line of sight.
+        xx: The variance along x.
+        xy: The covariance of x and y.
+        yy: The variance along y.
+    """
+
+    point: Point
+    xx: float
+    xy: float
+    yy: float
+
+
+def find_spot(pose: Pose, landmark: Landmark, noise: NoiseModel) -> Spot | None:
+    """Gives where a landmark says that its thing is; None without a direction or a range."""
+    if landmark.bearing_rad is None or landmark.range_m is None:
+        return None
+    way, far_m = pose.yaw_rad + landmark.bearing_rad, landmark.range_m
+    # A range ends at the surface or in the middle of a thing; nobody says which.
+    body = (BODY_M / 2) ** 2
+    along = (noise.range_m + noise.range_ratio * far_m) ** 2 + body
+    across = (noise.bearing_rad * far_m) ** 2 + body
+    cos, sin = math.cos(way), math.sin(way)
+    return Spot(
+        point=Point(pose.x + far_m * cos, pose.y + far_m * sin),
+        xx=along * cos * cos + across * sin * sin,
+        xy=(along - across) * cos * sin,
+        yy=along * sin * sin + across * cos * cos,
+    )
+
+
+def are_apart(one: Spot | None, other: Spot | None) -> bool:
+    """True for two spots so far apart that one thing is hardly in both."""
+    if one is None or other is None:
+        return False
+    dx, dy = one.point.x - other.point.x, one.point.y - other.point.y
+    xx, xy, yy = one.xx + other.xx, one.xy + other.xy, one.yy + other.yy
+    squared = (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy)
+    return squared > N_SIGMAS**2
+
 
 _FARTHEST_SIGMAS = 3.5
 
@@ -142,3 +191,84 @@ def _weigh_range(sight: SightMap, ranges_m: FloatArray, told_m: float) -> FloatA
     bell = np.exp(-0.5 * ((told_m - ranges_m) / sigma) ** 2) / (sigma * math.sqrt(math.tau))
     wrong = noise.wrong_range_ratio
     return np.asarray((1 - wrong) * bell * noise.reach_m + wrong, dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sighting:
+    """One landmark of one waypoint; compared by identity.
+
+    Attributes:
+        waypoint: From where it was seen: the standpoint, whose pose is the one it was seen from.
+        landmark: What was seen.
+        category: What it is filed under.
+        wrong_ratio: How likely it is wrong as a whole.
+        likelihood: Where it may be; None where nothing says.
+        spot: Where its direction and range together say that it is; None without both.
+    """
+
+    waypoint: Waypoint
+    landmark: Landmark
+    category: Category
+    wrong_ratio: float
+    likelihood: ViewLikelihood | None
+    spot: Spot | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Surroundings:
+    """What a waypoint sees of the map, and its sightings.
+
+    Attributes:
+        near_m: To the first obstacle, by ray of the grid's frame.
+        far_m: To the first wall.
+        sightings: Of all its landmarks; none where its standpoints have them.
+    """
+
+    near_m: FloatArray
+    far_m: FloatArray
+    sightings: tuple[Sighting, ...]
+
+
+def read_waypoints(
+    sight: SightMap, waypoints: Sequence[Waypoint], known: Mapping[Waypoint, Surroundings]
+) -> dict[Waypoint, Surroundings]:
+    """Gives what every waypoint sees, and what was seen from each of its standpoints.
+
+    What is known of an equal one is taken as it is.
+    """
+    stands = [stand for waypoint in waypoints for stand in waypoint.standpoints]
+    every = dict.fromkeys((*waypoints, *stands))
+    new = [waypoint for waypoint in every if waypoint not in known]
+    near_m, far_m = look_around(sight, [waypoint.pose for waypoint in new])
+    read = {
+        waypoint: _read(sight, waypoint, near, far)
+        for waypoint, near, far in zip(new, near_m, far_m, strict=True)
+    }
+    return {waypoint: known.get(waypoint) or read[waypoint] for waypoint in every}
+
+
+def _read(
+    sight: SightMap, waypoint: Waypoint, near_m: FloatArray, far_m: FloatArray
+) -> Surroundings:
+    if waypoint.standpoints != (waypoint,):
+        return Surroundings(near_m=near_m, far_m=far_m, sightings=())
+    outlook = build_outlook(sight, waypoint.pose, near_m, far_m)
+    sorted_in = (
+        (Category.SAFETY, waypoint.safety_landmarks),
+        (Category.FUNCTIONAL, waypoint.functional_landmarks),
+    )
+    sightings = []
+    for category, landmarks in sorted_in:
+        for landmark in landmarks:
+            likelihood = weigh_view(sight, outlook, waypoint.pose, landmark)
+            sightings.append(
+                Sighting(
+                    waypoint=waypoint,
+                    landmark=landmark,
+                    category=category,
+                    wrong_ratio=sight.noise.wrong_ratio_of(landmark.confidence),
+                    likelihood=likelihood if likelihood and np.any(likelihood.ratios) else None,
+                    spot=find_spot(waypoint.pose, landmark, sight.noise),
+                )
+            )
+    return Surroundings(near_m=near_m, far_m=far_m, sightings=tuple(sightings))

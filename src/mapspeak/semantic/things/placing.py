@@ -11,10 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapspeak.geometry import Point
-from mapspeak.semantic.things.likelihood import ViewLikelihood
-from mapspeak.semantic.things.news import find_log_priors
+from mapspeak.semantic.things.laserchanges import find_log_priors
+from mapspeak.semantic.things.likelihood import N_SIGMAS, ViewLikelihood
 from mapspeak.semantic.things.sight import BODY_M, SightMap
-from mapspeak.semantic.things.spots import N_SIGMAS
 from mapspeak.spatial.grid import FloatArray, IntArray
 
 __all__ = [

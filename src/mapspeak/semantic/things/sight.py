@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.geometry import Pose
-from mapspeak.semantic.things.noise import NOISE, NoiseModel
+from mapspeak.semantic.things.thing import NOISE, NoiseModel
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 

@@ -47,7 +47,7 @@ def test_a_text_of_any_length_has_a_vector_of_its_beginning(model: Embedder) -> 
 
 @pytest.mark.parametrize("content", [b"", b"\x3a\x05hello", b"no model", b"\xff" * 99])
 def test_a_file_that_is_no_model_is_refused(content: bytes, tmp_path: Path) -> None:
-    from mapspeak.semantic.retrieval.meaning.minilm import MiniLM  # noqa: PLC0415 - optional
+    from mapspeak.semantic.retrieval.minilm import MiniLM  # noqa: PLC0415 - optional
 
     path = tmp_path / "model.onnx"
     path.write_bytes(content)

@@ -1,7 +1,6 @@
 import pytest
 
-from mapspeak.semantic.retrieval.meaning import is_word
-from mapspeak.semantic.retrieval.meaning.wordpieces import read_wordpieces
+from mapspeak.semantic.retrieval.minilm import is_word, read_wordpieces
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Whether one can see from a place what its record names there."""
+"""Whether a robot can have stood and seen what a record says, on the map as it is now."""
 
 import math
 from collections.abc import Iterator
@@ -9,9 +9,65 @@ from mapspeak.semantic.quoting import quote_name
 from mapspeak.semantic.things import Things
 from mapspeak.semantic.things.sight import BODY_M, OWN_M
 from mapspeak.semantic.waypoint import Landmark, Waypoint
-from mapspeak.spatial import FREE_MAX, UNKNOWN
+from mapspeak.spatial import FREE_MAX, UNKNOWN, OccupancyGrid
+from mapspeak.spatial.paths import DistanceField
 
-__all__ = ["check_rays"]
+FARTHEST_M = 1e6
+
+
+def check_pose(
+    grid: OccupancyGrid, waypoint: Waypoint, distances: DistanceField | None, map_id: str | None
+) -> Iterator[Finding]:
+    """Gives what is odd about where a waypoint is."""
+    if None not in (map_id, waypoint.map_id) and waypoint.map_id != map_id:
+        of, on = quote_name(waypoint.map_id or ""), quote_name(map_id or "")
+        sentence = f"belongs to the map {of}, but the robot is on {on}"
+        yield _finding(FindingKind.OTHER_MAP, waypoint, sentence)
+    point = waypoint.pose.point
+    ground = _ground_at(grid, point)
+    if ground is not None:
+        yield _finding(*_say_ground(ground, waypoint, point))
+    elif distances is not None and not distances.is_reachable(point):
+        sentence = (
+            f"stands at {_say(point)}, where a robot of {distances.radius_m:.2f} m radius cannot "
+            "get to now"
+        )
+        yield _finding(FindingKind.UNREACHABLE, waypoint, sentence)
+
+
+def _ground_at(grid: OccupancyGrid, point: Point) -> FindingKind | None:
+    """Gives what is wrong with the cell at a point; None where it is free."""
+    if max(abs(point.x), abs(point.y)) > FARTHEST_M:
+        return FindingKind.OFF_MAP
+    cell = grid.cell_at(point)
+    if not grid.contains(cell):
+        return FindingKind.OFF_MAP
+    occupancy = int(grid.cells[cell.row, cell.col])
+    if occupancy > FREE_MAX:
+        return FindingKind.IN_OBSTACLE
+    return FindingKind.IN_UNKNOWN if occupancy == UNKNOWN else None
+
+
+def _say_ground(
+    kind: FindingKind, waypoint: Waypoint, point: Point
+) -> tuple[FindingKind, Waypoint, str]:
+    said = {
+        FindingKind.OFF_MAP: f"stands at {_say(point)}, off the map",
+        FindingKind.IN_OBSTACLE: f"stands at {_say(point)}, where the map has an obstacle now",
+        FindingKind.IN_UNKNOWN: f"stands at {_say(point)}, where nobody has seen the floor",
+    }
+    return kind, waypoint, said[kind]
+
+
+def _finding(kind: FindingKind, waypoint: Waypoint, what: str) -> Finding:
+    sentence = f"{quote_name(waypoint.name)} {what}."
+    return Finding(kind=kind, sentence=sentence, waypoints=(waypoint.name,))
+
+
+def _say(point: Point) -> str:
+    is_near = max(abs(point.x), abs(point.y)) < FARTHEST_M
+    return f"({point.x:.2f}, {point.y:.2f})" if is_near else f"({point.x:g}, {point.y:g})"
+
 
 N_SIGMAS = 2.0
 
@@ -36,7 +92,7 @@ def _check(
     if _ends_in_unknown(found, waypoint, way, open_m):
         if landmark.range_m is None or landmark.range_m > open_m:
             sentence = f"the line to it leaves the seen floor after {open_m:.1f} m"
-            yield _finding(FindingKind.THROUGH_UNKNOWN, waypoint, landmark, sentence)
+            yield _landmark_finding(FindingKind.THROUGH_UNKNOWN, waypoint, landmark, sentence)
         return
     if landmark.range_m is None:
         return
@@ -44,7 +100,7 @@ def _check(
     spread_m = noise.range_m + noise.range_ratio * landmark.range_m
     if landmark.range_m > _widest_m(found, waypoint, way) + BODY_M + N_SIGMAS * spread_m:
         sentence = f"it is told as {landmark.range_m:.1f} m away, behind a wall at {open_m:.1f} m"
-        yield _finding(FindingKind.BEHIND_WALL, waypoint, landmark, sentence)
+        yield _landmark_finding(FindingKind.BEHIND_WALL, waypoint, landmark, sentence)
 
 
 def _widest_m(found: Things, waypoint: Waypoint, way: float) -> float:
@@ -70,7 +126,9 @@ def _ends_in_unknown(found: Things, waypoint: Waypoint, way: float, open_m: floa
     return int(grid.cells[end.row, end.col]) == UNKNOWN and not (around > FREE_MAX).any()
 
 
-def _finding(kind: FindingKind, waypoint: Waypoint, landmark: Landmark, what: str) -> Finding:
+def _landmark_finding(
+    kind: FindingKind, waypoint: Waypoint, landmark: Landmark, what: str
+) -> Finding:
     return Finding(
         kind=kind,
         sentence=f"{quote_name(landmark.label)} of {quote_name(waypoint.name)}: {what}.",
