@@ -26,11 +26,10 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.figure import Figure
+from mapspeak.driving.drive import DriveReport
+from mapspeak.driving.exploration import Explorer, Pick, take_first
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.links.simulated import SimulatedRobot
-from mapspeak.navigation.atlas import Atlas
-from mapspeak.navigation.drive import DriveReport
-from mapspeak.navigation.exploration import Explorer, Pick, take_first
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.session import Session
 from mapspeak.simulator import BODY_RADIUS_M, Simulation, TrueFloor, World, load_world
@@ -38,6 +37,7 @@ from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.mapfiles import write_map
 from mapspeak.spatial.paths import clearance_m
+from mapspeak.worldmodel.model import Atlas
 
 __all__ = ["choose_start", "main", "measure"]
 

@@ -10,12 +10,12 @@ import numpy as np
 
 from benchmarks.figure import Figure
 from mapspeak.geometry import Pose
-from mapspeak.navigation.atlas import Atlas
 from mapspeak.semantic import SemanticMap
 from mapspeak.server.mapview.drawing import draw_atlas
 from mapspeak.server.mapview.tables import describe_atlas
 from mapspeak.server.mapview.views import MapLook, view_of
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
+from mapspeak.worldmodel.model import Atlas
 
 __all__ = ["draw_building", "measure"]
 

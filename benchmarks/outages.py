@@ -24,9 +24,9 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.figure import Figure
+from mapspeak.driving.drive import DriveReport
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import open_rosbridge_robot
-from mapspeak.navigation.drive import DriveReport
 from mapspeak.robot import GoalState
 from mapspeak.ros.messages import Dialect
 from mapspeak.semantic import SemanticMapStore

@@ -17,10 +17,10 @@ import numpy as np
 from benchmarks.figure import Figure
 from benchmarks.relations.sites import Site, build_sites
 from benchmarks.relations.truth import Truth, away
+from mapspeak.driving.routes import RoutePlan, plan_route
 from mapspeak.geometry import Point, Pose
-from mapspeak.navigation.atlas import Atlas
-from mapspeak.navigation.routes import RoutePlan, plan_route
 from mapspeak.semantic import Landmark, SemanticMap, Waypoint
+from mapspeak.worldmodel.model import Atlas
 
 __all__ = ["measure"]
 

@@ -32,8 +32,7 @@ from benchmarks.figure import Figure
 from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Point, Pose
 from mapspeak.links.simulated import SimulatedRobot
-from mapspeak.navigation.closures import ClosedArea
-from mapspeak.navigation.safety import (
+from mapspeak.safety import (
     Approvals,
     AreaRule,
     AuditLine,
@@ -50,6 +49,7 @@ from mapspeak.server import build_server
 from mapspeak.server.tools import build_toolsets
 from mapspeak.session import Session
 from mapspeak.simulator import BODY_RADIUS_M, Simulation, load_world
+from mapspeak.worldmodel.closures import ClosedArea
 
 __all__ = ["main", "measure"]
 

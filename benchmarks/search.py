@@ -25,10 +25,8 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.figure import Figure
-from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.links.simulated import SimulatedRobot
-from mapspeak.navigation.drive import DriveReport
-from mapspeak.navigation.search import (
+from mapspeak.driving.drive import DriveReport
+from mapspeak.driving.search import (
     Budget,
     Candidate,
     CandidateKind,
@@ -36,6 +34,8 @@ from mapspeak.navigation.search import (
     Judgement,
     Searcher,
 )
+from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.links.simulated import SimulatedRobot
 from mapspeak.robot import Detection
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.session import Session

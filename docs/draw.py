@@ -10,7 +10,6 @@ from pathlib import Path
 
 from benchmarks.look import draw_building
 from mapspeak.geometry import Pose
-from mapspeak.navigation.atlas import Atlas
 from mapspeak.semantic import SemanticMap
 from mapspeak.server.mapview.drawing import draw_atlas
 from mapspeak.server.mapview.tables import describe_atlas
@@ -19,6 +18,7 @@ from mapspeak.simulator import TrueFloor, load_world
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map
 from mapspeak.spatial.rooms import find_rooms
+from mapspeak.worldmodel.model import Atlas
 
 ROOT = Path(__file__).parents[1]
 PICTURES = ROOT / "docs" / "pictures"

@@ -32,7 +32,7 @@ TROUBLES = ROOT / "docs" / "howto" / "troubleshooting.md"
 SOURCES = {
     "robot": ("links", "server/tools/ros/inquiry.py"),
     "start": ("cli", "settings.py", "server/transport.py", "server/app.py"),
-    "refused": ("navigation/safety", "navigation/goals.py", "navigation/drive.py"),
+    "refused": ("safety", "places/goalcheck.py", "driving/drive.py"),
     "files": ("spatial/mapfiles.py", "simulator/worldfiles.py", "server/mapcommand"),
 }
 """Where the messages of each group are written, below src/mapspeak."""

@@ -6,15 +6,15 @@ from datetime import UTC, datetime, timedelta
 from drawing import grid_from_text
 from guarding import corners
 from mapspeak.geometry import Point, Pose
-from mapspeak.navigation.atlas import Atlas
-from mapspeak.navigation.events.notices import (
+from mapspeak.places.notices import (
     close_floor_of,
     find_hindrances,
 )
-from mapspeak.navigation.revision import MapRevision
 from mapspeak.semantic import SemanticMap
 from mapspeak.semantic.events import Effect, Event
 from mapspeak.spatial import OccupancyGrid
+from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.revision import MapRevision
 
 RADIUS_M = 0.25
 NOW = datetime(2026, 11, 23, 12, 0, tzinfo=UTC)

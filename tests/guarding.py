@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from mapspeak.geometry import Point
-from mapspeak.navigation.safety import (
+from mapspeak.safety import (
     Approvals,
     AreaRule,
     AuditLine,

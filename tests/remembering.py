@@ -4,8 +4,8 @@ import math
 
 from fakes import two_rooms
 from mapspeak.geometry import Point, Pose
-from mapspeak.navigation.atlas import Atlas
 from mapspeak.semantic import Landmark, SemanticMap, Waypoint
+from mapspeak.worldmodel.model import Atlas
 
 LADDER = Point(0.3, 2.4)
 """At the west wall of the west room, R2."""

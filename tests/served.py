@@ -9,8 +9,8 @@ from mcp.client import Client
 from mcp.client.session import ElicitationFnT
 from mcp_types import CallToolResult, ImageContent, TextContent
 
-from mapspeak.navigation.safety import Guard
 from mapspeak.robot import Robot
+from mapspeak.safety import Guard
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server import DEFAULT_TOOLSETS, CallLog, Representation, build_server
 from mapspeak.session import Session

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 from benchmarks.memory.sites import RADIUS_M, Site
 from mapspeak.geometry import Pose
-from mapspeak.navigation.atlas import Atlas
-from mapspeak.navigation.memory.recollection import Recollector
-from mapspeak.navigation.recall import RecallQuery, recall
-from mapspeak.navigation.recall.answer import Recall
+from mapspeak.places.recall import RecallQuery, recall
+from mapspeak.places.recall.answer import Recall
 from mapspeak.semantic import SemanticMap
 from mapspeak.semantic.retrieval import Embedder
+from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.recollection import Recollector
 
 __all__ = ["FindModel", "Request", "ask", "list_requests", "open_atlas"]
 

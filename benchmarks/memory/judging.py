@@ -12,11 +12,11 @@ from benchmarks.memory.observer import Memory
 from benchmarks.memory.places import truth_of
 from benchmarks.memory.sites import Site, TrueThing
 from mapspeak.geometry import wrap_angle
-from mapspeak.navigation.atlas import Atlas
-from mapspeak.navigation.goals import judge_goal
-from mapspeak.navigation.recall import SURE_RATIO, RecallCandidate
-from mapspeak.navigation.recall.answer import Recall
+from mapspeak.places.goalcheck import judge_goal
+from mapspeak.places.recall import SURE_RATIO, RecallCandidate
+from mapspeak.places.recall.answer import Recall
 from mapspeak.semantic.retrieval import EntryKind, Verdict
+from mapspeak.worldmodel.model import Atlas
 
 __all__ = ["Facing", "Fault", "Judged", "Outcome", "choose", "judge_all"]
 

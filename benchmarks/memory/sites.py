@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from benchmarks.search import build_worlds
 from mapspeak.geometry import Point, Pose
-from mapspeak.navigation.revision import MapRevision
 from mapspeak.simulator import (
     BODY_RADIUS_M,
     TrueFloor,
@@ -37,6 +36,7 @@ from mapspeak.simulator.slices import slice_world
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import clearance_m
 from mapspeak.spatial.rooms import RoomMap
+from mapspeak.worldmodel.revision import MapRevision
 
 __all__ = [
     "Site",

@@ -11,7 +11,7 @@ from benchmarks.relations.roomgoals import build_room_goals
 from benchmarks.relations.sites import TrueDoor, TrueRoom
 from benchmarks.relations.truth import Fit, Fitting, Places, Truth, angle_off, away, bearing
 from mapspeak.geometry import Point, Pose
-from mapspeak.navigation.atlas import Atlas
+from mapspeak.worldmodel.model import Atlas
 
 __all__ = ["build_goals"]
 

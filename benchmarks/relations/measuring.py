@@ -17,10 +17,10 @@ from benchmarks.relations.goals import build_goals
 from benchmarks.relations.sites import Site, build_sites
 from benchmarks.relations.truth import Truth, angle_off
 from mapspeak.errors import GoalError
-from mapspeak.navigation.atlas import Atlas
-from mapspeak.navigation.choosing import CheckedGoal, check_place
-from mapspeak.navigation.places import Place, find_place
+from mapspeak.places.choosing import CheckedGoal, check_place
+from mapspeak.places.places import Place, find_place
 from mapspeak.semantic import SemanticMap
+from mapspeak.worldmodel.model import Atlas
 
 __all__ = ["main", "measure"]
 

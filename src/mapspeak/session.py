@@ -12,19 +12,16 @@ from typing import TypeVar
 import anyio
 import anyio.to_thread
 
+from mapspeak.driving.diary import Diary, Keeping
+from mapspeak.driving.doorlearning import learn_from_drive
+from mapspeak.driving.drive import DriveBook
+from mapspeak.driving.lease import Lease
 from mapspeak.errors import LinkError, MapError, MapspeakError, SemanticMapError
 from mapspeak.geometry import Point
-from mapspeak.navigation.atlas import Atlas
-from mapspeak.navigation.choosing import CheckedGoal, choose_goal
-from mapspeak.navigation.drive import DriveBook
-from mapspeak.navigation.events.learning import learn_from_drive
-from mapspeak.navigation.lease import Lease
-from mapspeak.navigation.memory.diary import Diary, Keeping
-from mapspeak.navigation.memory.recollection import Recollector
-from mapspeak.navigation.revision import MapRevision
-from mapspeak.navigation.safety import Guard, GuardedConnection, GuardedRobot, Surveyor, WhenBusy
+from mapspeak.places.choosing import CheckedGoal, choose_goal
 from mapspeak.robot import CameraPicture, Robot
 from mapspeak.ros import RosConnection, started_over
+from mapspeak.safety import Guard, GuardedConnection, GuardedRobot, Surveyor, WhenBusy
 from mapspeak.semantic import PictureBook, SemanticMap, SemanticMapStore
 from mapspeak.semantic.alignment import MapComparison, MapKeeper, MapRelation
 from mapspeak.semantic.episodes import (
@@ -38,6 +35,9 @@ from mapspeak.semantic.episodes import (
 from mapspeak.semantic.events import Event
 from mapspeak.semantic.retrieval import Embedder, find_model
 from mapspeak.spatial import OccupancyGrid
+from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.recollection import Recollector
+from mapspeak.worldmodel.revision import MapRevision
 
 __all__ = ["Session"]
 

@@ -5,7 +5,7 @@ from click.testing import CliRunner
 
 from guarding import make_guard
 from mapspeak.cli import cli
-from mapspeak.navigation.safety import (
+from mapspeak.safety import (
     Approval,
     ApprovalNeededError,
     Guard,

@@ -4,7 +4,7 @@ import pytest
 
 from mapspeak.cli import main
 from mapspeak.cli.guarding import GuardChoice, build_guard
-from mapspeak.navigation.safety import Policy
+from mapspeak.safety import Policy
 
 
 def test_a_server_does_not_start_with_a_mistake_in_its_policy_and_names_the_line(

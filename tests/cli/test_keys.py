@@ -14,7 +14,7 @@ from fakes import FakeRobot, two_rooms
 from guarding import make_guard
 from mapspeak.cli.keys import HELP, StopKeys, stop_keys
 from mapspeak.geometry import Pose
-from mapspeak.navigation.safety import Hold
+from mapspeak.safety import Hold
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.session import Session
 

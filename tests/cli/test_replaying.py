@@ -6,7 +6,7 @@ from click.testing import CliRunner
 from guarding import make_guard
 from mapspeak.cli import cli
 from mapspeak.errors import PolicyError
-from mapspeak.navigation.safety import Caller, Publish, calling
+from mapspeak.safety import Caller, Publish, calling
 
 LAMP = Publish(topic="/lamp", type="std_msgs/msg/Bool", message={"data": True})
 TF = Publish(topic="/tf", type="tf2_msgs/msg/TFMessage", message={})

@@ -15,9 +15,9 @@ from mcp_types import CallToolResult, ImageContent
 from PIL import Image
 
 from guarding import audit_of, make_guard
-from mapspeak.navigation.safety import Policy
 from mapspeak.robot import Robot
 from mapspeak.ros import RosConnection
+from mapspeak.safety import Policy
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server import build_server
 from mapspeak.session import Session

@@ -13,7 +13,7 @@ from fakes import FakeRobot
 from guarding import audit_of, make_guard
 from mapspeak.geometry import Pose
 from mapspeak.installation import shell_command
-from mapspeak.navigation.safety import Approval, Guard, Kind, Otherwise, Policy
+from mapspeak.safety import Approval, Guard, Kind, Otherwise, Policy
 from served import MODES, connect, report_of, text_of
 
 pytestmark = pytest.mark.anyio

@@ -16,7 +16,7 @@ from drawing import grid_from_text
 from fakes import FakeRobot
 from guarding import audit_of, make_guard, rectangle
 from mapspeak.geometry import Pose
-from mapspeak.navigation.safety import (
+from mapspeak.safety import (
     Approval,
     AreaRule,
     Guard,

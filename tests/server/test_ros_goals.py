@@ -13,8 +13,8 @@ from guarding import audit_of, make_guard
 from mapspeak.geometry import Pose
 from mapspeak.links.ros.actions import ActionPatience, ActionState, SentGoal
 from mapspeak.links.rosbridge.client import RobotAddress, RosbridgeClient, open_client
-from mapspeak.navigation.safety import Kind, Policy
 from mapspeak.ros.messages import Dialect, write_header, write_pose
+from mapspeak.safety import Kind, Policy
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.goals import ActionBook

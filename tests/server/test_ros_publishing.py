@@ -13,8 +13,8 @@ from fakes import two_rooms
 from guarding import make_guard
 from mapspeak.links.rosbridge.client import RobotAddress, open_client
 from mapspeak.links.rosbridge.server import open_rosbridge_server
-from mapspeak.navigation.safety import Policy
 from mapspeak.ros.messages import Dialect
+from mapspeak.safety import Policy
 from rosbridge_robot import ScriptedRobot
 from rosserved import Caller, on_our_server, on_script, served
 

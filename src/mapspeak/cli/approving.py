@@ -14,7 +14,7 @@ __all__ = ["approve"]
 @CONTROL_OPTION
 def approve(wish_id: str | None, control: Path | None) -> None:
     """Approves a command that waits, once; without an id it lists what waits."""
-    from mapspeak.navigation.safety import WaitingRoom  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.safety import WaitingRoom  # noqa: PLC0415 - heavy; help must be quick
 
     room = WaitingRoom(control_folder(control) / "approvals")
     if wish_id is not None:

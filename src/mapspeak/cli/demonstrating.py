@@ -15,7 +15,7 @@ from mapspeak.cli.options import SEED_OPTION, WORLD_OPTION
 
 if TYPE_CHECKING:
     from mapspeak.evaluation.page import Moment
-    from mapspeak.navigation.safety import Hold
+    from mapspeak.safety import Hold
 
 __all__ = ["demo"]
 
@@ -37,7 +37,7 @@ def demo(world: str, seed: int, folder: Path | None, is_quiet: bool) -> None:  #
     """
     from mapspeak.evaluation.demo import DemoOptions, run_demo  # noqa: PLC0415
     from mapspeak.evaluation.progress import show_progress  # noqa: PLC0415
-    from mapspeak.navigation.safety import Hold  # noqa: PLC0415
+    from mapspeak.safety import Hold  # noqa: PLC0415
 
     options = DemoOptions(
         world=world, seed=seed, folder=folder or Path("out") / f"demo-{Path(world).stem}-{seed}"

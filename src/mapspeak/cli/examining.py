@@ -47,11 +47,11 @@ def doctor(
 
 async def examine_choice(choice: RobotChoice) -> "list[Finding]":
     """Return what the robot offers, once all of it has been found, and what it really gives."""
+    from mapspeak.driving.checkup import examine  # noqa: PLC0415
     from mapspeak.links.ros import (  # noqa: PLC0415 - heavy; help must be quick
         RosRobot,
         describe_profile,
     )
-    from mapspeak.navigation.checkup import examine  # noqa: PLC0415
     from mapspeak.ros import LinkKind  # noqa: PLC0415
 
     async with open_robot(choice) as robot:

@@ -13,7 +13,7 @@ import click
 from mapspeak.cli.options import FILE
 
 if TYPE_CHECKING:
-    from mapspeak.navigation.safety import Guard
+    from mapspeak.safety import Guard
 
 __all__ = [
     "CONTROL_OPTION",
@@ -74,7 +74,7 @@ def build_guard(choice: GuardChoice, *, robot: str) -> "Guard":
     Raises:
         ConfigError: The policy has a mistake; says the line and the key.
     """
-    from mapspeak.navigation.safety import (  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.safety import (  # noqa: PLC0415 - heavy; help must be quick
         Approvals,
         AuditLog,
         Guard,

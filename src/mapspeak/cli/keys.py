@@ -12,7 +12,7 @@ from mapspeak.cli.stopping import hold_robots
 from mapspeak.errors import ConfigError
 
 if TYPE_CHECKING:
-    from mapspeak.navigation.safety import Hold
+    from mapspeak.safety import Hold
 
 __all__ = ["StopKeys", "stop_keys"]
 

@@ -8,7 +8,7 @@ import click
 from mapspeak.cli.options import FILE
 
 if TYPE_CHECKING:
-    from mapspeak.navigation.safety import AuditLine
+    from mapspeak.safety import AuditLine
 
 __all__ = ["replay"]
 
@@ -18,7 +18,7 @@ __all__ = ["replay"]
 @click.option("--refused", "only_refused", is_flag=True, help="Only what was refused.")
 def replay(file: Path, only_refused: bool) -> None:  # noqa: FBT001 - a flag
     """Shows an audit log: who wanted what, what became of it, and why."""
-    from mapspeak.navigation.safety import read_audit  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.safety import read_audit  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.semantic.waypoint import clean_line  # noqa: PLC0415
 
     n_shown = n_refused = 0

@@ -10,7 +10,7 @@ from mapspeak.cli.guarding import CONTROL_OPTION, control_folder, wall_clock
 from mapspeak.installation import shell_command
 
 # Nothing heavier may be imported here: a stop waits for it.
-from mapspeak.navigation.hold import Hold
+from mapspeak.safety.hold import Hold
 
 __all__ = ["hold_robots", "release", "stop"]
 

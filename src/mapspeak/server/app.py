@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from mapspeak import __version__
 from mapspeak.errors import ConfigError, MapspeakError
-from mapspeak.navigation.safety import ApprovalNeededError, Caller, calling
+from mapspeak.safety import ApprovalNeededError, Caller, calling
 from mapspeak.semantic.waypoint import clean_line
 from mapspeak.server.asking import Asking
 from mapspeak.server.calllog import CallLog

@@ -16,7 +16,7 @@ from mcp_types import (
 from mcp_types.version import is_version_at_least
 from pydantic import BaseModel, Field, StrictBool
 
-from mapspeak.navigation.safety import (
+from mapspeak.safety import (
     Approval,
     ApprovalNeededError,
     Approvals,

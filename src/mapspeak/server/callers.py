@@ -5,7 +5,7 @@ from typing import Any
 from mcp.server.mcpserver import Context
 from pydantic import BeforeValidator
 
-from mapspeak.navigation.drive import DriveReport, OnProgress
+from mapspeak.driving.drive import DriveReport, OnProgress
 
 __all__ = ["AT_MOST_LONGEST_WAIT", "LONGEST_WAIT_S", "client_of", "tell_progress"]
 

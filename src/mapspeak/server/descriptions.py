@@ -3,10 +3,9 @@
 import math
 from collections.abc import Iterator
 
-from mapspeak.navigation.atlas import Atlas, RememberedPlace, RememberedThing
-from mapspeak.navigation.choosing import CheckedGoal, check_place
-from mapspeak.navigation.places import Place
-from mapspeak.navigation.ways import standing_point
+from mapspeak.places.choosing import CheckedGoal, check_place
+from mapspeak.places.places import Place
+from mapspeak.places.ways import standing_point
 from mapspeak.semantic import group_views
 from mapspeak.semantic.quoting import quote
 from mapspeak.server.mapview.roomtables import say_walk
@@ -22,6 +21,7 @@ from mapspeak.server.wording import (
 )
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region, RoomClass
+from mapspeak.worldmodel.model import Atlas, RememberedPlace, RememberedThing
 
 __all__ = ["describe_place"]
 

@@ -4,8 +4,8 @@ from typing import Self
 
 from pydantic import Field
 
-from mapspeak.navigation.exploration import BlockedPlace, ExplorationState, Progress
-from mapspeak.navigation.search import Candidate, SearchState, Standing
+from mapspeak.driving.exploration import BlockedPlace, ExplorationState, Progress
+from mapspeak.driving.search import Candidate, SearchState, Standing
 from mapspeak.server.reports import PoseReport, Report
 from mapspeak.server.wording import say_point, say_pose_doubt
 from mapspeak.spatial.frontiers import RefusedFrontier

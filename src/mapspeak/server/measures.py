@@ -4,14 +4,14 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from mapspeak.errors import GoalError
-from mapspeak.navigation.atlas import Atlas
-from mapspeak.navigation.choosing import check_place
-from mapspeak.navigation.goals import GoalVerdict
-from mapspeak.navigation.places import Place, Spot, find_place
-from mapspeak.navigation.ways import Way, find_way, measure_path, standing_point
+from mapspeak.places.choosing import check_place
+from mapspeak.places.goalcheck import GoalVerdict
+from mapspeak.places.places import Place, Spot, find_place
+from mapspeak.places.ways import Way, find_way, measure_path, standing_point
 from mapspeak.server.mapview.roomtables import say_sizes
 from mapspeak.server.wording import build_table, join_words, say_kind, say_path, say_point
 from mapspeak.spatial.rooms import Door, Region
+from mapspeak.worldmodel.model import Atlas
 
 __all__ = ["describe_measures"]
 

@@ -6,17 +6,17 @@ from typing import Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from mapspeak.driving.drive import DriveReport
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
-from mapspeak.navigation.atlas import RememberedPlace, number_places
-from mapspeak.navigation.choosing import CheckedGoal
-from mapspeak.navigation.drive import DriveReport
-from mapspeak.navigation.goals import GoalVerdict
+from mapspeak.places.choosing import CheckedGoal
+from mapspeak.places.goalcheck import GoalVerdict
 from mapspeak.robot import GoalState, StampedPose
 from mapspeak.semantic import Landmark, Merge, SemanticMap, WriteReceipt, name_key
 from mapspeak.semantic.quoting import quote_name
 from mapspeak.server.memory.remembering import say_landmarks, say_replaced
 from mapspeak.server.wording import say_pose, say_pose_doubt
+from mapspeak.worldmodel.model import RememberedPlace, number_places
 
 __all__ = [
     "DriveAnswer",

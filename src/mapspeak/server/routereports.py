@@ -4,7 +4,7 @@ from typing import Self
 
 from pydantic import Field
 
-from mapspeak.navigation.routes import RoutePlan, RouteProgress, RouteState, Stop, StopState
+from mapspeak.driving.routes import RoutePlan, RouteProgress, RouteState, Stop, StopState
 from mapspeak.server.reports import PoseReport, Report
 from mapspeak.server.wording import say_pose_doubt
 

@@ -5,12 +5,12 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.navigation.atlas import Atlas
-from mapspeak.navigation.closures import ClosedArea, ClosedFloor
-from mapspeak.navigation.standing import find_standing_point
+from mapspeak.places.standing import find_standing_point
 from mapspeak.robot import PoseDoubt
 from mapspeak.semantic.events import tell_place
 from mapspeak.spatial.rooms import Door, Region
+from mapspeak.worldmodel.closures import ClosedArea, ClosedFloor
+from mapspeak.worldmodel.model import Atlas
 
 __all__ = [
     "build_table",

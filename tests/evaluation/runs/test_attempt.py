@@ -13,7 +13,7 @@ from mapspeak.evaluation.trials import (
     read_turns,
     trial_folder,
 )
-from mapspeak.navigation.safety import read_audit
+from mapspeak.safety import read_audit
 from mapspeak.simulator import load_world
 from mapspeak.spatial.mapfiles import load_map
 from sites import make_flat, prepare

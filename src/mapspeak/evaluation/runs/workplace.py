@@ -19,7 +19,7 @@ from mapspeak.evaluation.runs.inspecting import open_inspection
 from mapspeak.evaluation.scores.evidence import NOWHERE
 from mapspeak.evaluation.trials import Setting, Trial
 from mapspeak.links.simulated import SimulatedRobot, SoloRobot
-from mapspeak.navigation.safety import Approvals, AuditLog, Guard, Hold, Policy, WaitingRoom
+from mapspeak.safety import Approvals, AuditLog, Guard, Hold, Policy, WaitingRoom
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server import DEFAULT_TOOLSETS, Representation, build_server
 from mapspeak.session import Session

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mapspeak.navigation.atlas import Atlas
 from mapspeak.server.mapview.views import Layer, MapLook, MapView
 from mapspeak.server.wording import list_some, say_area
 from mapspeak.spatial import OccupancyGrid
@@ -27,6 +26,7 @@ from mapspeak.spatial.picture import (
 )
 from mapspeak.spatial.picture import Region as Area
 from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap
+from mapspeak.worldmodel.model import Atlas
 
 __all__ = ["AtlasPicture", "draw_atlas", "draw_rooms"]
 

@@ -3,8 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from mapspeak.navigation.atlas import Atlas
-from mapspeak.navigation.standing import choose_standing_point, find_standing_point
+from mapspeak.places.standing import choose_standing_point, find_standing_point
 from mapspeak.server.mapview.views import MapView, Part
 from mapspeak.server.wording import (
     build_table,
@@ -15,6 +14,7 @@ from mapspeak.server.wording import (
     say_point,
 )
 from mapspeak.spatial.rooms import CorridorWalk, Door, Region, RoomClass, Side, Stop
+from mapspeak.worldmodel.model import Atlas
 
 __all__ = ["room_tables", "say_sizes", "say_walk"]
 

@@ -3,8 +3,6 @@
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 
-from mapspeak.navigation.atlas import Atlas, RememberedPlace
-from mapspeak.navigation.closures import ClosedArea
 from mapspeak.semantic.quoting import quote
 from mapspeak.server.mapview.roomtables import room_tables, say_walk
 from mapspeak.server.mapview.views import Layer, MapLook, MapView
@@ -21,6 +19,8 @@ from mapspeak.server.wording import (
 )
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door
+from mapspeak.worldmodel.closures import ClosedArea
+from mapspeak.worldmodel.model import Atlas, RememberedPlace
 
 __all__ = ["describe_atlas"]
 

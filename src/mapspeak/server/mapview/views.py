@@ -8,14 +8,14 @@ from typing import Generic, Self, TypeVar
 
 import numpy as np
 
+from mapspeak.driving.exploration.progress import find_refused
 from mapspeak.geometry import Point
-from mapspeak.navigation.atlas import Atlas, RememberedPlace
-from mapspeak.navigation.closures import ClosedArea
-from mapspeak.navigation.exploration.progress import find_refused
-from mapspeak.navigation.places import Place, find_place
+from mapspeak.places.places import Place, find_place
 from mapspeak.spatial.frontiers import Frontier, RefusedFrontier
 from mapspeak.spatial.picture import NORTH_UP_RAD, Zoom
 from mapspeak.spatial.rooms import Door, Region, RoomClass
+from mapspeak.worldmodel.closures import ClosedArea
+from mapspeak.worldmodel.model import Atlas, RememberedPlace
 
 __all__ = ["Layer", "MapLook", "MapView", "Part", "Up", "look_at", "view_of"]
 

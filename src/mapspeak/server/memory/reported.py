@@ -4,7 +4,7 @@ from datetime import datetime
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
-from mapspeak.navigation.recall import Recall, RecallQuery
+from mapspeak.places.recall import Recall, RecallQuery
 from mapspeak.semantic import find_objection
 from mapspeak.semantic.episodes import EpisodeQuery, EpisodeStore, Observation, ObservationKind
 from mapspeak.semantic.quoting import quote_name

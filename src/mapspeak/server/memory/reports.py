@@ -5,7 +5,7 @@ from typing import Self
 
 from pydantic import Field
 
-from mapspeak.navigation.recall import Recall, RecallCandidate
+from mapspeak.places.recall import Recall, RecallCandidate
 from mapspeak.semantic.retrieval import Verdict
 from mapspeak.server.memory.moments import say_age
 from mapspeak.server.reports import PoseReport, Report

@@ -3,13 +3,13 @@
 from collections.abc import Iterator
 from datetime import datetime
 
-from mapspeak.navigation.atlas import Atlas, RememberedThing
-from mapspeak.navigation.recall import Nearby
+from mapspeak.places.recall import Nearby
 from mapspeak.semantic.consistency import Finding
 from mapspeak.semantic.episodes import EpisodeMatch, EpisodePage
 from mapspeak.semantic.quoting import quote, tell_name
 from mapspeak.server.memory.moments import say_age
 from mapspeak.server.wording import say_count, say_point, say_pose
+from mapspeak.worldmodel.model import Atlas, RememberedThing
 
 __all__ = ["describe_check", "describe_episodes", "describe_nearby", "say_episode"]
 

@@ -3,13 +3,13 @@
 import math
 from collections.abc import Iterator, Sequence
 
-from mapspeak.navigation.atlas import Atlas, RememberedPlace, RememberedThing
-from mapspeak.navigation.recall import SURE_RATIO, describe_candidate
+from mapspeak.places.recall import SURE_RATIO, describe_candidate
 from mapspeak.semantic import Landmark
 from mapspeak.semantic.consistency import Trust
 from mapspeak.semantic.quoting import quote, tell_name
 from mapspeak.server.wording import say_path, say_point, say_pose
 from mapspeak.spatial.rooms import Region
+from mapspeak.worldmodel.model import Atlas, RememberedPlace, RememberedThing
 
 __all__ = ["say_landmark", "say_things_from", "say_things_in", "thing_lines"]
 

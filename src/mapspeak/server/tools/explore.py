@@ -9,18 +9,18 @@ from mcp.server.mcpserver import Context, Image
 from mcp_types import CallToolResult, ImageContent, TextContent
 from pydantic import Field
 
-from mapspeak.errors import GoalError, LinkError, SemanticMapError
-from mapspeak.navigation.drive import DriveReport
-from mapspeak.navigation.exploration import (
+from mapspeak.driving.drive import DriveReport
+from mapspeak.driving.exploration import (
     Bounds,
     ExplorationState,
     Explorer,
     spread_headings,
     turn_to,
 )
-from mapspeak.navigation.safety import Errand, on_errand
-from mapspeak.navigation.search import Budget, Judgement, Searcher, leave_out_shown
+from mapspeak.driving.search import Budget, Judgement, Searcher, leave_out_shown
+from mapspeak.errors import GoalError, LinkError, SemanticMapError
 from mapspeak.robot import CameraPicture, GoalState
+from mapspeak.safety import Errand, on_errand
 from mapspeak.semantic import TakenPicture
 from mapspeak.server.callers import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S, client_of, tell_progress
 from mapspeak.server.explorereports import ExploreAnswer, SearchAnswer

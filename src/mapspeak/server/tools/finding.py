@@ -7,10 +7,9 @@ from pydantic import Field
 
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point
-from mapspeak.navigation.atlas import Atlas
-from mapspeak.navigation.places import find_place
-from mapspeak.navigation.recall import RecallQuery, recall
-from mapspeak.navigation.thingnames import split_room
+from mapspeak.places.places import find_place
+from mapspeak.places.recall import RecallQuery, recall
+from mapspeak.places.thingnames import split_room
 from mapspeak.semantic.retrieval import EntryKind
 from mapspeak.server.memory.moments import read_moment
 from mapspeak.server.memory.reported import say_reported
@@ -18,6 +17,7 @@ from mapspeak.server.memory.reports import RecallAnswer
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.session import Session
 from mapspeak.spatial.rooms import Region
+from mapspeak.worldmodel.model import Atlas
 
 __all__ = ["FindTools", "find_point", "find_room"]
 

@@ -9,9 +9,8 @@ from mcp.server.mcpserver import Image
 from pydantic import Field
 
 from mapspeak.errors import LinkError, MapError, SemanticMapError
-from mapspeak.navigation.atlas import Atlas
-from mapspeak.navigation.events import notices
-from mapspeak.navigation.recall import find_nearby
+from mapspeak.places import notices
+from mapspeak.places.recall import find_nearby
 from mapspeak.semantic.episodes import (
     EpisodeMatch,
     EpisodeOrder,
@@ -32,6 +31,7 @@ from mapspeak.server.memory.texts import (
 from mapspeak.server.tools.finding import FindTools, find_point, find_room
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.session import Session
+from mapspeak.worldmodel.model import Atlas
 
 __all__ = ["MemoryTools"]
 

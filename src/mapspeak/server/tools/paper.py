@@ -8,9 +8,9 @@ from pydantic import Field
 
 from mapspeak.errors import LinkError, MapError, SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
-from mapspeak.navigation.goals import FARTHEST_M
-from mapspeak.navigation.places import is_taken_name
-from mapspeak.navigation.recall import find_speaking_places
+from mapspeak.places.goalcheck import FARTHEST_M
+from mapspeak.places.places import is_taken_name
+from mapspeak.places.recall import find_speaking_places
 from mapspeak.robot import PoseDoubt
 from mapspeak.semantic import TakenPicture, Waypoint, WriteReceipt
 from mapspeak.server.mapview.captions import say_axes, say_plain

@@ -4,8 +4,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from mapspeak.navigation.choosing import check_place
-from mapspeak.navigation.places import find_place
+from mapspeak.places.choosing import check_place
+from mapspeak.places.places import find_place
 from mapspeak.server.descriptions import describe_place
 from mapspeak.server.measures import describe_measures
 from mapspeak.server.reports import GoalAnswer

@@ -7,8 +7,8 @@ from mcp.server.mcpserver import Context
 from mcp_types import CallToolResult, ImageContent, TextContent
 from pydantic import Field
 
-from mapspeak.navigation.routes import RouteBook, RouteState, WhenBlocked
-from mapspeak.navigation.safety import Errand, on_errand
+from mapspeak.driving.routes import RouteBook, RouteState, WhenBlocked
+from mapspeak.safety import Errand, on_errand
 from mapspeak.server.callers import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S, client_of, tell_progress
 from mapspeak.server.routereports import RouteAnswer
 from mapspeak.server.sightings import Sighting, look_ahead

@@ -8,9 +8,9 @@ from pydantic import Field
 
 from mapspeak.errors import GoalError, LinkError
 from mapspeak.links.ros.actions import ActionState, SentGoal
-from mapspeak.navigation.safety import Act
 from mapspeak.ros.definitions import check_message
 from mapspeak.ros.messages import Message, bare_type
+from mapspeak.safety import Act
 from mapspeak.server.callers import client_of
 from mapspeak.server.rosreports import cut, show_message
 from mapspeak.server.tools.ros.commands import RosCommands

@@ -7,9 +7,9 @@ from typing import Any
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.navigation.safety import Act, Call, GuardedConnection, Publish, SetParameter
 from mapspeak.ros import RosConnection
 from mapspeak.ros.messages import Message
+from mapspeak.safety import Act, Call, GuardedConnection, Publish, SetParameter
 
 __all__ = ["VELOCITIES", "RosCommands", "stand_of"]
 

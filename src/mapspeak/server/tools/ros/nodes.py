@@ -7,9 +7,9 @@ import anyio
 from pydantic import Field
 
 from mapspeak.errors import LinkError, MapspeakError
-from mapspeak.navigation.safety import SetParameter
 from mapspeak.ros import RosGraph, find_nearest
 from mapspeak.ros.messages import Dialect
+from mapspeak.safety import SetParameter
 from mapspeak.server.rosreports import cut, show_value
 from mapspeak.server.tools.ros.census import mark_ours
 from mapspeak.server.tools.ros.commands import RosCommands

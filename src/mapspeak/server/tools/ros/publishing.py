@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import anyio
 
 from mapspeak.errors import GoalError, LinkError
-from mapspeak.navigation.safety import publishing_for
 from mapspeak.ros.messages import Message
+from mapspeak.safety import publishing_for
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.session import Session
 

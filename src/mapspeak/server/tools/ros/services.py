@@ -8,8 +8,8 @@ from typing import Annotated, Any
 from mcp.server.mcpserver import Image
 from pydantic import Field
 
-from mapspeak.navigation.safety import Call
 from mapspeak.ros.definitions import check_message
+from mapspeak.safety import Call
 from mapspeak.server.rosreports import cut, show_message
 from mapspeak.server.tools.ros.census import find_server
 from mapspeak.server.tools.ros.commands import RosCommands

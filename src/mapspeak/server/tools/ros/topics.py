@@ -9,9 +9,9 @@ from mcp.server.mcpserver import Image
 from pydantic import Field
 
 from mapspeak.errors import LinkError
-from mapspeak.navigation.safety import Publish
 from mapspeak.ros.definitions import check_message
 from mapspeak.ros.messages import Message, bare_type
+from mapspeak.safety import Publish
 from mapspeak.server.rosreports import cut
 from mapspeak.server.tools.ros.census import Census, fetch_hearers, fetch_publishers, take_census
 from mapspeak.server.tools.ros.commands import VELOCITIES, RosCommands, stand_of

@@ -1,0 +1,400 @@
+"""Drives as jobs: sent, asked about later by their id, waited for, cancelled; one at a time.
+
+A drive's state is the robot's own account of it, fetched when somebody asks; nothing runs in the
+background, so a simulated robot's time stands still between two questions. `watch` asks where
+nobody else does, so that a drive ends also when the robot falls silent, jumps or does not move.
+
+A drive that ends otherwise than by arriving, or by the navigation's own word that it was cancelled
+or replaced, is stopped; where the robot cannot be reached, as soon as it can.
+"""
+
+import logging
+import re
+from collections.abc import Awaitable, Callable, Generator
+from contextlib import contextmanager
+from dataclasses import replace
+
+import anyio
+
+from mapspeak.driving.drivemonitor import DriveMonitor, Look
+from mapspeak.driving.drivereport import JUST_SENT, Drive, DriveReport
+from mapspeak.driving.owedstop import NEEDS_NO_STOP, OwedStop
+from mapspeak.errors import GoalError, LinkError, MapspeakError
+from mapspeak.geometry import Point, Pose
+from mapspeak.robot import GoalState, GoalStatus, PoseDoubt, Robot
+from mapspeak.safety import WhenBusy
+
+__all__ = ["Drive", "DriveBook", "DriveReport"]
+
+POLL_S = 0.2
+PROGRESS_S = 1.0
+N_KEPT = 200
+N_BLOCKED_KEPT = 8
+FRONTIER = re.compile(r"F\d+")
+
+
+OnProgress = Callable[[DriveReport], Awaitable[None]]
+
+logger = logging.getLogger(__name__)
+
+
+class DriveBook:
+    """Every drive of one robot, the latest last.
+
+    Args:
+        robot: The robot.
+        when_busy: What becomes of a drive while one of another client is under way.
+        patience_s: Robot time without any movement after which a drive has timed out.
+        wall_s: Tells wall time.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        when_busy: WhenBusy = WhenBusy.REPLACE,
+        patience_s: float = 60.0,
+        wall_s: Callable[[], float] = anyio.current_time,
+    ) -> None:
+        self._robot = robot
+        self._when_busy = when_busy
+        self._monitor = DriveMonitor(robot, patience_s=patience_s, wall_s=wall_s)
+        self._owed = OwedStop(robot, wall_s=wall_s)
+        self._drives: dict[str, Drive] = {}
+        self._n_started = 0
+        self._n_stops = 0
+        self._n_preparing = 0
+        self._starting = anyio.Lock()
+
+    @property
+    def latest(self) -> Drive | None:
+        """The drive that was started last."""
+        return next(reversed(self._drives.values()), None)
+
+    @property
+    def under_way(self) -> Drive | None:
+        """The drive that has not ended yet, as far as anyone has asked."""
+        return next((each for each in self._open() if each.robot_goal_id is not None), None)
+
+    @property
+    def last_ended(self) -> Drive | None:
+        """The drive that was started last of those that have ended, as far as anyone has asked."""
+        return next((each for each in reversed(self._drives.values()) if each.final), None)
+
+    @property
+    def frontiers_tried(self) -> tuple[Point, ...]:
+        """Where the robot has arrived, or lately could not get to, when sent to a frontier.
+
+        One that was blocked is worth another try later, when more is known of the way.
+        """
+        ended = [drive for drive in self._drives.values() if drive.final is not None]
+        lately = {drive.goal_id for drive in ended[-N_BLOCKED_KEPT:]}
+        return tuple(
+            drive.goal.point
+            for drive in ended
+            if FRONTIER.fullmatch(drive.place)
+            and drive.final is not None
+            and (
+                drive.final.state is GoalState.ARRIVED
+                or (drive.final.state is GoalState.BLOCKED and drive.goal_id in lately)
+            )
+        )
+
+    @property
+    def is_busy(self) -> bool:
+        """True while a drive may be under way, waits its turn or is being prepared."""
+        return bool(self._open()) or self._owed.goal_id is not None or self._n_preparing > 0
+
+    @property
+    def driven_m(self) -> float:
+        """How far the robot has come on its drives, by its own poses."""
+        return self._monitor.driven_m
+
+    @contextmanager
+    def preparing(self) -> Generator[int]:
+        """Marks that a goal is being checked, and gives the ticket to start its drive with."""
+        self._n_preparing += 1
+        try:
+            yield self._n_stops
+        finally:
+            self._n_preparing -= 1
+
+    async def start(
+        self,
+        goal: Pose,
+        *,
+        place: str,
+        ticket: int,
+        client: str = "",
+        when_busy: WhenBusy | None = None,
+    ) -> Drive:
+        """Sends a goal to the robot, or lets it wait its turn.
+
+        Args:
+            goal: Where to.
+            place: What it was called.
+            ticket: From `preparing`.
+            client: Who asks.
+            when_busy: What becomes of it while another drive is under way; by default a newer
+                drive of the same client replaces the older one.
+
+        Raises:
+            GoalError: The robot was stopped after the ticket was given, or another drive is under
+                way that must not be replaced.
+            LinkError: The robot cannot be reached, or nobody knows where it is.
+            PolicyError: The robot must not drive there.
+        """
+        async with self._starting:
+            busy = await self._find_busy()
+            await self._monitor.find_robot()
+            self._check_ticket(ticket)
+            drive = self._make(goal, place, client)
+            if busy is None or self._choose(busy, client, when_busy) is WhenBusy.REPLACE:
+                drive = await self._send(replace(drive, begun_at=self._monitor.here.point))
+                self._end_all("A newer goal took its place.", but=drive)
+                return drive
+            if self._choose(busy, client, when_busy) is WhenBusy.WAIT:
+                return self._keep(drive)
+            raise GoalError(
+                f"{busy.goal_id} to {busy.place} is under way.",
+                hint="Wait for its end with wait_for_goal, or end it with cancel_goal.",
+            )
+
+    async def report(self, goal_id: str | None = None) -> DriveReport:
+        """Return how a drive stands, or stood when the robot was heard last; by default the latest.
+
+        Raises:
+            GoalError: No drive has that id.
+        """
+        if goal_id is None and not self._drives:
+            await self._check_foreign_goals()
+        drive = self._find(goal_id)
+        look = await self._monitor.look(drive)
+        drive = self._drives.get(drive.goal_id, drive)
+        if drive.final is None:
+            await self._note(drive, look)
+            drive = self._drives.get(drive.goal_id, drive)
+        if drive.final is not None and drive.ended_at is None and self._monitor.knows_place(look):
+            drive = self._keep(replace(drive, ended_at=self._monitor.here.point))
+        is_owed = self._owed.goal_id == drive.goal_id
+        return self._monitor.tell(drive, look, is_stop_owed=is_owed)
+
+    async def watch(self) -> None:
+        """Look after the drive under way, and start the next one; to be called now and then."""
+        drive = self.under_way
+        if drive is not None:
+            await self.report(drive.goal_id)
+        await self._settle()
+        await self._start_next()
+
+    async def wait(
+        self, goal_id: str | None, *, wait_s: float, on_progress: OnProgress
+    ) -> DriveReport:
+        """Waits until a drive ends or that much robot time has passed; gives how it stands then.
+
+        Whoever gives up waiting gives up the drive: the robot comes to a stand.
+        """
+        try:
+            return await self._wait(goal_id, wait_s, on_progress)
+        except anyio.get_cancelled_exc_class():
+            with anyio.CancelScope(shield=True):
+                await self._abandon(goal_id)
+            raise
+
+    async def _wait(
+        self, goal_id: str | None, wait_s: float, on_progress: OnProgress
+    ) -> DriveReport:
+        deadline_s = self._robot.now_s + wait_s
+        next_progress_s = self._robot.now_s + PROGRESS_S
+        report = await self.report(goal_id)
+        while not report.status.state.is_final and self._robot.now_s < deadline_s:
+            left_s = deadline_s - self._robot.now_s
+            try:
+                await self._robot.sleep(min(POLL_S, max(left_s, 0.01)))
+            except LinkError:
+                # The robot's clock stands: its time would be waited for without end.
+                return await self.report(report.drive.goal_id)
+            await self._start_next()
+            report = await self.report(report.drive.goal_id)
+            if self._robot.now_s >= next_progress_s:
+                next_progress_s += PROGRESS_S
+                await on_progress(report)
+        return report
+
+    async def _abandon(self, goal_id: str | None) -> None:
+        """End a drive that nobody waits for any more; one out of reach when it is back."""
+        drive = self._find(goal_id)
+        try:
+            await self.cancel(drive.goal_id)
+        except LinkError as error:
+            logger.warning("%s could not be cancelled yet: %s", drive.goal_id, error)
+            self._owed.owe(drive.goal_id)
+
+    async def cancel(self, goal_id: str | None = None) -> DriveReport:
+        """End a drive; one that has already ended is reported as it ended.
+
+        Raises:
+            GoalError: No drive has that id.
+            LinkError: The robot could not be told.
+        """
+        report = await self.report(goal_id)
+        if report.status.state.is_final:
+            return report
+        if report.drive.robot_goal_id is None:
+            status = GoalStatus(state=GoalState.CANCELLED, reason="It was cancelled.")
+            self._end(report.drive, status)
+        else:
+            with anyio.CancelScope(shield=True):
+                await self._robot.cancel_goal(report.drive.robot_goal_id)
+        return await self.report(report.drive.goal_id)
+
+    async def stop(self, reason: str = "The robot was stopped.") -> None:
+        """Stop the robot and end what was under way; what is being prepared does not start.
+
+        Raises:
+            LinkError: The robot could not be told; it is as soon as it can be reached.
+        """
+        self._n_stops += 1
+        with anyio.CancelScope(shield=True):
+            self._dismiss(reason)
+            if (drive := self.under_way) is not None:
+                self._owed.owe(drive.goal_id)
+            await self._robot.stop()
+            self._owed.forgive()
+            if (drive := self.under_way) is not None:
+                report = await self.report(drive.goal_id)
+                if report.status.state is GoalState.CANCELLED:
+                    self._keep(replace(report.drive, final=replace(report.status, reason=reason)))
+
+    # --- inside ---
+
+    def _open(self) -> list[Drive]:
+        """Gives the drives that have not ended, in their order."""
+        return [each for each in self._drives.values() if each.final is None]
+
+    def _waiting(self) -> list[Drive]:
+        """Gives the drives that wait their turn, in their order."""
+        return [each for each in self._open() if each.robot_goal_id is None]
+
+    def _dismiss(self, reason: str) -> None:
+        """Ends the drives that wait."""
+        for drive in self._waiting():
+            self._end(drive, GoalStatus(state=GoalState.CANCELLED, reason=reason))
+
+    async def _find_busy(self) -> Drive | None:
+        """Finds the drive that is under way, after asking the robot whether it has ended."""
+        drive = self.under_way
+        if drive is not None:
+            await self.report(drive.goal_id)
+        return self.under_way
+
+    def _check_ticket(self, ticket: int) -> None:
+        if ticket != self._n_stops:
+            raise GoalError(
+                "The robot was stopped while this goal was being checked.",
+                hint="Call navigate_to again when it may drive.",
+            )
+
+    def _choose(self, busy: Drive, client: str, when_busy: WhenBusy | None) -> WhenBusy:
+        if when_busy is not None:
+            return when_busy
+        return WhenBusy.REPLACE if busy.client == client else self._when_busy
+
+    def _make(self, goal: Pose, place: str, client: str) -> Drive:
+        return Drive(
+            goal_id=f"G{self._n_started + 1}",
+            goal=goal,
+            place=place,
+            robot_goal_id=None,
+            started_s=self._robot.now_s,
+            client=client,
+        )
+
+    async def _send(self, drive: Drive) -> Drive:
+        """Send a drive to the robot, which gives up whatever it was doing."""
+        await self._owed.wait_for_stop()
+        drive = replace(drive, started_s=self._robot.now_s)
+        drive = replace(drive, robot_goal_id=await self._robot.send_goal(drive.goal))
+        self._owed.forgive()
+        self._monitor.begin()
+        return self._keep(replace(drive, heard=JUST_SENT))
+
+    def _end_all(self, reason: str, *, but: Drive) -> None:
+        """Notes that all drives but one are over: the robot has one goal."""
+        status = GoalStatus(state=GoalState.PREEMPTED, reason=reason)
+        for drive in self._open():
+            if drive.goal_id != but.goal_id:
+                self._end(drive, status)
+
+    async def _start_next(self) -> None:
+        """Sends the next drive that waits, once the one before it has ended."""
+        if not self._waiting():
+            return
+        async with self._starting:
+            if await self._find_busy() is not None or not self._waiting():
+                return
+            drive = self._waiting()[0]
+            try:
+                await self._send(drive)
+            except MapspeakError as error:
+                self._end(drive, GoalStatus(state=GoalState.REJECTED, reason=str(error)))
+
+    async def _note(self, drive: Drive, look: Look) -> None:
+        """Note what a look has shown of a drive, and end one that is over or must not go on."""
+        drive = self._keep(replace(drive, heard=look.status))
+        end = look.status if look.status.state.is_final else None
+        if end is None and drive.robot_goal_id is not None:
+            end = self._monitor.judge(look)
+            if end is not None:
+                self._dismiss(f"The drive before it has ended: {end.reason}")
+        if end is None:
+            return
+        self._end(drive, end)
+        if end.state not in NEEDS_NO_STOP:
+            self._owed.owe(drive.goal_id)
+            # A goal that is being sent takes over from it; a robot out of reach is stopped later.
+            if not self._starting.locked() and look.doubt is not PoseDoubt.NO_ANSWER:
+                await self._owed.stop()
+
+    async def _settle(self) -> None:
+        """Stop what could not be stopped before, or note that it has ended by itself."""
+        drive = self._drives.get(self._owed.goal_id or "")
+        if drive is None or self._starting.locked():
+            return
+        truth = await self._owed.settle(drive)
+        drive = self._drives.get(drive.goal_id, drive)
+        if truth is not None and (drive.final is None or drive.final.state is GoalState.LOST):
+            self._keep(replace(drive, final=truth))
+
+    async def _check_foreign_goals(self) -> None:
+        goals = await self._robot.fetch_foreign_goals()
+        if goals:
+            raise GoalError(
+                f"navigate_to has sent the robot nowhere, but it follows another goal: "
+                f"{', '.join(goals)}.",
+                hint="Wait for its end, or end it with stop_robot.",
+            )
+
+    def _find(self, goal_id: str | None) -> Drive:
+        drive = self.latest if goal_id is None else self._drives.get(goal_id.strip().upper())
+        if drive is not None:
+            return drive
+        if not self._drives:
+            raise GoalError(
+                "navigate_to has sent the robot nowhere yet.", hint="Call navigate_to first."
+            )
+        raise GoalError(
+            f"There is no goal {str(goal_id)[:40]!r}.",
+            hint=f"Known goals are {', '.join(list(self._drives)[-5:])}.",
+        )
+
+    def _end(self, drive: Drive, status: GoalStatus) -> None:
+        """Note how a drive ended; the first word counts."""
+        self._keep(replace(drive, final=drive.final or status))
+
+    def _keep(self, drive: Drive) -> Drive:
+        self._n_started += drive.goal_id not in self._drives
+        self._drives[drive.goal_id] = drive
+        while len(self._drives) > N_KEPT:
+            del self._drives[next(iter(self._drives))]
+        return drive

@@ -1,0 +1,29 @@
+"""Exploring: frontier after frontier, until nothing is left or what is left cannot be reached."""
+
+from mapspeak.driving.exploration.blocked import BlockedPlace, BlockedPlaces
+from mapspeak.driving.exploration.explorer import Bounds, Explorer, Pick, take_first
+from mapspeak.driving.exploration.progress import ExplorationState, Progress
+from mapspeak.driving.exploration.room import has_room_at
+from mapspeak.driving.exploration.site import Site
+from mapspeak.driving.exploration.trips import OnTrip, Target, Trip, Trips, TripState
+from mapspeak.driving.exploration.turning import spread_headings, turn_to
+
+__all__ = [
+    "BlockedPlace",
+    "BlockedPlaces",
+    "Bounds",
+    "ExplorationState",
+    "Explorer",
+    "OnTrip",
+    "Pick",
+    "Progress",
+    "Site",
+    "Target",
+    "Trip",
+    "TripState",
+    "Trips",
+    "has_room_at",
+    "spread_headings",
+    "take_first",
+    "turn_to",
+]

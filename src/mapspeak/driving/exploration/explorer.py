@@ -1,0 +1,284 @@
+"""The exploration loop: look at the map, choose a frontier, drive, and think again on the way."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import anyio
+
+from mapspeak.driving.exploration.blocked import BlockedPlace
+from mapspeak.driving.exploration.progress import (
+    ExplorationState,
+    Progress,
+    find_unreachable,
+    judge_end,
+    known_area_m2,
+    known_ratio,
+)
+from mapspeak.driving.exploration.room import has_room_at
+from mapspeak.driving.exploration.site import Site
+from mapspeak.driving.exploration.trips import OnTrip, Target, Trips, TripState
+from mapspeak.errors import PolicyError
+from mapspeak.geometry import Point
+from mapspeak.spatial.frontiers import Frontier, remaining_ratio
+from mapspeak.worldmodel.model import Atlas
+
+__all__ = ["Bounds", "Explorer", "Pick", "take_first"]
+
+RETHINK_S = 1.0
+"""The map is looked at so often on the way."""
+SEEN_RATIO = 0.3
+"""Less than this of what a frontier promised is left: it has been seen from afar.
+
+Nothing else makes the robot turn on the way: two frontiers that are equally good would else take
+it back and forth between them.
+"""
+PAUSE_M = 3.0
+"""As the crow flies from the last pause; nearer to it there is not much else to be looked at."""
+BESIDE_M = 1.5
+"""A border with the unknown that is this near to a blocked place is what was to be seen there."""
+SLACK_S = 0.01
+
+Pick = Callable[[Sequence[Frontier], Atlas], Frontier]
+"""Chooses one of several frontiers, which come best first."""
+
+
+def take_first(frontiers: Sequence[Frontier], _atlas: Atlas) -> Frontier:
+    """Takes the best one."""
+    return frontiers[0]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bounds:
+    """Where an exploration ends, whatever is left.
+
+    Attributes:
+        n_goals: So many frontiers to drive to.
+        duration_s: So much robot time in calls.
+        known_ratio: So much of the floor that is to be expected.
+        stops_at_goals: It pauses wherever the robot arrives, and where it sees from afar what it
+            was sent to see, so that somebody can look around.
+    """
+
+    n_goals: int | None = None
+    duration_s: float | None = None
+    known_ratio: float | None = None
+    stops_at_goals: bool = False
+
+
+class Explorer:
+    """One robot's exploration; it advances only while a call waits.
+
+    Args:
+        site: The robot, its drives and its map.
+        pick: Chooses among frontiers; the first of the ranking unless told otherwise.
+    """
+
+    def __init__(self, site: Site, *, pick: Pick = take_first) -> None:
+        self._site = site
+        self._pick = pick
+        self._trips = Trips(site)
+        self._state = ExplorationState.NOTHING_KNOWN
+        self._bounds = Bounds()
+        self._paused_at: Point | None = None
+        self._elapsed_s = 0.0
+
+    @property
+    def is_going_on(self) -> bool:
+        """True when the next call goes on with what an earlier one began."""
+        return not self._state.is_end
+
+    async def advance(
+        self, bounds: Bounds | None, *, wait_s: float, on_trip: OnTrip, client: str = ""
+    ) -> Progress:
+        """Explores until it ends, pauses, or so much robot time has passed; begins where needed.
+
+        Whoever gives up waiting gives up the drive: the robot comes to a stand.
+
+        Args:
+            bounds: Where to end; None for those of the exploration that is going on.
+            wait_s: Robot time after which to answer, with the robot still under way.
+            on_trip: Told about the drive, about every second.
+            client: Who asks for it.
+
+        Raises:
+            PolicyError: The robot must not drive now, wherever to; it comes to a stand.
+        """
+        if not self.is_going_on:
+            self._begin()
+        self._bounds = bounds or self._bounds
+        try:
+            return await self._advance(wait_s, on_trip, client)
+        except (anyio.get_cancelled_exc_class(), PolicyError):
+            with anyio.CancelScope(shield=True):
+                await self._trips.give_up()
+            raise
+
+    def _begin(self) -> None:
+        self._trips.begin_count()
+        self._paused_at = None
+        self._elapsed_s = 0.0
+        self._bounds = Bounds()
+
+    async def _advance(self, wait_s: float, on_trip: OnTrip, client: str) -> Progress:
+        begun_s, before_s = self._site.robot.now_s, self._elapsed_s
+        while True:
+            with self._site.drives.preparing() as ticket:
+                atlas = await self._site.fetch_atlas()
+                if (told := self._bound_reached(atlas)) is not None:
+                    await self._trips.give_up()
+                    return await self._end(atlas, ExplorationState.BOUND_REACHED, told)
+                if (seen := self._find_seen_from_here(atlas)) is not None:
+                    await self._trips.give_up(is_seen=True)
+                    return await self._end(atlas, ExplorationState.AT_GOAL, seen)
+                state = await self._choose(atlas, ticket, client)
+            if state is None:
+                return await self._end(atlas, *judge_end(atlas, self._blocked(atlas)))
+            left_s = wait_s - (self._site.robot.now_s - begun_s)
+            if state is TripState.UNDER_WAY and left_s > SLACK_S:
+                state = await self._trips.follow(
+                    wait_s=min(RETHINK_S, left_s), grid=atlas.grid, on_trip=on_trip
+                )
+            spent_s = self._site.robot.now_s - begun_s
+            self._elapsed_s = before_s + spent_s
+            ended = self._after(state, is_late=spent_s >= wait_s - SLACK_S)
+            if ended is not None:
+                return await self._end(await self._site.fetch_atlas(), *ended)
+
+    def _after(self, state: TripState, *, is_late: bool) -> tuple[ExplorationState, str] | None:
+        """Gives how the call ends after a step of a trip; None where it goes on."""
+        if state is TripState.INTERRUPTED:
+            return (
+                ExplorationState.INTERRUPTED,
+                self._trips.why_ended or "Something ended the drive.",
+            )
+        if state is TripState.ARRIVED and self._bounds.stops_at_goals:
+            return ExplorationState.AT_GOAL, "The robot stands at a frontier."
+        return (ExplorationState.DRIVING, "There is more to explore.") if is_late else None
+
+    def _find_seen_from_here(self, atlas: Atlas) -> str | None:
+        """Says so where a pause is due because the target has been seen from afar."""
+        trip = self._trips.current
+        if not self._bounds.stops_at_goals or trip is None:
+            return None
+        is_near = (
+            self._paused_at is not None and atlas.robot.point.distance_to(self._paused_at) < PAUSE_M
+        )
+        if is_near or not self._must_turn(atlas, trip.target):
+            return None
+        return f"What {trip.target.id} promised has been seen from here."
+
+    async def _choose(self, atlas: Atlas, ticket: int, client: str) -> TripState | None:
+        """Sets out to the next target where there is no trip, or its end has been seen from afar.
+
+        Gives None when there is no target left.
+        """
+        trip = self._trips.current
+        if trip is not None and not self._must_turn(atlas, trip.target):
+            return TripState.UNDER_WAY
+        target = await self._site.compute(lambda: self._find_target(atlas))
+        if target is None:
+            await self._trips.give_up(is_seen=True)
+            return None
+        if trip is not None and trip.target.pose == target.pose:
+            return TripState.UNDER_WAY
+        return await self._trips.set_out(target, ticket=ticket, client=client, grid=atlas.grid)
+
+    def _find_target(self, atlas: Atlas) -> Target | None:
+        """Gives the next frontier; where none is left, a place that was blocked before."""
+        frontiers = [
+            each
+            for each in atlas.frontiers.frontiers
+            if not self._trips.blocked.is_closed(each.pose.point, atlas.grid)
+        ]
+        if frontiers:
+            frontier = self._pick(frontiers, atlas)
+            return Target(
+                id=frontier.id, pose=frontier.pose, reason=frontier.reason, frontier=frontier
+            )
+        retry = self._trips.blocked.worth_another_try(atlas.grid)
+        nearest = min(retry, key=lambda each: _path_m(atlas, each), default=None)
+        if nearest is None or not math.isfinite(_path_m(atlas, nearest)):
+            return None
+        reason = f"another try; before: {nearest.reason}"
+        return Target(id=nearest.id, pose=nearest.pose, reason=reason)
+
+    def _blocked(self, atlas: Atlas) -> tuple[BlockedPlace, ...]:
+        """Gives the blocked places at which something unknown is left."""
+        report = atlas.frontiers
+        borders = [
+            *(each.pose.point for each in report.frontiers),
+            *(each.anchor for each in report.frontiers),
+            *(each.anchor for each in report.refused),
+        ]
+        return tuple(
+            place
+            for place in self._trips.blocked
+            if any(place.pose.point.distance_to(border) <= BESIDE_M for border in borders)
+        )
+
+    def _must_turn(self, atlas: Atlas, target: Target) -> bool:
+        """True when a target has been seen from afar, or proves to be no place to stand.
+
+        The last goal of an exploration is driven to its end.
+        """
+        frontier = target.frontier
+        if frontier is None:
+            return False
+        if not has_room_at(atlas.grid, target.pose.point, radius_m=atlas.radius_m):
+            return True
+        is_last = self._bounds.n_goals is not None and self._trips.n_begun >= self._bounds.n_goals
+        return not is_last and remaining_ratio(atlas.grid, frontier) < SEEN_RATIO
+
+    def _bound_reached(self, atlas: Atlas) -> str | None:
+        """Gives which bound ends the exploration, in words; None where it goes on."""
+        bounds = self._bounds
+        if bounds.duration_s is not None and self._elapsed_s >= bounds.duration_s - SLACK_S:
+            return f"{bounds.duration_s:.0f} s have passed."
+        if self._trips.current is not None:
+            return None
+        if bounds.n_goals is not None and self._trips.n_begun >= bounds.n_goals:
+            return _say_tried(self._trips)
+        if bounds.known_ratio is not None and known_ratio(atlas) >= bounds.known_ratio:
+            return f"{100 * bounds.known_ratio:.0f} % of the floor to be expected are known."
+        return None
+
+    async def _end(self, atlas: Atlas, state: ExplorationState, sentence: str) -> Progress:
+        self._state = state
+        if state is ExplorationState.AT_GOAL:
+            self._paused_at = atlas.robot.point
+        return await self._site.compute(lambda: self._report(atlas, sentence))
+
+    def _report(self, atlas: Atlas, sentence: str) -> Progress:
+        return Progress(
+            state=self._state,
+            sentence=sentence,
+            n_goals=self._trips.n_begun,
+            n_arrived=self._trips.n_arrived,
+            n_seen=self._trips.n_seen,
+            n_blocked=self._trips.n_blocked,
+            driven_m=self._trips.driven_m,
+            elapsed_s=self._elapsed_s,
+            known_area_m2=known_area_m2(atlas),
+            known_ratio=known_ratio(atlas),
+            frontiers=atlas.frontiers.frontiers,
+            trip=self._trips.current,
+            pose=atlas.robot,
+            pose_doubt=atlas.pose_doubt,
+            unreachable=find_unreachable(atlas),
+            blocked=self._blocked(atlas),
+        )
+
+
+def _say_tried(trips: Trips) -> str:
+    """Return what became of the goals."""
+    goals = "goal was" if trips.n_begun == 1 else "goals were"
+    return (
+        f"{trips.n_begun} {goals} tried: {trips.n_arrived} reached, {trips.n_seen} seen from "
+        f"afar, {trips.n_blocked} blocked."
+    )
+
+
+def _path_m(atlas: Atlas, place: BlockedPlace) -> float:
+    path_m = atlas.path_m(place.pose.point)
+    return math.inf if path_m is None else path_m

@@ -1,0 +1,185 @@
+"""How an exploration stands, as a value."""
+
+import math
+from collections import Counter
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from mapspeak.driving.exploration.blocked import BlockedPlace
+from mapspeak.driving.exploration.trips import Trip
+from mapspeak.geometry import Point, Pose
+from mapspeak.robot import PoseDoubt
+from mapspeak.spatial.frontiers import (
+    Frontier,
+    FrontierReport,
+    FrontierVerdict,
+    RefusalReason,
+    RefusedFrontier,
+)
+from mapspeak.spatial.paths import DistanceField
+from mapspeak.worldmodel.model import Atlas
+
+__all__ = [
+    "ExplorationState",
+    "Progress",
+    "find_refused",
+    "find_unreachable",
+    "judge_end",
+    "known_ratio",
+]
+
+MOST_NAMED = 3
+CLOSED_OFF = "behind what is closed: no way while it is"
+NEAR_M = 0.5
+"""A border is looked at from the floor that is so much more than the robot's radius around it."""
+OUT_OF_REACH = frozenset({RefusalReason.NO_WAY, RefusalReason.TOO_NARROW})
+
+
+class ExplorationState(StrEnum):
+    """How an exploration stands; all but the first two are an end, though not of the map."""
+
+    DRIVING = "driving"
+    AT_GOAL = "at_goal"
+    BOUND_REACHED = "bound_reached"
+    NOTHING_LEFT = "nothing_left"
+    REST_UNREACHABLE = "rest_unreachable"
+    NOTHING_KNOWN = "nothing_known"
+    INTERRUPTED = "interrupted"
+
+    @property
+    def is_end(self) -> bool:
+        """True when calling again begins anew instead of going on."""
+        return self not in (ExplorationState.DRIVING, ExplorationState.AT_GOAL)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Progress:
+    """How an exploration stands.
+
+    Attributes:
+        state: See `ExplorationState`.
+        sentence: The same in words with numbers.
+        n_goals: Frontiers the robot was sent to since the exploration began.
+        n_arrived: How many of them it has come to.
+        n_seen: How many it left on the way, since what they were for had been seen from afar.
+        n_blocked: How many it could not get to.
+        driven_m: How far it has driven meanwhile, by its own poses.
+        elapsed_s: Robot time of all calls.
+        known_area_m2: Free floor on the map.
+        known_ratio: Of the free floor that is to be expected in all.
+        frontiers: Where one could still go, best first.
+        trip: The drive under way.
+        pose: Where the robot is.
+        pose_doubt: Why it may be elsewhere.
+        unreachable: Borders with the unknown that the robot cannot get to.
+        blocked: Places that it was sent to in vain.
+    """
+
+    state: ExplorationState
+    sentence: str
+    n_goals: int
+    n_arrived: int
+    n_seen: int
+    n_blocked: int
+    driven_m: float
+    elapsed_s: float
+    known_area_m2: float
+    known_ratio: float
+    frontiers: tuple[Frontier, ...]
+    trip: Trip | None
+    pose: Pose
+    pose_doubt: PoseDoubt | None
+    unreachable: tuple[RefusedFrontier, ...]
+    blocked: tuple[BlockedPlace, ...]
+
+
+def known_ratio(atlas: Atlas) -> float:
+    """Gives the known share of the floor that is to be expected: what frontiers promise is not."""
+    known_m2 = known_area_m2(atlas)
+    promised_m2 = sum(frontier.gain_m2 for frontier in atlas.frontiers.frontiers)
+    return known_m2 / (known_m2 + promised_m2) if known_m2 else 0.0
+
+
+def known_area_m2(atlas: Atlas) -> float:
+    """Gives the free floor on the map."""
+    return int(atlas.grid.free.sum()) * atlas.grid.resolution_m**2
+
+
+def find_unreachable(atlas: Atlas) -> tuple[RefusedFrontier, ...]:
+    """Gives the borders with the unknown that the robot cannot get to, those closed off as such."""
+    return tuple(each for each in find_refused(atlas) if each.reason in OUT_OF_REACH)
+
+
+def find_refused(atlas: Atlas) -> tuple[RefusedFrontier, ...]:
+    """Gives the borders with the unknown that are no place to go, those closed off as such."""
+    return tuple(
+        replace(each, sentence=CLOSED_OFF)
+        if each.reason in OUT_OF_REACH and _is_closed_off(atlas, each)
+        else each
+        for each in atlas.frontiers.refused
+    )
+
+
+def _is_closed_off(atlas: Atlas, border: RefusedFrontier) -> bool:
+    """True where the robot would get near to a border if no area were closed."""
+    if not atlas.map.areas:
+        return False
+    opened = atlas.map.open.distances_from(atlas.robot.point)
+    is_near = _is_reached_near(opened, border.anchor)
+    return is_near and not _is_reached_near(atlas.distances, border.anchor)
+
+
+def _is_reached_near(distances: DistanceField, point: Point) -> bool:
+    grid = distances.lattice.grid
+    reach = math.ceil((distances.radius_m + NEAR_M) / grid.resolution_m)
+    cell = grid.cell_at(point)
+    rows = np.arange(max(cell.row - reach, 0), min(cell.row + reach + 1, grid.n_rows))
+    cols = np.arange(max(cell.col - reach, 0), min(cell.col + reach + 1, grid.n_cols))
+    return bool(np.isfinite(distances.distances_at(rows[:, np.newaxis], cols)).any())
+
+
+def judge_end(atlas: Atlas, blocked: tuple[BlockedPlace, ...]) -> tuple[ExplorationState, str]:
+    """Says what it means that there is no frontier to go to: all seen, or the rest out of reach."""
+    report = atlas.frontiers
+    if report.verdict is FrontierVerdict.NOTHING_KNOWN:
+        return ExplorationState.NOTHING_KNOWN, report.sentence
+    unreachable = find_unreachable(atlas)
+    if not unreachable and not blocked:
+        return ExplorationState.NOTHING_LEFT, f"Nothing is left to explore{_say_dull(report)}."
+    closing = " and ".join(f"the {area.title}" for area in atlas.map.areas[:MOST_NAMED])
+    parts = [f"{n} {words}" for n, words in _count(unreachable, blocked, closing) if n]
+    left_m = sum(each.length_m for each in unreachable)
+    sentence = (
+        f"What is left cannot be reached: {', '.join(parts)}; "
+        f"{left_m:.1f} m of border with the unknown."
+    )
+    return ExplorationState.REST_UNREACHABLE, sentence
+
+
+def _say_dull(report: FrontierReport) -> str:
+    """Gives what is not worth a drive, in words."""
+    dull = [each for each in report.refused if _is_dull(each)]
+    if not dull:
+        return ": all was seen"
+    left_m = sum(each.length_m for each in dull)
+    places = "places" if len(dull) > 1 else "place"
+    return f" that is worth a drive; {left_m:.1f} m of border in {len(dull)} {places} stay"
+
+
+def _is_dull(border: RefusedFrontier) -> bool:
+    return border.reason is RefusalReason.NOTHING_TO_SEE
+
+
+def _count(
+    unreachable: tuple[RefusedFrontier, ...], blocked: tuple[BlockedPlace, ...], closing: str
+) -> tuple[tuple[int, str], ...]:
+    n_closed_off = sum(each.sentence == CLOSED_OFF for each in unreachable)
+    reasons = Counter(each.reason for each in unreachable if each.sentence != CLOSED_OFF)
+    return (
+        (n_closed_off, f"behind what is closed ({closing})"),
+        (reasons[RefusalReason.TOO_NARROW], "behind gaps too narrow for the robot"),
+        (reasons[RefusalReason.NO_WAY], "behind walls"),
+        (len(blocked), "where driving there failed"),
+    )

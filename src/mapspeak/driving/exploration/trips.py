@@ -1,0 +1,194 @@
+"""Trips: drives to one target after the other that may be given up on the way for a better one.
+
+A trip advances only while somebody waits for it. Its drive stands in the drive book like any
+other, so that a stop, a cancelled goal or a newer goal ends it.
+"""
+
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from enum import StrEnum
+
+import anyio
+
+from mapspeak.driving.drive import DriveReport
+from mapspeak.driving.exploration.blocked import BlockedPlaces
+from mapspeak.driving.exploration.site import Site
+from mapspeak.errors import GoalError
+from mapspeak.geometry import Pose
+from mapspeak.robot import GoalState
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.frontiers import Frontier
+
+__all__ = ["OnTrip", "Target", "Trip", "TripState", "Trips"]
+
+OnTrip = Callable[[DriveReport], Awaitable[None]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Target:
+    """Where to go next, and why.
+
+    Attributes:
+        id: F3, W2, or the words for a place that has no id.
+        pose: Where to stand.
+        reason: Why there, in words.
+        frontier: The frontier to look over; None where it is none.
+    """
+
+    id: str
+    pose: Pose
+    reason: str
+    frontier: Frontier | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Trip:
+    """A target that the robot is on its way to.
+
+    Attributes:
+        target: Where to.
+        goal_id: Its drive in the drive book.
+    """
+
+    target: Target
+    goal_id: str
+
+
+class TripState(StrEnum):
+    """How a trip stands."""
+
+    UNDER_WAY = "under_way"
+    ARRIVED = "arrived"
+    BLOCKED = "blocked"
+    INTERRUPTED = "interrupted"
+
+
+class Trips:
+    """The trip under way, the metres driven so far, and the places that were blocked.
+
+    Attributes:
+        current: The trip under way; None between two.
+        blocked: Places that could not be reached.
+        n_begun: How many trips there were.
+        n_arrived: How many of them ended where they led to.
+        n_seen: How many were left on the way, since what they were for had been seen from afar.
+        n_blocked: How many could not be driven to their end.
+        why_ended: Why the latest trip ended as it did; empty when it arrived.
+    """
+
+    def __init__(self, site: Site) -> None:
+        self._site = site
+        self.current: Trip | None = None
+        self.blocked = BlockedPlaces()
+        self.n_begun = self.n_arrived = self.n_seen = self.n_blocked = 0
+        self.why_ended = ""
+        self._driven_before_m = 0.0
+
+    @property
+    def driven_m(self) -> float:
+        """How far the robot has come, also between two calls, by its own poses."""
+        return self._site.drives.driven_m - self._driven_before_m
+
+    def begin_count(self) -> None:
+        """Count trips and metres from zero again; what was blocked stays remembered."""
+        self.n_begun = self.n_arrived = self.n_seen = self.n_blocked = 0
+        self._driven_before_m = self._site.drives.driven_m
+
+    async def set_out(
+        self, target: Target, *, ticket: int, client: str, grid: OccupancyGrid
+    ) -> TripState:
+        """Sends the robot to a target; one it was on the way to is given up.
+
+        Args:
+            target: Where to.
+            ticket: Of the drive book, from before the target was chosen.
+            client: Who asks for it.
+            grid: The map by which it was chosen.
+
+        Raises:
+            PolicyError: The robot must not drive now, wherever to.
+        """
+        try:
+            drive = await self._site.drives.start(
+                target.pose, place=target.id, ticket=ticket, client=client
+            )
+        except GoalError as error:
+            return self._take_in_refusal(target, error.message, ticket=ticket, grid=grid)
+        self.n_seen += self.current is not None
+        self.current = Trip(target, drive.goal_id)
+        self.n_begun += 1
+        return TripState.UNDER_WAY
+
+    async def follow(self, *, wait_s: float, grid: OccupancyGrid, on_trip: OnTrip) -> TripState:
+        """Waits for the trip under way, so much robot time at most, and says how it stands.
+
+        Args:
+            wait_s: At most, in robot time.
+            grid: The map of that moment; a place that proves blocked is remembered with it.
+            on_trip: Told about the drive.
+        """
+        trip = self.current
+        if trip is None:
+            return TripState.INTERRUPTED
+        report = await self._site.drives.wait(trip.goal_id, wait_s=wait_s, on_progress=_tell_nobody)
+        await on_trip(report)
+        return self._take_in(trip, report, grid)
+
+    async def give_up(self, *, is_seen: bool = False) -> None:
+        """Bring the robot to a stand, where it is on a trip.
+
+        Args:
+            is_seen: What the trip was for has been seen from afar.
+        """
+        trip, self.current = self.current, None
+        if trip is not None:
+            self.n_seen += is_seen
+            with anyio.CancelScope(shield=True):
+                await self._site.drives.cancel(trip.goal_id)
+
+    def _take_in(self, trip: Trip, report: DriveReport, grid: OccupancyGrid) -> TripState:
+        status = report.status
+        if not status.state.is_final:
+            return TripState.UNDER_WAY
+        self.current = None
+        self.why_ended = status.reason
+        if status.state is GoalState.ARRIVED:
+            self.n_arrived += 1
+            self.blocked.forget(trip.target.pose.point)
+            return TripState.ARRIVED
+        if status.state in (GoalState.CANCELLED, GoalState.PREEMPTED):
+            self.why_ended = status.reason or f"{trip.goal_id} was {status.state}."
+            return TripState.INTERRUPTED
+        self.n_blocked += 1
+        self.why_ended = status.reason or f"The drive ended as {status.state}."
+        self._remember_blocked(trip.target, report.pose, grid)
+        return TripState.BLOCKED
+
+    def _take_in_refusal(
+        self, target: Target, why: str, *, ticket: int, grid: OccupancyGrid
+    ) -> TripState:
+        """Takes a refusal for one of the place, unless the robot belongs to somebody else now."""
+        self.why_ended = why
+        if self._is_not_ours(ticket):
+            self.current = None
+            return TripState.INTERRUPTED
+        self._remember_blocked(target, target.pose, grid)
+        return TripState.BLOCKED
+
+    def _remember_blocked(self, target: Target, stuck: Pose, grid: OccupancyGrid) -> None:
+        self.blocked.remember(
+            target.id, target.pose, stuck=stuck.point, reason=self.why_ended, grid=grid
+        )
+
+    def _is_not_ours(self, ticket: int) -> bool:
+        """True when the robot was stopped meanwhile, or is on a drive that somebody else wants."""
+        drives = self._site.drives
+        with drives.preparing() as now:
+            was_stopped = now != ticket
+        goal_id = None if self.current is None else self.current.goal_id
+        under_way = drives.under_way
+        return was_stopped or (under_way is not None and under_way.goal_id != goal_id)
+
+
+async def _tell_nobody(_report: DriveReport) -> None:
+    """Takes what is told again at the end of each short wait."""

@@ -1,0 +1,92 @@
+"""A stop that the robot could not be told yet: it is told as soon as it can be reached."""
+
+import logging
+from collections.abc import Callable
+
+import anyio
+
+from mapspeak.driving.drivereport import Drive
+from mapspeak.errors import LinkError, MapspeakError
+from mapspeak.robot import GoalState, GoalStatus, Robot
+
+__all__ = ["NEEDS_NO_STOP", "OwedStop"]
+
+NEWS_S = 0.5
+"""Wall time from the robot's return until its navigation has told how goals stand."""
+NEEDS_NO_STOP = (GoalState.ARRIVED, GoalState.CANCELLED, GoalState.PREEMPTED)
+"""Navigation has ended these itself; what a newer goal has replaced, that drives on with."""
+
+logger = logging.getLogger(__name__)
+
+
+class OwedStop:
+    """The stop that is owed to one robot, if any.
+
+    Attributes:
+        goal_id: Of the drive it is owed for; None where nothing is owed.
+
+    Args:
+        robot: The robot.
+        wall_s: Tells wall time.
+    """
+
+    def __init__(self, robot: Robot, *, wall_s: Callable[[], float]) -> None:
+        self._robot = robot
+        self._wall_s = wall_s
+        self._stopping = anyio.Lock()
+        self._answered_s: float | None = None
+        self._has_warned = False
+        self.goal_id: str | None = None
+
+    def owe(self, goal_id: str) -> None:
+        """Note that a drive has to be stopped."""
+        self.goal_id, self._answered_s, self._has_warned = goal_id, None, False
+
+    def forgive(self) -> None:
+        """Note that nothing has to be stopped any more."""
+        self.goal_id = None
+
+    async def wait_for_stop(self) -> None:
+        """Return when no stop is being sent: it would end what is sent meanwhile."""
+        async with self._stopping:
+            return
+
+    async def stop(self) -> None:
+        """Stop the robot where that is owed; what fails stays owed."""
+        async with self._stopping:
+            owed = self.goal_id
+            if owed is None:
+                return
+            try:
+                with anyio.CancelScope(shield=True):
+                    await self._robot.stop()
+            except MapspeakError as error:
+                if not self._has_warned:
+                    logger.warning("%s could not be stopped yet: %s", owed, error)
+                self._has_warned = True
+                return
+            if self.goal_id == owed:
+                self.forgive()
+
+    async def settle(self, drive: Drive) -> GoalStatus | None:
+        """Stop the drive a stop is owed for, unless it has ended by itself; return how it has.
+
+        A robot that is back needs a moment to tell how its goals stand.
+        """
+        try:
+            truth = await self._robot.fetch_goal_status(drive.robot_goal_id or "")
+        except LinkError:
+            # Out of reach, or only its state is: then it can be stopped.
+            self._answered_s = None
+            await self.stop()
+            return None
+        if self.goal_id != drive.goal_id:
+            return None
+        if truth.state in NEEDS_NO_STOP:
+            self.forgive()
+            return truth
+        now_s = self._wall_s()
+        self._answered_s = now_s if self._answered_s is None else self._answered_s
+        if truth.state.is_final or now_s - self._answered_s >= NEWS_S:
+            await self.stop()
+        return None

@@ -1,0 +1,25 @@
+"""Several places in order, planned as a whole and driven one after the other."""
+
+from mapspeak.driving.routes.candidates import Candidate, find_candidates
+from mapspeak.driving.routes.following import (
+    RouteBook,
+    RouteProgress,
+    RouteState,
+    Stop,
+    StopState,
+    WhenBlocked,
+)
+from mapspeak.driving.routes.planning import RoutePlan, plan_route
+
+__all__ = [
+    "Candidate",
+    "RouteBook",
+    "RoutePlan",
+    "RouteProgress",
+    "RouteState",
+    "Stop",
+    "StopState",
+    "WhenBlocked",
+    "find_candidates",
+    "plan_route",
+]

@@ -1,0 +1,318 @@
+"""Where to look for a thing next: remembered places, frontiers, and floor that nobody has seen."""
+
+import math
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.driving.search.opinions import Opinions, weight_of
+from mapspeak.driving.search.seenfloor import REACH_M, SeenFloor
+from mapspeak.driving.search.sightlines import cast_sight_lines
+from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.places.choosing import check_place
+from mapspeak.places.naming import Place
+from mapspeak.semantic import TakenPicture
+from mapspeak.semantic.retrieval import Verdict
+from mapspeak.spatial.frontiers import Frontier
+from mapspeak.worldmodel.model import Atlas, RememberedPlace
+
+__all__ = ["Candidate", "CandidateKind", "find_candidates", "unseen_area_m2"]
+
+N_RAYS = 72
+EVERY_M = 1.0
+"""Places to look from are this far from each other."""
+COMFORT_M = 0.1
+LEAST_AREA_M2 = 1.0
+"""Less unseen floor than this in view is not worth a look."""
+STOP_M = 0.5
+"""What a look costs beside the way to it."""
+TURN_M = 0.5
+"""What half a turn costs."""
+UNKNOWN_WEIGHT = 0.5
+"""A square metre that is only expected counts as this much of one that is known and unseen."""
+NEAR_M = 5.0
+MAY_BE_NEAR = 0.8
+"""The score of what lies near something remembered that speaks of the thing, or is like it."""
+LEAST_SAID_RATIO = 0.5
+"""Of the words for the thing, a record says at least so much that speaks of it."""
+MOST_REMEMBERED = 12
+
+FloatArray = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+class CandidateKind(StrEnum):
+    """What makes a place worth a look."""
+
+    REMEMBERED = "remembered"
+    PICTURED = "pictured"
+    FRONTIER = "frontier"
+    UNSEEN = "unseen"
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Candidate:
+    """A place to look for the thing from.
+
+    Attributes:
+        kind: What makes it worth a look.
+        id: W2, T1, P5 or F3; for unseen floor its coordinates.
+        pose: Where to stand and where to look.
+        area_m2: Floor that is to come into view for the first time, as far as can be told.
+        path_m: From the robot.
+        score: How likely the thing is there, 0.5 where nobody knows.
+        rate: What speaks for it: square metres by their likelihood, for each metre of way.
+        frontier: The frontier it is; None where it is none.
+        name: What something remembered, or a picture, is known by during the search.
+    """
+
+    kind: CandidateKind
+    id: str
+    pose: Pose
+    area_m2: float
+    path_m: float
+    score: float
+    rate: float
+    frontier: Frontier | None = None
+    name: str = ""
+
+    @property
+    def reason(self) -> str:
+        """Why there, in words with numbers."""
+        if self.kind is CandidateKind.REMEMBERED:
+            what = "thing that is remembered" if self.id.startswith("T") else "remembered place"
+            return f"a {what} speaks of it, {self.path_m:.1f} m away"
+        if self.kind is CandidateKind.PICTURED:
+            return f"the detector reported it in this picture, {self.path_m:.1f} m away"
+        what = "unknown or unseen floor" if self.frontier else "floor not looked at yet"
+        liking = "" if self.score == 0.5 else f", score {self.score:.2f}"
+        return f"{self.area_m2:.1f} m2 of {what}, {self.path_m:.1f} m away{liking}"
+
+
+def find_candidates(
+    atlas: Atlas,
+    thing: str,
+    *,
+    seen: SeenFloor,
+    opinions: Opinions,
+    visited: Collection[str],
+    pictures: Sequence[TakenPicture] = (),
+) -> list[Candidate]:
+    """Finds where to look next, best first; what is remembered comes before all else.
+
+    After that come earlier pictures in which the robot's own detector reported such a thing.
+
+    Args:
+        atlas: The map.
+        thing: What is looked for.
+        seen: What was looked at already.
+        opinions: What the model thinks.
+        visited: The names of candidates of what is remembered that were looked at already.
+        pictures: Those earlier pictures, in the order in which to go there.
+    """
+    speaking, alike = _find_remembered(atlas, thing)
+    remembered = [
+        candidate
+        for each in speaking
+        if _key(each) not in visited and (candidate := _remembered(atlas, each)) is not None
+    ]
+    seen_mask = seen.mask_on(atlas.grid)
+    near = [each.point for each in (*speaking, *alike)]
+    others = [
+        *_frontiers(atlas, seen_mask, seen.half_view_rad, opinions, near),
+        *_unseen(atlas, seen_mask, seen.half_view_rad, opinions, near),
+    ]
+    pictured = [
+        candidate
+        for each in pictures
+        if each.id not in visited and (candidate := _pictured(atlas, each)) is not None
+    ]
+    return [*remembered, *pictured, *sorted(others, key=lambda each: -each.rate)]
+
+
+def unseen_area_m2(atlas: Atlas, pose: Pose, *, seen: SeenFloor) -> float:
+    """Gives how much floor that was not looked at yet comes into view in a pose."""
+    areas_m2 = _areas_by_heading(
+        atlas,
+        seen.mask_on(atlas.grid, around=pose.point),
+        np.array([[pose.x, pose.y]]),
+        seen.half_view_rad,
+    )
+    return float(areas_m2[0, _heading_index(pose.yaw_rad)])
+
+
+def _find_remembered(atlas: Atlas, thing: str) -> tuple[list[Place], list[Place]]:
+    """Gives what speaks of the thing, and what may be it by its likeness alone."""
+    by_id = {each.id: Place(each.id, each) for each in atlas.recollection.everything}
+    answer = atlas.recollection.find(thing, limit=MOST_REMEMBERED)
+    speaking = answer.find_speaking(least_said_ratio=LEAST_SAID_RATIO)
+    is_ambiguous = answer.verdict is Verdict.AMBIGUOUS
+    meant = answer.candidates[: answer.n_meant] if is_ambiguous else ()
+    return (
+        [by_id[each.entry.id] for each in speaking],
+        [by_id[each.entry.id] for each in meant if each not in speaking],
+    )
+
+
+def _key(place: Place) -> str:
+    """Gives what it is known by as long as a search lasts; ids of waypoints change in between."""
+    remembered = place.thing
+    return remembered.waypoint.name if isinstance(remembered, RememberedPlace) else place.name
+
+
+def _remembered(atlas: Atlas, place: Place) -> Candidate | None:
+    """Gives where to stand for it, or the nearest pose that works; None where none does."""
+    goal = check_place(atlas, place)
+    pose = goal.pose if goal.check.is_ok else goal.check.nearest
+    path_m = None if pose is None else atlas.path_m(pose.point)
+    if pose is None or path_m is None:
+        return None
+    return Candidate(
+        kind=CandidateKind.REMEMBERED,
+        id=place.name,
+        pose=pose,
+        area_m2=0.0,
+        path_m=path_m,
+        score=1.0,
+        rate=math.inf,
+        name=_key(place),
+    )
+
+
+def _pictured(atlas: Atlas, picture: TakenPicture) -> Candidate | None:
+    """Gives the pose that a picture was taken in; None where the robot cannot get there now."""
+    path_m = atlas.path_m(picture.pose.point)
+    if path_m is None:
+        return None
+    return Candidate(
+        kind=CandidateKind.PICTURED,
+        id=picture.id,
+        pose=picture.pose,
+        area_m2=0.0,
+        path_m=path_m,
+        score=1.0,
+        rate=math.inf,
+        name=picture.id,
+    )
+
+
+def _frontiers(
+    atlas: Atlas, seen: Mask, half_rad: float, opinions: Opinions, near: list[Point]
+) -> Iterator[Candidate]:
+    frontiers = atlas.frontiers.frontiers
+    if not frontiers:
+        return
+    places = np.array([[each.pose.x, each.pose.y] for each in frontiers])
+    areas_m2 = _areas_by_heading(atlas, seen, places, half_rad)
+    for frontier, by_heading in zip(frontiers, areas_m2, strict=True):
+        unseen_m2 = float(by_heading[_heading_index(frontier.pose.yaw_rad)])
+        yield _rated(
+            atlas,
+            CandidateKind.FRONTIER,
+            frontier.pose,
+            area_m2=unseen_m2 + UNKNOWN_WEIGHT * frontier.gain_m2,
+            path_m=frontier.distance_m,
+            opinions=opinions,
+            near=near,
+            frontier=frontier,
+        )
+
+
+def _unseen(
+    atlas: Atlas, seen: Mask, half_rad: float, opinions: Opinions, near: list[Point]
+) -> Iterator[Candidate]:
+    """Gives the best heading at each of many places from which something unseen is in view."""
+    places, ways_m = _places_to_stand(atlas)
+    areas_m2 = _areas_by_heading(atlas, seen, places, half_rad)
+    best = areas_m2.argmax(axis=1)
+    for place, path_m, index, by_heading in zip(places, ways_m, best, areas_m2, strict=True):
+        area_m2 = float(by_heading[index])
+        if area_m2 >= LEAST_AREA_M2:
+            yaw_rad = wrap_angle(index * math.tau / N_RAYS)
+            yield _rated(
+                atlas,
+                CandidateKind.UNSEEN,
+                Pose(float(place[0]), float(place[1]), yaw_rad),
+                area_m2=area_m2,
+                path_m=float(path_m),
+                opinions=opinions,
+                near=near,
+            )
+
+
+def _rated(
+    atlas: Atlas,
+    kind: CandidateKind,
+    pose: Pose,
+    *,
+    area_m2: float,
+    path_m: float,
+    opinions: Opinions,
+    near: list[Point],
+    frontier: Frontier | None = None,
+) -> Candidate:
+    looks_at = frontier.anchor if frontier else pose.transform(Point(REACH_M / 2, 0.0))
+    own_id = frontier.id if frontier else f"({pose.x:.1f}, {pose.y:.1f})"
+    # Finding rooms takes long, and nobody needs them who thinks nothing of any.
+    room_id = atlas.find_room_id(looks_at) if opinions.speaks_of_rooms else None
+    score = opinions.score_at(looks_at, ids=(own_id, room_id or ""))
+    if any(point.distance_to(looks_at) <= NEAR_M for point in near):
+        score = max(score, MAY_BE_NEAR)
+    turn_rad = abs(wrap_angle(pose.yaw_rad - atlas.robot.yaw_rad)) if path_m < STOP_M else 0.0
+    cost_m = path_m + STOP_M + TURN_M * turn_rad / math.pi
+    return Candidate(
+        kind=kind,
+        id=own_id,
+        pose=pose,
+        area_m2=area_m2,
+        path_m=path_m,
+        score=score,
+        rate=area_m2 * weight_of(score) / cost_m,
+        frontier=frontier,
+    )
+
+
+def _places_to_stand(atlas: Atlas) -> tuple[FloatArray, FloatArray]:
+    """Gives places spread over the floor, each where its square has most room, and ways to them.
+
+    The first one is where the robot is: it may turn there.
+    """
+    reachable = atlas.distances.build_reachable_mask()
+    clear_m = np.where(reachable, atlas.map.clearance_m, 0.0)
+    rows, cols = np.nonzero(clear_m >= atlas.radius_m + COMFORT_M)
+    every = max(round(EVERY_M / atlas.grid.resolution_m), 1)
+    roomiest_first = np.argsort(-clear_m[rows, cols], kind="stable")
+    rows, cols = rows[roomiest_first], cols[roomiest_first]
+    squares = (rows // every) * (atlas.grid.n_cols // every + 1) + cols // every
+    _, first = np.unique(squares, return_index=True)
+    points = atlas.grid.points_at(rows[first], cols[first])
+    ways_m = atlas.distances.distances_at(rows[first], cols[first])
+    is_reached = np.isfinite(ways_m)
+    here = np.array([[atlas.robot.x, atlas.robot.y]])
+    return (
+        np.concatenate([here, points[is_reached]]),
+        np.concatenate([np.zeros(1), ways_m[is_reached]]),
+    )
+
+
+def _areas_by_heading(atlas: Atlas, seen: Mask, places: FloatArray, half_rad: float) -> FloatArray:
+    """Gives the unseen floor in view from places by heading, shape (places, N_RAYS), in m2."""
+    grid = atlas.grid
+    angles: FloatArray = np.arange(N_RAYS, dtype=np.float64) * (math.tau / N_RAYS)
+    # No step is longer than a cell, so that no ray passes a wall between two of them.
+    step_m = grid.resolution_m
+    steps_m = np.arange(step_m, REACH_M + 1e-9, step_m)
+    lines = cast_sight_lines(grid, places, angles=angles, steps_m=steps_m)
+    is_new = lines.is_open & ~seen[lines.rows, lines.cols]
+    by_ray = is_new @ (steps_m * step_m * math.tau / N_RAYS)
+    half = max(round(half_rad / (math.tau / N_RAYS)), 1)
+    around = np.concatenate([by_ray[:, -half:], by_ray, by_ray[:, :half]], axis=1)
+    sums = np.cumsum(np.pad(around, ((0, 0), (1, 0))), axis=1)
+    return np.asarray(sums[:, 2 * half + 1 :] - sums[:, : -2 * half - 1], dtype=np.float64)
+
+
+def _heading_index(yaw_rad: float) -> int:
+    return round(yaw_rad / (math.tau / N_RAYS)) % N_RAYS

@@ -1,0 +1,391 @@
+"""The search loop: go where the thing may be seen, look, take in what the model thinks, go on."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import anyio
+import numpy as np
+
+from mapspeak.driving.exploration import (
+    OnTrip,
+    Site,
+    Target,
+    Trips,
+    TripState,
+    has_room_at,
+)
+from mapspeak.driving.search.candidates import (
+    Candidate,
+    CandidateKind,
+    find_candidates,
+    unseen_area_m2,
+)
+from mapspeak.driving.search.company import find_company_score
+from mapspeak.driving.search.earlier import Earlier, Look, read_earlier
+from mapspeak.driving.search.opinions import Opinions
+from mapspeak.driving.search.seenfloor import REACH_M, SeenFloor
+from mapspeak.driving.search.standing import SearchState, Standing, find_seen_regions
+from mapspeak.driving.search.words import speaks_of
+from mapspeak.errors import PolicyError
+from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.robot import CameraPicture, Detection
+from mapspeak.semantic import TakenPicture, name_key
+from mapspeak.spatial.frontiers import remaining_ratio
+from mapspeak.worldmodel.model import Atlas
+
+__all__ = ["Budget", "Choose", "Judgement", "Searcher"]
+
+RETHINK_S = 1.0
+LEFT_RATIO = 0.3
+"""Less than this of what a place had to show is left: it was seen on the way."""
+BETTER_RATIO = 1.5
+"""Only what is so much better makes the robot turn when the model has changed its mind."""
+HERE_M = 0.15
+HERE_RAD = math.radians(8)
+SAME_M = 1.0
+"""A place to look from that has moved no farther is the same."""
+APART_M = 2.0
+MOST_NEXT = 6
+UNKNOWN_RANGE_M = 3.0
+DISMISSED_M = 1.5
+"""What the detector reports this near to something that was none is none either."""
+SLACK_S = 0.01
+ANEW = "Nothing new is left: what only earlier pictures showed is looked at anew."
+
+Choose = Callable[[Sequence[Candidate]], Candidate | None]
+"""Chooses one of several places to look from, which come best first; None for none of them."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Budget:
+    """What a search may cost.
+
+    Attributes:
+        n_looks: Pictures.
+        driven_m: Metres.
+    """
+
+    n_looks: int | None = None
+    driven_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judgement:
+    """What the model says between two steps.
+
+    Attributes:
+        is_seen: The thing is in the last picture; None where it does not say.
+        likely: How likely the thing is near what the last picture shows, from 0 to 1.
+        scores: How likely it is at places, by their ids.
+    """
+
+    is_seen: bool | None = None
+    likely: float | None = None
+    scores: Mapping[str, float] = field(default_factory=dict)
+
+
+def take_best(candidates: Sequence[Candidate]) -> Candidate:
+    """Takes the first one."""
+    return candidates[0]
+
+
+class Searcher:
+    """One search after the other; each advances only while a call waits.
+
+    Args:
+        site: The robot, its drives and its map.
+        choose: Chooses where to look next; the best unless told otherwise.
+    """
+
+    def __init__(self, site: Site, *, choose: Choose = take_best) -> None:
+        self._site = site
+        self._choose = choose
+        self._trips = Trips(site)
+        self._judged: dict[str, list[Look]] = {}
+        self._begin("", Earlier())
+        self._state = SearchState.NOT_FOUND
+
+    def _begin(self, thing: str, earlier: Earlier) -> None:
+        self._thing = thing
+        self._earlier = earlier
+        self._seen = SeenFloor(earlier=earlier.looks)
+        self._news = earlier.sentence
+        self._shown: Look | None = None
+        self._opinions = Opinions()
+        self._visited: set[str] = set()
+        self._looked: Point | None = None
+        self._here: Candidate | None = None
+        self._next: tuple[Candidate, ...] = ()
+        self._n_looks = 0
+        self._state = SearchState.DRIVING
+        self._has_new_opinion = False
+        self._reported: Point | None = None
+        self._dismissed: list[Point] = []
+        self._trips.begin_count()
+
+    def note_picture(self, picture: CameraPicture) -> None:
+        """Takes in that somebody was shown a picture."""
+        self._n_looks += 1
+        self._seen.add_look(picture.pose, picture.horizontal_fov_rad)
+        self._shown = picture.pose, picture.horizontal_fov_rad
+        self._looked = picture.pose.transform(Point(REACH_M / 2, 0.0))
+
+    async def advance(
+        self,
+        thing: str,
+        judgement: Judgement,
+        budget: Budget,
+        *,
+        wait_s: float,
+        on_trip: OnTrip,
+        client: str = "",
+        earlier: Sequence[TakenPicture] = (),
+    ) -> Standing:
+        """Searches until there is something to look at, it ends, or so much robot time has passed.
+
+        Whoever gives up waiting gives up the drive: the robot comes to a stand.
+
+        Args:
+            thing: What to look for; another one than before begins a new search.
+            judgement: What the model says of the last picture and of places.
+            budget: What the search may cost in all.
+            wait_s: Robot time after which to answer, with the robot still under way.
+            on_trip: Told about the drive, about every second.
+            client: Who asks for it.
+            earlier: The pictures so far, the oldest first; a new search begins from them.
+
+        Raises:
+            PolicyError: The robot must not drive now, wherever to; it comes to a stand.
+        """
+        key = name_key(thing)
+        if self._state.is_end or key != name_key(self._thing):
+            await self._trips.give_up()
+            seen_before = self._judged.get(key, ())
+            self._begin(thing, read_earlier(earlier, thing, judged=seen_before))
+        self._take_in(judgement)
+        try:
+            return await self._advance(judgement, budget, wait_s, on_trip, client)
+        except (anyio.get_cancelled_exc_class(), PolicyError):
+            with anyio.CancelScope(shield=True):
+                await self._trips.give_up()
+            raise
+
+    def _take_in(self, judgement: Judgement) -> None:
+        if judgement.is_seen is False and self._reported is not None:
+            self._dismissed.append(self._reported)
+        if judgement.is_seen is False and self._shown is not None:
+            self._judged.setdefault(name_key(self._thing), []).append(self._shown)
+        self._reported = self._shown = None
+        self._opinions.add_scores(judgement.scores)
+        if judgement.likely is not None and self._looked is not None:
+            self._opinions.add_view(self._looked, judgement.likely)
+        self._has_new_opinion = bool(judgement.scores) or judgement.likely is not None
+
+    async def _advance(
+        self, judgement: Judgement, budget: Budget, wait_s: float, on_trip: OnTrip, client: str
+    ) -> Standing:
+        if judgement.is_seen:
+            await self._trips.give_up()
+            return await self._end(SearchState.FOUND, f"{self._thing} was found.")
+        deadline_s = self._site.robot.now_s + wait_s
+        ended = None
+        while ended is None:
+            ended = await self._step(budget, deadline_s, on_trip, client)
+            if ended is None and self._site.robot.now_s >= deadline_s - SLACK_S:
+                ended = SearchState.DRIVING, "The robot is on its way."
+        return await self._end(*ended)
+
+    async def _step(
+        self, budget: Budget, deadline_s: float, on_trip: OnTrip, client: str
+    ) -> tuple[SearchState, str] | None:
+        """Drives on for a moment; gives how the call ends, None where it goes on."""
+        with self._site.drives.preparing() as ticket:
+            atlas = await self._site.fetch_atlas()
+            if (told := self._what_is_spent(budget)) is not None:
+                await self._trips.give_up()
+                return SearchState.BUDGET_SPENT, told
+            state = await self._set_out(atlas, ticket, client)
+        left_s = deadline_s - self._site.robot.now_s
+        if state is TripState.UNDER_WAY and left_s > SLACK_S:
+            state = await self._trips.follow(
+                wait_s=min(RETHINK_S, left_s), grid=atlas.grid, on_trip=on_trip
+            )
+        match state:
+            case None:
+                return SearchState.NOT_FOUND, "There is nowhere left to look."
+            case TripState.INTERRUPTED:
+                return SearchState.INTERRUPTED, self._trips.why_ended
+            case TripState.ARRIVED:
+                return self._arrive()
+        label = await self._find_report()
+        if label is None:
+            return None
+        await self._trips.give_up()
+        return SearchState.REPORTED, f"The robot's detector reports {label}."
+
+    def _arrive(self) -> tuple[SearchState, str]:
+        here = self._here
+        if here is not None and here.name:
+            self._visited.add(here.name)
+        return SearchState.LOOK, "The robot looks at a new place."
+
+    async def _set_out(self, atlas: Atlas, ticket: int, client: str) -> TripState | None:
+        """Sets out to the next place where there is no trip, or it has become pointless."""
+        trip, here = self._trips.current, self._here
+        if (
+            trip is not None
+            and here is not None
+            and not self._has_new_opinion
+            and not await self._is_pointless(atlas, here)
+        ):
+            return TripState.UNDER_WAY
+        candidates = await self._site.compute(lambda: self._find_candidates(atlas))
+        if not candidates and self._seen.n_earlier:
+            self._seen.forget_earlier()
+            candidates = await self._site.compute(lambda: self._find_candidates(atlas))
+            self._news = f"{self._news} {ANEW}".lstrip() if candidates else self._news
+        was_asked, self._has_new_opinion = self._has_new_opinion, False
+        best = self._choose(candidates) if candidates else None
+        if best is None:
+            await self._trips.give_up()
+            self._here = None
+            return None
+        is_going = trip is not None and here is not None and was_asked
+        if is_going and best.rate < BETTER_RATIO * _rate_now(here, candidates):
+            return TripState.UNDER_WAY
+        self._here = best
+        self._next = _pick_apart(best, candidates)
+        if _stands_at(atlas, best):
+            await self._trips.give_up()
+            return TripState.ARRIVED
+        target = Target(id=best.id, pose=best.pose, reason=best.reason, frontier=best.frontier)
+        return await self._trips.set_out(target, ticket=ticket, client=client, grid=atlas.grid)
+
+    def _find_candidates(self, atlas: Atlas) -> list[Candidate]:
+        self._recall_company(atlas)
+        found = find_candidates(
+            atlas,
+            self._thing,
+            seen=self._seen,
+            opinions=self._opinions,
+            visited=self._visited,
+            pictures=self._earlier.reporting,
+        )
+        blocked = self._trips.blocked
+        return [
+            each
+            for each in found
+            if not blocked.is_closed(each.pose.point, atlas.grid)
+            and (each.kind is CandidateKind.REMEMBERED or not self._seen.has_look_from(each.pose))
+        ]
+
+    def _recall_company(self, atlas: Atlas) -> None:
+        """Takes in what remembered places say of where the thing may be; a kitchen has fridges."""
+        for place in atlas.places:
+            waypoint = place.waypoint
+            named = (*waypoint.safety_landmarks, *waypoint.functional_landmarks)
+            words = ", ".join((waypoint.name, *(each.label for each in named)))
+            if (score := find_company_score(words, self._thing)) is not None:
+                self._opinions.add_company(waypoint.pose.point, score)
+
+    async def _is_pointless(self, atlas: Atlas, here: Candidate) -> bool:
+        """True when what a place had to show was seen on the way, or it cannot be stood in."""
+        if not has_room_at(atlas.grid, here.pose.point, radius_m=atlas.radius_m):
+            return True
+        if here.name:
+            return False
+        left_m2 = await self._site.compute(
+            lambda: unseen_area_m2(atlas, here.pose, seen=self._seen)
+        )
+        if here.frontier is not None:
+            left_ratio = remaining_ratio(atlas.grid, here.frontier)
+            return left_ratio < LEFT_RATIO and left_m2 < LEFT_RATIO * here.area_m2
+        return left_m2 < LEFT_RATIO * here.area_m2
+
+    async def _find_report(self) -> str | None:
+        """Gives what the robot's own detector takes for the thing; None where it sees no such."""
+        robot = self._site.robot
+        if robot.description.detector is None:
+            return None
+        detections = await robot.fetch_detections()
+        pose = (await robot.fetch_pose()).pose
+        self._seen.add(pose, None)
+        found = None
+        for each in detections:
+            place = _place_of(each, pose)
+            is_new = all(place.distance_to(other) > DISMISSED_M for other in self._dismissed)
+            if speaks_of(each.label, self._thing):
+                if is_new and found is None:
+                    self._reported, found = place, each.label
+            elif (score := find_company_score(each.label, self._thing)) is not None:
+                self._has_new_opinion |= self._opinions.add_company(place, score)
+        return found
+
+    def _what_is_spent(self, budget: Budget) -> str | None:
+        if budget.n_looks is not None and self._n_looks >= budget.n_looks:
+            return f"{budget.n_looks} pictures were looked at."
+        if budget.driven_m is not None and self._trips.driven_m >= budget.driven_m:
+            return f"{budget.driven_m:.0f} m were driven."
+        return None
+
+    async def _end(self, state: SearchState, sentence: str) -> Standing:
+        self._state = state
+        atlas = await self._site.fetch_atlas()
+        return await self._site.compute(lambda: self._report(atlas, sentence))
+
+    def _report(self, atlas: Atlas, sentence: str) -> Standing:
+        trip = self._trips.current
+        seen = self._seen.mask_on(atlas.grid)
+        news, self._news = self._news, ""
+        n_free = max(int(np.count_nonzero(atlas.grid.free)), 1)
+        return Standing(
+            state=self._state,
+            sentence=" ".join(filter(None, (sentence or "The drive was ended.", news))),
+            thing=self._thing,
+            n_looks=self._n_looks,
+            n_earlier=self._seen.n_earlier,
+            driven_m=self._trips.driven_m,
+            here=self._here,
+            goal_id=None if trip is None else trip.goal_id,
+            next=self._next,
+            regions=find_seen_regions(atlas, seen) if self._state.is_end else (),
+            seen_ratio=int(np.count_nonzero(seen)) / n_free,
+            blocked=tuple(self._trips.blocked),
+            pose=atlas.robot,
+            pose_doubt=atlas.pose_doubt,
+        )
+
+
+def _pick_apart(best: Candidate, others: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """Gives the best of some places that are not much the same as one before."""
+    picked = [best]
+    for each in others:
+        away_m = (each.pose.point.distance_to(other.pose.point) for other in picked)
+        if min(away_m) >= APART_M and len(picked) <= MOST_NEXT:
+            picked.append(each)
+    return tuple(picked[1:])
+
+
+def _rate_now(here: Candidate | None, candidates: Sequence[Candidate]) -> float:
+    """Gives what speaks for the place under way, as things stand now."""
+    if here is None or here.name:
+        return math.inf
+    same = (
+        each.rate
+        for each in candidates
+        if each.pose.point.distance_to(here.pose.point) <= SAME_M and each.kind is here.kind
+    )
+    return max(same, default=0.0)
+
+
+def _place_of(detection: Detection, pose: Pose) -> Point:
+    range_m = UNKNOWN_RANGE_M if detection.range_m is None else detection.range_m
+    along = Pose(pose.x, pose.y, pose.yaw_rad + detection.bearing_rad)
+    return along.transform(Point(range_m, 0.0))
+
+
+def _stands_at(atlas: Atlas, candidate: Candidate) -> bool:
+    turn_rad = abs(wrap_angle(candidate.pose.yaw_rad - atlas.robot.yaw_rad))
+    is_near = atlas.robot.point.distance_to(candidate.pose.point) <= HERE_M
+    return is_near and turn_rad <= HERE_RAD

@@ -1,0 +1,99 @@
+"""How a search stands, as a value."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.driving.exploration import BlockedPlace
+from mapspeak.driving.search.candidates import Candidate
+from mapspeak.geometry import Pose
+from mapspeak.robot import PoseDoubt
+from mapspeak.worldmodel.model import Atlas
+
+__all__ = ["SearchState", "SeenRegion", "Standing", "find_seen_regions"]
+
+
+class SearchState(StrEnum):
+    """How a search stands; the first three go on with the next call."""
+
+    DRIVING = "driving"
+    LOOK = "look"
+    REPORTED = "reported"
+    FOUND = "found"
+    NOT_FOUND = "not_found"
+    BUDGET_SPENT = "budget_spent"
+    INTERRUPTED = "interrupted"
+
+    @property
+    def is_end(self) -> bool:
+        """True when the next call begins a new search."""
+        return self not in (SearchState.DRIVING, SearchState.LOOK, SearchState.REPORTED)
+
+    @property
+    def shows_picture(self) -> bool:
+        """True when somebody should judge what the camera sees."""
+        return self in (SearchState.LOOK, SearchState.REPORTED)
+
+
+@dataclass(frozen=True, slots=True)
+class SeenRegion:
+    """A room or corridor, and how much of its floor the camera has looked at.
+
+    Attributes:
+        id: Of the region.
+        seen_ratio: Of its free floor.
+    """
+
+    id: str
+    seen_ratio: float
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Standing:
+    """How a search stands.
+
+    Attributes:
+        state: See `SearchState`.
+        sentence: The same in words with numbers.
+        thing: What is looked for.
+        n_looks: Pictures shown so far.
+        n_earlier: Pictures from before that count as looked at.
+        driven_m: Metres driven so far.
+        here: What the robot looks at now, or is on the way to; None for neither.
+        goal_id: Of the drive under way.
+        next: What comes after that, best first.
+        regions: What the camera has seen of each room and corridor, in the end; none before.
+        seen_ratio: Of all free floor that is known.
+        blocked: Places that the robot could not get to.
+        pose: Where the robot is.
+        pose_doubt: Why it may be elsewhere.
+    """
+
+    state: SearchState
+    sentence: str
+    thing: str
+    n_looks: int
+    n_earlier: int
+    driven_m: float
+    here: Candidate | None
+    goal_id: str | None
+    next: tuple[Candidate, ...]
+    regions: tuple[SeenRegion, ...]
+    seen_ratio: float
+    blocked: tuple[BlockedPlace, ...]
+    pose: Pose
+    pose_doubt: PoseDoubt | None
+
+
+def find_seen_regions(atlas: Atlas, seen: NDArray[np.bool_]) -> tuple[SeenRegion, ...]:
+    """Gives how much of each room and corridor was looked at, by a mask of the map's cells."""
+    labels = atlas.rooms.labels
+    n_all = np.bincount(labels[atlas.grid.free])
+    n_seen = np.bincount(labels[seen], minlength=n_all.size)
+    return tuple(
+        SeenRegion(region.id, float(n_seen[region.index] / max(n_all[region.index], 1)))
+        for region in atlas.rooms.regions
+        if region.index < n_all.size
+    )

@@ -1,1 +1,0 @@
-"""Going somewhere: checking goals, driving, exploring."""

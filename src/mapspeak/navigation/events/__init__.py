@@ -1,1 +1,0 @@
-"""Closures and notices on the map: where they are, what they bar, and which ways they burden."""

@@ -1,1 +1,0 @@
-"""What is made of the memory on the map: its things, how far to trust them, and a diary."""

@@ -1,0 +1,140 @@
+"""From a place that somebody names to the pose the robot drives to."""
+
+import math
+from dataclasses import dataclass, replace
+
+from mapspeak.errors import GoalError
+from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.places.goalcheck import GoalCheck, check_goal, say_refusal
+from mapspeak.places.places import Place, Spot, find_place, is_taken_name, say_spot
+from mapspeak.places.standing import (
+    arrival_pose,
+    choose_crossing,
+    choose_standing_point,
+    facing_in,
+    stand_before,
+)
+from mapspeak.spatial.frontiers import Frontier
+from mapspeak.spatial.rooms import Door, Region
+from mapspeak.worldmodel.model import Atlas, RememberedPlace, RememberedThing
+
+__all__ = ["CheckedGoal", "check_place", "choose_goal", "read_place", "stand_at"]
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedGoal:
+    """A pose to drive to, judged against the map.
+
+    Attributes:
+        name: Such as "R3" or "(1.20, -3.40)".
+        pose: Where to stand.
+        check: What is to be said of it.
+        reason: Why there, where words had to be read for it; else empty.
+        comes_straight_on: Nobody asked for a heading: it is that of the way from the robot.
+    """
+
+    name: str
+    pose: Pose
+    check: GoalCheck
+    reason: str = ""
+    comes_straight_on: bool = False
+
+    @property
+    def title(self) -> str:
+        """What the drive there is called: the id of what has one, else the name with its reason."""
+        is_told = self.reason and not is_taken_name(self.name)
+        return f"{self.name}: {self.reason}" if is_told else self.name
+
+    @property
+    def sentence(self) -> str:
+        """Why there, and what is to be said of it."""
+        return "; ".join(filter(None, (self.reason, self.check.sentence)))
+
+
+def choose_goal(
+    atlas: Atlas, *, place: str | None, x: float | None, y: float | None, yaw_deg: float | None
+) -> CheckedGoal:
+    """Gives the pose to drive to for a place or for coordinates, checked against the map.
+
+    Raises:
+        GoalError: Neither or both were given, there is no such place, or the robot cannot drive
+            there; the hint names the nearest pose that would work.
+    """
+    meant = read_place(atlas, place=place, x=x, y=y)
+    goal = check_place(atlas, meant, yaw_deg=yaw_deg)
+    if not goal.check.is_ok:
+        has_heading = yaw_deg is not None or _has_heading(meant)
+        hint = _what_instead(goal.check, has_heading=has_heading)
+        raise GoalError(say_refusal(goal.name, goal.check), hint=hint)
+    return goal
+
+
+def read_place(atlas: Atlas, *, place: str | None, x: float | None, y: float | None) -> Place:
+    """Gives the place that was named, or that of the coordinates.
+
+    Raises:
+        GoalError: Neither or both were given, or there is no such place.
+    """
+    if place is not None and x is None and y is None:
+        return find_place(atlas, place)
+    if place is None and x is not None and y is not None:
+        point = Point(x, y)
+        return Place(say_spot(point), Spot(point))
+    raise GoalError(
+        "A goal is either a place or both x and y.",
+        hint="Give place (an id such as R3, or a remembered name), or x and y in metres.",
+    )
+
+
+def check_place(atlas: Atlas, place: Place, *, yaw_deg: float | None = None) -> CheckedGoal:
+    """Judges the pose in which the robot would stand at a place."""
+    pose = stand_at(atlas, place)
+    if yaw_deg is not None:
+        pose = Pose(pose.x, pose.y, wrap_angle(math.radians(yaw_deg)))
+    check = check_goal(atlas.grid, atlas.distances, pose, opened=atlas.map.open.distances_from)
+    is_free = yaw_deg is None and not _has_heading(place)
+    if check.nearest is not None and is_free:
+        check = replace(check, nearest=arrival_pose(atlas, check.nearest.point))
+    straight_on = is_free and not isinstance(place.thing, Region)
+    return CheckedGoal(place.name, pose, check, place.reason, straight_on)
+
+
+def _has_heading(place: Place) -> bool:
+    """True where it matters how the robot stands there, and not only where."""
+    match place.thing:
+        case Region() | Door():
+            return False
+        case Spot(yaw_rad=yaw_rad):
+            return yaw_rad is not None
+        case _:
+            return True
+
+
+def stand_at(atlas: Atlas, place: Place) -> Pose:
+    """Gives the pose to drive to for a place, whether or not the robot can stand there."""
+    match place.thing:
+        case Region() as region:
+            point = choose_standing_point(atlas, region)
+            return Pose(point.x, point.y, facing_in(atlas, region, point))
+        case Door() as door:
+            return arrival_pose(atlas, choose_crossing(atlas, door))
+        case Frontier(pose=pose):
+            return pose
+        case RememberedPlace(waypoint=waypoint):
+            return waypoint.pose
+        case RememberedThing() as remembered:
+            return stand_before(atlas, remembered)
+        case Spot(point=point, yaw_rad=yaw_rad):
+            straight_on = arrival_pose(atlas, point)
+            return straight_on if yaw_rad is None else Pose(point.x, point.y, yaw_rad)
+
+
+def _what_instead(check: GoalCheck, *, has_heading: bool) -> str:
+    if check.nearest is None:
+        return "No place near it works either; call look_at_map and choose another one."
+    near = check.nearest
+    heading = f", yaw_deg={near.yaw_deg:.0f}" if has_heading else ""
+    return (
+        f"The nearest pose that works is x={near.x:.2f}, y={near.y:.2f}{heading}; "
+        "call navigate_to with it, or call look_at_map."
+    )

@@ -1,0 +1,284 @@
+"""Is this goal sensible? Why not? What instead?"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from mapspeak.geometry import Point, Pose
+from mapspeak.spatial import Cell, OccupancyGrid
+from mapspeak.spatial.grid import FloatArray, Mask
+from mapspeak.spatial.paths import DistanceField, distances_from
+from mapspeak.worldmodel.closures import MARGIN_M, ClosedFloor
+
+__all__ = ["GoalCheck", "GoalVerdict", "check_goal", "judge_goal", "say_refusal"]
+
+Opened = Callable[[Point], DistanceField]
+
+
+class GoalVerdict(StrEnum):
+    """What is to be said of a goal before driving to it."""
+
+    OK = "ok"
+    NOT_FINITE = "not_finite"
+    OFF_MAP = "off_map"
+    UNKNOWN = "unknown"
+    OCCUPIED = "occupied"
+    TOO_TIGHT = "too_tight"
+    CLOSED = "closed"
+    UNREACHABLE = "unreachable"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GoalCheck:
+    """A goal judged against a map.
+
+    Attributes:
+        verdict: The reason code.
+        sentence: The same in words with numbers.
+        clearance_m: From the goal to the nearest obstacle; 0 in one, off the map and where nobody
+            knows.
+        path_m: By path from the robot; None where no way leads there.
+        nearest: The nearest pose that would work, by ways from the goal that pass through no wall;
+            None for a good goal, and where there is none.
+    """
+
+    verdict: GoalVerdict
+    sentence: str
+    clearance_m: float
+    path_m: float | None = None
+    nearest: Pose | None = None
+
+    @property
+    def is_ok(self) -> bool:
+        """True when the robot can drive there and stand there."""
+        return self.verdict is GoalVerdict.OK
+
+
+FARTHEST_M = 1e6
+"""No map reaches so far; farther numbers are typing errors, and overflow cell indices."""
+SEARCH_M = 8.0
+"""How far around a goal another one is looked for first."""
+NEAR_M = 1.0
+"""Whatever is nearer than that is the nearest within a square of twice as many metres."""
+WALL_SIDES_M = 0.15
+"""A goal in a wall belongs to the nearer side; to both where they differ by no more than this."""
+
+
+def check_goal(
+    grid: OccupancyGrid, distances: DistanceField, goal: Pose, *, opened: Opened | None = None
+) -> GoalCheck:
+    """Judges a goal before driving, and finds the nearest pose that would work.
+
+    Args:
+        grid: The map.
+        distances: From the robot, on that map or on its floor without closed areas.
+        goal: Where to stand.
+        opened: Gives the distances from a point on the map itself, where somebody keeps them; to
+            say which closed area cuts a goal off.
+    """
+    check = judge_goal(grid, distances, goal, opened=opened)
+    if check.is_ok or check.verdict is GoalVerdict.NOT_FINITE:
+        return check
+    return replace(check, nearest=_find_nearest(grid, distances, goal))
+
+
+def say_refusal(name: str, check: GoalCheck) -> str:
+    """Return why a place is no goal, with its name where the sentence does not say it."""
+    return check.sentence if name in check.sentence else f"{name}: {check.sentence}"
+
+
+def judge_goal(
+    grid: OccupancyGrid, distances: DistanceField, goal: Pose, *, opened: Opened | None = None
+) -> GoalCheck:
+    """Judges a goal as `check_goal`, without looking for another where it does not work."""
+    if not goal.is_finite() or max(abs(goal.x), abs(goal.y)) > FARTHEST_M:
+        sentence = f"({goal.x:g}, {goal.y:g}) is no place: a goal is two numbers of metres."
+        return GoalCheck(verdict=GoalVerdict.NOT_FINITE, sentence=sentence, clearance_m=0.0)
+    clear_m = _clearance_at(grid, goal.point)
+    path_m = distances.distance_to(goal.point)
+    closed = _say_closed(distances, goal, is_reachable=path_m is not None)
+    verdict, sentence = closed or _judge(grid, distances, goal, clear_m, path_m)
+    if verdict is GoalVerdict.UNREACHABLE:
+        sentence = _say_cut_off(grid, distances, goal, opened) or sentence
+    return GoalCheck(verdict=verdict, sentence=sentence, clearance_m=clear_m, path_m=path_m)
+
+
+def _judge(
+    grid: OccupancyGrid,
+    distances: DistanceField,
+    goal: Pose,
+    clear_m: float,
+    path_m: float | None,
+) -> tuple[GoalVerdict, str]:
+    cell, radius_m = grid.cell_at(goal.point), distances.radius_m
+    if not grid.contains(cell):
+        return GoalVerdict.OFF_MAP, f"{_say(goal)} lies off the map, {_bounds(grid)}."
+    if grid.unknown[cell.row, cell.col]:
+        return GoalVerdict.UNKNOWN, f"nobody has seen yet what is at {_say(goal)}."
+    if not grid.free[cell.row, cell.col]:
+        return GoalVerdict.OCCUPIED, f"{_say(goal)} lies in a wall or an obstacle."
+    if path_m is not None:
+        sentence = f"{_say(goal)} is {path_m:.1f} m away by path, {_say_clearance(clear_m)}."
+        return GoalVerdict.OK, sentence
+    if clear_m < radius_m:
+        sentence = (
+            f"{_say(goal)} is {_say_clearance(clear_m)}; the robot needs {radius_m:.2f} m "
+            "around its centre."
+        )
+        return GoalVerdict.TOO_TIGHT, sentence
+    sentence = f"no known way as wide as the robot, {2 * radius_m:.2f} m, leads to {_say(goal)}."
+    return GoalVerdict.UNREACHABLE, sentence
+
+
+def _say_cut_off(
+    grid: OccupancyGrid, distances: DistanceField, goal: Pose, opened: Opened | None
+) -> str:
+    """Says which closed areas cut a goal off; nothing where walls do."""
+    floor, radius_m = distances.lattice.grid, distances.radius_m
+    if not isinstance(floor, ClosedFloor):
+        return ""
+    start = distances.start
+    field = opened(start) if opened else distances_from(grid, start, radius_m=radius_m)
+    way = field.way_to(goal.point)
+    reach_m = radius_m + MARGIN_M + 2 * floor.resolution_m
+    areas = [] if way is None else floor.find_areas_along(way, within_m=reach_m)
+    if not areas:
+        return ""
+    titles = " and the ".join(area.title for area in areas)
+    return f"every known way to {_say(goal)} is closed; the shortest leads over the {titles}."
+
+
+def _say_closed(
+    distances: DistanceField, goal: Pose, *, is_reachable: bool
+) -> tuple[GoalVerdict, str] | None:
+    """Gives the verdict on a goal at which the robot would be over a closed area."""
+    floor = distances.lattice.grid
+    if not isinstance(floor, ClosedFloor):
+        return None
+    # Borders of areas and of cells differ: what is reachable decides between the two.
+    cell_m = floor.resolution_m
+    reach_m = distances.radius_m if is_reachable else distances.radius_m + MARGIN_M + 2 * cell_m
+    area = floor.find_area(goal.point, within_m=reach_m)
+    if area is not None:
+        off_m = area.distance_to(goal.point)
+        where = f"{off_m:.2f} m from" if off_m else "in"
+        return GoalVerdict.CLOSED, f"{_say(goal)} lies {where} the {area.title}."
+    around = None if is_reachable else floor.find_area(distances.start, within_m=0.0)
+    if around is None:
+        return None
+    ended = f", or end_event ends {around.event_id} where it is over" if around.event_id else ""
+    sentence = f"the robot itself stands in the {around.title}; a person has to lead it out{ended}."
+    return GoalVerdict.CLOSED, sentence
+
+
+def _find_nearest(grid: OccupancyGrid, distances: DistanceField, goal: Pose) -> Pose | None:
+    """Finds the reachable cell nearest to the goal by ways that pass through no wall.
+
+    What nobody has seen may be floor, so such ways may lead through it. A goal that is walled in,
+    such as the inside of a cupboard, gets the nearest cell as the crow flies.
+    """
+    straight: Pose | None = None
+    for reach_m in (SEARCH_M, math.inf):
+        window = _window(grid, goal.point, reach_m)
+        points = _reachable_points(window, distances)
+        if not points.size:
+            continue
+        ways_m = _ways_around_walls(window, goal.point, points)
+        best = int(np.argmin(ways_m))
+        if np.isfinite(ways_m[best]):
+            return Pose(float(points[best, 0]), float(points[best, 1]), goal.yaw_rad)
+        if straight is None and not _is_free(grid, goal.point):
+            off_m = np.hypot(points[:, 0] - goal.x, points[:, 1] - goal.y)
+            x, y = points[int(np.argmin(off_m))].tolist()
+            straight = Pose(x, y, goal.yaw_rad)
+    return straight
+
+
+def _is_free(grid: OccupancyGrid, point: Point) -> bool:
+    cell = grid.cell_at(point)
+    return grid.contains(cell) and bool(grid.free[cell.row, cell.col])
+
+
+def _reachable_points(window: OccupancyGrid, distances: DistanceField) -> FloatArray:
+    points = window.points_at(*np.nonzero(window.free))
+    rows, cols = distances.lattice.grid.cells_at(points)
+    return points[np.isfinite(distances.distances_at(rows, cols))]
+
+
+def _ways_around_walls(window: OccupancyGrid, goal: Point, points: FloatArray) -> FloatArray:
+    """Gives the lengths of ways from the goal over free and unseen floor."""
+    floor = OccupancyGrid(
+        cells=np.where(window.occupied & ~_wall_around(window, goal), 100, 0).astype(np.int8),
+        resolution_m=window.resolution_m,
+        origin=window.origin,
+    )
+    start = _into(window, goal)
+    rows, cols = window.cells_at(points)
+    around_m = distances_from(floor, start, radius_m=0.0).distances_at(rows, cols)
+    straight_m = np.hypot(points[:, 0] - goal.x, points[:, 1] - goal.y)
+    return np.maximum(around_m, straight_m)
+
+
+def _wall_around(window: OccupancyGrid, goal: Point) -> Mask:
+    """True around a goal in a wall, as far as to where the wall ends; nowhere for other goals."""
+    inside = window.fractional_cells_at(np.array([[goal.x, goal.y]]))[0]
+    rows, cols = np.indices(window.cells.shape)
+    away_m = np.hypot(rows + 0.5 - inside[0], cols + 0.5 - inside[1]) * window.resolution_m
+    cell = window.cell_at(_into(window, goal))
+    if not window.occupied[cell.row, cell.col] or window.occupied.all():
+        return np.zeros(window.cells.shape, dtype=np.bool_)
+    return np.asarray(away_m <= away_m[~window.occupied].min() + WALL_SIDES_M, dtype=np.bool_)
+
+
+def _into(grid: OccupancyGrid, point: Point) -> Point:
+    """Gives the point itself, or the centre of the nearest cell where it lies off the map."""
+    cell = grid.cell_at(point)
+    if grid.contains(cell):
+        return point
+    row, col = np.clip((cell.row, cell.col), 0, (grid.n_rows - 1, grid.n_cols - 1)).tolist()
+    return grid.point_at(Cell(row, col))
+
+
+def _clearance_at(grid: OccupancyGrid, point: Point) -> float:
+    cell = grid.cell_at(point)
+    if not grid.contains(cell) or not grid.free[cell.row, cell.col]:
+        return 0.0
+    # Most goals have something near, and a small window is looked at in no time.
+    near_m = _nearest_obstacle_m(grid, cell, NEAR_M)
+    return near_m if near_m <= NEAR_M else _nearest_obstacle_m(grid, cell, SEARCH_M)
+
+
+def _nearest_obstacle_m(grid: OccupancyGrid, cell: Cell, reach_m: float) -> float:
+    """Gives the metres to the nearest obstacle in the square within reach; infinite without one."""
+    reach = math.ceil(reach_m / grid.resolution_m)
+    top, left = max(cell.row - reach, 0), max(cell.col - reach, 0)
+    window = grid.crop(slice(top, cell.row + reach + 1), slice(left, cell.col + reach + 1))
+    rows, cols = np.nonzero(window.occupied)
+    off = np.hypot(rows - (cell.row - top), cols - (cell.col - left))
+    return float(off.min(initial=math.inf)) * grid.resolution_m
+
+
+def _window(grid: OccupancyGrid, centre: Point, reach_m: float) -> OccupancyGrid:
+    """Gives the part of a map around a point, or around the part of the map nearest to it."""
+    cell = grid.cell_at(_into(grid, centre))
+    n = max(grid.n_rows, grid.n_cols) if math.isinf(reach_m) else int(reach_m / grid.resolution_m)
+    top, left = max(cell.row - n, 0), max(cell.col - n, 0)
+    return grid.crop(slice(top, cell.row + n + 1), slice(left, cell.col + n + 1))
+
+
+def _say(goal: Pose) -> str:
+    return f"({goal.x:.2f}, {goal.y:.2f})"
+
+
+def _say_clearance(clear_m: float) -> str:
+    if math.isinf(clear_m):
+        return f"more than {SEARCH_M:.0f} m from any obstacle"
+    return f"{clear_m:.2f} m from the nearest obstacle"
+
+
+def _bounds(grid: OccupancyGrid) -> str:
+    low, high = grid.bounds()
+    return f"which spans x {low.x:.1f} to {high.x:.1f}, y {low.y:.1f} to {high.y:.1f}"

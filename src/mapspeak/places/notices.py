@@ -1,0 +1,297 @@
+"""Events of the semantic map where ways are planned: what they close, and what they make slow."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from datetime import datetime
+
+import numpy as np
+
+from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import Point
+from mapspeak.places.places import Place, Spot, find_place
+from mapspeak.semantic import LEFT_OUT, Concern, SemanticMapStore
+from mapspeak.semantic.events import (
+    Effect,
+    Event,
+    current_events,
+    find_place_ids,
+    gives_orders,
+)
+from mapspeak.spatial.rooms import Door, Region, RoomMap
+from mapspeak.worldmodel.closures import ClosedArea, Outline
+from mapspeak.worldmodel.footprints import (
+    outline_around,
+    outline_of_door,
+    outlines_of_region,
+)
+from mapspeak.worldmodel.hindrances import Hindrance
+from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.revision import MapRevision
+
+__all__ = [
+    "close_floor_of",
+    "end_event",
+    "find_hindrances",
+    "note_event",
+    "say_consequences",
+    "say_events",
+    "say_unplaced",
+]
+
+SPOT_RADIUS_M = 0.5
+"""An event at a point takes this much floor around it."""
+REST_RATIO = 0.1
+"""A room is cut off when no more of what was reached of it is left: a few cells at its door."""
+AVOID_FACTOR, AVOID_EXTRA_M = 10.0, 20.0
+SLOW_FACTOR, SLOW_EXTRA_M = 2.0, 5.0
+"""What a way counts that leads through: so many times its length there, at least so much more."""
+
+
+def note_event(
+    atlas: Atlas,
+    store: SemanticMapStore,
+    *,
+    text: str,
+    effect: Effect,
+    now: datetime,
+    place: str | None = None,
+    begins: datetime | None = None,
+    until: datetime | None = None,
+    source: str = "",
+) -> Event:
+    """Remembers an event, with the outline that its place has now; gives it as it was written.
+
+    Args:
+        atlas: The map as it is now.
+        store: Where to write.
+        text: What is the matter.
+        effect: What it means for ways.
+        now: The operator's time.
+        place: An id, a name, coordinates, or words as for a goal; a mere note needs none.
+        begins: The first moment; None for now.
+        until: The first moment after; None where nobody knows.
+        source: Who said it.
+
+    Raises:
+        GoalError: There is no such place.
+        SemanticMapError: It is over, its words give orders, it closes the floor below the robot, or
+            it cannot be written.
+    """
+    if until is not None and until <= now:
+        raise SemanticMapError(
+            f"The event '{text}' was over at {until.isoformat(timespec='minutes')}.",
+            hint="Give a time that is still to come, with its zone.",
+        )
+    _require_no_orders(event=text, place=place or "", source=source)
+    found = None if place is None else find_place(atlas, place)
+    event = Event(
+        text=text,
+        place="" if found is None else _name_of(found, place or "", effect),
+        effect=effect,
+        at=None if found is None else found.point,
+        outlines=() if found is None or effect is Effect.NONE else _outlines_of(atlas.rooms, found),
+        begins=begins,
+        until=until,
+        source=source,
+        recorded_at=now,
+    )
+    _require_robot_outside(atlas, event, now)
+    return store.write_event(event)
+
+
+def _require_no_orders(**said: str) -> None:
+    for what, words in said.items():
+        if gives_orders(words):
+            raise SemanticMapError(
+                f"The {what} '{words[:80]}' gives orders: {LEFT_OUT[Concern.ORDERS]}",
+                hint="Say what is the matter, such as 'C1 is closed'; effect says what it means "
+                "for ways.",
+            )
+
+
+def say_consequences(atlas: Atlas, event: Event, now: datetime) -> tuple[str, ...]:
+    """Gives what an event that closes floor means for the robot, where it stands now.
+
+    Args:
+        atlas: The map before the event.
+        event: As it was written.
+        now: The operator's time.
+    """
+    if event.effect is not Effect.CLOSED:
+        return ()
+    area = _area_of(event, atlas.map, now)
+    if area is None:
+        return ()
+    if area.contains(atlas.robot.point):
+        return ("The robot stands inside: it has to drive out before that begins.",)
+    cut_off = _find_cut_off(atlas, area)
+    if not cut_off:
+        return ()
+    return (f"While it lasts the robot cannot get to {', '.join(cut_off)} from where it is.",)
+
+
+def _require_robot_outside(atlas: Atlas, event: Event, now: datetime) -> None:
+    """Refuses what would close the floor below the robot: it could drive nowhere any more."""
+    if event.effect is not Effect.CLOSED or not event.is_current(now):
+        return
+    area = _area_of(event, atlas.map, now)
+    if area is not None and area.contains(atlas.robot.point):
+        raise SemanticMapError(
+            f"The robot itself stands in {event.place or 'what is to be closed'}; closed, it could "
+            "not drive out. Nothing was noted.",
+            hint="Drive out first, then note it again; or note it with the effect avoid.",
+        )
+
+
+def _find_cut_off(atlas: Atlas, area: ClosedArea) -> list[str]:
+    """Gives the rooms beside a closed area that the robot gets to only while it is open."""
+    before = atlas.distances.build_reachable_mask()
+    closed = atlas.map.with_areas((*atlas.map.areas, area), atlas.map.hindrances)
+    after = closed.distances_from(atlas.robot.point).build_reachable_mask()
+    labels = atlas.rooms.labels
+    return [
+        region.id
+        for region in atlas.rooms.regions
+        if not area.contains(region.widest)
+        and np.count_nonzero(after & (labels == region.index))
+        < REST_RATIO * np.count_nonzero(before & (labels == region.index))
+    ]
+
+
+def end_event(store: SemanticMapStore, event_id: str, *, now: datetime) -> Event:
+    """Ends an event at once; its record stays, as something that was.
+
+    Raises:
+        SemanticMapError: There is none of that id, it is over already, or it cannot be written.
+    """
+    events = {event.id.upper(): event for event in store.read_events()}
+    event = events.get(event_id.strip().upper())
+    if event is None:
+        known = ", ".join(each.id for each in current_events(events.values(), now)) or "none"
+        raise SemanticMapError(
+            f"There is no event '{event_id}'.", hint=f"Events that last now: {known}."
+        )
+    if event.until is not None and event.until <= now:
+        raise SemanticMapError(
+            f"{event.id} had already ended, at {event.until.isoformat(timespec='minutes')}.",
+            hint="Nothing was changed.",
+        )
+    begins = None if event.begins is not None and event.begins >= now else event.begins
+    return store.write_event(replace(event, begins=begins, until=now))
+
+
+def say_events(events: Iterable[Event], now: datetime) -> tuple[str, ...]:
+    """Gives the events that last, and those still to come, one sentence each."""
+    lasting = [each for each in events if each.until is None or now < each.until]
+    return tuple(event.sentence(now) for event in lasting)
+
+
+def say_unplaced(events: Iterable[Event], revision: MapRevision, now: datetime) -> tuple[str, ...]:
+    """Gives the events that should change ways, but name no place on this map."""
+    return tuple(
+        f"The event {event.id} names no place on this map, so it changes no way: {event.told_text}."
+        for event in current_events(events, now)
+        if event.effect is not Effect.NONE and not _find_outlines(event, revision)
+    )
+
+
+def close_floor_of(
+    events: Iterable[Event], revision: MapRevision, now: datetime
+) -> Iterator[ClosedArea]:
+    """Gives what events close at a moment; none opens what something else closes."""
+    for event in current_events(events, now):
+        if event.effect is Effect.CLOSED:
+            area = _area_of(event, revision, now)
+            if area is not None:
+                yield area
+
+
+def find_hindrances(
+    events: Iterable[Event], revision: MapRevision, now: datetime
+) -> Iterator[Hindrance]:
+    """Gives where events make ways slow, or better avoided, at a moment."""
+    for event in current_events(events, now):
+        if event.effect in (Effect.SLOW, Effect.AVOID):
+            area = _area_of(event, revision, now)
+            if area is not None:
+                is_slow = event.effect is Effect.SLOW
+                yield Hindrance(
+                    area=area,
+                    extra_m=SLOW_EXTRA_M if is_slow else AVOID_EXTRA_M,
+                    factor=SLOW_FACTOR if is_slow else AVOID_FACTOR,
+                )
+
+
+def _area_of(event: Event, revision: MapRevision, now: datetime) -> ClosedArea | None:
+    outlines = _find_outlines(event, revision)
+    if not outlines:
+        return None
+    until = ""
+    if event.until is not None:
+        local = event.until.astimezone(now.tzinfo)
+        until = f"{local:%H:%M}" if local.date() == now.date() else f"{local:%Y-%m-%d %H:%M}"
+    return ClosedArea(
+        name=_title_of(event),
+        outline=outlines[0],
+        further_outlines=outlines[1:],
+        until=until,
+        reason="" if gives_orders(event.text) else event.text,
+        event_id=event.id,
+    )
+
+
+def _title_of(event: Event) -> str:
+    """Gives how the area is called: by the event's words only where these give no orders."""
+    words = (event.place, *find_place_ids(event.place), event.text)
+    return next((each for each in words if each and not gives_orders(each)), event.id)
+
+
+def _find_outlines(event: Event, revision: MapRevision) -> tuple[Outline, ...]:
+    """Gives the outlines that were written, else those of the ids that its place names."""
+    if event.outlines:
+        return event.outlines
+    found: list[Outline] = []
+    for place_id in find_place_ids(event.place):
+        # Rooms are found only where somebody has written an event without an outline.
+        rooms = revision.rooms
+        region = rooms.find_region(place_id)
+        door = next((each for each in rooms.doors if each.id == place_id), None)
+        if region is not None:
+            found += outlines_of_region(rooms, region)
+        elif door is not None:
+            found.append(outline_of_door(rooms, door))
+    if not found and event.at is not None:
+        found.append(outline_around(event.at, radius_m=SPOT_RADIUS_M))
+    return tuple(found)
+
+
+def _outlines_of(rooms: RoomMap, place: Place) -> tuple[Outline, ...]:
+    match place.thing:
+        case Region() as region:
+            return outlines_of_region(rooms, region)
+        case Door() as door:
+            return (outline_of_door(rooms, door),)
+        case _:
+            return (outline_around(place.point, radius_m=SPOT_RADIUS_M),)
+
+
+def _name_of(place: Place, words: str, effect: Effect) -> str:
+    """Gives the id with the words that were used for it, where these are others.
+
+    What has no extent of its own tells how much floor is taken around it.
+    """
+    said = words.strip()
+    if isinstance(place.thing, Spot) and not place.reason:
+        said = name = _say_point(place.point)
+    else:
+        name = place.name
+    named = said if name.casefold() in said.casefold() else f"{said} ({name})"
+    if effect is Effect.NONE or isinstance(place.thing, (Region, Door)):
+        return named
+    at = "" if name == named == _say_point(place.point) else f" at {_say_point(place.point)}"
+    return f"{SPOT_RADIUS_M} m around {named}{at}"
+
+
+def _say_point(point: Point) -> str:
+    """Gives a point as it is written for a goal."""
+    return f"{point.x:.2f}, {point.y:.2f}"

@@ -1,0 +1,78 @@
+"""What is remembered nearest to a thing: by where things are, not where they were seen from."""
+
+import re
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from mapspeak.places.naming import no_such_place
+from mapspeak.places.recall.filters import last_seen
+from mapspeak.places.thingnames import split_room
+from mapspeak.worldmodel.model import Atlas, RememberedThing
+
+__all__ = ["Nearby", "find_nearby"]
+
+THING_ID = re.compile(r"[Tt]\d+")
+NEVER = datetime.min.replace(tzinfo=UTC)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Nearby:
+    """A thing and what is near to it.
+
+    Attributes:
+        thing: The thing; of several of one name the one that was seen last.
+        others: The others of that name, those seen last first.
+        nearest: All other things whose position is known, each with its metres from there, the
+            nearest first.
+    """
+
+    thing: RememberedThing
+    others: tuple[RememberedThing, ...]
+    nearest: tuple[tuple[RememberedThing, float], ...]
+
+
+def find_nearby(
+    atlas: Atlas, words: str, *, radius_m: float | None = None, room_id: str | None = None
+) -> Nearby | None:
+    """Finds the thing that is called so, and what is near to it; None where nothing is.
+
+    Args:
+        atlas: The map with the memory.
+        words: "T3", "potted plant", or "potted plant in R3".
+        radius_m: Only what is so near.
+        room_id: Only what is in that room.
+
+    Raises:
+        GoalError: The words are the id of no thing.
+    """
+    called = _find_called(atlas, words.strip())
+    if not called:
+        return None
+    first, *others = called
+    away = [
+        (each, each.thing.position.distance_to(first.point))
+        for each in atlas.things
+        if each.id != first.id and each.thing.position is not None
+    ]
+    nearest = [
+        (each, away_m)
+        for each, away_m in sorted(away, key=lambda pair: pair[1])
+        if (radius_m is None or away_m <= radius_m)
+        and (room_id is None or room_id in atlas.rooms_before(each))
+    ]
+    return Nearby(thing=first, others=tuple(others), nearest=tuple(nearest))
+
+
+def _find_called(atlas: Atlas, words: str) -> list[RememberedThing]:
+    if THING_ID.fullmatch(words):
+        found = atlas.recollection.find_thing(words.upper())
+        if found is None:
+            raise no_such_place(atlas, words)
+        return [found]
+    label, room_id = split_room(atlas, words)
+    called = [
+        each
+        for each in atlas.recollection.find_called(label)
+        if room_id is None or room_id in atlas.rooms_before(each)
+    ]
+    return sorted(called, key=lambda each: last_seen(atlas, each) or NEVER, reverse=True)

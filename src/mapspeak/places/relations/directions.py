@@ -1,0 +1,268 @@
+"""Left, right, in front, behind, north: places in some direction from a thing."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mapspeak.errors import GoalError
+from mapspeak.geometry import Point
+from mapspeak.places.relations.footing import Footing, find_footing
+from mapspeak.places.relations.phrases import Towards
+from mapspeak.places.relations.referent import Referent, find_near_side, find_normal
+from mapspeak.places.relations.stand import Stand, refuse, tolerance_m
+from mapspeak.places.relations.words import Compass, Side, say_heading
+from mapspeak.spatial.rooms import Door, Region
+from mapspeak.worldmodel.model import Atlas
+
+__all__ = ["front_of_region", "stand_towards"]
+
+SECTOR_RAD = math.radians(40)
+"""A place still lies in a direction so far off it."""
+AWAY_M = 1.0
+FARTHEST_M = 2.5
+"""A place that is said to be on a side of a thing is at most so far from it."""
+BESIDE_DOOR_M = 0.6
+BEYOND_RAD = math.radians(60)
+"""So far off the way through a door is still through it, and not along its wall."""
+HERE_M = 0.3
+"""From so near nobody sees a thing from one side."""
+TURNS = {Side.FRONT: 0.0, Side.LEFT: math.pi / 2, Side.BEHIND: math.pi, Side.RIGHT: -math.pi / 2}
+"""From a thing's own front to its sides; who looks at it has left and right the other way."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Aim:
+    """Where to look for a place.
+
+    Attributes:
+        heading_rad: The direction from the thing.
+        away_m: How far from its edge it should be.
+        is_asked: True where somebody said how far.
+        home: The region it has to lie in; None for any.
+        sees: What nothing may stand before; None where that does not matter.
+        how: What to say of the point of view.
+    """
+
+    heading_rad: float
+    away_m: float
+    is_asked: bool
+    home: Region | None = None
+    sees: Point | None = None
+    how: str = ""
+
+
+def stand_towards(
+    atlas: Atlas, thing: Referent, wanted: Towards, seen_from: Referent | None
+) -> Stand:
+    """Finds where to stand in some direction from a thing.
+
+    Raises:
+        GoalError: Nothing fits, or the direction has no meaning there; the hint says what would do.
+    """
+    if wanted.direction is Side.FRONT and thing.region is not None and seen_from is None:
+        thing = front_of_region(atlas, thing.region)
+    aim = _aim_at(atlas, thing, wanted, seen_from)
+    found = _search(atlas, thing, aim)
+    if found is None:
+        far = "" if wanted.away_m is None else f" {wanted.away_m:g} m"
+        raise refuse(
+            f"The robot can stand nowhere{far} {_say(wanted)} {thing.name}{aim.how}.",
+            list(_what_works(atlas, thing, wanted, seen_from)),
+        )
+    point, away_m = found
+    edge = "" if thing.is_point else ", measured from its edge"
+    return Stand(
+        point=point,
+        yaw_rad=point.bearing_to(thing.anchor),
+        reason=f"{away_m:.1f} m {_say(wanted)} {thing.name}{aim.how}{edge}, facing it",
+    )
+
+
+def front_of_region(atlas: Atlas, region: Region) -> Referent:
+    """Gives the door of a region that the robot comes to first, as seen from outside.
+
+    Raises:
+        GoalError: No door of it can be reached.
+    """
+    crossings = ((atlas.find_crossing(door), door) for door in atlas.rooms.doors_of(region))
+    reached = [
+        (atlas.path_m(crossing) or 0.0, door.id, door) for crossing, door in crossings if crossing
+    ]
+    if not reached:
+        raise refuse(
+            f"{region.id} has no door that the robot can get to, so it has no front.",
+            [f"north of {region.id}", f"next to {region.id}"],
+        )
+    door = min(reached, key=lambda each: each[:2])[2]
+    other_id = next(each for each in door.region_ids if each != region.id)
+    return Referent(
+        name=f"{region.id} (its door {door.id})",
+        anchor=door.place,
+        extent=_extent_of(door, find_normal(atlas, door, atlas.rooms.region(other_id))),
+        home=atlas.rooms.region(other_id),
+        door=door,
+    )
+
+
+def _extent_of(door: Door, normal_rad: float) -> np.ndarray:
+    along = np.array([-math.sin(normal_rad), math.cos(normal_rad)]) * door.width_m / 2
+    return np.array([door.place.x, door.place.y]) + np.linspace(-1, 1, 9)[:, None] * along
+
+
+def _say(wanted: Towards) -> str:
+    return f"{wanted.direction} of" if isinstance(wanted.direction, Compass) else wanted.direction
+
+
+def _aim_at(atlas: Atlas, thing: Referent, wanted: Towards, seen_from: Referent | None) -> Aim:
+    away_m = AWAY_M if wanted.away_m is None else wanted.away_m
+    aim = Aim(heading_rad=0.0, away_m=away_m, is_asked=wanted.away_m is not None)
+    match wanted.direction:
+        case Compass() as compass if thing.door is not None:
+            return _aim_past_door(atlas, thing, thing.door, compass, aim)
+        case Compass() as compass:
+            sees = thing.anchor if thing.is_point else None
+            home = thing.home if thing.is_point else None
+            return replace(aim, heading_rad=compass.heading_rad, home=home, sees=sees)
+        case side if thing.door is not None:
+            return _aim_at_door(atlas, thing, thing.door, side, aim, seen_from)
+        case side:
+            return _aim_at_thing(atlas, thing, side, aim, seen_from)
+
+
+def _aim_at_thing(
+    atlas: Atlas, thing: Referent, side: Side, aim: Aim, seen_from: Referent | None
+) -> Aim:
+    sees = thing.anchor if thing.is_point else None
+    if seen_from is None and thing.front_rad is not None:
+        heading_rad = thing.front_rad + TURNS[side]
+        how = " by its own heading"
+        return replace(aim, heading_rad=heading_rad, home=thing.home, sees=sees, how=how)
+    viewer = atlas.robot.point if seen_from is None else seen_from.anchor
+    who = "the robot" if seen_from is None else seen_from.name
+    if thing.region is not None and atlas.rooms.find_region_at(viewer) is thing.region:
+        raise refuse(
+            f"{side.capitalize()} {thing.name} means nothing from inside it, where {who} is.",
+            [f"north of {thing.name}", f"the north wall of {thing.name}", f"next to {thing.name}"],
+        )
+    if viewer.distance_to(thing.anchor) < HERE_M:
+        if seen_from is not None:
+            raise refuse(f"{who} is too near to {thing.name} to see it from a side.")
+        heading_rad = atlas.robot.yaw_rad + TURNS[side]
+        how = " by the heading of the robot, which is there"
+        return replace(aim, heading_rad=heading_rad, home=thing.home, sees=sees, how=how)
+    look_rad = viewer.bearing_to(thing.anchor)
+    turn_rad = math.pi - TURNS[side] if side in (Side.FRONT, Side.BEHIND) else TURNS[side]
+    how = f" as seen from {who}, looking {say_heading(look_rad)}"
+    return replace(aim, heading_rad=look_rad + turn_rad, home=thing.home, sees=sees, how=how)
+
+
+def _aim_at_door(
+    atlas: Atlas, thing: Referent, door: Door, side: Side, aim: Aim, seen_from: Referent | None
+) -> Aim:
+    near, who = thing.home or find_near_side(atlas, door), "the robot"
+    if seen_from is not None:
+        near, who = _side_seen_from(atlas, door, seen_from), seen_from.name
+    normal_rad = find_normal(atlas, door, near)
+    far_id = next(each for each in door.region_ids if each != near.id)
+    home = atlas.rooms.region(far_id) if side is Side.BEHIND else near
+    turn_rad = TURNS[side] if side in (Side.FRONT, Side.BEHIND) else -TURNS[side]
+    is_beside = side in (Side.LEFT, Side.RIGHT)
+    before_rad = normal_rad + (math.pi if side is Side.BEHIND else 0.0)
+    step_m = atlas.radius_m
+    return replace(
+        aim,
+        heading_rad=normal_rad + turn_rad,
+        away_m=BESIDE_DOOR_M if is_beside and not aim.is_asked else aim.away_m,
+        home=home,
+        sees=Point(
+            door.place.x + step_m * math.cos(before_rad),
+            door.place.y + step_m * math.sin(before_rad),
+        ),
+        how=f" as seen from {who} in {near.id}" if side is not Side.FRONT else f" in {home.id}",
+    )
+
+
+def _aim_past_door(atlas: Atlas, thing: Referent, door: Door, compass: Compass, aim: Aim) -> Aim:
+    """Aims into the region that lies that way; along the wall, on the robot's side of it."""
+    near = thing.home or find_near_side(atlas, door)
+    far_id = next(each for each in door.region_ids if each != near.id)
+    home = near
+    if math.cos(find_normal(atlas, door, near) - compass.heading_rad) < -math.cos(BEYOND_RAD):
+        home = atlas.rooms.region(far_id)
+    before_rad = find_normal(atlas, door, home)
+    sees = Point(
+        door.place.x + atlas.radius_m * math.cos(before_rad),
+        door.place.y + atlas.radius_m * math.sin(before_rad),
+    )
+    return replace(aim, heading_rad=compass.heading_rad, home=home, sees=sees, how=f" in {home.id}")
+
+
+def _side_seen_from(atlas: Atlas, door: Door, viewer: Referent) -> Region:
+    """Gives the region of a door on whose side a viewer is."""
+    sides = [atlas.rooms.region(region_id) for region_id in door.region_ids]
+    standing = viewer.region or viewer.home
+    for side in sides:
+        if standing is not None and side.id == standing.id:
+            return side
+
+    def ahead(side: Region) -> float:
+        return math.cos(find_normal(atlas, door, side) - door.place.bearing_to(viewer.anchor))
+
+    return max(sides, key=ahead)
+
+
+def _search(atlas: Atlas, thing: Referent, aim: Aim) -> tuple[Point, float] | None:
+    """Finds the place nearest to what is aimed at, and how far from the thing it is."""
+    along = np.array([math.cos(aim.heading_rad), math.sin(aim.heading_rad)])
+    offsets = thing.extent - np.array([thing.anchor.x, thing.anchor.y])
+    edge_m = float((offsets @ along).max())
+    sideways = offsets @ np.array([-along[1], along[0]])
+    reach_m = edge_m + float(np.abs(sideways).max()) + max(aim.away_m, FARTHEST_M) + 1.0
+    footing = find_footing(atlas, thing.anchor, reach_m)
+    forward_m = footing.along_m(thing.anchor, aim.heading_rad) - edge_m
+    lateral_m = footing.along_m(thing.anchor, aim.heading_rad + math.pi / 2)
+    outside_m = np.maximum(
+        np.maximum(float(sideways.min()) - lateral_m, lateral_m - float(sideways.max())), 0.0
+    )
+    away_m = np.hypot(forward_m, outside_m)
+    allowed = (forward_m > 0) & (outside_m <= math.tan(SECTOR_RAD) * forward_m)
+    allowed &= _is_far_enough(atlas, away_m, aim) & _is_at_home(footing, thing, aim)
+    costs = np.hypot(forward_m - aim.away_m, outside_m) + 0.1 * np.abs(lateral_m)
+    point = footing.choose(atlas, allowed, costs, in_sight_of=aim.sees)
+    if point is None:
+        return None
+    return point, float(away_m[int(np.argmin(footing.away_m(point)))])
+
+
+def _is_far_enough(atlas: Atlas, away_m: np.ndarray, aim: Aim) -> np.ndarray:
+    if aim.is_asked:
+        allowed = np.abs(away_m - aim.away_m) <= tolerance_m(atlas.grid.resolution_m)
+        return np.asarray(allowed)
+    return np.asarray((away_m >= 0.4 * aim.away_m) & (away_m <= FARTHEST_M))
+
+
+def _is_at_home(footing: Footing, thing: Referent, aim: Aim) -> np.ndarray:
+    if aim.home is not None:
+        return np.asarray(footing.regions == aim.home.index)
+    if thing.region is not None:
+        return np.asarray(footing.regions != thing.region.index)
+    return np.ones(len(footing.points), dtype=np.bool_)
+
+
+def _what_works(
+    atlas: Atlas, thing: Referent, wanted: Towards, seen_from: Referent | None
+) -> Iterator[str]:
+    """Gives the phrases of the same kind in which the robot could stand."""
+    around: tuple[Side | Compass, ...] = tuple(Side)
+    if isinstance(wanted.direction, Compass):
+        around = (Compass.NORTH, Compass.EAST, Compass.SOUTH, Compass.WEST)
+    for direction in (wanted.direction, *(each for each in around if each != wanted.direction)):
+        other = replace(wanted, direction=direction, away_m=None)
+        try:
+            found = _search(atlas, thing, _aim_at(atlas, thing, other, seen_from))
+        except GoalError:
+            continue
+        if found is not None:
+            yield f"{found[1]:.1f} m {_say(other)} {thing.name}"

@@ -1,0 +1,121 @@
+"""Where a robot can stand near a place, and which of these places suits best."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapspeak.geometry import Point
+from mapspeak.places.standing import COMFORT_M
+from mapspeak.spatial.grid import FloatArray, IntArray, Mask
+from mapspeak.worldmodel.model import Atlas
+
+__all__ = ["Footing", "find_footing", "is_in_sight"]
+
+IN_DOOR_M = 0.5
+AT_ONCE = 512
+"""So many lines of sight are looked along together."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Footing:
+    """The cells of a part of the map that the robot can get to; arrays of one length.
+
+    Attributes:
+        points: Their centres in metres, shape (n, 2).
+        paths_m: How far the robot has to drive to each.
+        clear_m: From each to the nearest obstacle.
+        regions: The index of the region each lies in; 0 in none.
+        in_doors: True in the middle of a door, where a robot is in the way.
+    """
+
+    points: FloatArray
+    paths_m: FloatArray
+    clear_m: FloatArray
+    regions: IntArray
+    in_doors: Mask
+
+    def away_m(self, point: Point) -> FloatArray:
+        """Gives how far each cell is from a point, as the crow flies."""
+        return np.asarray(np.hypot(self.points[:, 0] - point.x, self.points[:, 1] - point.y))
+
+    def along_m(self, origin: Point, heading_rad: float) -> FloatArray:
+        """Gives how far each cell is from a point in a direction; negative behind it."""
+        dx, dy = self.points[:, 0] - origin.x, self.points[:, 1] - origin.y
+        return np.asarray(dx * math.cos(heading_rad) + dy * math.sin(heading_rad))
+
+    def choose(
+        self, atlas: Atlas, allowed: Mask, costs: FloatArray, *, in_sight_of: Point | None = None
+    ) -> Point | None:
+        """Gives the allowed cell of the least cost; None where there is none.
+
+        Roomy ones aside from doors go first, then tight ones, then those in doors.
+
+        Args:
+            atlas: The map.
+            allowed: True for the cells that would do.
+            costs: Of each cell; the first of equal ones wins.
+            in_sight_of: What nothing may stand before.
+        """
+        is_roomy = self.clear_m >= atlas.radius_m + COMFORT_M
+        aside = allowed & ~self.in_doors
+        for candidates in map(np.flatnonzero, (aside & is_roomy, aside, allowed)):
+            ordered = candidates[np.argsort(costs[candidates], kind="stable")]
+            for start in range(0, ordered.size, AT_ONCE):
+                some = ordered[start : start + AT_ONCE]
+                if in_sight_of is not None:
+                    some = some[is_in_sight(atlas, self.points[some], in_sight_of)]
+                if some.size:
+                    x, y = self.points[some[0]].tolist()
+                    return Point(x, y)
+        return None
+
+
+def find_footing(atlas: Atlas, centre: Point, reach_m: float) -> Footing:
+    """Finds the reachable cells at most so far from a place to each side."""
+    grid = atlas.grid
+    cell, reach = grid.cell_at(centre), math.ceil(reach_m / grid.resolution_m)
+    rows = slice(max(cell.row - reach, 0), max(cell.row + reach + 1, 0))
+    cols = slice(max(cell.col - reach, 0), max(cell.col + reach + 1, 0))
+    at_rows, at_cols = np.nonzero(grid.free[rows, cols])
+    at_rows, at_cols = at_rows + rows.start, at_cols + cols.start
+    paths_m = atlas.distances.distances_at(at_rows, at_cols)
+    is_reached = np.isfinite(paths_m)
+    at_rows, at_cols = at_rows[is_reached], at_cols[is_reached]
+    points = grid.points_at(at_rows, at_cols)
+    return Footing(
+        points=points,
+        paths_m=paths_m[is_reached],
+        clear_m=atlas.map.clearance_m[at_rows, at_cols].astype(np.float64),
+        regions=atlas.rooms.labels[at_rows, at_cols].astype(np.intp),
+        in_doors=_find_in_doors(atlas, points, centre, reach_m),
+    )
+
+
+def _find_in_doors(atlas: Atlas, points: FloatArray, centre: Point, reach_m: float) -> Mask:
+    found = np.zeros(len(points), dtype=np.bool_)
+    for door in atlas.rooms.doors:
+        if door.place.distance_to(centre) <= 2 * reach_m:
+            away_m = np.hypot(points[:, 0] - door.place.x, points[:, 1] - door.place.y)
+            found |= away_m <= min(door.width_m / 2, IN_DOOR_M)
+    return found
+
+
+def is_in_sight(atlas: Atlas, points: FloatArray, thing: Point) -> Mask:
+    """True for the points from which nothing stands before a thing.
+
+    The thing itself may be an obstacle: once a line has met what it ends in, no floor follows.
+    """
+    grid = atlas.grid
+    if not len(points):
+        return np.zeros(0, dtype=np.bool_)
+    lines = np.array([thing.x, thing.y]) - points
+    longest_m = float(np.hypot(lines[:, 0], lines[:, 1]).max())
+    shares = np.linspace(0.0, 1.0, math.ceil(longest_m / grid.resolution_m * 2) + 2)
+    steps = points[:, None, :] + shares[None, :, None] * lines[:, None, :]
+    rows, cols = grid.cells_at(steps.reshape(-1, 2))
+    inside = grid.contains_cells(rows, cols)
+    is_floor = inside & grid.free[np.where(inside, rows, 0), np.where(inside, cols, 0)]
+    is_floor = is_floor.reshape(len(points), shares.size)
+    is_blocked = np.logical_or.accumulate(~is_floor, axis=1)
+    return np.asarray(~(is_blocked & is_floor).any(axis=1), dtype=np.bool_)

@@ -1,0 +1,210 @@
+"""What a relation relates to: a point, a door, a wall or a whole room, with its front."""
+
+import math
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+
+from mapspeak.geometry import Point
+from mapspeak.places.goalcheck import FARTHEST_M
+from mapspeak.places.naming import Place, Spot
+from mapspeak.places.relations.outlines import find_outline
+from mapspeak.places.relations.stand import refuse
+from mapspeak.spatial.frontiers import Frontier
+from mapspeak.spatial.grid import FloatArray
+from mapspeak.spatial.rooms import Door, Region
+from mapspeak.worldmodel.model import Atlas, RememberedPlace, RememberedThing
+
+__all__ = ["Referent", "find_near_side", "find_normal", "refer_to", "refer_to_point"]
+
+AROUND_DOOR_M = 0.6
+"""So much floor on both sides of a door says which way it leads."""
+AROUND_THING_M = 1.5
+BOTH_SIDES_M = 0.2
+"""What is nearly as far from the floor of two regions belongs to neither."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Referent:
+    """A thing as relations see it; compared by identity.
+
+    Attributes:
+        name: How the answer calls it.
+        anchor: Its middle.
+        extent: Points over all of it, in metres, shape (n, 2).
+        home: The region to stand in beside it; None where any will do.
+        region: What it is, if a region.
+        door: What it is, if a door.
+        front_rad: Where its own front looks; None where it has none.
+        is_robot: True of the robot itself.
+    """
+
+    name: str
+    anchor: Point
+    extent: FloatArray = field(repr=False)
+    home: Region | None = None
+    region: Region | None = None
+    door: Door | None = None
+    front_rad: float | None = None
+    is_robot: bool = False
+
+    @property
+    def is_point(self) -> bool:
+        """True of what has no extent."""
+        return len(self.extent) == 1
+
+
+def refer_to(atlas: Atlas, place: Place) -> Referent:
+    """Gives a place as something to relate to.
+
+    Raises:
+        GoalError: It lies farther away than any map reaches.
+    """
+    match place.thing:
+        case Spot(point=point) if max(abs(point.x), abs(point.y)) > FARTHEST_M:
+            raise refuse(f"{place.name} lies farther away than any map reaches.")
+        case Region() as region:
+            return _refer_to_region(atlas, region)
+        case Door() as door:
+            return _refer_to_door(atlas, door)
+        case RememberedPlace(id=place_id, waypoint=waypoint):
+            name = place.name if place.name == place_id else f"{place_id} ({place.name})"
+            return refer_to_point(atlas, name, waypoint.pose.point, front_rad=waypoint.pose.yaw_rad)
+        case RememberedThing(id=thing_id, thing=thing) as remembered:
+            rooms = [atlas.rooms.region(each) for each in atlas.rooms_before(remembered)]
+            home = rooms[0] if len(rooms) == 1 else None
+            name = f"{thing.label} ({thing_id}, seen from {_say_seen_from(atlas, remembered)})"
+            return refer_to_point(atlas, name, remembered.point, home=home)
+        case Frontier(pose=pose):
+            return refer_to_point(atlas, place.name, pose.point)
+        case Spot(point=point, yaw_rad=yaw_rad):
+            is_robot = place.name == "robot"
+            name = "the robot" if is_robot else place.name
+            return refer_to_point(atlas, name, point, front_rad=yaw_rad, is_robot=is_robot)
+
+
+def _say_seen_from(atlas: Atlas, remembered: RememberedThing) -> str:
+    places = map(atlas.recollection.find_place, remembered.thing.waypoints)
+    return " and ".join(dict.fromkeys(place.id for place in places if place is not None))
+
+
+def refer_to_point(
+    atlas: Atlas,
+    name: str,
+    point: Point,
+    *,
+    front_rad: float | None = None,
+    home: Region | None = None,
+    is_robot: bool = False,
+) -> Referent:
+    """Gives a point as something to relate to."""
+    return Referent(
+        name=name,
+        anchor=point,
+        extent=np.array([[point.x, point.y]]),
+        home=home or atlas.rooms.find_region_at(point) or _find_region_around(atlas, point),
+        front_rad=front_rad,
+        is_robot=is_robot,
+    )
+
+
+def _find_region_around(atlas: Atlas, point: Point) -> Region | None:
+    """Finds the region that a thing stands in; None for what is in a wall between two."""
+    reach = math.ceil(AROUND_THING_M / atlas.grid.resolution_m)
+    cell = atlas.grid.cell_at(point)
+    top, left = max(cell.row - reach, 0), max(cell.col - reach, 0)
+    labels = atlas.rooms.labels[
+        top : max(cell.row + reach + 1, 0), left : max(cell.col + reach + 1, 0)
+    ]
+    rows, cols = np.nonzero(labels)
+    if not rows.size:
+        return None
+    points = atlas.grid.points_at(rows + top, cols + left)
+    away_m = np.hypot(points[:, 0] - point.x, points[:, 1] - point.y)
+    near = away_m <= away_m.min() + BOTH_SIDES_M
+    indices = np.unique(labels[rows, cols][near])
+    return next((each for each in atlas.rooms.regions if [each.index] == indices.tolist()), None)
+
+
+def find_normal(atlas: Atlas, door: Door, side: Region) -> float:
+    """Gives the direction in which a door leads into one of its two regions, as a yaw.
+
+    It is at right angles to the line through its two posts where the floor near it shows no other.
+    """
+    reach_m = door.width_m / 2 + AROUND_DOOR_M
+    reach = math.ceil(reach_m / atlas.grid.resolution_m)
+    cell = atlas.grid.cell_at(door.place)
+    top, left = max(cell.row - reach, 0), max(cell.col - reach, 0)
+    labels = atlas.rooms.labels[top : cell.row + reach + 1, left : cell.col + reach + 1]
+    middles = []
+    for region_id in (side.id, *(each for each in door.region_ids if each != side.id)):
+        rows, cols = np.nonzero(labels == atlas.rooms.region(region_id).index)
+        points = atlas.grid.points_at(rows + top, cols + left)
+        away_m = np.hypot(points[:, 0] - door.place.x, points[:, 1] - door.place.y)
+        near = points[away_m <= reach_m]
+        middles.append(near.mean(axis=0) if len(near) else np.array([door.place.x, door.place.y]))
+    into = middles[0] - middles[1]
+    return _squared(atlas, door, math.atan2(float(into[1]), float(into[0])))
+
+
+def _squared(atlas: Atlas, door: Door, rough_rad: float) -> float:
+    """Turns a direction through a door until the posts beside it lie square to it."""
+    reach = math.ceil((door.width_m / 2 + AROUND_DOOR_M) / atlas.grid.resolution_m)
+    cell = atlas.grid.cell_at(door.place)
+    top, left = max(cell.row - reach, 0), max(cell.col - reach, 0)
+    solid = atlas.grid.occupied[top : cell.row + reach + 1, left : cell.col + reach + 1]
+    rows, cols = np.nonzero(solid)
+    points = atlas.grid.points_at(rows + top, cols + left) - np.array([door.place.x, door.place.y])
+    across = np.array([-math.sin(rough_rad), math.cos(rough_rad)])
+    posts = []
+    for sign in (1.0, -1.0):
+        beside = points[(points @ (sign * across)) > 0.5 * np.hypot(points[:, 0], points[:, 1])]
+        if not len(beside):
+            return rough_rad
+        posts.append(beside[int(np.argmin(np.hypot(beside[:, 0], beside[:, 1])))])
+    line = posts[0] - posts[1]
+    square_rad = math.atan2(float(line[1]), float(line[0])) - math.pi / 2
+    off_rad = math.remainder(square_rad - rough_rad, math.tau)
+    return math.remainder(square_rad, math.tau) if abs(off_rad) < math.pi / 4 else rough_rad
+
+
+def _refer_to_region(atlas: Atlas, region: Region) -> Referent:
+    window = atlas.rooms.window_of(region)
+    inside = (atlas.rooms.labels[window] == region.index).astype(np.uint8)
+    edges, _ = cv2.findContours(np.pad(inside, 1), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    cells = np.concatenate(edges)[:, 0, :] - 1
+    extent = atlas.grid.points_at(cells[:, 1] + window[0].start, cells[:, 0] + window[1].start)
+    middle = find_outline(atlas, region).middle
+    return Referent(name=region.id, anchor=middle, extent=extent, region=region)
+
+
+def _refer_to_door(atlas: Atlas, door: Door) -> Referent:
+    near = find_near_side(atlas, door)
+    along_rad = find_normal(atlas, door, near) + math.pi / 2
+    half = np.array([math.cos(along_rad), math.sin(along_rad)]) * door.width_m / 2
+    middle = np.array([door.place.x, door.place.y])
+    shares = np.linspace(-1.0, 1.0, 9)[:, None]
+    extent = middle + shares * half
+    return Referent(name=door.id, anchor=door.place, extent=extent, home=near, door=door)
+
+
+def find_near_side(atlas: Atlas, door: Door) -> Region:
+    """Gives the region of a door on whose side the robot comes to it."""
+    sides = [atlas.rooms.region(region_id) for region_id in door.region_ids]
+    here = atlas.find_room_id(atlas.robot.point)
+    standing = next((side for side in sides if side.id == here), None)
+    if standing is not None:
+        return standing
+
+    def path_m(side: Region) -> float:
+        heading_rad = find_normal(atlas, door, side)
+        ahead_m = atlas.radius_m + AROUND_DOOR_M
+        before = Point(
+            door.place.x + ahead_m * math.cos(heading_rad),
+            door.place.y + ahead_m * math.sin(heading_rad),
+        )
+        found_m = atlas.path_m(before)
+        return math.inf if found_m is None else found_m
+
+    return min(sides, key=path_m)

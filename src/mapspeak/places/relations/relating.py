@@ -1,0 +1,269 @@
+"""From words that relate a place to others to the place."""
+
+import math
+
+import numpy as np
+
+from mapspeak.errors import GoalError
+from mapspeak.geometry import Point
+from mapspeak.places.naming import Place, Spot, find_named, no_such_place
+from mapspeak.places.relations.around import stand_away, stand_facing, stand_next_to
+from mapspeak.places.relations.closest import find_nearest
+from mapspeak.places.relations.directions import stand_towards
+from mapspeak.places.relations.footing import find_footing
+from mapspeak.places.relations.halfway import stand_between
+from mapspeak.places.relations.inside import (
+    FoundCorner,
+    FoundWall,
+    find_corners,
+    find_middle,
+    find_walls,
+    stand_at_wall,
+    stand_in_corner,
+    stand_in_middle,
+)
+from mapspeak.places.relations.operands import find_by_kind, find_known, find_room_here
+from mapspeak.places.relations.phrases import (
+    Away,
+    Between,
+    Corner,
+    Facing,
+    Middle,
+    Nearest,
+    NextTo,
+    Relation,
+    Towards,
+    Turned,
+    WallSide,
+    parse_relation,
+)
+from mapspeak.places.relations.referent import Referent, refer_to, refer_to_point
+from mapspeak.places.relations.stand import Stand, refuse
+from mapspeak.places.relations.words import plain
+from mapspeak.places.ways import standing_point
+from mapspeak.spatial.rooms import Region
+from mapspeak.worldmodel.model import Atlas
+
+__all__ = ["find_related"]
+
+MOST_RELATIONS = 4
+LONGEST_NAME = 80
+BESIDE_M = 1.0
+
+
+def find_related(atlas: Atlas, words: str) -> Place | None:
+    """Finds the place that a relation means, such as "left of W3"; None for other words.
+
+    The place comes with its reason. It can be reached, whatever stands around it; of "the nearest
+    door" and the like it is the thing itself.
+
+    Raises:
+        GoalError: A name in it means nothing or several things, or nothing fits; the hint says
+            what would.
+    """
+    relation = parse_relation(words)
+    if relation is None:
+        return find_named(atlas, plain(words)) or find_by_kind(atlas, words)
+    return Reader(atlas).find(relation, " ".join(words.split()), n_left=MOST_RELATIONS - 1)
+
+
+class Reader:
+    """Reads relations in one state of the map."""
+
+    def __init__(self, atlas: Atlas) -> None:
+        self._atlas = atlas
+
+    def find(self, relation: Relation, words: str, *, n_left: int) -> Place:
+        """Gives the place that a relation means; `n_left` more may stand inside it."""
+        if isinstance(relation, Nearest):
+            start = None if relation.to is None else self._refer(relation.to, n_left)
+            return find_nearest(self._atlas, relation.kind, start)
+        stand = self._stand(relation, n_left)
+        return Place(words[:LONGEST_NAME], Spot(stand.point, stand.yaw_rad), stand.reason)
+
+    def _stand(self, relation: Relation, n_left: int) -> Stand:
+        match relation:
+            case Towards():
+                stand = self._stand_towards(relation, n_left)
+            case Away(of=of, away_m=away_m):
+                _check_distance(away_m)
+                stand = stand_away(self._atlas, self._refer(of, n_left), away_m)
+            case NextTo(of):
+                stand = stand_next_to(self._atlas, self._refer(of, n_left))
+            case Facing(of):
+                stand = stand_facing(self._atlas, self._refer(of, n_left))
+            case Turned():
+                stand = self._stand_turned(relation, n_left)
+            case Between():
+                stand = stand_between(self._atlas, *self._refer_to_both(relation, n_left))
+            case _:
+                stand = self._stand_inside(relation, n_left)
+        return stand
+
+    def _stand_inside(self, relation: Corner | WallSide | Middle | Nearest, n_left: int) -> Stand:
+        match relation:
+            case Corner():
+                return stand_in_corner(self._atlas, self._find_corners(relation, n_left))
+            case WallSide(is_along=is_along):
+                walls = self._find_walls(relation, n_left)
+                return stand_at_wall(self._atlas, walls, is_along=is_along)
+            case Middle(of):
+                return stand_in_middle(self._atlas, self._refer(of, n_left))
+            case Nearest():
+                place = self.find(relation, "", n_left=n_left)
+                return Stand(point=standing_point(self._atlas, place), reason=place.reason)
+
+    def _refer(self, words: str, n_left: int) -> Referent:
+        """Gives what words inside a phrase mean: a name, or another phrase."""
+        known = find_known(self._atlas, words)
+        if known is not None:
+            return known
+        relation = parse_relation(words)
+        if relation is None:
+            raise no_such_place(self._atlas, plain(words))
+        if n_left == 0:
+            raise refuse(
+                f"There are more than {MOST_RELATIONS} relations inside each other.",
+                else_hint="Drive to one of the inner places first, or give x, y.",
+            )
+        return self._refer_to_relation(relation, plain(words), n_left - 1)
+
+    def _refer_to_relation(self, relation: Relation, words: str, n_left: int) -> Referent:
+        """Gives what a phrase is about: the corner itself, say, not where one stands in it."""
+        match relation:
+            case Nearest():
+                return refer_to(self._atlas, self.find(relation, words, n_left=n_left))
+            case Corner():
+                corner = self._find_corners(relation, n_left)[0]
+                return refer_to_point(self._atlas, corner.name, corner.point, home=corner.region)
+            case WallSide():
+                return _refer_to_wall(self._find_walls(relation, n_left)[0])
+            case Middle(of) if (thing := self._refer(of, n_left)).region is not None:
+                name = f"the middle of {thing.name}"
+                middle = find_middle(self._atlas, thing.region)
+                return refer_to_point(self._atlas, name, middle, home=thing.region)
+            case _:
+                stand = self._stand(relation, n_left)
+                return refer_to_point(self._atlas, f"the place {words}", stand.point)
+
+    def _refer_to_both(self, relation: Between, n_left: int) -> tuple[Referent, Referent]:
+        """Gives the two things of a "between", by the first division of the words that works."""
+        doors = self._find_both_doors(relation.of)
+        if doors is not None:
+            return doors
+        fault: GoalError | None = None
+        for one, other in relation.ways:
+            try:
+                return self._refer(one, n_left), self._refer(other, n_left)
+            except GoalError as error:
+                fault = fault or error
+        raise fault or refuse(
+            "Between what and what?", else_hint="Say it such as 'between D1 and D2'."
+        )
+
+    def _find_both_doors(self, words: str) -> tuple[Referent, Referent] | None:
+        """Gives the two doors of "between the doors" and "between the doors of R2"."""
+        first, _, rest = plain(words).partition(" ")
+        if plain(words).casefold() not in ("doors", "two doors") and first.casefold() != "doors":
+            return None
+        room = self._room_of(rest.removeprefix("of ")) if first == "doors" and rest else None
+        room = room or find_room_here(self._atlas)
+        doors = self._atlas.rooms.doors_of(room)
+        if len(doors) != 2:
+            ids = ", ".join(door.id for door in doors) or "none"
+            raise refuse(
+                f"{room.id} has {len(doors)} doors.",
+                else_hint=f"Say between which two; they are {ids}.",
+            )
+        one, other = (refer_to(self._atlas, Place(door.id, door)) for door in doors)
+        return one, other
+
+    def _stand_towards(self, relation: Towards, n_left: int) -> Stand:
+        _check_distance(relation.away_m)
+        thing = self._refer(relation.of, n_left)
+        seen_from = None
+        if relation.seen_from is not None:
+            seen_from = self._refer(relation.seen_from, n_left)
+        return stand_towards(self._atlas, thing, relation, seen_from)
+
+    def _stand_turned(self, relation: Turned, n_left: int) -> Stand:
+        thing = self._refer(relation.to, n_left)
+        inner = parse_relation(relation.place)
+        if inner is not None and find_known(self._atlas, relation.place) is None:
+            stand = self._stand(inner, n_left)
+            point, why = stand.point, stand.reason.removesuffix(", facing it")
+        else:
+            at = self._refer(relation.place, n_left)
+            found = find_named(self._atlas, plain(relation.place))
+            point, why = standing_point(self._atlas, found) if found else at.anchor, at.name
+        if point.distance_to(thing.anchor) < self._atlas.radius_m:
+            raise refuse(f"{relation.place} is where {thing.name} is: it cannot be faced there.")
+        return Stand(
+            point=point,
+            yaw_rad=point.bearing_to(thing.anchor),
+            reason=f"{why}, facing {thing.name}",
+        )
+
+    def _find_corners(self, relation: Corner, n_left: int) -> tuple[FoundCorner, ...]:
+        """Gives the corners that may be meant, the best first."""
+        near = None if relation.near is None else self._refer(relation.near, n_left)
+        region = self._region_beside(relation.of, near, n_left)
+        corners = find_corners(self._atlas, region, relation.compass)
+        if near is not None:
+            return tuple(sorted(corners, key=lambda each: _away_m(each.point, near)))
+        return tuple(sorted(corners, key=lambda each: self._path_m(each.point)))
+
+    def _find_walls(self, relation: WallSide, n_left: int) -> tuple[FoundWall, ...]:
+        """Gives the walls that may be meant, the best first."""
+        region = self._region_of(relation.of, n_left)
+        walls = find_walls(self._atlas, region, relation.compass)
+        return tuple(sorted(walls, key=lambda each: self._path_m(each.wall.middle)))
+
+    def _region_beside(self, of: str | None, near: Referent | None, n_left: int) -> Region:
+        if of is not None:
+            return self._region_of(of, n_left)
+        home = None if near is None else near.home
+        return home or find_room_here(self._atlas)
+
+    def _region_of(self, words: str, n_left: int) -> Region:
+        thing = self._refer(words, n_left)
+        if thing.region is None:
+            raise refuse(
+                f"{thing.name} is no room or corridor: it has no corners or walls.",
+                [f"next to {thing.name}"],
+            )
+        return thing.region
+
+    def _room_of(self, words: str) -> Region:
+        return self._region_of(words, 0)
+
+    def _path_m(self, point: Point) -> float:
+        """Gives how far it is to the floor beside a point that the robot cannot stand in."""
+        footing = find_footing(self._atlas, point, BESIDE_M)
+        return float(footing.paths_m.min(initial=math.inf))
+
+
+def _check_distance(away_m: float | None) -> None:
+    if away_m is not None and not 0 < away_m < math.inf:
+        raise refuse(
+            f"{away_m:g} m is no distance.", else_hint="Give metres above zero, such as 1.5 m."
+        )
+
+
+def _away_m(point: Point, thing: Referent) -> float:
+    x, y = thing.extent[:, 0] - point.x, thing.extent[:, 1] - point.y
+    return float((x * x + y * y).min())
+
+
+def _refer_to_wall(found: FoundWall) -> Referent:
+    wall, region = found.wall, found.region
+    n = max(math.ceil(wall.length_m / 0.1), 2)
+    shares = [step / (n - 1) for step in range(n)]
+    points = [
+        (
+            wall.start.x + share * (wall.end.x - wall.start.x),
+            wall.start.y + share * (wall.end.y - wall.start.y),
+        )
+        for share in shares
+    ]
+    return Referent(name=found.name, anchor=wall.middle, extent=np.array(points), home=region)

@@ -1,0 +1,170 @@
+"""Where and how a robot stands when it is sent to a place."""
+
+import itertools
+import math
+
+import numpy as np
+
+from mapspeak.geometry import Point, Pose
+from mapspeak.places.goalcheck import FARTHEST_M
+from mapspeak.spatial import Cell
+from mapspeak.spatial.grid import FloatArray, IntArray
+from mapspeak.spatial.paths import Path
+from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap
+from mapspeak.worldmodel.doorways import find_crossing
+from mapspeak.worldmodel.model import Atlas, RememberedThing
+from mapspeak.worldmodel.revision import MapRevision
+
+__all__ = [
+    "arrival_pose",
+    "choose_crossing",
+    "choose_standing_point",
+    "facing_in",
+    "find_standing_point",
+    "stand_before",
+]
+
+COMFORT_M = 0.15
+"""How much more than its radius a robot should have around it where it is sent to stand."""
+N_RAYS = 72
+HALF_VIEW_RAD = math.radians(30)
+"""What is seen at once: half the opening of a common camera."""
+
+
+def find_standing_point(atlas: Atlas, region: Region) -> Point | None:
+    """Finds a reachable point of a region with room around it, near its middle, or None."""
+    known = atlas.reach.standing
+    if region.id not in known:
+        known[region.id] = _search(atlas, atlas.map, region)
+    return known[region.id]
+
+
+def choose_standing_point(atlas: Atlas, region: Region) -> Point:
+    """Gives where the robot stands in a region, or would if it got there.
+
+    What is asked about a region out of reach is then answered for the way there, and not for
+    furniture that happens to be in the middle of it.
+    """
+    known = atlas.reach.out_of_reach
+    found = find_standing_point(atlas, region) or known.get(region.id)
+    if found is None:
+        opened = atlas.map.open
+        found = None if opened is atlas.map else _search(atlas, opened, region)
+        found = known[region.id] = found or _roomiest(atlas, opened, region)
+    return found
+
+
+def choose_crossing(atlas: Atlas, door: Door) -> Point:
+    """Gives where the robot passes a door, or would if nothing was closed; else its middle."""
+    found = atlas.find_crossing(door)
+    if found is None and atlas.map.open is not atlas.map:
+        opened = atlas.map.open.distances_from(atlas.robot.point)
+        found = find_crossing(atlas.rooms, opened, door)
+    return found or door.place
+
+
+def _search(atlas: Atlas, revision: MapRevision, region: Region) -> Point | None:
+    """Finds where to stand by the ways and the clearances of one state of the map."""
+    middle = _middle_of(atlas, region)
+    distances = revision.distances_from(atlas.robot.point)
+    comfortable_m = atlas.radius_m + COMFORT_M
+    cell = atlas.grid.cell_at(middle)
+    is_roomy = revision.clearance_m[cell.row, cell.col] >= comfortable_m
+    if is_roomy and distances.is_reachable(middle):
+        return middle
+    rows, cols = _cells_of(atlas.rooms, region)
+    distances_m = distances.distances_at(rows, cols)
+    clear_m = revision.clearance_m[rows, cols]
+    reachable = np.flatnonzero(np.isfinite(distances_m))
+    if not reachable.size:
+        return None
+    enough_m = min(comfortable_m, float(clear_m[reachable].max()))
+    reachable = reachable[clear_m[reachable] >= enough_m]
+    points = atlas.grid.points_at(rows[reachable], cols[reachable])
+    away_m = np.hypot(points[:, 0] - middle.x, points[:, 1] - middle.y)
+    best = points[int(np.argmin(away_m))]
+    return Point(float(best[0]), float(best[1]))
+
+
+def _roomiest(atlas: Atlas, revision: MapRevision, region: Region) -> Point:
+    """Gives the point of a region that is farthest from what stands in it."""
+    rows, cols = _cells_of(atlas.rooms, region)
+    clear_m = np.where(atlas.grid.free[rows, cols], revision.clearance_m[rows, cols], -1.0)
+    best = int(np.argmax(clear_m))
+    return atlas.grid.point_at(Cell(int(rows[best]), int(cols[best])))
+
+
+def _cells_of(rooms: RoomMap, region: Region) -> tuple[IntArray, IntArray]:
+    """Gives the rows and the columns of a region's cells."""
+    window = rooms.window_of(region)
+    rows, cols = np.nonzero(rooms.labels[window] == region.index)
+    return rows + window[0].start, cols + window[1].start
+
+
+def _middle_of(atlas: Atlas, region: Region) -> Point:
+    """Gives the widest point of a room, and the middle of the walk along a corridor."""
+    walk = atlas.map.walk_along(region) if region.room_class is RoomClass.CORRIDOR else None
+    return region.widest if walk is None else walk.middle
+
+
+def arrival_pose(atlas: Atlas, point: Point) -> Pose:
+    """Gives the pose at a point in which the robot ends when it drives there straight on.
+
+    It is the direction of the last stretch of the way, as long as the robot: a way over cells may
+    end with a step aside, and nobody wants the robot to turn for that.
+    """
+    is_near = max(abs(point.x), abs(point.y)) < FARTHEST_M
+    path = atlas.map.find_path_over(atlas.distances, point) if is_near else None
+    before = None if path is None else _back_from_end(path, 2 * atlas.radius_m)
+    yaw_rad = atlas.robot.yaw_rad if before is None else before.bearing_to(point)
+    return Pose(point.x, point.y, yaw_rad)
+
+
+def _back_from_end(path: Path, away_m: float) -> Point | None:
+    """Gives the point of a way so far before its end, or its start; None where it has no length."""
+    backwards = path.points[::-1]
+    for end, start in itertools.pairwise(backwards):
+        leg_m = start.distance_to(end)
+        if leg_m >= away_m:
+            share = away_m / leg_m
+            return Point(end.x + share * (start.x - end.x), end.y + share * (start.y - end.y))
+        away_m -= leg_m
+    return backwards[-1] if backwards[-1] != backwards[0] else None
+
+
+def stand_before(atlas: Atlas, remembered: RememberedThing) -> Pose:
+    """Gives the pose that faces a thing from near, else one that it was seen from."""
+    near = atlas.find_approach(remembered)
+    if near is not None:
+        return near
+    thing = remembered.thing
+    records = map(atlas.recollection.find_place, thing.waypoints)
+    poses = [record.waypoint.pose for record in records if record is not None]
+    pose = next((pose for pose in poses if atlas.path_m(pose.point) is not None), poses[0])
+    if thing.position is None or thing.position == pose.point:
+        return pose
+    return Pose(pose.x, pose.y, pose.point.bearing_to(thing.position))
+
+
+def facing_in(atlas: Atlas, region: Region, point: Point) -> float:
+    """Gives the heading, in radians, in which most of a region lies before a robot at a point."""
+    angles = np.linspace(0.0, math.tau, N_RAYS, endpoint=False)
+    sights_m = _sights_in(atlas, region, point, angles)
+    half = round(HALF_VIEW_RAD / (math.tau / N_RAYS))
+    around = np.concatenate([sights_m[-half:], sights_m, sights_m[:half]])
+    seen = np.convolve(around, np.ones(2 * half + 1), mode="valid")
+    return math.remainder(float(angles[int(np.argmax(seen))]), math.tau)
+
+
+def _sights_in(atlas: Atlas, region: Region, point: Point, angles: FloatArray) -> FloatArray:
+    """Gives how far one sees over free floor of the region along each angle, in metres."""
+    step_m = atlas.grid.resolution_m
+    steps_m = np.arange(1, math.ceil(math.hypot(region.length_m, region.width_m) / step_m)) * step_m
+    xs = point.x + np.outer(np.cos(angles), steps_m)
+    ys = point.y + np.outer(np.sin(angles), steps_m)
+    rows, cols = atlas.grid.cells_at(np.stack([xs.ravel(), ys.ravel()], axis=1))
+    inside = atlas.grid.contains_cells(rows, cols)
+    rows, cols = np.where(inside, rows, 0), np.where(inside, cols, 0)
+    is_ours = (atlas.rooms.labels[rows, cols] == region.index) & atlas.grid.free[rows, cols]
+    is_seen = np.logical_and.accumulate((inside & is_ours).reshape(xs.shape), axis=1)
+    return np.asarray(is_seen.sum(axis=1) * step_m, dtype=np.float64)

@@ -1,0 +1,141 @@
+"""How far it is between two places, and what the way leads through."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapspeak.geometry import Point
+from mapspeak.places.naming import Place, Spot
+from mapspeak.places.standing import choose_crossing, choose_standing_point, stand_before
+from mapspeak.spatial.paths import DistanceField, Path
+from mapspeak.spatial.rooms import Door, Region
+from mapspeak.worldmodel.model import Atlas, RememberedThing
+
+__all__ = ["Way", "find_way", "measure_path", "standing_point"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Way:
+    """The way a robot would take from one place to another.
+
+    Attributes:
+        start: Where it begins.
+        goal: Where it ends.
+        end: The point it ends at: in a room, where the robot would stand.
+        straight_m: As the crow flies, between the same two points as the path.
+        path_m: By path; None where the robot cannot get through.
+        through: Ids of the regions and doors on the way, in order, both ends included.
+        clearance_m: From the robot's centre to the nearest obstacle, where it is least; None
+            without a path.
+    """
+
+    start: Place
+    goal: Place
+    end: Point
+    straight_m: float
+    path_m: float | None = None
+    through: tuple[str, ...] = ()
+    clearance_m: float | None = None
+
+
+def measure_path(atlas: Atlas, start: Place, goal: Place) -> float | None:
+    """Gives the metres by path between two places; None where the robot cannot get through."""
+    distances = _distances_from(atlas, start)
+    end = standing_point(atlas, goal)
+    if distances is None or atlas.map.weights is None:
+        return None if distances is None else distances.distance_to(end)
+    return _measure(atlas, distances, atlas.map.find_path_over(distances, end), end)
+
+
+def find_way(atlas: Atlas, start: Place, goal: Place) -> Way:
+    """Finds the way between two places; of a room it is the point to stand in that counts."""
+    begin, end = standing_point(atlas, start), standing_point(atlas, goal)
+    straight_m = begin.distance_to(end)
+    distances = _distances_from(atlas, start)
+    path = None if distances is None else atlas.map.find_path_over(distances, end)
+    path_m = _measure(atlas, distances, path, end)
+    if path is None or path_m is None:
+        return Way(start=start, goal=goal, end=end, straight_m=straight_m)
+    cells = _cells_along(atlas, path)
+    return Way(
+        start=start,
+        goal=goal,
+        end=end,
+        straight_m=straight_m,
+        path_m=path_m,
+        through=_name_regions(atlas, *cells),
+        clearance_m=float(atlas.map.clearance_m[cells].min()),
+    )
+
+
+def _measure(
+    atlas: Atlas, distances: DistanceField | None, path: Path | None, end: Point
+) -> float | None:
+    """Gives the metres to the end: by the way round where that is not the shortest one."""
+    if distances is None or path is None:
+        return None
+    is_shortest = atlas.map.weights is None
+    return distances.distance_to(end) if is_shortest else path.length_m
+
+
+def _distances_from(atlas: Atlas, start: Place) -> DistanceField | None:
+    """Gives the distances from a place; None where no way begins.
+
+    Elsewhere than where it is, a robot cannot squeeze out of a place that is too tight for it.
+    """
+    if isinstance(start.thing, Spot) and start.point == atlas.robot.point:
+        return atlas.distances
+    begin = standing_point(atlas, start)
+    distances = atlas.map.distances_from(begin)
+    return None if distances.lattice.index_at(begin) is None else distances
+
+
+def standing_point(atlas: Atlas, place: Place) -> Point:
+    """Gives the point from which and to which ways to a place are measured."""
+    match place.thing:
+        case Region() as region:
+            return choose_standing_point(atlas, region)
+        case Door() as door:
+            return choose_crossing(atlas, door)
+        case RememberedThing() as remembered:
+            return stand_before(atlas, remembered).point
+        case _:
+            return place.point
+
+
+def _cells_along(atlas: Atlas, path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Gives rows and columns of the cells that a path passes, a step for each cell's length."""
+    points = [path.points[0]]
+    for before, after in zip(path.points, path.points[1:], strict=False):
+        n_steps = max(math.ceil(before.distance_to(after) / atlas.grid.resolution_m), 1)
+        points += [
+            Point(
+                before.x + (after.x - before.x) * step / n_steps,
+                before.y + (after.y - before.y) * step / n_steps,
+            )
+            for step in range(1, n_steps + 1)
+        ]
+    rows, cols = atlas.grid.cells_at(np.array([[point.x, point.y] for point in points]))
+    return rows.clip(0, atlas.grid.n_rows - 1), cols.clip(0, atlas.grid.n_cols - 1)
+
+
+def _name_regions(atlas: Atlas, rows: np.ndarray, cols: np.ndarray) -> tuple[str, ...]:
+    """Gives the regions that some cells lie in, with the door between each and the next."""
+    by_index = {region.index: region.id for region in atlas.rooms.regions}
+    names: list[str] = []
+    for row, col in zip(rows.tolist(), cols.tolist(), strict=True):
+        name = by_index.get(int(atlas.rooms.labels[row, col]))
+        if name is None or (names and names[-1] == name):
+            continue
+        if names:
+            names += _door_between(atlas, names[-1], name, row, col)
+        names.append(name)
+    return tuple(names)
+
+
+def _door_between(atlas: Atlas, first: str, second: str, row: int, col: int) -> list[str]:
+    doors = atlas.rooms.doors_between(first, second)
+    x, y = atlas.grid.points_at(np.array([row]), np.array([col]))[0].tolist()
+    nearest = min(doors, key=lambda door: door.place.distance_to(Point(x, y)), default=None)
+    return [] if nearest is None else [nearest.id]

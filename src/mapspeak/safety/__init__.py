@@ -1,0 +1,87 @@
+"""Limits that are on: a policy, a guard in front of the robot, a hold, an audit log."""
+
+from mapspeak.safety.approvals import Approvals, WaitingRoom
+from mapspeak.safety.audit import AuditLine, AuditLog, read_audit
+from mapspeak.safety.caller import NOBODY, Caller, calling, current_caller
+from mapspeak.safety.commands import (
+    Act,
+    Call,
+    Command,
+    Drive,
+    Kind,
+    Publish,
+    SetParameter,
+    say_command,
+)
+from mapspeak.safety.connection import GuardedConnection
+from mapspeak.safety.deciding import (
+    Allowed,
+    Decision,
+    NeedsApproval,
+    Refused,
+    Situation,
+    decide,
+)
+from mapspeak.safety.errands import Errand, on_errand
+from mapspeak.safety.guard import ApprovalNeededError, Guard, Permit
+from mapspeak.safety.hold import Hold
+from mapspeak.safety.policy import (
+    Approval,
+    AreaRule,
+    Hours,
+    Otherwise,
+    Patterns,
+    Policy,
+    Speeds,
+    WhenBusy,
+)
+from mapspeak.safety.policyfile import load_policy
+from mapspeak.safety.robot import GuardedRobot
+from mapspeak.safety.surveying import Surveyor
+from mapspeak.safety.velocities import HandDriving, publishing_for
+
+__all__ = [
+    "NOBODY",
+    "Act",
+    "Allowed",
+    "Approval",
+    "ApprovalNeededError",
+    "Approvals",
+    "AreaRule",
+    "AuditLine",
+    "AuditLog",
+    "Call",
+    "Caller",
+    "Command",
+    "Decision",
+    "Drive",
+    "Errand",
+    "Guard",
+    "GuardedConnection",
+    "GuardedRobot",
+    "HandDriving",
+    "Hold",
+    "Hours",
+    "Kind",
+    "NeedsApproval",
+    "Otherwise",
+    "Patterns",
+    "Permit",
+    "Policy",
+    "Publish",
+    "Refused",
+    "SetParameter",
+    "Situation",
+    "Speeds",
+    "Surveyor",
+    "WaitingRoom",
+    "WhenBusy",
+    "calling",
+    "current_caller",
+    "decide",
+    "load_policy",
+    "on_errand",
+    "publishing_for",
+    "read_audit",
+    "say_command",
+]

@@ -1,0 +1,191 @@
+"""Commands that wait for a person's word, and those that got it."""
+
+import json
+import secrets
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mapspeak.errors import ConfigError
+from mapspeak.safety.commands import Command, is_same, say_command
+from mapspeak.safety.errands import Errand
+from mapspeak.semantic.waypoint import clean_line
+
+__all__ = ["Approvals", "WaitingRoom"]
+
+VALID_S = 600.0
+"""A word that was given is good for so long, and for one command."""
+MOST_WAITING = 50
+
+
+Wanted = Command | Errand
+"""What a person's word may be for: one command, or the drives of an errand."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Wish:
+    """What somebody asked for.
+
+    Attributes:
+        id: What an operator calls it.
+        wanted: What for.
+        client: Who asked.
+        asked_s: When, by the same clock as all times here.
+        secret: What an answer of that client must know, beside the id.
+    """
+
+    id: str
+    wanted: Wanted
+    client: str
+    asked_s: float
+    secret: str = field(default_factory=lambda: secrets.token_hex(16), repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class WaitingRoom:
+    """A folder in which a server writes what waits, and an operator what is approved.
+
+    Attributes:
+        folder: Shared by servers and operators.
+    """
+
+    folder: Path
+
+    def add(self, wish_id: str, said: str) -> None:
+        """Writes a command that waits."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self._file(wish_id, "waiting").write_text(json.dumps({"what": said}), encoding="utf-8")
+
+    def list_waiting(self) -> dict[str, str]:
+        """Return what waits, each on one line, by its id."""
+        waiting = {}
+        for path in sorted(self.folder.glob("*.waiting")):
+            try:
+                what = str(json.loads(path.read_text(encoding="utf-8"))["what"])
+                waiting[clean_line(path.stem)] = clean_line(what)
+            except (OSError, ValueError, KeyError, TypeError):
+                continue
+        return waiting
+
+    def approve(self, wish_id: str) -> str:
+        """Approves a waiting command and gives it in words.
+
+        Raises:
+            ConfigError: Nothing waits under that id.
+        """
+        waiting = self.list_waiting()
+        if wish_id not in waiting:
+            raise ConfigError(
+                f"Nothing waits for approval under {wish_id!r}.",
+                hint=f"There waits: {', '.join(waiting) or 'nothing'}.",
+            )
+        self._file(wish_id, "waiting").rename(self._file(wish_id, "approved"))
+        return waiting[wish_id]
+
+    def take_approved(self, wish_id: str) -> bool:
+        """Gives whether a command was approved; once."""
+        try:
+            self._file(wish_id, "approved").unlink()
+        except OSError:
+            return False
+        return True
+
+    def remove(self, wish_id: str) -> None:
+        """Forgets a command."""
+        for state in ("waiting", "approved"):
+            self._file(wish_id, state).unlink(missing_ok=True)
+
+    def _file(self, wish_id: str, state: str) -> Path:
+        return self.folder / f"{wish_id}.{state}"
+
+
+@dataclass(slots=True)
+class Approvals:
+    """What waits for a person's word in one server.
+
+    Attributes:
+        room: Where it waits for `mapspeak approve`.
+        now_s: Seconds that only grow.
+    """
+
+    room: WaitingRoom
+    now_s: Callable[[], float]
+    _wishes: dict[str, _Wish] = field(default_factory=dict)
+    _asked: set[str] = field(default_factory=set)
+    _granted: set[str] = field(default_factory=set)
+    _n_wishes: int = 0
+    _prefix: str = field(default_factory=lambda: secrets.token_hex(2))
+
+    def ask(self, wanted: Wanted, *, client: str) -> str:
+        """Notes a wish and gives its id; the same one for the same wish."""
+        self._forget_old()
+        for known in self._wishes.values():
+            if _is_of(known, wanted, client):
+                return known.id
+        self._n_wishes += 1
+        wish_id = f"{self._prefix}-{self._n_wishes}"
+        self._wishes[wish_id] = _Wish(
+            id=wish_id, wanted=wanted, client=client, asked_s=self.now_s()
+        )
+        return wish_id
+
+    def queue(self, wish_id: str) -> None:
+        """Lets a wish wait for `mapspeak approve`."""
+        wish = self._wishes[wish_id]
+        who = f", asked by {wish.client}" if wish.client else ""
+        self.room.add(wish_id, f"{_say(wish.wanted)}{who}")
+
+    def ask_client(self, wish_id: str) -> str:
+        """Note that the client is asked now, and return the secret that its answer must know."""
+        self._asked.add(wish_id)
+        return self._wishes[wish_id].secret
+
+    def grant(self, wish_id: str, *, client: str, secret: str) -> bool:
+        """Note a person's word for a wish, once; return False when that client was not asked."""
+        wish = self._wishes.get(wish_id)
+        if wish is None or wish_id not in self._asked or wish.client != client:
+            return False
+        if not secrets.compare_digest(wish.secret.encode(), secret.encode()):
+            return False
+        self._asked.discard(wish_id)
+        self._granted.add(wish_id)
+        return True
+
+    def take_word(self, wanted: Wanted, *, client: str) -> str | None:
+        """Gives the id of the word that a person gave for this wish of this client, once."""
+        self._forget_old()
+        for wish in list(self._wishes.values()):
+            if not _is_of(wish, wanted, client):
+                continue
+            if wish.id in self._granted or self.room.take_approved(wish.id):
+                self._forget(wish.id)
+                return wish.id
+        return None
+
+    def close(self) -> None:
+        """Forgets everything: what waits here can no longer be done."""
+        for wish_id in list(self._wishes):
+            self._forget(wish_id)
+
+    def _forget_old(self) -> None:
+        oldest_s = self.now_s() - VALID_S
+        old = [each.id for each in self._wishes.values() if each.asked_s < oldest_s]
+        surplus = list(self._wishes)[: max(len(self._wishes) - MOST_WAITING, 0)]
+        for wish_id in {*old, *surplus}:
+            self._forget(wish_id)
+
+    def _forget(self, wish_id: str) -> None:
+        del self._wishes[wish_id]
+        self._asked.discard(wish_id)
+        self._granted.discard(wish_id)
+        self.room.remove(wish_id)
+
+
+def _is_of(wish: _Wish, wanted: Wanted, client: str) -> bool:
+    if isinstance(wish.wanted, Errand) or isinstance(wanted, Errand):
+        return wish.client == client and wish.wanted == wanted
+    return wish.client == client and is_same(wish.wanted, wanted)
+
+
+def _say(wanted: Wanted) -> str:
+    return wanted.said if isinstance(wanted, Errand) else say_command(wanted)

@@ -1,0 +1,203 @@
+"""The audit log: append-only JSON lines, one for each decision and one for each result."""
+
+import fcntl
+import itertools
+import json
+import math
+import os
+import secrets
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from mapspeak.errors import ConfigError, PolicyError, say_cause
+from mapspeak.safety.caller import Caller
+from mapspeak.safety.commands import Command, Drive, say_command
+
+__all__ = ["AuditLine", "AuditLog", "read_audit"]
+
+MOST_CHARACTERS = 2_000
+"""Of one argument that somebody gave; what is longer is cut, and said to be."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AuditLine:
+    """One line of the log.
+
+    Attributes:
+        number: Of the command that it is about, within one run of a server.
+        run: Which run of which server wrote it.
+        robot: Which one it is about, where a server has several.
+        wall_time: ISO 8601, by the operator's clock.
+        robot_s: Robot time.
+        event: "decision", "result", "leg", "ended", "stop" or "memory".
+        client: Who wanted it.
+        tool: By which tool.
+        kind: Of command; empty for what is none.
+        what: In words.
+        verdict: "allowed", "refused" or "needs approval"; empty for what is no decision.
+        said: Why, or with what result.
+        details: The command's own values.
+    """
+
+    number: int
+    run: str
+    robot: str
+    wall_time: str
+    robot_s: float | None
+    event: str
+    client: str
+    tool: str
+    kind: str
+    what: str
+    verdict: str
+    said: str
+    details: Mapping[str, Any]
+
+
+class AuditLog:
+    """Writes one file; each line is on its way to the disk when a call returns.
+
+    Args:
+        path: The file; its folder is made.
+        wall_clock: The operator's.
+        robot: What the robot is called in the lines.
+        most_bytes: A file that has grown larger is renamed to "NAME.1", in place of the one before.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        wall_clock: Callable[[], datetime],
+        robot: str = "",
+        most_bytes: int = 20_000_000,
+    ) -> None:
+        self.path = path
+        self._most_bytes = most_bytes
+        self._robot = robot
+        self._wall_clock = wall_clock
+        self._run = f"{wall_clock():%Y%m%dT%H%M%S}-{os.getpid()}-{secrets.token_hex(2)}"
+        self._numbers = itertools.count(1)
+
+    def next_number(self) -> int:
+        """Gives the number of another command."""
+        return next(self._numbers)
+
+    def write(
+        self,
+        event: str,
+        *,
+        number: int,
+        caller: Caller,
+        robot_s: float,
+        command: Command | None = None,
+        verdict: str = "",
+        said: str = "",
+    ) -> None:
+        """Appends one line.
+
+        Raises:
+            PolicyError: The line could not be written.
+        """
+        line = {
+            "number": number,
+            "run": self._run,
+            "robot": self._robot,
+            "wall_time": self._wall_clock().isoformat(timespec="milliseconds"),
+            "robot_s": round(robot_s, 3) if math.isfinite(robot_s) else None,
+            "event": event,
+            "client": caller.client,
+            "tool": caller.tool,
+            "kind": "" if command is None else str(command.kind),
+            "what": "" if command is None else say_command(command),
+            "verdict": verdict,
+            "said": said[:MOST_CHARACTERS],
+            "details": {} if command is None else _details(command),
+        }
+        text = json.dumps(line, ensure_ascii=False, default=lambda value: str(value)[:200])
+        self._append(f"{text}\n".encode(errors="replace"))
+
+    def _append(self, line: bytes) -> None:
+        """Writes a whole line or raises: opened anew, so that a file that was moved is noticed."""
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT
+            descriptor = os.open(self.path, flags, 0o600)
+            try:
+                n_written = os.write(descriptor, line)
+                self._begin_anew_if_large(descriptor)
+            finally:
+                os.close(descriptor)
+        except OSError as error:
+            raise self._broken(error.strerror or str(error)) from error
+        if n_written != len(line):
+            raise self._broken("there is no room")
+
+    def _begin_anew_if_large(self, descriptor: int) -> None:
+        if os.fstat(descriptor).st_size <= self._most_bytes:
+            return
+        # Of several servers one renames the file; the others find that it is another one by then.
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(descriptor), self.path.stat()):
+                self.path.replace(f"{self.path}.1")
+
+    def _broken(self, reason: str) -> PolicyError:
+        return PolicyError(
+            f"The audit log {self.path} cannot be written: {reason}. Without it nothing may move.",
+            hint="Tell the person at the robot: make room, or name another file with --audit.",
+        )
+
+
+def read_audit(path: Path) -> Iterator[AuditLine]:
+    """Reads a log, line by line; a last line that was cut off by a crash is left out.
+
+    Raises:
+        ConfigError: The file cannot be read, or is no audit log.
+    """
+    try:
+        # Only a line feed ends a line here; what people publish may hold other signs for it.
+        lines = path.read_text(encoding="utf-8").removesuffix("\n").split("\n")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(
+            f"{path} cannot be read: {say_cause(error)}.", hint="Give the file of an audit log."
+        ) from error
+    for number, line in enumerate(lines, start=1):
+        try:
+            yield AuditLine(**json.loads(line))
+        except (TypeError, ValueError) as error:
+            if number == len(lines):
+                return
+            raise ConfigError(
+                f"{path}, line {number} is no line of an audit log.",
+                hint="Give the file that was named with --audit.",
+            ) from error
+
+
+def _details(command: Command) -> dict[str, Any]:
+    if isinstance(command, Drive):
+        goal = command.goal
+        return {
+            "x": _as_json(goal.x),
+            "y": _as_json(goal.y),
+            "yaw_rad": _as_json(goal.yaw_rad),
+            "verdict": str(command.check.verdict),
+            "path_m": command.check.path_m,
+        }
+    fields = {name: getattr(command, name) for name in command.__dataclass_fields__}
+    return {name: _shorten(value) for name, value in fields.items()}
+
+
+def _as_json(number: float) -> float | str:
+    return number if math.isfinite(number) else str(number)
+
+
+def _shorten(value: object) -> object:
+    text = json.dumps(value, default=str)
+    if len(text) <= MOST_CHARACTERS and "NaN" not in text and "Infinity" not in text:
+        return value
+    return f"{text[:MOST_CHARACTERS]} (of {len(text)} characters)"

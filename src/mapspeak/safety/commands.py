@@ -1,0 +1,168 @@
+"""What somebody may want of the robot that moves or changes something, as values to judge."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.places.goalcheck import GoalCheck
+
+__all__ = [
+    "Act",
+    "Call",
+    "Command",
+    "Drive",
+    "Kind",
+    "Publish",
+    "SetParameter",
+    "read_action_goal",
+    "say_command",
+]
+
+SAME_GOAL_M = 0.1
+"""An approved goal stays approved while a changing map moves it by no more than this."""
+SAME_GOAL_RAD = math.radians(10)
+MOST_SHOWN = 200
+
+Message = Mapping[str, Any]
+
+
+class Kind(StrEnum):
+    """The kinds of commands, as policy and audit name them."""
+
+    DRIVE = "drive"
+    PUBLISH = "publish"
+    CALL = "call"
+    ACT = "act"
+    SET_PARAMETER = "set_parameter"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drive:
+    """Drives somewhere by the robot's own navigation.
+
+    Attributes:
+        goal: Where to.
+        check: What the map says of it, closed areas included.
+    """
+
+    goal: Pose
+    check: GoalCheck
+    kind = Kind.DRIVE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Publish:
+    """Publishes one message.
+
+    Attributes:
+        topic: Such as "/cmd_vel".
+        type: Such as "geometry_msgs/msg/Twist".
+        message: Its fields.
+    """
+
+    topic: str
+    type: str
+    message: Message
+    kind = Kind.PUBLISH
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Call:
+    """Calls a service.
+
+    Attributes:
+        service: Its name.
+        type: Its type.
+        arguments: Of the request.
+    """
+
+    service: str
+    type: str
+    arguments: Message
+    kind = Kind.CALL
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Act:
+    """Sends a goal to an action.
+
+    Attributes:
+        action: Its name.
+        type: Its type, as the caller says.
+        goal: The goal's fields.
+        true_type: Its type, as the robot says; empty when the robot does not tell it.
+    """
+
+    action: str
+    type: str
+    goal: Message
+    true_type: str = ""
+    kind = Kind.ACT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetParameter:
+    """Sets a parameter.
+
+    Attributes:
+        node: Whose; empty in ROS 1.
+        name: Which.
+        value: To what.
+    """
+
+    node: str
+    name: str
+    value: Any
+    kind = Kind.SET_PARAMETER
+
+    @property
+    def full_name(self) -> str:
+        """Node and parameter, as patterns see them."""
+        return f"{self.node}:{self.name}" if self.node else self.name
+
+
+Command = Drive | Publish | Call | Act | SetParameter
+
+
+def say_command(command: Command) -> str:
+    """Gives a command in words."""
+    match command:
+        case Drive(goal=goal):
+            return f"drive to ({goal.x:.2f}, {goal.y:.2f}), yaw {goal.yaw_deg:.0f} deg"
+        case Publish():
+            return f"publish {command.type or 'anything'} on {command.topic}"
+        case Call():
+            return f"call {command.service}{_in_brackets(command.type)}"
+        case Act():
+            kind = _in_brackets(command.true_type or command.type)
+            return f"send a goal to {command.action}{kind}"
+        case SetParameter(value=None):
+            return f"delete {command.full_name}"
+        case SetParameter():
+            return f"set {command.full_name} to {str(command.value)[:MOST_SHOWN]!r}"
+
+
+def read_action_goal(command: Publish) -> Act | None:
+    """Return the goal that a message is by which ROS 1 sends one; None for any other message."""
+    action = command.topic.removesuffix("/goal")
+    kind = command.type.removesuffix("ActionGoal")
+    goal = command.message.get("goal", {})
+    if command.topic == action or command.type == kind or not isinstance(goal, Mapping):
+        return None
+    return Act(action=action, type=kind, goal=goal, true_type=kind)
+
+
+def _in_brackets(text: str) -> str:
+    return f" ({text})" if text else ""
+
+
+def is_same(one: Command, other: Command) -> bool:
+    """True when what was approved of one holds for the other."""
+    if isinstance(one, Drive) and isinstance(other, Drive):
+        turned_rad = wrap_angle(one.goal.yaw_rad - other.goal.yaw_rad)
+        is_near = one.goal.point.distance_to(other.goal.point) <= SAME_GOAL_M
+        return is_near and abs(turned_rad) <= SAME_GOAL_RAD
+    return one == other

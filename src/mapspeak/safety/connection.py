@@ -1,0 +1,398 @@
+"""A ROS system behind the guard: reading passes, what changes something is decided on first."""
+
+import re
+from collections.abc import Callable, Coroutine, Mapping
+from contextlib import suppress
+from typing import Any, TypeVar
+
+from mapspeak.errors import LinkError
+from mapspeak.ros import (
+    ActionGoal,
+    LinkName,
+    NodeLinks,
+    OwnEnds,
+    RosConnection,
+    RosGraph,
+    Started,
+    Subscription,
+)
+from mapspeak.ros.messages import Message
+from mapspeak.safety.commands import (
+    Act,
+    Call,
+    Command,
+    Publish,
+    SetParameter,
+    read_action_goal,
+)
+from mapspeak.safety.deciding import Refused, find_speeds, is_name_denied
+from mapspeak.safety.guard import Guard
+from mapspeak.safety.planning import Planner
+from mapspeak.safety.velocities import (
+    HandDriving,
+    is_zero_velocity,
+    refuse_velocity,
+    zero_velocity_of,
+)
+
+__all__ = ["GuardedConnection"]
+
+T = TypeVar("T")
+
+VELOCITY_TYPE = re.compile(
+    r"geometry_msgs/(?:msg/)?Twist(?:Stamped)?|ackermann_msgs/(?:msg/)?AckermannDrive(?:Stamped)?"
+)
+CANCEL_TYPE = re.compile(r"actionlib_msgs/(?:msg/)?GoalID")
+CANCEL_SERVICE_TYPE = re.compile(r"action_msgs/(?:srv/)?CancelGoal")
+
+
+class GuardedConnection:
+    """A `RosConnection` that changes only what its policy lets it; stopping always passes.
+
+    Args:
+        connection: The connection itself.
+        guard: Decides and notes.
+        now_s: Robot time.
+        by_hand: Knows where velocities would take the robot; None where nothing is closed.
+        planner: Holds the poses of goals to the map; None where nobody checks them.
+    """
+
+    def __init__(
+        self,
+        connection: RosConnection,
+        *,
+        guard: Guard,
+        now_s: Callable[[], float],
+        by_hand: HandDriving | None = None,
+        planner: Planner | None = None,
+    ) -> None:
+        self._planner = planner
+        self._connection = connection
+        self._by_hand = by_hand
+        self._guard = guard
+        self._now_s = now_s
+        self._types: dict[str, str] = {}
+
+    # --- what changes something ---
+
+    async def publish(self, topic: str, message: Message) -> None:
+        """Publishes on an advertised topic what the policy allows.
+
+        Raises:
+            PolicyError: It does not.
+        """
+        command = Publish(topic=topic, type=self._types.get(topic, ""), message=message)
+        if _is_stop(command):
+            await self._connection.publish(topic, message)
+            self._note_stop(command)
+            return
+        goal = read_action_goal(command)
+        if goal is not None:
+            await self._send(goal, self._connection.publish(topic, message))
+            return
+        objection = await self._by_hand.find_objection(message) if self._by_hand else None
+        done = self._connection.publish(topic, message)
+        # From before it is sent: what fails half-way may move the robot all the same.
+        self._watch_over(command, objection)
+        await self._guarded(command, done, objection)
+
+    def publish_everywhere(self, topic: str, message: Message) -> int:
+        """Publishes at once by every way that is open, and gives how many: for a stop.
+
+        Raises:
+            PolicyError: It is no stop, and the policy does not allow it.
+        """
+        command = Publish(topic=topic, type=self._types.get(topic, ""), message=message)
+        if _is_stop(command):
+            n_ways = self._connection.publish_everywhere(topic, message)
+            self._note_stop(command)
+            return n_ways
+        objection = self._objection_unseen(command)
+        permit = self._guard.clear(command, robot_s=self._now_s(), objection=objection)
+        n_ways = self._connection.publish_everywhere(topic, message)
+        self._guard.note_result(permit, f"by {n_ways} ways", robot_s=self._now_s())
+        return n_ways
+
+    async def call_service(
+        self,
+        service: str,
+        arguments: Mapping[str, Any] | None = None,
+        *,
+        type_name: str | None = None,
+        timeout_s: float | None = None,
+    ) -> dict[str, Any]:
+        """Gives what a service answers that the policy allows to be called.
+
+        Raises:
+            PolicyError: It does not.
+        """
+        command = Call(service=service, type=type_name or "", arguments=arguments or {})
+        answer = self._connection.call_service(
+            service, arguments, type_name=type_name, timeout_s=timeout_s
+        )
+        if _is_stop(command):
+            self._note_stop(command)
+            return await answer
+        return await self._guarded(command, answer)
+
+    async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
+        """Sends a goal to an action of ROS 2 that the policy allows.
+
+        Raises:
+            PolicyError: It does not.
+        """
+        command = Act(
+            action=action,
+            type=type_name,
+            goal=arguments,
+            true_type=await self._fetch_action_type(action),
+        )
+        return await self._send(
+            command, self._connection.send_goal(action, arguments, type_name=type_name)
+        )
+
+    async def _send(self, command: Act, work: Coroutine[Any, Any, T]) -> T:
+        """Send the goal of an action that the policy allows, when its poses are goals."""
+        objection = None
+        try:
+            # What is denied anyway needs no look at the map.
+            if self._planner is not None and not is_name_denied(command, self._guard.policy):
+                objection = await self._planner.judge_message(command.goal)
+        except BaseException:
+            work.close()
+            raise
+        return await self._guarded(command, work, objection)
+
+    async def _fetch_action_type(self, action: str) -> str:
+        """Return an action's type as the robot says; empty when it does not tell it."""
+        with suppress(LinkError):
+            return await self._connection.fetch_action_type(action)
+        return ""
+
+    async def set_parameter(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401
+        """Sets a node's parameter that the policy allows to be set.
+
+        Raises:
+            PolicyError: It does not.
+        """
+        command = SetParameter(node=node, name=name, value=value)
+        await self._guarded(command, self._connection.set_parameter(node, name, value))
+
+    def check_name(self, command: Command) -> None:
+        """Returns when a command is not denied for its name, whatever else it says.
+
+        Raises:
+            PolicyError: It is.
+        """
+        is_stop = isinstance(command, Publish | Call) and _is_stop(command)
+        if not is_stop and is_name_denied(command, self._guard.policy):
+            self._guard.clear(command, robot_s=self._now_s())
+
+    def _watch_over(self, command: Publish, objection: Refused | None) -> None:
+        """Lets the robot be watched that is about to be driven by a velocity."""
+        is_velocity = _is_velocity(command.type)
+        if self._by_hand is None or objection is not None or not is_velocity:
+            return
+        zero = zero_velocity_of(command.message)
+        self._by_hand.begin(
+            command.topic,
+            publish_zero=lambda: self._connection.publish_everywhere(command.topic, zero),
+        )
+
+    def _objection_unseen(self, command: Publish) -> Refused | None:
+        """Return what is against a velocity when there is no time to look for the robot."""
+        is_free = self._by_hand is None or not self._by_hand.knows_areas
+        if is_free or not any(find_speeds(command.message)):
+            return None
+        return refuse_velocity("A velocity goes out by all ways at once only when it is zero.")
+
+    async def _guarded(
+        self, command: Command, work: Coroutine[Any, Any, T], objection: Refused | None = None
+    ) -> T:
+        """Does what was decided to be allowed, and notes how it ended."""
+        try:
+            permit = self._guard.clear(command, robot_s=self._now_s(), objection=objection)
+        except BaseException:
+            work.close()
+            raise
+        said = "given up"
+        try:
+            result = await work
+            said = "done"
+        finally:
+            self._guard.note_result(permit, said, robot_s=self._now_s())
+        return result
+
+    def _note_stop(self, command: Publish | Call) -> None:
+        if self._by_hand is not None and isinstance(command, Publish):
+            self._by_hand.end(command.topic)
+        name = command.service if isinstance(command, Call) else command.topic
+        said = f"zero velocity, or the end of a goal, on {name}"
+        self._guard.note_event("stop", said, robot_s=self._now_s())
+
+    # --- what ends something: never refused ---
+
+    def cancel_goal(self, goal: ActionGoal) -> None:
+        """Asks for the end of a goal that the server has taken; its `end` tells if that worked."""
+        self._connection.cancel_goal(goal)
+        self._guard.note_event("stop", f"cancelled {goal.goal_id}", robot_s=self._now_s())
+
+    def give_up_goal(self, goal: ActionGoal) -> None:
+        """Lets a goal without a sign of life hold up nothing; what is heard of it is told on."""
+        self._connection.give_up_goal(goal)
+
+    def clear_the_way(self) -> None:
+        """Makes sure that what is sent next is not held up by what was sent before."""
+        self._connection.clear_the_way()
+
+    # --- what reads ---
+
+    @property
+    def is_open(self) -> bool:
+        """True when something can be sent at once."""
+        return self._connection.is_open
+
+    @property
+    def connected_for_s(self) -> float | None:
+        """Since when topics and goals have been connected, in wall time; None while not."""
+        return self._connection.connected_for_s
+
+    @property
+    def lost_for_s(self) -> float | None:
+        """Since when the connection has been lost, in wall time; None while there is one."""
+        return self._connection.lost_for_s
+
+    @property
+    def link(self) -> LinkName:
+        """How we are connected."""
+        return self._connection.link
+
+    @property
+    def own_ends(self) -> OwnEnds:
+        """What of the system is our own doing."""
+        return self._connection.own_ends
+
+    @property
+    def started(self) -> Started:
+        """Everything that was started over this connection."""
+        return self._connection.started
+
+    def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        """Runs something in the background until the connection is closed."""
+        self._connection.start_soon(work)
+
+    async def wait_until_connected(self) -> None:
+        """Returns at once, or when the connection is open again."""
+        await self._connection.wait_until_connected()
+
+    def subscribe(
+        self,
+        topic: str,
+        *,
+        type_name: str | None = None,
+        is_bulky: bool = False,
+        throttle_ms: int = 0,
+    ) -> Subscription:
+        """Gives the subscription to a topic, which is begun where there is none yet."""
+        return self._connection.subscribe(
+            topic, type_name=type_name, is_bulky=is_bulky, throttle_ms=throttle_ms
+        )
+
+    def unsubscribe(self, subscription: Subscription) -> None:
+        """Ends one use of a subscription; the last one ends it at the robot too."""
+        self._connection.unsubscribe(subscription)
+
+    def renew(self, subscription: Subscription) -> None:
+        """Subscribes again, perhaps in another way: a latched message may have been missed."""
+        self._connection.renew(subscription)
+
+    def advertise(self, topic: str, *, type_name: str) -> None:
+        """Says that we will publish; the robot needs a moment until it listens.
+
+        Raises:
+            PolicyError: The policy forbids the topic: the robot must not even hear of it.
+        """
+        command = Publish(topic=topic, type=type_name, message={})
+        self.check_name(read_action_goal(command) or command)
+        self._types[topic] = type_name
+        self._connection.advertise(topic, type_name=type_name)
+
+    def unadvertise(self, topic: str) -> None:
+        """Takes back what `advertise` said; does nothing for what was not advertised."""
+        self._connection.unadvertise(topic)
+
+    def advertise_late(self) -> None:
+        """Tells the robot of what is advertised from now on only with the first message there."""
+        self._connection.advertise_late()
+
+    def advertise_early(self) -> None:
+        """Tells the robot at once of all that is advertised, now and from now on."""
+        self._connection.advertise_early()
+
+    async def fetch_graph(self) -> RosGraph:
+        """Gives the topics and actions there are."""
+        return await self._connection.fetch_graph()
+
+    async def fetch_topics(self) -> Mapping[str, str]:
+        """Gives the type of each topic."""
+        return await self._connection.fetch_topics()
+
+    async def fetch_time_s(self) -> float | None:
+        """Gives robot time; None where the robot does not say."""
+        return await self._connection.fetch_time_s()
+
+    async def fetch_nodes(self) -> tuple[str, ...]:
+        """Gives the full names of all nodes, in their order."""
+        return await self._connection.fetch_nodes()
+
+    async def fetch_node(self, node: str) -> NodeLinks:
+        """Gives what a node publishes, subscribes to and serves."""
+        return await self._connection.fetch_node(node)
+
+    async def fetch_publishers(self, topic: str) -> tuple[str, ...]:
+        """Gives the nodes that publish on a topic."""
+        return await self._connection.fetch_publishers(topic)
+
+    async def fetch_subscribers(self, topic: str) -> tuple[str, ...]:
+        """Gives the nodes that listen to a topic."""
+        return await self._connection.fetch_subscribers(topic)
+
+    async def fetch_services(self) -> tuple[str, ...]:
+        """Gives the full names of all services, in their order."""
+        return await self._connection.fetch_services()
+
+    async def fetch_service_type(self, service: str) -> str:
+        """Gives a service's type, as "package/Type"."""
+        return await self._connection.fetch_service_type(service)
+
+    async def fetch_action_type(self, action: str) -> str:
+        """Gives an action's type, as "package/Type"."""
+        return await self._connection.fetch_action_type(action)
+
+    async def fetch_definitions(self, type_name: str) -> Mapping[str, str]:
+        """Gives the .msg texts of a type and of every type within it."""
+        return await self._connection.fetch_definitions(type_name)
+
+    async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
+        """Gives the names of a node's parameters; ROS 1 keeps them below the node's name."""
+        return await self._connection.fetch_parameter_names(node)
+
+    async def fetch_parameter(self, node: str, name: str) -> Any:  # noqa: ANN401 - any YAML value
+        """Gives the value of a node's parameter; None where it is not set."""
+        return await self._connection.fetch_parameter(node, name)
+
+
+def _is_stop(command: Publish | Call) -> bool:
+    """True for a velocity of zero, and for what cancels goals in ROS 1 and ROS 2."""
+    if isinstance(command, Call):
+        # The name is asked for too: a type is what the caller says, and some links do not check it.
+        is_cancel = not command.type or CANCEL_SERVICE_TYPE.fullmatch(command.type) is not None
+        return is_cancel and command.service.endswith("/_action/cancel_goal")
+    if CANCEL_TYPE.fullmatch(command.type) and command.topic.endswith("/cancel"):
+        return True
+    # Only types that hold nothing else: an odometry with a speed of zero is no stop.
+    return _is_velocity(command.type) and is_zero_velocity(command.message)
+
+
+def _is_velocity(type_name: str) -> bool:
+    return VELOCITY_TYPE.fullmatch(type_name) is not None

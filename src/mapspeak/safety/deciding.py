@@ -1,0 +1,267 @@
+"""Whether a command may go to the robot: one pure function over values."""
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from mapspeak.installation import shell_command
+from mapspeak.places.goalcheck import GoalCheck, GoalVerdict
+from mapspeak.ros.messages import bare_type
+from mapspeak.safety.commands import (
+    Act,
+    Call,
+    Command,
+    Drive,
+    Publish,
+    SetParameter,
+    say_command,
+)
+from mapspeak.safety.hold import say_hold
+from mapspeak.safety.policy import RATE_KEYS, Policy
+
+__all__ = [
+    "Allowed",
+    "Decision",
+    "NeedsApproval",
+    "Refused",
+    "Situation",
+    "decide",
+    "find_speeds",
+    "is_name_denied",
+    "judge_check",
+]
+
+MOST_NESTED = 8
+"""No message of speeds is nested deeper; what is, is refused unread."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Allowed:
+    """The command may go to the robot.
+
+    Attributes:
+        by: The person's word that covers it; empty where none was needed.
+    """
+
+    by: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Refused:
+    """The command must not go to the robot.
+
+    Attributes:
+        rule: The rule's key in policy.yaml, or what else is against it.
+        reason: What is wrong, with the number and the unit.
+        hint: What could be done instead.
+    """
+
+    rule: str
+    reason: str
+    hint: str
+
+    @property
+    def is_of_the_goal(self) -> bool:
+        """True when another goal may be allowed now, and False when no command would be."""
+        return self.rule.startswith("goals")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NeedsApproval:
+    """A person has to agree first.
+
+    Attributes:
+        question: What to ask.
+    """
+
+    question: str
+
+
+Decision = Allowed | Refused | NeedsApproval
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Situation:
+    """What a decision depends on besides the command and the policy.
+
+    Attributes:
+        held_by: Why the robot is held; None where it is not.
+        n_in_last_minute: Commands of this kind that were allowed in the last minute.
+        is_approved: A person has agreed to this command.
+        objection: What is against a velocity or the goal of an action by where it leads.
+    """
+
+    held_by: str | None = None
+    n_in_last_minute: int = 0
+    is_approved: bool = False
+    objection: Refused | None = None
+
+
+def decide(command: Command, *, policy: Policy, situation: Situation) -> Decision:
+    """Decides on a command."""
+    refusals = (
+        _against_everything(policy, situation),
+        _against_name(command, policy),
+        judge_check(command.check, policy) if isinstance(command, Drive) else None,
+        _against_speed(command, policy),
+        situation.objection,
+        _against_rate(command, policy, situation),
+    )
+    refused = next((each for each in refusals if each is not None), None)
+    if refused is not None:
+        return refused
+    if command.kind in policy.approval.kinds and not situation.is_approved:
+        return NeedsApproval(question=f"May the robot {say_command(command)}?")
+    return Allowed()
+
+
+def _against_everything(policy: Policy, situation: Situation) -> Refused | None:
+    if policy.is_read_only:
+        return Refused(
+            rule="read_only",
+            reason="The policy is read-only: nothing may move or change.",
+            hint="Look, measure and remember what you see; a person can change policy.yaml.",
+        )
+    if situation.held_by is not None:
+        return Refused(
+            rule="hold",
+            reason=f"The robot is held: {say_hold(situation.held_by)}.",
+            hint=f"Tell the person at the robot: `{shell_command('release')}` lets it drive again.",
+        )
+    return None
+
+
+def is_name_denied(command: Command, policy: Policy) -> bool:
+    """True when the policy forbids a command for its name, whatever it says."""
+    return _against_name(command, policy) is not None
+
+
+def _against_name(command: Command, policy: Policy) -> Refused | None:
+    patterns = policy.patterns.get(command.kind)
+    if isinstance(command, Drive) or patterns is None:
+        return None
+    name = _name_of(command)
+    denial = patterns.find_denial(name, _types_of(command))
+    if denial is None:
+        return None
+    key, said = f"{command.kind}.{denial.key}", ", ".join(denial.patterns) or "nothing"
+    how = f"change {key}"
+    if denial.key == "usual_denials":
+        opened = json.dumps([*patterns.allow, name], ensure_ascii=False)
+        how = f"open this one name: `{command.kind}: {{allow: {opened}}}`"
+    return Refused(
+        rule=key,
+        reason=f"The policy denies this: {say_command(command)} ({key}: {said}).",
+        hint="To drive use navigate_to, to stop stop_robot. In the file given to mapspeak with "
+        f"--policy a person can {how}.",
+    )
+
+
+def _name_of(command: Publish | Call | Act | SetParameter) -> str:
+    match command:
+        case Publish(topic=name) | Call(service=name) | Act(action=name):
+            return name
+        case SetParameter():
+            return command.full_name
+
+
+def _types_of(command: Publish | Call | Act | SetParameter) -> tuple[str, ...]:
+    """Return the types that a command is known by, as they were written and as "package/Type"."""
+    types: tuple[str, ...] = ()
+    match command:
+        case Act():
+            types = (command.type, command.true_type)
+        case Publish() | Call():
+            types = (command.type,)
+        case SetParameter():
+            pass
+    return tuple({form for each in types if each for form in (each, bare_type(each))})
+
+
+def judge_check(check: GoalCheck, policy: Policy) -> Refused | None:
+    """Return what is against a goal by what the map says of it; None when nothing is."""
+    always = (GoalVerdict.NOT_FINITE, GoalVerdict.CLOSED)
+    if not check.is_ok and (policy.needs_known_way or check.verdict in always):
+        return Refused(rule="goals", reason=check.sentence, hint=_what_instead(check))
+    if check.path_m is not None and check.path_m > policy.farthest_m:
+        return Refused(
+            rule="goals.farthest_m",
+            reason=f"The goal is {check.path_m:.1f} m away, the policy allows "
+            f"{policy.farthest_m:.1f} m.",
+            hint="Choose a nearer goal, and go on from there.",
+        )
+    return None
+
+
+def _what_instead(check: GoalCheck) -> str:
+    near = check.nearest
+    if near is None:
+        return "No place near it works either; call look_at_map and choose another one."
+    return f"The nearest pose that works is x={near.x:.2f}, y={near.y:.2f}."
+
+
+def _against_speed(command: Command, policy: Policy) -> Refused | None:
+    if not isinstance(command, Publish):
+        return None
+    limits = {
+        "linear": ("A linear speed", "linear_mps", "m/s"),
+        "angular": ("An angular speed", "angular_radps", "rad/s"),
+        "speed": ("A speed", "linear_mps", "m/s"),
+    }
+    for part, speed in find_speeds(command.message):
+        name, key, unit = limits[part]
+        most: float = getattr(policy.speeds, key)
+        # Written so that what is no number is refused too.
+        if not speed <= most:
+            return Refused(
+                rule=f"speed.{key}",
+                reason=f"{name} of {speed:g} {unit} is above the limit, {most:g} {unit}.",
+                hint=f"Publish at most {most:g} {unit}; a person can change speed.{key} in "
+                "policy.yaml.",
+            )
+    return None
+
+
+def find_speeds(value: object, depth: int = 0) -> Iterator[tuple[str, float]]:
+    """Finds speeds anywhere in a message: of Twist, TwistStamped, and drives with a speed."""
+    if depth > MOST_NESTED:
+        yield "linear", math.nan
+    elif isinstance(value, Mapping):
+        for key, inner in value.items():
+            if key in ("linear", "angular") and isinstance(inner, Mapping):
+                yield key, _length_of(inner)
+            elif key == "speed":
+                yield key, abs(_number(inner))
+            else:
+                yield from find_speeds(inner, depth + 1)
+    elif isinstance(value, (list, tuple)):
+        for inner in value:
+            yield from find_speeds(inner, depth + 1)
+
+
+def _length_of(vector: Mapping[str, Any]) -> float:
+    return math.sqrt(sum(_number(part) ** 2 for part in vector.values()))
+
+
+def _number(value: object) -> float:
+    """Gives a finite number as it is, and what is none as NaN."""
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    try:
+        return float(value) if is_number else math.nan  # type: ignore[arg-type]
+    except OverflowError:
+        return math.inf
+
+
+def _against_rate(command: Command, policy: Policy, situation: Situation) -> Refused | None:
+    most = policy.rates.get(command.kind)
+    if most is None or situation.n_in_last_minute < most:
+        return None
+    key = f"rates.{RATE_KEYS[command.kind]}"
+    return Refused(
+        rule=key,
+        reason=f"{situation.n_in_last_minute} commands of the kind {command.kind} were given in "
+        f"the last minute, the policy allows {most}.",
+        hint=f"Wait, or do more with each command; a person can change {key} in policy.yaml.",
+    )

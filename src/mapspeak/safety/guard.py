@@ -1,0 +1,223 @@
+"""The one door that every command passes on its way to a robot: decided, noted, counted."""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+
+from mapspeak.errors import GoalError, PolicyError
+from mapspeak.installation import shell_command
+from mapspeak.safety.approvals import Approvals
+from mapspeak.safety.audit import AuditLog
+from mapspeak.safety.caller import Caller, current_caller
+from mapspeak.safety.commands import Command, Drive
+from mapspeak.safety.deciding import (
+    Allowed,
+    Decision,
+    NeedsApproval,
+    Refused,
+    Situation,
+    decide,
+)
+from mapspeak.safety.errands import Errand, Errands, current_errand
+from mapspeak.safety.hold import Hold
+from mapspeak.safety.policy import Otherwise, Policy
+from mapspeak.safety.rates import RateLog
+
+__all__ = ["ApprovalNeededError", "Guard", "Permit"]
+
+logger = logging.getLogger(__name__)
+
+
+class ApprovalNeededError(PolicyError):
+    """A person has to agree first.
+
+    Attributes:
+        question: What to ask.
+        wish_id: What to grant when the person agrees.
+    """
+
+    def __init__(self, question: str, *, wish_id: str, hint: str) -> None:
+        super().__init__(f"A person must agree first. {question}", hint=hint)
+        self.question = question
+        self.wish_id = wish_id
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Permit:
+    """A command that was allowed.
+
+    Attributes:
+        number: Of the command in the audit log.
+        command: The command.
+        caller: Who gave it.
+    """
+
+    number: int
+    command: Command
+    caller: Caller
+
+
+@dataclass(slots=True, kw_only=True)
+class Guard:
+    """Holds commands to a policy; every wrapper of a port asks the same one.
+
+    Attributes:
+        policy: What commands are held to.
+        audit: Where all of them are noted.
+        hold: What keeps the robot standing.
+        approvals: What waits for a person's word.
+        wall_clock: The operator's.
+        robot: What the operator calls it; empty leaves that to the robot.
+    """
+
+    policy: Policy
+    audit: AuditLog
+    hold: Hold
+    approvals: Approvals
+    wall_clock: Callable[[], datetime]
+    robot: str = ""
+    _rates: RateLog = field(default_factory=RateLog)
+    _errands: Errands = field(default_factory=Errands)
+
+    def clear(
+        self, command: Command, *, robot_s: float, objection: Refused | None = None
+    ) -> Permit:
+        """Allows a command, and notes that; between this and the command nothing may wait.
+
+        Args:
+            command: What is wanted.
+            robot_s: Robot time.
+            objection: What is against it by where it leads.
+
+        Raises:
+            ApprovalNeededError: A person has to agree first.
+            GoalError: The robot must not drive there; another goal may do.
+            PolicyError: It is not allowed, or could not be noted.
+        """
+        caller = current_caller()
+        permit = Permit(number=self.audit.next_number(), command=command, caller=caller)
+        decision = self._decide(command, caller, robot_s, objection)
+        verdict, said = _say_decision(decision)
+        self._note("decision", permit, robot_s=robot_s, verdict=verdict, said=said)
+        match decision:
+            case Refused(reason=reason, hint=hint):
+                kind_of_error = GoalError if decision.is_of_the_goal else PolicyError
+                raise kind_of_error(reason, hint=hint)
+            case NeedsApproval(question=question):
+                raise self._ask(command, question, caller)
+            case Allowed():
+                self._rates.note(command.kind, robot_s)
+        return permit
+
+    def note_result(self, permit: Permit, said: str, *, robot_s: float) -> None:
+        """Notes what the robot answered to a command that was allowed."""
+        self._note_after("result", permit, robot_s=robot_s, said=said)
+
+    def note_end(self, permit: Permit, said: str, *, robot_s: float) -> None:
+        """Notes how something that took a while has ended."""
+        self._note_after("ended", permit, robot_s=robot_s, said=said)
+
+    def note_leg(self, permit: Permit, said: str, *, robot_s: float) -> None:
+        """Notes that the robot is sent on within a drive that was allowed.
+
+        Raises:
+            PolicyError: The line could not be written.
+        """
+        self._note("leg", permit, robot_s=robot_s, said=said)
+
+    def note_event(self, event: str, said: str, *, robot_s: float) -> None:
+        """Notes what is no command: a stop, a hold. It never fails: stopping goes first."""
+        try:
+            self.audit.write(
+                event,
+                number=self.audit.next_number(),
+                caller=current_caller(),
+                robot_s=robot_s,
+                said=said,
+            )
+        except PolicyError as error:
+            logger.error("%s", error)  # noqa: TRY400 - it says all there is to say
+
+    def _decide(
+        self, command: Command, caller: Caller, robot_s: float, objection: Refused | None
+    ) -> Decision:
+        situation = replace(self._situation(command, robot_s), objection=objection)
+        decision = decide(command, policy=self.policy, situation=situation)
+        if not isinstance(decision, NeedsApproval):
+            return decision
+        errand = _errand_of(command)
+        if errand is None:
+            wish_id = self.approvals.take_word(command, client=caller.client)
+        else:
+            wish_id = self._take_part(errand, caller.client, robot_s)
+            decision = NeedsApproval(question=_ask_for(errand))
+        if wish_id is None:
+            return decision
+        return Allowed(by=wish_id if errand is None else f"{wish_id}: {errand.said}")
+
+    def _take_part(self, errand: Errand, client: str, robot_s: float) -> str | None:
+        """Gives the word that covers another drive of an errand; None where none does any more."""
+        wish_id = self._errands.take_drive(errand, client=client, robot_s=robot_s)
+        if wish_id is not None:
+            return wish_id
+        wish_id = self.approvals.take_word(errand, client=client)
+        if wish_id is None:
+            return None
+        self._errands.begin(errand, client=client, wish_id=wish_id, robot_s=robot_s)
+        return self._errands.take_drive(errand, client=client, robot_s=robot_s)
+
+    def end_errands(self) -> None:
+        """Lets a person be asked again for what is left of errands: the robot was stopped."""
+        self._errands.end_all()
+
+    def _situation(self, command: Command, robot_s: float) -> Situation:
+        n_lately = self._rates.count(command.kind, robot_s)
+        return Situation(held_by=self.hold.read(), n_in_last_minute=n_lately)
+
+    def _ask(self, command: Command, question: str, caller: Caller) -> ApprovalNeededError:
+        wish_id = self.approvals.ask(_errand_of(command) or command, client=caller.client)
+        hint = "The client cannot ask anybody: tell the person that the policy wants their word."
+        if self.policy.approval.otherwise is Otherwise.QUEUE:
+            self.approvals.queue(wish_id)
+            hint = f"Call again once a person has typed `{shell_command(f'approve {wish_id}')}`."
+        return ApprovalNeededError(question, wish_id=wish_id, hint=hint)
+
+    def _note(
+        self, event: str, permit: Permit, *, robot_s: float, verdict: str = "", said: str
+    ) -> None:
+        self.audit.write(
+            event,
+            number=permit.number,
+            caller=permit.caller,
+            robot_s=robot_s,
+            command=permit.command,
+            verdict=verdict,
+            said=said,
+        )
+
+    def _note_after(self, event: str, permit: Permit, *, robot_s: float, said: str) -> None:
+        """Notes what has happened already: an error here could only hide it."""
+        try:
+            self._note(event, permit, robot_s=robot_s, said=said)
+        except PolicyError as error:
+            logger.error("%s", error)  # noqa: TRY400 - it says all there is to say
+
+
+def _say_decision(decision: Decision) -> tuple[str, str]:
+    match decision:
+        case Refused(rule=rule, reason=reason):
+            return "refused", f"{rule}: {reason}"
+        case NeedsApproval(question=question):
+            return "needs approval", question
+        case Allowed(by=by):
+            return "allowed", f"by approval {by}" if by else ""
+
+
+def _errand_of(command: Command) -> Errand | None:
+    """Gives what a drive is a part of; None for one that is for itself, and for other commands."""
+    return current_errand() if isinstance(command, Drive) else None
+
+
+def _ask_for(errand: Errand) -> str:
+    return f"May the robot {errand.said}? The limits of its policy stay."

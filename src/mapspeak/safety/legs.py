@@ -1,0 +1,144 @@
+"""A drive round closed areas in legs, for a robot whose own navigation knows nothing of them."""
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from mapspeak.geometry import Point, Pose
+from mapspeak.safety.monitor import KEEP_M
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.paths import Path, find_path
+from mapspeak.worldmodel.closures import MARGIN_M, ClosedArea, distance_to_line
+from mapspeak.worldmodel.revision import MapRevision
+
+__all__ = ["plan_legs"]
+
+STEP_M = 0.1
+STRAY_M = 0.03
+"""So far the legs may lead off the way that was found: a part of the margin around areas."""
+SHORTEST_M = 0.5
+BOW_M = 1.0
+"""From areas farther off than this a leg needs no second look: no robot leaves a line so far."""
+AROUND_M = 2.0
+LEAVING_M = 0.01
+"""A robot that stands too near may come no nearer than by the noise of its pose."""
+
+
+def plan_legs(revision: MapRevision, here: Point, goal: Pose) -> tuple[Pose, ...]:
+    """Gives the poses to drive to one after the other, the goal last.
+
+    The robot's own navigation is expected to go the shortest way over the floor as it knows it.
+    Where that is clear of areas, and of hindrances that can be avoided, it gets the goal alone;
+    else the corners of the way round them.
+    """
+    if not (revision.areas or revision.hindrances):
+        return (goal,)
+    reach_m = revision.radius_m + MARGIN_M
+    expected = revision.open.distances_from(here).path_to(goal.point)
+    if expected is not None and not _is_clear(expected.points, revision.areas, reach_m):
+        expected = None
+    if expected is not None and not _find_crossed(revision, expected):
+        return (goal,)
+    way = revision.find_path(here, goal.point)
+    if way is None:
+        return (goal,)
+    if expected is not None and _find_crossed(revision, expected) <= _find_crossed(revision, way):
+        # The robot's own way is no worse than ours.
+        return (goal,)
+    corners = _split(revision, _simplify(way.points))[1:-1]
+    ends = [*corners[1:], goal.point]
+    return (
+        *(
+            Pose(corner.x, corner.y, corner.bearing_to(end))
+            for corner, end in zip(corners, ends, strict=False)
+        ),
+        goal,
+    )
+
+
+def _find_crossed(revision: MapRevision, way: Path) -> set[int]:
+    """Gives the numbers of the hindrances that a way leads over."""
+    return {n for n, each in enumerate(revision.hindrances) if each.is_crossed_by(way)}
+
+
+def _simplify(points: Sequence[Point]) -> list[Point]:
+    """Leaves points out while the way stays where it was: at each one left the robot stops.
+
+    This is Douglas and Peucker, "Algorithms for the reduction of the number of points required to
+    represent a digitized line or its caricature" (1973).
+    """
+    start, end = points[0], points[-1]
+    off_m = [distance_to_line(each, start, end) for each in points[1:-1]]
+    if not off_m or max(off_m) <= STRAY_M:
+        return [start, end]
+    farthest = off_m.index(max(off_m)) + 1
+    return [*_simplify(points[: farthest + 1])[:-1], *_simplify(points[farthest:])]
+
+
+def _split(revision: MapRevision, points: Sequence[Point]) -> list[Point]:
+    """Makes legs shorter by which a robot that keeps off walls would come too near to an area."""
+    split = [points[0]]
+    for start, end in itertools.pairwise(points):
+        n_parts = _count_parts(revision, start, end)
+        split += [_between(start, end, part / n_parts) for part in range(1, n_parts)]
+        split.append(end)
+    return split
+
+
+def _count_parts(revision: MapRevision, start: Point, end: Point) -> int:
+    """Gives into how many parts a leg is cut, until the robot goes clear or they are short."""
+    reach_m = revision.radius_m + KEEP_M + STRAY_M
+    near = [
+        area
+        for area in revision.areas
+        if min(map(area.distance_to, _steps((start, end)))) < reach_m + BOW_M
+    ]
+    n_parts = 1
+    while near and start.distance_to(end) / n_parts > SHORTEST_M:
+        ends = [_between(start, end, part / n_parts) for part in range(n_parts + 1)]
+        if all(_goes_clear(revision, near, pair, reach_m) for pair in itertools.pairwise(ends)):
+            break
+        n_parts *= 2
+    return n_parts
+
+
+def _goes_clear(
+    revision: MapRevision, areas: Sequence[ClosedArea], ends: tuple[Point, Point], reach_m: float
+) -> bool:
+    """True when the robot is expected to keep off areas by its own way from one end to another."""
+    way = find_path(_crop_around(revision.grid, ends), *ends, radius_m=revision.radius_m)
+    return way is None or _is_clear(way.points, areas, reach_m)
+
+
+def _crop_around(grid: OccupancyGrid, ends: tuple[Point, Point]) -> OccupancyGrid:
+    """Gives the part of the map on which a way between two near places is looked for."""
+    rows, cols = grid.cells_at(np.array([[each.x, each.y] for each in ends]))
+    n = math.ceil(AROUND_M / grid.resolution_m)
+    low_row, low_col = max(int(rows.min()) - n, 0), max(int(cols.min()) - n, 0)
+    return grid.crop(
+        slice(low_row, int(rows.max()) + n + 1), slice(low_col, int(cols.max()) + n + 1)
+    )
+
+
+def _is_clear(points: Sequence[Point], areas: Sequence[ClosedArea], reach_m: float) -> bool:
+    """True when a way keeps off all areas, or leads away from one that it begins too near to."""
+    for area in areas:
+        least_m = min(area.distance_to_border(points[0]) - LEAVING_M, reach_m)
+        along = (area.distance_to_border(each) for each in _steps(points))
+        if area.contains(points[0]) or any(off_m < least_m for off_m in along):
+            return False
+    return True
+
+
+def _steps(points: Sequence[Point]) -> Iterator[Point]:
+    """Gives points along a way, close together."""
+    for start, end in itertools.pairwise(points):
+        n_steps = max(math.ceil(start.distance_to(end) / STEP_M), 1)
+        for step in range(1, n_steps + 1):
+            yield _between(start, end, step / n_steps)
+
+
+def _between(start: Point, end: Point, share: float) -> Point:
+    return Point(start.x + share * (end.x - start.x), start.y + share * (end.y - start.y))

@@ -1,0 +1,181 @@
+"""What is watched while a robot moves: closed areas ahead, and a goal that went bad."""
+
+import math
+from collections.abc import Sequence
+from enum import StrEnum
+
+from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.worldmodel.closures import ClosedArea
+from mapspeak.worldmodel.revision import MapRevision
+
+__all__ = [
+    "BRAKING_MPS2",
+    "KEEP_M",
+    "REACTION_S",
+    "GoalMonitor",
+    "KeepOutMonitor",
+    "Mover",
+    "find_entered",
+]
+
+OCCUPIED_FOR_S = 5.0
+"""A person who walks over the goal does not spoil it."""
+REACTION_S = 0.2
+"""Between a look at the pose and the wheels' answer to a stop."""
+BRAKING_MPS2 = 1.0
+KEEP_M = 0.05
+"""What a stop leaves between the robot's edge and an area; less than ways and goals leave."""
+WAVER_M = 0.01
+"""By so much the pose of a robot that stands differs from one look to the next."""
+LEAST_STEP_S = 0.05
+LOST_TRACK_S = 2.0
+"""What lies longer ago says nothing about how fast the robot drives now."""
+FASTEST_MPS = 5.0
+"""What seems to go faster was not driven: localisation has corrected itself."""
+N_STEPS = 8
+"""At so many places of the way to a stand is looked how near the areas are."""
+
+
+class Mover(StrEnum):
+    """What moves a robot, in words."""
+
+    NAVIGATION = "its own navigation"
+    VELOCITY = "a published velocity"
+    OTHERS = "something that mapspeak did not start"
+
+
+ADVICE = {
+    Mover.NAVIGATION: "Lead it round by goals on the way.",
+    Mover.VELOCITY: "Drive it away from there, or use navigate_to, which leads round.",
+    Mover.OTHERS: "Find out what drives it: another client's goal, or velocities of its own.",
+}
+
+
+class GoalMonitor:
+    """Watches whether a drive's goal still is one; it only judges what it is told.
+
+    Args:
+        goal: Where the drive leads.
+        radius_m: Of the robot.
+    """
+
+    def __init__(self, *, goal: Pose, radius_m: float) -> None:
+        self._goal = goal
+        self._radius_m = radius_m
+        self._occupied_since_s: float | None = None
+
+    def judge(self, revision: MapRevision, *, now_s: float) -> str | None:
+        """Return why the goal is no longer a goal; None while it is one."""
+        here = self._goal.point
+        # The way to the goal was checked; only what closes or fills up since then matters here.
+        near = (area for area in revision.areas if area.distance_to(here) < self._radius_m)
+        area = next(near, None)
+        if area is not None:
+            return f"The goal now lies in the {area.title}; the robot was stopped."
+        cell = revision.grid.cell_at(here)
+        is_off = not revision.grid.contains(cell)
+        if not is_off and not revision.grid.occupied[cell.row, cell.col]:
+            self._occupied_since_s = None
+            return None
+        self._occupied_since_s = now_s if self._occupied_since_s is None else self._occupied_since_s
+        if now_s - self._occupied_since_s < OCCUPIED_FOR_S:
+            return None
+        what = "is off the map now" if is_off else "has an obstacle on it now"
+        return f"The map has changed: the goal {what}; the robot was stopped."
+
+
+class KeepOutMonitor:
+    """Watches a robot, whatever moves it, for the closed areas ahead; judges what it is told."""
+
+    def __init__(self) -> None:
+        self._before: tuple[Pose, float] | None = None
+        self._least_m: dict[ClosedArea, float] = {}
+
+    def begin_at(self, here: Pose, *, now_s: float) -> None:
+        """Begin anew where the robot stands: what it came too near to before is forgotten."""
+        self._before = (here, now_s)
+        self._least_m = {}
+
+    def judge(self, revision: MapRevision, here: Pose, *, now_s: float, mover: Mover) -> str | None:
+        """Return which closed area the robot is about to enter; None when it enters none.
+
+        One that stands too near may drive along the area and away, and no nearer.
+        """
+        way = (here.point, *self._find_way_to_stand(here, now_s))
+        for area in revision.areas:
+            left_m = area.distance_to_border(here.point)
+            least_m = self._find_least(area, min(revision.radius_m + KEEP_M, left_m - WAVER_M))
+            if any(area.distance_to_border(each) < least_m for each in way):
+                edge_m = max(left_m - revision.radius_m, 0.0)
+                return (
+                    f"The robot was stopped {edge_m:.2f} m before the {area.title}: "
+                    f"{mover} was about to drive into it. {ADVICE[mover]}"
+                )
+        return None
+
+    def _find_least(self, area: ClosedArea, least_m: float) -> float:
+        """Return how near to an area the robot's centre may come: as near as it is, if too near."""
+        self._least_m[area] = max(least_m, self._least_m.get(area, least_m))
+        return self._least_m[area]
+
+    def _find_way_to_stand(self, here: Pose, now_s: float) -> tuple[Point, ...]:
+        """Return the way that the robot would still go if the next look told it to stop."""
+        before, self._before = self._before, (here, now_s)
+        if before is None:
+            return ()
+        then, then_s = before
+        passed_s = now_s - then_s
+        if passed_s < LEAST_STEP_S:
+            self._before = before
+            return ()
+        moved_m = then.point.distance_to(here.point)
+        if passed_s > LOST_TRACK_S or moved_m <= WAVER_M:
+            return ()
+        speed_mps = moved_m / passed_s
+        if speed_mps > FASTEST_MPS:
+            return ()
+        # The next look is as far away as the last one was.
+        further_m = speed_mps * (passed_s + REACTION_S + speed_mps / (2 * BRAKING_MPS2))
+        turned_rad = _find_turn(then, here)
+        heading_rad = then.point.bearing_to(here.point) + turned_rad / 2
+        return _follow_arc(here.point, heading_rad, turned_rad / moved_m, further_m)
+
+
+def find_entered(
+    areas: Sequence[ClosedArea], here: Point, way: Sequence[Point], *, radius_m: float
+) -> ClosedArea | None:
+    """Finds the area that a robot would come too near to on a way; it may always drive away."""
+    for area in areas:
+        least_m = min(radius_m + KEEP_M, area.distance_to_border(here) - WAVER_M)
+        if any(area.distance_to_border(each) < least_m for each in way):
+            return area
+    return None
+
+
+def _find_turn(then: Pose, here: Pose) -> float:
+    """Gives by how much a robot turned as it drove, without what it turned on the spot before.
+
+    At the end of an arc it looks half the turn away from the chord, and after a turn on the spot
+    along it.
+    """
+    turned_rad = wrap_angle(here.yaw_rad - then.yaw_rad)
+    off_rad = wrap_angle(here.yaw_rad - then.point.bearing_to(here.point))
+    if abs(off_rad) > math.pi / 2:
+        off_rad = wrap_angle(off_rad + math.pi)
+    low, high = min(turned_rad, 0.0), max(turned_rad, 0.0)
+    return min(max(2 * off_rad, low), high)
+
+
+def _follow_arc(
+    start: Point, heading_rad: float, curvature_radpm: float, length_m: float
+) -> tuple[Point, ...]:
+    """Gives places along a way that goes on turning as it did."""
+    step_m = length_m / N_STEPS
+    points = [start]
+    for number in range(N_STEPS):
+        toward_rad = heading_rad + curvature_radpm * step_m * (number + 0.5)
+        last = points[-1]
+        points.append(
+            Point(last.x + step_m * math.cos(toward_rad), last.y + step_m * math.sin(toward_rad))
+        )
+    return tuple(points[1:])

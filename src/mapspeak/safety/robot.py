@@ -1,0 +1,391 @@
+"""A robot behind the guard: the only one that a session and its tools get."""
+
+import logging
+from collections import OrderedDict
+from dataclasses import replace
+
+import anyio
+
+from mapspeak.errors import ConfigError, LinkError, MapspeakError, PolicyError
+from mapspeak.geometry import Pose
+from mapspeak.robot import (
+    CameraPicture,
+    Detection,
+    GoalState,
+    GoalStatus,
+    RangeScan,
+    Robot,
+    RobotDescription,
+    StampedPose,
+)
+from mapspeak.safety.caller import NOBODY, current_caller
+from mapspeak.safety.commands import Drive, say_command
+from mapspeak.safety.guard import Guard, Permit
+from mapspeak.safety.hold import say_hold
+from mapspeak.safety.monitor import GoalMonitor, KeepOutMonitor, Mover
+from mapspeak.safety.planning import Plan, Planner
+from mapspeak.safety.standing import HoldKeeper, StandingCheck
+from mapspeak.safety.surveying import Surveyor
+from mapspeak.safety.underway import GuardedDrive
+from mapspeak.safety.velocities import HandDriving
+from mapspeak.spatial import OccupancyGrid
+
+__all__ = ["GuardedRobot"]
+
+WATCH_S = 0.1
+"""Robot time between two looks at where a drive leads."""
+EPSILON_S = 1e-6
+BLIND_S = 2.0
+"""Wall time without a pose after which a robot that must keep off some area is stopped."""
+REPEAT_S = 0.5
+"""Wall time between two looks whether a held robot stands."""
+N_KEPT = 200
+
+logger = logging.getLogger(__name__)
+
+
+class GuardedRobot:
+    """A `Robot` that drives only where its policy lets it; stopping is always allowed.
+
+    Args:
+        robot: The robot itself; nobody else may have it.
+        guard: Decides and notes.
+        surveyor: Knows what is closed now.
+        repeat_s: Between two looks whether a held robot stands, in wall time.
+
+    Attributes:
+        planner: Checks goals, and plans the legs to them.
+        by_hand: Knows the velocities that were published.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        *,
+        guard: Guard,
+        surveyor: Surveyor,
+        repeat_s: float = REPEAT_S,
+    ) -> None:
+        self._robot = robot
+        self._guard = guard
+        self._surveyor = surveyor
+        self._drive: GuardedDrive | None = None
+        self._verdicts: OrderedDict[str, GoalStatus] = OrderedDict()
+        self._n_stops = 0
+        self._watching = anyio.Lock()
+        self._stepping = anyio.Lock()
+        self._seen_at_s = float("-inf")
+        self._hold_keeper = HoldKeeper(guard.hold, StandingCheck(robot), repeat_s=repeat_s)
+        self.planner = Planner(robot, surveyor=surveyor, policy=guard.policy)
+        self.by_hand = HandDriving(robot, planner=self.planner, surveyor=surveyor)
+        self._monitor = KeepOutMonitor()
+
+    @property
+    def description(self) -> RobotDescription:
+        """What is fixed about this robot; its radius includes the clearance that it must keep."""
+        bare = self._robot.description
+        return replace(bare, radius_m=bare.radius_m + self._guard.policy.clearance_m)
+
+    @property
+    def now_s(self) -> float:
+        """Robot time."""
+        return self._robot.now_s
+
+    async def sleep(self, duration_s: float) -> None:
+        """Returns when that much robot time has passed; a drive is watched meanwhile."""
+        deadline_s = self.now_s + duration_s
+        while self._is_watched and self.now_s < deadline_s - EPSILON_S:
+            await self._robot.sleep(min(WATCH_S, deadline_s - self.now_s))
+            await self.obey_hold()
+            await self.watch()
+            await self.watch_map()
+        await self._robot.sleep(max(deadline_s - self.now_s, 0.0))
+
+    @property
+    def _is_watched(self) -> bool:
+        return self._drive is not None or self.by_hand.is_under_way or self._surveyor.has_rules
+
+    async def fetch_map(self) -> OccupancyGrid:
+        """Gives the latest map."""
+        return await self._robot.fetch_map()
+
+    async def fetch_pose(self) -> StampedPose:
+        """Gives where the robot believes it is."""
+        return await self._robot.fetch_pose()
+
+    async def fetch_picture(self) -> CameraPicture:
+        """Takes a picture with the front camera."""
+        return await self._robot.fetch_picture()
+
+    async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
+        """Gives how goals stand that others have sent."""
+        return await self._robot.fetch_foreign_goals()
+
+    async def fetch_detections(self) -> tuple[Detection, ...]:
+        """Gives what the robot's own object detector reports in the camera view."""
+        return await self._robot.fetch_detections()
+
+    async def fetch_scan(self) -> RangeScan | None:
+        """Gives what the laser meets now; None without one."""
+        return await self._robot.fetch_scan()
+
+    async def send_goal(self, goal: Pose) -> str:
+        """Starts a drive that the policy allows, and gives the id it is known by.
+
+        Raises:
+            PolicyError: The policy, a hold or a person does not allow it, or it was stopped.
+        """
+        n_stops = self._n_stops
+        plan = await self.planner.plan(goal)
+        permit = self._guard.clear(Drive(goal=goal, check=plan.check), robot_s=self.now_s)
+        if n_stops != self._n_stops:
+            raise self._overtaken(permit)
+        try:
+            robot_goal_id = await self._robot.send_goal(plan.legs[0])
+        except BaseException as error:
+            # Whether the robot took the goal is unknown: it must not drive with nobody knowing.
+            with anyio.CancelScope(shield=True):
+                self._guard.note_result(permit, _say_error(error), robot_s=self.now_s)
+                await self.stop()
+            raise
+        self._take_up(robot_goal_id, plan, permit)
+        if n_stops != self._n_stops:
+            with anyio.CancelScope(shield=True):
+                await self.stop()
+            raise self._overtaken(permit)
+        return robot_goal_id
+
+    async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
+        """Gives how a drive stands; why it was ended here comes before what the robot says."""
+        drive = self._drive
+        if drive is not None and drive.goal_id == robot_goal_id:
+            status = await self._follow(drive)
+        else:
+            status = await self._robot.fetch_goal_status(robot_goal_id)
+        status = self._verdicts.get(robot_goal_id, status)
+        self._note_end(robot_goal_id, status)
+        return status
+
+    async def cancel_goal(self, robot_goal_id: str) -> None:
+        """Asks the navigation to end a drive; never refused."""
+        drive = self._drive
+        leg_id = robot_goal_id
+        if drive is not None and drive.goal_id == robot_goal_id:
+            leg_id = drive.leg_id
+            self._give_up_legs(drive, "It was cancelled.")
+        try:
+            await self._robot.cancel_goal(leg_id)
+        finally:
+            self._guard.note_event("stop", f"cancelled {robot_goal_id}", robot_s=self.now_s)
+
+    async def stop(self) -> None:
+        """Ends every drive and commands zero velocity, at once; never refused."""
+        await self._stop("stopped")
+
+    @property
+    def name(self) -> str:
+        """What the operator calls the robot."""
+        return self._guard.robot or self._robot.description.name
+
+    async def obey_hold(self) -> None:
+        """Stop the robot for a hold, and again when it moves; to be called often, and apart.
+
+        Stops that fail are tried again at the next call.
+        """
+        await self._hold_keeper.obey(self.name, stop=self._stop_for_hold, repeat=self._repeat_stop)
+
+    async def watch(self) -> None:
+        """Stop the robot before it enters a closed area, whatever moves it; to be called often."""
+        async with self._watching:
+            drive = self._drive
+            fault = await self._find_fault(self._mover)
+            if drive is not self._drive:
+                return
+            if fault is None:
+                if drive is not None and drive.legs:
+                    await self._follow(drive)
+            elif drive is not None:
+                await self._end(drive, GoalState.BLOCKED, fault)
+            else:
+                logger.warning("%s", fault)
+                with anyio.CancelScope(shield=True):
+                    await self._stop(fault)
+
+    async def watch_map(self) -> None:
+        """Notice what closes, and stop the robot when its goal is closed or full by now.
+
+        A map may take long to come and to be looked through: `watch` must not wait for it.
+        """
+        drive = self._drive
+        if drive is None and not self._surveyor.has_rules:
+            return
+        try:
+            revision = await self.planner.survey_lately()
+        except LinkError as error:
+            logger.log(
+                logging.DEBUG if drive is None else logging.WARNING,
+                "While watching the map: %s",
+                error,
+            )
+            return
+        if drive is None:
+            return
+        fault = drive.goal_monitor.judge(revision, now_s=self.now_s)
+        if fault is not None and drive is self._drive:
+            await self._end(drive, GoalState.BLOCKED, fault)
+
+    # --- inside ---
+
+    @property
+    def _mover(self) -> Mover:
+        if self._drive is not None:
+            return Mover.NAVIGATION
+        return Mover.VELOCITY if self.by_hand.is_under_way else Mover.OTHERS
+
+    def _take_up(self, robot_goal_id: str, plan: Plan, permit: Permit) -> None:
+        """Begins to look after a drive that the robot has accepted."""
+        self._note_replaced()
+        self._seen_at_s = anyio.current_time()
+        first, *others = plan.legs
+        self._monitor.begin_at(plan.here, now_s=self.now_s)
+        self._drive = GuardedDrive(
+            goal_id=robot_goal_id,
+            leg_id=robot_goal_id,
+            leg=first,
+            legs=others,
+            permit=permit,
+            goal_monitor=GoalMonitor(goal=plan.legs[-1], radius_m=self.description.radius_m),
+        )
+        said = f", in {len(plan.legs)} legs round what is closed" if others else ""
+        self._guard.note_result(permit, f"accepted as {robot_goal_id}{said}", robot_s=self.now_s)
+
+    async def _follow(self, drive: GuardedDrive) -> GoalStatus:
+        """Gives how a drive stands, and sends the robot on where a leg of it has ended."""
+        async with self._stepping:
+            status = await self._robot.fetch_goal_status(drive.leg_id)
+            if status.state is GoalState.ARRIVED and drive.legs and drive is self._drive:
+                further_m = drive.further_m
+                await self._send_on(drive)
+                return GoalStatus(state=GoalState.DRIVING, distance_left_m=further_m)
+        left_m = status.distance_left_m
+        if not drive.legs or left_m is None:
+            return status
+        return replace(status, distance_left_m=left_m + drive.further_m)
+
+    async def _send_on(self, drive: GuardedDrive) -> None:
+        n_stops = self._n_stops
+        if self._guard.hold.read() is not None:
+            return
+        drive.leg = drive.legs.pop(0)
+        said = f"on to ({drive.leg.x:.2f}, {drive.leg.y:.2f})"
+        self._guard.note_leg(drive.permit, said, robot_s=self.now_s)
+        drive.leg_id = await self._robot.send_goal(drive.leg)
+        if n_stops != self._n_stops:
+            with anyio.CancelScope(shield=True):
+                await self.stop()
+
+    async def _find_fault(self, mover: Mover) -> str | None:
+        """Return why the robot must not go on; that nothing can be seen is a reason after a while.
+
+        The blind robot is stopped on a drive of ours only: what others do with it is not known.
+        """
+        revision = self._surveyor.latest
+        if revision is None or not revision.areas:
+            return None
+        try:
+            pose = (await self._robot.fetch_pose()).pose
+        except LinkError as error:
+            blind_s = anyio.current_time() - self._seen_at_s
+            if mover is not Mover.NAVIGATION or blind_s < BLIND_S:
+                return None
+            return f"The robot was stopped: where it is was unknown for {blind_s:.0f} s. {error}"
+        self._seen_at_s = anyio.current_time()
+        fault = self._monitor.judge(revision, pose, now_s=self.now_s, mover=mover)
+        if fault is not None:
+            self._monitor.begin_at(pose, now_s=self.now_s)
+        return fault
+
+    async def _end(self, drive: GuardedDrive, state: GoalState, reason: str) -> None:
+        """Stops the robot and remembers why, whatever its navigation will say of the drive."""
+        self._verdicts[drive.goal_id] = GoalStatus(state=state, reason=reason)
+        logger.warning("%s", reason)
+        with anyio.CancelScope(shield=True):
+            try:
+                await self._stop(reason)
+            except MapspeakError:
+                # It may still drive: nobody may take the drive for ended, and it is stopped again.
+                del self._verdicts[drive.goal_id]
+                raise
+        self._note_end(drive.goal_id, self._verdicts[drive.goal_id])
+
+    async def _stop_for_hold(self, held_by: str) -> None:
+        if self._drive is None:
+            await self._stop("held")
+            return
+        reason = f"The robot is held: {say_hold(held_by)}."
+        await self._end(self._drive, GoalState.CANCELLED, reason)
+
+    async def _repeat_stop(self) -> None:
+        self.by_hand.stand()
+        await self._robot.stop()
+
+    async def _stop(self, why: str) -> None:
+        self._n_stops += 1
+        self._guard.end_errands()
+        if self._drive is not None:
+            self._give_up_legs(self._drive, "The robot was stopped.")
+        try:
+            await self._repeat_stop()
+        except MapspeakError as error:
+            why = f"{why}, but: {error}"
+            raise
+        finally:
+            self._guard.note_event("stop", why, robot_s=self.now_s)
+            self._latch()
+
+    def _latch(self) -> None:
+        """Holds the robot after a client's stop, where the policy says so."""
+        caller = current_caller()
+        if caller is NOBODY or not self._guard.policy.latches_on_stop:
+            return
+        try:
+            at = self._guard.wall_clock()
+            self._guard.hold.put(f"{caller.tool or 'a client'} stopped it", at=at)
+        except ConfigError as error:
+            logger.error("%s", error)  # noqa: TRY400 - it says all there is to say
+
+    def _note_end(self, robot_goal_id: str, status: GoalStatus) -> None:
+        drive = self._drive
+        if drive is None or drive.goal_id != robot_goal_id or not status.state.is_final:
+            return
+        self._drive = None
+        # The robot knows legs by other ids: how the drive ended is known here alone.
+        self._verdicts[robot_goal_id] = status
+        while len(self._verdicts) > N_KEPT:
+            self._verdicts.popitem(last=False)
+        said = f"{status.state}: {status.reason}" if status.reason else str(status.state)
+        self._guard.note_end(drive.permit, said, robot_s=self.now_s)
+
+    def _give_up_legs(self, drive: GuardedDrive, reason: str) -> None:
+        """Ends a drive that was to go on after its present leg: its end is not the goal."""
+        if drive.legs:
+            drive.legs.clear()
+            status = GoalStatus(state=GoalState.CANCELLED, reason=reason)
+            self._verdicts.setdefault(drive.goal_id, status)
+
+    def _note_replaced(self) -> None:
+        if self._drive is not None:
+            status = GoalStatus(state=GoalState.PREEMPTED, reason="A newer goal took its place.")
+            self._note_end(self._drive.goal_id, status)
+
+    def _overtaken(self, permit: Permit) -> PolicyError:
+        what = say_command(permit.command)
+        self._guard.note_result(permit, "given up: the robot was stopped", robot_s=self.now_s)
+        return PolicyError(
+            f"The robot was stopped before it could {what}.",
+            hint="Call navigate_to again when it may drive.",
+        )
+
+
+def _say_error(error: BaseException) -> str:
+    return str(error) if isinstance(error, MapspeakError) else f"given up: {type(error).__name__}"

@@ -1,0 +1,237 @@
+"""Velocities that are published: where they would take the robot, and if it may go there."""
+
+import math
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from typing import Any
+
+import anyio
+
+from mapspeak.errors import LinkError
+from mapspeak.geometry import Point, Pose
+from mapspeak.robot import Robot
+from mapspeak.safety.deciding import Refused, find_speeds
+from mapspeak.safety.monitor import BRAKING_MPS2, REACTION_S, find_entered
+from mapspeak.safety.planning import Planner
+from mapspeak.safety.surveying import Surveyor
+
+__all__ = [
+    "HandDriving",
+    "is_zero_velocity",
+    "publishing_for",
+    "refuse_velocity",
+    "zero_velocity_of",
+]
+
+LEAST_S = 0.5
+"""A single message is taken to move the robot for so long: drivers wait about that for the next."""
+STEP_M = 0.05
+MOST_STEPS = 400
+
+Message = Mapping[str, Any]
+
+# State of a task, not of the module: until when its present publication goes on, in wall time.
+_UNTIL_S: ContextVar[float] = ContextVar("publishing_until", default=-math.inf)
+
+
+@contextmanager
+def publishing_for(duration_s: float) -> Generator[None]:
+    """Says that what is published in the `with` block is published again for so long."""
+    token = _UNTIL_S.set(anyio.current_time() + duration_s)
+    try:
+        yield
+    finally:
+        _UNTIL_S.reset(token)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Velocity:
+    """A velocity in the plane, in the robot's own frame.
+
+    Attributes:
+        forward_mps: Along x.
+        left_mps: Along y.
+        turn_radps: Counter-clockwise.
+    """
+
+    forward_mps: float
+    left_mps: float = 0.0
+    turn_radps: float = 0.0
+
+    @property
+    def speed_mps(self) -> float:
+        """The length of its linear part."""
+        return math.hypot(self.forward_mps, self.left_mps)
+
+
+class HandDriving:
+    """Knows the velocities that were published, and judges those that are to be.
+
+    Args:
+        robot: The robot itself.
+        planner: Surveys the map.
+        surveyor: Knows what is closed now.
+    """
+
+    def __init__(self, robot: Robot, *, planner: Planner, surveyor: Surveyor) -> None:
+        self._robot = robot
+        self._planner = planner
+        self._surveyor = surveyor
+        self._zeros: dict[str, Callable[[], object]] = {}
+        self._moving: set[str] = set()
+
+    @property
+    def knows_areas(self) -> bool:
+        """True when there is anything that may be closed, now or at another hour."""
+        return self._surveyor.has_rules
+
+    @property
+    def is_under_way(self) -> bool:
+        """True from a velocity on until zero velocity was published on its topic."""
+        return bool(self._moving)
+
+    async def find_objection(self, message: Message) -> Refused | None:
+        """Gives which closed area a velocity would take the robot into; None where into none.
+
+        That nobody knows where the robot is counts as an objection.
+        """
+        if not self._surveyor.has_rules or not _is_moving(message):
+            return None
+        try:
+            here = (await self._robot.fetch_pose()).pose
+            await self._planner.survey_lately()
+        except LinkError as error:
+            return refuse_velocity(
+                "The policy closes areas, and where the robot is cannot be known now: "
+                f"{error.message}"
+            )
+        return self._find_objection(message, here)
+
+    def begin(self, topic: str, *, publish_zero: Callable[[], object]) -> None:
+        """Note that a velocity was let go.
+
+        Args:
+            topic: Where it was published.
+            publish_zero: Publishes zero velocity there.
+        """
+        self._zeros[topic] = publish_zero
+        self._moving.add(topic)
+
+    def end(self, topic: str) -> None:
+        """Note that zero velocity was published."""
+        self._moving.discard(topic)
+
+    def stand(self) -> None:
+        """Publish zero velocity on every topic on which a velocity was ever published."""
+        for topic, publish_zero in self._zeros.items():
+            publish_zero()
+            self.end(topic)
+
+    def _find_objection(self, message: Message, here: Pose) -> Refused | None:
+        revision = self._surveyor.latest
+        if revision is None:
+            return None
+        areas, radius_m = revision.areas, revision.radius_m
+        lasts_s = max(LEAST_S, _UNTIL_S.get() - anyio.current_time()) + REACTION_S
+        velocity = _read_velocity(message)
+        if velocity is None:
+            speeds = (speed for part, speed in find_speeds(message) if part != "angular")
+            fastest_mps = max(speeds, default=0.0)
+            reach_m = _reach_m(fastest_mps, lasts_s) + radius_m
+            entered = next((each for each in areas if each.distance_to(here.point) < reach_m), None)
+        else:
+            way = _predict(here, velocity, lasts_s)
+            entered = find_entered(areas, here.point, way, radius_m=radius_m)
+        if entered is None:
+            return None
+        off_m = max(entered.distance_to(here.point) - radius_m, 0.0)
+        return refuse_velocity(
+            f"This velocity would take the robot into the {entered.title}, {off_m:.2f} m from its "
+            f"edge, within {lasts_s:.1f} s."
+        )
+
+
+def refuse_velocity(reason: str) -> Refused:
+    """Return the refusal of a velocity for where it leads."""
+    return Refused(
+        rule="keep_out",
+        reason=reason,
+        hint="Publish a velocity that leads away, or use navigate_to, which leads round.",
+    )
+
+
+def zero_velocity_of(message: Message) -> dict[str, Any]:
+    """Gives a velocity message with every number at zero; header and texts stay."""
+    return {name: value if name == "header" else _zero_of(value) for name, value in message.items()}
+
+
+def is_zero_velocity(message: Message) -> bool:
+    """Return True when a velocity says that the robot stands, with every field at zero.
+
+    A speed of zero beside an acceleration or a steering angle is none.
+    """
+    return any(True for _ in find_speeds(message)) and _is_zero(message)
+
+
+def _is_zero(value: object) -> bool:
+    match value:
+        case Mapping():
+            return all(name == "header" or _is_zero(each) for name, each in value.items())
+        case int() | float():
+            return value == 0
+        case _:
+            return False
+
+
+def _zero_of(value: Any) -> Any:  # noqa: ANN401 - ROS JSON
+    if isinstance(value, Mapping):
+        return zero_velocity_of(value)
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return type(value)(0) if is_number else value
+
+
+def _is_moving(message: Message) -> bool:
+    """True for a message with speeds; one that is no number is refused for that elsewhere."""
+    speeds = [speed for _, speed in find_speeds(message)]
+    return any(speeds) and all(map(math.isfinite, speeds))
+
+
+def _read_velocity(message: Message) -> Velocity | None:
+    """Gives the velocity of a Twist or TwistStamped; None for all that holds other speeds."""
+    twist = message.get("twist", message)
+    parts = {"linear", "angular"} & twist.keys() if isinstance(twist, Mapping) else set()
+    if not parts or len(parts) != len(list(find_speeds(message))):
+        return None
+    linear, angular = twist.get("linear", {}), twist.get("angular", {})
+    return Velocity(
+        forward_mps=float(linear.get("x", 0.0)),
+        left_mps=float(linear.get("y", 0.0)),
+        turn_radps=float(angular.get("z", 0.0)),
+    )
+
+
+def _reach_m(speed_mps: float, lasts_s: float) -> float:
+    """Gives how far a robot gets until it stands."""
+    return speed_mps * lasts_s + speed_mps**2 / (2 * BRAKING_MPS2)
+
+
+def _predict(here: Pose, velocity: Velocity, lasts_s: float) -> tuple[Point, ...]:
+    """Gives places along the way to the stand, with the velocity held until it brakes."""
+    speed_mps = velocity.speed_mps
+    if speed_mps == 0.0:
+        return ()
+    length_m = _reach_m(speed_mps, lasts_s)
+    n_steps = min(math.ceil(length_m / STEP_M), MOST_STEPS)
+    step_m = length_m / n_steps
+    turn_rad = velocity.turn_radps * step_m / speed_mps
+    heading_rad = here.yaw_rad + math.atan2(velocity.left_mps, velocity.forward_mps)
+    points = [here.point]
+    for number in range(n_steps):
+        toward_rad = heading_rad + turn_rad * (number + 0.5)
+        last = points[-1]
+        points.append(
+            Point(last.x + step_m * math.cos(toward_rad), last.y + step_m * math.sin(toward_rad))
+        )
+    return tuple(points[1:])

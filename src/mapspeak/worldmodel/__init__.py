@@ -1,0 +1,1 @@
+"""The world model: the map, its rooms, what is remembered and what is closed, under ids."""

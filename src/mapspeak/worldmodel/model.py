@@ -1,0 +1,344 @@
+"""One map as everybody speaks of it: rooms, doors, frontiers and remembered places under their ids.
+
+An atlas is made from a map, a pose and the memory. Ids come from the atlas before it, so that R3
+stays R3 while the map grows.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from mapspeak.geometry import Point, Pose
+from mapspeak.robot import PoseDoubt
+from mapspeak.semantic import SemanticMap
+from mapspeak.semantic.consistency import check_memory
+from mapspeak.semantic.things import (
+    find_approach,
+    find_fronts,
+    find_least_path_m,
+    measure_faced,
+)
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.frontiers import (
+    FrontierReport,
+    find_frontiers,
+    match_frontiers,
+    rerank_frontiers,
+)
+from mapspeak.spatial.paths import DistanceField
+from mapspeak.spatial.rooms import Door, RoomMap
+from mapspeak.worldmodel.doorways import find_crossing
+from mapspeak.worldmodel.judging import Judge
+from mapspeak.worldmodel.recollection import (
+    Recollection,
+    Recollector,
+    RememberedPlace,
+    RememberedThing,
+    number_places,
+)
+from mapspeak.worldmodel.revision import MapRevision
+
+__all__ = ["Atlas", "RememberedPlace", "RememberedThing", "number_places"]
+
+
+STEP_M = 0.2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reach:
+    """What was found for all places from which a robot can get to the same floor of one map.
+
+    Attributes:
+        start: One of these places.
+        crossings: Where it passes each door, by the door's id; None where it does not.
+        standing: Where it would stand in each region, by the region's id.
+        out_of_reach: The same for regions it cannot get to.
+        frontiers: By the places from which it has looked already.
+        reminders: What was found of remembered things; of one state of the memory at a time.
+    """
+
+    start: Point
+    crossings: dict[str, Point | None] = field(default_factory=dict)
+    standing: dict[str, Point | None] = field(default_factory=dict)
+    out_of_reach: dict[str, Point] = field(default_factory=dict)
+    frontiers: dict[tuple[Point, ...], FrontierReport] = field(default_factory=dict)
+    reminders: dict[Recollection, "Reminders"] = field(default_factory=dict)
+
+
+@dataclass(slots=True, eq=False)
+class Reminders:
+    """What was found of remembered things on one map, for one state of the memory.
+
+    Attributes:
+        approaches: Where the robot would stand before a thing.
+        faced: The share of where a thing may be that it would face there.
+        fronts: The last floor before a thing, for each who saw it.
+        rooms: The rooms before a thing, by id.
+        judge: What may be trusted; None until somebody asks.
+    """
+
+    approaches: dict[RememberedThing, Pose | None] = field(default_factory=dict)
+    faced: dict[RememberedThing, float] = field(default_factory=dict)
+    fronts: dict[RememberedThing, list[Point]] = field(default_factory=dict)
+    rooms: dict[RememberedThing, tuple[str, ...]] = field(default_factory=dict)
+    judge: Judge | None = None
+
+    def of(self, things: Sequence[RememberedThing]) -> "Reminders":
+        """Gives what holds for another state of the memory: what was found of the very same."""
+        return Reminders(
+            approaches={each: self.approaches[each] for each in things if each in self.approaches},
+            faced={each: self.faced[each] for each in things if each in self.faced},
+            fronts={each: self.fronts[each] for each in things if each in self.fronts},
+            rooms={each: self.rooms[each] for each in things if each in self.rooms},
+        )
+
+
+class Atlas:
+    """A state of the map with everything that has an id; parts are computed when first asked for.
+
+    Args:
+        grid: The map.
+        robot: Where the robot is.
+        memory: What is remembered.
+        radius_m: Of the robot.
+        looked_from: Places of former frontiers that the robot has been to.
+        previous: The atlas before, whose ids are kept and whose parts are used where they hold.
+        revision: The state of the map, where somebody has made it already.
+        recollector: Keeps what is made of the memory; that of the atlas before where None.
+        pose_doubt: Why the robot may be elsewhere.
+
+    Attributes:
+        map: The state of the map.
+        robot: Where the robot is.
+        pose_doubt: Why it may be elsewhere; None for a fresh pose on the map.
+        memory: What is remembered.
+        places: Remembered places.
+        recollector: Keeps what is made of the memory.
+        warnings: What a reader of the memory should know.
+    """
+
+    def __init__(
+        self,
+        grid: OccupancyGrid,
+        robot: Pose,
+        memory: SemanticMap,
+        *,
+        radius_m: float,
+        looked_from: Sequence[Point] = (),
+        previous: "Atlas | None" = None,
+        revision: MapRevision | None = None,
+        recollector: Recollector | None = None,
+        pose_doubt: PoseDoubt | None = None,
+    ) -> None:
+        before = None if previous is None else previous.map
+        is_unchanged = before is not None and before.is_of(grid)
+        self.map: MapRevision = revision or (
+            before
+            if before is not None and is_unchanged
+            else MapRevision(grid, radius_m=radius_m, previous=before, leaves_pockets=True)
+        )
+        self.robot = robot
+        self.pose_doubt = pose_doubt
+        self.memory = memory
+        self.places: tuple[RememberedPlace, ...] = (
+            previous.places
+            if previous is not None and previous.memory.waypoints == memory.waypoints
+            else number_places(memory.waypoints)
+        )
+        self.warnings = memory.warnings
+        self.recollector: Recollector = recollector or (
+            Recollector() if previous is None else previous.recollector
+        )
+        self._looked_from = tuple(looked_from)
+        self._previous_frontiers = None if previous is None else previous.latest_frontiers
+        has_only_moved = previous is not None and previous.map is self.map
+        self._earlier_reach = previous.latest_reach if previous and has_only_moved else None
+
+    @property
+    def grid(self) -> OccupancyGrid:
+        """The map."""
+        return self.map.grid
+
+    @property
+    def radius_m(self) -> float:
+        """Of the robot."""
+        return self.map.radius_m
+
+    @property
+    def rooms(self) -> RoomMap:
+        """Rooms, corridors, open spaces and doors."""
+        return self.map.rooms
+
+    @property
+    def distances(self) -> DistanceField:
+        """Path distances from the robot."""
+        return self.map.distances_from(self.robot.point)
+
+    @cached_property
+    def reach(self) -> Reach:
+        """What depends on where the robot can get to, and not on where it is."""
+        earlier = self._earlier_reach
+        if earlier is not None and self.distances.is_reachable(earlier.start):
+            return earlier
+        return Reach(self.robot.point)
+
+    @cached_property
+    def frontiers(self) -> FrontierReport:
+        """Where the known meets the unknown, best first; poses stay while the map does."""
+        known = self.reach.frontiers.get(self._looked_from)
+        moved = None if known is None else rerank_frontiers(known, self.distances)
+        if moved is not None:
+            return moved
+        found = find_frontiers(
+            self.grid,
+            self.robot.point,
+            radius_m=self.radius_m,
+            distances=self.distances,
+            looked_from=self._looked_from,
+        )
+        earlier = self._previous_frontiers
+        named = found if earlier is None else match_frontiers(earlier, found)
+        self.reach.frontiers[self._looked_from] = named
+        return named
+
+    @property
+    def latest_frontiers(self) -> FrontierReport | None:
+        """The frontiers found last; finds none anew."""
+        found: FrontierReport | None = self.__dict__.get("frontiers", self._previous_frontiers)
+        return found
+
+    @property
+    def latest_reach(self) -> Reach | None:
+        """The reach of this atlas, or of one before it on the same map."""
+        found: Reach | None = self.__dict__.get("reach", self._earlier_reach)
+        return found
+
+    def path_m(self, point: Point) -> float | None:
+        """Gives the metres the robot has to drive to a point; None where it cannot get to."""
+        return self.distances.distance_to(point)
+
+    def find_room_id(self, point: Point) -> str | None:
+        """Gives the id of the room or corridor a point lies in."""
+        region = self.rooms.find_region_at(point)
+        return None if region is None else region.id
+
+    def find_crossing(self, door: Door) -> Point | None:
+        """Finds where the robot passes a door; None where it does not get through."""
+        crossings = self.reach.crossings
+        if door.id not in crossings:
+            crossings[door.id] = find_crossing(self.rooms, self.distances, door)
+        return crossings[door.id]
+
+    @cached_property
+    def recollection(self) -> Recollection:
+        """What is remembered, joined with the map: things, and the index to find them."""
+        return self.recollector.recollect(self.memory, self.grid)
+
+    @property
+    def things(self) -> tuple[RememberedThing, ...]:
+        """Remembered things, in the order of their ids."""
+        return self.recollection.things
+
+    @property
+    def judge(self) -> Judge:
+        """Says how far what is remembered may be trusted, and what is odd about it."""
+        known = self._reminders
+        if known.judge is None:
+            # What is closed for now says nothing against a record of what lies behind it.
+            distances = self.map.open.distances_from(self.robot.point)
+            findings = check_memory(
+                self.memory, self.recollection.found, distances=distances, rooms=self.rooms
+            )
+            known.judge = Judge(findings)
+        return known.judge
+
+    def find_approach(self, remembered: RememberedThing) -> Pose | None:
+        """Finds where the robot stands to face a thing from near; None where it cannot."""
+        known = self._reminders.approaches
+        if remembered not in known:
+            position = remembered.thing.position
+            known[remembered] = (
+                None
+                if position is None
+                else find_approach(
+                    self.recollection.found.sight,
+                    self.distances,
+                    position,
+                    [view.place for view in remembered.thing.supporting],
+                    fronts=self._find_fronts(remembered),
+                    whereabouts=remembered.thing.whereabouts,
+                )
+            )
+        return known[remembered]
+
+    def find_least_path_m(self, remembered: RememberedThing) -> float:
+        """Gives metres than which no way to look at a thing is shorter."""
+        seen_from = [view.place for view in remembered.thing.supporting]
+        return find_least_path_m(self.grid, self.distances, remembered.point, seen_from)
+
+    def measure_faced(self, remembered: RememberedThing) -> float:
+        """Gives the share of where a thing may be that the robot would face before it."""
+        known, thing = self._reminders.faced, remembered.thing
+        if remembered not in known:
+            pose = self.find_approach(remembered)
+            seen_from = [view.place for view in thing.supporting]
+            known[remembered] = (
+                0.0
+                if pose is None or thing.whereabouts is None
+                else measure_faced(
+                    self.recollection.found.sight, pose, seen_from, thing.whereabouts
+                )
+            )
+        return known[remembered]
+
+    def rooms_before(self, remembered: RememberedThing) -> tuple[str, ...]:
+        """Gives the rooms a thing may be in, by id: those on the side that it was seen from."""
+        known = self._reminders.rooms
+        if remembered not in known:
+            seen_from = [view.place for view in remembered.thing.supporting]
+            room_ids = map(self._find_room_on_line, self._find_fronts(remembered), seen_from)
+            known[remembered] = tuple(dict.fromkeys(filter(None, room_ids)))
+        return known[remembered]
+
+    def _find_fronts(self, remembered: RememberedThing) -> list[Point]:
+        """Gives the last floor before a thing for each who saw it; their own without a position."""
+        known, thing = self._reminders.fronts, remembered.thing
+        if remembered not in known:
+            seen_from = [view.place for view in thing.supporting]
+            sight, position = self.recollection.found.sight, thing.position
+            known[remembered] = (
+                seen_from if position is None else find_fronts(sight, position, seen_from)
+            )
+        return known[remembered]
+
+    def _find_room_on_line(self, end: Point, start: Point) -> str | None:
+        """Gives the room of the last floor on a line: what hangs on a wall is in no room itself."""
+        n_steps = math.ceil(start.distance_to(end) / STEP_M)
+        for step in range(n_steps, -1, -1):
+            share = step / max(n_steps, 1)
+            x, y = start.x + share * (end.x - start.x), start.y + share * (end.y - start.y)
+            room_id = self.find_room_id(Point(x, y))
+            if room_id is not None:
+                return room_id
+        return None
+
+    @property
+    def _reminders(self) -> Reminders:
+        known = self.reach.reminders
+        if self.recollection not in known:
+            before = next(iter(known.values()), Reminders())
+            known.clear()
+            known[self.recollection] = before.of(self.things)
+        return known[self.recollection]
+
+    @cached_property
+    def growing_ids(self) -> frozenset[str]:
+        """The regions that border on the unknown: their areas are not final."""
+        frontiers = self.frontiers
+        borders = (
+            *(frontier.pose.point for frontier in frontiers.frontiers),
+            *(frontier.anchor for frontier in frontiers.frontiers),
+            *(refused.anchor for refused in frontiers.refused),
+        )
+        return frozenset(filter(None, map(self.find_room_id, borders)))

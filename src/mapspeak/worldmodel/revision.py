@@ -1,0 +1,167 @@
+"""One state of the map with all that does not depend on where the robot is.
+
+Atlases of the same map share it, so that nothing is computed twice while only the pose changes.
+"""
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from mapspeak.geometry import Point
+from mapspeak.spatial import Cell, OccupancyGrid
+from mapspeak.spatial.paths import DistanceField, Path, clearance_m, distances_from
+from mapspeak.spatial.paths.clearance import Clearance
+from mapspeak.spatial.paths.wavefront import Costs
+from mapspeak.spatial.rooms import CorridorWalk, Region, RoomMap, find_rooms, walk_along
+from mapspeak.worldmodel.closures import ClosedArea, close_floor
+from mapspeak.worldmodel.hindrances import Hindrance, weigh_floor
+
+__all__ = ["MapRevision"]
+
+MOST_FIELDS = 6
+"""Distances from so many places are kept; on a map of 16 Mcells each takes 16 MB."""
+
+
+class MapRevision:
+    """A map and what is found on it; each part is computed when first asked for.
+
+    Args:
+        grid: The map.
+        radius_m: Of the robot.
+        previous: The state before, whose rooms give theirs their ids.
+        areas: What is closed of the floor: no way leads over it.
+        hindrances: What ways lead round where that is not too far.
+        leaves_pockets: A robot that a gap too narrow by a cell shuts in gets out of it.
+
+    Attributes:
+        grid: The map.
+        radius_m: Of the robot.
+        areas: What is closed of the floor.
+        hindrances: What costs more than its length.
+    """
+
+    def __init__(
+        self,
+        grid: OccupancyGrid,
+        *,
+        radius_m: float,
+        previous: "MapRevision | None" = None,
+        areas: Sequence[ClosedArea] = (),
+        hindrances: Sequence[Hindrance] = (),
+        leaves_pockets: bool = False,
+    ) -> None:
+        self.grid = grid
+        self.radius_m = radius_m
+        self.areas = tuple(areas)
+        self.hindrances = tuple(hindrances)
+        self._leaves_pockets = leaves_pockets
+        self._open: MapRevision | None = None
+        self._earlier_rooms = None if previous is None else previous.latest_rooms
+        self._fields: dict[Cell, DistanceField] = {}
+        self._walks: dict[str, CorridorWalk | None] = {}
+
+    def is_of(self, grid: OccupancyGrid) -> bool:
+        """True when a map shows the same as this one."""
+        return self.grid is grid or (
+            self.grid.resolution_m == grid.resolution_m
+            and self.grid.origin == grid.origin
+            and np.array_equal(self.grid.cells, grid.cells)
+        )
+
+    def with_areas(
+        self, areas: Sequence[ClosedArea], hindrances: Sequence[Hindrance] = ()
+    ) -> "MapRevision":
+        """Gives the same map with other areas closed or hindered; its rooms are the same ones."""
+        other = MapRevision(
+            self.grid,
+            radius_m=self.radius_m,
+            previous=self,
+            areas=areas,
+            hindrances=hindrances,
+            leaves_pockets=self._leaves_pockets,
+        )
+        other._open = self.open
+        if "rooms" in self.__dict__:
+            other.__dict__["rooms"] = self.rooms
+        return other
+
+    @property
+    def open(self) -> "MapRevision":
+        """The same map with nothing closed, as a robot sees it that knows of no areas."""
+        if not (self.areas or self.hindrances):
+            return self
+        if self._open is None:
+            self._open = MapRevision(
+                self.grid,
+                radius_m=self.radius_m,
+                previous=self,
+                leaves_pockets=self._leaves_pockets,
+            )
+        return self._open
+
+    @cached_property
+    def floor(self) -> OccupancyGrid:
+        """The map without the floor that is closed."""
+        return close_floor(self.grid, self.areas)
+
+    @cached_property
+    def rooms(self) -> RoomMap:
+        """Rooms, corridors, open spaces and doors."""
+        return find_rooms(self.grid, previous=self._earlier_rooms)
+
+    @cached_property
+    def clearance_m(self) -> Clearance:
+        """Metres from each cell to the nearest obstacle or closed area, the shape of the grid."""
+        known = next(iter(self._fields.values()), None)
+        return clearance_m(self.floor) if known is None else known.lattice.fine_clearance_m
+
+    @property
+    def latest_rooms(self) -> RoomMap | None:
+        """The rooms found last, on this map or an earlier one; finds none anew."""
+        found: RoomMap | None = self.__dict__.get("rooms", self._earlier_rooms)
+        return found
+
+    def walk_along(self, region: Region) -> CorridorWalk | None:
+        """Gives the walk along one of the regions, past its doors; None where it has none."""
+        if not region.door_ids:
+            return None
+        if region.id not in self._walks:
+            self._walks[region.id] = walk_along(self.rooms, region)
+        return self._walks[region.id]
+
+    @cached_property
+    def weights(self) -> Costs | None:
+        """What a metre counts in each cell of the map; None where it is one everywhere."""
+        return weigh_floor(self.grid, self.hindrances)
+
+    def find_path(self, start: Point, goal: Point) -> Path | None:
+        """Finds the way to take from one place to another, round hindrances where that pays."""
+        return self.find_path_over(self.distances_from(start), goal)
+
+    def find_path_over(self, distances: DistanceField, goal: Point) -> Path | None:
+        """Finds the way to take from where distances were measured."""
+        if self.weights is None:
+            return distances.path_to(goal)
+        return distances.cheapest_path_to(goal, self.weights)
+
+    def distances_from(self, point: Point) -> DistanceField:
+        """Gives the path distances from a place to every other."""
+        cell = self.grid.cell_at(point)
+        if cell not in self._fields:
+            known = next(iter(self._fields.values()), None)
+            field = (
+                distances_from(
+                    self.floor,
+                    point,
+                    radius_m=self.radius_m,
+                    leaves_pockets=self._leaves_pockets,
+                )
+                if known is None
+                else known.from_elsewhere(point)
+            )
+            # A new dictionary each time: several threads may ask at once.
+            kept = list(self._fields.items())[1 - MOST_FIELDS :]
+            self._fields = {**dict(kept), cell: field}
+            return field
+        return self._fields[cell]

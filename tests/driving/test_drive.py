@@ -1,0 +1,225 @@
+from pathlib import Path
+
+import anyio
+import pytest
+
+from fakes import FakeRobot, two_rooms
+from mapspeak.driving.drive import Drive, DriveBook
+from mapspeak.errors import GoalError
+from mapspeak.geometry import Pose
+from mapspeak.robot import GoalState, GoalStatus
+from mapspeak.safety import WhenBusy
+from mapspeak.semantic import SemanticMapStore
+from mapspeak.session import Session
+
+pytestmark = pytest.mark.anyio
+
+NEAR, FAR = Pose(2.5, 1.4), Pose(6.0, 1.4)
+
+
+async def start(
+    drives: DriveBook, goal: Pose, *, client: str = "", when_busy: WhenBusy | None = None
+) -> Drive:
+    with drives.preparing() as ticket:
+        return await drives.start(
+            goal, place="there", ticket=ticket, client=client, when_busy=when_busy
+        )
+
+
+async def state_of(drives: DriveBook, drive: Drive) -> GoalState:
+    return (await drives.report(drive.goal_id)).status.state
+
+
+async def tell_nobody(_report: object) -> None:
+    await anyio.lowlevel.checkpoint()
+
+
+async def test_the_same_clients_newer_drive_replaces_the_older_one() -> None:
+    drives = DriveBook(FakeRobot(two_rooms()), when_busy=WhenBusy.REFUSE)
+    first = await start(drives, FAR, client="one")
+    second = await start(drives, NEAR, client="one")
+    assert await state_of(drives, first) is GoalState.PREEMPTED
+    assert await state_of(drives, second) is GoalState.DRIVING
+
+
+async def test_another_clients_drive_is_refused_where_it_must_not_replace() -> None:
+    drives = DriveBook(FakeRobot(two_rooms()), when_busy=WhenBusy.REFUSE)
+    first = await start(drives, FAR, client="one")
+    with pytest.raises(GoalError, match="G1 to there is under way"):
+        await start(drives, NEAR, client="two")
+    assert await state_of(drives, first) is GoalState.DRIVING
+
+
+async def test_a_drive_that_waits_its_turn_begins_when_the_one_before_has_ended() -> None:
+    robot = FakeRobot(two_rooms())
+    drives = DriveBook(robot, when_busy=WhenBusy.WAIT)
+    first = await start(drives, FAR, client="one")
+    second = await start(drives, NEAR, client="two")
+    assert await state_of(drives, second) is GoalState.PLANNED
+    ended = await drives.wait(second.goal_id, wait_s=25.0, on_progress=tell_nobody)
+    assert ended.status.state is GoalState.ARRIVED
+    assert await state_of(drives, first) is GoalState.ARRIVED
+    assert list(robot.goals.values()) == [FAR, NEAR]
+
+
+async def test_a_drive_that_waits_begins_though_nobody_waits_for_it() -> None:
+    robot = FakeRobot(two_rooms())
+    drives = DriveBook(robot)
+    await start(drives, NEAR)
+    second = await start(drives, FAR, when_busy=WhenBusy.WAIT)
+    await robot.sleep(5.0)
+    await drives.watch()
+    assert await state_of(drives, second) is GoalState.DRIVING
+
+
+async def test_a_drive_that_waits_can_be_cancelled_and_is_stopped_with_the_rest() -> None:
+    robot = FakeRobot(two_rooms())
+    drives = DriveBook(robot)
+    await start(drives, FAR)
+    second = await start(drives, NEAR, when_busy=WhenBusy.WAIT)
+    third = await start(drives, NEAR, when_busy=WhenBusy.WAIT)
+    assert (await drives.cancel(second.goal_id)).status.state is GoalState.CANCELLED
+    await drives.stop()
+    assert await state_of(drives, third) is GoalState.CANCELLED
+    assert not drives.is_busy
+    assert len(robot.goals) == 1
+
+
+class StubbornRobot(FakeRobot):
+    """Refuses goals when a test says so."""
+
+    refuses = False
+
+    async def send_goal(self, goal: Pose) -> str:
+        if self.refuses:
+            raise GoalError("Not there.", hint="Elsewhere.")
+        return await super().send_goal(goal)
+
+
+async def test_a_goal_that_is_refused_leaves_the_drive_under_way_as_it_is() -> None:
+    robot = StubbornRobot(two_rooms())
+    drives = DriveBook(robot)
+    first = await start(drives, FAR)
+    robot.refuses = True
+    with pytest.raises(GoalError):
+        await start(drives, NEAR)
+    assert drives.under_way is not None
+    assert drives.under_way.goal_id == first.goal_id
+    assert await state_of(drives, first) is GoalState.DRIVING
+
+
+async def test_a_drive_that_waited_and_is_refused_then_says_why() -> None:
+    robot = StubbornRobot(two_rooms())
+    drives = DriveBook(robot)
+    await start(drives, NEAR)
+    second = await start(drives, FAR, when_busy=WhenBusy.WAIT)
+    robot.refuses = True
+    ended = await drives.wait(second.goal_id, wait_s=25.0, on_progress=tell_nobody)
+    assert ended.status.state is GoalState.REJECTED
+    assert "Not there." in ended.status.reason
+
+
+class StuckRobot(FakeRobot):
+    """Accepts goals and never begins to drive."""
+
+    async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
+        status = await super().fetch_goal_status(robot_goal_id)
+        return status if status.state.is_final else GoalStatus(state=GoalState.ACCEPTED)
+
+    async def sleep(self, duration_s: float) -> None:
+        self._now_s += duration_s
+
+
+async def test_a_navigation_that_never_begins_times_out_and_is_stopped() -> None:
+    robot = StuckRobot(two_rooms())
+    drives = DriveBook(robot, patience_s=10.0)
+    drive = await start(drives, FAR)
+    ended = await drives.wait(drive.goal_id, wait_s=25.0, on_progress=tell_nobody)
+    assert ended.status.state is GoalState.TIMED_OUT
+    assert "has not begun for 10 s" in ended.status.reason
+    assert ended.elapsed_s < 11.0
+    assert robot.n_stops == 1
+
+
+async def test_a_drive_that_goes_on_does_not_time_out() -> None:
+    drives = DriveBook(FakeRobot(two_rooms()), patience_s=1.0)
+    drive = await start(drives, FAR)
+    ended = await drives.wait(drive.goal_id, wait_s=25.0, on_progress=tell_nobody)
+    assert ended.status.state is GoalState.ARRIVED
+
+
+async def test_a_watching_session_stops_a_robot_that_jumps(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    session = Session(robot, SemanticMapStore(tmp_path / "m.yaml"), lease_s=60.0)
+    await start(session.drives, FAR)
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(session.keep_watch)
+        await session.drives.watch()
+        robot.pose = Pose(5.9, 0.7)
+        await robot.sleep(0.1)
+        with anyio.fail_after(20.0):
+            while not robot.n_stops:
+                await anyio.lowlevel.checkpoint()
+        tasks.cancel_scope.cancel()
+
+
+class SlowToAccept(FakeRobot):
+    """A robot that takes goals only after a while."""
+
+    async def send_goal(self, goal: Pose) -> str:
+        await self.sleep(4.0)
+        return await super().send_goal(goal)
+
+
+async def test_the_time_of_a_drive_counts_from_when_it_was_sent() -> None:
+    drives = DriveBook(SlowToAccept(two_rooms()))
+    drive = await start(drives, FAR)
+    assert (await drives.report(drive.goal_id)).elapsed_s == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize(
+    ("state", "n_stops"),
+    [
+        (GoalState.ARRIVED, 0),
+        (GoalState.CANCELLED, 0),
+        (GoalState.PREEMPTED, 0),
+        (GoalState.BLOCKED, 1),
+        (GoalState.REJECTED, 1),
+        (GoalState.TIMED_OUT, 1),
+        (GoalState.LOST, 1),
+    ],
+)
+async def test_a_drive_that_ends_badly_is_stopped_whoever_says_so(
+    state: GoalState, n_stops: int
+) -> None:
+    robot = FakeRobot(two_rooms())
+    drives = DriveBook(robot)
+    drive = await start(drives, FAR)
+    robot.ended[drive.robot_goal_id or ""] = GoalStatus(state=state)
+    await drives.watch()
+    await drives.watch()
+    assert robot.n_stops == n_stops
+    assert await state_of(drives, drive) is state
+    assert not drives.is_busy
+
+
+async def test_the_metres_driven_are_counted_also_while_nobody_waits() -> None:
+    robot = FakeRobot(two_rooms())
+    drives = DriveBook(robot)
+    await start(drives, FAR)
+    for _ in range(9):
+        await robot.sleep(0.5)
+        await drives.watch()
+    assert drives.driven_m == pytest.approx(4.5, abs=0.01)
+
+
+async def test_a_drive_from_before_the_clock_was_set_back_has_no_negative_time() -> None:
+    robot = FakeRobot(two_rooms())
+    await robot.sleep(100.0)
+    drives = DriveBook(robot)
+    drive = await start(drives, NEAR)
+    await robot.sleep(3.0)
+    robot.set_clock(0.0)
+    report = await drives.report(drive.goal_id)
+    assert report.elapsed_s == 0.0
+    assert report.pose_age_s == 0.0

@@ -1,0 +1,60 @@
+"""Which of several things of one name is known so well that it is the answer."""
+
+import pytest
+
+from drawing import grid_from_text
+from mapspeak.geometry import Point, Pose
+from mapspeak.places.recall import RecallQuery, recall
+from mapspeak.semantic import SemanticMap, Waypoint
+from mapspeak.semantic.retrieval import Verdict
+from mapspeak.worldmodel.model import Atlas
+from remembering import look
+
+HALL = """
+    ################################
+    #..............................#
+    #..............................#
+    #..............................#
+    #..............................#
+    #..............................#
+    #..............................#
+    #..............................#
+    #..............................#
+    ################################
+"""
+ON_NORTH_WALL = Point(2.5, 2.3)
+
+
+def hall_of(*waypoints: Waypoint) -> Atlas:
+    return Atlas(
+        grid_from_text(HALL, resolution_m=0.25),
+        Pose(1.0, 1.0, 0.0),
+        SemanticMap(waypoints=waypoints),
+        radius_m=0.2,
+    )
+
+
+def seen(name: str, x: float, y: float, at: Point) -> Waypoint:
+    far_m = Point(x, y).distance_to(at)
+    return look(name, x, y, ("hydrant", at), yaw_deg=90, range_m=far_m)
+
+
+@pytest.mark.parametrize(
+    ("away_m", "verdict"), [(1.7, Verdict.AMBIGUOUS), (2.4, Verdict.FOUND), (4.0, Verdict.FOUND)]
+)
+def test_the_best_known_of_a_name_is_found_only_where_no_other_of_the_name_is_within_two_metres(
+    away_m: float, verdict: Verdict
+) -> None:
+    three = [
+        seen(name, x, y, ON_NORTH_WALL)
+        for name, x, y in (("a", 1.5, 1.0), ("b", 2.5, 0.9), ("c", 3.5, 1.0))
+    ]
+    other = Point(ON_NORTH_WALL.x + away_m, ON_NORTH_WALL.y)
+    atlas = hall_of(*three, seen("d", other.x + 0.3, 1.5, other))
+    first, second = (each.thing for each in atlas.things)
+    assert first.position is not None
+    assert second.position is not None
+    assert first.position.distance_to(second.position) == pytest.approx(away_m, abs=0.2)
+    answer = recall(atlas, RecallQuery(words="hydrant"))
+    assert answer.n_meant == 2
+    assert answer.verdict is verdict

@@ -1,0 +1,147 @@
+"""What a closure cuts off, and who is told: goals, records, explorations, sessions."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from closing import EAST, LATER, NOW, RADIUS_M, WEST, atlas_on, event, office, revision_with
+from fakes import FakeRobot
+from guarding import WallClock, corners, make_guard, rectangle
+from mapspeak.driving.exploration import ExplorationState
+from mapspeak.driving.exploration.progress import CLOSED_OFF, find_unreachable, judge_end
+from mapspeak.errors import GoalError, PolicyError
+from mapspeak.geometry import Pose
+from mapspeak.places.choosing import check_place
+from mapspeak.places.goalcheck import GoalVerdict
+from mapspeak.places.notices import (
+    close_floor_of,
+    say_consequences,
+)
+from mapspeak.places.places import find_place
+from mapspeak.safety import Policy, Surveyor
+from mapspeak.semantic import SemanticMap, SemanticMapStore, Waypoint
+from mapspeak.semantic.events import Effect
+from mapspeak.server.mapview.tables import describe_atlas
+from mapspeak.server.mapview.views import MapLook, view_of
+from mapspeak.server.measures import describe_measures
+from mapspeak.session import Session
+from mapspeak.spatial import UNKNOWN
+from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.revision import MapRevision
+
+pytestmark = pytest.mark.anyio
+
+
+def test_a_closure_names_the_rooms_that_it_cuts_off() -> None:
+    south = corners((8.5, 1.0), (15.5, 3.5))
+    atlas = atlas_on(revision_with(event(Effect.CLOSED, outlines=(south,))))
+    here, there = (atlas.rooms.find_region_at(each) for each in (WEST, EAST))
+    assert here is not None
+    assert there is not None
+
+    both = event(Effect.CLOSED, id="E2")
+    (told,) = say_consequences(atlas, both, NOW)
+
+    assert there.id in told
+    assert here.id not in told
+    with_a_way_round = say_consequences(atlas_on(revision_with()), both, NOW)
+    assert there.id not in " ".join(with_a_way_round)
+
+
+def test_a_goal_behind_a_closure_names_what_closes_the_way() -> None:
+    south = corners((8.5, 1.0), (15.5, 3.5))
+    atlas = atlas_on(
+        revision_with(
+            event(Effect.CLOSED, id="E2"), event(Effect.CLOSED, place="C2", outlines=(south,))
+        )
+    )
+
+    check = check_place(atlas, find_place(atlas, f"{EAST.x}, {EAST.y}")).check
+
+    assert check.verdict is GoalVerdict.UNREACHABLE
+    assert "area 'C1', closed by event E2 until 14:00" in check.sentence
+    assert "as wide as the robot" not in check.sentence
+
+
+def test_a_record_behind_a_closure_is_no_less_trusted() -> None:
+    closed = revision_with(
+        event(Effect.CLOSED), event(Effect.CLOSED, outlines=(corners((8.5, 1.0), (15.5, 3.5)),))
+    )
+    memory = SemanticMap(waypoints=(Waypoint(name="far", pose=Pose(EAST.x, EAST.y)),))
+
+    atlas = Atlas(closed.grid, Pose(WEST.x, WEST.y), memory, radius_m=RADIUS_M, revision=closed)
+
+    assert atlas.path_m(EAST) is None
+    assert atlas.judge.findings == ()
+
+
+def test_what_nobody_saw_behind_a_closure_is_told_as_closed_off() -> None:
+    grid = office()
+    cells = grid.cells.copy()
+    cells[:, 235:] = UNKNOWN
+    grid = replace(grid, cells=cells)
+    south = corners((8.5, 1.0), (15.5, 3.5))
+    bare = MapRevision(grid, radius_m=RADIUS_M)
+    events = [event(Effect.CLOSED, id="E2"), event(Effect.CLOSED, outlines=(south,))]
+    closed = bare.with_areas(tuple(close_floor_of(events, bare, NOW)))
+
+    state, sentence = judge_end(atlas_on(closed), ())
+
+    assert state is ExplorationState.REST_UNREACHABLE
+    assert "behind what is closed (the area 'C1', closed by event E2 until 14:00" in sentence
+    assert "behind walls" not in sentence
+    assert {each.sentence for each in find_unreachable(atlas_on(closed))} == {CLOSED_OFF}
+    assert CLOSED_OFF in describe_atlas(view_of(atlas_on(closed), MapLook()))
+
+
+def test_a_way_that_is_closed_is_measured_as_none_with_what_closes_it() -> None:
+    south = corners((8.5, 1.0), (15.5, 3.5))
+    atlas = atlas_on(
+        revision_with(event(Effect.CLOSED, id="E2"), event(Effect.CLOSED, outlines=(south,)))
+    )
+    there = atlas.rooms.find_region_at(EAST)
+    assert there is not None
+
+    told = describe_measures(atlas, start="robot", places=None)
+
+    assert f"{there.id} | 19.98, 6.48 | no way (unreachable)" in told
+    assert "the shortest leads over the area 'C1', closed by event E2 until 14:00" in told
+
+
+async def test_an_event_closes_and_opens_again_by_itself_and_the_policy_stays() -> None:
+    clock = WallClock(NOW)
+    pit = rectangle("pit", (2.0, 2.0), (3.0, 3.0))
+    events = [event(Effect.CLOSED), event(Effect.NONE, text="the pit is open again", place="pit")]
+    surveyor = Surveyor([pit], wall_clock=clock, read_events=lambda: events)
+
+    before = await surveyor.survey(office(), radius_m=RADIUS_M)
+    clock.now = LATER
+    after = await surveyor.survey(office(), radius_m=RADIUS_M)
+
+    assert [area.name for area in before.areas] == ["pit", "C1"]
+    assert [area.name for area in after.areas] == ["pit"]
+
+
+async def test_the_revision_stays_while_events_do() -> None:
+    surveyor = Surveyor([], wall_clock=WallClock(NOW), read_events=lambda: [event(Effect.AVOID)])
+    grid = office()
+
+    first = await surveyor.survey(grid, radius_m=RADIUS_M)
+
+    assert await surveyor.survey(grid, radius_m=RADIUS_M) is first
+    assert first.hindrances
+
+
+async def test_a_session_heeds_the_events_of_its_memory(tmp_path: Path) -> None:
+    store = SemanticMapStore(tmp_path / "places.yaml")
+    guard = make_guard(tmp_path, Policy(), clock=WallClock(NOW))
+    session = Session(FakeRobot(office()), store, lease_s=60.0, guard=guard)
+    store.write_event(event(Effect.CLOSED))
+
+    atlas = await session.fetch_atlas()
+
+    assert [area.name for area in atlas.map.areas] == ["C1"]
+    assert 'E1 "painters at work" (C1), closed to the robot, until 14:00.' in atlas.warnings
+    with pytest.raises((PolicyError, GoalError)):
+        await session.robot.send_goal(Pose(12.0, 6.5))

@@ -1,0 +1,201 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drawing import grid_from_text
+from mapspeak.geometry import Point, Pose
+from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, check_goal
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.paths import distances_from
+
+FLAT = """
+    ############????
+    #.....#....#????
+    #.....#....#????
+    #..........#????
+    #.....#....#????
+    #.....#....#####
+    ############...#
+               #...#
+               #####
+    """
+RADIUS_M = 0.4
+
+
+def check(goal: Pose, *, text: str = FLAT, origin: Pose | None = None) -> GoalCheck:
+    """Judges a goal for a robot that stands in the left room of the flat."""
+    grid = grid_from_text(text, resolution_m=0.5, origin=origin)
+    robot = (origin or Pose(0.0, 0.0)).transform(Point(1.25, 2.25))
+    return check_goal(grid, distances_from(grid, robot, radius_m=RADIUS_M), goal)
+
+
+def test_a_goal_in_the_open_is_fine_and_says_how_far_it_is() -> None:
+    found = check(Pose(4.75, 2.75, 1.0))
+    assert found.is_ok
+    assert found.nearest is None
+    assert found.path_m == pytest.approx(3.7, abs=0.2)
+    assert found.clearance_m == pytest.approx(1.0)
+    assert found.sentence == "(4.75, 2.75) is 3.7 m away by path, 1.00 m from the nearest obstacle."
+
+
+@pytest.mark.parametrize(
+    ("goal", "verdict", "says"),
+    [
+        (Pose(math.nan, 1.0), GoalVerdict.NOT_FINITE, "no place"),
+        (Pose(1.0, math.inf), GoalVerdict.NOT_FINITE, "no place"),
+        (Pose(1.0, 1.0, math.nan), GoalVerdict.NOT_FINITE, "no place"),
+        (Pose(1e300, 1.0), GoalVerdict.NOT_FINITE, "no place"),
+        (Pose(-3.0, 2.0), GoalVerdict.OFF_MAP, "spans x 0.0 to 8.0, y 0.0 to 4.5"),
+        (Pose(7.0, 3.5), GoalVerdict.UNKNOWN, "nobody has seen"),
+        (Pose(3.25, 3.75), GoalVerdict.OCCUPIED, "in a wall"),
+        (Pose(6.75, 0.75), GoalVerdict.UNREACHABLE, "as wide as the robot, 0.80 m"),
+    ],
+)
+def test_a_bad_goal_is_refused_with_the_reason(goal: Pose, verdict: GoalVerdict, says: str) -> None:
+    found = check(goal)
+    assert found.verdict is verdict
+    assert says in found.sentence
+    assert found.path_m is None
+
+
+def test_a_goal_nearer_to_a_wall_than_the_robots_radius_is_too_tight() -> None:
+    cells = np.zeros((60, 60), np.int8)
+    cells[:, 0] = 100
+    grid = OccupancyGrid(cells=cells, resolution_m=0.05)
+    distances = distances_from(grid, Point(2.0, 2.0), radius_m=0.3)
+    found = check_goal(grid, distances, Pose(0.125, 1.025, 0.5))
+    assert found.verdict is GoalVerdict.TOO_TIGHT
+    assert "0.10 m from the nearest obstacle; the robot needs 0.30 m" in found.sentence
+    assert found.nearest is not None
+    assert (found.nearest.x, found.nearest.y) == pytest.approx((0.325, 1.025))
+    assert found.nearest.yaw_rad == 0.5
+
+
+def test_a_goal_inside_a_wall_is_refused_with_the_nearest_free_pose() -> None:
+    found = check(Pose(0.25, 2.75))
+    assert found.nearest is not None
+    assert (found.nearest.x, found.nearest.y) == pytest.approx((0.75, 2.75))
+
+
+def test_the_nearest_pose_is_found_around_walls_and_not_through_them() -> None:
+    text = """
+        ###########
+        #....#....#
+        #....#....#
+        #....#....#
+        #....#.####
+        #....#.#..#
+        #.......#.#
+        ###########
+        """
+    beyond_the_wall = Pose(4.25, 1.25)
+    found = check(beyond_the_wall, text=text)
+    assert found.verdict is GoalVerdict.UNREACHABLE
+    assert found.nearest is None
+
+
+def test_the_nearest_pose_may_lie_beyond_what_nobody_has_seen() -> None:
+    text = """
+        #########
+        #....???#
+        #....???#
+        #....???#
+        #########
+        """
+    grid = grid_from_text(text, resolution_m=0.5)
+    distances = distances_from(grid, Point(1.25, 1.25), radius_m=0.5)
+    found = check_goal(grid, distances, Pose(3.75, 1.25))
+    assert found.verdict is GoalVerdict.UNKNOWN
+    assert found.nearest is not None
+    assert (found.nearest.x, found.nearest.y) == pytest.approx((2.25, 1.25))
+
+
+def test_a_goal_off_the_map_is_answered_with_a_place_on_it() -> None:
+    found = check(Pose(-40.0, 2.75))
+    assert found.verdict is GoalVerdict.OFF_MAP
+    assert found.nearest is not None
+    assert (found.nearest.x, found.nearest.y) == pytest.approx((0.75, 2.75))
+
+
+def test_in_a_thin_wall_the_side_that_can_be_reached_counts() -> None:
+    cells = np.zeros((40, 60), np.int8)
+    cells[:, 30:32] = 100
+    grid = OccupancyGrid(cells=cells, resolution_m=0.05)
+    distances = distances_from(grid, Point(2.5, 1.0), radius_m=0.2)
+    found = check_goal(grid, distances, Pose(1.51, 1.025))
+    assert found.nearest is not None
+    assert found.nearest.x == pytest.approx(1.775)
+
+
+def test_there_is_no_nearest_pose_where_the_robot_cannot_move_at_all() -> None:
+    grid = grid_from_text("###\n#.#\n###")
+    distances = distances_from(grid, Point(1.5, 1.5), radius_m=5.0)
+    assert check_goal(grid, distances, Pose(1.5, 1.5)).nearest is None
+
+
+def test_the_same_is_said_on_a_map_with_a_turned_origin() -> None:
+    origin = Pose(3.0, -2.0, 2.5)
+    plain = check(Pose(0.25, 2.75))
+    moved = check(origin @ Pose(0.25, 2.75), origin=origin)
+    assert moved.verdict is plain.verdict
+    assert plain.nearest is not None
+    assert moved.nearest is not None
+    expected = origin @ plain.nearest
+    assert (moved.nearest.x, moved.nearest.y) == pytest.approx((expected.x, expected.y))
+
+
+@given(x=st.floats(-2.0, 10.0), y=st.floats(-2.0, 7.0))
+@settings(max_examples=60, deadline=None)
+def test_the_pose_that_is_offered_instead_is_accepted(x: float, y: float) -> None:
+    found = check(Pose(x, y))
+    if found.nearest is not None:
+        assert check(found.nearest).is_ok
+
+
+def test_a_goal_on_the_border_of_two_cells_is_as_clear_as_the_cell_it_is_taken_for() -> None:
+    cells = np.zeros((60, 60), dtype=np.int8)
+    cells[:, 0] = 100
+    grid = OccupancyGrid(cells=cells, resolution_m=0.05, origin=Pose(8.7, -10.0))
+    distances = distances_from(grid, Point(10.5, -8.5), radius_m=0.28)
+    for number in range(1, 30):
+        x = 8.7 + 0.05 * number
+        check = check_goal(grid, distances, Pose(round(x, 2), -8.5))
+        assert check.is_ok == (check.clearance_m >= 0.28), check
+
+
+@pytest.mark.parametrize("goal", [Pose(2.5, 2.5), Pose(-0.02, 1.0), Pose(9.0, 9.0)])
+def test_a_goal_inside_a_thing_or_beside_the_map_has_a_nearest_pose_that_works(
+    goal: Pose,
+) -> None:
+    grid = grid_from_text(
+        """
+        ##########
+        #........#
+        #........#
+        #..####..#
+        #..#??#..#
+        #..#??#..#
+        #..####..#
+        #........#
+        #........#
+        ##########
+        """,
+        resolution_m=0.5,
+    )
+    distances = distances_from(grid, Point(1.0, 1.0), radius_m=0.2)
+    check = check_goal(grid, distances, goal)
+    assert not check.is_ok
+    assert check.nearest is not None
+    assert distances.is_reachable(check.nearest.point)
+
+
+def test_a_number_with_hundreds_of_digits_is_not_repeated() -> None:
+    grid = grid_from_text("....", resolution_m=0.5)
+    distances = distances_from(grid, Point(0.5, 0.2), radius_m=0.0)
+    for far in (1e300, -1e308, 1e7):
+        check = check_goal(grid, distances, Pose(far, 0.0))
+        assert check.verdict is GoalVerdict.NOT_FINITE
+        assert len(check.sentence) < 100

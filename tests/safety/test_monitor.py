@@ -1,0 +1,162 @@
+import math
+from collections.abc import Callable
+
+import pytest
+
+from drawing import grid_from_text
+from guarding import corners
+from mapspeak.geometry import Point, Pose
+from mapspeak.safety.monitor import GoalMonitor, KeepOutMonitor, Mover
+from mapspeak.worldmodel.closures import MARGIN_M, ClosedArea
+from mapspeak.worldmodel.revision import MapRevision
+
+RADIUS_M = 0.3
+PIT = ClosedArea(name="pit", outline=corners((5.0, 0.0), (6.0, 2.0)))
+FLOOR = MapRevision(grid_from_text("....\n....", resolution_m=3.0), radius_m=RADIUS_M, areas=(PIT,))
+
+
+def watching() -> Callable[..., str | None]:
+    monitor = KeepOutMonitor()
+    return lambda here, *, now_s: monitor.judge(FLOOR, here, now_s=now_s, mover=Mover.OTHERS)
+
+
+def judge(
+    start: Point,
+    *,
+    heading_rad: float,
+    speed_mps: float,
+    seconds: float,
+    turn_radps: float = 0.0,
+    every_s: float = 0.1,
+) -> Point | None:
+    """Gives where a robot that drives on is told to stop; None where it is not."""
+    watch = watching()
+    x, y = start.x, start.y
+    for tick in range(round(seconds / 0.01)):
+        yaw_rad = heading_rad + turn_radps * tick * 0.01
+        is_look = tick % round(every_s / 0.01) == 0
+        if is_look and watch(Pose(x, y, yaw_rad), now_s=tick * 0.01):
+            return Point(x, y)
+        x += 0.01 * speed_mps * math.cos(yaw_rad)
+        y += 0.01 * speed_mps * math.sin(yaw_rad)
+    return None
+
+
+@pytest.mark.parametrize("every_s", [0.1, 0.3])
+@pytest.mark.parametrize("speed_mps", [0.05, 0.2, 0.5, 1.0, 1.5])
+def test_a_robot_is_stopped_early_enough_to_brake_and_not_much_earlier(
+    speed_mps: float, every_s: float
+) -> None:
+    start = Point(1.0, 1.0)
+    stopped = judge(start, heading_rad=0.0, speed_mps=speed_mps, seconds=90, every_s=every_s)
+    assert stopped is not None
+    # It hears of the stop a little later, and brakes then.
+    left_m = PIT.distance_to(stopped) - 0.2 * speed_mps - speed_mps**2 / 2
+    assert RADIUS_M <= left_m <= RADIUS_M + MARGIN_M + 2 * every_s * speed_mps
+
+
+def test_a_robot_that_comes_to_a_stand_where_goals_may_be_is_let_go() -> None:
+    watch = watching()
+    left_m = 2.0
+    for tick in range(200):
+        here = Pose(5.0 - RADIUS_M - MARGIN_M - left_m, 1.0, 0.0)
+        assert watch(here, now_s=tick / 10) is None
+        left_m -= min(0.1 * min(math.sqrt(left_m), 0.8), left_m)
+
+
+def test_a_robot_that_drives_along_an_area_is_let_go() -> None:
+    start = Point(1.0, 2.0 + RADIUS_M + MARGIN_M)
+    assert judge(start, heading_rad=0.0, speed_mps=1.0, seconds=10) is None
+
+
+def test_a_robot_that_turns_away_from_an_area_in_time_is_let_go() -> None:
+    start = Point(4.0, 1.0)
+    way = {"heading_rad": 0.0, "speed_mps": 0.5, "seconds": 3.0}
+    assert judge(start, turn_radps=1.0, **way) is None
+    assert judge(start, turn_radps=0.1, **way) is not None
+
+
+def test_a_robot_that_turns_towards_an_area_beside_it_is_stopped_in_time() -> None:
+    start = Point(5.5, 2.0 + RADIUS_M + MARGIN_M)
+    stopped = judge(start, heading_rad=math.pi, speed_mps=0.5, turn_radps=1.0, seconds=3.0)
+    assert stopped is not None
+    assert PIT.distance_to(stopped) >= RADIUS_M
+
+
+@pytest.mark.parametrize("turned_rad", [-3.0, -0.4, 0.4, 3.0])
+def test_a_robot_that_turned_on_the_spot_is_expected_to_go_straight_on(turned_rad: float) -> None:
+    watch = watching()
+    for pose, now_s in ((Pose(5.5, 2.6, turned_rad), 0.0), (Pose(5.6, 2.6, 0.0), 0.1)):
+        assert watch(pose, now_s=now_s) is None
+
+
+def test_a_robot_that_turns_towards_an_area_as_it_backs_is_stopped_in_time() -> None:
+    watch = watching()
+    backwards = (Pose(6.0, 2.6, 0.0), Pose(5.9, 2.595, 0.1), Pose(5.801, 2.58, 0.2))
+    said = [watch(pose, now_s=tick / 10) for tick, pose in enumerate(backwards)]
+    assert said[-1] is not None
+
+
+def test_a_robot_that_cuts_a_corner_of_an_area_is_stopped() -> None:
+    assert judge(Point(4.0, 2.9), heading_rad=-0.7, speed_mps=0.5, seconds=10) is not None
+
+
+def test_a_robot_that_leaves_an_area_is_let_go() -> None:
+    start = Point(5.2, 1.0)
+    assert judge(start, heading_rad=math.pi, speed_mps=0.5, seconds=10) is None
+
+
+def test_a_robot_that_has_left_an_area_may_not_come_back_to_where_it_began() -> None:
+    watch = watching()
+    for tick, x in enumerate((4.8, 4.7, 4.6, 4.5)):
+        assert watch(Pose(x, 1.0, math.pi), now_s=tick / 10) is None
+    assert watch(Pose(4.6, 1.0, math.pi), now_s=0.4) is not None
+
+
+def test_a_robot_that_goes_deeper_into_an_area_is_stopped() -> None:
+    start = Point(5.05, 1.0)
+    assert judge(start, heading_rad=0.0, speed_mps=0.5, seconds=10) is not None
+
+
+@pytest.mark.parametrize("x", [4.6, 4.7, 4.75])
+def test_a_robot_that_stands_beside_an_area_may_turn_and_its_pose_may_waver(x: float) -> None:
+    watch = watching()
+    for tick in range(40):
+        here = Pose(x + 0.004 * (-1) ** tick, 1.0, 0.1 * tick)
+        assert watch(here, now_s=tick / 10) is None
+
+
+@pytest.mark.parametrize("x", [4.6, 4.7, 4.75])
+def test_a_robot_that_stands_beside_an_area_may_not_go_nearer(x: float) -> None:
+    assert judge(Point(x, 1.0), heading_rad=0.0, speed_mps=0.2, seconds=3) is not None
+
+
+def test_a_robot_in_an_area_that_was_not_seen_for_long_is_stopped() -> None:
+    watch = watching()
+    assert watch(Pose(4.0, 1.0, 0.0), now_s=0.0) is None
+    assert watch(Pose(4.9, 1.0, 0.0), now_s=9.0) is not None
+
+
+def test_a_pose_that_localisation_corrects_is_no_speed() -> None:
+    watch = watching()
+    assert watch(Pose(1.0, 1.0, 0.0), now_s=0.0) is None
+    assert watch(Pose(2.0, 1.0, 0.0), now_s=0.1) is None
+    assert watch(Pose(4.9, 1.0, 0.0), now_s=0.2) is not None
+
+
+@pytest.mark.parametrize("mover", Mover)
+def test_who_is_told_of_a_stop_is_told_what_drove_the_robot(mover: Mover) -> None:
+    monitor = KeepOutMonitor()
+    monitor.begin_at(Pose(4.6, 1.0), now_s=0.0)
+    said = monitor.judge(FLOOR, Pose(4.68, 1.0), now_s=0.2, mover=mover)
+    assert said is not None
+    assert f"before the keep-out area 'pit': {mover} was about to drive into it. " in said
+
+
+def test_a_goal_that_closes_or_fills_up_is_no_goal_any_more() -> None:
+    assert "now lies in" in str(
+        GoalMonitor(goal=Pose(5.5, 1.0), radius_m=RADIUS_M).judge(FLOOR, now_s=0.0)
+    )
+    off = GoalMonitor(goal=Pose(-3.0, 1.0), radius_m=RADIUS_M)
+    assert off.judge(FLOOR, now_s=0.0) is None
+    assert "is off the map now" in str(off.judge(FLOOR, now_s=6.0))
