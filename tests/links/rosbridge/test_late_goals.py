@@ -9,11 +9,21 @@ import pytest
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.links.ros import RosRobot
+from mapspeak.links.ros.actions import ActionClient, SentGoal
 from mapspeak.links.ros.driving import DrivingPatience
 from mapspeak.links.rosbridge.client import Timing
 from mapspeak.robot import GoalState
 from mapspeak.ros.messages import Dialect, write_stamp
-from rosbridge_robot import CANCEL_SERVICE, CANCELED, ScriptedRobot, connect_scripted, eventually
+from rosbridge_robot import (
+    ABORTED,
+    CANCEL_SERVICE,
+    CANCELED,
+    STATUS_TOPIC,
+    SUCCEEDED,
+    ScriptedRobot,
+    connect_scripted,
+    eventually,
+)
 from rosbridge_script import PATIENCE_S, Operation, Visitor
 
 pytestmark = pytest.mark.anyio
@@ -24,7 +34,7 @@ QUICK = Timing(
 BRIEF = DrivingPatience(
     acceptance_s=0.2, listing_s=0.0, end_s=5.0, result_s=0.0, return_s=0.1, settling_s=0.0
 )
-LONG = DrivingPatience(acceptance_s=PATIENCE_S, end_s=5.0, settling_s=0.0)
+LONG = DrivingPatience(acceptance_s=PATIENCE_S, end_s=5.0, result_s=0.0, settling_s=0.0)
 GOAL = Pose(4.0, 2.0)
 OURS, OTHERS, NEWER = bytes(range(16)), bytes(range(16, 32)), bytes(range(32, 48))
 EXECUTING = 2
@@ -151,6 +161,139 @@ async def test_the_goal_that_is_wanted_is_not_taken_for_the_one_that_was_withdra
         await eventually_so(lambda: OURS in nav2.cancelled)
         assert (await robot.fetch_goal_status(wanted)).state is GoalState.DRIVING
     assert NEWER not in nav2.cancelled
+
+
+# --- a newer goal is not told as the older one ends
+
+
+async def rejected(scripted: ScriptedRobot, robot: RosRobot) -> str:
+    """Send a goal that rosbridge tells as rejected."""
+    sent: list[str] = []
+
+    async def drive() -> None:
+        sent.append(await robot.send_goal(GOAL))
+
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(drive)
+        await scripted.until(lambda: scripted.goals)
+        await scripted.end_goal(0, is_result=False)
+    assert (await robot.fetch_goal_status(sent[0])).state is GoalState.REJECTED
+    return sent[0]
+
+
+async def list_is_heard(scripted: ScriptedRobot, robot: RosRobot) -> None:
+    """Return when all that was published until now has been taken in."""
+    await robot.connection.call_service("/rosapi/get_time")
+    heard = robot.connection.subscribe(STATUS_TOPIC).latest
+    assert heard is not None
+    assert len(heard["status_list"]) == len(scripted.statuses)
+
+
+@pytest.mark.parametrize("last", [SUCCEEDED, ABORTED, CANCELED])
+@pytest.mark.parametrize("is_refused", [False, True])
+async def test_how_a_rejected_goal_ends_late_is_not_told_of_the_goal_after_it(
+    *, is_refused: bool, last: int
+) -> None:
+    scripted = ScriptedRobot()
+    SlowNav2(scripted)
+    async with connected(scripted, patience=LONG if is_refused else BRIEF) as robot:
+        older = await (rejected(scripted, robot) if is_refused else robot.send_goal(GOAL))
+        scripted.accepts_goals = True
+        newer = await robot.send_goal(GOAL)
+        await scripted.tell_status(OURS, EXECUTING)
+        # As long as it takes to find out whose goal that is.
+        await anyio.sleep(0.5)
+        await scripted.tell_status(OURS, last)
+        await list_is_heard(scripted, robot)
+        states = [(await robot.fetch_goal_status(each)).state for each in (older, newer)]
+        await scripted.end_goal(SUCCEEDED)
+        await until_state(robot, newer, GoalState.ARRIVED)
+    assert states == [GoalState.REJECTED, GoalState.DRIVING]
+
+
+@pytest.mark.parametrize("last", [SUCCEEDED, ABORTED, CANCELED])
+async def test_a_goal_that_is_not_taken_yet_does_not_end_as_the_rejected_one_before_it(
+    last: int,
+) -> None:
+    scripted = ScriptedRobot()
+    SlowNav2(scripted)
+    async with connected(scripted, patience=LONG) as robot, anyio.create_task_group() as tasks:
+        await rejected(scripted, robot)
+        tasks.start_soon(robot.send_goal, GOAL)
+        await scripted.until(lambda: len(scripted.goals) == 2)
+        await scripted.tell_status(OURS, last)
+        await list_is_heard(scripted, robot)
+        client_of(robot).look()
+        assert [goal.is_over for goal in goals_of(robot)] == [True, False]
+        tasks.cancel_scope.cancel()
+
+
+async def test_a_goal_whose_result_came_first_does_not_end_the_one_after_it() -> None:
+    scripted = ScriptedRobot()
+    async with connected(scripted, patience=LONG) as robot:
+        older = await robot.send_goal(GOAL)
+        await scripted.end_goal(SUCCEEDED)
+        await until_state(robot, older, GoalState.ARRIVED)
+        newer = await robot.send_goal(GOAL)
+        await scripted.tell_status(OURS, SUCCEEDED)
+        await list_is_heard(scripted, robot)
+        assert (await robot.fetch_goal_status(newer)).state is GoalState.DRIVING
+        await scripted.tell_status(NEWER, EXECUTING)
+        await list_is_heard(scripted, robot)
+        assert [goal.server_id for goal in goals_of(robot)] == [OURS.hex(), NEWER.hex()]
+
+
+@pytest.mark.parametrize("is_known", [False, True])
+async def test_a_goal_that_another_client_had_before_does_not_end_ours(*, is_known: bool) -> None:
+    scripted = ScriptedRobot()
+    async with connected(scripted, patience=LONG) as robot:
+        if is_known:
+            await scripted.tell_status(OTHERS, EXECUTING)
+            del scripted.statuses[OTHERS.hex()]
+            await scripted.tell_status(OURS, SUCCEEDED)
+        goal_id = await robot.send_goal(GOAL)
+        await scripted.tell_status(OTHERS, SUCCEEDED)
+        await list_is_heard(scripted, robot)
+        assert (await robot.fetch_goal_status(goal_id)).state is GoalState.DRIVING
+
+
+async def test_the_goal_that_is_wanted_is_known_by_its_id_once_the_withdrawn_one_is() -> None:
+    scripted = ScriptedRobot()
+    nav2 = SlowNav2(scripted)
+    async with connected(scripted) as robot:
+        await robot.send_goal(GOAL)
+        scripted.accepts_goals = True
+        await robot.send_goal(GOAL)
+        await nav2.take(NEWER)
+        await nav2.take(OURS, goal=0)
+        await eventually_so(
+            lambda: [goal.server_id for goal in goals_of(robot)] == [OURS.hex(), NEWER.hex()]
+        )
+    assert NEWER not in nav2.cancelled
+
+
+async def test_a_goal_that_cannot_be_known_by_its_id_is_ended_once_it_is_told_as_lost() -> None:
+    scripted = ScriptedRobot()
+    nav2 = SlowNav2(scripted)
+    async with connected(scripted) as robot:
+        await robot.send_goal(GOAL)
+        scripted.accepts_goals = True
+        wanted = await robot.send_goal(GOAL)
+        await nav2.take(NEWER, goal=None)
+        await list_is_heard(scripted, robot)
+        await scripted.server.drop_all()
+        await until_state(robot, wanted, GoalState.LOST)
+        await eventually_so(lambda: NEWER in nav2.cancelled)
+
+
+def goals_of(robot: RosRobot) -> list[SentGoal]:
+    return client_of(robot).goals
+
+
+def client_of(robot: RosRobot) -> ActionClient:
+    client = robot.connection.started.actions["/navigate_to_pose"]
+    assert isinstance(client, ActionClient)
+    return client
 
 
 # --- ROS 1

@@ -103,9 +103,14 @@ class ActionClient(ABC):
         return frozenset(goal.owner for goal in self.open_goals if goal.owner is not None)
 
     @property
+    def goals(self) -> list[SentGoal]:
+        """Our goals, in the order in which they were sent; of those that are over, the latest."""
+        return list(self._goals.values())
+
+    @property
     def open_goals(self) -> list[SentGoal]:
         """Our goals that are not over, in the order in which they were sent."""
-        return [goal for goal in self._goals.values() if not goal.is_over]
+        return [goal for goal in self.goals if not goal.is_over]
 
     @property
     def listed(self) -> Mapping[str, ActionState]:

@@ -1,8 +1,6 @@
 """Actions of ROS 2: goals over the connection, and the latched list of all goals' states."""
 
-import base64
-import binascii
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import partial
 
 import anyio
@@ -16,20 +14,12 @@ from mapspeak.links.ros.actions.client import (
     ActionPatience,
 )
 from mapspeak.links.ros.actions.goal import ActionState, SentGoal
+from mapspeak.links.ros.actions.statuses import STATES, read_statuses
 from mapspeak.ros import ActionEnd, ActionGoal, RosConnection
 from mapspeak.ros.messages import Message
 
 __all__ = ["Ros2ActionClient"]
 
-STATES = {
-    1: ActionState.ACCEPTED,
-    2: ActionState.RUNNING,
-    3: ActionState.CANCELLING,
-    4: ActionState.SUCCEEDED,
-    5: ActionState.CANCELLED,
-    6: ActionState.ABORTED,
-}
-"""action_msgs/GoalStatus."""
 CANCEL_TYPE, STATUS_TYPE = "action_msgs/srv/CancelGoal", "action_msgs/msg/GoalStatusArray"
 REFUSED = 1
 ENDED = (2, 3)
@@ -40,16 +30,18 @@ SUSPECTED_S = (0.05, 0.05, 0.1, 0.1, 0.2, 0.5, 1.0, 1.0)
 """Between two attempts to find out whether a goal that has appeared is a withdrawn one."""
 UNNAMED_S = 0.3
 """So long a goal that may be a withdrawn one may go on, where safety comes first."""
-WITHDRAWN_S = 60.0
-"""So long after a goal was withdrawn safety comes first."""
+RECENT_S = 60.0
+"""So long after the end of a goal the list may name it for the first time."""
+N_SEEN_KEPT = 1_000
 
 
 class _Track:
     """What the connection knows of one goal of ours."""
 
-    def __init__(self, goal: SentGoal, wire: ActionGoal) -> None:
+    def __init__(self, goal: SentGoal, wire: ActionGoal, *, n_seen: int) -> None:
         self.goal = goal
         self.wire = wire
+        self.n_seen = n_seen
         self.feedback: Message | None = None
         self.ended_s: float | None = None
         self.n_lists_at_loss: int | None = None
@@ -61,12 +53,13 @@ class Ros2ActionClient(ActionClient):
     """Sends goals, and joins what is heard of them: from the connection, and from the list.
 
     In ROS 2 itself the server knows a goal by the id that we gave it. rosbridge gives it another,
-    and does not tell which: there, the goal that newly appears in the list is ours. When that may
-    be a withdrawn one, rosbridge is told again to cancel that one, by the id it has for it, which
-    touches nobody else's; a goal that goes on nevertheless is another client's, and is left alone.
-    Only where rosbridge may have forgotten the id, because the connection was lost since, or where
-    the robot was told to stop, no difference can be made for certain, and safety comes first: the
-    goal is cancelled, whoever sent it.
+    and does not tell which: there, the goal that newly appears in the list, and is not over, is
+    ours. As long as it may be an older one of ours, which has ended without an id, no newer one
+    gets that id: how that stands, feedback and result tell. rosbridge is told again to cancel a
+    withdrawn goal by the id it has for it, which touches no other client's; a goal that goes on
+    nevertheless is left alone. Only where rosbridge may have forgotten the id, because the
+    connection was lost since, or where the robot was told to stop, no difference can be made for
+    certain, and safety comes first: the goal is cancelled, whoever sent it.
     """
 
     def __init__(
@@ -74,7 +67,8 @@ class Ros2ActionClient(ActionClient):
     ) -> None:
         super().__init__(connection, action, type_name=type_name, patience=patience)
         self._tracks: dict[str, _Track] = {}
-        self._seen: set[str] = set()
+        self._seen: dict[str, int] = {}
+        self._n_seen = 0
         self._suspected: set[str] = set()
         self._lists = connection.subscribe(f"{action}/_action/status", type_name=STATUS_TYPE)
         self._lists.listen(self._take_list)
@@ -111,7 +105,7 @@ class Ros2ActionClient(ActionClient):
         return len(answer.get("goals_canceling") or [])
 
     async def _begin(self, arguments: Message, through: RosConnection, sent_s: float) -> SentGoal:
-        before = set(self._statuses)
+        n_seen = self._n_seen
         wire = await through.send_goal(self.action, arguments, type_name=self.type_name)
         goal = SentGoal(
             wire.goal_id,
@@ -122,10 +116,10 @@ class Ros2ActionClient(ActionClient):
             server_id=wire.ros_id,
         )
         self._goals[goal.id] = goal
-        track = self._tracks[goal.id] = _Track(goal, wire)
+        track = self._tracks[goal.id] = _Track(goal, wire, n_seen=n_seen)
         wire.listen(partial(self._hear, track))
         # The list may have come while the goal was still being sent.
-        self._claim([each for each in self._statuses if each not in before | self.ours.keys()])
+        self._claim(self._seen_since(track))
         self._hear(track)
         return goal
 
@@ -135,6 +129,9 @@ class Ros2ActionClient(ActionClient):
         if goal.is_withdrawn:
             track.n_lists_at_end = self._lists.n_received
             goal.through.give_up_goal(track.wire)
+            if goal.server_id is None:
+                # It may be one of those that could not be told apart until now.
+                self._claim(self._seen_since(track))
 
     def _forget(self, goal: SentGoal) -> None:
         del self._tracks[goal.id]
@@ -204,11 +201,18 @@ class Ros2ActionClient(ActionClient):
             self._withdraw(goal, ActionState.LOST, UNSERVED)
 
     def _take_list(self, message: Message) -> None:
-        self._statuses = dict(_read_list(message))
+        self._statuses = dict(read_statuses(message))
         fresh = [each for each in self._statuses if each not in self._seen]
-        self._seen = set(self._statuses)
+        for server_id in fresh:
+            self._seen[server_id] = self._n_seen
+            self._n_seen += 1
+        for server_id in list(self._seen)[: max(len(self._seen) - N_SEEN_KEPT, 0)]:
+            del self._seen[server_id]
         self._claim(fresh)
-        for goal in list(self._goals.values()):
+        self._consider_all()
+
+    def _consider_all(self) -> None:
+        for goal in self.goals:
             self._consider(self._tracks[goal.id])
         self._tell()
 
@@ -282,35 +286,66 @@ class Ros2ActionClient(ActionClient):
 
     # --- which goal is ours, where only rosbridge knows
 
-    def _claim(self, fresh: list[str]) -> None:
-        """Take for ours the goals that have appeared, the oldest first."""
-        for server_id in fresh:
-            if server_id in self.ours:
-                continue
+    def _seen_since(self, track: _Track) -> list[str]:
+        """Return the listed goals that were first seen after a goal was sent."""
+        return [each for each in self._statuses if self._seen.get(each, -1) >= track.n_seen]
+
+    def _claim(self, server_ids: list[str]) -> None:
+        """Take for ours the goals that have appeared, the oldest first, as far as that is sure."""
+        for server_id in server_ids:
             state = self._statuses[server_id]
-            if self._unresolved() and not state.is_final:
+            if server_id in self.ours or server_id in self._suspected:
+                continue
+            if state.is_final:
+                self._give_to_ended(server_id, state)
+            elif self._suspects():
                 self._suspected.add(server_id)
                 self._connection.start_soon(partial(self._find_out, server_id))
-            elif self._unresolved() and state is ActionState.CANCELLED:
-                self._give_to_withdrawn(server_id)
             else:
                 self._give_to_open(server_id)
 
     def _unresolved(self) -> list[SentGoal]:
         """Return the withdrawn goals that the server may still take under an unknown id."""
+        return [goal for goal in self._suspects() if goal.is_withdrawn and not goal.is_settled]
+
+    def _suspects(self) -> list[SentGoal]:
+        """Return our goals that are over, and that the list may still name for the first time."""
         return [
             goal
-            for goal in self._goals.values()
-            if goal.is_withdrawn and not goal.is_settled and goal.server_id is None
+            for goal in self.goals
+            if goal.is_over
+            and goal.server_id is None
+            and (self._is_recent(goal) or (goal.is_withdrawn and not goal.is_settled))
         ]
 
-    def _give_to_open(self, server_id: str, *, is_taken: bool = False) -> bool:
-        """Return True when a goal under way needed an id; by choice only one that was taken."""
+    def _is_recent(self, goal: SentGoal) -> bool:
+        heard_s = max(goal.ended_s or 0.0, self._tracks[goal.id].heard_s)
+        return anyio.current_time() - heard_s < RECENT_S
+
+    def _give_to_open(self, server_id: str) -> None:
+        """Give an id to a goal under way that was sent before the id was seen."""
         for goal in self.open_goals:
-            if goal.server_id is None and not (is_taken and goal.state is ActionState.SENT):
+            is_older = self._tracks[goal.id].n_seen <= self._seen.get(server_id, -1)
+            if goal.server_id is None and is_older:
                 goal.server_id = server_id
-                return True
-        return False
+                return
+
+    def _give_to_ended(self, server_id: str, state: ActionState) -> None:
+        """Give an id to a goal that has ended in the same way, or was to be cancelled."""
+        for goal in self._suspects():
+            end = self._tracks[goal.id].wire.end
+            told = STATES.get(end.status or 0) if end is not None else ActionState.CANCELLED
+            if told is state and (end is not None or goal.is_withdrawn):
+                self._resolve(goal, server_id)
+                return
+
+    def _resolve(self, goal: SentGoal, server_id: str) -> None:
+        """Give an id to a goal that is over; what it may have been is then known to be another."""
+        goal.server_id = server_id
+        self._note_life(goal)
+        if not self._suspects():
+            for track in [self._tracks[each.id] for each in self.open_goals]:
+                self._claim(self._seen_since(track))
 
     async def _find_out(self, server_id: str) -> None:
         """Cancel a goal that has appeared where it is one of ours that was withdrawn."""
@@ -319,54 +354,32 @@ class Ros2ActionClient(ActionClient):
             for goal in self._unresolved():
                 goal.through.cancel_goal(self._tracks[goal.id].wire)
             await anyio.sleep(pause_s)
-            state = self._statuses.get(server_id)
-            if state in (None, ActionState.CANCELLING, ActionState.CANCELLED):
-                self._give_to_withdrawn(server_id)
+            state = self._statuses.get(server_id, ActionState.CANCELLED)
+            is_late = anyio.current_time() - begun_s > UNNAMED_S
+            if state is ActionState.CANCELLING or (is_late and self._is_safety_first()):
+                for goal in self._unresolved()[:1]:
+                    self._resolve(goal, server_id)
                 break
-            if anyio.current_time() - begun_s > UNNAMED_S:
-                # What is wanted may be ended by mistake as little as what is not may go on.
-                if self._give_to_open(server_id, is_taken=True):
-                    break
-                if self._is_safety_first():
-                    self._give_to_withdrawn(server_id)
-                    break
+            if state.is_final:
+                self._give_to_ended(server_id, state)
+                break
         else:
-            self._give_to_open(server_id)
+            # No goal goes on for so long that the server has ended.
+            if not any(self._is_recent(goal) for goal in self._unresolved()):
+                self._give_to_open(server_id)
         self._suspected.discard(server_id)
-        for goal in list(self._goals.values()):
-            self._consider(self._tracks[goal.id])
-        self._tell()
-
-    def _give_to_withdrawn(self, server_id: str) -> None:
-        withdrawn = next(iter(self._unresolved()), None)
-        if withdrawn is not None and server_id not in self.ours:
-            withdrawn.server_id = server_id
-            self._note_life(withdrawn)
+        self._consider_all()
 
     def _is_safety_first(self) -> bool:
         """True where nothing else would end a goal that may be a withdrawn one."""
         if any(goal.server_id is None for goal in self.open_goals):
             # It may be the one that is wanted, and that is told as under way.
             return False
-        now_s = anyio.current_time()
         return any(
             (goal.state is ActionState.CANCELLED or self._tracks[goal.id].wire.is_lost)
-            and now_s - (goal.ended_s or now_s) < WITHDRAWN_S
+            and self._is_recent(goal)
             for goal in self._unresolved()
         )
-
-
-def _read_list(message: Message) -> Iterator[tuple[str, ActionState]]:
-    """Yield id and state of each goal of a list; leave out what is none."""
-    entries = message.get("status_list")
-    for entry in entries if isinstance(entries, list) else []:
-        try:
-            # The 16 bytes of an id come as a list, as base64 or as bytes.
-            uuid = entry["goal_info"]["goal_id"]["uuid"]
-            raw = base64.b64decode(uuid, validate=True) if isinstance(uuid, str) else bytes(uuid)
-            yield raw.hex(), STATES[entry["status"]]
-        except (KeyError, TypeError, ValueError, binascii.Error):
-            continue
 
 
 def _reason_of(values: Message | None, state: ActionState) -> str:
