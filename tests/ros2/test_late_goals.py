@@ -17,7 +17,7 @@ from ros2.robot_process import RobotProcess
 
 pytestmark = [pytest.mark.ros2, pytest.mark.anyio]
 
-NEXT_ROOM = Pose(8.0, 2.25)
+NEXT_ROOM, NEARER = Pose(8.0, 2.25), Pose(3.0, 2.25)
 SHORT = DrivingPatience(acceptance_s=0.5)
 LATE_S = 2.0
 PATIENCE_S = 30.0
@@ -83,6 +83,26 @@ async def test_a_goal_that_was_called_rejected_does_not_drive_the_robot_later(
         after_m = robot.driven_m
     assert state is GoalState.REJECTED
     assert not robot.is_driving
+    assert after_m - before_m < STILL_M
+
+
+async def test_a_goal_that_follows_a_rejected_one_is_told_as_it_truly_ends(
+    robot: RobotProcess, open_link: OpenLink
+) -> None:
+    robot.set_faults(acceptance_s=LATE_S)
+    async with open_link(robot) as opened:
+        older = await opened.send_goal(NEXT_ROOM)
+        assert (await opened.fetch_goal_status(older)).state is GoalState.REJECTED
+        robot.set_faults(acceptance_s=0.0)
+        newer = await opened.send_goal(NEARER)
+        with anyio.fail_after(PATIENCE_S):
+            while not (told := await opened.fetch_goal_status(newer)).state.is_final:
+                await anyio.sleep(0.05)
+        before_m = robot.driven_m
+        left_m = robot.pose.point.distance_to(NEARER.point)
+        await anyio.sleep(1.0)
+        after_m = robot.driven_m
+    assert (told.state is GoalState.ARRIVED) == (left_m < STILL_M)
     assert after_m - before_m < STILL_M
 
 
