@@ -96,7 +96,7 @@ async def test_a_goal_that_follows_a_rejected_one_is_told_as_it_truly_ends(
         robot.set_faults(acceptance_s=0.0)
         newer = await opened.send_goal(NEARER)
         with anyio.fail_after(PATIENCE_S):
-            while not (told := await opened.fetch_goal_status(newer)).state.is_final:
+            while not (told := await opened.fetch_goal_status(newer)).state.is_final:  # noqa: ASYNC110
                 await anyio.sleep(0.05)
         before_m = robot.driven_m
         left_m = robot.pose.point.distance_to(NEARER.point)
