@@ -138,7 +138,8 @@ class DdsNode:
 
         def decode(data: bytes) -> tuple[bytes, Request]:
             number = data[HEADER_BYTES : HEADER_BYTES + skip]
-            return number, self.types.decode(name.request_type, data, skip)
+            bare = data[:HEADER_BYTES] + data[HEADER_BYTES + skip :]
+            return number, self.types.decode(name.request_type, bare)
 
         def take(request: tuple[bytes, Request]) -> None:
             number, arguments = request

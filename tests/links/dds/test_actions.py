@@ -271,7 +271,7 @@ async def test_a_goal_that_was_ended_before_it_was_taken_is_cancelled_when_it_is
 async def test_a_goal_that_does_not_fit_or_goes_nowhere_is_an_error() -> None:
     async with open_counter() as (_, connection):
         for action, arguments, type_name, message in (
-            (ACTION, {"orders": 3}, TYPE, "'orders'"),
+            (ACTION, {"orders": 3}, TYPE, "'goal.orders'"),
             (ACTION, {"order": 3}, "nav2_msgs/action/Wait", "is a example_interfaces/Fibonacci"),
             ("/nobody", {}, TYPE, "Nobody serves"),
         ):

@@ -127,7 +127,7 @@ async def test_what_was_published_last_arrives_though_we_leave_at_once() -> None
 async def test_nan_is_not_published() -> None:
     async with open_both() as (_, connection):
         connection.advertise("/cmd_vel", type_name="geometry_msgs/msg/Twist")
-        with pytest.raises(LinkError, match="'x'"):
+        with pytest.raises(LinkError, match=r"linear\.x"):
             await connection.publish("/cmd_vel", {"linear": {"x": float("nan")}})
 
 

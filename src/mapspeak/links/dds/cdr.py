@@ -1,288 +1,271 @@
-"""Messages as bytes: the encoding CDR of DDS, read and written after the fields of a type.
+"""Messages as bytes: CDR, the encoding of DDS, by the code that rosbags makes of a definition."""
 
-ROS 2 uses its first version (PLAIN_CDR of the OMG's DDS-XTYPES, chapter 7.4.1): each number at a
-multiple of its size, counted from behind four bytes that tell the byte order.
-"""
-
+import base64
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from rosbags.serde import SerdeError
+from rosbags.typesys.store import Typestore
 
 from mapspeak.errors import LinkError
-from mapspeak.links.dds.values import PRIMITIVES, Primitive, as_array, as_text, misfit
-from mapspeak.ros.definitions import Field, TypeBook
-from mapspeak.ros.messages import Message, bare_type
+from mapspeak.ros.definitions import (
+    NOTHING,
+    Field,
+    MessageType,
+    TypeBook,
+    check_message,
+    describe_field,
+    look_up,
+)
+from mapspeak.ros.messages import Message
+
+__all__ = ["HEADER_BYTES", "MOST_BYTES", "MOST_FIELDS", "MOST_MESSAGES", "Codec", "Store"]
 
 HEADER_BYTES = 4
-LITTLE_ENDIAN = b"\x00\x01\x00\x00"
-BIG_ENDIAN_MARK = 0
-PLACEHOLDER = Field(name="structure_needs_at_least_one_member", type="uint8")
-"""What ROS 2 puts in a message without fields."""
+"""They tell the byte order, and stand before what is encoded."""
+MOST_BYTES = 100_000_000
+"""The largest message that is read or written; a map of 16 million cells has 16 MB."""
+MOST_MESSAGES = 1_000_000
+"""Within one message: each takes a hundred times its bytes."""
+MOST_FIELDS = 1_000
+"""Of a type and all types within; rosbags writes code for each, 1 ms long, and for each value of
+a fixed array of texts or messages."""
+TEXT_BYTES, COUNT_BYTES = 5, 4
+"""An empty text, and an empty list."""
+DTYPES = {
+    kind: np.dtype(code)
+    for kind, code in {
+        "bool": "?", "byte": "u1", "char": "u1", "int8": "i1", "uint8": "u1", "int16": "<i2",
+        "uint16": "<u2", "int32": "<i4", "uint32": "<u4", "int64": "<i8", "uint64": "<u8",
+        "float32": "<f4", "float64": "<f8",
+    }.items()
+}  # fmt: skip
+"""The kinds of numbers."""
 
-Read = Callable[[memoryview, int], tuple[Any, int]]
-"""Takes the bytes behind the header and a position; gives the value and the position behind it."""
-Write = Callable[[bytearray, Any, str], None]
-"""Takes the bytes so far, a value, and the name of its field."""
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Layout:
+    """A type that the store was told of.
+
+    Attributes:
+        name: In the store.
+        fields: In their order.
+        inner: The layouts of the messages within, by their types.
+        least_bytes: Of a message.
+        n_fields: Of this and of each type within, by their names in the store.
+    """
+
+    name: str
+    fields: tuple[Field, ...]
+    inner: Mapping[str, "_Layout"]
+    least_bytes: int
+    n_fields: Mapping[str, int]
 
 
 class Codec:
-    """Reads and writes the messages of all types that it is told of.
+    """Reads and writes the messages of all types in a book.
 
     Args:
         book: Describes the types.
+        store: Of an earlier state of the book: code is made anew only for types that differ.
     """
 
-    def __init__(self, book: TypeBook) -> None:
+    def __init__(self, book: TypeBook, store: "Store | None" = None) -> None:
         self._book = book
-        self._readers: dict[tuple[str, str], Read] = {}
-        self._writers: dict[str, Write] = {}
+        self.store = store or Store()
+        self._layouts: dict[str, _Layout] = {}
 
-    def decode(self, type_name: str, data: bytes, *, skip: int = 0) -> dict[str, Any]:
-        """Gives a message; arrays of numbers are numpy arrays upon these bytes, uint8[] is bytes.
+    def decode(self, type_name: str, data: bytes) -> dict[str, Any]:
+        """Return a message; arrays of numbers are numpy arrays upon these bytes, uint8[] is bytes.
 
         Args:
             type_name: Such as "nav_msgs/OccupancyGrid".
             data: With its header of four bytes.
-            skip: So many bytes before the message are something else; a multiple of eight.
 
         Raises:
             LinkError: These bytes are no such message, or nobody knows the type.
         """
-        if len(data) < HEADER_BYTES or data[0] != 0 or data[1] not in (0, 1):
+        layout = self._find(type_name)
+        if len(data) > MOST_BYTES:
             raise LinkError(
-                f"A {type_name} is written in a way that we cannot read.",
-                hint="It is no plain CDR: look which middleware the robot uses.",
+                f"A {type_name} of {len(data)} bytes was not read; {MOST_BYTES} are the most.",
+                hint="Let the robot publish less at once.",
             )
-        order = ">" if data[1] == BIG_ENDIAN_MARK else "<"
         try:
-            message, end = self._reader(bare_type(type_name), order)(
-                memoryview(data)[HEADER_BYTES:], skip
-            )
-        except (ValueError, IndexError, UnicodeDecodeError) as error:
-            raise _no_such_message(type_name) from error
-        # Less than a whole word may follow, as padding.
-        if not 0 <= len(data) - HEADER_BYTES - end < HEADER_BYTES:
-            raise _no_such_message(type_name)
-        decoded: dict[str, Any] = message
-        return decoded
+            return self.store.decode(layout.name, data)
+        except SerdeError as error:
+            raise LinkError(
+                f"What came is no {type_name}.",
+                hint="The robot may use another version of that type than we know, or a "
+                "middleware that does not write plain CDR.",
+            ) from error
 
     def encode(self, type_name: str, message: Message) -> bytes:
-        """Gives the bytes of a message with their header; fields left out are zero or empty.
+        """Return the bytes of a message with their header; fields left out hold their defaults.
 
         Raises:
-            LinkError: A field does not exist, does not hold what it should, or is not finite.
+            LinkError: The message does not fit its type, or nobody knows the type.
         """
-        out = bytearray()
-        self._writer(bare_type(type_name))(out, message, "")
-        return LITTLE_ENDIAN + bytes(out)
+        layout = self._find(type_name)
+        filled = self._fill(layout, check_message(self._book, type_name, message))
+        return bytes(self.store.serialize_cdr(filled, layout.name, little_endian=True))
 
-    def _fields_of(self, type_name: str) -> tuple[Field, ...]:
-        if not self._book.knows(type_name):
-            raise LinkError(
-                f"We do not know what a {type_name} looks like.",
-                hint="Robots of ROS 2 Jazzy and later tell it; for older ones take rosbridge, "
-                "or give its definition where a tool asks for one.",
-            )
-        return self._book[type_name].fields or (PLACEHOLDER,)
+    def _find(self, type_name: str, above: tuple[str, ...] = ()) -> _Layout:
+        """Return the layout of a type; the store is told of it where it does not know it yet."""
+        if type_name not in self._layouts:
+            message = look_up(self._book, type_name, above=above)
+            kinds = dict.fromkeys(field.type for field in message.fields if field.is_message)
+            inner = {kind: self._find(kind, (*above, message.name)) for kind in kinds}
+            self._layouts[type_name] = self.store.lay_out(message, inner)
+        return self._layouts[type_name]
 
-    # --- reading
+    def _fill(self, layout: _Layout, message: Mapping[str, Any]) -> SimpleNamespace:
+        """Return a checked message as rosbags wants it, with all its fields."""
+        values = [
+            self._fill_field(layout, field, message[field.name])
+            if field.name in message
+            else self._fill_field(layout, field, self._default(field))
+            for field in layout.fields or (NOTHING,)
+        ]
+        return SimpleNamespace(**{_numbered(number): value for number, value in enumerate(values)})
 
-    def _reader(self, type_name: str, order: str) -> Read:
-        known = self._readers.get((type_name, order))
-        if known is None:
-            known = self._build_reader(type_name, order)
-            self._readers[type_name, order] = known
-        return known
+    def _default(self, field: Field) -> Any:  # noqa: ANN401 - ROS JSON
+        if field.is_message:
+            return {} if field.length is None else [{}] * field.length
+        return self._book.default(field)
 
-    def _build_reader(self, type_name: str, order: str) -> Read:
-        fields = self._fields_of(type_name)
-        parts = [(field.name, self._field_reader(field, order)) for field in fields]
-        is_empty = fields == (PLACEHOLDER,)
-
-        def read(data: memoryview, position: int) -> tuple[dict[str, Any], int]:
-            message = {}
-            for name, read_part in parts:
-                message[name], position = read_part(data, position)
-            return ({} if is_empty else message), position
-
-        return read
-
-    def _field_reader(self, field: Field, order: str) -> Read:
-        if field.length is not None and field.type in PRIMITIVES:
-            return _array_reader(PRIMITIVES[field.type], field, order)
-        read = self._value_reader(field.type, order)
+    def _fill_field(self, layout: _Layout, field: Field, value: Any) -> Any:  # noqa: ANN401 - ROS JSON
+        if field.is_message:
+            inner = layout.inner[field.type]
+            if field.length is None:
+                return self._fill(inner, value)
+            return [self._fill(inner, each) for each in value]
+        if field.type == "string":
+            return value
         if field.length is None:
-            return read
-        return _list_reader(read, field, order)
-
-    def _value_reader(self, type_name: str, order: str) -> Read:
-        if type_name == "string":
-            return _string_reader(order)
-        if type_name in PRIMITIVES:
-            return _number_reader(PRIMITIVES[type_name], order)
-        return self._reader(type_name, order)
-
-    # --- writing
-
-    def _writer(self, type_name: str) -> Write:
-        known = self._writers.get(type_name)
-        if known is None:
-            known = self._writers[type_name] = self._build_writer(type_name)
-        return known
-
-    def _build_writer(self, type_name: str) -> Write:
-        fields = self._fields_of(type_name)
-        parts = [(field.name, self._field_writer(field)) for field in fields]
-        names = {field.name for field in fields}
-        defaults = {field.name: self._book.default(field) for field in fields}
-
-        def write(out: bytearray, message: Any, name: str) -> None:  # noqa: ANN401 - ROS JSON
-            if not isinstance(message, Mapping):
-                raise misfit(name or type_name, message, f"a {type_name}")
-            for given in message:
-                if given not in names:
-                    raise LinkError(
-                        f"{type_name} has no field {str(given)[:80]!r}.",
-                        hint=f"Its fields are: {', '.join(sorted(names))}.",
-                    )
-            for each, write_part in parts:
-                write_part(out, message.get(each, defaults[each]), each)
-
-        return write
-
-    def _field_writer(self, field: Field) -> Write:
-        if field.length is not None and field.type in PRIMITIVES:
-            return _array_writer(PRIMITIVES[field.type], field)
-        write = self._value_writer(field.type)
-        return write if field.length is None else _list_writer(write, field)
-
-    def _value_writer(self, type_name: str) -> Write:
-        if type_name == "string":
-            return _write_string
-        if type_name in PRIMITIVES:
-            return _number_writer(PRIMITIVES[type_name])
-        return self._writer(type_name)
+            return value % 256 if field.type == "byte" else value
+        return _as_array(field, value)
 
 
-def _no_such_message(type_name: str) -> LinkError:
-    return LinkError(
-        f"What came is no {type_name}.",
-        hint="The robot may use another version of that type than we know.",
-    )
+class Store(Typestore):
+    """What rosbags was told of, in all versions.
+
+    Types and fields have numbers for names: what a robot calls them is kept out of the code.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._layouts: dict[object, _Layout] = {}
+        self._n_messages_left = 0
+
+    def decode(self, name: str, data: bytes) -> dict[str, Any]:
+        """Return a message by its type's name here; raises `SerdeError`."""
+        self._n_messages_left = MOST_MESSAGES
+        message: dict[str, Any] = self.deserialize_cdr(memoryview(data), name)  # type: ignore[assignment]
+        return message
+
+    def lay_out(self, message: MessageType, inner: Mapping[str, _Layout]) -> _Layout:
+        """Return the layout of a type, given those of the types within.
+
+        Raises:
+            LinkError: It is too large, or holds what CDR cannot.
+        """
+        key = (message.fields, tuple(layout.name for layout in inner.values()))
+        if key not in self._layouts:
+            name = f"type{len(self._layouts)}"
+            fields = message.fields or (NOTHING,)
+            n_fields = {name: sum(map(_count_code, fields))}
+            for each in inner.values():
+                n_fields |= each.n_fields
+            least_bytes = sum(_least_bytes(field, inner) for field in fields)
+            if sum(n_fields.values()) > MOST_FIELDS or least_bytes > MOST_BYTES:
+                raise LinkError(
+                    f"{message.name[:80]} is too large a type: more than {MOST_FIELDS} fields or "
+                    f"{MOST_BYTES} bytes.",
+                    hint="Take rosbridge or rclpy for it.",
+                )
+            described = [
+                (
+                    _numbered(number),
+                    describe_field(
+                        field, inner[field.type].name if field.is_message else _kind_of(field)
+                    ),
+                )
+                for number, field in enumerate(fields)
+            ]
+            self.fielddefs[name] = ([], described)
+            self.types[name] = self._factory(message.fields)
+            self._layouts[key] = _Layout(
+                name=name,
+                fields=message.fields,
+                inner=inner,
+                least_bytes=least_bytes,
+                n_fields=n_fields,
+            )
+        return self._layouts[key]
+
+    def _factory(self, fields: tuple[Field, ...]) -> Any:  # noqa: ANN401 - stands for a class
+        names = [field.name for field in fields]
+        conversions = [(field.name, _conversion(field)) for field in fields]
+        converted = [(name, convert) for name, convert in conversions if convert is not None]
+
+        def make(*values: Any) -> dict[str, Any]:  # noqa: ANN401 - ROS JSON
+            self._n_messages_left -= 1
+            if self._n_messages_left < 0:
+                raise SerdeError(f"more than {MOST_MESSAGES} messages")
+            message = dict(zip(names, values, strict=False))
+            for name, convert in converted:
+                message[name] = convert(message[name])
+            return message
+
+        return make
 
 
-def _number_reader(kind: Primitive, order: str) -> Read:
-    size, unpack = kind.size, kind.packing(order).unpack_from
-
-    def read(data: memoryview, position: int) -> tuple[Any, int]:
-        position = -(-position // size) * size
-        if position + size > len(data):
-            raise IndexError
-        return unpack(data, position)[0], position + size
-
-    return read
+def _numbered(number: int) -> str:
+    return f"field{number}"
 
 
-def _string_reader(order: str) -> Read:
-    read_length = _number_reader(PRIMITIVES["uint32"], order)
-
-    def read(data: memoryview, position: int) -> tuple[str, int]:
-        length, position = read_length(data, position)
-        end = position + length
-        if length == 0 or end > len(data):
-            raise IndexError
-        return str(data[position : end - 1], "utf-8"), end
-
-    return read
+def _kind_of(field: Field) -> str:
+    return "uint8" if field.type in ("byte", "char") else field.type
 
 
-def _array_reader(kind: Primitive, field: Field, order: str) -> Read:
-    size, dtype = kind.size, np.dtype(f"{order}{kind.dtype_code}")
-    read_length = _length_reader(field, order)
-
-    def read(data: memoryview, position: int) -> tuple[Any, int]:
-        length, position = read_length(data, position)
-        if length:
-            position = -(-position // size) * size
-        end = position + length * size
-        if end > len(data):
-            raise IndexError
-        if kind.dtype == "uint8":
-            return bytes(data[position:end]), end
-        values = np.frombuffer(data[position:end], dtype=dtype)
-        return (values.tolist() if kind.dtype == "bool" else values), end
-
-    return read
+def _is_array(field: Field) -> bool:
+    return field.length is not None and field.type in DTYPES
 
 
-def _list_reader(read_one: Read, field: Field, order: str) -> Read:
-    read_length = _length_reader(field, order)
-
-    def read(data: memoryview, position: int) -> tuple[list[Any], int]:
-        length, position = read_length(data, position)
-        # No value is shorter than a byte: a length from a damaged message costs nothing.
-        if length > len(data) - position:
-            raise IndexError
-        values = []
-        for _ in range(length):
-            value, position = read_one(data, position)
-            values.append(value)
-        return values, position
-
-    return read
+def _conversion(field: Field) -> Callable[[NDArray[Any]], Any] | None:
+    if not _is_array(field) or field.type not in ("bool", "byte", "char", "uint8"):
+        return None
+    return np.ndarray.tolist if field.type == "bool" else np.ndarray.tobytes
 
 
-def _length_reader(field: Field, order: str) -> Read:
-    if not field.length:
-        return _number_reader(PRIMITIVES["uint32"], order)
-    length = field.length
-    return lambda _data, position: (length, position)
+def _count_code(field: Field) -> int:
+    """Return for how many fields rosbags writes code: a fixed array is spelled out."""
+    return 1 if _is_array(field) else field.length or 1
 
 
-def _number_writer(kind: Primitive) -> Write:
-    size, pack = kind.size, kind.packing("<").pack
-
-    def write(out: bytearray, value: Any, name: str) -> None:  # noqa: ANN401 - ROS JSON
-        out += bytes(-len(out) % size) + pack(kind.checked(value, name))
-
-    return write
-
-
-_write_length = _number_writer(PRIMITIVES["uint32"])
+def _least_bytes(field: Field, inner: Mapping[str, _Layout]) -> int:
+    if field.length == 0:
+        return COUNT_BYTES
+    if field.is_message:
+        one = inner[field.type].least_bytes
+    else:
+        one = DTYPES[field.type].itemsize if field.type in DTYPES else TEXT_BYTES
+    return one * (field.length or 1)
 
 
-def _write_string(out: bytearray, value: Any, name: str) -> None:  # noqa: ANN401 - ROS JSON
-    text = as_text(value, name)
-    _write_length(out, len(text) + 1, name)
-    out += text + b"\x00"
-
-
-def _array_writer(kind: Primitive, field: Field) -> Write:
-    def write(out: bytearray, value: Any, name: str) -> None:  # noqa: ANN401 - ROS JSON
-        values = as_array(value, name, kind)
-        _write_count(out, len(values), field)
-        if len(values):
-            out += bytes(-len(out) % kind.size) + values.tobytes()
-
-    return write
-
-
-def _list_writer(write_one: Write, field: Field) -> Write:
-    def write(out: bytearray, value: Any, name: str) -> None:  # noqa: ANN401 - ROS JSON
-        if not isinstance(value, list | tuple):
-            raise misfit(name, value, "a list")
-        _write_count(out, len(value), field)
-        for each in value:
-            write_one(out, each, name)
-
-    return write
-
-
-def _write_count(out: bytearray, n_values: int, field: Field) -> None:
-    if field.length and n_values != field.length:
-        raise misfit(field.name, n_values, f"{field.length} values")
-    if field.most is not None and n_values > field.most:
-        raise misfit(field.name, n_values, f"at most {field.most} values")
-    if not field.length:
-        _write_length(out, n_values, field.name)
+def _as_array(field: Field, value: Any) -> NDArray[Any]:  # noqa: ANN401 - ROS JSON
+    dtype = DTYPES[field.type]
+    if isinstance(value, str):
+        value = base64.b64decode(value, validate=True)
+    if isinstance(value, bytes | bytearray | memoryview):
+        return np.frombuffer(value, dtype=dtype)
+    if field.type == "byte":
+        value = np.asarray(value, dtype=np.int16)
+    if isinstance(value, np.ndarray):
+        return np.ascontiguousarray(value.astype(dtype, copy=False))
+    return np.array(value, dtype=dtype)

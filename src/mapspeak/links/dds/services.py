@@ -30,7 +30,7 @@ LATE_ANSWER_S = 1.0
 
 Answer = dict[str, Any]
 Encode = Callable[[str, Mapping[str, Any]], bytes]
-DecodeFrom = Callable[[str, bytes, int], Answer]
+Decode = Callable[[str, bytes], Answer]
 
 
 class _Call:
@@ -60,7 +60,7 @@ class ServiceClient:
         name: Of the service, and its type.
         framing: How the robot frames requests and answers.
         encode: Gives the bytes of a message of a type.
-        decode: Gives the message of a type in bytes, behind so many that are something else.
+        decode: Gives the message of a type in bytes.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class ServiceClient:
         *,
         framing: Framing,
         encode: Encode,
-        decode: DecodeFrom,
+        decode: Decode,
     ) -> None:
         self.name = name
         self._participant = participant
@@ -198,11 +198,12 @@ class ServiceClient:
     def _understand(self, data: bytes) -> tuple[int | None, Answer]:
         """Gives the number of the request, None for others' and 0 where unknown, and the answer."""
         if self._framing is Framing.BARE:
-            return 0, self._decode(self.name.reply_type, data, 0)
+            return 0, self._decode(self.name.reply_type, data)
         asker, number = NUMBER.unpack_from(data.ljust(HEADER_BYTES + NUMBER.size), HEADER_BYTES)
         if asker != self._id:
             return None, {}
-        return number, self._decode(self.name.reply_type, data, NUMBER.size)
+        bare = data[:HEADER_BYTES] + data[HEADER_BYTES + NUMBER.size :]
+        return number, self._decode(self.name.reply_type, bare)
 
     def _take(self, sample: Sample) -> None:
         number, answer = (0, None) if sample.refusal is not None else sample.content

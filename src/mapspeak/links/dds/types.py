@@ -24,7 +24,8 @@ class Types:
         self._distro = distro
         self._hashes: dict[str, str] = {}
         self._other_versions: set[str] = set()
-        self._use(_book_of(distro))
+        self._book = _book_of(distro)
+        self._codec = Codec(self._book)
 
     def encode(self, type_name: str, message: Mapping[str, Any]) -> bytes:
         """Gives the bytes of a message.
@@ -36,13 +37,13 @@ class Types:
             raise self.refusal(type_name)
         return self._codec.encode(type_name, message)
 
-    def decode(self, type_name: str, data: bytes, skip: int = 0) -> dict[str, Any]:
-        """Gives the message in some bytes, behind so many that are something else.
+    def decode(self, type_name: str, data: bytes) -> dict[str, Any]:
+        """Gives the message in some bytes.
 
         Raises:
             LinkError: It is none of that type, or nobody knows the type.
         """
-        return self._codec.decode(type_name, data, skip=skip)
+        return self._codec.decode(type_name, data)
 
     def knows(self, type_name: str) -> bool:
         """True for a type as the robot has it, whose fields, and those of all within, are known."""
@@ -120,7 +121,7 @@ class Types:
         return {name: self._book.texts[name] for name in dict.fromkeys((*found, *within))}
 
     def _use(self, book: TypeBook) -> None:
-        self._book, self._codec = book, Codec(book)
+        self._book, self._codec = book, Codec(book, self._codec.store)
 
 
 def _has_hash(book: TypeBook, name: str, type_hash: str) -> bool:

@@ -25,14 +25,20 @@ from mapspeak.ros.definitions.parts import (
     split_parts,
     write_definition,
 )
-from mapspeak.ros.definitions.typestore import EMPTY, build_typestore, hash_type, name_in_ros2
+from mapspeak.ros.definitions.typestore import (
+    NOTHING,
+    describe_field,
+    hash_type,
+    look_up,
+    name_in_ros2,
+)
 
 __all__ = [
     "ACTION_PARTS",
     "DISTROS",
-    "EMPTY",
     "FLOATS",
     "GENERATED",
+    "NOTHING",
     "SERVICE_PARTS",
     "TIMES",
     "WHOLES",
@@ -40,14 +46,15 @@ __all__ = [
     "Field",
     "MessageType",
     "TypeBook",
-    "build_typestore",
     "check_message",
+    "describe_field",
     "describe_type",
     "find_actions_of_ros1",
     "find_odd_lines",
     "hash_type",
     "kinds_of",
     "known_definitions",
+    "look_up",
     "name_in_ros2",
     "name_parts",
     "parse_definition",

@@ -1,11 +1,14 @@
 """Messages that are about to be sent, held against what their type says."""
 
 import base64
-import binascii
 import difflib
 import math
+import re
 from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from mapspeak.errors import LinkError
 from mapspeak.ros.definitions.book import MOST_NESTED, TypeBook
@@ -16,11 +19,21 @@ __all__ = ["check_message"]
 
 LARGEST_FLOAT32 = 3.4028234663852886e38
 BYTES = ("uint8", "char", "byte")
+NUMBERS = frozenset((*FLOATS, *WHOLES, "bool"))
+UNSENDABLE = re.compile("[\x00\ud800-\udfff]")
 MOST_SHOWN = 40
 
 
 def check_message(book: TypeBook, type_name: str, message: object) -> dict[str, Any]:
-    """Gives a message as it may be sent: fields left out stay out, whole numbers become floats.
+    """Return a message as it may be sent: fields left out stay out, whole numbers become floats.
+
+    Every message goes through here before it is sent: no link looks at what it is given, but
+    rosbridge's, which sees to what JSON can hold.
+
+    Args:
+        book: Describes the type and all types within.
+        type_name: Of the message.
+        message: Lists of numbers may be numpy arrays; uint8[] may be bytes or, as in JSON, base64.
 
     Raises:
         LinkError: It does not fit; says the field's path and what its type wants.
@@ -52,16 +65,39 @@ def _check(
 def _check_field(book: TypeBook, field: Field, value: object, *, path: str, depth: int) -> Any:  # noqa: ANN401 - ROS JSON
     if field.length is None:
         return _check_value(book, field, value, path=path, depth=depth)
-    if isinstance(value, str) and field.type in BYTES and _n_bytes(value) is not None:
-        _check_length(field, _n_bytes(value) or 0, path)
-        return value
-    if not isinstance(value, list):
+    n_values = _count(field, value)
+    if n_values is None:
         raise _misfit(path, f"a list ({field.shown_type})", value)
-    _check_length(field, len(value), path)
+    _check_length(field, n_values, path)
+    if isinstance(value, np.ndarray):
+        return _check_array(book, field, value, path=path)
+    if not isinstance(value, list | tuple):
+        return value
     return [
         _check_value(book, field, each, path=f"{path}[{number}]", depth=depth)
         for number, each in enumerate(value)
     ]
+
+
+def _count(field: Field, value: object) -> int | None:
+    """Return how many values a list has; None for what is no list of that field."""
+    if isinstance(value, str):
+        return _n_bytes(value) if field.type in BYTES else None
+    if isinstance(value, bytes | bytearray | memoryview):
+        return len(value) if field.type in BYTES else None
+    if isinstance(value, np.ndarray):
+        return len(value) if value.ndim == 1 else None
+    return len(value) if isinstance(value, list | tuple) else None
+
+
+def _check_array(book: TypeBook, field: Field, values: NDArray[Any], *, path: str) -> NDArray[Any]:
+    kinds = {"bool": "b"}.get(field.type, "iuf" if field.type in FLOATS else "iu")
+    if values.size and (field.type not in NUMBERS or values.dtype.kind not in kinds):
+        raise _misfit(path, f"a list of numbers ({field.shown_type})", f"{values.dtype}")
+    # Where one is no number, it is the least and the largest.
+    for extreme in (values.min(), values.max()) if values.size else ():
+        _check_value(book, field, extreme, path=path, depth=0)
+    return values
 
 
 def _check_length(field: Field, length: int, path: str) -> None:
@@ -75,6 +111,8 @@ def _check_length(field: Field, length: int, path: str) -> None:
 
 def _check_value(book: TypeBook, field: Field, value: object, *, path: str, depth: int) -> Any:  # noqa: ANN401 - ROS JSON
     kind = field.type
+    if isinstance(value, np.generic):
+        value = value.item()
     if kind in FLOATS:
         return _check_float(kind, value, path)
     if kind in WHOLES:
@@ -105,8 +143,8 @@ def _check_float(kind: str, value: object, path: str) -> float:
 
 
 def _check_text(field: Field, value: object, path: str) -> str:
-    # Half a surrogate pair can be said in JSON, and no wire can carry it.
-    if not isinstance(value, str) or any("\ud800" <= sign <= "\udfff" for sign in value):
+    # Half a surrogate pair or a zero can be said in JSON, and no wire of ROS can carry it.
+    if not isinstance(value, str) or UNSENDABLE.search(value):
         raise _misfit(path, f"a text ({field.shown_type})", value)
     if field.most_letters is not None and len(value) > field.most_letters:
         raise LinkError(
@@ -119,7 +157,7 @@ def _check_text(field: Field, value: object, path: str) -> str:
 def _n_bytes(text: str) -> int | None:
     try:
         return len(base64.b64decode(text, validate=True))
-    except binascii.Error:
+    except ValueError:
         return None
 
 

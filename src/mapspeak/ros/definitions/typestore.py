@@ -1,23 +1,19 @@
-"""Types as rosbags keeps them: what their hashes are made of, and the code that reads their CDR."""
+"""Types as rosbags describes them: what their hashes, and the code for their CDR, are made of."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mapspeak.errors import LinkError
 from mapspeak.ros.definitions.book import MOST_NESTED, TypeBook
 from mapspeak.ros.definitions.parsing import Field, MessageType
 from mapspeak.ros.messages import bare_type
 
-if TYPE_CHECKING:
-    from rosbags.typesys.store import Typestore
+__all__ = ["NOTHING", "describe_field", "hash_type", "look_up", "name_in_ros2"]
 
-__all__ = ["EMPTY", "build_typestore", "hash_type", "name_in_ros2"]
-
-EMPTY = "structure_needs_at_least_one_member"
-"""The field of a message without fields."""
+NOTHING = Field(name="structure_needs_at_least_one_member", type="uint8")
+"""What ROS 2 puts in a message without fields."""
 OF_ACTION = ("Goal", "Result", "Feedback", "FeedbackMessage")
 OF_SERVICE = ("Request", "Response")
 OF_ACTIONS_SERVICE = ("SendGoal", "GetResult")
-SAME_ON_THE_WIRE = {"char": "uint8"}
 
 
 def name_in_ros2(name: str) -> str:
@@ -30,61 +26,70 @@ def name_in_ros2(name: str) -> str:
 
 
 def hash_type(book: TypeBook, name: str) -> str:
-    """Gives a type's hash, as nodes of ROS 2 tell it since Iron: "RIHS01_...".
+    """Return a type's hash, as nodes of ROS 2 tell it since Iron: "RIHS01_...".
 
     Raises:
-        LinkError: See `build_typestore`.
-    """
-    return build_typestore(book, name).hash_rihs01(name_in_ros2(name))
-
-
-def build_typestore(book: TypeBook, name: str) -> "Typestore":
-    """Gives a store of rosbags that holds a type and all types within.
-
-    Raises:
-        LinkError: One of them is not known, holds itself, or holds what CDR cannot.
+        LinkError: It or a type within is not known, holds itself, or holds what CDR cannot.
     """
     from rosbags.typesys.store import Typestore  # noqa: PLC0415 - takes 0.1 s
 
     store = Typestore()
-    _add(store.fielddefs, book, name, depth=0)
-    return store
+    _add(store.fielddefs, book, name, above=())
+    return store.hash_rihs01(name_in_ros2(name))
 
 
-def _add(found: dict[str, Any], book: TypeBook, name: str, *, depth: int) -> None:
-    if not book.knows(name) or depth > MOST_NESTED:
+def _add(found: dict[str, Any], book: TypeBook, name: str, *, above: tuple[str, ...]) -> None:
+    message = look_up(book, name, above=above)
+    if name_in_ros2(name) in found:
+        return
+    for kind in dict.fromkeys(field.type for field in message.fields if field.is_message):
+        _add(found, book, kind, above=(*above, message.name))
+    fields = message.fields or (NOTHING,)
+    found[name_in_ros2(name)] = ([], [(field.name, _describe(field)) for field in fields])
+
+
+def _describe(field: Field) -> Any:  # noqa: ANN401 - rosbags' nested tuples
+    if field.is_message:
+        return describe_field(field, name_in_ros2(field.type))
+    return describe_field(field, "uint8" if field.type == "char" else field.type)
+
+
+def look_up(book: TypeBook, name: str, *, above: tuple[str, ...]) -> MessageType:
+    """Return a type that is within others.
+
+    Raises:
+        LinkError: It is not known, or holds itself.
+    """
+    if not book.knows(name) or bare_type(name) in above or len(above) > MOST_NESTED:
         raise LinkError(
-            f"We do not know what a {name[:80]} looks like.",
+            f"We do not know what a {bare_type(name)[:80]} looks like.",
             hint="Robots of ROS 2 Jazzy and later tell it for topics; for others take rosbridge, "
             "or give its definition where a tool asks for one.",
         )
-    message = book[name]
-    found[name_in_ros2(name)] = ([], _describe_fields(message))
-    for kind in dict.fromkeys(field.type for field in message.fields if field.is_message):
-        _add(found, book, kind, depth=depth + 1)
+    return book[name]
 
 
-def _describe_fields(message: MessageType) -> list[Any]:
-    fields = message.fields or (Field(name=EMPTY, type="uint8"),)
-    return [(field.name, _describe_field(field)) for field in fields]
+def describe_field(field: Field, kind: str) -> Any:  # noqa: ANN401 - rosbags' nested tuples
+    """Return a field as rosbags describes it.
 
+    Args:
+        field: Which.
+        kind: Of number, or the name of its messages.
 
-def _describe_field(field: Field) -> Any:  # noqa: ANN401 - rosbags' nested tuples
+    Raises:
+        LinkError: CDR cannot hold it.
+    """
     from rosbags.interfaces import Nodetype  # noqa: PLC0415 - as above
 
-    one: Any
     if field.type == "wstring":
         raise LinkError(
-            f"The field {field.name} holds a wstring, which mapspeak cannot write over DDS.",
+            f"The field {field.name[:80]} holds a wstring, which mapspeak cannot write over DDS.",
             hint="Take rosbridge or rclpy for it.",
         )
-    if field.is_message:
-        one = (Nodetype.NAME, name_in_ros2(field.type))
-    else:
-        one = (
-            Nodetype.BASE,
-            (SAME_ON_THE_WIRE.get(field.type, field.type), field.most_letters or 0),
-        )
+    is_name = field.is_message
+    one: Any = (
+        (Nodetype.NAME, kind) if is_name else (Nodetype.BASE, (kind, field.most_letters or 0))
+    )
     if field.length is None:
         return one
     if field.length:
