@@ -26,7 +26,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.figure import Figure
-from mapspeak.driving.drive import DriveReport
+from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.exploration import Explorer, Pick, take_first
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.links.simulated import SimulatedRobot

@@ -25,7 +25,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.figure import Figure
-from mapspeak.driving.drive import DriveReport
+from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.search import (
     Budget,
     Candidate,

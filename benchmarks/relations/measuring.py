@@ -17,8 +17,8 @@ from benchmarks.relations.goals import build_goals
 from benchmarks.relations.sites import Site, build_sites
 from benchmarks.relations.truth import Truth, angle_off
 from mapspeak.errors import GoalError
-from mapspeak.places.choosing import CheckedGoal, check_place
-from mapspeak.places.places import Place, find_place
+from mapspeak.places.choosing import CheckedGoal, check_place, find_place
+from mapspeak.places.naming import Place
 from mapspeak.semantic import SemanticMap
 from mapspeak.worldmodel.model import Atlas
 

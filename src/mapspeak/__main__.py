@@ -4,8 +4,6 @@ import os
 
 from mapspeak.installation import prefer_own_packages
 
-__all__ = ["main"]
-
 
 def main() -> None:
     """Run the command line with the packages of its own environment."""

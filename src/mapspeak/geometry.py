@@ -7,8 +7,6 @@ name says no frame is in the `map` frame.
 import math
 from dataclasses import dataclass
 
-__all__ = ["Point", "Pose", "wrap_angle"]
-
 
 def wrap_angle(angle_rad: float) -> float:
     """Gives the same angle in (-pi, pi]."""

@@ -9,8 +9,6 @@ import sys
 from importlib.metadata import requires
 from pathlib import Path
 
-__all__ = ["prefer_own_packages", "say_install", "shell_command"]
-
 
 def shell_command(words: str) -> str:
     """Return what a person types here for a command, such as "memory list".

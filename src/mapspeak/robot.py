@@ -14,22 +14,6 @@ from numpy.typing import NDArray
 from mapspeak.geometry import Pose
 from mapspeak.spatial import OccupancyGrid
 
-__all__ = [
-    "OLD_POSE_S",
-    "SCAN_PATIENCE_S",
-    "CameraPicture",
-    "Detection",
-    "Finding",
-    "GoalState",
-    "GoalStatus",
-    "Health",
-    "PoseDoubt",
-    "RangeScan",
-    "Robot",
-    "RobotDescription",
-    "StampedPose",
-]
-
 OLD_POSE_S = 3.0
 """A pose that is older is no sure answer to where a robot is: it drives on meanwhile."""
 SCAN_PATIENCE_S = 0.5

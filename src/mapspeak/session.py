@@ -39,8 +39,6 @@ from mapspeak.worldmodel.model import Atlas
 from mapspeak.worldmodel.recollection import Recollector
 from mapspeak.worldmodel.revision import MapRevision
 
-__all__ = ["Session"]
-
 LOOK_S = 0.05
 """Wall time between two looks for a hold, and at where a drive leads."""
 WATCH_S = 0.5

@@ -13,8 +13,6 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from mapspeak.errors import ConfigError, say_cause
 
-__all__ = ["read_settings"]
-
 MAX_FILE_BYTES = 1_000_000
 
 PLAIN = {

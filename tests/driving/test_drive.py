@@ -4,7 +4,8 @@ import anyio
 import pytest
 
 from fakes import FakeRobot, two_rooms
-from mapspeak.driving.drive import Drive, DriveBook
+from mapspeak.driving.drive import DriveBook
+from mapspeak.driving.drivereport import Drive
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState, GoalStatus

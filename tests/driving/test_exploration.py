@@ -5,7 +5,7 @@ import anyio
 import pytest
 
 from drawing import grid_from_text
-from mapspeak.driving.drive import DriveReport
+from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.exploration import (
     BlockedPlaces,
     Bounds,

@@ -10,7 +10,7 @@ from closing import EAST, NOW, WEST, event, goes_north, office, revision_with
 from fakes import FakeRobot
 from guarding import WallClock, corners, make_guard
 from mapspeak.driving.doorlearning import learn_from_drive
-from mapspeak.driving.drive import Drive
+from mapspeak.driving.drivereport import Drive
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import GoalState, GoalStatus
 from mapspeak.safety import Policy

@@ -5,7 +5,8 @@ import pytest
 
 from failing_robot import FailingRobot
 from fakes import FakeRobot, two_rooms
-from mapspeak.driving.drive import Drive, DriveBook, DriveReport
+from mapspeak.driving.drive import DriveBook
+from mapspeak.driving.drivereport import Drive, DriveReport
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState, PoseDoubt, StampedPose

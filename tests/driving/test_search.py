@@ -5,7 +5,7 @@ import pytest
 
 from drawing import grid_from_text
 from embedding import ConceptEmbedder
-from mapspeak.driving.drive import DriveReport
+from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.search import (
     Budget,
     Candidate,
@@ -20,7 +20,7 @@ from mapspeak.driving.search import (
     speaks_of,
 )
 from mapspeak.driving.search.candidates import find_candidates
-from mapspeak.driving.search.opinions import weight_of
+from mapspeak.driving.search.evidence import weight_of
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import Detection
 from mapspeak.semantic import Landmark, SemanticMapStore, Waypoint

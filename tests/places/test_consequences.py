@@ -12,13 +12,12 @@ from mapspeak.driving.exploration import ExplorationState
 from mapspeak.driving.exploration.progress import CLOSED_OFF, find_unreachable, judge_end
 from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Pose
-from mapspeak.places.choosing import check_place
+from mapspeak.places.choosing import check_place, find_place
 from mapspeak.places.goalcheck import GoalVerdict
 from mapspeak.places.notices import (
     close_floor_of,
     say_consequences,
 )
-from mapspeak.places.places import find_place
 from mapspeak.safety import Policy, Surveyor
 from mapspeak.semantic import SemanticMap, SemanticMapStore, Waypoint
 from mapspeak.semantic.events import Effect

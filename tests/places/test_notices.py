@@ -20,8 +20,7 @@ from mapspeak.places.notices import (
 )
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.semantic.events import Effect
-from mapspeak.worldmodel.closures import MARGIN_M
-from mapspeak.worldmodel.footprints import POST_M, SILL_M
+from mapspeak.worldmodel.closures import MARGIN_M, POST_M, SILL_M
 
 
 @pytest.fixture

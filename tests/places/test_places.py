@@ -7,8 +7,8 @@ from drawing import grid_from_text
 from fakes import two_rooms
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point, Pose
-from mapspeak.places.choosing import check_place, choose_goal
-from mapspeak.places.places import Place, Spot, find_place, is_taken_name
+from mapspeak.places.choosing import check_place, choose_goal, find_place
+from mapspeak.places.naming import Place, Spot, is_taken_name
 from mapspeak.places.ways import find_way
 from mapspeak.semantic import SemanticMap, Waypoint
 from mapspeak.spatial import OccupancyGrid

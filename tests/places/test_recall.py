@@ -9,9 +9,8 @@ from embedding import ConceptEmbedder
 from fakes import two_rooms
 from mapspeak.errors import ConfigError, GoalError
 from mapspeak.geometry import Point
-from mapspeak.places.choosing import check_place
+from mapspeak.places.choosing import check_place, find_place
 from mapspeak.places.naming import AmbiguousPlaceError
-from mapspeak.places.places import find_place
 from mapspeak.places.recall import RecallQuery, recall
 from mapspeak.semantic import Landmark, SemanticMap, Waypoint
 from mapspeak.semantic.retrieval import EntryKind, Verdict

@@ -4,18 +4,19 @@ from pathlib import Path
 import pytest
 
 from mapspeak.places.relations import parse_relation
-from mapspeak.places.relations.phrases import (
+from mapspeak.places.relations.grammar import (
     Away,
     Between,
+    Compass,
     Corner,
     Kind,
     Middle,
     Nearest,
+    Side,
     Towards,
     Turned,
     WallSide,
 )
-from mapspeak.places.relations.words import Compass, Side
 
 REFERENCE = Path(__file__).parents[2] / "docs" / "reference" / "relations.md"
 

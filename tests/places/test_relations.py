@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from drawing import grid_from_text
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.places.choosing import check_place
-from mapspeak.places.places import Place, find_place
+from mapspeak.places.choosing import check_place, find_place
+from mapspeak.places.naming import Place
 from mapspeak.semantic import Landmark, SemanticMap, Waypoint
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door

@@ -7,7 +7,7 @@ from mcp_types import CallToolResult
 from drawing import grid_from_text
 from failing_robot import FailingRobot
 from fakes import FakeRobot, two_rooms
-from mapspeak.driving.drive import DriveReport
+from mapspeak.driving.drivereport import DriveReport
 from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState, StampedPose
 from mapspeak.semantic import SemanticMapStore

@@ -4,9 +4,8 @@ import pytest
 from drawing import grid_from_text, text_from_grid
 from guarding import corners
 from mapspeak.geometry import Point, Pose
-from mapspeak.places.choosing import check_place
+from mapspeak.places.choosing import check_place, find_place
 from mapspeak.places.goalcheck import GoalVerdict, check_goal
-from mapspeak.places.places import find_place
 from mapspeak.semantic import SemanticMap
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import distances_from

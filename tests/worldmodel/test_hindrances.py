@@ -7,11 +7,11 @@ import pytest
 from closing import EAST, NOW, RADIUS_M, WEST, atlas_on, event, goes_north, office, revision_with
 from guarding import corners
 from mapspeak.geometry import Point, Pose
+from mapspeak.places.choosing import find_place
 from mapspeak.places.notices import (
     close_floor_of,
     say_unplaced,
 )
-from mapspeak.places.places import find_place
 from mapspeak.places.ways import find_way
 from mapspeak.safety.legs import plan_legs
 from mapspeak.semantic.events import Effect, Event

@@ -6,8 +6,6 @@ import click
 
 from mapspeak.cli.guarding import CONTROL_OPTION, control_folder
 
-__all__ = ["approve"]
-
 
 @click.command()
 @click.argument("wish_id", required=False)

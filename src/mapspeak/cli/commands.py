@@ -19,8 +19,6 @@ from mapspeak.cli.simulating import simulate
 from mapspeak.cli.stopping import release, stop
 from mapspeak.errors import MapspeakError
 
-__all__ = ["cli", "main"]
-
 
 @click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="mapspeak")

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from mapspeak.evaluation.page import Moment
     from mapspeak.safety import Hold
 
-__all__ = ["demo"]
-
 
 @click.command()
 @WORLD_OPTION

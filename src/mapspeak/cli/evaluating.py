@@ -9,8 +9,6 @@ import click
 if TYPE_CHECKING:
     from mapspeak.evaluation.runs import RunOptions
 
-__all__ = ["evaluate"]
-
 TABLE_WIDTH = 180
 """Characters of the table where nobody knows the width, as in a file."""
 INTERRUPTED = 130

@@ -16,8 +16,6 @@ from mapspeak.cli.robots import RobotChoice, open_robot
 if TYPE_CHECKING:
     from mapspeak.robot import Finding
 
-__all__ = ["doctor", "examine_choice"]
-
 SIGNS = {"fine": "ok", "doubtful": "??", "missing": "--"}
 
 

@@ -6,8 +6,6 @@ from pathlib import Path
 
 from mapspeak.errors import ConfigError
 
-__all__ = ["file_for", "name_robots", "split_files"]
-
 NAME = re.compile(r"(?P<name>[A-Za-z][A-Za-z0-9_-]{0,39})=(?P<rest>.+)", re.DOTALL)
 ONLY = ""
 """The name of a robot that has none, because it is the only one."""

@@ -15,17 +15,6 @@ from mapspeak.cli.options import FILE
 if TYPE_CHECKING:
     from mapspeak.safety import Guard
 
-__all__ = [
-    "CONTROL_OPTION",
-    "GUARD_OPTIONS",
-    "GuardChoice",
-    "build_guard",
-    "control_folder",
-    "data_folder",
-    "keep_private",
-    "wall_clock",
-]
-
 CONTROL_OPTION = click.option(
     "--control",
     type=click.Path(path_type=Path, file_okay=False),

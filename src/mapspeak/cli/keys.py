@@ -14,8 +14,6 @@ from mapspeak.errors import ConfigError
 if TYPE_CHECKING:
     from mapspeak.safety import Hold
 
-__all__ = ["StopKeys", "stop_keys"]
-
 STOP = b" s"
 RELEASE = b"r"
 HELP = "Space or s stops the robot, r lets it go on."

@@ -14,8 +14,6 @@ from mapspeak.errors import MapError
 if TYPE_CHECKING:
     from mapspeak.server.mapcommand import MapJob
 
-__all__ = ["map_command"]
-
 
 @click.command("map")
 @click.argument("files", nargs=-1, required=True, type=FILE)

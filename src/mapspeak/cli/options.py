@@ -9,17 +9,6 @@ import click
 
 from mapspeak.geometry import Pose
 
-__all__ = [
-    "DEFAULT_WORLD",
-    "FILE",
-    "ROBOT_HELP",
-    "ROBOT_OPTIONS",
-    "SEED_OPTION",
-    "WORLD_OPTION",
-    "add_options",
-    "read_pose",
-]
-
 Command = Callable[..., Any]
 Decorator = Callable[[Command], Command]
 

@@ -10,8 +10,6 @@ from mapspeak.cli.options import FILE
 if TYPE_CHECKING:
     from mapspeak.safety import AuditLine
 
-__all__ = ["replay"]
-
 
 @click.command()
 @click.argument("file", type=FILE)

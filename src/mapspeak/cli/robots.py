@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
     OpenLink = Callable[[], AbstractAsyncContextManager[RosRobot]]
 
-__all__ = ["RobotChoice", "ServedRobot", "open_robot", "open_served_robot"]
-
 ROBOT_TOKEN_VARIABLE = "MAPSPEAK_ROBOT_TOKEN"  # noqa: S105 - the variable's name, not a token
 ROSBRIDGE_SCHEMES = ("ws://", "wss://")
 LARGEST_DOMAIN = 232

@@ -37,8 +37,6 @@ if TYPE_CHECKING:
     from mapspeak.server import CallLog, MapspeakServer, Representation
     from mapspeak.session import Session
 
-__all__ = ["serve"]
-
 TOKEN_VARIABLE = "MAPSPEAK_HTTP_TOKEN"  # noqa: S105 - the variable's name, not a token
 DEFAULT_HTTP = "127.0.0.1:8766"
 

@@ -5,8 +5,6 @@ import click
 
 from mapspeak.cli.options import SEED_OPTION, WORLD_OPTION
 
-__all__ = ["simulate"]
-
 DEFAULT_ROSBRIDGE = "127.0.0.1:9090"
 
 

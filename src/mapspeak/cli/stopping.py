@@ -12,8 +12,6 @@ from mapspeak.installation import shell_command
 # Nothing heavier may be imported here: a stop waits for it.
 from mapspeak.safety.hold import Hold
 
-__all__ = ["hold_robots", "release", "stop"]
-
 POLL_S = 0.01
 
 

@@ -11,8 +11,6 @@ from mapspeak.robot import Finding, Health, RangeScan, Robot
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import clearance_m
 
-__all__ = ["examine"]
-
 OLD_POSE_S = 5.0
 """A pose older than this is no answer to where a driving robot is."""
 ON_MAP_M = 0.3

@@ -14,8 +14,6 @@ from mapspeak.semantic.episodes import (
     observations_from,
 )
 
-__all__ = ["Diary", "Keeping"]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Keeping:

@@ -8,17 +8,15 @@ from collections.abc import Iterable
 from dataclasses import replace
 from datetime import datetime, timedelta
 
-from mapspeak.driving.drive import Drive
+from mapspeak.driving.drivereport import Drive
 from mapspeak.geometry import Point
 from mapspeak.places.notices import end_event, find_hindrances
 from mapspeak.robot import GoalState
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.semantic.events import OPEN_AGAIN, ROBOT, SHUT, Effect, Event, current_events
 from mapspeak.spatial.paths import Path
-from mapspeak.worldmodel.footprints import outline_of_door
+from mapspeak.worldmodel.closures import outline_of_door
 from mapspeak.worldmodel.revision import MapRevision
-
-__all__ = ["learn_from_drive"]
 
 AHEAD_M = 1.5
 """A robot that gives up at a door stands so near to it, along its way."""

@@ -9,8 +9,6 @@ from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState, GoalStatus, PoseDoubt, Robot, StampedPose
 
-__all__ = ["DriveMonitor", "Look"]
-
 STALE = (PoseDoubt.OLD_POSE, PoseDoubt.CLOCK_STANDS)
 WAITS = GoalStatus(state=GoalState.PLANNED, reason="It waits for the drive before it.")
 

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import GoalState, GoalStatus, PoseDoubt
 
-__all__ = ["JUST_SENT", "Drive", "DriveReport"]
-
 JUST_SENT = GoalStatus(state=GoalState.ACCEPTED)
 
 

@@ -7,8 +7,6 @@ import anyio
 
 from mapspeak.errors import ConfigError
 
-__all__ = ["Lease"]
-
 
 class Lease:
     """Knows since when no client has been heard. Wall time: it is about clients, not the robot.

@@ -9,8 +9,6 @@ from mapspeak.driving.drivereport import Drive
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.robot import GoalState, GoalStatus, Robot
 
-__all__ = ["NEEDS_NO_STOP", "OwedStop"]
-
 NEWS_S = 0.5
 """Wall time from the robot's return until its navigation has told how goals stand."""
 NEEDS_NO_STOP = (GoalState.ARRIVED, GoalState.CANCELLED, GoalState.PREEMPTED)

@@ -9,8 +9,6 @@ from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.robot import GoalState, GoalStatus, StampedPose
 
-__all__ = ["DriveWatchdog", "Odometer"]
-
 MOVED_M = 0.1
 TURNED_RAD = math.radians(10)
 JUMP_M = 1.0

@@ -17,8 +17,6 @@ from mapspeak.links.ros import RosRobot
 from mapspeak.robot import Robot
 from mapspeak.ros import RosConnection, Started
 
-__all__ = ["Arrival"]
-
 PAUSE_S = 2.0
 """Between two looks for a robot while nobody asks for it."""
 FIRST_LOOK_S = 15.0

@@ -32,8 +32,6 @@ from mapspeak.simulator import (
 )
 from mapspeak.spatial import OccupancyGrid
 
-__all__ = ["Clock", "SimulatedRobot", "SoloRobot", "open_simulated_robot"]
-
 CHUNK_S = 0.25
 """Robot time computed in one go; a command waits at most for one such chunk."""
 EPSILON_S = 1e-6

@@ -6,7 +6,17 @@ from dataclasses import dataclass, replace
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.places.goalcheck import GoalCheck, check_goal, say_refusal
-from mapspeak.places.places import Place, Spot, find_place, is_taken_name, say_spot
+from mapspeak.places.naming import (
+    Place,
+    Spot,
+    find_named,
+    find_thing,
+    is_taken_name,
+    no_such_place,
+    place_of,
+    say_spot,
+)
+from mapspeak.places.relations import find_related
 from mapspeak.places.standing import (
     arrival_pose,
     choose_crossing,
@@ -16,9 +26,26 @@ from mapspeak.places.standing import (
 )
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region
-from mapspeak.worldmodel.model import Atlas, RememberedPlace, RememberedThing
+from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
 
-__all__ = ["CheckedGoal", "check_place", "choose_goal", "read_place", "stand_at"]
+
+def find_place(atlas: Atlas, words: str) -> Place:
+    """Finds what is meant by an id, a remembered name, coordinates, "robot", a relation or a thing.
+
+    A relation is such as "left of W3" or "between D1 and D2"; `mapspeak.places.relations`. A
+    thing is meant by its label, such as "fire extinguisher", where nothing else is called so.
+
+    Raises:
+        GoalError: There is no such place, or there are several; the hint says what became of it
+            and what there is.
+    """
+    place = find_named(atlas, words) or find_related(atlas, words) or find_thing(atlas, words)
+    if place is None:
+        raise no_such_place(atlas, words)
+    if isinstance(place.thing, RememberedThing) and not place.reason:
+        return place_of(atlas, place.thing, name=place.name)
+    return place
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,8 +13,6 @@ from mapspeak.spatial.grid import FloatArray, Mask
 from mapspeak.spatial.paths import DistanceField, distances_from
 from mapspeak.worldmodel.closures import MARGIN_M, ClosedFloor
 
-__all__ = ["GoalCheck", "GoalVerdict", "check_goal", "judge_goal", "say_refusal"]
-
 Opened = Callable[[Point], DistanceField]
 
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
-from mapspeak.places.places import Place, Spot, find_place
+from mapspeak.places.choosing import find_place
+from mapspeak.places.naming import Place, Spot
 from mapspeak.semantic import LEFT_OUT, Concern, SemanticMapStore
 from mapspeak.semantic.events import (
     Effect,
@@ -18,25 +19,15 @@ from mapspeak.semantic.events import (
     gives_orders,
 )
 from mapspeak.spatial.rooms import Door, Region, RoomMap
-from mapspeak.worldmodel.closures import ClosedArea, Outline
-from mapspeak.worldmodel.footprints import (
+from mapspeak.worldmodel.closures import (
+    ClosedArea,
+    Outline,
     outline_around,
     outline_of_door,
     outlines_of_region,
 )
-from mapspeak.worldmodel.hindrances import Hindrance
 from mapspeak.worldmodel.model import Atlas
-from mapspeak.worldmodel.revision import MapRevision
-
-__all__ = [
-    "close_floor_of",
-    "end_event",
-    "find_hindrances",
-    "note_event",
-    "say_consequences",
-    "say_events",
-    "say_unplaced",
-]
+from mapspeak.worldmodel.revision import Hindrance, MapRevision
 
 SPOT_RADIUS_M = 0.5
 """An event at a point takes this much floor around it."""

@@ -11,18 +11,9 @@ from mapspeak.spatial import Cell
 from mapspeak.spatial.grid import FloatArray, IntArray
 from mapspeak.spatial.paths import Path
 from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap
-from mapspeak.worldmodel.doorways import find_crossing
-from mapspeak.worldmodel.model import Atlas, RememberedThing
+from mapspeak.worldmodel.model import Atlas, find_crossing
+from mapspeak.worldmodel.recollection import RememberedThing
 from mapspeak.worldmodel.revision import MapRevision
-
-__all__ = [
-    "arrival_pose",
-    "choose_crossing",
-    "choose_standing_point",
-    "facing_in",
-    "find_standing_point",
-    "stand_before",
-]
 
 COMFORT_M = 0.15
 """How much more than its radius a robot should have around it where it is sent to stand."""

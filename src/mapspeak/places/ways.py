@@ -10,9 +10,8 @@ from mapspeak.places.naming import Place, Spot
 from mapspeak.places.standing import choose_crossing, choose_standing_point, stand_before
 from mapspeak.spatial.paths import DistanceField, Path
 from mapspeak.spatial.rooms import Door, Region
-from mapspeak.worldmodel.model import Atlas, RememberedThing
-
-__all__ = ["Way", "find_way", "measure_path", "standing_point"]
+from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.recollection import RememberedThing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

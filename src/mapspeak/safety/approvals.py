@@ -11,8 +11,6 @@ from mapspeak.safety.commands import Command, is_same, say_command
 from mapspeak.safety.errands import Errand
 from mapspeak.semantic.waypoint import clean_line
 
-__all__ = ["Approvals", "WaitingRoom"]
-
 VALID_S = 600.0
 """A word that was given is good for so long, and for one command."""
 MOST_WAITING = 50

@@ -17,8 +17,6 @@ from mapspeak.errors import ConfigError, PolicyError, say_cause
 from mapspeak.safety.caller import Caller
 from mapspeak.safety.commands import Command, Drive, say_command
 
-__all__ = ["AuditLine", "AuditLog", "read_audit"]
-
 MOST_CHARACTERS = 2_000
 """Of one argument that somebody gave; what is longer is cut, and said to be."""
 

@@ -5,8 +5,6 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 
-__all__ = ["NOBODY", "Caller", "calling", "current_caller"]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Caller:

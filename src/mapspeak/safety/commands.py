@@ -9,18 +9,6 @@ from typing import Any
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.places.goalcheck import GoalCheck
 
-__all__ = [
-    "Act",
-    "Call",
-    "Command",
-    "Drive",
-    "Kind",
-    "Publish",
-    "SetParameter",
-    "read_action_goal",
-    "say_command",
-]
-
 SAME_GOAL_M = 0.1
 """An approved goal stays approved while a changing map moves it by no more than this."""
 SAME_GOAL_RAD = math.radians(10)

@@ -35,8 +35,6 @@ from mapspeak.safety.velocities import (
     zero_velocity_of,
 )
 
-__all__ = ["GuardedConnection"]
-
 T = TypeVar("T")
 
 VELOCITY_TYPE = re.compile(

@@ -21,18 +21,6 @@ from mapspeak.safety.commands import (
 from mapspeak.safety.hold import say_hold
 from mapspeak.safety.policy import RATE_KEYS, Policy
 
-__all__ = [
-    "Allowed",
-    "Decision",
-    "NeedsApproval",
-    "Refused",
-    "Situation",
-    "decide",
-    "find_speeds",
-    "is_name_denied",
-    "judge_check",
-]
-
 MOST_NESTED = 8
 """No message of speeds is nested deeper; what is, is refused unread."""
 

@@ -2,8 +2,6 @@
 
 from mapspeak.safety.commands import Kind
 
-__all__ = ["USUAL_DENIALS", "USUAL_TYPES"]
-
 USUAL_DENIALS = {
     Kind.PUBLISH: (
         *("*/tf", "*/tf_static", "*/clock", "*/map", "*/map_updates", "*/odom", "*/odometry*"),

@@ -5,8 +5,6 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 
-__all__ = ["Errand", "Errands", "current_errand", "on_errand"]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Errand:

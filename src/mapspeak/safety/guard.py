@@ -24,8 +24,6 @@ from mapspeak.safety.hold import Hold
 from mapspeak.safety.policy import Otherwise, Policy
 from mapspeak.safety.rates import RateLog
 
-__all__ = ["ApprovalNeededError", "Guard", "Permit"]
-
 logger = logging.getLogger(__name__)
 
 

@@ -17,8 +17,6 @@ from typing import Any
 
 from mapspeak.errors import ConfigError
 
-__all__ = ["Hold", "say_hold"]
-
 FRACTION = re.compile(r"(?<=:\d\d)\.\d+$")
 
 HOLD = "hold"

@@ -13,8 +13,6 @@ from mapspeak.spatial.paths import Path, find_path
 from mapspeak.worldmodel.closures import MARGIN_M, ClosedArea, distance_to_line
 from mapspeak.worldmodel.revision import MapRevision
 
-__all__ = ["plan_legs"]
-
 STEP_M = 0.1
 STRAY_M = 0.03
 """So far the legs may lead off the way that was found: a part of the margin around areas."""

@@ -12,8 +12,6 @@ from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map
 from mapspeak.worldmodel.closures import Outline
 
-__all__ = ["load_mask"]
-
 CLOSED = 100
 """Nav2 makes a cell lethal at this value alone; less makes it dear, as for preferred lanes."""
 MOST_SIDES = 100_000

@@ -8,16 +8,6 @@ from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.worldmodel.closures import ClosedArea
 from mapspeak.worldmodel.revision import MapRevision
 
-__all__ = [
-    "BRAKING_MPS2",
-    "KEEP_M",
-    "REACTION_S",
-    "GoalMonitor",
-    "KeepOutMonitor",
-    "Mover",
-    "find_entered",
-]
-
 OCCUPIED_FOR_S = 5.0
 """A person who walks over the goal does not spoil it."""
 REACTION_S = 0.2

@@ -16,8 +16,6 @@ from mapspeak.safety.policy import Policy
 from mapspeak.safety.surveying import Surveyor
 from mapspeak.worldmodel.revision import MapRevision
 
-__all__ = ["Plan", "Planner", "find_poses"]
-
 SAME_PLACE_M = 0.1
 """A goal no farther away than this is a turn."""
 SURVEY_EVERY_S = 1.0

@@ -11,8 +11,6 @@ from mapspeak.geometry import Point
 from mapspeak.safety.commands import Kind
 from mapspeak.safety.denials import USUAL_DENIALS, USUAL_TYPES
 
-__all__ = ["Approval", "AreaRule", "Hours", "Otherwise", "Patterns", "Policy", "Speeds", "WhenBusy"]
-
 DAYS = ("mon", "tue", "wed", "thu", "fri", "sat", "sun")
 
 

@@ -36,8 +36,6 @@ from mapspeak.safety.policy import (
 from mapspeak.settings import read_settings
 from mapspeak.worldmodel.closures import Outline
 
-__all__ = ["load_policy"]
-
 THINNEST_M = 0.001
 N_OTHER_WAYS = 2
 """An area is said in one of three ways, and not in the others."""

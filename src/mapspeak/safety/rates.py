@@ -4,8 +4,6 @@ from collections import defaultdict, deque
 
 from mapspeak.safety.commands import Kind
 
-__all__ = ["RateLog"]
-
 MINUTE_S = 60.0
 MOST_KEPT = 10_000
 

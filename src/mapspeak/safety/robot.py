@@ -30,8 +30,6 @@ from mapspeak.safety.underway import GuardedDrive
 from mapspeak.safety.velocities import HandDriving
 from mapspeak.spatial import OccupancyGrid
 
-__all__ = ["GuardedRobot"]
-
 WATCH_S = 0.1
 """Robot time between two looks at where a drive leads."""
 EPSILON_S = 1e-6

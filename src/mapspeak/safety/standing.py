@@ -9,8 +9,6 @@ from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.robot import Robot
 from mapspeak.safety.hold import Hold
 
-__all__ = ["HoldKeeper", "StandingCheck"]
-
 WAVER_M = 0.01
 WAVER_RAD = 0.02
 OLD_S = 1.0

@@ -16,11 +16,8 @@ from mapspeak.places.notices import (
 from mapspeak.safety.policy import AreaRule
 from mapspeak.semantic.events import Effect, Event
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.worldmodel.closures import ClosedArea, Outline, mask_areas
-from mapspeak.worldmodel.footprints import outlines_of_region
+from mapspeak.worldmodel.closures import ClosedArea, Outline, mask_areas, outlines_of_region
 from mapspeak.worldmodel.revision import MapRevision
-
-__all__ = ["Surveyor"]
 
 logger = logging.getLogger(__name__)
 

@@ -7,8 +7,6 @@ from mapspeak.geometry import Pose
 from mapspeak.safety.guard import Permit
 from mapspeak.safety.monitor import GoalMonitor
 
-__all__ = ["GuardedDrive"]
-
 
 @dataclass(slots=True, kw_only=True)
 class GuardedDrive:

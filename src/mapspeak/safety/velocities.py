@@ -17,14 +17,6 @@ from mapspeak.safety.monitor import BRAKING_MPS2, REACTION_S, find_entered
 from mapspeak.safety.planning import Planner
 from mapspeak.safety.surveying import Surveyor
 
-__all__ = [
-    "HandDriving",
-    "is_zero_velocity",
-    "publishing_for",
-    "refuse_velocity",
-    "zero_velocity_of",
-]
-
 LEAST_S = 0.5
 """A single message is taken to move the robot for so long: drivers wait about that for the next."""
 STEP_M = 0.05

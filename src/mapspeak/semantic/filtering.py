@@ -41,16 +41,6 @@ from mapspeak.semantic.vocabulary import (
     VEHICLES,
 )
 
-__all__ = [
-    "LEFT_OUT",
-    "Concern",
-    "Objection",
-    "find_head",
-    "find_objection",
-    "gives_orders",
-    "tells_what_to_do",
-]
-
 
 class Concern(StrEnum):
     """What the policy leaves out."""

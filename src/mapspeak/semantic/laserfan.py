@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
 
-__all__ = ["HALF_FAN_RAD", "SAME_STAND_M", "LaserFan", "LaserRing", "build_ring"]
-
 STEP_RAD = math.radians(3.0)
 """Between two beams: 0.2 m at four metres, the side of the cells in which a thing is looked for.
 

@@ -15,8 +15,6 @@ from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.semantic.laserfan import SAME_STAND_M
 from mapspeak.semantic.waypoint import Confidence, Landmark, Waypoint, name_key
 
-__all__ = ["Merge", "Reunion", "group_views", "merge_waypoint", "noted_at", "seen_from"]
-
 SAME_BEARING_RAD = math.radians(30.0)
 """Two looks at one thing, each 10 degrees off as a rule, differ by less 19 times in 20."""
 SAME_RANGE_RATIO = 0.5

@@ -10,8 +10,6 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.semantic.laserfan import LaserRing
 
-__all__ = ["PictureBook", "Reading", "TakenPicture"]
-
 MOST_PICTURES = 500
 """How many pictures can be spoken of; older ones are forgotten here, whoever keeps them."""
 BESIDE_RAD = math.radians(10.0)

@@ -4,8 +4,6 @@ import re
 
 from mapspeak.semantic.waypoint import clean_line
 
-__all__ = ["quote", "quote_name", "tell_name"]
-
 LONGEST_NAME = 120
 """What writes allow; a file that somebody else wrote may have any."""
 _AS_APOSTROPHE = dict.fromkeys(

@@ -33,8 +33,6 @@ from mapspeak.server.toolset import Effect, Tool
 from mapspeak.server.visible import show_controls, show_controls_of
 from mapspeak.session import Session
 
-__all__ = ["DEFAULT_TOOLSETS", "MapspeakServer", "build_server"]
-
 DEFAULT_TOOLSETS = ("look", "places", "drive", "paper")
 
 

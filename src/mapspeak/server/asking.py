@@ -23,8 +23,6 @@ from mapspeak.safety import (
     Otherwise,
 )
 
-__all__ = ["Asking"]
-
 CALLS_AGAIN = "2026-07-28"
 """From this version of the protocol on a client is asked by an answer that it calls again with."""
 KEY = "approval-"

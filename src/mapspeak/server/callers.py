@@ -5,9 +5,8 @@ from typing import Any
 from mcp.server.mcpserver import Context
 from pydantic import BeforeValidator
 
-from mapspeak.driving.drive import DriveReport, OnProgress
-
-__all__ = ["AT_MOST_LONGEST_WAIT", "LONGEST_WAIT_S", "client_of", "tell_progress"]
+from mapspeak.driving.drive import OnProgress
+from mapspeak.driving.drivereport import DriveReport
 
 LONGEST_WAIT_S = 25.0
 """Clients give up on a call that takes much longer."""

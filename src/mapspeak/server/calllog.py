@@ -15,8 +15,6 @@ from typing import Any
 
 from mcp_types import CallToolResult, ImageContent, TextContent
 
-__all__ = ["CallLog", "CallNote"]
-
 SUFFIXES = {"image/jpeg": ".jpg"}
 
 

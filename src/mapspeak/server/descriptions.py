@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 
 from mapspeak.places.choosing import CheckedGoal, check_place
-from mapspeak.places.places import Place
+from mapspeak.places.naming import Place
 from mapspeak.places.ways import standing_point
 from mapspeak.semantic import group_views
 from mapspeak.semantic.quoting import quote
@@ -21,9 +21,8 @@ from mapspeak.server.wording import (
 )
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region, RoomClass
-from mapspeak.worldmodel.model import Atlas, RememberedPlace, RememberedThing
-
-__all__ = ["describe_place"]
+from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
 
 NEAR_M = 5.0
 

@@ -10,8 +10,6 @@ from mapspeak.server.reports import PoseReport, Report
 from mapspeak.server.wording import say_point, say_pose_doubt
 from mapspeak.spatial.frontiers import RefusedFrontier
 
-__all__ = ["ExploreAnswer", "SearchAnswer"]
-
 MOST_NAMED = 8
 
 NEXT_STEP = {

@@ -19,8 +19,6 @@ from mapspeak.errors import ConfigError
 from mapspeak.server.app import STOP, MapspeakServer
 from mapspeak.server.prompts import add_prompts
 
-__all__ = ["FleetServer"]
-
 ARGUMENT = "robot"
 
 

@@ -7,8 +7,6 @@ import json
 from collections.abc import Callable
 from typing import Any
 
-__all__ = ["lean_input", "lean_output"]
-
 Schema = Any
 """JSON of any shape."""
 

@@ -10,8 +10,6 @@ from mcp_types import CallToolResult, TextContent
 
 from mapspeak.server.prompts import read_text
 
-__all__ = ["keep_offered", "tell_offered", "tell_offered_in", "write_instructions"]
-
 SENTENCES = re.compile(r"(?<=[.!?])\s+")
 CLAUSE = "; "
 PARTS = re.compile(r"(; |, or |: )")

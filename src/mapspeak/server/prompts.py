@@ -11,8 +11,6 @@ from mcp.server import MCPServer
 
 from mapspeak.semantic import LEFT_OUT
 
-__all__ = ["add_prompts", "policy_text", "read_text"]
-
 
 def read_text(name: str) -> str:
     """Gives one of the texts that come with the server: instructions, exploration, ..."""

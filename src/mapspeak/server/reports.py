@@ -6,7 +6,7 @@ from typing import Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from mapspeak.driving.drive import DriveReport
+from mapspeak.driving.drivereport import DriveReport
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.places.choosing import CheckedGoal
@@ -16,19 +16,7 @@ from mapspeak.semantic import Landmark, Merge, SemanticMap, WriteReceipt, name_k
 from mapspeak.semantic.quoting import quote_name
 from mapspeak.server.memory.remembering import say_landmarks, say_replaced
 from mapspeak.server.wording import say_pose, say_pose_doubt
-from mapspeak.worldmodel.model import RememberedPlace, number_places
-
-__all__ = [
-    "DriveAnswer",
-    "GoalAnswer",
-    "LandmarkReport",
-    "MemoryAnswer",
-    "PoseAnswer",
-    "PoseReport",
-    "WaypointReport",
-    "WriteAnswer",
-]
-
+from mapspeak.worldmodel.recollection import RememberedPlace, number_places
 
 MOST_NAMED = 12
 AT_GOAL_M = 0.5

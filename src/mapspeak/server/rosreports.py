@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["LONGEST_ANSWER", "cut", "show_message", "show_value"]
-
 LONGEST_ANSWER = 20_000
 """No answer has more letters; most have a tenth of that."""
 LONGEST_LINE = 90

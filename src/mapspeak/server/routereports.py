@@ -8,8 +8,6 @@ from mapspeak.driving.routes import RoutePlan, RouteProgress, RouteState, Stop, 
 from mapspeak.server.reports import PoseReport, Report
 from mapspeak.server.wording import say_pose_doubt
 
-__all__ = ["RouteAnswer"]
-
 DETOUR_M = 0.05
 NEXT_STEP = {
     RouteState.DRIVING: "Call follow_route without stops to go on; stop_robot ends it.",

@@ -12,8 +12,6 @@ from mapspeak.server.memory.lasers import fetch_ring
 from mapspeak.server.wording import say_pose, say_pose_doubt
 from mapspeak.session import Session
 
-__all__ = ["Sighting", "look_ahead"]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sighting:

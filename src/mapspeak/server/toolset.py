@@ -8,8 +8,6 @@ from typing import Any, get_args, get_type_hints
 
 from mcp_types import ToolAnnotations
 
-__all__ = ["Effect", "Tool"]
-
 
 class Effect(StrEnum):
     """What calling a tool changes."""

@@ -24,8 +24,6 @@ from mapspeak.errors import ConfigError
 from mapspeak.server.app import MapspeakServer
 from mapspeak.server.fleet import FleetServer
 
-__all__ = ["serve_http", "serve_stdio"]
-
 HEALTH = "/health"
 PUBLIC = ("/", HEALTH)
 HTTP_LOGGERS = ("mcp.server.streamable_http", "uvicorn.error")

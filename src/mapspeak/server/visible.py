@@ -6,8 +6,6 @@ from typing import Any
 
 from mcp_types import CallToolResult, TextContent
 
-__all__ = ["show_controls", "show_controls_of"]
-
 CONTROL = re.compile(
     r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b\u200e\u200f\u2028-\u202e\u2060-\u2069\ufeff]"
 )

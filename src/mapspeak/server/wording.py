@@ -12,24 +12,6 @@ from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.closures import ClosedArea, ClosedFloor
 from mapspeak.worldmodel.model import Atlas
 
-__all__ = [
-    "build_table",
-    "join_words",
-    "list_some",
-    "say_area",
-    "say_compass",
-    "say_count",
-    "say_direction",
-    "say_kind",
-    "say_obstruction",
-    "say_path",
-    "say_point",
-    "say_pose",
-    "say_pose_doubt",
-    "say_warnings",
-    "shorten",
-]
-
 Item = TypeVar("Item")
 
 LONGEST_NAME = 40

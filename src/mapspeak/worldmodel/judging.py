@@ -6,8 +6,6 @@ from collections.abc import Iterable
 from mapspeak.semantic.consistency import Finding, Trust, judge_trust
 from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
 
-__all__ = ["Judge"]
-
 
 class Judge:
     """Findings, sorted by what they are about.

@@ -27,16 +27,6 @@ from mapspeak.semantic.retrieval import (
 from mapspeak.semantic.things import Category, Thing, Things, find_things, name_the_same
 from mapspeak.spatial import OccupancyGrid
 
-__all__ = [
-    "Recollection",
-    "Recollector",
-    "Remembered",
-    "RememberedPlace",
-    "RememberedThing",
-    "number_places",
-    "number_things",
-]
-
 logger = logging.getLogger(__name__)
 
 SAME_THING_M = 1.0

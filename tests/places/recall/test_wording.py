@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from mapspeak.places.recall import RecallQuery, recall
-from mapspeak.places.recall.wording import find_doubt
+from mapspeak.places.recall.answer import find_doubt
 from remembering import EXTINGUISHER, atlas_of, looks_at
 
 LOOKS = looks_at("fire extinguisher", EXTINGUISHER)

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from mapspeak.semantic import SemanticMap, Waypoint
     from mapspeak.semantic.retrieval import Candidate
 
-__all__ = ["memory"]
-
 
 @click.group()
 def memory() -> None:

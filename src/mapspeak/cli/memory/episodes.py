@@ -14,8 +14,6 @@ from mapspeak.cli.memory.files import JSON_OPTION, MEMORY_OPTION, find_memory
 if TYPE_CHECKING:
     from mapspeak.semantic.episodes import EpisodeMatch, EpisodeQuery, EpisodeStore, Rank
 
-__all__ = ["episodes"]
-
 _AGE = re.compile(r"(\d+(?:\.\d+)?)(m|h|d)")
 _CLOCK = re.compile(r"(\d{1,2}):(\d\d)")
 _UNITS = {"m": "minutes", "h": "hours", "d": "days"}

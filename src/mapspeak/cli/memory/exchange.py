@@ -19,8 +19,6 @@ from mapspeak.errors import ConfigError, say_cause
 if TYPE_CHECKING:
     from mapspeak.semantic.exchange import ExchangeFormat, Union
 
-__all__ = ["export", "import_", "merge"]
-
 FORMATS = ("geojson", "csv", "osm")
 
 

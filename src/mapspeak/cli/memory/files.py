@@ -13,17 +13,6 @@ from mapspeak.errors import ConfigError
 if TYPE_CHECKING:
     from mapspeak.semantic import SemanticMap, SemanticMapStore
 
-__all__ = [
-    "JSON_OPTION",
-    "MEMORY_OPTION",
-    "find_memory",
-    "open_memory",
-    "read_places",
-    "rename_memory",
-    "usual_memory",
-    "write_out",
-]
-
 MEMORY_OPTION = click.option(
     "--memory",
     "--semantic-map",

@@ -1,12 +1,18 @@
 """Exploring: frontier after frontier, until nothing is left or what is left cannot be reached."""
 
-from mapspeak.driving.exploration.blocked import BlockedPlace, BlockedPlaces
+from mapspeak.driving.exploration.blocked import BlockedPlace, BlockedPlaces, has_room_at
 from mapspeak.driving.exploration.explorer import Bounds, Explorer, Pick, take_first
 from mapspeak.driving.exploration.progress import ExplorationState, Progress
-from mapspeak.driving.exploration.room import has_room_at
-from mapspeak.driving.exploration.site import Site
-from mapspeak.driving.exploration.trips import OnTrip, Target, Trip, Trips, TripState
-from mapspeak.driving.exploration.turning import spread_headings, turn_to
+from mapspeak.driving.exploration.trips import (
+    OnTrip,
+    Site,
+    Target,
+    Trip,
+    Trips,
+    TripState,
+    spread_headings,
+    turn_to,
+)
 
 __all__ = [
     "BlockedPlace",

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import anyio
 
-from mapspeak.driving.exploration.blocked import BlockedPlace
+from mapspeak.driving.exploration.blocked import BlockedPlace, has_room_at
 from mapspeak.driving.exploration.progress import (
     ExplorationState,
     Progress,
@@ -15,15 +15,11 @@ from mapspeak.driving.exploration.progress import (
     known_area_m2,
     known_ratio,
 )
-from mapspeak.driving.exploration.room import has_room_at
-from mapspeak.driving.exploration.site import Site
-from mapspeak.driving.exploration.trips import OnTrip, Target, Trips, TripState
+from mapspeak.driving.exploration.trips import OnTrip, Site, Target, Trips, TripState
 from mapspeak.errors import PolicyError
 from mapspeak.geometry import Point
 from mapspeak.spatial.frontiers import Frontier, remaining_ratio
 from mapspeak.worldmodel.model import Atlas
-
-__all__ = ["Bounds", "Explorer", "Pick", "take_first"]
 
 RETHINK_S = 1.0
 """The map is looked at so often on the way."""

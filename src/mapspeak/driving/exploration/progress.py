@@ -21,15 +21,6 @@ from mapspeak.spatial.frontiers import (
 from mapspeak.spatial.paths import DistanceField
 from mapspeak.worldmodel.model import Atlas
 
-__all__ = [
-    "ExplorationState",
-    "Progress",
-    "find_refused",
-    "find_unreachable",
-    "judge_end",
-    "known_ratio",
-]
-
 MOST_NAMED = 3
 CLOSED_OFF = "behind what is closed: no way while it is"
 NEAR_M = 0.5

@@ -1,25 +1,77 @@
-"""Trips: drives to one target after the other that may be given up on the way for a better one.
+"""Trips: drives to one target after the other that may be given up on the way for a better one."""
 
-A trip advances only while somebody waits for it. Its drive stands in the drive book like any
-other, so that a stop, a cancelled goal or a newer goal ends it.
-"""
-
+import math
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Protocol, TypeVar
 
 import anyio
 
-from mapspeak.driving.drive import DriveReport
+from mapspeak.driving.drive import DriveBook, OnProgress
+from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.exploration.blocked import BlockedPlaces
-from mapspeak.driving.exploration.site import Site
 from mapspeak.errors import GoalError
-from mapspeak.geometry import Pose
-from mapspeak.robot import GoalState
+from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.robot import GoalState, Robot
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import Frontier
+from mapspeak.worldmodel.model import Atlas
 
-__all__ = ["OnTrip", "Target", "Trip", "TripState", "Trips"]
+T = TypeVar("T")
+
+
+class Site(Protocol):
+    """A robot, its drives, and the map as it is now; a session is one."""
+
+    @property
+    def robot(self) -> Robot:
+        """The port to the robot."""
+        ...
+
+    @property
+    def drives(self) -> DriveBook:
+        """Every drive of the robot."""
+        ...
+
+    async def fetch_atlas(self) -> Atlas:
+        """Gives the map as it is now, with everything on it under its id."""
+        ...
+
+    async def compute(self, work: Callable[[], T]) -> T:
+        """Does heavy work so that a stop is answered meanwhile."""
+        ...
+
+
+async def turn_to(
+    site: Site, yaw_rad: float, *, wait_s: float, on_progress: OnProgress, client: str = ""
+) -> DriveReport:
+    """Turns the robot where it stands, and gives how that went.
+
+    Args:
+        site: The robot and its drives.
+        yaw_rad: The heading to end with.
+        wait_s: Robot time to wait for it.
+        on_progress: Told about the turn.
+        client: Who asks for it.
+
+    Raises:
+        GoalError: The robot was stopped meanwhile.
+        LinkError: The robot cannot be reached.
+    """
+    with site.drives.preparing() as ticket:
+        here = (await site.robot.fetch_pose()).pose
+        goal = Pose(here.x, here.y, wrap_angle(yaw_rad))
+        place = f"a turn to {goal.yaw_deg:.0f} deg"
+        drive = await site.drives.start(goal, place=place, ticket=ticket, client=client)
+    return await site.drives.wait(drive.goal_id, wait_s=wait_s, on_progress=on_progress)
+
+
+def spread_headings(first_rad: float, n_headings: int) -> list[float]:
+    """Gives headings all around, in radians, evenly spread and counter-clockwise from the first."""
+    step_rad = math.tau / n_headings
+    return [wrap_angle(first_rad + index * step_rad) for index in range(n_headings)]
+
 
 OnTrip = Callable[[DriveReport], Awaitable[None]]
 

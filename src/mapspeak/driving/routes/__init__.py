@@ -1,6 +1,5 @@
 """Several places in order, planned as a whole and driven one after the other."""
 
-from mapspeak.driving.routes.candidates import Candidate, find_candidates
 from mapspeak.driving.routes.following import (
     RouteBook,
     RouteProgress,
@@ -9,7 +8,7 @@ from mapspeak.driving.routes.following import (
     StopState,
     WhenBlocked,
 )
-from mapspeak.driving.routes.planning import RoutePlan, plan_route
+from mapspeak.driving.routes.planning import Candidate, RoutePlan, find_candidates, plan_route
 
 __all__ = [
     "Candidate",

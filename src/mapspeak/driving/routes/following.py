@@ -10,18 +10,16 @@ from enum import StrEnum
 
 import anyio
 
-from mapspeak.driving.drive import DriveReport, OnProgress
+from mapspeak.driving.drive import OnProgress
+from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.exploration import Site
-from mapspeak.driving.routes.candidates import Candidate
-from mapspeak.driving.routes.planning import RoutePlan, plan_route
+from mapspeak.driving.routes.planning import Candidate, RoutePlan, plan_route
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose
 from mapspeak.places.goalcheck import GoalCheck, check_goal
 from mapspeak.places.standing import arrival_pose
 from mapspeak.robot import GoalState, PoseDoubt
 from mapspeak.worldmodel.model import Atlas
-
-__all__ = ["RouteBook", "RouteProgress", "RouteState", "Stop", "StopState", "WhenBlocked"]
 
 SLACK_S = 0.01
 ENDED_ELSEWHERE = (GoalState.CANCELLED, GoalState.PREEMPTED)

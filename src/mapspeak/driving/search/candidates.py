@@ -8,18 +8,16 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.driving.search.opinions import Opinions, weight_of
-from mapspeak.driving.search.seenfloor import REACH_M, SeenFloor
-from mapspeak.driving.search.sightlines import cast_sight_lines
+from mapspeak.driving.search.evidence import Opinions, weight_of
+from mapspeak.driving.search.seenfloor import REACH_M, SeenFloor, cast_sight_lines
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.places.choosing import check_place
 from mapspeak.places.naming import Place
 from mapspeak.semantic import TakenPicture
 from mapspeak.semantic.retrieval import Verdict
 from mapspeak.spatial.frontiers import Frontier
-from mapspeak.worldmodel.model import Atlas, RememberedPlace
-
-__all__ = ["Candidate", "CandidateKind", "find_candidates", "unseen_area_m2"]
+from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.recollection import RememberedPlace
 
 N_RAYS = 72
 EVERY_M = 1.0

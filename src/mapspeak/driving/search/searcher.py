@@ -21,20 +21,22 @@ from mapspeak.driving.search.candidates import (
     find_candidates,
     unseen_area_m2,
 )
-from mapspeak.driving.search.company import find_company_score
-from mapspeak.driving.search.earlier import Earlier, Look, read_earlier
-from mapspeak.driving.search.opinions import Opinions
+from mapspeak.driving.search.evidence import (
+    Earlier,
+    Look,
+    Opinions,
+    find_company_score,
+    read_earlier,
+    speaks_of,
+)
 from mapspeak.driving.search.seenfloor import REACH_M, SeenFloor
 from mapspeak.driving.search.standing import SearchState, Standing, find_seen_regions
-from mapspeak.driving.search.words import speaks_of
 from mapspeak.errors import PolicyError
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.robot import CameraPicture, Detection
 from mapspeak.semantic import TakenPicture, name_key
 from mapspeak.spatial.frontiers import remaining_ratio
 from mapspeak.worldmodel.model import Atlas
-
-__all__ = ["Budget", "Choose", "Judgement", "Searcher"]
 
 RETHINK_S = 1.0
 LEFT_RATIO = 0.3

@@ -12,8 +12,6 @@ from mapspeak.geometry import Pose
 from mapspeak.robot import PoseDoubt
 from mapspeak.worldmodel.model import Atlas
 
-__all__ = ["SearchState", "SeenRegion", "Standing", "find_seen_regions"]
-
 
 class SearchState(StrEnum):
     """How a search stands; the first three go on with the next call."""

@@ -4,8 +4,6 @@ from collections.abc import Callable
 
 import anyio
 
-__all__ = ["NOTICE_S", "Announcements", "say_again"]
-
 NOTICE_S = 0.3
 """From a topic's first announcement until the robot's nodes listen, in wall time."""
 N_AGAIN = 10

@@ -11,8 +11,6 @@ from mapspeak.errors import LinkError
 from mapspeak.links.ros.transforms import TransformTree
 from mapspeak.ros.messages import FrameTransform
 
-__all__ = ["Mounting", "find_mounting"]
-
 MOST_TILT_RAD = math.radians(10.0)
 """A laser that looks more up or down meets the floor or the ceiling within a few metres."""
 

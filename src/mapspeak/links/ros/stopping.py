@@ -6,8 +6,6 @@ from mapspeak.errors import LinkError
 from mapspeak.links.ros.velocity import Brake
 from mapspeak.ros import RosConnection, Startable
 
-__all__ = ["stop_everything"]
-
 
 async def stop_everything(connection: RosConnection, *, brake: Brake) -> None:
     """End all goals of ours, and every drive; the brake was pulled before.

@@ -4,26 +4,194 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from datetime import datetime
 from heapq import heapify, heappop, heappush
 from itertools import islice
 
+from mapspeak.geometry import Point
 from mapspeak.places.choosing import stand_at
-from mapspeak.places.naming import Place, say_spot
-from mapspeak.places.recall.answer import Recall, RecallQuery
-from mapspeak.places.recall.candidates import describe_candidate
-from mapspeak.places.recall.filters import find_passing, point_of
-from mapspeak.places.recall.preferring import find_best_known
-from mapspeak.places.recall.wording import find_doubt, say_advice, say_evidence
-from mapspeak.places.thingnames import split_room
-from mapspeak.semantic.retrieval import Answer, Basis, Candidate, Verdict
-from mapspeak.worldmodel.model import Atlas
-from mapspeak.worldmodel.recollection import (
-    Remembered,
-    RememberedPlace,
-    RememberedThing,
+from mapspeak.places.goalcheck import judge_goal
+from mapspeak.places.naming import Place, say_spot, split_room
+from mapspeak.places.recall.answer import (
+    Recall,
+    RecallCandidate,
+    RecallQuery,
+    find_doubt,
+    say_advice,
+    say_evidence,
 )
+from mapspeak.semantic import Landmark
+from mapspeak.semantic.retrieval import Answer, Basis, Candidate, EntryKind, Verdict
+from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.recollection import Remembered, RememberedPlace, RememberedThing
 
-__all__ = ["find_speaking_places", "recall"]
+
+def find_passing(atlas: Atlas, query: RecallQuery) -> Iterator[Remembered]:
+    """Gives the places, then the things, that pass every filter of a request."""
+    everything: list[Remembered] = [*atlas.recollection.places, *atlas.things]
+    return (each for each in everything if _passes(atlas, each, query))
+
+
+def kind_of(remembered: Remembered) -> EntryKind:
+    """Says whether it is a place or a thing."""
+    return EntryKind.PLACE if isinstance(remembered, RememberedPlace) else EntryKind.THING
+
+
+def point_of(remembered: Remembered) -> Point:
+    """Gives where it is; of a thing without a position, where it was seen from."""
+    if isinstance(remembered, RememberedPlace):
+        return remembered.waypoint.pose.point
+    return remembered.point
+
+
+def find_rooms(atlas: Atlas, remembered: Remembered) -> tuple[str, ...]:
+    """Gives the rooms it may be in, by id."""
+    if isinstance(remembered, RememberedPlace):
+        room_id = atlas.find_room_id(point_of(remembered))
+        return () if room_id is None else (room_id,)
+    return atlas.rooms_before(remembered)
+
+
+def last_seen(atlas: Atlas, remembered: Remembered) -> datetime | None:
+    """Gives when it was seen last, by the calendar; None where nobody noted it."""
+    if isinstance(remembered, RememberedPlace):
+        return remembered.waypoint.recorded_at
+    times = (view.recorded_at for _, view in list_views(atlas, remembered))
+    return max(filter(None, times), default=None)
+
+
+def list_views(atlas: Atlas, remembered: Remembered) -> Iterator[tuple[RememberedPlace, Landmark]]:
+    """Gives what was seen of a thing, each with its time and picture, and from where."""
+    if isinstance(remembered, RememberedPlace):
+        return
+    for view in remembered.thing.supporting:
+        place = atlas.recollection.find_place(view.waypoint)
+        if place is not None:
+            yield place, place.waypoint.dated(view.landmark)
+
+
+def _passes(atlas: Atlas, remembered: Remembered, query: RecallQuery) -> bool:
+    if query.kind not in (None, kind_of(remembered)):
+        return False
+    if query.near is not None and point_of(remembered).distance_to(query.near) > query.near_m:
+        return False
+    if query.since is not None or query.until is not None:
+        seen_at = last_seen(atlas, remembered)
+        if seen_at is None or not _is_between(seen_at, query):
+            return False
+    return query.room_id is None or query.room_id in find_rooms(atlas, remembered)
+
+
+def _is_between(moment: datetime, query: RecallQuery) -> bool:
+    is_late = query.since is None or moment >= query.since
+    return is_late and (query.until is None or moment < query.until)
+
+
+def describe_candidate(
+    atlas: Atlas, remembered: Remembered, *, score_ratio: float = 1.0, evidence: str = ""
+) -> RecallCandidate:
+    """Gives what is known of a place or thing, and the pose in which a robot would stand for it.
+
+    Args:
+        atlas: The map with the memory.
+        remembered: The place or thing.
+        score_ratio: How alike it and a request are.
+        evidence: Why it is meant, in words.
+    """
+    if isinstance(remembered, RememberedPlace):
+        return _describe_place(atlas, remembered, score_ratio, evidence)
+    return _describe_thing(atlas, remembered, score_ratio, evidence)
+
+
+def _describe_place(
+    atlas: Atlas, remembered: RememberedPlace, score_ratio: float, evidence: str
+) -> RecallCandidate:
+    waypoint = remembered.waypoint
+    pose = stand_at(atlas, Place(remembered.id, remembered))
+    check = judge_goal(atlas.grid, atlas.distances, pose, opened=atlas.map.open.distances_from)
+    return RecallCandidate(
+        id=remembered.id,
+        kind=EntryKind.PLACE,
+        name=waypoint.name,
+        score_ratio=score_ratio,
+        evidence=evidence,
+        seen_from=(remembered.id,),
+        pictures=() if waypoint.picture is None else (waypoint.picture,),
+        position=waypoint.pose.point,
+        uncertainty_m=None,
+        room_ids=find_rooms(atlas, remembered),
+        pose=pose,
+        is_faced=False,
+        faced_ratio=0.0,
+        problem="" if check.is_ok else check.sentence,
+        path_m=check.path_m,
+        last_seen=last_seen(atlas, remembered),
+        trust=atlas.judge.judge_place(remembered),
+    )
+
+
+def _describe_thing(
+    atlas: Atlas, remembered: RememberedThing, score_ratio: float, evidence: str
+) -> RecallCandidate:
+    thing = remembered.thing
+    pose = stand_at(atlas, Place(remembered.id, remembered))
+    check = judge_goal(atlas.grid, atlas.distances, pose, opened=atlas.map.open.distances_from)
+    views = list(list_views(atlas, remembered))
+    pictures = (view.picture for _, view in views)
+    return RecallCandidate(
+        id=remembered.id,
+        kind=EntryKind.THING,
+        name=thing.label,
+        score_ratio=score_ratio,
+        evidence=evidence,
+        seen_from=tuple(dict.fromkeys(place.id for place, _ in views)),
+        pictures=tuple(dict.fromkeys(filter(None, pictures))),
+        position=thing.position,
+        uncertainty_m=thing.uncertainty_m,
+        room_ids=find_rooms(atlas, remembered),
+        pose=pose,
+        is_faced=atlas.find_approach(remembered) is not None,
+        faced_ratio=atlas.measure_faced(remembered),
+        problem="" if check.is_ok else check.sentence,
+        path_m=check.path_m,
+        last_seen=last_seen(atlas, remembered),
+        trust=atlas.judge.judge_thing(remembered),
+    )
+
+
+LEAST_VIEWS = 3
+"""Two views of wrong things meet somewhere now and then; three hardly ever do."""
+APART_M = 2.0
+"""Of things of one name that stand nearer to each other, views may have been mixed up."""
+
+
+def find_best_known(
+    atlas: Atlas, meant: Sequence[Remembered], *, room_id: str | None
+) -> RememberedThing | None:
+    """Finds the one thing that views from three places agree on, with no other of its name near.
+
+    Args:
+        atlas: The map with the memory.
+        meant: Of one name.
+        room_id: Where it was asked for.
+
+    Returns:
+        None where there is none, or several, or where anything else speaks against it.
+    """
+    things = [each for each in meant if isinstance(each, RememberedThing)]
+    if len(things) < len(meant):
+        return None
+    known = (each for each in things if each.thing.n_agreeing >= LEAST_VIEWS)
+    sure = (
+        each for each in known if not find_doubt(describe_candidate(atlas, each), room_id=room_id)
+    )
+    # To describe one costs much, and with a second one it is settled.
+    best, second = next(sure, None), next(sure, None)
+    if best is None or second is not None:
+        return None
+    near = [each for each in things if each.point.distance_to(best.point) < APART_M]
+    return best if near == [best] else None
+
 
 MOST_TIED = 30
 """So many equally likely ones are sorted by their way; of more, the first by their ids."""

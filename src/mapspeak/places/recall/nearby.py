@@ -4,12 +4,10 @@ import re
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from mapspeak.places.naming import no_such_place
-from mapspeak.places.recall.filters import last_seen
-from mapspeak.places.thingnames import split_room
-from mapspeak.worldmodel.model import Atlas, RememberedThing
-
-__all__ = ["Nearby", "find_nearby"]
+from mapspeak.places.naming import no_such_place, split_room
+from mapspeak.places.recall.asking import last_seen
+from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.recollection import RememberedThing
 
 THING_ID = re.compile(r"[Tt]\d+")
 NEVER = datetime.min.replace(tzinfo=UTC)

@@ -1,7 +1,7 @@
 """Places named by what they are near to: "left of W3", "between D1 and D2", "nearest door"."""
 
-from mapspeak.places.relations.closest import find_all_near
-from mapspeak.places.relations.phrases import Nearest, parse_relation
+from mapspeak.places.relations.grammar import Nearest, parse_relation
+from mapspeak.places.relations.proximity import find_all_near
 from mapspeak.places.relations.relating import find_related
 
 __all__ = ["Nearest", "find_all_near", "find_related", "parse_relation"]

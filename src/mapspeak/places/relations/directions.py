@@ -8,15 +8,11 @@ import numpy as np
 
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point
-from mapspeak.places.relations.footing import Footing, find_footing
-from mapspeak.places.relations.phrases import Towards
-from mapspeak.places.relations.referent import Referent, find_near_side, find_normal
-from mapspeak.places.relations.stand import Stand, refuse, tolerance_m
-from mapspeak.places.relations.words import Compass, Side, say_heading
+from mapspeak.places.relations.grammar import Compass, Side, Towards, say_heading
+from mapspeak.places.relations.placement import Footing, Stand, find_footing, refuse, tolerance_m
+from mapspeak.places.relations.referents import Referent, find_near_side, find_normal
 from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import Atlas
-
-__all__ = ["front_of_region", "stand_towards"]
 
 SECTOR_RAD = math.radians(40)
 """A place still lies in a direction so far off it."""

@@ -8,25 +8,13 @@ import numpy as np
 
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.places.naming import say_spot
-from mapspeak.places.relations.footing import find_footing
+from mapspeak.places.relations.grammar import Compass, read_heading, say_heading
 from mapspeak.places.relations.outlines import Wall, find_outline
-from mapspeak.places.relations.referent import Referent
-from mapspeak.places.relations.stand import Stand, join_or, refuse
-from mapspeak.places.relations.words import Compass, read_heading, say_heading
+from mapspeak.places.relations.placement import Stand, find_footing, join_or, refuse
+from mapspeak.places.relations.referents import Referent
 from mapspeak.places.standing import facing_in
 from mapspeak.spatial.rooms import Region, RoomClass
 from mapspeak.worldmodel.model import Atlas
-
-__all__ = [
-    "FoundCorner",
-    "FoundWall",
-    "find_corners",
-    "find_middle",
-    "find_walls",
-    "stand_at_wall",
-    "stand_in_corner",
-    "stand_in_middle",
-]
 
 CORNER_M = 1.5
 WALL_M = 0.8

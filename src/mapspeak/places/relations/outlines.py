@@ -12,8 +12,6 @@ from mapspeak.spatial.grid import Mask
 from mapspeak.spatial.rooms import Region
 from mapspeak.worldmodel.model import Atlas
 
-__all__ = ["BareCorner", "Outline", "Wall", "find_outline"]
-
 ROUGHNESS_M = 0.25
 """An outline is straight where it bends by no more than this."""
 LEAST_WALL_M = 0.6

@@ -7,23 +7,8 @@ import numpy as np
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point
 from mapspeak.places.naming import Place, Spot, find_named, no_such_place
-from mapspeak.places.relations.around import stand_away, stand_facing, stand_next_to
-from mapspeak.places.relations.closest import find_nearest
 from mapspeak.places.relations.directions import stand_towards
-from mapspeak.places.relations.footing import find_footing
-from mapspeak.places.relations.halfway import stand_between
-from mapspeak.places.relations.inside import (
-    FoundCorner,
-    FoundWall,
-    find_corners,
-    find_middle,
-    find_walls,
-    stand_at_wall,
-    stand_in_corner,
-    stand_in_middle,
-)
-from mapspeak.places.relations.operands import find_by_kind, find_known, find_room_here
-from mapspeak.places.relations.phrases import (
+from mapspeak.places.relations.grammar import (
     Away,
     Between,
     Corner,
@@ -36,15 +21,37 @@ from mapspeak.places.relations.phrases import (
     Turned,
     WallSide,
     parse_relation,
+    plain,
 )
-from mapspeak.places.relations.referent import Referent, refer_to, refer_to_point
-from mapspeak.places.relations.stand import Stand, refuse
-from mapspeak.places.relations.words import plain
+from mapspeak.places.relations.inside import (
+    FoundCorner,
+    FoundWall,
+    find_corners,
+    find_middle,
+    find_walls,
+    stand_at_wall,
+    stand_in_corner,
+    stand_in_middle,
+)
+from mapspeak.places.relations.placement import Stand, find_footing, refuse
+from mapspeak.places.relations.proximity import (
+    find_nearest,
+    stand_away,
+    stand_between,
+    stand_facing,
+    stand_next_to,
+)
+from mapspeak.places.relations.referents import (
+    Referent,
+    find_by_kind,
+    find_known,
+    find_room_here,
+    refer_to,
+    refer_to_point,
+)
 from mapspeak.places.ways import standing_point
 from mapspeak.spatial.rooms import Region
 from mapspeak.worldmodel.model import Atlas
-
-__all__ = ["find_related"]
 
 MOST_RELATIONS = 4
 LONGEST_NAME = 80

@@ -21,8 +21,6 @@ from mapspeak.semantic.mapfile import MapDocument, moved
 from mapspeak.semantic.store import SemanticMapStore
 from mapspeak.spatial import OccupancyGrid
 
-__all__ = ["MapKeeper", "RealignReceipt"]
-
 GROWN_RATIO = 0.1
 """A map that shows so much more floor than the kept one is kept in its place."""
 KEY = "snapshot"

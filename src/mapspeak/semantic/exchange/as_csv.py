@@ -19,8 +19,6 @@ from mapspeak.installation import shell_command
 from mapspeak.semantic.exchange.records import Facts, facts_of, map_from, place_of
 from mapspeak.semantic.waypoint import SemanticMap, Waypoint, name_key
 
-__all__ = ["from_csv", "to_csv"]
-
 _FIRST_COLUMNS = ("place", "kind", "label", "x_m", "y_m", "yaw_deg", "bearing_deg", "range_m")
 _PLACE = "waypoint"
 _FORMULA = r"'*[=+@\uff1d\uff0b\uff20\uff0d-]"

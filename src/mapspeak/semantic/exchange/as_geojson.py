@@ -24,8 +24,6 @@ from mapspeak.semantic.exchange.records import (
 from mapspeak.semantic.waypoint import SemanticMap, Waypoint
 from mapspeak.spatial.areagraph import LatLon, MapAnchor
 
-__all__ = ["from_geojson", "to_geojson"]
-
 _Position = tuple[FiniteFloat, FiniteFloat]
 
 

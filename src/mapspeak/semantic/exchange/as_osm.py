@@ -31,8 +31,6 @@ from mapspeak.spatial.areagraph.osm_xml import (
     write_osm_xml,
 )
 
-__all__ = ["from_osm", "to_osm"]
-
 OWN = "mapspeak:"
 LEVEL = "0"
 _FEATURE = f"{OWN}feature"

@@ -24,8 +24,6 @@ from mapspeak.semantic.store import SemanticMapStore
 from mapspeak.semantic.waypoint import SemanticMap, Waypoint
 from mapspeak.spatial.areagraph import MapAnchor
 
-__all__ = ["ExchangeFormat", "export_text", "import_text", "merge_files", "merge_into"]
-
 
 class ExchangeFormat(StrEnum):
     """A format of other programs; its value is the ending of its files."""

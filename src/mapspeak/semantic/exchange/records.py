@@ -14,8 +14,6 @@ from mapspeak.installation import shell_command
 from mapspeak.semantic.mapfile.schema import record_data, waypoint_from
 from mapspeak.semantic.waypoint import SemanticMap, Waypoint, name_key
 
-__all__ = ["FILE_VERSION", "facts_of", "map_from", "place_of", "refusal_of"]
-
 FILE_VERSION = 1
 
 Facts = dict[str, object]

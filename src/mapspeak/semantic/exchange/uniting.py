@@ -9,8 +9,6 @@ from mapspeak.semantic.mapfile.schema import record_data
 from mapspeak.semantic.merging import merge_waypoint
 from mapspeak.semantic.waypoint import SemanticMap, Waypoint, name_key
 
-__all__ = ["Union", "unite"]
-
 SAME_PLACE_M = 1.0
 """Poses under one name that lie further apart are two places."""
 

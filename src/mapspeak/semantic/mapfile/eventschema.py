@@ -20,8 +20,6 @@ from mapspeak.semantic.events import ID_RULE, Effect, Event, Outline, is_event_i
 from mapspeak.semantic.mapfile.tree import Data, ListNode, MappingNode, Node, TextError
 from mapspeak.semantic.quoting import quote_name
 
-__all__ = ["EventNode", "event_data", "read_events"]
-
 EventNode = tuple[Event, Node]
 """An event and where it stands in the text."""
 

@@ -41,8 +41,6 @@ from mapspeak.semantic.waypoint import name_key
 
 _Key = TypeVar("_Key")
 
-__all__ = ["WORDS_ONLY", "EntryIndex"]
-
 WORDS_ONLY = "The search compares words only, no meanings."
 
 WORD_THRESHOLDS = Thresholds(least_ratio=0.05, sure_ratio=1.1, same_ratio=0.02, absent_ratio=0.3)

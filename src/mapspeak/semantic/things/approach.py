@@ -11,8 +11,6 @@ from mapspeak.spatial import UNKNOWN, OccupancyGrid
 from mapspeak.spatial.grid import FREE_MAX, FloatArray, IntArray, Mask
 from mapspeak.spatial.paths import DistanceField, clearance_m
 
-__all__ = ["find_approach", "find_fronts", "find_least_path_m", "measure_faced"]
-
 LARGEST_OFF_M = 1.4
 """One stands no farther from a thing, so that it is within 1.5 m on a coarse map, too."""
 BEST_OFF_M = 1.0

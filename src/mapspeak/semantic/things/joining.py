@@ -25,15 +25,6 @@ from mapspeak.semantic.things.sight import SightMap
 from mapspeak.semantic.waypoint import Waypoint
 from mapspeak.spatial.grid import FloatArray, IntArray
 
-__all__ = [
-    "Group",
-    "Posteriors",
-    "SameName",
-    "agreement_of",
-    "group_names",
-    "join_sightings",
-]
-
 SameName = Callable[[str, str], bool]
 Group = list[Sighting]
 

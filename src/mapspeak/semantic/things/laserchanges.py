@@ -21,8 +21,6 @@ from mapspeak.semantic.laserfan import LaserFan
 from mapspeak.semantic.things.sight import BODY_M, N_RAYS, SightMap, bearing_index
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 
-__all__ = ["Correction", "LaserNews", "find_log_priors", "read_news"]
-
 _BESIDE = range(-2, 3)
 """Rays of the map that a beam may be, 1.5 degrees apart: a heading is no better known."""
 _LEAST_MET = 0.05

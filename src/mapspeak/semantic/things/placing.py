@@ -16,17 +16,6 @@ from mapspeak.semantic.things.likelihood import N_SIGMAS, ViewLikelihood
 from mapspeak.semantic.things.sight import BODY_M, SightMap
 from mapspeak.spatial.grid import FloatArray, IntArray
 
-__all__ = [
-    "Placement",
-    "Posterior",
-    "build_posterior",
-    "find_middle",
-    "log_evidence",
-    "measure_agreement",
-    "place",
-    "trust_range",
-]
-
 _LEAST_WEIGHT = 1e-4
 _PEAK_M = 0.5
 _MIDDLE_M = 0.75

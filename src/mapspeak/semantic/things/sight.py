@@ -16,8 +16,6 @@ from mapspeak.semantic.things.thing import NOISE, NoiseModel
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 
-__all__ = ["N_RAYS", "SightMap", "bearing_index", "build_sight_map", "look_around"]
-
 N_RAYS = 240
 LATTICE_M = 0.2
 """The side of the cells in which a thing is looked for; finer than any view can tell."""

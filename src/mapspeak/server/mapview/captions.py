@@ -3,8 +3,6 @@
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.picture import MapPicture
 
-__all__ = ["say_axes", "say_plain"]
-
 
 def say_plain(grid: OccupancyGrid, picture: MapPicture) -> str:
     """Gives the caption of the map in grey levels and nothing else."""

@@ -28,8 +28,6 @@ from mapspeak.spatial.picture import Region as Area
 from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap
 from mapspeak.worldmodel.model import Atlas
 
-__all__ = ["AtlasPicture", "draw_atlas", "draw_rooms"]
-
 LEGEND = (
     LegendEntry(sample=Sample.PLAIN_REGION, text="room"),
     LegendEntry(sample=Sample.HATCHED_REGION, text="corridor"),

@@ -13,8 +13,6 @@ from mapspeak.spatial.coverage import measure_known_area
 from mapspeak.spatial.mapfiles import LoadedMap
 from mapspeak.spatial.rooms import Region
 
-__all__ = ["DoorFacts", "MapFacts", "PointFacts", "RegionFacts"]
-
 
 class PointFacts(Report):
     """A point in the map frame."""

@@ -13,8 +13,6 @@ from mapspeak.server.wording import say_warnings
 from mapspeak.spatial import FREE_MAX, UNKNOWN, OccupancyGrid
 from mapspeak.spatial.picture import Zoom
 
-__all__ = ["describe_raw_grid"]
-
 MOST_CHARACTERS = 18_000
 """Of the JSON: answers of more than 20,000 characters are cut by some clients."""
 MEANING = (

@@ -16,8 +16,6 @@ from mapspeak.server.mapview.views import MapView
 from mapspeak.server.wording import say_pose, say_warnings
 from mapspeak.spatial.picture import NORTH_UP_RAD, draw_robot_pose
 
-__all__ = ["Representation", "Shown", "show"]
-
 
 class Representation(StrEnum):
     """How look_at_map shows the map."""

@@ -16,8 +16,6 @@ from mapspeak.server.wording import (
 from mapspeak.spatial.rooms import CorridorWalk, Door, Region, RoomClass, Side, Stop
 from mapspeak.worldmodel.model import Atlas
 
-__all__ = ["room_tables", "say_sizes", "say_walk"]
-
 MOST_STOPS = 15
 COLUMNS = ("id", "kind", "floor m2", "free m2", "size m", "stand at x, y", "path m", "doors")
 BENT_RAD = math.radians(45)

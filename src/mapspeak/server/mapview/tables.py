@@ -20,9 +20,8 @@ from mapspeak.server.wording import (
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door
 from mapspeak.worldmodel.closures import ClosedArea
-from mapspeak.worldmodel.model import Atlas, RememberedPlace
-
-__all__ = ["describe_atlas"]
+from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.recollection import RememberedPlace
 
 MOST_WALKS = 6
 AXES = "Metres in the map frame, x right and y up; yaw counter-clockwise from x."

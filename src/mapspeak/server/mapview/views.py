@@ -10,14 +10,14 @@ import numpy as np
 
 from mapspeak.driving.exploration.progress import find_refused
 from mapspeak.geometry import Point
-from mapspeak.places.places import Place, find_place
+from mapspeak.places.choosing import find_place
+from mapspeak.places.naming import Place
 from mapspeak.spatial.frontiers import Frontier, RefusedFrontier
 from mapspeak.spatial.picture import NORTH_UP_RAD, Zoom
 from mapspeak.spatial.rooms import Door, Region, RoomClass
 from mapspeak.worldmodel.closures import ClosedArea
-from mapspeak.worldmodel.model import Atlas, RememberedPlace
-
-__all__ = ["Layer", "MapLook", "MapView", "Part", "Up", "look_at", "view_of"]
+from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.recollection import RememberedPlace
 
 Item = TypeVar("Item")
 

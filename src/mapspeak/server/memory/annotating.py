@@ -27,9 +27,6 @@ from mapspeak.semantic import (
 )
 from mapspeak.semantic.things import name_the_same
 
-__all__ = ["Annotator", "LandmarkInput", "Landmarks"]
-
-
 SAME_VIEW_RAD = math.radians(15.0)
 """A picture of a heading that much off still shows nearly all that is seen along the other."""
 

@@ -6,8 +6,6 @@ from mapspeak.errors import LinkError
 from mapspeak.robot import SCAN_PATIENCE_S, Robot
 from mapspeak.semantic import LaserRing, build_ring
 
-__all__ = ["fetch_ring"]
-
 
 async def fetch_ring(robot: Robot) -> LaserRing | None:
     """Gives what the laser meets; None where there is none, or none that answers in time.

@@ -5,8 +5,6 @@ from datetime import datetime, timedelta
 
 from mapspeak.errors import SemanticMapError
 
-__all__ = ["AHEAD", "PAST", "read_moment", "say_age"]
-
 AHEAD = "2026-11-20T09:30, 09:30, in 2h, now"
 PAST = "2026-11-20, 2026-11-20T09:30, 09:30, 2h ago"
 """What schemas and hints say that can be written; `read_moment` reads all of it."""

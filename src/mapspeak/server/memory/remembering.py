@@ -8,8 +8,6 @@ from mapspeak.semantic import Confidence, Landmark, Merge, Reunion, Waypoint
 from mapspeak.semantic.quoting import quote, quote_name, tell_name
 from mapspeak.server.wording import say_pose, shorten
 
-__all__ = ["say_far", "say_landmarks", "say_replaced"]
-
 MOVED_M = 0.05
 FAR_M = 5.0
 """Looks at one place are taken from no farther apart."""

@@ -12,8 +12,6 @@ from mapspeak.semantic.retrieval import EntryKind, Verdict, calls_by_name
 from mapspeak.server.memory.moments import say_age
 from mapspeak.server.wording import say_count, say_pose
 
-__all__ = ["say_reported"]
-
 MOST_READ = 200
 APART_M = 1.0
 """Pictures from nearer to each other are from one place."""

@@ -10,8 +10,6 @@ from mapspeak.semantic.retrieval import Verdict
 from mapspeak.server.memory.moments import say_age
 from mapspeak.server.reports import PoseReport, Report
 
-__all__ = ["CandidateReport", "RecallAnswer"]
-
 MOST_DOUBTS = 4
 
 

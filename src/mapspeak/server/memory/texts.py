@@ -9,9 +9,8 @@ from mapspeak.semantic.episodes import EpisodeMatch, EpisodePage
 from mapspeak.semantic.quoting import quote, tell_name
 from mapspeak.server.memory.moments import say_age
 from mapspeak.server.wording import say_count, say_point, say_pose
-from mapspeak.worldmodel.model import Atlas, RememberedThing
-
-__all__ = ["describe_check", "describe_episodes", "describe_nearby", "say_episode"]
+from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.recollection import RememberedThing
 
 MOST_LISTED = 30
 LONGEST_TEXT = 300

@@ -9,9 +9,8 @@ from mapspeak.semantic.consistency import Trust
 from mapspeak.semantic.quoting import quote, tell_name
 from mapspeak.server.wording import say_path, say_point, say_pose
 from mapspeak.spatial.rooms import Region
-from mapspeak.worldmodel.model import Atlas, RememberedPlace, RememberedThing
-
-__all__ = ["say_landmark", "say_things_from", "say_things_in", "thing_lines"]
+from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
 
 MOST_THINGS = 20
 MOST_VIEWS = 12

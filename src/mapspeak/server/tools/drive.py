@@ -12,8 +12,6 @@ from mapspeak.server.toolset import Effect, Tool
 from mapspeak.server.wording import say_pose, say_pose_doubt
 from mapspeak.session import Session
 
-__all__ = ["DriveTools"]
-
 Place = Annotated[
     str | None,
     Field(

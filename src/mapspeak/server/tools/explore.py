@@ -9,7 +9,7 @@ from mcp.server.mcpserver import Context, Image
 from mcp_types import CallToolResult, ImageContent, TextContent
 from pydantic import Field
 
-from mapspeak.driving.drive import DriveReport
+from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.exploration import (
     Bounds,
     ExplorationState,
@@ -29,8 +29,6 @@ from mapspeak.server.sightings import Sighting, look_ahead
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.server.wording import shorten
 from mapspeak.session import Session
-
-__all__ = ["ExploreTools"]
 
 LEAST_TURN_S = 0.5
 MOST_PICTURES = 12

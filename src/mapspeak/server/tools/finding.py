@@ -7,9 +7,9 @@ from pydantic import Field
 
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point
-from mapspeak.places.places import find_place
+from mapspeak.places.choosing import find_place
+from mapspeak.places.naming import split_room
 from mapspeak.places.recall import RecallQuery, recall
-from mapspeak.places.thingnames import split_room
 from mapspeak.semantic.retrieval import EntryKind
 from mapspeak.server.memory.moments import read_moment
 from mapspeak.server.memory.reported import say_reported
@@ -18,8 +18,6 @@ from mapspeak.server.toolset import Effect, Tool
 from mapspeak.session import Session
 from mapspeak.spatial.rooms import Region
 from mapspeak.worldmodel.model import Atlas
-
-__all__ = ["FindTools", "find_point", "find_room"]
 
 Query = Annotated[str, Field(description="name or purpose", min_length=1, max_length=300)]
 Near = Annotated[str | None, Field(description="place, within 5 m", max_length=200)]

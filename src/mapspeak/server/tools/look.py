@@ -13,8 +13,6 @@ from mapspeak.server.sightings import look_ahead
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.session import Session
 
-__all__ = ["LookTools"]
-
 Layers = Annotated[
     list[Layer] | None, Field(description="what to draw and list; everything when left out")
 ]

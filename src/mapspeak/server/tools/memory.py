@@ -33,8 +33,6 @@ from mapspeak.server.toolset import Effect, Tool
 from mapspeak.session import Session
 from mapspeak.worldmodel.model import Atlas
 
-__all__ = ["MemoryTools"]
-
 MOST_EPISODES = 20
 MOST_NEAR_SEEN = 8
 """Fewer observations beside things: what is near is mostly told by these."""

@@ -9,7 +9,7 @@ from pydantic import Field
 from mapspeak.errors import LinkError, MapError, SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.places.goalcheck import FARTHEST_M
-from mapspeak.places.places import is_taken_name
+from mapspeak.places.naming import is_taken_name
 from mapspeak.places.recall import find_speaking_places
 from mapspeak.robot import PoseDoubt
 from mapspeak.semantic import TakenPicture, Waypoint, WriteReceipt
@@ -26,9 +26,6 @@ from mapspeak.spatial.picture import (
     draw_map_plain,
     draw_robot_pose,
 )
-
-__all__ = ["PaperTools"]
-
 
 Name = Annotated[
     str,

@@ -4,16 +4,13 @@ from typing import Annotated
 
 from pydantic import Field
 
-from mapspeak.places.choosing import check_place
-from mapspeak.places.places import find_place
+from mapspeak.places.choosing import check_place, find_place
 from mapspeak.server.descriptions import describe_place
 from mapspeak.server.measures import describe_measures
 from mapspeak.server.reports import GoalAnswer
 from mapspeak.server.tools.finding import FindTools
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.session import Session
-
-__all__ = ["PlaceTools"]
 
 MOST_PLACES = 30
 

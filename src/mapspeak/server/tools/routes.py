@@ -16,8 +16,6 @@ from mapspeak.server.toolset import Effect, Tool
 from mapspeak.server.wording import shorten
 from mapspeak.session import Session
 
-__all__ = ["RouteTools"]
-
 MOST_STOPS = 20
 ERRAND_S = 1800.0
 """A person's word for a route is good for so much robot time."""

@@ -12,8 +12,6 @@ from mapspeak.server.tools.routes import RouteTools
 from mapspeak.server.toolset import Tool
 from mapspeak.session import Session
 
-__all__ = ["build_toolsets"]
-
 
 def build_toolsets(
     session: Session, representation: Representation = Representation.PICTURE_TABLE

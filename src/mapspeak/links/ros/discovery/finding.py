@@ -14,8 +14,6 @@ from mapspeak.links.ros.discovery.size import find_radius_m
 from mapspeak.ros import RosConnection, RosGraph
 from mapspeak.ros.messages import Dialect
 
-__all__ = ["look_at_robot"]
-
 MOST_ROUNDS = 8
 """Of asking who serves the best topics, and, where nobody does, choosing the next best."""
 RADIUS_S = 3.0

@@ -5,8 +5,6 @@ from collections.abc import Awaitable, Callable
 from mapspeak.errors import LinkError
 from mapspeak.ros import RosConnection
 
-__all__ = ["Liveness"]
-
 
 class Liveness:
     """Asks for the other end of topics, of each once.

@@ -11,21 +11,6 @@ from mapspeak.links.ros.discovery.profile import (
     end_of_goals,
 )
 
-__all__ = [
-    "CAMERA",
-    "LASER",
-    "MAP",
-    "NAVIGATION",
-    "PARTS",
-    "POSE",
-    "RADIUS",
-    "VELOCITY",
-    "Part",
-    "Worth",
-    "find_missing",
-    "improve",
-]
-
 
 class Worth(IntEnum):
     """How good a part is that was found, the worst first."""

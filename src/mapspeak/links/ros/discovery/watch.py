@@ -13,8 +13,6 @@ from mapspeak.links.ros.discovery.profile import RobotProfile
 from mapspeak.links.ros.frames import FrameListener
 from mapspeak.ros import RosConnection
 
-__all__ = ["FRAMES_S", "RobotWatch"]
-
 FRAMES_S = 2.0
 PAUSE_S, LATER_PAUSE_S, LONGEST_PAUSE_S = 0.3, 5.0, 30.0
 """Between two looks: at first, and when all that is there counts as found, ever longer."""

@@ -13,8 +13,6 @@ from mapspeak.robot import GoalState
 from mapspeak.ros import RosConnection
 from mapspeak.ros.messages import Dialect, FramedPose, Message
 
-__all__ = ["ActionDriver", "Navigation"]
-
 STATE_OF = {
     ActionState.SUCCEEDED: GoalState.ARRIVED,
     ActionState.ABORTED: GoalState.BLOCKED,

@@ -6,8 +6,6 @@ from mapspeak.links.ros import TopicSubscription
 from mapspeak.links.rosbridge.client.channel import Channel
 from mapspeak.links.rosbridge.protocol import Encoding
 
-__all__ = ["TopicRequest"]
-
 ENCODINGS = (Encoding.CBOR, Encoding.CBOR, Encoding.JSON)
 """Of bulky messages: asked for so first, and again, and again.
 

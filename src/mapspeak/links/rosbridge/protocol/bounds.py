@@ -5,19 +5,6 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "MAX_CONTAINERS",
-    "MAX_DEPTH",
-    "MAX_ELEMENTS",
-    "MAX_FRAME_BYTES",
-    "MAX_REST_BYTES",
-    "FrameError",
-    "Raw",
-    "check_cbor",
-    "check_json",
-    "parts_of",
-]
-
 MAX_FRAME_BYTES = 100_000_000
 """The largest message that is taken: a map of 16 million cells as JSON has 35 to 80 MB."""
 MAX_REST_BYTES = 24_000_000

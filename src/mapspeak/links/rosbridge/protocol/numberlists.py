@@ -16,8 +16,6 @@ from mapspeak.links.rosbridge.protocol.bounds import (
     parts_of,
 )
 
-__all__ = ["WORTH_CUTTING_BYTES", "cut_out_numbers", "marker_of"]
-
 WORTH_CUTTING_BYTES = 16_384
 """Below this size, reading numbers apart saves nothing."""
 PART_BYTES = 100_000

@@ -22,8 +22,6 @@ from mapspeak.links.rosbridge.server.publication import answer_frame
 from mapspeak.links.rosbridge.server.system import RosSystem, refusal
 from mapspeak.ros.messages import bare_type
 
-__all__ = ["GoalOperations"]
-
 Operation = Mapping[str, Any]
 FEEDBACK_DEPTH = 5
 

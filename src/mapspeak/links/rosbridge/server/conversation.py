@@ -21,8 +21,6 @@ from mapspeak.links.rosbridge.server.publication import (
 from mapspeak.links.rosbridge.server.system import RosSystem, refusal
 from mapspeak.ros.messages import Dialect, bare_type
 
-__all__ = ["Conversation"]
-
 Operation = Mapping[str, Any]
 TOPIC_NAME = re.compile(r"/?[A-Za-z_]\w*(/\w+)*/?", re.ASCII)
 

@@ -12,8 +12,6 @@ from mapspeak.links.rosbridge.server.graph import BASE_FRAME
 from mapspeak.robot import GoalState, GoalStatus, Robot
 from mapspeak.ros.messages import FramedPose
 
-__all__ = ["Drive", "Drives"]
-
 MOST_ENDED = 10
 """Ended goals that are still told about."""
 

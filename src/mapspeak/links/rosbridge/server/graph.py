@@ -4,8 +4,6 @@ from mapspeak.links.rosbridge.server.hub import ROSBRIDGE_NODE, Topic
 from mapspeak.robot import RobotDescription
 from mapspeak.ros.messages import Dialect
 
-__all__ = ["BASE_FRAME", "BASE_NODE", "ROSAPI_NODE", "SLAM_NODES", "navigator_of", "topics_of"]
-
 BASE_FRAME = "base_footprint"
 BASE_NODE = "/robot_base"
 CAMERA_NODE, LASER_NODE = "/camera", "/laser"

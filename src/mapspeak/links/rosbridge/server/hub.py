@@ -6,8 +6,6 @@ from dataclasses import dataclass, field
 from mapspeak.links.rosbridge.server.publication import Publication
 from mapspeak.ros.messages import Message, bare_type
 
-__all__ = ["ROSBRIDGE_NODE", "Hub", "Topic"]
-
 Listener = Callable[[Publication], None]
 ROSBRIDGE_NODE = "/rosbridge_websocket"
 

@@ -19,8 +19,6 @@ from mapspeak.ros.definitions import (
 )
 from mapspeak.ros.messages import Dialect, bare_type
 
-__all__ = ["ROS2_DISTRIBUTION", "Interfaces"]
-
 ROS2_DISTRIBUTION = "jazzy"
 
 KIND_OF_GENERATED = {

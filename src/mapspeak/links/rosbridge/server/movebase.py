@@ -19,8 +19,6 @@ from mapspeak.ros.messages import (
     write_stamp,
 )
 
-__all__ = ["MoveBase"]
-
 ACTIVE, PREEMPTED, SUCCEEDED, ABORTED, REJECTED, PREEMPTING = 1, 2, 3, 4, 5, 6
 STATUS = {
     GoalState.ARRIVED: (SUCCEEDED, "Goal reached."),

@@ -19,8 +19,6 @@ from mapspeak.ros.messages import (
     write_stamp,
 )
 
-__all__ = ["ACTION", "ACTION_TYPE", "Nav2"]
-
 ACTION = "/navigate_to_pose"
 ACTION_TYPE = "nav2_msgs/NavigateToPose"
 EXECUTING, CANCELING, SUCCEEDED, CANCELED, ABORTED = 2, 3, 4, 5, 6

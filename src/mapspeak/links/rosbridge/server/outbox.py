@@ -8,8 +8,6 @@ import anyio
 
 from mapspeak.links.rosbridge.server.publication import Frame, Publication
 
-__all__ = ["Outbox"]
-
 MOST_REPLIES = 1000
 
 Item = Frame | Publication

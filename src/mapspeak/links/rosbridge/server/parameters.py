@@ -9,8 +9,6 @@ from mapspeak.links.rosbridge.server.interfaces import Interfaces
 from mapspeak.links.rosbridge.server.services import Service, Services
 from mapspeak.ros.messages import Dialect
 
-__all__ = ["Parameters", "add_parameter_services"]
-
 Values = dict[str, Any]
 ROS1_DISTRIBUTION = "noetic\n"
 NOT_SET = 0

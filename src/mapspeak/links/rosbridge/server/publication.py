@@ -13,8 +13,6 @@ from PIL import Image
 from mapspeak.links.rosbridge.protocol.encoding import to_cbor, to_json
 from mapspeak.ros.messages import Message
 
-__all__ = ["Compression", "Frame", "Publication", "answer_frame", "fragments_of"]
-
 
 class Compression(StrEnum):
     """How a client wants a topic's messages; later ones win where it asked for several."""

@@ -15,8 +15,6 @@ from mapspeak.links.rosbridge.server.services import Service
 from mapspeak.links.rosbridge.server.system import RosSystem
 from mapspeak.ros.messages import Dialect, bare_type, write_stamp
 
-__all__ = ["add_rosapi"]
-
 Values = dict[str, Any]
 Answer = Callable[[Values], Values]
 HIDDEN = "/_action/"

@@ -10,8 +10,6 @@ from mapspeak.links.rosbridge.server.serving import open_rosbridge_server
 from mapspeak.robot import Robot
 from mapspeak.ros.messages import Dialect
 
-__all__ = ["run_rosbridge_server"]
-
 DEFAULT_HOST = "127.0.0.1"
 
 

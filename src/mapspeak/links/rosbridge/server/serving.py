@@ -20,8 +20,6 @@ from mapspeak.links.rosbridge.server.websocket import WebSocket
 from mapspeak.robot import Robot
 from mapspeak.ros.messages import Dialect
 
-__all__ = ["RosbridgeServer", "open_rosbridge_server", "serve_system"]
-
 LONGEST_FRAME = 10_000_000
 """rosbridge's `max_message_size`: on ROS 2 longer text is cut in pieces, longer CBOR is lost."""
 MOST_OPERATIONS = 1000

@@ -31,8 +31,6 @@ from mapspeak.ros.messages import (
 )
 from mapspeak.spatial import OccupancyGrid
 
-__all__ = ["TICK_S", "Sources"]
-
 TICK_S = 0.05
 """Between two transforms."""
 MAP_PERIOD_S = 1.0

@@ -23,8 +23,6 @@ from mapspeak.links.rosbridge.server.system import RosSystem
 from mapspeak.robot import Robot
 from mapspeak.ros.messages import Dialect, read_twist, write_grid
 
-__all__ = ["RosStack"]
-
 STATUS_PERIOD_S = 0.2
 FEEDBACK_PERIOD_S = 0.1
 

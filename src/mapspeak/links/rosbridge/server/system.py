@@ -7,8 +7,6 @@ from mapspeak.links.rosbridge.server.nav2 import Nav2
 from mapspeak.links.rosbridge.server.services import Services
 from mapspeak.ros.messages import Dialect
 
-__all__ = ["RosSystem", "refusal"]
-
 LONGEST_COMPLAINT = 1000
 LOGGED_ERROR = 8
 """rosgraph_msgs/Log.ERROR."""

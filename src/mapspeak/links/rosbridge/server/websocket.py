@@ -9,8 +9,6 @@ from websockets.http11 import Request
 from websockets.protocol import State
 from websockets.server import ServerProtocol
 
-__all__ = ["WebSocket"]
-
 LONGEST_MESSAGE = 10_000_000
 """What rosbridge takes in at most, unless told otherwise."""
 FRAME_LENGTH = 1 << 18

@@ -23,8 +23,6 @@ from mapspeak.server.tools.ros.views import view_fields
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.server.wording import say_count
 
-__all__ = ["ActionTools"]
-
 LONGEST_WAIT_S = 25.0
 MOST_LISTED = 20
 

@@ -9,16 +9,6 @@ from mapspeak.errors import LinkError
 from mapspeak.ros import NodeLinks, OwnEnds, RosConnection
 from mapspeak.server.wording import list_some
 
-__all__ = [
-    "Census",
-    "Nodes",
-    "fetch_hearers",
-    "fetch_publishers",
-    "find_server",
-    "mark_ours",
-    "take_census",
-]
-
 MOST_AT_ONCE = 8
 MOST_NODES = 20
 OURS = " (mapspeak)"

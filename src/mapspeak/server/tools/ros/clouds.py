@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from mapspeak.errors import LinkError
 from mapspeak.ros.messages import Message, read_header
 
-__all__ = ["PointCloud", "read_cloud"]
-
 HINT = "Look at the fields of the message; the node that sends it may be misconfigured."
 KINDS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 """By sensor_msgs/PointField, numpy's names."""

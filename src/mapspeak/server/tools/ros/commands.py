@@ -11,8 +11,6 @@ from mapspeak.ros import RosConnection
 from mapspeak.ros.messages import Message
 from mapspeak.safety import Act, Call, GuardedConnection, Publish, SetParameter
 
-__all__ = ["VELOCITIES", "RosCommands", "stand_of"]
-
 SETTLE_S = 0.3
 """From the first advertisement until the robot's nodes hear what is published, in wall time."""
 LONGEST_SETTLE_S = 1.0

@@ -14,8 +14,6 @@ from mapspeak.server.tools.ros.reading import say_rate
 from mapspeak.server.tools.ros.stamps import say_lag
 from mapspeak.server.wording import list_some, say_count
 
-__all__ = ["TRANSFORMS", "FrameLink", "check_frames", "hear_frames", "say_frames"]
-
 TRANSFORMS = "tf2_msgs/TFMessage"
 FRAMES_COME_S = 2.0
 """For a frame that somebody sends to come, in wall time."""

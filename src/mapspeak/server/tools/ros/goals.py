@@ -17,8 +17,6 @@ from mapspeak.ros.messages import Dialect, Message
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.inquiry import RosInquiry
 
-__all__ = ["ActionBook", "Job"]
-
 MOST_KEPT = 200
 POLL_S = 0.2
 USUAL_PATIENCE = ActionPatience()

@@ -21,8 +21,6 @@ from mapspeak.ros.definitions import (
 from mapspeak.ros.messages import Dialect, bare_type
 from mapspeak.session import Session
 
-__all__ = ["ACTION_GOAL", "Described", "RosInquiry", "full_name", "require_ros"]
-
 NO_ROS = "This robot is no ROS robot: the simulated one is none."
 ACTION_GOAL = "ActionGoal"
 MOST_NEAR = 5

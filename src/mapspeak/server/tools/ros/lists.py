@@ -6,8 +6,6 @@ from typing import Annotated, TypeVar
 
 from pydantic import Field
 
-__all__ = ["Filter", "Page", "choose", "say_page"]
-
 Item = TypeVar("Item")
 
 PAGE_SIZE = 40

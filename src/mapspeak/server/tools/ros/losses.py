@@ -6,8 +6,6 @@ import anyio
 
 from mapspeak.ros import RosConnection
 
-__all__ = ["say_loss"]
-
 
 def say_loss(connection: RosConnection, *, since_s: float) -> str:
     """Says that the connection is lost, or was lost after a moment; empty where it held.

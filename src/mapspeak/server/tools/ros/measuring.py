@@ -16,8 +16,6 @@ from mapspeak.server.tools.ros.views import BULKY
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.session import Session
 
-__all__ = ["MeasuringTools"]
-
 MOST_TOPICS = 20
 
 Topics = Annotated[

@@ -18,8 +18,6 @@ from mapspeak.server.tools.ros.lists import PAGE_SIZE, Filter, Page, choose, say
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.server.wording import list_some
 
-__all__ = ["NodeTools"]
-
 MOST_DESCRIBED = 5
 MOST_AT_ONCE = 8
 MOST_NAMED = 40

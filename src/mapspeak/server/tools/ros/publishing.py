@@ -12,8 +12,6 @@ from mapspeak.safety import publishing_for
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.session import Session
 
-__all__ = ["Publication", "Publisher"]
-
 BY_HAND = "If the robot still moves, stop it by hand; stop_robot works once the connection is back."
 
 

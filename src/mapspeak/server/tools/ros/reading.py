@@ -9,8 +9,6 @@ from mapspeak.errors import LinkError
 from mapspeak.ros import RosConnection, Subscription
 from mapspeak.ros.messages import Message
 
-__all__ = ["Heard", "hear", "say_rate"]
-
 RENEW_S = (2.0, 3.0)
 """For a first message, in wall time, before a topic is asked for anew: a latched one may have been
 missed, and a large one may come only when it is asked for otherwise."""

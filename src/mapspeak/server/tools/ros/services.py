@@ -20,8 +20,6 @@ from mapspeak.server.tools.ros.views import view_fields
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.session import Session
 
-__all__ = ["ServiceTools"]
-
 Service = Annotated[str, Field(description="full name, such as /reset", max_length=200)]
 RequestFields = Annotated[
     dict[str, Any] | None,

@@ -5,8 +5,6 @@ from collections.abc import Mapping
 from mapspeak.errors import LinkError
 from mapspeak.ros.messages import Message, read_stamp
 
-__all__ = ["say_lag", "say_stamp", "stamp_of"]
-
 LATE_PERIODS = 3.0
 LEAST_LATE_S = 0.5
 """A way over a network takes some time, and so does an answer."""

@@ -11,8 +11,6 @@ from mapspeak.server.tools.ros.topics import TopicTools
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.session import Session
 
-__all__ = ["RosTools"]
-
 
 class RosTools:
     """Looking into a ROS system, and acting on it.

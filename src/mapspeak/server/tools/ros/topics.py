@@ -28,8 +28,6 @@ from mapspeak.server.toolset import Effect, Tool
 from mapspeak.server.wording import list_some
 from mapspeak.session import Session
 
-__all__ = ["TopicTools"]
-
 LONGEST_S = 25.0
 MOST_NAMED = 20
 VIEWS_KEPT = 4

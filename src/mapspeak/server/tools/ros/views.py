@@ -33,8 +33,6 @@ from mapspeak.server.tools.ros.clouds import read_cloud
 from mapspeak.server.wording import say_point, say_pose
 from mapspeak.spatial.picture import draw_map_axis
 
-__all__ = ["BULKY", "VIEWED", "View", "view_fields", "view_message"]
-
 EDGE_PX = 1000
 LARGEST_BYTES = 700_000
 AHEAD_RAD = math.radians(15)
