@@ -7,7 +7,7 @@ from pathlib import Path
 from mapspeak.safety import Policy, load_policy
 from mapspeak.safety.policyfile import _PolicyFile
 
-PAGE = Path(__file__).parents[3] / "docs" / "howto" / "limits.md"
+PAGE = Path(__file__).parents[2] / "docs" / "howto" / "limits.md"
 
 
 def examples() -> list[str]:
