@@ -7,7 +7,8 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.frontiers import Frontier, find_frontiers
 from mapspeak.spatial.frontiers.merging import merge_by_place
-from mapspeak.spatial.paths import cells_on_line, clearance_m
+from mapspeak.spatial.paths import clearance_m
+from mapspeak.spatial.visibility import cells_on_line
 
 RADIUS_M = 0.28
 COMFORT_M = 0.1

@@ -98,3 +98,35 @@ def test_a_map_that_lies_in_bytes_is_not_copied_and_any_other_is() -> None:
     assert not np.shares_memory(
         OccupancyGrid(cells=changeable, resolution_m=0.05).cells, changeable
     )
+
+
+def test_a_single_cell_is_free_occupied_or_unknown_and_unknown_outside() -> None:
+    grid = OccupancyGrid(cells=np.array([[-1, 0, 49, 50, 100]], dtype=np.int8), resolution_m=1.0)
+    cells = [Cell(0, col) for col in range(5)]
+    assert [grid.is_free(cell) for cell in cells] == [False, True, True, False, False]
+    assert [grid.is_occupied(cell) for cell in cells] == [False, False, False, True, True]
+    assert [grid.is_unknown(cell) for cell in cells] == [True, False, False, False, False]
+    outside = Cell(1, 0)
+    assert not grid.is_free(outside)
+    assert not grid.is_occupied(outside)
+    assert grid.is_unknown(outside)
+
+
+def test_masks_are_built_once_and_locked() -> None:
+    grid = OccupancyGrid(cells=np.zeros((2, 2), dtype=np.int8), resolution_m=1.0)
+    assert grid.free is grid.free
+    with pytest.raises(ValueError, match="read-only"):
+        grid.free[0, 0] = False
+
+
+def test_the_window_around_a_place_stays_on_the_array() -> None:
+    grid = OccupancyGrid(cells=np.zeros((10, 20), dtype=np.int8), resolution_m=0.5)
+    assert grid.window_around(Point(5.2, 0.3), 1.0) == (slice(0, 3), slice(8, 13))
+    assert grid.window_around(Point(-9.0, 99.0), 1.0) == (slice(10, 10), slice(0, 0))
+    assert grid.window(np.array([2, 4]), np.array([3, 19]), margin=1) == (slice(1, 6), slice(2, 20))
+
+
+def test_values_are_looked_up_at_points_with_another_outside() -> None:
+    grid = OccupancyGrid(cells=np.zeros((1, 2), dtype=np.int8), resolution_m=1.0)
+    points = np.array([[[0.5, 0.5], [1.5, 0.5]], [[-0.5, 0.5], [0.5, 1.5]]])
+    assert grid.look_up(np.array([[7, 8]]), points, outside=0).tolist() == [[7, 8], [0, 0]]

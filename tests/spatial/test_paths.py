@@ -10,12 +10,12 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.paths import (
     Path,
-    cells_on_line,
     clearance_m,
     distances_from,
     find_path,
     known_clearance_m,
 )
+from mapspeak.spatial.visibility import cells_on_line
 
 TWO_ROOMS = """
     ####################
@@ -242,3 +242,9 @@ def test_a_path_is_the_same_length_there_and_back() -> None:
     assert there is not None
     assert back is not None
     assert math.isclose(there.length_m, back.length_m, rel_tol=0.05)
+
+
+def test_a_path_is_sampled_at_its_corners_and_in_even_steps_between_them() -> None:
+    path = Path.through((Point(0.0, 0.0), Point(1.0, 0.0), Point(1.0, 0.3)))
+    sampled = path.sampled(0.5)
+    assert [(point.x, point.y) for point in sampled] == [(0, 0), (0.5, 0), (1, 0), (1, 0.3)]

@@ -97,7 +97,7 @@ async def _look_at_place(robot: Robot, grid: OccupancyGrid) -> Finding:
     cell = grid.cell_at((await robot.fetch_pose()).pose.point)
     if not grid.contains(cell):
         return _misplaced("the robot stands off its map")
-    if grid.occupied[cell.row, cell.col]:
+    if grid.is_occupied(cell):
         return _misplaced("the robot stands in a wall of its map")
     clear_m, radius_m = _clearance_at(grid, cell.row, cell.col), robot.description.radius_m
     if clear_m < radius_m:

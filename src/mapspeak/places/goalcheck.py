@@ -114,9 +114,9 @@ def _judge(
     cell, radius_m = grid.cell_at(goal.point), distances.radius_m
     if not grid.contains(cell):
         return GoalVerdict.OFF_MAP, f"{_say(goal)} lies off the map, {_bounds(grid)}."
-    if grid.unknown[cell.row, cell.col]:
+    if grid.is_unknown(cell):
         return GoalVerdict.UNKNOWN, f"nobody has seen yet what is at {_say(goal)}."
-    if not grid.free[cell.row, cell.col]:
+    if not grid.is_free(cell):
         return GoalVerdict.OCCUPIED, f"{_say(goal)} lies in a wall or an obstacle."
     if path_m is not None:
         sentence = f"{_say(goal)} is {path_m:.1f} m away by path, {_say_clearance(clear_m)}."
@@ -188,16 +188,11 @@ def _find_nearest(grid: OccupancyGrid, distances: DistanceField, goal: Pose) -> 
         best = int(np.argmin(ways_m))
         if np.isfinite(ways_m[best]):
             return Pose(float(points[best, 0]), float(points[best, 1]), goal.yaw_rad)
-        if straight is None and not _is_free(grid, goal.point):
+        if straight is None and not grid.is_free(grid.cell_at(goal.point)):
             off_m = np.hypot(points[:, 0] - goal.x, points[:, 1] - goal.y)
             x, y = points[int(np.argmin(off_m))].tolist()
             straight = Pose(x, y, goal.yaw_rad)
     return straight
-
-
-def _is_free(grid: OccupancyGrid, point: Point) -> bool:
-    cell = grid.cell_at(point)
-    return grid.contains(cell) and bool(grid.free[cell.row, cell.col])
 
 
 def _reachable_points(window: OccupancyGrid, distances: DistanceField) -> FloatArray:
@@ -226,7 +221,7 @@ def _wall_around(window: OccupancyGrid, goal: Point) -> Mask:
     rows, cols = np.indices(window.cells.shape)
     away_m = np.hypot(rows + 0.5 - inside[0], cols + 0.5 - inside[1]) * window.resolution_m
     cell = window.cell_at(_into(window, goal))
-    if not window.occupied[cell.row, cell.col] or window.occupied.all():
+    if not window.is_occupied(cell) or window.occupied.all():
         return np.zeros(window.cells.shape, dtype=np.bool_)
     return np.asarray(away_m <= away_m[~window.occupied].min() + WALL_SIDES_M, dtype=np.bool_)
 
@@ -242,7 +237,7 @@ def _into(grid: OccupancyGrid, point: Point) -> Point:
 
 def _clearance_at(grid: OccupancyGrid, point: Point) -> float:
     cell = grid.cell_at(point)
-    if not grid.contains(cell) or not grid.free[cell.row, cell.col]:
+    if not grid.is_free(cell):
         return 0.0
     # Most goals have something near, and a small window is looked at in no time.
     near_m = _nearest_obstacle_m(grid, cell, NEAR_M)
@@ -251,11 +246,10 @@ def _clearance_at(grid: OccupancyGrid, point: Point) -> float:
 
 def _nearest_obstacle_m(grid: OccupancyGrid, cell: Cell, reach_m: float) -> float:
     """Gives the metres to the nearest obstacle in the square within reach; infinite without one."""
-    reach = math.ceil(reach_m / grid.resolution_m)
-    top, left = max(cell.row - reach, 0), max(cell.col - reach, 0)
-    window = grid.crop(slice(top, cell.row + reach + 1), slice(left, cell.col + reach + 1))
-    rows, cols = np.nonzero(window.occupied)
-    off = np.hypot(rows - (cell.row - top), cols - (cell.col - left))
+    margin = math.ceil(reach_m / grid.resolution_m)
+    down, across = grid.window(cell.row, cell.col, margin=margin)
+    rows, cols = np.nonzero(grid.crop(down, across).occupied)
+    off = np.hypot(rows - (cell.row - down.start), cols - (cell.col - across.start))
     return float(off.min(initial=math.inf)) * grid.resolution_m
 
 
@@ -263,8 +257,7 @@ def _window(grid: OccupancyGrid, centre: Point, reach_m: float) -> OccupancyGrid
     """Gives the part of a map around a point, or around the part of the map nearest to it."""
     cell = grid.cell_at(_into(grid, centre))
     n = max(grid.n_rows, grid.n_cols) if math.isinf(reach_m) else int(reach_m / grid.resolution_m)
-    top, left = max(cell.row - n, 0), max(cell.col - n, 0)
-    return grid.crop(slice(top, cell.row + n + 1), slice(left, cell.col + n + 1))
+    return grid.crop(*grid.window(cell.row, cell.col, margin=n))
 
 
 def _say(goal: Pose) -> str:

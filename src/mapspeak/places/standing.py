@@ -11,6 +11,7 @@ from mapspeak.spatial import Cell
 from mapspeak.spatial.grid import FloatArray, IntArray
 from mapspeak.spatial.paths import Path
 from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap
+from mapspeak.spatial.visibility import cast_rays
 from mapspeak.worldmodel.model import Atlas, find_crossing
 from mapspeak.worldmodel.recollection import RememberedThing
 from mapspeak.worldmodel.revision import MapRevision
@@ -151,11 +152,12 @@ def _sights_in(atlas: Atlas, region: Region, point: Point, angles: FloatArray) -
     """Gives how far one sees over free floor of the region along each angle, in metres."""
     step_m = atlas.grid.resolution_m
     steps_m = np.arange(1, math.ceil(math.hypot(region.length_m, region.width_m) / step_m)) * step_m
-    xs = point.x + np.outer(np.cos(angles), steps_m)
-    ys = point.y + np.outer(np.sin(angles), steps_m)
-    rows, cols = atlas.grid.cells_at(np.stack([xs.ravel(), ys.ravel()], axis=1))
-    inside = atlas.grid.contains_cells(rows, cols)
-    rows, cols = np.where(inside, rows, 0), np.where(inside, cols, 0)
-    is_ours = (atlas.rooms.labels[rows, cols] == region.index) & atlas.grid.free[rows, cols]
-    is_seen = np.logical_and.accumulate((inside & is_ours).reshape(xs.shape), axis=1)
+    grid = atlas.grid
+    rays = cast_rays(
+        grid.cells.shape,
+        grid.fractional_cells_at(np.array([[point.x, point.y]])),
+        angles_rad=angles - grid.origin.yaw_rad,
+        steps=steps_m / step_m,
+    )
+    is_seen = rays.follow((atlas.rooms.labels == region.index) & grid.free)[0]
     return np.asarray(is_seen.sum(axis=1) * step_m, dtype=np.float64)

@@ -1,6 +1,5 @@
 """How far it is between two places, and what the way leads through."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,16 +104,7 @@ def standing_point(atlas: Atlas, place: Place) -> Point:
 
 def _cells_along(atlas: Atlas, path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Gives rows and columns of the cells that a path passes, a step for each cell's length."""
-    points = [path.points[0]]
-    for before, after in zip(path.points, path.points[1:], strict=False):
-        n_steps = max(math.ceil(before.distance_to(after) / atlas.grid.resolution_m), 1)
-        points += [
-            Point(
-                before.x + (after.x - before.x) * step / n_steps,
-                before.y + (after.y - before.y) * step / n_steps,
-            )
-            for step in range(1, n_steps + 1)
-        ]
+    points = path.sampled(atlas.grid.resolution_m)
     rows, cols = atlas.grid.cells_at(np.array([[point.x, point.y] for point in points]))
     return rows.clip(0, atlas.grid.n_rows - 1), cols.clip(0, atlas.grid.n_cols - 1)
 

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -91,7 +91,8 @@ def _count_parts(revision: MapRevision, start: Point, end: Point) -> int:
     near = [
         area
         for area in revision.areas
-        if min(map(area.distance_to, _steps((start, end)))) < reach_m + BOW_M
+        if min(map(area.distance_to, Path.through((start, end)).sampled(STEP_M)[1:]))
+        < reach_m + BOW_M
     ]
     n_parts = 1
     while near and start.distance_to(end) / n_parts > SHORTEST_M:
@@ -113,29 +114,18 @@ def _goes_clear(
 def _crop_around(grid: OccupancyGrid, ends: tuple[Point, Point]) -> OccupancyGrid:
     """Gives the part of the map on which a way between two near places is looked for."""
     rows, cols = grid.cells_at(np.array([[each.x, each.y] for each in ends]))
-    n = math.ceil(AROUND_M / grid.resolution_m)
-    low_row, low_col = max(int(rows.min()) - n, 0), max(int(cols.min()) - n, 0)
-    return grid.crop(
-        slice(low_row, int(rows.max()) + n + 1), slice(low_col, int(cols.max()) + n + 1)
-    )
+    return grid.crop(*grid.window(rows, cols, margin=math.ceil(AROUND_M / grid.resolution_m)))
 
 
 def _is_clear(points: Sequence[Point], areas: Sequence[ClosedArea], reach_m: float) -> bool:
     """True when a way keeps off all areas, or leads away from one that it begins too near to."""
+    steps = Path.through(tuple(points)).sampled(STEP_M)[1:]
     for area in areas:
         least_m = min(area.distance_to_border(points[0]) - LEAVING_M, reach_m)
-        along = (area.distance_to_border(each) for each in _steps(points))
+        along = (area.distance_to_border(each) for each in steps)
         if area.contains(points[0]) or any(off_m < least_m for off_m in along):
             return False
     return True
-
-
-def _steps(points: Sequence[Point]) -> Iterator[Point]:
-    """Gives points along a way, close together."""
-    for start, end in itertools.pairwise(points):
-        n_steps = max(math.ceil(start.distance_to(end) / STEP_M), 1)
-        for step in range(1, n_steps + 1):
-            yield _between(start, end, step / n_steps)
 
 
 def _between(start: Point, end: Point, share: float) -> Point:

@@ -64,7 +64,7 @@ class GoalMonitor:
             return f"The goal now lies in the {area.title}; the robot was stopped."
         cell = revision.grid.cell_at(here)
         is_off = not revision.grid.contains(cell)
-        if not is_off and not revision.grid.occupied[cell.row, cell.col]:
+        if not is_off and not revision.grid.is_occupied(cell):
             self._occupied_since_s = None
             return None
         self._occupied_since_s = now_s if self._occupied_since_s is None else self._occupied_since_s

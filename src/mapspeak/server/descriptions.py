@@ -186,10 +186,10 @@ def _say_ground(atlas: Atlas, place: Place) -> str:
     cell = atlas.grid.cell_at(place.point)
     if not atlas.grid.contains(cell):
         return "off the map"
-    if atlas.grid.unknown[cell.row, cell.col]:
+    if atlas.grid.is_unknown(cell):
         return "not seen yet"
     room = atlas.find_room_id(place.point) or "no room"
-    if not atlas.grid.free[cell.row, cell.col]:
+    if not atlas.grid.is_free(cell):
         return f"a wall or an obstacle, in {room}"
     clear_m = float(atlas.map.clearance_m[cell.row, cell.col])
     clear = "no obstacle known" if math.isinf(clear_m) else f"{clear_m:.2f} m from any obstacle"

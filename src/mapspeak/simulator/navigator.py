@@ -248,10 +248,10 @@ class Navigator:
 def _fault_of(grid: OccupancyGrid, goal: Point) -> str | None:
     """Gives why the robot cannot stand at a goal, whatever the way; None when it can."""
     cell = grid.cell_at(goal)
-    if not grid.contains(cell) or grid.unknown[cell.row, cell.col]:
+    if grid.is_unknown(cell):
         return "The goal lies where the map knows nothing."
     room_m = float(clearance_m(grid)[cell.row, cell.col])
-    if not grid.free[cell.row, cell.col] or room_m < _PLANNING_RADII_M[-1]:
+    if not grid.is_free(cell) or room_m < _PLANNING_RADII_M[-1]:
         return (
             f"The goal lies {room_m:.2f} m from an obstacle, the robot's radius is"
             f" {BODY_RADIUS_M} m: it does not fit there."

@@ -5,8 +5,10 @@ the grid's own y axis, columns along its x axis, and the origin pose is that of 
 cell (0, 0) in the map frame. The origin may be turned.
 """
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +23,12 @@ FREE_MAX = 49
 LEAST_RESOLUTION_M, LARGEST_RESOLUTION_M = 0.0005, 100.0
 FARTHEST_ORIGIN_M = 1e8
 
+_Scalar = TypeVar("_Scalar", bound=np.generic)
 Mask = NDArray[np.bool_]
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
+Window = tuple[slice, slice]
+"""Rows and columns of a part of an array."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -45,18 +50,19 @@ class OccupancyGrid:
         stamp_s: Robot time at which the map was made.
 
     Raises:
-        MapError: The array is not two-dimensional, holds other values, or resolution or origin are
-            none that a map can have.
+        MapError: The array is not two-dimensional, holds other values, or resolution or origin
+            are out of range.
     """
 
     cells: NDArray[np.int8]
     resolution_m: float
     origin: Pose = field(default=Pose(0.0, 0.0, 0.0))
     stamp_s: float = 0.0
+    _masks: dict[str, Mask] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         _check(np.asarray(self.cells), self.resolution_m, self.origin)
-        if not _nobody_can_write(self.cells):
+        if not _is_immutable(self.cells):
             cells = np.array(self.cells, dtype=np.int8, order="C")
             cells.setflags(write=False)
             object.__setattr__(self, "cells", cells)
@@ -83,29 +89,49 @@ class OccupancyGrid:
 
     @property
     def free(self) -> Mask:
-        """True where a robot can be: occupancy 0 to 49."""
-        return (self.cells >= 0) & (self.cells <= FREE_MAX)
+        """True where a robot can be: occupancy 0 to 49. Built once and locked, as the next two."""
+        # As an unsigned byte, unknown is 255.
+        return self._mask("free", lambda: self.cells.view(np.uint8) <= FREE_MAX)
 
     @property
     def occupied(self) -> Mask:
         """True where something stands: occupancy 50 to 100."""
-        return self.cells > FREE_MAX
+        return self._mask("occupied", lambda: self.cells > FREE_MAX)
 
     @property
     def unknown(self) -> Mask:
         """True where nothing has been seen yet."""
-        return self.cells < 0
+        return self._mask("unknown", lambda: self.cells < 0)
+
+    def _mask(self, name: str, build: Callable[[], Mask]) -> Mask:
+        if name not in self._masks:
+            mask = build()
+            mask.setflags(write=False)
+            self._masks[name] = mask
+        return self._masks[name]
+
+    def is_free(self, cell: Cell) -> bool:
+        """Return True where a robot can be; never outside the array."""
+        return self.contains(cell) and 0 <= int(self.cells[cell.row, cell.col]) <= FREE_MAX
+
+    def is_occupied(self, cell: Cell) -> bool:
+        """Return True where something stands; never outside the array."""
+        return self.contains(cell) and int(self.cells[cell.row, cell.col]) > FREE_MAX
+
+    def is_unknown(self, cell: Cell) -> bool:
+        """Return True where nothing has been seen yet, as everywhere outside the array."""
+        return not self.contains(cell) or int(self.cells[cell.row, cell.col]) < 0
 
     def find_barred(self, start: Point) -> Mask | None:  # noqa: ARG002 - of the map itself, none
-        """Finds the cells that nothing from a place may pass, however wrong its pose may be.
+        """Find the cells that no way from a place may pass; None where there are no such cells.
 
-        A wall may stand where a robot seems to be because a pose or a map is off; what somebody
-        has closed is another thing. None where nothing is.
+        Walls are not among them: where a pose or a map is off, a robot may seem to stand in a wall.
+        What people have closed is, however wrong the pose may be.
         """
         return None
 
     def bounds(self) -> tuple[Point, Point]:
-        """Gives the least and the greatest x and y of the map, as two points."""
+        """Return the least and the greatest x and y of the map, as two points."""
         corners = [
             self.origin.transform(Point(x, y))
             for x in (0.0, self.width_m)
@@ -115,15 +141,40 @@ class OccupancyGrid:
         return Point(min(xs), min(ys)), Point(max(xs), max(ys))
 
     def contains(self, cell: Cell) -> bool:
-        """True when the cell lies inside the array."""
+        """Return True when the cell lies inside the array."""
         return 0 <= cell.row < self.n_rows and 0 <= cell.col < self.n_cols
 
     def contains_cells(self, rows: IntArray, cols: IntArray) -> Mask:
-        """True where the cell of that row and column lies inside the array; arrays of one shape."""
+        """Return True for rows and columns, of one shape, of cells that lie inside the array."""
         return np.asarray((rows >= 0) & (rows < self.n_rows) & (cols >= 0) & (cols < self.n_cols))
 
+    def window(self, rows: IntArray | int, cols: IntArray | int, *, margin: int) -> Window:
+        """Return the part of the array around some cells, with a margin of so many cells."""
+        return _span(rows, margin, self.n_rows), _span(cols, margin, self.n_cols)
+
+    def window_around(self, point: Point, reach_m: float) -> Window:
+        """Return the part of the array that holds all cells at most so far from a point."""
+        cell = self.cell_at(point)
+        return self.window(cell.row, cell.col, margin=math.ceil(reach_m / self.resolution_m))
+
+    def look_up(
+        self, values: NDArray[_Scalar], points: FloatArray, *, outside: float
+    ) -> NDArray[_Scalar]:
+        """Return the values of the cells that points fall in, and another outside the array.
+
+        Args:
+            values: One for each cell of the grid.
+            points: In metres, shape (..., 2).
+            outside: The value of points outside the array.
+        """
+        rows, cols = self.cells_at(points.reshape(-1, 2))
+        is_inside = self.contains_cells(rows, cols)
+        found = np.full(rows.size, outside, dtype=values.dtype)
+        found[is_inside] = values[rows[is_inside], cols[is_inside]]
+        return found.reshape(points.shape[:-1])
+
     def crop(self, rows: slice, cols: slice) -> "OccupancyGrid":
-        """Gives a part of the map, at its own place in the world; slices begin on the array."""
+        """Return a part of the map, at its own place in the world; slices begin on the array."""
         corner = Pose(cols.start * self.resolution_m, rows.start * self.resolution_m)
         return OccupancyGrid(
             cells=self.cells[rows, cols],
@@ -133,23 +184,23 @@ class OccupancyGrid:
         )
 
     def cell_at(self, point: Point) -> Cell:
-        """Gives the cell a point falls in, which may lie outside the array (see `contains`)."""
+        """Return the cell a point falls in, which may lie outside the array (see `contains`)."""
         rows, cols = self.cells_at(np.array([[point.x, point.y]]))
         return Cell(int(rows[0]), int(cols[0]))
 
     def point_at(self, cell: Cell) -> Point:
-        """Gives the centre of a cell."""
+        """Return the centre of a cell."""
         xy = self.points_at(np.array([cell.row]), np.array([cell.col]))
         return Point(float(xy[0, 0]), float(xy[0, 1]))
 
     def cells_at(self, points: FloatArray) -> tuple[IntArray, IntArray]:
-        """Gives rows and columns for points of shape (n, 2); they may lie outside the array."""
+        """Return rows and columns for points of shape (n, 2); they may lie outside the array."""
         in_grid = self.fractional_cells_at(points)
         floored = np.floor(in_grid).astype(np.intp)
         return floored[:, 0], floored[:, 1]
 
     def fractional_cells_at(self, points: FloatArray) -> FloatArray:
-        """Gives (row, col) of shape (n, 2) as real numbers; a cell's centre is at +0.5, +0.5."""
+        """Return (row, col) of shape (n, 2) as real numbers; a cell's centre is at +0.5, +0.5."""
         cos, sin = np.cos(self.origin.yaw_rad), np.sin(self.origin.yaw_rad)
         dx = points[:, 0] - self.origin.x
         dy = points[:, 1] - self.origin.y
@@ -158,7 +209,7 @@ class OccupancyGrid:
         return np.stack([row, col], axis=1)
 
     def points_at(self, rows: IntArray, cols: IntArray) -> FloatArray:
-        """Gives the centres of cells in metres, shape (n, 2)."""
+        """Return the centres of cells in metres, shape (n, 2)."""
         cos, sin = np.cos(self.origin.yaw_rad), np.sin(self.origin.yaw_rad)
         along_x = (cols + 0.5) * self.resolution_m
         along_y = (rows + 0.5) * self.resolution_m
@@ -167,8 +218,13 @@ class OccupancyGrid:
         return np.stack([x, y], axis=1)
 
 
-def _nobody_can_write(cells: NDArray[np.integer[Any]]) -> bool:
-    """True for what lies in a `bytes`, as a map does that came over a wire: no copy is needed."""
+def _span(places: IntArray | int, margin: int, size: int) -> slice:
+    first, last = int(np.min(places)) - margin, int(np.max(places)) + margin
+    return slice(min(max(first, 0), size), min(max(last + 1, 0), size))
+
+
+def _is_immutable(cells: NDArray[np.integer[Any]]) -> bool:
+    """Return True for what lies in a `bytes`, as a map from a wire does: no copy is needed."""
     owner: object = cells
     if not (isinstance(owner, np.ndarray) and owner.dtype == np.int8 and owner.flags.c_contiguous):
         return False

@@ -42,10 +42,8 @@ def find_crossing(rooms: RoomMap, distances: DistanceField, door: Door) -> Point
     That the middle of a door can be reached is not enough: the robot may stand before it.
     """
     reach_m = door.width_m / 2 + distances.radius_m + AROUND_M
-    reach = math.ceil(reach_m / rooms.grid.resolution_m)
-    cell = rooms.grid.cell_at(door.place)
-    top, left = max(cell.row - reach, 0), max(cell.col - reach, 0)
-    labels = rooms.labels[top : cell.row + reach + 1, left : cell.col + reach + 1]
+    window = rooms.grid.window_around(door.place, reach_m)
+    labels, top, left = rooms.labels[window], window[0].start, window[1].start
     rows = np.arange(top, top + labels.shape[0])[:, np.newaxis]
     cols = np.arange(left, left + labels.shape[1])
     is_reached = np.isfinite(distances.distances_at(rows, cols))

@@ -10,7 +10,7 @@ import numpy as np
 from mapspeak.geometry import Point
 from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.paths import DistanceField, Path, clearance_m, distances_from
-from mapspeak.spatial.paths.clearance import Clearance
+from mapspeak.spatial.paths.lattice import Clearance
 from mapspeak.spatial.paths.wavefront import Costs
 from mapspeak.spatial.rooms import CorridorWalk, Region, RoomMap, find_rooms, walk_along
 from mapspeak.worldmodel.closures import ClosedArea, close_floor, mask_areas
@@ -41,7 +41,7 @@ class Hindrance:
 
     def is_crossed_by(self, path: Path) -> bool:
         """True when a way leads over it."""
-        return any(self.area.contains(point) for point in _points_along(path))
+        return any(self.area.contains(point) for point in path.sampled(STEP_M))
 
 
 def weigh_floor(grid: OccupancyGrid, hindrances: Sequence[Hindrance]) -> Costs | None:
@@ -53,16 +53,6 @@ def weigh_floor(grid: OccupancyGrid, hindrances: Sequence[Hindrance]) -> Costs |
         inside = mask_areas(grid, [hindrance.area])
         weights[inside] = np.maximum(weights[inside], np.float32(hindrance.weight))
     return weights
-
-
-def _points_along(path: Path) -> list[Point]:
-    points = [*path.points[:1]]
-    for start, end in zip(path.points, path.points[1:], strict=False):
-        n_steps = max(int(np.ceil(start.distance_to(end) / STEP_M)), 1)
-        xs = np.linspace(start.x, end.x, n_steps + 1)[1:].tolist()
-        ys = np.linspace(start.y, end.y, n_steps + 1)[1:].tolist()
-        points += [Point(x, y) for x, y in zip(xs, ys, strict=True)]
-    return points
 
 
 MOST_FIELDS = 6

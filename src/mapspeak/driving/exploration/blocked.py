@@ -1,6 +1,5 @@
 """Places that the robot was sent to and could not get to, and when another try makes sense."""
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -15,12 +14,11 @@ from mapspeak.spatial.paths import clearance_m
 def has_room_at(grid: OccupancyGrid, point: Point, *, radius_m: float) -> bool:
     """True where a robot of that radius can stand on known floor."""
     cell = grid.cell_at(point)
-    if not grid.contains(cell) or not grid.free[cell.row, cell.col]:
+    if not grid.is_free(cell):
         return False
-    reach = math.ceil(radius_m / grid.resolution_m) + 1
-    top, left = max(cell.row - reach, 0), max(cell.col - reach, 0)
-    near = grid.crop(slice(top, cell.row + reach + 1), slice(left, cell.col + reach + 1))
-    return bool(clearance_m(near)[cell.row - top, cell.col - left] >= radius_m)
+    rows, cols = grid.window_around(point, radius_m + grid.resolution_m)
+    near_m = clearance_m(grid.crop(rows, cols))
+    return bool(near_m[cell.row - rows.start, cell.col - cols.start] >= radius_m)
 
 
 SAME_PLACE_M = 0.5

@@ -1,6 +1,5 @@
 """How an exploration stands, as a value."""
 
-import math
 from collections import Counter
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -124,10 +123,8 @@ def _is_closed_off(atlas: Atlas, border: RefusedFrontier) -> bool:
 
 def _is_reached_near(distances: DistanceField, point: Point) -> bool:
     grid = distances.lattice.grid
-    reach = math.ceil((distances.radius_m + NEAR_M) / grid.resolution_m)
-    cell = grid.cell_at(point)
-    rows = np.arange(max(cell.row - reach, 0), min(cell.row + reach + 1, grid.n_rows))
-    cols = np.arange(max(cell.col - reach, 0), min(cell.col + reach + 1, grid.n_cols))
+    down, across = grid.window_around(point, distances.radius_m + NEAR_M)
+    rows, cols = np.arange(down.start, down.stop), np.arange(across.start, across.stop)
     return bool(np.isfinite(distances.distances_at(rows[:, np.newaxis], cols)).any())
 
 

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.driving.search.evidence import Opinions, weight_of
-from mapspeak.driving.search.seenfloor import REACH_M, SeenFloor, cast_sight_lines
+from mapspeak.driving.search.seenfloor import REACH_M, SeenFloor
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.places.choosing import check_place
 from mapspeak.places.naming import Place
 from mapspeak.semantic import TakenPicture
 from mapspeak.semantic.retrieval import Verdict
 from mapspeak.spatial.frontiers import Frontier
+from mapspeak.spatial.visibility import cast_rays
 from mapspeak.worldmodel.model import Atlas
 from mapspeak.worldmodel.recollection import RememberedPlace
 
@@ -303,8 +304,13 @@ def _areas_by_heading(atlas: Atlas, seen: Mask, places: FloatArray, half_rad: fl
     # No step is longer than a cell, so that no ray passes a wall between two of them.
     step_m = grid.resolution_m
     steps_m = np.arange(step_m, REACH_M + 1e-9, step_m)
-    lines = cast_sight_lines(grid, places, angles=angles, steps_m=steps_m)
-    is_new = lines.is_open & ~seen[lines.rows, lines.cols]
+    rays = cast_rays(
+        grid.cells.shape,
+        grid.fractional_cells_at(places),
+        angles_rad=angles - grid.origin.yaw_rad,
+        steps=steps_m / grid.resolution_m,
+    )
+    is_new = rays.follow(grid.free) & ~seen.ravel()[rays.cells]
     by_ray = is_new @ (steps_m * step_m * math.tau / N_RAYS)
     half = max(round(half_rad / (math.tau / N_RAYS)), 1)
     around = np.concatenate([by_ray[:, -half:], by_ray, by_ray[:, :half]], axis=1)

@@ -5,56 +5,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.spatial import OccupancyGrid
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class SightLines:
-    """The cells on lines from each of some places, all of shape (places, lines, steps).
-
-    Attributes:
-        rows: Of the cells; 0 where a line is outside the array.
-        cols: The same.
-        is_open: True where nothing but free floor lies between.
-    """
-
-    rows: IntArray
-    cols: IntArray
-    is_open: NDArray[np.bool_]
-
-
-def cast_sight_lines(
-    grid: OccupancyGrid, places: FloatArray, *, angles: FloatArray, steps_m: FloatArray
-) -> SightLines:
-    """Casts lines from places, and looks at them step by step.
-
-    Args:
-        grid: The map.
-        places: In metres, shape (n, 2).
-        angles: Of the lines, in the map frame.
-        steps_m: Where to look at a line, from its beginning.
-    """
-    # A map is no more than turned and shifted, so that only directions need to be turned.
-    in_grid = angles - grid.origin.yaw_rad
-    steps = steps_m / grid.resolution_m
-    starts = grid.fractional_cells_at(places)
-    rows = _floored(starts[:, 0, None, None] + np.outer(np.sin(in_grid), steps))
-    cols = _floored(starts[:, 1, None, None] + np.outer(np.cos(in_grid), steps))
-    is_inside = grid.contains_cells(rows, cols)
-    rows[~is_inside] = cols[~is_inside] = 0
-    is_free = grid.free[rows, cols] & is_inside
-    return SightLines(rows=rows, cols=cols, is_open=np.logical_and.accumulate(is_free, axis=2))
-
-
-def _floored(places: FloatArray) -> IntArray:
-    return np.asarray(np.floor(places, out=places), dtype=np.intp)
-
+from mapspeak.spatial.grid import IntArray, Mask
+from mapspeak.spatial.visibility import cast_rays
 
 REACH_M = 4.0
 """Things are known from no farther, whatever the camera shows of the background."""
@@ -64,8 +19,6 @@ LOOKED_NEAR_M = 0.4
 LOOKED_RAD = math.radians(15)
 SAME_PLACE_M = 0.1
 SAME_HEADING_RAD = math.radians(2)
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,16 +106,21 @@ class SeenFloor:
         for view in (*self._views, *self._earlier):
             if around is not None and view.pose.point.distance_to(around) > 2 * REACH_M:
                 continue
-            rows, cols = _cells_in_view(grid, view)
-            seen[rows, cols] = True
+            seen.flat[_cells_in_view(grid, view)] = True
         return seen
 
 
-def _cells_in_view(grid: OccupancyGrid, view: _View) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _cells_in_view(grid: OccupancyGrid, view: _View) -> IntArray:
+    """Return flat indices of the free cells that a look shows."""
     # Where rays are furthest apart they are still nearer to each other than cells are.
     n_rays = math.ceil(2 * view.half_rad * REACH_M / grid.resolution_m * 1.2)
     angles = view.pose.yaw_rad + np.linspace(-view.half_rad, view.half_rad, n_rays)
     steps_m = np.arange(0.0, REACH_M, grid.resolution_m * 0.9)
     place = np.array([[view.pose.x, view.pose.y]])
-    lines = cast_sight_lines(grid, place, angles=angles, steps_m=steps_m)
-    return lines.rows[lines.is_open], lines.cols[lines.is_open]
+    rays = cast_rays(
+        grid.cells.shape,
+        grid.fractional_cells_at(place),
+        angles_rad=angles - grid.origin.yaw_rad,
+        steps=steps_m / grid.resolution_m,
+    )
+    return rays.cells[rays.follow(grid.free)]

@@ -191,7 +191,7 @@ def _judge_explore(site: Site, _truth: dict[str, Any], evidence: Evidence) -> Sc
         )
     grid = evidence.grid
     cell = grid.cell_at(said)
-    if not grid.contains(cell) or not grid.free[cell.row, cell.col]:
+    if not grid.is_free(cell):
         return Score(
             is_success=False,
             failure=Failure.WRONG_PLACE,

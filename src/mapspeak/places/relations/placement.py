@@ -74,11 +74,9 @@ class Footing:
 def find_footing(atlas: Atlas, centre: Point, reach_m: float) -> Footing:
     """Finds the reachable cells at most so far from a place to each side."""
     grid = atlas.grid
-    cell, reach = grid.cell_at(centre), math.ceil(reach_m / grid.resolution_m)
-    rows = slice(max(cell.row - reach, 0), max(cell.row + reach + 1, 0))
-    cols = slice(max(cell.col - reach, 0), max(cell.col + reach + 1, 0))
-    at_rows, at_cols = np.nonzero(grid.free[rows, cols])
-    at_rows, at_cols = at_rows + rows.start, at_cols + cols.start
+    window = grid.window_around(centre, reach_m)
+    at_rows, at_cols = np.nonzero(grid.free[window])
+    at_rows, at_cols = at_rows + window[0].start, at_cols + window[1].start
     paths_m = atlas.distances.distances_at(at_rows, at_cols)
     is_reached = np.isfinite(paths_m)
     at_rows, at_cols = at_rows[is_reached], at_cols[is_reached]
@@ -113,10 +111,7 @@ def is_in_sight(atlas: Atlas, points: FloatArray, thing: Point) -> Mask:
     longest_m = float(np.hypot(lines[:, 0], lines[:, 1]).max())
     shares = np.linspace(0.0, 1.0, math.ceil(longest_m / grid.resolution_m * 2) + 2)
     steps = points[:, None, :] + shares[None, :, None] * lines[:, None, :]
-    rows, cols = grid.cells_at(steps.reshape(-1, 2))
-    inside = grid.contains_cells(rows, cols)
-    is_floor = inside & grid.free[np.where(inside, rows, 0), np.where(inside, cols, 0)]
-    is_floor = is_floor.reshape(len(points), shares.size)
+    is_floor = grid.look_up(grid.free, steps, outside=False)
     is_blocked = np.logical_or.accumulate(~is_floor, axis=1)
     return np.asarray(~(is_blocked & is_floor).any(axis=1), dtype=np.bool_)
 

@@ -122,16 +122,12 @@ def refer_to_point(
 
 def _find_region_around(atlas: Atlas, point: Point) -> Region | None:
     """Finds the region that a thing stands in; None for what is in a wall between two."""
-    reach = math.ceil(AROUND_THING_M / atlas.grid.resolution_m)
-    cell = atlas.grid.cell_at(point)
-    top, left = max(cell.row - reach, 0), max(cell.col - reach, 0)
-    labels = atlas.rooms.labels[
-        top : max(cell.row + reach + 1, 0), left : max(cell.col + reach + 1, 0)
-    ]
+    window = atlas.grid.window_around(point, AROUND_THING_M)
+    labels = atlas.rooms.labels[window]
     rows, cols = np.nonzero(labels)
     if not rows.size:
         return None
-    points = atlas.grid.points_at(rows + top, cols + left)
+    points = atlas.grid.points_at(rows + window[0].start, cols + window[1].start)
     away_m = np.hypot(points[:, 0] - point.x, points[:, 1] - point.y)
     near = away_m <= away_m.min() + BOTH_SIDES_M
     indices = np.unique(labels[rows, cols][near])
@@ -144,14 +140,12 @@ def find_normal(atlas: Atlas, door: Door, side: Region) -> float:
     It is at right angles to the line through its two posts where the floor near it shows no other.
     """
     reach_m = door.width_m / 2 + AROUND_DOOR_M
-    reach = math.ceil(reach_m / atlas.grid.resolution_m)
-    cell = atlas.grid.cell_at(door.place)
-    top, left = max(cell.row - reach, 0), max(cell.col - reach, 0)
-    labels = atlas.rooms.labels[top : cell.row + reach + 1, left : cell.col + reach + 1]
+    window = atlas.grid.window_around(door.place, reach_m)
+    labels = atlas.rooms.labels[window]
     middles = []
     for region_id in (side.id, *(each for each in door.region_ids if each != side.id)):
         rows, cols = np.nonzero(labels == atlas.rooms.region(region_id).index)
-        points = atlas.grid.points_at(rows + top, cols + left)
+        points = atlas.grid.points_at(rows + window[0].start, cols + window[1].start)
         away_m = np.hypot(points[:, 0] - door.place.x, points[:, 1] - door.place.y)
         near = points[away_m <= reach_m]
         middles.append(near.mean(axis=0) if len(near) else np.array([door.place.x, door.place.y]))
@@ -161,12 +155,10 @@ def find_normal(atlas: Atlas, door: Door, side: Region) -> float:
 
 def _squared(atlas: Atlas, door: Door, rough_rad: float) -> float:
     """Turns a direction through a door until the posts beside it lie square to it."""
-    reach = math.ceil((door.width_m / 2 + AROUND_DOOR_M) / atlas.grid.resolution_m)
-    cell = atlas.grid.cell_at(door.place)
-    top, left = max(cell.row - reach, 0), max(cell.col - reach, 0)
-    solid = atlas.grid.occupied[top : cell.row + reach + 1, left : cell.col + reach + 1]
-    rows, cols = np.nonzero(solid)
-    points = atlas.grid.points_at(rows + top, cols + left) - np.array([door.place.x, door.place.y])
+    window = atlas.grid.window_around(door.place, door.width_m / 2 + AROUND_DOOR_M)
+    rows, cols = np.nonzero(atlas.grid.occupied[window])
+    points = atlas.grid.points_at(rows + window[0].start, cols + window[1].start)
+    points -= np.array([door.place.x, door.place.y])
     across = np.array([-math.sin(rough_rad), math.cos(rough_rad)])
     posts = []
     for sign in (1.0, -1.0):

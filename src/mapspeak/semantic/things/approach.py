@@ -7,8 +7,8 @@ import numpy as np
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.semantic.things.sight import BODY_M, N_RAYS, SightMap, bearing_index
-from mapspeak.spatial import UNKNOWN, OccupancyGrid
-from mapspeak.spatial.grid import FREE_MAX, FloatArray, IntArray, Mask
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 from mapspeak.spatial.paths import DistanceField, clearance_m
 
 LARGEST_OFF_M = 1.4
@@ -154,27 +154,19 @@ def _reachable_near(
     rows, cols, points = rows[is_reachable], cols[is_reachable], points[is_reachable]
     # Farther obstacles than this do not matter for standing comfortably.
     wide_m = LARGEST_OFF_M + distances.radius_m + COMFORT_M
-    down, across = _window(sight.grid, target, wide_m)
+    down, across = sight.grid.window_around(target, wide_m)
     clear_m = clearance_m(sight.grid.crop(down, across))
     return points, clear_m[rows - down.start, cols - across.start].astype(np.float64)
 
 
 def _floor_near(grid: OccupancyGrid, target: Point) -> tuple[IntArray, IntArray, FloatArray]:
     """Gives the free cells from which one might look at a thing: rows, columns, and middles."""
-    down, across = _window(grid, target, LARGEST_OFF_M)
+    down, across = grid.window_around(target, LARGEST_OFF_M)
     rows, cols = np.nonzero(grid.crop(down, across).free)
     rows, cols = rows + down.start, cols + across.start
     points = grid.points_at(rows, cols)
     is_near = np.hypot(points[:, 0] - target.x, points[:, 1] - target.y) <= LARGEST_OFF_M
     return rows[is_near], cols[is_near], points[is_near]
-
-
-def _window(grid: OccupancyGrid, middle: Point, reach_m: float) -> tuple[slice, slice]:
-    cell, reach = grid.cell_at(middle), math.ceil(reach_m / grid.resolution_m)
-    down, across = (
-        slice(max(at - reach, 0), max(at + reach + 1, 0)) for at in (cell.row, cell.col)
-    )
-    return down, across
 
 
 def find_fronts(sight: SightMap, target: Point, seen_from: Sequence[Point]) -> list[Point]:
@@ -203,10 +195,7 @@ def _last_floor(grid: OccupancyGrid, starts: FloatArray, ends: FloatArray) -> Fl
     steps = np.arange(int(n_steps.max(initial=0)) + 1)
     shares = np.maximum(1.0 - steps / n_steps[:, None], 0.0)[..., None]
     points = ends[:, None] * shares + starts[:, None] * (1.0 - shares)
-    rows, cols = grid.cells_at(points.reshape(-1, 2))
-    is_inside = grid.contains_cells(rows, cols)
-    values = np.where(is_inside, grid.cells[rows * is_inside, cols * is_inside], UNKNOWN)
-    is_floor = ((values >= 0) & (values <= FREE_MAX)).reshape(shares.shape[:2])
+    is_floor = grid.look_up(grid.free, points, outside=False)
     # Where there is none the first is chosen, which is the end.
     last = np.argmax(is_floor, axis=1)
     return np.asarray(points[np.arange(len(points)), last])

@@ -15,6 +15,7 @@ from mapspeak.geometry import Pose
 from mapspeak.semantic.things.thing import NOISE, NoiseModel
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
+from mapspeak.spatial.visibility import measure_sight
 
 N_RAYS = 240
 LATTICE_M = 0.2
@@ -25,8 +26,6 @@ BODY_M = 0.3
 """A thing's middle lies up to so far behind the surface that the robot has met."""
 OWN_M = 0.2
 """The robot's own place is no obstacle, even where the map has one by now."""
-_FARTHEST_CELL = 1e6
-"""No map reaches so far; farther places overflow cell indices."""
 
 Clearance = NDArray[np.float32]
 
@@ -66,8 +65,6 @@ class SightMap:
     ) -> FloatArray:
         """Gives how far one sees, in metres, from each place along its angle.
 
-        Rays go on by as much as is free around them ("sphere tracing"; Hart, 1996).
-
         Args:
             off: `obstacle_off` or `wall_off`.
             places: Fractional cells, shape (n, 2).
@@ -77,29 +74,8 @@ class SightMap:
         """
         size_m = self.grid.resolution_m
         reach_m = self.noise.reach_m if reach_m is None else reach_m
-        rows, cols = np.clip(places, -_FARTHEST_CELL, _FARTHEST_CELL).T
-        far = np.zeros(len(places)) + begin_m / size_m
-        farthest = np.zeros(len(places)) + reach_m / size_m
-        rays = np.stack([rows, cols, np.sin(angles), np.cos(angles), farthest, far])
-        going = np.arange(len(places))
-        while going.size:
-            row, col, down, across, most, at = rays
-            free = self._look_up(off, row + at * down, col + at * across)
-            is_on = (free > 0.0) & (at < most)
-            if not is_on.all():
-                far[going] = at
-                going, free, rays = going[is_on], free[is_on], rays[:, is_on]
-            # Both the ray's place in its cell and the obstacle's corner may be nearer by 0.71.
-            rays[-1] += np.maximum(free - math.sqrt(2), 0.5)
-        return np.minimum(far, farthest) * size_m
-
-    def _look_up(self, off: Clearance, rows: FloatArray, cols: FloatArray) -> Clearance:
-        """Gives what is free around places, as fractional cells; nothing off the array."""
-        n_rows, n_cols = self.grid.cells.shape
-        rows, cols = np.floor(rows), np.floor(cols)
-        is_inside = (rows >= 0) & (rows < n_rows) & (cols >= 0) & (cols < n_cols)
-        flat = np.where(is_inside, rows * n_cols + cols, 0).astype(np.intp)
-        return np.asarray(np.where(is_inside, off.ravel()[flat], 0.0), dtype=np.float32)
+        reached = measure_sight(off, places, angles, begin=begin_m / size_m, reach=reach_m / size_m)
+        return reached * size_m
 
 
 def build_sight_map(grid: OccupancyGrid, *, noise: NoiseModel = NOISE) -> SightMap:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapspeak.spatial.frontiers.edges import Border, find_middle
-from mapspeak.spatial.frontiers.rays import cast_rays
 from mapspeak.spatial.frontiers.terrain import Terrain
 from mapspeak.spatial.grid import Cell, IntArray
+from mapspeak.spatial.visibility import cast_rays
 
 __all__ = ["Lookout", "find_lookouts"]
 
@@ -25,7 +25,7 @@ COMFORT_M = 0.1
 A navigator plans on its own map with its own rounding and padding; what is just wide enough here
 it refuses. Two cells of a usual map make up for both.
 """
-N_DIRECTIONS = 32
+_ANGLES_RAD = np.linspace(0.0, math.tau, 32, endpoint=False)
 AT_ONCE = 256
 """Targets whose surroundings are held in memory together."""
 
@@ -111,8 +111,8 @@ def _find_stands_off(terrain: Terrain, rows: IntArray, cols: IntArray) -> IntArr
     reach_m = terrain.radius_m + REACH_M
     n_steps = math.ceil(reach_m / terrain.grid.resolution_m)
     steps = np.arange(n_steps + 1, dtype=np.float64)
-    shape = (terrain.grid.n_rows, terrain.grid.n_cols)
-    rays = cast_rays(shape, rows, cols, n_directions=N_DIRECTIONS, steps=steps)
+    middles = np.stack([rows, cols], axis=1) + 0.5
+    rays = cast_rays(terrain.free.shape, middles, angles_rad=_ANGLES_RAD, steps=steps)
     clearances_m = terrain.clearances_m.ravel()[rays.cells]
     is_reachable = terrain.reachable.ravel()[rays.cells] & rays.is_inside
     # Beside an obstacle a ray might slip between two cells of wall that touch at a corner.

@@ -45,8 +45,7 @@ def _window(terrain: Terrain, rows: IntArray, cols: IntArray) -> tuple[slice, sl
     """
     from_robot_m = terrain.distances.distances_at(rows, cols)
     reach = math.ceil(float(from_robot_m.max()) / terrain.grid.resolution_m) + 1
-    top, left = max(int(rows.min()) - reach, 0), max(int(cols.min()) - reach, 0)
-    return slice(top, int(rows.max()) + reach + 1), slice(left, int(cols.max()) + reach + 1)
+    return terrain.grid.window(rows, cols, margin=reach)
 
 
 def _spread_together(floor: Mask, starts: IntArray, goals: IntArray) -> FloatArray:

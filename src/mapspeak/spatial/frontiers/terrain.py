@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from mapspeak.spatial.grid import Mask, OccupancyGrid
-from mapspeak.spatial.paths.clearance import Clearance
 from mapspeak.spatial.paths.distances import DistanceField
+from mapspeak.spatial.paths.lattice import Clearance
 
 __all__ = ["Terrain", "build_terrain"]
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.spatial.frontiers.rays import cast_rays
 from mapspeak.spatial.grid import UNKNOWN, Cell, FloatArray, Mask, OccupancyGrid
-from mapspeak.spatial.paths.clearance import Clearance, clearance_m
+from mapspeak.spatial.paths.lattice import Clearance, clearance_m
+from mapspeak.spatial.visibility import cast_rays
 
 __all__ = ["Prospect", "Views", "find_area_m2", "find_views"]
 
@@ -25,6 +25,7 @@ STEP_M = 0.15
 WALL_HOLE_M = 0.3
 """Beams far apart leave holes in walls; through one this wide nothing can be seen."""
 N_RAYS = 72
+_ANGLES_RAD = np.linspace(0.0, math.tau, N_RAYS, endpoint=False)
 LEAST_LEANING_RATIO = 0.02
 """Unknown that leans less than this to one side lies all around."""
 AT_ONCE = 256
@@ -77,10 +78,9 @@ class Views:
 
     def find_prospects(self) -> list[Prospect]:
         """Finds the prospect from each place."""
-        angles = np.linspace(0.0, math.tau, N_RAYS, endpoint=False)
         areas_m2 = self.areas_m2(self.openness_m)
         totals_m2 = areas_m2.sum(axis=1)
-        along_x, along_y = areas_m2 @ np.cos(angles), areas_m2 @ np.sin(angles)
+        along_x, along_y = areas_m2 @ np.cos(_ANGLES_RAD), areas_m2 @ np.sin(_ANGLES_RAD)
         is_leaning = np.hypot(along_x, along_y) > LEAST_LEANING_RATIO * totals_m2
         return [
             Prospect(float(total_m2), float(bearing_rad) if leans else None)
@@ -125,8 +125,8 @@ def _look(
     """Gives where rays are over the unknown, and where no wall hides them; by place, ray, step."""
     rows = np.array([place.row for place in places], dtype=np.intp)
     cols = np.array([place.col for place in places], dtype=np.intp)
-    shape = (grid.n_rows, grid.n_cols)
-    rays = cast_rays(shape, rows, cols, n_directions=N_RAYS, steps=steps)
+    middles = np.stack([rows, cols], axis=1) + 0.5
+    rays = cast_rays(grid.cells.shape, middles, angles_rad=_ANGLES_RAD, steps=steps)
     solid_m = np.minimum(clearances_m[rows, cols], WALL_HOLE_M / 2)
     # A ray that has left the array beside a wall has crossed it: the nearest cell inside counts.
     is_wall = clearances_m.ravel()[rays.cells] < solid_m[:, None, None]

@@ -3,19 +3,19 @@
 import math
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from mapspeak.geometry import Point
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask, OccupancyGrid
-from mapspeak.spatial.paths.lattice import Lattice, build_coarse_lattice
-from mapspeak.spatial.paths.path import Path
-from mapspeak.spatial.paths.pocket import POCKET_M2, open_pocket
-from mapspeak.spatial.paths.search import find_path_near
-from mapspeak.spatial.paths.start import find_seeds
-from mapspeak.spatial.paths.trace import descend
-from mapspeak.spatial.paths.wavefront import Costs, spread
-
-__all__ = ["DistanceField", "distances_from"]
+from mapspeak.spatial.paths.lattice import (
+    Lattice,
+    build_coarse_lattice,
+    build_narrow_lattice,
+    with_passable,
+)
+from mapspeak.spatial.paths.route import Path, find_path_near, find_seeds
+from mapspeak.spatial.paths.wavefront import Costs, descend, spread
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -42,7 +42,7 @@ class DistanceField:
     closed_lattice: Lattice
 
     def distance_to(self, point: Point) -> float | None:
-        """Gives the metres to a point by path; None where the robot cannot get to."""
+        """Return the metres to a point by path; None where the robot cannot get to."""
         index = self.lattice.index_at(point)
         if index is None or not math.isfinite(self.costs[index]):
             return None
@@ -50,11 +50,11 @@ class DistanceField:
         return max(by_cells, self.start.distance_to(point))
 
     def is_reachable(self, point: Point) -> bool:
-        """True where the robot can drive to from the start."""
+        """Return True where the robot can drive to from the start."""
         return self.distance_to(point) is not None
 
     def path_to(self, point: Point) -> Path | None:
-        """Finds a way near the shortest one, off walls as far as its surroundings allow."""
+        """Find a way near the shortest one, off walls as far as its surroundings allow."""
         goal = self.lattice.index_at(point)
         if goal is None or not math.isfinite(self.costs[goal]):
             return None
@@ -62,7 +62,7 @@ class DistanceField:
         return find_path_near(self.lattice, way, (self.start, point), radius_m=self.radius_m)
 
     def cheapest_path_to(self, point: Point, weights: Costs) -> Path | None:
-        """Finds a way near the cheapest one where some floor costs more.
+        """Find a way near the cheapest one where some floor costs more.
 
         Args:
             point: Where to.
@@ -79,7 +79,7 @@ class DistanceField:
         return find_path_near(self.lattice, way, ends, radius_m=self.radius_m, weights=weights)
 
     def way_to(self, point: Point) -> tuple[Point, ...] | None:
-        """Gives the shortest way from cell to cell, good enough to draw; `path_to` is to drive."""
+        """Return the shortest way from cell to cell, good enough to draw; `path_to` is to drive."""
         goal = self.lattice.index_at(point)
         if goal is None or not math.isfinite(self.costs[goal]):
             return None
@@ -90,13 +90,13 @@ class DistanceField:
         return (*(Point(x, y) for x, y in points.tolist()), point)
 
     def from_elsewhere(self, start: Point) -> "DistanceField":
-        """Gives the distances from another place on the same map, for the same robot."""
+        """Return the distances from another place on the same map, for the same robot."""
         return _distances_over(
             self.closed_lattice, start, radius_m=self.radius_m, leaves_pockets=self.leaves_pockets
         )
 
     def build_reachable_mask(self) -> Mask:
-        """Gives where on the map the robot can drive to, as a mask."""
+        """Return where on the map the robot can drive to, as a mask."""
         lattice = self.lattice
         finite = np.isfinite(self.costs).reshape(lattice.moves.shape)
         fine = finite.repeat(lattice.factor, axis=0).repeat(lattice.factor, axis=1)
@@ -104,7 +104,7 @@ class DistanceField:
         return np.asarray(lattice.passable & fine[:n_rows, :n_cols], dtype=np.bool_)
 
     def distances_at(self, rows: IntArray, cols: IntArray) -> FloatArray:
-        """Gives the metres by path to cells of the map; infinite where the robot cannot get to."""
+        """Return the metres by path to cells of the map; infinite where the robot cannot get to."""
         costs = self.costs[self.lattice.indices(rows, cols)]
         metres = costs.astype(np.float64) * self.lattice.cell_size_m
         return np.where(self.lattice.passable[rows, cols], metres, np.inf)
@@ -113,7 +113,7 @@ class DistanceField:
 def distances_from(
     grid: OccupancyGrid, start: Point, *, radius_m: float, leaves_pockets: bool = False
 ) -> DistanceField:
-    """Gives the path distance from the start to every place on the map.
+    """Return the path distance from the start to every place on the map.
 
     On large maps it works on cells of twice the size, with the same connections.
 
@@ -152,3 +152,55 @@ def _spread_from(lattice: Lattice, start: Point, radius_m: float) -> Costs:
     if seeds is None:
         return np.full(lattice.moves.size, np.inf, dtype=np.float32)
     return spread(lattice.moves, None, seeds)
+
+
+POCKET_M2 = 5.0
+"""A robot that can go nowhere but on so little floor may be in a pocket."""
+FINE_RATIO = 0.2
+"""Of the radius: on a map of larger cells one of them is no mere doubt about a gap."""
+
+
+def open_pocket(lattice: Lattice, costs: Costs, start: Point, *, radius_m: float) -> Lattice:
+    """Return the lattice with the narrowest gap opened that keeps a robot from most of the floor.
+
+    Args:
+        lattice: The map's, for the robot's radius.
+        costs: What can be reached on it, from the start.
+        start: Where the robot is.
+        radius_m: Of the robot.
+
+    Returns:
+        The same lattice where no gap that lacks less than one cell on each side leads out, and on
+        a coarse map.
+    """
+    cell_m = lattice.grid.resolution_m
+    if cell_m > FINE_RATIO * radius_m:
+        return lattice
+    narrow = build_narrow_lattice(lattice, radius_m - cell_m)
+    seeds = find_seeds(narrow, start, radius_m=radius_m)
+    if seeds is None:
+        return lattice
+    ways = spread(narrow.moves, None, seeds)
+    beyond = _find_largest(lattice, np.isfinite(ways).reshape(narrow.moves.shape), costs)
+    if beyond is None:
+        return lattice
+    nearest = int(np.where(beyond.ravel(), ways, np.inf).argmin())
+    gap = np.zeros(narrow.passable.size, dtype=np.uint8)
+    gap[descend(narrow.moves, None, ways, nearest)] = 1
+    # A way that goes round a corner needs the cells on both sides of its diagonal steps.
+    wide = cv2.dilate(gap.reshape(narrow.passable.shape), np.ones((3, 3), np.uint8)) > 0
+    return with_passable(lattice, lattice.passable | (wide & narrow.passable))
+
+
+def _find_largest(lattice: Lattice, is_reached: Mask, costs: Costs) -> Mask | None:
+    """Return the largest piece of passable floor that is reached through narrow gaps only."""
+    here = np.isfinite(costs).reshape(lattice.moves.shape)
+    here = here.repeat(lattice.factor, axis=0).repeat(lattice.factor, axis=1)
+    n_rows, n_cols = lattice.passable.shape
+    left = (lattice.passable & is_reached & ~here[:n_rows, :n_cols]).astype(np.uint8)
+    n_pieces, pieces, stats, _ = cv2.connectedComponentsWithStats(left, connectivity=4)
+    if n_pieces < 2:
+        return None
+    largest = 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax())
+    is_more = stats[largest, cv2.CC_STAT_AREA] > np.count_nonzero(here)
+    return np.asarray(pieces == largest) if is_more else None

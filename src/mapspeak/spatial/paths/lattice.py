@@ -1,7 +1,9 @@
-"""The cells a robot's centre may be in and the moves between them.
+"""The cells that a robot's centre may be in, the moves between them, and the room around each.
 
-On large maps two by two cells make one cell of the lattice. It has a move where the fine cells
-have one, so that nothing opens or closes by looking coarser.
+Clearance runs from cell centre to cell centre: a LiDAR's hits fall anywhere in the cell that they
+mark, so that cell's centre is the unbiased place of the surface. On large maps two by two cells
+make one cell of the lattice. It has a move where the fine cells have one, so that nothing opens or
+closes by looking coarser.
 """
 
 import dataclasses
@@ -9,23 +11,48 @@ import functools
 from dataclasses import dataclass
 from typing import TypeVar
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.geometry import Point
 from mapspeak.spatial.grid import IntArray, Mask, OccupancyGrid
-from mapspeak.spatial.paths.clearance import Clearance, clearance_m
 from mapspeak.spatial.paths.wavefront import BITS, Costs, Moves
 
-__all__ = [
-    "Lattice",
-    "build_coarse_lattice",
-    "build_fine_lattice",
-    "build_narrow_lattice",
-    "moves_within",
-    "restrict",
-    "with_passable",
-]
+Clearance = NDArray[np.float32]
+
+
+def clearance_m(grid: OccupancyGrid) -> Clearance:
+    """Return for every cell the metres to the nearest occupied cell; infinite where there is none.
+
+    Unknown cells are no obstacle here: a robot that looks into the unknown stands beside it.
+    """
+    return _distance_to(grid.occupied, grid.resolution_m)
+
+
+def known_clearance_m(grid: OccupancyGrid) -> Clearance:
+    """Return for every cell the metres to the nearest cell that is not free.
+
+    Unknown cells and everything outside the array count as obstacles.
+    """
+    padded = np.pad(~grid.free, 1, constant_values=True)
+    return np.ascontiguousarray(_distance_to(padded, grid.resolution_m)[1:-1, 1:-1])
+
+
+def _distance_to(blocked: Mask, resolution_m: float) -> Clearance:
+    if not blocked.any():
+        return np.full(blocked.shape, np.inf, dtype=np.float32)
+    source = np.logical_not(blocked).view(np.uint8)
+    transformed = cv2.distanceTransform(source, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    distance = np.asarray(transformed, dtype=np.float32)
+    # Its last digit depends on how many threads OpenCV finds free. In cells each distance is the
+    # root of a whole number, so that the right digit is known.
+    np.square(distance, out=distance)
+    np.rint(distance, out=distance)
+    np.sqrt(distance, out=distance)
+    distance *= np.float32(resolution_m)
+    return distance
+
 
 Number = TypeVar("Number", np.bool_, np.float32)
 
@@ -67,7 +94,7 @@ class Lattice:
         return int(self.moves.shape[1])
 
     def index_at(self, point: Point) -> int | None:
-        """Gives the flat index of the cell at a point; None where the robot cannot be."""
+        """Return the flat index of the cell at a point; None where the robot cannot be."""
         cell = self.grid.cell_at(point)
         if not (self.grid.contains(cell) and self.passable[cell.row, cell.col]):
             return None
@@ -75,24 +102,24 @@ class Lattice:
         return index if self.is_open.flat[index] else None
 
     def coarsened(self, weights: Costs) -> Costs:
-        """Gives the largest of the weights of the map's cells within each lattice cell."""
+        """Return the largest of the weights of the map's cells within each lattice cell."""
         if self.factor == 1:
             return weights
         return functools.reduce(np.maximum, _quarters(weights))
 
     def indices(self, rows: IntArray, cols: IntArray) -> IntArray:
-        """Gives the flat indices of the lattice cells that hold cells of the map."""
+        """Return the flat indices of the lattice cells that hold cells of the map."""
         return (rows // self.factor) * self.n_cols + cols // self.factor
 
 
 def build_fine_lattice(grid: OccupancyGrid, radius_m: float) -> Lattice:
-    """Gives the lattice with one cell for each cell of the map."""
+    """Return the lattice with one cell for each cell of the map."""
     clearance = clearance_m(grid)
     return _fine(grid, clearance, grid.free & (clearance >= radius_m))
 
 
 def build_coarse_lattice(grid: OccupancyGrid, radius_m: float) -> Lattice:
-    """Gives the lattice that suits the map's size: of two by two cells where it is large."""
+    """Return the lattice that suits the map's size: of two by two cells where it is large."""
     if grid.cells.size < LARGE_MAP:
         return build_fine_lattice(grid, radius_m)
     clearance = clearance_m(grid)
@@ -100,25 +127,25 @@ def build_coarse_lattice(grid: OccupancyGrid, radius_m: float) -> Lattice:
 
 
 def build_narrow_lattice(lattice: Lattice, radius_m: float) -> Lattice:
-    """Gives the fine lattice of the same map for a robot of another radius."""
+    """Return the fine lattice of the same map for a robot of another radius."""
     passable = lattice.grid.free & (lattice.fine_clearance_m >= radius_m)
     return _fine(lattice.grid, lattice.fine_clearance_m, passable)
 
 
 def with_passable(lattice: Lattice, passable: Mask) -> Lattice:
-    """Gives the lattice with other cells passable; a mask of the shape of the map."""
+    """Return the lattice with other cells passable; a mask of the shape of the map."""
     build = _fine if lattice.factor == 1 else _halve
     return build(lattice.grid, lattice.fine_clearance_m, passable)
 
 
 def restrict(lattice: Lattice, mask: Mask) -> Lattice:
-    """Gives a fine lattice that can be entered inside the mask only."""
+    """Return a fine lattice that can be entered inside the mask only."""
     is_open = lattice.is_open & mask
     return dataclasses.replace(lattice, is_open=is_open, moves=moves_within(is_open))
 
 
 def moves_within(mask: Mask) -> Moves:
-    """Gives the moves between neighbouring cells of the mask."""
+    """Return the moves between neighbouring cells of the mask."""
     return _moves(mask[:, :-1] & mask[:, 1:], mask[:-1] & mask[1:])
 
 
@@ -153,7 +180,7 @@ def _halve(grid: OccupancyGrid, clearance: Clearance, passable: Mask) -> Lattice
 
 
 def _quarters(values: NDArray[Number]) -> tuple[NDArray[Number], ...]:
-    """Gives the low left, low right, high left and high right cell of each two by two cells."""
+    """Return the low left, low right, high left and high right cell of each two by two cells."""
     n_rows, n_cols = values.shape
     if n_rows % 2 or n_cols % 2:
         values = np.pad(values, ((0, n_rows % 2), (0, n_cols % 2)))
@@ -161,7 +188,7 @@ def _quarters(values: NDArray[Number]) -> tuple[NDArray[Number], ...]:
 
 
 def _hang_together(low_left: Mask, low_right: Mask, high_left: Mask, high_right: Mask) -> Mask:
-    """True where there are passable ones among four cells, and they touch by their sides."""
+    """Return True where there are passable ones among four cells, and they touch by their sides."""
     rising = low_left & high_right & ~low_right & ~high_left
     falling = low_right & high_left & ~low_left & ~high_right
     some = low_left | low_right | high_left | high_right
@@ -169,7 +196,7 @@ def _hang_together(low_left: Mask, low_right: Mask, high_left: Mask, high_right:
 
 
 def _moves(to_east: Mask, to_north: Mask) -> Moves:
-    """Gives all moves from those to the east and to the north.
+    """Return all moves from those to the east and to the north.
 
     A diagonal move needs both ways around its corner, so that no wall's corner is cut.
     """

@@ -1,4 +1,4 @@
-"""Least costs over a graph of cells, a whole ring of cells per step.
+"""Least costs over a graph of cells, a whole ring of cells per step, and the way back from them.
 
 Every move costs at least one, so all cells whose cost lies between k and k + 1 are settled once
 the rings before are, and can be handled together: Dijkstra's algorithm with buckets as wide as the
@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 from mapspeak.spatial.grid import IntArray
 
-__all__ = ["BITS", "STEPS", "Costs", "Moves", "Seeds", "offsets", "spread"]
-
 Costs = NDArray[np.float32]
 Moves = NDArray[np.uint8]
 
@@ -24,6 +22,8 @@ BITS = (1 << np.arange(8)).astype(np.uint8)
 north-east, north-west, south-west, south-east. North is the next row."""
 STEPS = np.array([1.0] * 4 + [math.sqrt(2.0)] * 4, dtype=np.float32)
 """The length of a move in each direction, in cells."""
+ROUNDING = 1e-3
+"""How much two costs of the same way may differ, in cells and as a share."""
 FEW_BUCKETS = 8
 """So many are looked through one by one."""
 
@@ -42,7 +42,7 @@ class Seeds:
 
 
 def offsets(n_cols: int) -> IntArray:
-    """Gives the change of the flat index for each direction."""
+    """Return the change of the flat index for each direction."""
     east, north = 1, n_cols
     straight = [east, north, -east, -north]
     diagonal = [north + east, north - east, -north - east, -north + east]
@@ -52,7 +52,7 @@ def offsets(n_cols: int) -> IntArray:
 def spread(
     moves: Moves, weights: Costs | None, seeds: Seeds, *, goals: IntArray | None = None
 ) -> Costs:
-    """Gives the least cost to every cell, flat; infinite where the wave does not come.
+    """Return the least cost to every cell, flat; infinite where the wave does not come.
 
     Args:
         moves: Shape (rows, cols); the directions in which each cell may be left. No move may leave
@@ -68,6 +68,32 @@ def spread(
             break
         front.advance(ring)
     return front.costs
+
+
+def descend(moves: Moves, weights: Costs | None, costs: Costs, goal: int) -> IntArray:
+    """Return the flat indices of the cheapest way to the goal, from the seed where it begins.
+
+    The arguments are those of `spread` and the costs that it gave.
+    """
+    directions = offsets(moves.shape[1])
+    flat_moves = moves.ravel()
+    flat_weights = None if weights is None else weights.ravel()
+    way = [goal]
+    while True:
+        cell = way[-1]
+        is_open = (flat_moves[cell] & BITS) != 0
+        neighbours = cell + directions[is_open]
+        if not neighbours.size:
+            break
+        lengths = STEPS[is_open]
+        if flat_weights is not None:
+            lengths = lengths * ((flat_weights[neighbours] + flat_weights[cell]) * np.float32(0.5))
+        totals = costs[neighbours] + lengths
+        best = int(totals.argmin())
+        if totals[best] > costs[cell] + ROUNDING:
+            break
+        way.append(int(neighbours[best]))
+    return np.array(way[::-1], dtype=np.intp)
 
 
 class _Front:
@@ -86,7 +112,7 @@ class _Front:
         self._wait(seeds.cells, seeds.costs)
 
     def next_ring(self) -> IntArray | None:
-        """Takes the cells of the next bucket that holds any, each once, and settles them."""
+        """Take the cells of the next bucket that holds any, each once, and settles them."""
         while self._waiting:
             cells = np.concatenate(self._waiting.pop(min(self._waiting)))
             cells = self._unique(cells[~self.is_settled[cells]])
@@ -96,7 +122,7 @@ class _Front:
         return None
 
     def advance(self, ring: IntArray) -> None:
-        """Moves from the ring's cells to their neighbours where that is cheaper than so far."""
+        """Move from the ring's cells to their neighbours where that is cheaper than so far."""
         costs = self.costs[ring] + self._move_costs(ring)
         targets = ring + self._offsets
         is_better = ((self._moves[ring] & BITS[:, None]) != 0) & (

@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.spatial.rooms.floor import Floor
+from mapspeak.spatial.visibility import cast_rays
 
 _REACH_M = 1.5
 _SLACK_RATIO = 1.3
@@ -21,7 +22,7 @@ class Frames:
         self._wall = cv2.dilate(floor.wall, np.ones((3, 3), np.uint8))
         angles_deg = [angle + turn for angle in floor.directions_deg for turn in (0, 90)]
         one_way = np.radians(np.array(angles_deg))
-        self._angles_rad = np.concatenate([one_way, one_way + np.pi])[:, np.newaxis]
+        self._angles_rad = np.concatenate([one_way, one_way + np.pi])
 
     def measure(self, row: int, col: int, clearance_m: float) -> float:
         """Gives the metres of wall on both sides of a place, in the best main direction.
@@ -52,10 +53,8 @@ class Frames:
         return gap_m, (n_wall[way, last] - n_wall[way, first]) * self._cell_size_m
 
     def _lines(self, row: int, col: int, n_steps: int) -> Lines:
-        step = np.arange(1, max(n_steps, 2))
-        rows = np.rint(row + step * np.sin(self._angles_rad)).astype(np.intp)
-        cols = np.rint(col + step * np.cos(self._angles_rad)).astype(np.intp)
-        n_rows, n_cols = self._wall.shape
-        inside = (rows >= 0) & (rows < n_rows) & (cols >= 0) & (cols < n_cols)
-        walls = self._wall[np.clip(rows, 0, n_rows - 1), np.clip(cols, 0, n_cols - 1)]
-        return np.asarray((walls > 0) & inside)
+        steps = np.arange(1.0, max(n_steps, 2))
+        start = np.array([[row + 0.5, col + 0.5]])
+        rays = cast_rays(self._wall.shape, start, angles_rad=self._angles_rad, steps=steps)
+        is_wall: Lines = (self._wall.ravel()[rays.cells[0]] > 0) & rays.is_inside[0]
+        return is_wall

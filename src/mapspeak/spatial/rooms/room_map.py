@@ -158,8 +158,7 @@ class RoomMap:
         cell = self.grid.cell_at(region.widest)
         reach = max(round(region.length_m / 2 / self.grid.resolution_m), 1)
         while True:
-            rows = slice(max(cell.row - reach, 0), cell.row + reach + 1)
-            cols = slice(max(cell.col - reach, 0), cell.col + reach + 1)
+            rows, cols = self.grid.window(cell.row, cell.col, margin=reach)
             inside = self.labels[rows, cols] == region.index
             along, across = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
             window = (

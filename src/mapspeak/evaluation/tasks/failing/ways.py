@@ -138,8 +138,7 @@ def _room_setting(
 
 
 def _is_standable(site: Site, start: Pose) -> bool:
-    cell = site.grid.cell_at(start.point)
-    return site.grid.contains(cell) and bool(site.grid.free[cell.row, cell.col])
+    return site.grid.is_free(site.grid.cell_at(start.point))
 
 
 def _untouched(evidence: Evidence, score: Score) -> Score:
