@@ -23,7 +23,7 @@ import numpy as np
 from benchmarks.figure import Figure
 from mapspeak.errors import LinkError
 from mapspeak.links.ros2 import open_ros2_connection
-from mapspeak.links.rosbridge.client import RobotAddress, open_client
+from mapspeak.links.rosbridge import RobotAddress, open_client
 from mapspeak.ros import RosConnection
 from mapspeak.ros.messages import Dialect, read_grid, write_grid
 from mapspeak.spatial import OccupancyGrid

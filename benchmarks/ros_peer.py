@@ -25,9 +25,9 @@ from anyio.streams.buffered import BufferedByteReceiveStream
 from benchmarks.figure import Figure
 from benchmarks.talking import HELLO
 from mapspeak.links.rosbridge import open_rosbridge_robot
-from mapspeak.links.rosbridge.server import open_rosbridge_server
 from mapspeak.links.simulated import Clock, open_simulated_robot
 from mapspeak.ros.messages import Dialect
+from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server import build_server
 from mapspeak.session import Session

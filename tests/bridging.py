@@ -9,9 +9,9 @@ import anyio
 from websockets.asyncio.client import ClientConnection, connect
 
 from fakes import FakeRobot, two_rooms
-from mapspeak.links.rosbridge.protocol.decoding import decode_cbor
-from mapspeak.links.rosbridge.server import open_rosbridge_server
+from mapspeak.links.rosbridge.protocol.codec import decode_cbor
 from mapspeak.ros.messages import Dialect
+from mapspeak.rosbridge_server import open_rosbridge_server
 
 STEP_S = 0.05
 PATIENCE_S = 10.0

@@ -11,13 +11,12 @@ from fakes import two_rooms
 from faulty import Faults, FaultyRobot, Velocity
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
-from mapspeak.links.rosbridge.server.drives import Drive, Drives
-from mapspeak.links.rosbridge.server.graph import SLAM_NODES, navigator_of, topics_of
-from mapspeak.links.rosbridge.server.hub import Hub, Topic
-from mapspeak.links.rosbridge.server.publication import Publication
-from mapspeak.links.rosbridge.server.serving import Reception
-from mapspeak.links.rosbridge.server.stack import RosStack
 from mapspeak.ros.messages import Dialect, Message, Twist, read_twist, write_twist
+from mapspeak.rosbridge_server.drives import Drive, Drives
+from mapspeak.rosbridge_server.graph import SLAM_NODES, navigator_of, topics_of
+from mapspeak.rosbridge_server.hub import Hub, Publication, Topic
+from mapspeak.rosbridge_server.serving import Reception
+from mapspeak.rosbridge_server.stack import RosStack
 from mapspeak.spatial import OccupancyGrid
 
 START = Pose(1.5, 1.4)

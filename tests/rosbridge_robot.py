@@ -8,9 +8,8 @@ import anyio
 
 from mapspeak.geometry import Pose
 from mapspeak.links.ros import DrivingPatience, RobotOverrides, RosRobot
-from mapspeak.links.rosbridge import open_rosbridge_robot
-from mapspeak.links.rosbridge.client import Timing
-from mapspeak.links.rosbridge.protocol.encoding import to_cbor
+from mapspeak.links.rosbridge import Timing, open_rosbridge_robot
+from mapspeak.links.rosbridge.protocol.codec import to_cbor
 from mapspeak.ros.messages import (
     Dialect,
     FrameTransform,

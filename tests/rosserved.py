@@ -11,10 +11,10 @@ from mcp.client import Client
 
 from bridging import SteppedRobot
 from fakes import FakeRobot, two_rooms
-from mapspeak.links.rosbridge.client import RobotAddress, RosbridgeClient, Timing, open_client
-from mapspeak.links.rosbridge.server import open_rosbridge_server
+from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, Timing, open_client
 from mapspeak.ros import RosConnection
 from mapspeak.ros.messages import Dialect
+from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.safety import Guard
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server import build_server

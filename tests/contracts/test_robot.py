@@ -18,10 +18,10 @@ from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Point, Pose
 from mapspeak.links.ros2 import open_ros2_robot
 from mapspeak.links.rosbridge import open_rosbridge_robot
-from mapspeak.links.rosbridge.server import open_rosbridge_server
 from mapspeak.links.simulated import Clock, open_simulated_robot
 from mapspeak.robot import GoalState, GoalStatus, Robot
 from mapspeak.ros.messages import Dialect
+from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.simulator import Simulation, load_world
 from mapspeak.spatial import OccupancyGrid
 from ros2.conftest import START, TWO_ROOMS, import_what_warns

@@ -7,9 +7,9 @@ from pathlib import Path
 from bridging import SteppedRobot
 from fakes import two_rooms
 from goldens.transcript import Transcript, playing
-from mapspeak.links.rosbridge.client import RobotAddress, open_client
-from mapspeak.links.rosbridge.server import open_rosbridge_server
+from mapspeak.links.rosbridge import RobotAddress, open_client
 from mapspeak.ros.messages import Dialect
+from mapspeak.rosbridge_server import open_rosbridge_server
 from rosserved import QUICK
 
 TOPICS = ("/map", "/tf", "/odom", "/scan", "/cmd_vel", "/camera/image_raw/compressed", "/nosuch")

@@ -15,8 +15,8 @@ from mapspeak.errors import ConfigError
 from mapspeak.links.arrival import Arrival
 from mapspeak.links.ros import DrivingPatience
 from mapspeak.links.rosbridge import open_rosbridge_robot
-from mapspeak.links.rosbridge.server import open_rosbridge_server
 from mapspeak.ros.messages import Dialect
+from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server import build_server
 from mapspeak.session import Session

@@ -12,8 +12,7 @@ from hypothesis.extra import numpy as arrays
 from drawing import grid_from_text, text_from_grid
 from mapspeak.errors import LinkError, MapError
 from mapspeak.geometry import Pose, wrap_angle
-from mapspeak.links.rosbridge.protocol.decoding import decode_cbor, decode_json
-from mapspeak.links.rosbridge.protocol.encoding import to_cbor, to_json
+from mapspeak.links.rosbridge.protocol.codec import decode_cbor, decode_json, to_cbor, to_json
 from mapspeak.ros.messages import (
     CameraInfo,
     Dialect,

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from mapspeak.errors import LinkError, MapError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge.protocol.bounds import FrameError
-from mapspeak.links.rosbridge.protocol.decoding import decode_json
-from mapspeak.links.rosbridge.protocol.encoding import to_json
+from mapspeak.links.rosbridge.protocol.codec import decode_json, to_json
 from mapspeak.ros.messages import (
     CameraInfo,
     Dialect,

@@ -9,7 +9,7 @@ import pytest
 
 from fakes import FakeRobot, two_rooms
 from mapspeak.errors import LinkError
-from mapspeak.links.rosbridge.client import RobotAddress, RosbridgeClient, open_client
+from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, open_client
 from ros2.robot_process import RobotProcess
 from rosbridge_robot import eventually
 from rosserved import Caller, served

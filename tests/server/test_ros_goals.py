@@ -12,7 +12,7 @@ from fakes import FakeRobot, two_rooms
 from guarding import audit_of, make_guard
 from mapspeak.geometry import Pose
 from mapspeak.links.ros.actions import ActionPatience, ActionState, SentGoal
-from mapspeak.links.rosbridge.client import RobotAddress, RosbridgeClient, open_client
+from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, open_client
 from mapspeak.ros.messages import Dialect, write_header, write_pose
 from mapspeak.safety import Kind, Policy
 from mapspeak.semantic import SemanticMapStore

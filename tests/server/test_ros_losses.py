@@ -11,7 +11,7 @@ import anyio.lowlevel
 import pytest
 
 from fakes import FakeRobot, two_rooms
-from mapspeak.links.rosbridge.client import RobotAddress, RosbridgeClient, open_client
+from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, open_client
 from rosbridge_robot import ScriptedRobot
 from rosbridge_script import running
 from rosserved import QUICK, Caller, served

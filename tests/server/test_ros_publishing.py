@@ -11,9 +11,9 @@ import pytest
 from bridging import SteppedRobot
 from fakes import two_rooms
 from guarding import make_guard
-from mapspeak.links.rosbridge.client import RobotAddress, open_client
-from mapspeak.links.rosbridge.server import open_rosbridge_server
+from mapspeak.links.rosbridge import RobotAddress, open_client
 from mapspeak.ros.messages import Dialect
+from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.safety import Policy
 from rosbridge_robot import ScriptedRobot
 from rosserved import Caller, on_our_server, on_script, served

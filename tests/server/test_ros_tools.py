@@ -13,7 +13,7 @@ from PIL import Image
 from bridging import SteppedRobot
 from drawing import grid_from_text
 from fakes import FakeRobot, two_rooms
-from mapspeak.links.rosbridge.client import RobotAddress, Timing, open_client
+from mapspeak.links.rosbridge import RobotAddress, Timing, open_client
 from mapspeak.ros.messages import Dialect, write_header
 from mapspeak.server.tools.ros.reading import hear
 from mapspeak.spatial import OccupancyGrid

@@ -21,7 +21,7 @@ from mapspeak.evaluation.inspected import (
     without_hearers,
     without_node,
 )
-from mapspeak.links.rosbridge.client import RobotAddress, open_client
+from mapspeak.links.rosbridge import RobotAddress, open_client
 from mapspeak.ros.messages import Dialect, read_grid, read_header, read_transforms
 
 pytestmark = pytest.mark.anyio

@@ -7,7 +7,7 @@ import pytest
 from mapspeak.errors import LinkError
 from mapspeak.links.ros import DrivingPatience
 from mapspeak.links.ros.camera import Camera
-from mapspeak.links.rosbridge.client import Timing
+from mapspeak.links.rosbridge import Timing
 from rosbridge_robot import ScriptedRobot, connect_scripted
 
 pytestmark = pytest.mark.anyio

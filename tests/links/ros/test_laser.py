@@ -12,7 +12,7 @@ import pytest
 from mapspeak.geometry import Pose
 from mapspeak.links.ros import DrivingPatience, RobotOverrides
 from mapspeak.links.ros.laser import Laser
-from mapspeak.links.rosbridge.client import Timing
+from mapspeak.links.rosbridge import Timing
 from mapspeak.robot import RangeScan
 from mapspeak.ros.messages import Dialect, FrameTransform, LaserScan, write_scan, write_transforms
 from rosbridge_robot import ScriptedRobot, connect_scripted, eventually

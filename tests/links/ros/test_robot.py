@@ -10,7 +10,7 @@ from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.links.ros import DrivingPatience, RobotOverrides, RosRobot, describe_profile
 from mapspeak.links.ros.discovery import NavigationKind, PoseSource
-from mapspeak.links.rosbridge.client import Timing
+from mapspeak.links.rosbridge import Timing
 from mapspeak.robot import Health
 from mapspeak.ros.messages import Dialect, write_header
 from rosbridge_robot import CANCEL_SERVICE, ScriptedRobot, connect_scripted

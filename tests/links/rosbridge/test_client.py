@@ -14,10 +14,10 @@ import pytest
 
 from benchmarks.mutations import mutate, seed_frames
 from mapspeak.errors import ConfigError, LinkError
-from mapspeak.links.rosbridge.client import RobotAddress, RosbridgeClient, Timing, open_client
-from mapspeak.links.rosbridge.client.connection import MAX_REFUSED
-from mapspeak.links.rosbridge.client.websocket import MAX_PARTS, MAX_SKIPPED_BYTES
+from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, Timing, open_client
+from mapspeak.links.rosbridge.connection import MAX_REFUSED
 from mapspeak.links.rosbridge.protocol import MAX_FRAME_BYTES
+from mapspeak.links.rosbridge.websocket import MAX_PARTS, MAX_SKIPPED_BYTES
 from rosbridge_script import (
     PATIENCE_S,
     Operation,
@@ -528,7 +528,7 @@ import sys
 sys.path.insert(0, {str(tmp_path)!r})
 import anyio
 from mapspeak.errors import ConfigError
-from mapspeak.links.rosbridge.client import RobotAddress, open_client
+from mapspeak.links.rosbridge import RobotAddress, open_client
 async def connect():
     async with open_client(RobotAddress(url="ws://127.0.0.1:1")): pass
 try:

@@ -10,7 +10,7 @@ from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.links.ros import RosRobot
 from mapspeak.links.ros.driving import DrivingPatience
-from mapspeak.links.rosbridge.client import Timing
+from mapspeak.links.rosbridge import Timing
 from mapspeak.robot import GoalState, GoalStatus
 from mapspeak.ros.messages import (
     Dialect,

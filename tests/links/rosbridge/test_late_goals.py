@@ -11,7 +11,7 @@ from mapspeak.geometry import Pose
 from mapspeak.links.ros import RosRobot
 from mapspeak.links.ros.actions import ActionClient, SentGoal
 from mapspeak.links.ros.driving import DrivingPatience
-from mapspeak.links.rosbridge.client import Timing
+from mapspeak.links.rosbridge import Timing
 from mapspeak.robot import GoalState
 from mapspeak.ros.messages import Dialect, write_stamp
 from rosbridge_robot import (

@@ -20,8 +20,7 @@ from mapspeak.links.ros.discovery import PoseSource
 from mapspeak.links.ros.driving import DrivingPatience
 from mapspeak.links.ros.maps import MapKeeper
 from mapspeak.links.ros.poses import PoseKeeper
-from mapspeak.links.rosbridge import open_rosbridge_robot
-from mapspeak.links.rosbridge.client import RosbridgeClient, Timing
+from mapspeak.links.rosbridge import RosbridgeClient, Timing, open_rosbridge_robot
 from mapspeak.robot import GoalState, GoalStatus
 from mapspeak.ros.messages import Dialect, write_header, write_pose
 from rosbridge_robot import (

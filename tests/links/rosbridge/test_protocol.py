@@ -28,7 +28,7 @@ from mapspeak.links.rosbridge.protocol import (
     ServiceAnswered,
     StatusNoted,
 )
-from mapspeak.links.rosbridge.protocol.decoding import BARE_NUMBER
+from mapspeak.links.rosbridge.protocol.codec import BARE_NUMBER
 from mapspeak.ros import new_id
 
 

@@ -13,7 +13,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 
 from mapspeak.errors import ConfigError, LinkError
-from mapspeak.links.rosbridge.client import RobotAddress, Timing, open_client
+from mapspeak.links.rosbridge import RobotAddress, Timing, open_client
 from rosbridge_script import PATIENCE_S, Operation, ScriptedServer, Visitor, answering_with, running
 
 pytestmark = pytest.mark.anyio

@@ -7,7 +7,8 @@ from typing import Any
 import anyio
 
 from mapspeak.evaluation.inspected.system import InspectedSystem, OfferedService, Stream
-from mapspeak.links.rosbridge.server import (
+from mapspeak.ros.messages import Dialect
+from mapspeak.rosbridge_server import (
     Hub,
     Interfaces,
     Parameters,
@@ -18,7 +19,6 @@ from mapspeak.links.rosbridge.server import (
     add_rosapi,
     serve_system,
 )
-from mapspeak.ros.messages import Dialect
 
 __all__ = ["play"]
 

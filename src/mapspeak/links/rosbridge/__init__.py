@@ -1,6 +1,14 @@
-"""Robots behind rosbridge: its protocol, a client, and any robot offered as a server."""
+"""Robots behind rosbridge: its protocol, and a client that keeps one robot connected."""
 
-from mapspeak.links.rosbridge.client import RobotAddress, quote_address
+from mapspeak.links.rosbridge.address import RobotAddress, Timing, quote_address
+from mapspeak.links.rosbridge.client import RosbridgeClient, open_client
 from mapspeak.links.rosbridge.opening import open_rosbridge_robot
 
-__all__ = ["RobotAddress", "open_rosbridge_robot", "quote_address"]
+__all__ = [
+    "RobotAddress",
+    "RosbridgeClient",
+    "Timing",
+    "open_client",
+    "open_rosbridge_robot",
+    "quote_address",
+]

@@ -4,7 +4,7 @@ from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 
 from mapspeak.links.ros import DrivingPatience, RobotOverrides, RosRobot, build_ros_robot
-from mapspeak.links.rosbridge.client import RobotAddress, Timing, open_client
+from mapspeak.links.rosbridge import RobotAddress, Timing, open_client
 
 USUAL_TIMING = Timing()
 USUAL_PATIENCE = DrivingPatience()

@@ -1,9 +1,10 @@
 """The rosbridge protocol without I/O: frames in, events out; operations as text."""
 
 from mapspeak.links.rosbridge.protocol.bounds import MAX_FRAME_BYTES
+from mapspeak.links.rosbridge.protocol.codec import require_cbor
 from mapspeak.links.rosbridge.protocol.conversation import LIGHT_BYTES, Conversation
-from mapspeak.links.rosbridge.protocol.decoding import require_cbor
-from mapspeak.links.rosbridge.protocol.events import (
+from mapspeak.links.rosbridge.protocol.operations import (
+    Encoding,
     Event,
     FrameRefused,
     GoalEnded,
@@ -11,9 +12,6 @@ from mapspeak.links.rosbridge.protocol.events import (
     Published,
     ServiceAnswered,
     StatusNoted,
-)
-from mapspeak.links.rosbridge.protocol.operations import (
-    Encoding,
     advertise,
     authenticate,
     call_service,

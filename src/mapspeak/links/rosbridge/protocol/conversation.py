@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from mapspeak.links.rosbridge.protocol.bounds import MAX_FRAME_BYTES, FrameError, Raw
-from mapspeak.links.rosbridge.protocol.decoding import decode_cbor, decode_json, decode_png
-from mapspeak.links.rosbridge.protocol.events import (
+from mapspeak.links.rosbridge.protocol.bounds import MAX_FRAME_BYTES, FragmentStore, FrameError, Raw
+from mapspeak.links.rosbridge.protocol.codec import decode_cbor, decode_json, decode_png
+from mapspeak.links.rosbridge.protocol.operations import (
     Event,
     FrameRefused,
     GoalEnded,
@@ -13,7 +13,6 @@ from mapspeak.links.rosbridge.protocol.events import (
     ServiceAnswered,
     StatusNoted,
 )
-from mapspeak.links.rosbridge.protocol.fragments import FragmentStore
 
 MAX_WRAPPINGS = 3
 """A fragmented png is two layers of wrapping; nothing needs more."""

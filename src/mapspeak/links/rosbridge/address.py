@@ -1,0 +1,143 @@
+"""Where a rosbridge is, what it wants to see before it talks, and how long to wait for it."""
+
+import re
+import ssl
+from dataclasses import dataclass, field
+from hashlib import sha256
+from pathlib import Path
+from urllib.parse import parse_qsl, urlencode
+
+from websockets.exceptions import InvalidURI
+from websockets.uri import WebSocketURI, parse_uri
+
+from mapspeak.errors import ConfigError
+from mapspeak.ros import LinkKind, LinkName
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Timing:
+    """The time limits of one client; a test shortens them.
+
+    Attributes:
+        connect_s: For one attempt to connect, handshake included.
+        answer_s: For a service's answer, where the caller says nothing else.
+        attempt_s: For a connection that has been gone for longer than that: one more attempt.
+        first_pause_s: Before the first attempt to reconnect; doubled after each failure.
+        longest_pause_s: Between two attempts to reconnect.
+        ping_s: Between two pings.
+        silence_s: Without a single byte, pongs included, after which a socket counts as dead.
+        linger_s: From the last publication to closing, so that the robot still gets it.
+        goodbye_s: For the closing handshake.
+        retired_s: How long a replaced socket may still answer what it was asked.
+        frames_s: For the robot's frames to lead from the map to its base; static ones come at once,
+            moving ones many times a second.
+    """
+
+    connect_s: float = 5.0
+    answer_s: float = 5.0
+    attempt_s: float = 0.5
+    first_pause_s: float = 0.1
+    longest_pause_s: float = 1.0
+    ping_s: float = 5.0
+    silence_s: float = 20.0
+    linger_s: float = 0.15
+    goodbye_s: float = 0.5
+    retired_s: float = 30.0
+    frames_s: float = 2.0
+
+
+DEFAULT_PORT = 9090
+SECRET_KEY = re.compile("token|key|auth|pass|secret|sig", re.IGNORECASE)
+"""Of a query: what changes without the robot becoming another one."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotAddress:
+    """A rosbridge server.
+
+    Attributes:
+        url: ws://host:9090 or wss://host:9090; without a port, 9090 is meant.
+        headers: Sent with the first request, such as {"Authorization": "Bearer ..."}.
+        token: Given in rosbridge's own `auth` operation, for servers that want it.
+        ca_file: Whose certificates a wss server may show; None trusts the system's.
+
+    Raises:
+        ConfigError: The URL is none, or there is no such file.
+    """
+
+    url: str = field(repr=False)
+    headers: dict[str, str] = field(default_factory=dict, repr=False)
+    token: str | None = field(default=None, repr=False)
+    ca_file: Path | None = None
+
+    def __post_init__(self) -> None:
+        uri = _parse(self.url)
+        object.__setattr__(self, "url", _with_port(self.url, uri))
+        if self.ca_file is not None and not uri.secure:
+            raise ConfigError(
+                f"{self.shown} is not encrypted, so that a CA file says nothing.",
+                hint="Write wss:// for a server with a certificate, or leave the CA file away.",
+            )
+
+    @property
+    def uri(self) -> WebSocketURI:
+        """The URL in parts."""
+        return _parse(self.url)
+
+    @property
+    def link(self) -> LinkName:
+        """How one who is connected to it says so."""
+        return LinkName(LinkKind.ROSBRIDGE, self.shown)
+
+    @property
+    def shown(self) -> str:
+        """The URL as it may be shown and stored: without user, password and token.
+
+        A path or an id may hold a token too: a digest tells robots behind one gateway apart.
+        """
+        uri = self.uri
+        host = f"[{uri.host}]" if ":" in uri.host else uri.host
+        pairs = [pair for pair in parse_qsl(uri.query) if not SECRET_KEY.search(pair[0])]
+        resource = f"{uri.path.rstrip('/')}?{urlencode(pairs)}"
+        digest = "" if resource == "?" else f"/~{sha256(resource.encode()).hexdigest()[:8]}"
+        return f"{'wss' if uri.secure else 'ws'}://{host}:{uri.port}{digest}"
+
+    def build_ssl_context(self) -> ssl.SSLContext | None:
+        """Gives what decides whether a wss server is the right one; None for ws.
+
+        Raises:
+            ConfigError: The CA file cannot be read.
+        """
+        if not self.uri.secure:
+            return None
+        try:
+            return ssl.create_default_context(cafile=self.ca_file)
+        except (OSError, ssl.SSLError) as error:
+            raise ConfigError(
+                f"The CA file {self.ca_file} cannot be used: {error}.",
+                hint="Give a PEM file with the certificate that signed the robot's.",
+            ) from error
+
+
+def quote_address(text: str) -> str:
+    """Return what was given as an address in quotes, unless a part of it may be a secret."""
+    return "What was given" if {"@", "?", "#"} & set(text) else repr(text[:80])
+
+
+def _parse(url: str) -> WebSocketURI:
+    try:
+        return parse_uri(url)
+    except (InvalidURI, ValueError) as error:
+        raise ConfigError(
+            f"{quote_address(url)} is not the address of a rosbridge server.",
+            hint="It looks like ws://192.168.1.20:9090, ws://[fe80::1]:9090 or wss://robot:9090.",
+        ) from error
+
+
+def _with_port(url: str, uri: WebSocketURI) -> str:
+    authority = url.split("://", 1)[1].split("/", 1)[0].split("?", 1)[0]
+    has_port = authority.rsplit("@", 1)[-1].rsplit("]", 1)[-1].rpartition(":")[1] == ":"
+    if has_port:
+        return url
+    scheme = "wss" if uri.secure else "ws"
+    return url.replace(f"{scheme}://{authority}", f"{scheme}://{authority}:{DEFAULT_PORT}", 1)

@@ -1,0 +1,398 @@
+"""The client of one robot: what it subscribes to, publishes, calls and pursues."""
+
+from collections import deque
+from collections.abc import AsyncGenerator, Callable, Coroutine, Mapping
+from contextlib import asynccontextmanager
+from functools import partial
+from typing import Any
+
+import anyio
+from anyio.abc import TaskGroup
+
+from mapspeak.errors import LinkError
+from mapspeak.links.ros import (
+    NOTICE_S,
+    Announcements,
+    PursuedGoal,
+    TopicSubscription,
+    plain_errors,
+    say_again,
+)
+from mapspeak.links.rosbridge import protocol
+from mapspeak.links.rosbridge.address import RobotAddress, Timing
+from mapspeak.links.rosbridge.channel import Channel
+from mapspeak.links.rosbridge.protocol import (
+    Event,
+    FrameRefused,
+    GoalEnded,
+    GoalFedBack,
+    Published,
+    StatusNoted,
+)
+from mapspeak.links.rosbridge.requests import ServiceCaller, TopicRequest
+from mapspeak.links.rosbridge.rosapi import Rosapi
+from mapspeak.ros import ActionEnd, ActionGoal, LinkName, OwnEnds, Started, Subscription, new_id
+from mapspeak.ros.messages import Message
+
+N_REMARKS_KEPT = 50
+NODE = "rosbridge_websocket"
+"""What rosbridge's node is called, whatever its namespace."""
+USUAL_TIMING = Timing()
+
+
+class RosbridgeClient(Rosapi):
+    """One robot over two sockets: topics and goals on one, calls and what is urgent on the other.
+
+    Some versions of rosbridge handle what comes over one socket one after another, so that a stop
+    sent behind a goal would act when the goal has ended. Hence a goal takes the socket that carries
+    none, and what is urgent takes the other; a goal that replaces another frees that one's socket.
+
+    Args:
+        address: Where the robot is.
+        timing: All time limits.
+    """
+
+    def __init__(self, address: RobotAddress, *, timing: Timing = USUAL_TIMING) -> None:
+        super().__init__()
+        self.address = address
+        self.timing = timing
+        self.started = Started()
+        """Everything that was started over this connection."""
+        self._control = self._channel()
+        self._urgent = self._channel()
+        self._caller = ServiceCaller(self._free_for_calls)
+        self._requests: dict[str, TopicRequest] = {}
+        self._announcements = Announcements(self._announce, self._take_back)
+        self._goals: dict[str, tuple[PursuedGoal, Channel | None]] = {}
+        self._tasks: TaskGroup | None = None
+        self._published_s = float("-inf")
+        self.n_frames_refused = 0
+        """Frames that could not be understood and were left away."""
+        self.remarks: deque[str] = deque(maxlen=N_REMARKS_KEPT)
+        """What the server remarked, and why frames were refused; the newest last."""
+
+    @property
+    def link(self) -> LinkName:
+        """How we are connected."""
+        return self.address.link
+
+    @property
+    def is_open(self) -> bool:
+        """True when something can be sent at once."""
+        return self._control.is_up or self._urgent.is_up
+
+    @property
+    def n_connections(self) -> int:
+        """How often the socket that carries topics and goals has been connected."""
+        return self._control.n_connections
+
+    @property
+    def connected_for_s(self) -> float | None:
+        """Since when the socket that carries topics and goals has been open; None while it is not.
+
+        In wall time.
+        """
+        return self._control.up_for_s
+
+    @property
+    def lost_for_s(self) -> float | None:
+        """Since when the socket that carries topics and goals has been gone; None while it is not.
+
+        In wall time.
+        """
+        return self._control.lost_for_s
+
+    @property
+    def own_ends(self) -> OwnEnds:
+        """What rosbridge's node does for us; it may do the like for its other clients."""
+        return OwnEnds(
+            node=NODE, publishes=self._announcements.told, hears=frozenset(self._requests)
+        )
+
+    def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        """Runs something in the background until the client is closed."""
+        if self._tasks is not None:
+            self._tasks.start_soon(work)
+
+    async def wait_until_connected(self) -> None:
+        """Returns at once, or when both sockets are open again.
+
+        Raises:
+            LinkError: They are not within the usual time for an answer.
+        """
+        await self._control.wait_until_up(self.timing.answer_s)
+        await self._urgent.wait_until_up(self.timing.answer_s)
+
+    async def start(self, tasks: TaskGroup) -> None:
+        """Connects, and keeps connected in the background.
+
+        Raises:
+            LinkError: The robot cannot be reached.
+        """
+        self._tasks = tasks
+        await self._control.start(tasks)
+        await self._urgent.start(tasks)
+
+    async def aclose(self) -> None:
+        """Closes both sockets, once what was published last has had time to arrive."""
+        # rosbridge forgets a message when the socket that brought it closes at once.
+        await anyio.sleep_until(self._published_s + self.timing.linger_s)
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(self._control.say_goodbye)
+            tasks.start_soon(self._urgent.say_goodbye)
+
+    def subscribe(
+        self,
+        topic: str,
+        *,
+        type_name: str | None = None,
+        is_bulky: bool = False,
+        throttle_ms: int = 0,
+    ) -> TopicSubscription:
+        """Gives the subscription to a topic, which is begun where there is none yet.
+
+        The first subscriber decides how messages are written, and how often they come.
+        """
+        request = self._requests.get(topic)
+        if request is None:
+            subscription = TopicSubscription(topic, type_name=type_name)
+            request = TopicRequest(subscription, is_bulky, throttle_ms)
+            self._begin(request)
+            self._requests[topic] = request
+        request.subscription.n_users += 1
+        return request.subscription
+
+    def unsubscribe(self, subscription: Subscription) -> None:
+        """Ends one use of a subscription; the last one ends it at the server too."""
+        request = self._requests.get(subscription.topic)
+        if request is None or request.subscription is not subscription:
+            return
+        request.subscription.n_users -= 1
+        if request.subscription.n_users == 0:
+            del self._requests[subscription.topic]
+            self._end(request)
+
+    def renew(self, subscription: Subscription) -> None:
+        """Subscribes again: a latched message may have been missed, or cannot be written so."""
+        request = self._requests.get(subscription.topic)
+        if request is not None:
+            self._end(request)
+            request.n_renewals += 1
+            self._begin(request)
+
+    def advertise(self, topic: str, *, type_name: str) -> None:
+        """Says that we will publish; the robot needs a moment until it listens.
+
+        Raises:
+            LinkError: The topic was advertised with another type, or its name is none.
+        """
+        known = self._announcements.type_of(topic) or type_name
+        if known != type_name:
+            raise LinkError(
+                f"{topic} was advertised as {known}, not as {type_name}.",
+                hint="A topic has one type: look it up on the robot.",
+            )
+        self._announcements.advertise(topic, type_name)
+
+    def unadvertise(self, topic: str) -> None:
+        """Takes back what `advertise` said."""
+        self._announcements.unadvertise(topic)
+
+    def advertise_late(self) -> None:
+        """Tells the robot of what is advertised from now on only with the first message there."""
+        self._announcements.be_late()
+
+    def advertise_early(self) -> None:
+        """Tells the robot at once of all that is advertised, now and from now on."""
+        self._announcements.be_early()
+
+    async def publish(self, topic: str, message: Message) -> None:
+        """Publishes on an advertised topic.
+
+        Raises:
+            LinkError: There is no connection, or the message cannot be sent.
+        """
+        text = protocol.publish(topic, message)
+        if self._announcements.use(topic):
+            await anyio.sleep(NOTICE_S)
+        await self._free_for_topics().send(text, timeout_s=self.timing.answer_s)
+        self._published_s = anyio.current_time()
+
+    def publish_everywhere(self, topic: str, message: Message) -> int:
+        """Publishes over every open socket, and gives over how many: for a stop."""
+        text = protocol.publish(topic, message)
+        if self._announcements.use(topic):
+            self.start_soon(partial(say_again, partial(self._send_everywhere, text)))
+        return self._send_everywhere(text)
+
+    def _send_everywhere(self, text: bytes) -> int:
+        open_channels = [channel for channel in (self._urgent, self._control) if channel.is_up]
+        for channel in open_channels:
+            channel.send_if_up(text)
+        self._published_s = anyio.current_time()
+        return len(open_channels)
+
+    async def call_service(
+        self,
+        service: str,
+        arguments: Mapping[str, Any] | None = None,
+        *,
+        type_name: str | None = None,
+        timeout_s: float | None = None,
+    ) -> dict[str, Any]:
+        """Gives what a service answers. The wait ends, the connection stays.
+
+        Args:
+            service: Its full name.
+            arguments: The fields of the request; None for none.
+            type_name: None leaves it to the server.
+            timeout_s: In wall time; None takes the client's usual limit.
+
+        Raises:
+            LinkError: No answer, a refusal, or no connection.
+        """
+        return await self._caller.call(
+            service,
+            arguments or {},
+            type_name=type_name,
+            timeout_s=self.timing.answer_s if timeout_s is None else timeout_s,
+        )
+
+    async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> PursuedGoal:
+        """Sends a goal to an action of ROS 2 and gives what becomes of it, as it becomes.
+
+        Raises:
+            LinkError: There is no connection, or the goal cannot be sent.
+        """
+        goal = PursuedGoal(goal_id=new_id(), action=action)
+        text = protocol.send_action_goal(
+            action, arguments, operation_id=goal.goal_id, type_name=type_name
+        )
+        channel = self._free_for_topics()
+        self._goals[goal.goal_id] = (goal, channel)
+        try:
+            await channel.send(text, timeout_s=self.timing.answer_s)
+        except LinkError:
+            del self._goals[goal.goal_id]
+            raise
+        return goal
+
+    def cancel_goal(self, goal: ActionGoal) -> None:
+        """Cancels a goal over the socket it does not block; its end tells whether that worked."""
+        text = protocol.cancel_action_goal(goal.action, operation_id=goal.goal_id)
+        self.start_soon(partial(self._free_for_calls().send_when_up, text))
+
+    def give_up_goal(self, goal: ActionGoal) -> None:
+        """Replaces the socket of a goal without a sign of life, which it may block."""
+        pursued, channel = self._goals.get(goal.goal_id, (None, None))
+        if pursued is not None and channel is not None:
+            self._goals[goal.goal_id] = (pursued, None)
+            channel.replace()
+
+    def clear_the_way(self) -> None:
+        """Makes a socket anew where goals or calls are under way on both: for a stop."""
+        if self._carries_goal(self._free_for_calls()) or self._free_for_calls().is_waiting:
+            self._free_for_calls().replace()
+
+    def _announce(self, topic: str, type_name: str) -> None:
+        for channel in (self._control, self._urgent):
+            text = protocol.advertise(topic, operation_id=f"advertise:{topic}", type_name=type_name)
+            channel.keep_standing(f"advertise:{topic}", text)
+
+    def _take_back(self, topic: str) -> None:
+        text = protocol.unadvertise(topic, operation_id=f"advertise:{topic}")
+        for channel in (self._control, self._urgent):
+            channel.end_standing(f"advertise:{topic}", text)
+
+    def _channel(self) -> Channel:
+        return Channel(
+            self.address, on_event=self._take, on_loss=self._lose_goals, timing=self.timing
+        )
+
+    def _carries_goal(self, channel: Channel) -> bool:
+        return any(carrier is channel for _, carrier in self._goals.values())
+
+    def _free_for_topics(self) -> Channel:
+        is_free = self._carries_goal(self._urgent) or not self._carries_goal(self._control)
+        return self._control if is_free else self._urgent
+
+    def _free_for_calls(self) -> Channel:
+        is_free = self._carries_goal(self._control) or not self._carries_goal(self._urgent)
+        return self._urgent if is_free else self._control
+
+    def _begin(self, request: TopicRequest) -> None:
+        subscription = request.subscription
+        request.operation_id = new_id()
+        text = protocol.subscribe(
+            subscription.topic,
+            operation_id=request.operation_id,
+            type_name=subscription.type_name,
+            encoding=request.encoding,
+            throttle_ms=request.throttle_ms,
+        )
+        request.channel = self._free_for_topics()
+        request.channel.keep_standing(request.operation_id, text)
+
+    def _end(self, request: TopicRequest) -> None:
+        text = protocol.unsubscribe(request.subscription.topic, operation_id=request.operation_id)
+        if request.channel is not None:
+            request.channel.end_standing(request.operation_id, text)
+
+    def _take(self, event: Event) -> None:
+        match event:
+            case Published():
+                request = self._requests.get(event.topic)
+                if request is not None:
+                    request.subscription.take(event.message)
+            case GoalFedBack():
+                known = self._goals.get(event.goal_id)
+                if known is not None:
+                    known[0].take_feedback(event.values)
+            case GoalEnded():
+                known = self._goals.pop(event.goal_id, None)
+                if known is not None:
+                    known[0].take_end(
+                        ActionEnd(
+                            status=event.status, is_result=event.is_result, values=event.values
+                        )
+                    )
+            case StatusNoted():
+                self.remarks.append(f"{event.level}: {event.text}")
+            case FrameRefused():
+                self.n_frames_refused += 1
+                self.remarks.append(f"refused: {event.reason}")
+
+    def _lose_goals(self, channel: Channel) -> None:
+        # rosbridge itself may have gone, and with it what it knew of goals that were given up.
+        is_alone = channel.was_replaced
+        lost = [
+            goal
+            for goal, carrier in self._goals.values()
+            if carrier is channel or (carrier is None and not is_alone)
+        ]
+        for goal in lost:
+            del self._goals[goal.goal_id]
+            goal.take_loss()
+
+
+@asynccontextmanager
+async def open_client(
+    address: RobotAddress, *, timing: Timing = USUAL_TIMING
+) -> AsyncGenerator[RosbridgeClient]:
+    """Keeps a robot connected while the context lasts.
+
+    Raises:
+        LinkError: It cannot be reached.
+        ConfigError: An old package stands before one that is needed.
+    """
+    protocol.require_cbor()
+    client = RosbridgeClient(address, timing=timing)
+    with plain_errors():
+        async with anyio.create_task_group() as tasks:
+            await client.start(tasks)
+            try:
+                yield client
+            finally:
+                with anyio.CancelScope(shield=True):
+                    await client.aclose()
+                tasks.cancel_scope.cancel()

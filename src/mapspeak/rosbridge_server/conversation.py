@@ -1,0 +1,351 @@
+"""One client's operations, on goals too: done as asked, and what is wrong mostly not told."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import anyio
+from anyio.abc import TaskGroup
+
+from mapspeak.errors import LinkError, MapspeakError
+from mapspeak.links.rosbridge.protocol.bounds import FrameError
+from mapspeak.links.rosbridge.protocol.codec import decode_json
+from mapspeak.ros.messages import Dialect, bare_type
+from mapspeak.rosbridge_server.drives import Drive
+from mapspeak.rosbridge_server.hub import Compression, Frame, Publication, answer_frame
+from mapspeak.rosbridge_server.interfaces import RosSystem, refusal
+from mapspeak.rosbridge_server.nav2 import (
+    ABORTED,
+    ACTION,
+    ACTION_TYPE,
+    TF_ERROR,
+    Nav2,
+    result_of,
+    status_of,
+)
+from mapspeak.rosbridge_server.outbox import Outbox
+
+Operation = Mapping[str, Any]
+FEEDBACK_DEPTH = 5
+
+
+class GoalOperations:
+    """One client's goals; the ids of all clients' goals share one dictionary, as in rosbridge."""
+
+    def __init__(self, stack: RosSystem, outbox: Outbox, tasks: TaskGroup, *, blocks: bool) -> None:
+        self._stack = stack
+        self._outbox = outbox
+        self._tasks = tasks
+        self._blocks = blocks
+
+    async def send(self, operation: Operation) -> None:
+        """Carries out `send_action_goal`."""
+        if self._blocks:
+            await self._carry_out(operation)
+        else:
+            self._tasks.start_soon(self._carry_out, operation)
+
+    async def cancel(self, operation: Operation) -> None:
+        """Carries out `cancel_action_goal`; nothing is ever answered."""
+        nav2 = self._stack.nav2
+        if nav2 is not None:
+            await nav2.cancel_operation(str(operation.get("id")))
+
+    async def _carry_out(self, operation: Operation) -> None:
+        action, action_type = operation.get("action"), operation.get("action_type")
+        nav2 = self._stack.nav2
+        if nav2 is None or not isinstance(action, str) or not isinstance(action_type, str):
+            return
+        if f"/{action.strip('/')}" != ACTION:
+            return
+        try:
+            drive = await self._start(nav2, operation, action_type)
+        except LinkError as error:
+            self._answer(operation, refusal(error), status=0, is_done=False)
+        except MapspeakError as error:
+            await self._reject(operation, error)
+        else:
+            await self._follow(nav2, operation, drive)
+
+    async def _start(self, nav2: Nav2, operation: Operation, action_type: str) -> Drive | str:
+        if bare_type(action_type) != ACTION_TYPE:
+            raise LinkError(f"{ACTION} is no {action_type}.", hint=f"It is a {ACTION_TYPE}.")
+        args = operation.get("args") or {}
+        return await nav2.navigate(self._stack.interfaces.fill(f"{ACTION_TYPE}_Goal", args))
+
+    async def _reject(self, operation: Operation, error: MapspeakError) -> None:
+        """Answers as newer rosbridges do; 2.1 never says so, and blocks the socket for ever."""
+        if self._blocks:
+            await anyio.sleep_forever()
+        self._answer(operation, refusal(error), status=0, is_done=False)
+
+    async def _follow(self, nav2: Nav2, operation: Operation, drive: Drive | str) -> None:
+        if isinstance(drive, str):
+            values = {"error_code": TF_ERROR, "error_msg": drive}
+            self._answer(operation, values, status=ABORTED, is_done=True)
+            return
+        operation_id = str(operation.get("id"))
+        nav2.by_operation[operation_id] = drive
+        try:
+            await self._feed_back(nav2, operation, drive)
+        finally:
+            if nav2.by_operation.get(operation_id) is drive:
+                del nav2.by_operation[operation_id]
+        self._answer(operation, result_of(drive), status=status_of(drive), is_done=True)
+
+    async def _feed_back(self, nav2: Nav2, operation: Operation, drive: Drive) -> None:
+        """Passes the feedback on until the drive is over; to a slow client only the latest."""
+        lane = f"goal {operation.get('id')}"
+        answer = {"op": "action_feedback", "action": operation["action"]}
+
+        def pass_on(about: Drive, feedback: dict[str, Any]) -> None:
+            if about is drive:
+                frame = answer_frame(operation, {**answer, "values": feedback})
+                self._outbox.offer(lane, frame)
+
+        if operation.get("feedback") is True:
+            self._outbox.open_lane(lane, depth=FEEDBACK_DEPTH, throttle_s=0.0, holds_back=False)
+        nav2.followers.append(pass_on)
+        try:
+            await drive.is_over.wait()
+        finally:
+            nav2.followers.remove(pass_on)
+            self._outbox.close_lane(lane)
+
+    def _answer(self, operation: Operation, values: object, *, status: int, is_done: bool) -> None:
+        answer = {
+            "op": "action_result",
+            "action": operation["action"],
+            "values": values,
+            "status": status,
+            "result": is_done,
+        }
+        self._outbox.reply(answer_frame(operation, answer))
+
+
+TOPIC_NAME = re.compile(r"/?[A-Za-z_]\w*(/\w+)*/?", re.ASCII)
+
+
+@dataclass(slots=True)
+class Subscription:
+    """What a client asked for on one topic; each of its ids with the options that came with it."""
+
+    options: dict[str, Operation] = field(default_factory=dict)
+
+    @property
+    def throttle_s(self) -> float:
+        """The shortest of the times asked for between two messages."""
+        return min(_number(each, "throttle_rate") for each in self.options.values()) / 1000.0
+
+    @property
+    def queue_length(self) -> int:
+        """The shortest of the queues asked for; 0 where none was."""
+        return int(min(_number(each, "queue_length") for each in self.options.values()))
+
+    @property
+    def compression(self) -> Compression | None:
+        """The last in rosbridge's order of those asked for; None for one that is not known."""
+        asked = {str(each.get("compression") or "none") for each in self.options.values()}
+        known = [each for each in Compression if each in asked]
+        return known[-1] if known else None
+
+
+class Conversation:
+    """What one client has subscribed to, advertised and started.
+
+    Args:
+        stack: The robot's ROS.
+        outbox: Where answers and messages go.
+        tasks: Ends with the client.
+        blocks: A goal holds up the client's further operations until it has ended.
+    """
+
+    def __init__(self, stack: RosSystem, outbox: Outbox, tasks: TaskGroup, *, blocks: bool) -> None:
+        self._stack = stack
+        self._outbox = outbox
+        self._subscriptions: dict[str, Subscription] = {}
+        self._advertised: dict[str, set[str]] = {}
+        self._goals = GoalOperations(stack, outbox, tasks, blocks=blocks)
+        self.fragment_length: int | None = None
+        self._operations = {
+            "subscribe": self._subscribe,
+            "unsubscribe": self._unsubscribe,
+            "advertise": self._advertise,
+            "unadvertise": self._unadvertise,
+            "publish": self._publish,
+            "call_service": self._call_service,
+        }
+        if stack.dialect is Dialect.ROS2:
+            self._operations["send_action_goal"] = self._goals.send
+            self._operations["cancel_action_goal"] = self._goals.cancel
+
+    def frame_of(self, publication: Publication) -> Frame | None:
+        """Gives a message as the client wants it; None where the real one stays silent."""
+        subscription = self._subscriptions.get(publication.topic)
+        compression = subscription.compression if subscription else None
+        if compression is None or self._is_broken(compression, publication.type):
+            return None
+        return publication.frame(compression)
+
+    async def handle(self, frame: str | bytes) -> None:
+        """Carries one operation out."""
+        try:
+            operation = decode_json(frame.encode() if isinstance(frame, str) else frame)
+        except (FrameError, UnicodeEncodeError):
+            return  # Not even the log of ROS 1 hears of those.
+        name = operation.get("op") if isinstance(operation, dict) else None
+        if not isinstance(name, str) or name not in self._operations:
+            self._stack.complain(f"Unknown operation: {name}.")
+            return
+        try:
+            await self._operations[name](operation)
+        except LinkError as error:
+            self._stack.complain(f"[id: {operation.get('id')}] {name}: {error.message}")
+
+    def close(self) -> None:
+        """Forgets the client; its goals go on, as behind a real rosbridge."""
+        for topic in self._subscriptions:
+            self._stack.hub.unsubscribe(topic, self._outbox.hear)
+        for topic in self._advertised:
+            self._stack.hub.unadvertise(topic)
+
+    # --- topics ---
+
+    async def _subscribe(self, operation: Operation) -> None:
+        topic = _name(operation, "topic")
+        self._keep_fragment_length(operation)
+        message_type = self._checked_type(topic, operation.get("type"))
+        subscription = self._subscriptions.setdefault(topic, Subscription())
+        subscription.options[_id(operation)] = operation
+        known = self._stack.hub.find(topic)
+        self._outbox.open_lane(
+            topic,
+            depth=max(subscription.queue_length, 0) or (known.depth if known else 50),
+            throttle_s=subscription.throttle_s,
+            holds_back=subscription.queue_length > 0 and subscription.throttle_s > 0,
+        )
+        self._stack.hub.subscribe(topic, message_type, self._outbox.hear)
+
+    async def _unsubscribe(self, operation: Operation) -> None:
+        topic = _name(operation, "topic")
+        subscription = self._subscriptions.get(topic)
+        if subscription is None:
+            return
+        if "id" in operation:
+            subscription.options.pop(_id(operation), None)
+        else:
+            subscription.options.clear()
+        if not subscription.options:
+            del self._subscriptions[topic]
+            self._outbox.close_lane(topic)
+            self._stack.hub.unsubscribe(topic, self._outbox.hear)
+
+    async def _advertise(self, operation: Operation) -> None:
+        topic = _name(operation, "topic")
+        message_type = self._checked_type(topic, _name(operation, "type"))
+        if topic not in self._advertised:
+            is_latched = operation.get("latch") is True
+            self._stack.hub.advertise(topic, message_type, is_latched=is_latched)
+        self._advertised.setdefault(topic, set()).add(_id(operation))
+
+    async def _unadvertise(self, operation: Operation) -> None:
+        topic = _name(operation, "topic")
+        ids = self._advertised.get(topic, set())
+        ids.discard(_id(operation))
+        if topic in self._advertised and not ids:
+            del self._advertised[topic]
+            self._stack.hub.unadvertise(topic)
+
+    async def _publish(self, operation: Operation) -> None:
+        topic = _name(operation, "topic")
+        known = self._stack.hub.find(topic)
+        if known is None:
+            # Without an advertisement the type is not known, unless the operation says it.
+            await self._advertise(operation)
+            known = self._stack.hub.find(topic)
+        if known is not None:
+            message = self._stack.interfaces.fill(known.type, operation.get("msg", {}))
+            self._stack.hub.publish(topic, message)
+
+    # --- services ---
+
+    async def _call_service(self, operation: Operation) -> None:
+        name = _name(operation, "service")
+        service = self._stack.services.find(name)
+        if service is not None and service.answer is None:
+            return
+        try:
+            if service is None or service.answer is None:
+                raise LinkError(f"Service {name} does not exist", hint="See /rosapi/services.")
+            args = operation.get("args") or {}
+            if not isinstance(args, dict):
+                raise LinkError(f"The arguments of {name} are no object.", hint="Name each one.")
+            values: object = await service.answer(args)
+        except MapspeakError as error:
+            self._answer_call(operation, refusal(error), is_done=False)
+        else:
+            self._answer_call(operation, values, is_done=True)
+
+    def _answer_call(self, operation: Operation, values: object, *, is_done: bool) -> None:
+        answer = {
+            "op": "service_response",
+            "service": operation["service"],
+            "values": values,
+            "result": is_done,
+        }
+        self._reply(operation, answer)
+
+    # --- inside ---
+
+    def _reply(self, operation: Operation, answer: Mapping[str, Any]) -> None:
+        self._outbox.reply(answer_frame(operation, answer))
+
+    def _is_broken(self, compression: Compression, message_type: str) -> bool:
+        """True for what rosbridge on ROS 2 cannot send: any png, and lists of fixed length."""
+        if self._stack.dialect is Dialect.ROS1 or compression is Compression.NONE:
+            return False
+        return compression is Compression.PNG or self._stack.interfaces.has_fixed_array(
+            message_type
+        )
+
+    def _checked_type(self, topic: str, given: object) -> str:
+        """Gives the topic's type; what is given must be that type, in either ROS's words."""
+        known = self._stack.hub.find(topic)
+        if given is None and known is not None:
+            return known.type
+        if not isinstance(given, str):
+            raise LinkError(f"Cannot infer topic type for topic {topic}.", hint="Give its type.")
+        if known is not None and known.type != bare_type(given):
+            raise LinkError(f"Topic {topic} is a {known.type}, not a {given}.", hint="Ask rosapi.")
+        if not self._stack.interfaces.knows(given):
+            raise LinkError(f"Unable to load the type {given}.", hint="Is it installed?")
+        return bare_type(given)
+
+    def _keep_fragment_length(self, operation: Operation) -> None:
+        """Once asked for, pieces stay that short on the whole connection."""
+        length = int(_number(operation, "fragment_size"))
+        if length > 0:
+            self.fragment_length = min(length, self.fragment_length or length)
+
+
+def _name(operation: Operation, key: str) -> str:
+    value = operation.get(key)
+    if not isinstance(value, str) or not value:
+        raise LinkError(f"Expected a string for {key}.", hint="Name it.")
+    if key != "topic":
+        return value
+    if not TOPIC_NAME.fullmatch(value):
+        raise LinkError(f"{value!r} is an invalid topic name.", hint="Use letters and digits.")
+    return f"/{value.strip('/')}"
+
+
+def _id(operation: Operation) -> str:
+    return str(operation.get("id"))
+
+
+def _number(operation: Operation, key: str) -> float:
+    value = operation.get(key) or 0
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < 1e9:
+        raise LinkError(f"Expected a number for {key}.", hint="Give milliseconds, or a length.")
+    return float(value)

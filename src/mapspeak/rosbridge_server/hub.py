@@ -1,0 +1,212 @@
+"""The topics of the robot and of its clients, who hears them, and in which form they go out."""
+
+import base64
+import io
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from enum import StrEnum
+from functools import cached_property
+
+from PIL import Image
+
+from mapspeak.links.rosbridge.protocol.codec import to_cbor, to_json
+from mapspeak.ros.messages import Message, bare_type
+
+
+class Compression(StrEnum):
+    """How a client wants a topic's messages; later ones win where it asked for several."""
+
+    NONE = "none"
+    PNG = "png"
+    CBOR = "cbor"
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One websocket message.
+
+    Attributes:
+        data: UTF-8 text, or bytes.
+        is_text: Which of them.
+    """
+
+    data: bytes
+    is_text: bool
+
+
+class Publication:
+    """One message on one topic.
+
+    Attributes:
+        topic: Its name.
+        type: Of the message, as "package/Type".
+        message: Its fields; arrays as numpy arrays, uint8[] as bytes.
+    """
+
+    def __init__(self, topic: str, message_type: str, message: Message) -> None:
+        self.topic = topic
+        self.type = message_type
+        self.message = message
+
+    def frame(self, compression: Compression) -> Frame:
+        """Gives the message as a client wants it."""
+        match compression:
+            case Compression.CBOR:
+                return Frame(self._cbor, is_text=False)
+            case Compression.PNG:
+                return Frame(self._png, is_text=True)
+            case Compression.NONE:
+                return Frame(self._json, is_text=True)
+
+    @property
+    def _operation(self) -> dict[str, object]:
+        return {"op": "publish", "topic": self.topic, "msg": self.message}
+
+    @cached_property
+    def _json(self) -> bytes:
+        return to_json(self._operation)
+
+    @cached_property
+    def _cbor(self) -> bytes:
+        return to_cbor(self._operation)
+
+    @cached_property
+    def _png(self) -> bytes:
+        return to_json({"op": "png", "data": base64.b64encode(_as_picture(self._json)).decode()})
+
+
+def answer_frame(operation: Message, answer: Message) -> Frame:
+    """Gives the answer to an operation, with its id if it had one."""
+    named = {**answer, "id": operation["id"]} if "id" in operation else answer
+    return Frame(to_json(named), is_text=True)
+
+
+def fragments_of(frame: Frame, *, length: int, fragment_id: str) -> Iterator[Frame]:
+    """Gives a text in pieces of so many characters, as the operation `fragment`."""
+    text = frame.data.decode()
+    for number, start in enumerate(range(0, len(text), length)):
+        piece = {
+            "op": "fragment",
+            "id": fragment_id,
+            "data": text[start : start + length],
+            "num": number,
+            # The real one forgets to round down.
+            "total": (len(text) - 1) / length + 1,
+        }
+        yield Frame(to_json(piece), is_text=True)
+
+
+def _as_picture(text: bytes) -> bytes:
+    """Lays a text out as the pixels of a PNG, filled up with line ends, as rosbridge does."""
+    n_pixels = len(text) / 3.0
+    width_px = max(math.floor(math.sqrt(n_pixels)), 1)
+    height_px = max(math.ceil(n_pixels / width_px), 1)
+    padded = text.ljust(width_px * height_px * 3, b"\n")
+    encoded = io.BytesIO()
+    Image.frombytes("RGB", (width_px, height_px), padded).save(encoded, format="PNG")
+    return encoded.getvalue()
+
+
+Listener = Callable[[Publication], None]
+ROSBRIDGE_NODE = "/rosbridge_websocket"
+
+
+@dataclass(slots=True, kw_only=True)
+class Topic:
+    """One topic.
+
+    Attributes:
+        name: With its leading slash.
+        type: Of its messages, as "package/Type".
+        is_latched: Who subscribes later gets the last message at once.
+        depth: How many messages wait for a client that is slow; the newest stay.
+        publishers: Nodes that publish it.
+        subscribers: Nodes that hear it.
+    """
+
+    name: str
+    type: str
+    is_latched: bool = False
+    depth: int = 50
+    publishers: tuple[str, ...] = ()
+    subscribers: tuple[str, ...] = ()
+    last: Publication | None = None
+    n_advertisers: int = 0
+    listeners: list[Listener] = field(default_factory=list)
+    takers: list[Listener] = field(default_factory=list)
+
+
+class Hub:
+    """All topics there are; listeners are clients, takers are the robot's own nodes."""
+
+    def __init__(self, topics: list[Topic]) -> None:
+        self._topics = {topic.name: topic for topic in topics}
+        self._own = frozenset(self._topics)
+
+    @property
+    def topics(self) -> list[Topic]:
+        """The topics that somebody publishes or hears, by name."""
+        return sorted(self._topics.values(), key=lambda topic: topic.name)
+
+    def find(self, name: str) -> Topic | None:
+        """Finds a topic."""
+        return self._topics.get(name)
+
+    def is_wanted(self, name: str) -> bool:
+        """True when a client listens."""
+        return name in self._topics and bool(self._topics[name].listeners)
+
+    def publish(self, name: str, message: Message) -> None:
+        """Hands a message to all who hear the topic."""
+        topic = self._topics[name]
+        publication = Publication(name, topic.type, message)
+        if topic.is_latched:
+            topic.last = publication
+        for hear in [*topic.takers, *topic.listeners]:
+            hear(publication)
+
+    def take(self, name: str, taker: Listener) -> None:
+        """Lets one of the robot's own nodes hear a topic."""
+        self._topics[name].takers.append(taker)
+
+    def subscribe(self, name: str, message_type: str, listener: Listener) -> None:
+        """Lets a client hear a topic, and gives it the last message of a latched one."""
+        topic = self._topics.setdefault(name, Topic(name=name, type=bare_type(message_type)))
+        if listener not in topic.listeners:
+            topic.listeners.append(listener)
+        if topic.last is not None:
+            listener(topic.last)
+
+    def unsubscribe(self, name: str, listener: Listener) -> None:
+        """Ends a client's hearing."""
+        topic = self._topics.get(name)
+        if topic is not None and listener in topic.listeners:
+            topic.listeners.remove(listener)
+            self._forget_unused(topic)
+
+    def advertise(self, name: str, message_type: str, *, is_latched: bool) -> None:
+        """Notes that a client publishes a topic."""
+        topic = self._topics.setdefault(name, Topic(name=name, type=bare_type(message_type)))
+        topic.n_advertisers += 1
+        topic.is_latched = topic.is_latched or (is_latched and name not in self._own)
+
+    def unadvertise(self, name: str) -> None:
+        """Notes that a client publishes a topic no more."""
+        topic = self._topics.get(name)
+        if topic is not None:
+            topic.n_advertisers -= 1
+            self._forget_unused(topic)
+
+    def publishers_of(self, topic: Topic) -> list[str]:
+        """Gives the nodes that publish a topic; clients do so through rosbridge."""
+        return [*topic.publishers, *([ROSBRIDGE_NODE] if topic.n_advertisers else [])]
+
+    def subscribers_of(self, topic: Topic) -> list[str]:
+        """Gives the nodes that hear a topic."""
+        return [*topic.subscribers, *([ROSBRIDGE_NODE] if topic.listeners else [])]
+
+    def _forget_unused(self, topic: Topic) -> None:
+        is_used = topic.name in self._own or topic.listeners or topic.n_advertisers > 0
+        if not is_used:
+            del self._topics[topic.name]

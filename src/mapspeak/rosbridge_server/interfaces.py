@@ -1,0 +1,217 @@
+"""A ROS as rosbridge's operations find it, with message types described and filled in."""
+
+from collections.abc import Awaitable, Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from mapspeak.errors import LinkError, MapspeakError
+from mapspeak.ros.definitions import (
+    FLOATS,
+    GENERATED,
+    TIMES,
+    WHOLES,
+    Field,
+    TypeBook,
+    known_definitions,
+    write_definition,
+)
+from mapspeak.ros.messages import Dialect, bare_type
+from mapspeak.rosbridge_server.graph import Services
+from mapspeak.rosbridge_server.hub import Hub
+from mapspeak.rosbridge_server.nav2 import Nav2
+
+ROS2_DISTRIBUTION = "jazzy"
+
+KIND_OF_GENERATED = {
+    **dict.fromkeys(("Request", "Response"), "srv"),
+    **dict.fromkeys(("Goal", "Result", "Feedback", "FeedbackMessage"), "action"),
+}
+
+NO_MORE: Mapping[str, str] = MappingProxyType({})
+Answer = Callable[[dict[str, Any]], Awaitable[dict[str, Any]]]
+
+
+class Interfaces:
+    """The message types of one dialect.
+
+    Args:
+        dialect: Which.
+        more: The texts of types besides those that come with mapspeak, by "package/Type".
+    """
+
+    def __init__(self, dialect: Dialect, *, more: Mapping[str, str] = NO_MORE) -> None:
+        self._dialect = dialect
+        self._book = TypeBook({**known_definitions(dialect, distro=ROS2_DISTRIBUTION), **more})
+        self._fixed_arrays: dict[str, bool] = {}
+
+    @property
+    def names(self) -> list[str]:
+        """All messages, services and actions, as this ROS writes their names."""
+        return sorted({GENERATED.sub("", self.said(name)) for name in self._book.texts})
+
+    def said(self, name: str) -> str:
+        """Gives a type's name as this ROS writes it; one that is no message keeps its name."""
+        generated = GENERATED.search(name)
+        if "/" not in name or self._dialect is Dialect.ROS1:
+            return name
+        kind = "msg" if generated is None else KIND_OF_GENERATED[generated[1]]
+        package, _, last = bare_type(name).partition("/")
+        return f"{package}/{kind}/{last}"
+
+    def knows(self, name: str) -> bool:
+        """True for a type that is described here, however its name is written."""
+        return self._book.knows(name)
+
+    def has_fixed_array(self, name: str) -> bool:
+        """True when a list of fixed length is somewhere within."""
+        bare = bare_type(name)
+        if bare not in self._fixed_arrays:
+            self._fixed_arrays[bare] = any(
+                field.length
+                for each in self._book.within(bare)
+                for field in self._book[each].fields
+            )
+        return self._fixed_arrays[bare]
+
+    def full_text(self, name: str) -> str:
+        """Gives a type's definition and those of all types within, as `gendeps --cat` does."""
+        return write_definition(self._book.texts, self._book.within(name))
+
+    def details(self, name: str) -> list[dict[str, object]]:
+        """Gives what rosapi's message_details says of a type and of all types within."""
+        return [self._detail(each) for each in self._book.within(name)]
+
+    def fill(self, name: str, message: object) -> dict[str, Any]:
+        """Gives a client's message with all fields; those left out hold their defaults.
+
+        Raises:
+            LinkError: A field is not of that type, or does not hold what it should.
+        """
+        if not isinstance(message, Mapping):
+            raise _misfit(name, "message", message)
+        fields = {each.name: each for each in self._book[name].fields}
+        for given in message:
+            if given not in fields:
+                raise LinkError(
+                    f"Message type {name} does not have a field {given}.", hint="Leave it out."
+                )
+        return {
+            each.name: self._fill_field(each, message[each.name])
+            if each.name in message
+            else self._book.default(each)
+            for each in fields.values()
+        }
+
+    def filled(self, name: str, answer: Answer) -> Answer:
+        """Gives what answers a request of that type, once it has all its fields."""
+
+        async def reply(request: dict[str, Any]) -> dict[str, Any]:
+            return await answer(self.fill(name, request))
+
+        return reply
+
+    def _fill_field(self, field: Field, value: object) -> Any:  # noqa: ANN401 - ROS JSON
+        if field.length is None:
+            return self._fill_value(field, value)
+        if field.type == "uint8" and isinstance(value, str | bytes):
+            return value
+        is_list = isinstance(value, list | tuple | np.ndarray)
+        if not is_list or (field.length and len(value) != field.length):  # type: ignore[arg-type]
+            raise _misfit(field.type, field.name, value)
+        if isinstance(value, np.ndarray):
+            return value
+        return [self._fill_value(field, each) for each in value]  # type: ignore[attr-defined]
+
+    def _fill_value(self, field: Field, value: object) -> Any:  # noqa: ANN401 - ROS JSON
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        match field.type:
+            case "string" if isinstance(value, str) and _is_unicode(value):
+                return value
+            case "bool" if isinstance(value, bool | int):
+                return bool(value)
+            case kind if kind in FLOATS and is_number:
+                return value
+            case kind if kind in WHOLES and is_number and isinstance(value, int):
+                low, high = WHOLES[kind]
+                if low <= value <= high:
+                    return value
+            case kind if kind in TIMES and isinstance(value, Mapping):
+                # A stamp in the words of ROS 2 is silently replaced.
+                is_known = {"secs", "nsecs"} <= set(value)
+                return dict(value) if is_known else {"secs": 0, "nsecs": 0}
+            case kind if self._book.knows(kind):
+                return self.fill(kind, value)
+        raise _misfit(field.type, field.name, value)
+
+    def _detail(self, name: str) -> dict[str, object]:
+        message = self._book[name]
+        return {
+            "type": self.said(name),
+            "fieldnames": [each.name for each in message.fields],
+            "fieldtypes": [self.said(each.type) for each in message.fields],
+            "fieldarraylen": [
+                -1 if each.length is None else each.length for each in message.fields
+            ],
+            "examples": [_example(each) for each in message.fields],
+            "constnames": [each.name for each in message.constants],
+            "constvalues": [each.value for each in message.constants],
+        }
+
+
+def _is_unicode(text: str) -> bool:
+    """False for half a surrogate pair, which JSON can say and no wire can carry."""
+    return not any("\ud800" <= sign <= "\udfff" for sign in text)
+
+
+def _example(field: Field) -> str:
+    if field.length is not None:
+        return "[]"
+    if field.type in FLOATS:
+        return "0.0"
+    if field.type in WHOLES:
+        return "0"
+    return {"string": "", "bool": "False"}.get(field.type, "{}")
+
+
+def _misfit(wanted: str, name: str, value: object) -> LinkError:
+    return LinkError(
+        f"Expected {wanted} in {name}, got {type(value).__name__}.", hint="Look the type up."
+    )
+
+
+LONGEST_COMPLAINT = 1000
+LOGGED_ERROR = 8
+"""rosgraph_msgs/Log.ERROR."""
+
+
+class RosSystem:
+    """What clients find.
+
+    Attributes:
+        dialect: Which ROS.
+        hub: Its topics; on ROS 1 /rosout is one of them.
+        services: Its services.
+        interfaces: Its message types.
+        nav2: The navigation of ROS 2; None where there is none.
+    """
+
+    def __init__(self, hub: Hub, interfaces: Interfaces, *, dialect: Dialect) -> None:
+        self.dialect = dialect
+        self.hub = hub
+        self.services = Services()
+        self.interfaces = interfaces
+        self.nav2: Nav2 | None = None
+
+    def complain(self, text: str) -> None:
+        """Says what was wrong with an operation where rosbridge says it: on ROS 1, to /rosout."""
+        if self.dialect is Dialect.ROS1:
+            said = text[:LONGEST_COMPLAINT].encode(errors="replace").decode()
+            entry = {"level": LOGGED_ERROR, "name": "/rosbridge_websocket", "msg": said}
+            self.hub.publish("/rosout", self.interfaces.fill("rosgraph_msgs/Log", entry))
+
+
+def refusal(error: MapspeakError) -> str:
+    """Gives the text of an error as rosbridge answers it."""
+    return error.message if isinstance(error, LinkError) else str(error)

@@ -1,0 +1,161 @@
+"""Nav2's NavigateToPose, as rosbridge's action operations and as topics and services of ROS 2."""
+
+import base64
+import uuid
+from collections.abc import Callable
+from typing import Any
+
+from mapspeak.errors import MapspeakError
+from mapspeak.geometry import Pose
+from mapspeak.robot import GoalState, Robot
+from mapspeak.ros.messages import (
+    Dialect,
+    FramedPose,
+    read_pose_stamped,
+    write_pose_stamped,
+    write_stamp,
+)
+from mapspeak.rosbridge_server.drives import Drive, Drives
+from mapspeak.rosbridge_server.hub import Hub, Publication
+
+ACTION = "/navigate_to_pose"
+ACTION_TYPE = "nav2_msgs/NavigateToPose"
+EXECUTING, CANCELING, SUCCEEDED, CANCELED, ABORTED = 2, 3, 4, 5, 6
+STATUS = {
+    GoalState.ARRIVED: SUCCEEDED,
+    GoalState.CANCELLED: CANCELED,
+    GoalState.BLOCKED: ABORTED,
+    GoalState.PREEMPTED: ABORTED,
+    GoalState.LOST: ABORTED,
+    GoalState.REJECTED: ABORTED,
+}
+TF_ERROR, FAILED_TO_MAKE_PROGRESS = 9002, 105
+UNKNOWN_GOAL_ID, GOAL_TERMINATED = 2, 3
+USUAL_SPEED_MPS = 0.3
+FARTHEST_M = 1e8
+"""Goals of clients lie anywhere; a duration of ROS must be able to say how long it takes."""
+
+
+class Nav2:
+    """The action server, its topics `feedback` and `status`, and its service `cancel_goal`.
+
+    Attributes:
+        followers: Called with each feedback.
+        by_operation: The goals under way by the id of rosbridge's operation, of all clients.
+    """
+
+    def __init__(self, robot: Robot, hub: Hub, drives: Drives) -> None:
+        self._robot = robot
+        self._hub = hub
+        self._drives = drives
+        self._statuses: dict[Drive, int] = {}
+        self.followers: list[Callable[[Drive, dict[str, Any]], None]] = []
+        self.by_operation: dict[str, Drive] = {}
+        drives.listeners.append(self._tell)
+        hub.publish(f"{ACTION}/_action/status", {"status_list": []})
+
+    async def cancel_operation(self, operation_id: str) -> None:
+        """Asks the drive of one of rosbridge's operations to end, if it is under way."""
+        drive = self.by_operation.get(operation_id)
+        if drive is not None:
+            await self._drives.cancel(drive)
+
+    async def navigate(self, args: dict[str, Any]) -> Drive | str:
+        """Starts a drive for a goal of the action; gives a text where the goal is aborted at once.
+
+        Raises:
+            MapspeakError: The goal is rejected.
+        """
+        goal = await self._drives.resolve(read_pose_stamped(args["pose"]))
+        if goal is None:
+            return f"The frame {args['pose']['header']['frame_id']!r} does not exist."
+        return await self._drives.start(goal)
+
+    async def take_goal_pose(self, publication: Publication) -> None:
+        """Starts a drive for what was published on /goal_pose; errors are silent there."""
+        try:
+            await self.navigate({"pose": publication.message})
+        except MapspeakError:
+            return
+
+    def feedback_of(self, drive: Drive, pose: Pose) -> dict[str, Any]:
+        """Gives what the action feeds back, with the robot's pose in the map."""
+        now_s = self._robot.now_s
+        left_m = min(drive.status.distance_left_m or 0.0, FARTHEST_M)
+        here = FramedPose(pose=pose, frame_id="map", stamp_s=now_s)
+        return {
+            "current_pose": write_pose_stamped(here, dialect=Dialect.ROS2),
+            "navigation_time": write_stamp(now_s - drive.started_s, dialect=Dialect.ROS2),
+            "estimated_time_remaining": write_stamp(left_m / USUAL_SPEED_MPS, dialect=Dialect.ROS2),
+            "number_of_recoveries": drive.status.n_recoveries,
+            "distance_remaining": left_m,
+        }
+
+    def publish_feedback(self, pose: Pose) -> None:
+        """Publishes the feedback of the drive under way, if there is one."""
+        for drive in self._drives.all:
+            if not drive.is_over.is_set():
+                feedback = self.feedback_of(drive, pose)
+                message = {"goal_id": _uuid_message(drive), "feedback": feedback}
+                self._hub.publish(f"{ACTION}/_action/feedback", message)
+                for follow in self.followers:
+                    follow(drive, feedback)
+
+    async def cancel_goals(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Answers action_msgs/CancelGoal; an id of zeros means every goal (ROS 2 design)."""
+        wanted = _uuid_bytes(request["goal_info"]["goal_id"]["uuid"])
+        chosen = self._drives.all
+        if any(wanted):
+            chosen = [drive for drive in chosen if uuid.UUID(drive.goal_id).bytes == wanted]
+            if not chosen:
+                return {"return_code": UNKNOWN_GOAL_ID, "goals_canceling": []}
+        going = [drive for drive in chosen if not drive.is_over.is_set()]
+        for drive in going:
+            await self._drives.cancel(drive)
+        code = GOAL_TERMINATED if any(wanted) and not going else 0
+        return {"return_code": code, "goals_canceling": [_goal_info(drive) for drive in going]}
+
+    def _tell(self, _drive: Drive) -> None:
+        """Publishes the status of all goals, when one has changed."""
+        statuses = {drive: status_of(drive) for drive in self._drives.all}
+        if statuses == self._statuses:
+            return
+        self._statuses = statuses
+        entries = [
+            {"goal_info": _goal_info(drive), "status": status} for drive, status in statuses.items()
+        ]
+        self._hub.publish(f"{ACTION}/_action/status", {"status_list": entries})
+
+
+def status_of(drive: Drive) -> int:
+    """Gives the number that action_msgs/GoalStatus has for how a drive stands."""
+    if drive.is_over.is_set():
+        return STATUS[drive.status.state]
+    return CANCELING if drive.is_cancelling else EXECUTING
+
+
+def result_of(drive: Drive) -> dict[str, Any]:
+    """Gives the action's result of a drive that has ended."""
+    is_failed = drive.status.state in (GoalState.BLOCKED, GoalState.LOST)
+    return {
+        "error_code": FAILED_TO_MAKE_PROGRESS if is_failed else 0,
+        "error_msg": drive.status.reason if is_failed else "",
+    }
+
+
+def _goal_info(drive: Drive) -> dict[str, Any]:
+    stamp = write_stamp(drive.started_s, dialect=Dialect.ROS2)
+    return {"goal_id": _uuid_message(drive), "stamp": stamp}
+
+
+def _uuid_message(drive: Drive) -> dict[str, Any]:
+    return {"uuid": uuid.UUID(drive.goal_id).bytes}
+
+
+def _uuid_bytes(value: object) -> bytes:
+    """Gives the bytes of uint8[16]: base64 text, as rosbridge writes it, or a list."""
+    try:
+        data = base64.b64decode(value) if isinstance(value, str) else bytes(value)  # type: ignore[call-overload]
+    except (TypeError, ValueError):
+        data = b""
+    return data.ljust(16, b"\0")[:16]

@@ -1,0 +1,214 @@
+"""What the robot's nodes publish, taken from the port as often as its clock says."""
+
+import math
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+
+import numpy as np
+from anyio.abc import TaskGroup
+
+from mapspeak.errors import MapspeakError
+from mapspeak.geometry import Pose
+from mapspeak.robot import RangeScan, Robot, StampedPose
+from mapspeak.ros.messages import (
+    CameraInfo,
+    Dialect,
+    EncodedPicture,
+    FramedPose,
+    FrameTransform,
+    LaserScan,
+    Twist,
+    write_camera_info,
+    write_compressed_image,
+    write_grid,
+    write_odometry,
+    write_pose_with_covariance,
+    write_scan,
+    write_stamp,
+    write_transforms,
+)
+from mapspeak.rosbridge_server.graph import BASE_FRAME
+from mapspeak.rosbridge_server.hub import Hub
+from mapspeak.spatial import OccupancyGrid
+
+TICK_S = 0.05
+"""Between two transforms."""
+MAP_PERIOD_S = 1.0
+ESTIMATE_PERIOD_S = 0.5
+PICTURE_PERIOD_S = 0.2
+SCAN_PERIOD_S = 0.1
+CAMERA_FRAME, LASER_FRAME = "camera_link", "base_scan"
+IMAGE_TOPIC, INFO_TOPIC = "/camera/image_raw/compressed", "/camera/camera_info"
+SCAN_TOPIC = "/scan"
+N_BEAMS = 720
+
+
+@dataclass(slots=True)
+class Source:
+    """Something published again and again.
+
+    Attributes:
+        produce: Takes it from the robot and publishes it.
+        period_s: Robot time between two.
+        due_s: Robot time of the next.
+        is_busy: The last one is still under way.
+    """
+
+    produce: Callable[[], Awaitable[None]]
+    period_s: float
+    due_s: float = 0.0
+    is_busy: bool = False
+
+
+class Sources:
+    """The robot's own publishers; all but maps only while a client listens."""
+
+    def __init__(self, robot: Robot, hub: Hub, *, dialect: Dialect) -> None:
+        self._robot = robot
+        self._hub = hub
+        self._dialect = dialect
+        self._grid: OccupancyGrid | None = None
+        self._last: StampedPose | None = None
+        self._estimate_topic = "/amcl_pose" if dialect is Dialect.ROS1 else "/pose"
+        self._estimate_due_s = 0.0
+        self._has_looked = False
+        self._slow = [Source(self._publish_map, MAP_PERIOD_S)]
+        if robot.description.has_camera:
+            self._slow.append(Source(self._publish_picture, PICTURE_PERIOD_S))
+        if robot.description.has_laser:
+            self._slow.append(Source(self._publish_scan, SCAN_PERIOD_S))
+
+    async def start(self) -> None:
+        """Publishes what is latched, so that the first client finds it."""
+        fixed = [("base_link", BASE_FRAME), (CAMERA_FRAME, "base_link")]
+        if self._robot.description.has_laser:
+            fixed.append((LASER_FRAME, "base_link"))
+        transforms = [
+            FrameTransform(parent_from_child=Pose(0.0, 0.0), parent=parent, child=child, stamp_s=0)
+            for child, parent in fixed
+        ]
+        self._hub.publish("/tf_static", write_transforms(transforms, dialect=self._dialect))
+        await self._attempt(self._publish_map)
+
+    async def publish_due(self, tasks: TaskGroup) -> None:
+        """Publishes what is due; what takes long is done aside."""
+        now_s = self._robot.now_s
+        if self._hub.is_wanted("/clock"):
+            self._hub.publish("/clock", {"clock": write_stamp(now_s, dialect=self._dialect)})
+        if any(map(self._hub.is_wanted, ("/tf", "/odom", self._estimate_topic))):
+            await self._attempt(self._publish_pose)
+        for source in self._slow:
+            if now_s >= source.due_s and not source.is_busy:
+                source.due_s, source.is_busy = now_s + source.period_s, True
+                tasks.start_soon(self._run_aside, source)
+
+    async def _run_aside(self, source: Source) -> None:
+        try:
+            await self._attempt(source.produce)
+        finally:
+            source.is_busy = False
+
+    async def _attempt(self, produce: Callable[[], Awaitable[None]]) -> None:
+        try:
+            await produce()
+        except MapspeakError:
+            return  # A robot that has no map or picture yet publishes none, as a real one.
+
+    async def _publish_map(self) -> None:
+        grid = await self._robot.fetch_map()
+        if grid is self._grid or (self._grid is not None and _is_same(grid, self._grid)):
+            return
+        self._grid = grid
+        message = write_grid(grid, dialect=self._dialect)
+        self._hub.publish("/map", message)
+        self._hub.publish("/map_metadata", message["info"])
+
+    async def _publish_picture(self) -> None:
+        is_wanted = self._hub.is_wanted(IMAGE_TOPIC) or self._hub.is_wanted(INFO_TOPIC)
+        # The first picture takes long, which no client should have to wait for.
+        if self._has_looked and not is_wanted:
+            return
+        self._has_looked = True
+        taken = await self._robot.fetch_picture()
+        picture = EncodedPicture(
+            data=taken.data,
+            media_type=taken.media_type,
+            width_px=taken.width_px,
+            height_px=taken.height_px,
+            frame_id=CAMERA_FRAME,
+            stamp_s=taken.stamp_s,
+        )
+        info = CameraInfo(
+            width_px=taken.width_px,
+            height_px=taken.height_px,
+            horizontal_fov_rad=taken.horizontal_fov_rad,
+            frame_id=CAMERA_FRAME,
+            stamp_s=taken.stamp_s,
+        )
+        self._hub.publish(IMAGE_TOPIC, write_compressed_image(picture, dialect=self._dialect))
+        self._hub.publish(INFO_TOPIC, write_camera_info(info, dialect=self._dialect))
+
+    async def _publish_scan(self) -> None:
+        if not self._hub.is_wanted(SCAN_TOPIC):
+            return
+        scan = await self._robot.fetch_scan()
+        if scan is not None:
+            self._hub.publish(SCAN_TOPIC, write_scan(_in_even_steps(scan), dialect=self._dialect))
+
+    async def _publish_pose(self) -> None:
+        here = await self._robot.fetch_pose()
+        # The port tells one pose, that of SLAM: odometry without drift, so that map and odom agree.
+        for parent, child, pose in (("map", "odom", Pose(0, 0)), ("odom", BASE_FRAME, here.pose)):
+            transform = FrameTransform(
+                parent_from_child=pose, parent=parent, child=child, stamp_s=here.stamp_s
+            )
+            self._hub.publish("/tf", write_transforms([transform], dialect=self._dialect))
+        in_odom = FramedPose(pose=here.pose, frame_id="odom", stamp_s=here.stamp_s)
+        odometry = write_odometry(
+            in_odom, self._velocity(here), child=BASE_FRAME, dialect=self._dialect
+        )
+        self._hub.publish("/odom", odometry)
+        self._last = here
+        if here.stamp_s >= self._estimate_due_s:
+            self._estimate_due_s = here.stamp_s + ESTIMATE_PERIOD_S
+            in_map = FramedPose(pose=here.pose, frame_id="map", stamp_s=here.stamp_s)
+            estimate = write_pose_with_covariance(in_map, dialect=self._dialect)
+            self._hub.publish(self._estimate_topic, estimate)
+
+    def _velocity(self, here: StampedPose) -> Twist:
+        """Gives the velocity since the last pose, which is all that the port tells of it."""
+        if self._last is None or not 0.0 < here.stamp_s - self._last.stamp_s < 1.0:
+            return Twist(forward_mps=0.0, left_mps=0.0, turn_radps=0.0)
+        passed_s = here.stamp_s - self._last.stamp_s
+        step = self._last.pose.inverse() @ here.pose
+        return Twist(
+            forward_mps=step.x / passed_s,
+            left_mps=step.y / passed_s,
+            turn_radps=step.yaw_rad / passed_s,
+        )
+
+
+def _in_even_steps(scan: RangeScan) -> LaserScan:
+    """Gives a scan as its message has it: one beam to every half degree, from behind."""
+    step_rad = math.tau / N_BEAMS
+    ranges_m = np.full(N_BEAMS, np.nan)
+    numbers = np.round((scan.angles_rad + math.pi) / step_rad).astype(np.intp) % N_BEAMS
+    ranges_m[numbers] = scan.ranges_m
+    return LaserScan(
+        ranges_m=np.where(np.isfinite(ranges_m), ranges_m, np.nan),
+        first_angle_rad=-math.pi,
+        angle_step_rad=step_rad,
+        least_range_m=0.0,
+        largest_range_m=scan.reach_m,
+        frame_id=LASER_FRAME,
+        stamp_s=scan.stamp_s,
+        met_nothing=np.isinf(ranges_m),
+    )
+
+
+def _is_same(one: OccupancyGrid, other: OccupancyGrid) -> bool:
+    return (
+        one.stamp_s == other.stamp_s
+        and one.origin == other.origin
+        and np.array_equal(one.cells, other.cells)
+    )
