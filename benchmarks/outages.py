@@ -1,17 +1,22 @@
 """How a drive ends when a part of its robot is away for a while, and whether that is told truly.
 
-`python -m benchmarks.outages [SECONDS]...` takes each part away during a drive, for 1, 5, 14, 26
-and 60 s unless other times are given, from a robot behind rosbridge that is ROS 1 and ROS 2, and
-prints what became of the drive. What counts is how long the robot truly drove, once the part was
-back, while the last answer said that the drive was over.
+`python -m benchmarks.outages [SECONDS]... [--part PART]... [--ros DIALECT]...` takes each part away
+during a drive, for 1, 5, 14, 26 and 60 s unless other times are given, from a robot behind
+rosbridge that is ROS 1 and ROS 2, and prints what became of each drive as it ends. The variable
+MAPSPEAK_BENCH_OUTAGES holds the same arguments for `./run bench outages`. What counts is how long
+the robot truly drove, once the part was back, while the last answer said that the drive was over.
 """
 
+import os
+import shlex
 import sys
 from collections.abc import AsyncGenerator, Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from enum import StrEnum
+from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -20,8 +25,6 @@ import anyio
 import click
 import numpy as np
 from anyio.abc import ByteStream, SocketAttribute
-from rich.console import Console
-from rich.table import Table
 
 from benchmarks.figure import Figure
 from mapspeak.driving.drivereport import DriveReport
@@ -37,6 +40,7 @@ __all__ = ["main", "measure"]
 
 AWAY_S = (1.0, 5.0, 14.0, 26.0, 60.0)
 N_AT_ONCE = 4
+N_TRIES = 2
 SPEED_MPS = 0.5
 DRIVES_S = 3.0
 """Before the part goes away."""
@@ -283,41 +287,89 @@ def run_case(course: Course) -> Course:
     return course
 
 
-def run_all(away_s: Sequence[float]) -> list[Course]:
-    """Run every case, a few at once; the longest first."""
-    courses = [
+def list_cases(
+    away_s: Sequence[float], parts: Sequence[Part], dialects: Sequence[Dialect]
+) -> list[Course]:
+    """Return every case, the longest first."""
+    return [
         Course(dialect, part, each)
         for each in sorted(away_s, reverse=True)
-        for dialect in Dialect
-        for part in Part
+        for dialect in dialects
+        for part in parts
     ]
-    with ProcessPoolExecutor(N_AT_ONCE) as processes:
-        return list(processes.map(run_case, courses))
+
+
+def run_all(
+    cases: Sequence[Course], run_one: Callable[[Course], Course] = run_case
+) -> Iterator[Course]:
+    """Run each case in a process of its own, a few at once, and yield it as it ends.
+
+    A case whose process died is run once again, and is an error when it dies again.
+    """
+    with ThreadPoolExecutor(N_AT_ONCE) as threads:
+        for done in as_completed([threads.submit(_run_apart, each, run_one) for each in cases]):
+            yield done.result()
+
+
+def _run_apart(course: Course, run_one: Callable[[Course], Course]) -> Course:
+    for n_left in reversed(range(N_TRIES)):
+        # Cases that run beside this one keep their own processes when this one's dies.
+        with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as process:
+            try:
+                return process.submit(run_one, course).result()
+            except BrokenProcessPool:
+                if not n_left:
+                    raise
+                click.echo(f"{course.name}: its process died; once again", err=True)
+    raise AssertionError
 
 
 def measure() -> Iterator[Figure]:
     """Measure how long the robot drives while told otherwise."""
-    for course in run_all(AWAY_S):
+    arguments = shlex.split(os.environ.get("MAPSPEAK_BENCH_OUTAGES", ""))
+    for course in run_all(choose(**main.make_context("outages", arguments).params)):
+        click.echo(describe(course), err=True)
         yield Figure(name=f"{course.name}: driven wrongly", value=course.wrongly_s, unit="s")
+
+
+def describe(course: Course) -> str:
+    """Return what became of a drive, on one line."""
+    stood = "never stood" if course.stood_s is None else f"stood after {course.stood_s:.1f} s"
+    return (
+        f"{course.name}: {' > '.join(course.told)}; {stood}, drove {course.drove_m:.1f} m, "
+        f"wrongly {course.wrongly_s:.1f} s, slowest answer {course.longest_answer_s:.1f} s"
+    )
 
 
 @click.command()
 @click.argument("away_s", nargs=-1, type=float, metavar="[SECONDS]...")
-def main(away_s: tuple[float, ...]) -> None:
+@click.option(
+    "--part",
+    "parts",
+    multiple=True,
+    type=click.Choice([each.value for each in Part]),
+    help="All, if none.",
+)
+@click.option(
+    "--ros",
+    "dialects",
+    multiple=True,
+    type=click.Choice([each.value for each in Dialect]),
+    help="Likewise.",
+)
+def main(away_s: tuple[float, ...], parts: tuple[str, ...], dialects: tuple[str, ...]) -> None:
     """Print what became of each drive."""
-    table = Table("robot", "away", "s", "told", "stood after s", "drove m", "wrongly s", "answer s")
-    for course in run_all(away_s or AWAY_S):
-        table.add_row(
-            str(course.dialect),
-            str(course.part),
-            f"{course.away_s:g}",
-            " > ".join(course.told),
-            "-" if course.stood_s is None else f"{course.stood_s:.1f}",
-            f"{course.drove_m:.1f}",
-            f"{course.wrongly_s:.1f}",
-            f"{course.longest_answer_s:.1f}",
-        )
-    Console(width=200).print(table)
+    for course in run_all(choose(away_s, parts, dialects)):
+        click.echo(describe(course))
+
+
+def choose(away_s: Sequence[float], parts: Sequence[str], dialects: Sequence[str]) -> list[Course]:
+    """Return the cases that arguments name."""
+    return list_cases(
+        away_s or AWAY_S,
+        [Part(each) for each in parts] or list(Part),
+        [Dialect(each) for each in dialects] or list(Dialect),
+    )
 
 
 if __name__ == "__main__":

@@ -1,11 +1,17 @@
 """`ros_type` for names and definitions that are not quite right."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from bridging import SteppedRobot
+from fakes import FakeRobot, two_rooms
+from mapspeak.links.rosbridge.client import RobotAddress, RosbridgeClient, open_client
+from mapspeak.links.rosbridge.server import open_rosbridge_server
 from mapspeak.ros.messages import Dialect
-from rosserved import on_our_server
+from rosserved import QUICK, on_our_server, served
 
 pytestmark = pytest.mark.anyio
 both = pytest.mark.parametrize("dialect", Dialect)
@@ -58,3 +64,30 @@ async def test_a_definition_that_is_none_is_refused(
         )
     assert said in text
     assert "x: float64 = 1.5" in good
+
+
+class WithoutPackages:
+    """Offers a connection as rclpy does: with the types alone that its machine has installed."""
+
+    def __init__(self, connection: RosbridgeClient) -> None:
+        self._connection = connection
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - whatever the connection has
+        return getattr(self._connection, name)
+
+    async def fetch_definitions(self, type_name: str) -> Mapping[str, str]:  # noqa: ARG002
+        return {}
+
+
+async def test_a_type_that_the_ros_of_this_machine_lacks_is_to_be_installed(
+    tmp_path: Path,
+) -> None:
+    async with (
+        open_rosbridge_server(SteppedRobot(two_rooms()), dialect=Dialect.ROS2) as server,
+        open_client(RobotAddress(url=server.url), timing=QUICK) as client,
+        served(FakeRobot(), WithoutPackages(client), tmp_path) as caller,  # type: ignore[arg-type]
+    ):
+        said = await caller.refuse("ros_type", type="nav2_msgs/action/Spin")
+    assert "the ROS on this machine does not have it" in said
+    assert "sudo apt install ros-$ROS_DISTRO-nav2-msgs" in said
+    assert "nearest" not in said

@@ -1,6 +1,5 @@
 """All commands, and what becomes of errors."""
 
-import os
 import sys
 
 import click
@@ -52,15 +51,13 @@ for command, what in COMMANDS.items():
 
 def main() -> None:
     """Run the command line; what went wrong on purpose is said in one line, without a trace."""
-    umask = keep_private()
     try:
-        cli()
+        with keep_private():
+            cli()
     except* MapspeakError as group:
         for error in _leaves(group):
             click.echo(f"mapspeak: {error}", err=True)
         sys.exit(2)
-    finally:
-        os.umask(umask)
 
 
 def _leaves(group: BaseExceptionGroup[MapspeakError]) -> list[MapspeakError]:

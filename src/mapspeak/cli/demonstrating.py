@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import anyio
 import click
 
+from mapspeak.cli.guarding import usual_modes
 from mapspeak.cli.keys import StopKeys, stop_keys
 from mapspeak.cli.options import SEED_OPTION, WORLD_OPTION
 
@@ -48,7 +49,8 @@ def demo(world: str, seed: int, folder: Path | None, is_quiet: bool) -> None:  #
             if keys is not None:
                 keys.wait_until_released()
 
-        report = anyio.run(run_demo, options, on_progress)
+        with usual_modes():
+            report = anyio.run(run_demo, options, on_progress)
     click.echo(report.summary())
     click.echo(f"Everything is in {options.folder}/report.html")
     sys.exit(0 if report.is_success else 1)

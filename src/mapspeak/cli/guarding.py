@@ -2,7 +2,9 @@
 
 import os
 import time
-from contextlib import suppress
+from collections.abc import Generator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -14,6 +16,9 @@ from mapspeak.cli.options import FILE
 
 if TYPE_CHECKING:
     from mapspeak.safety import Guard
+
+PRIVATE = 0o077
+_umask_of_person: ContextVar[int | None] = ContextVar("umask_of_person", default=None)
 
 CONTROL_OPTION = click.option(
     "--control",
@@ -86,12 +91,33 @@ def build_guard(choice: GuardChoice, *, robot: str) -> "Guard":
     )
 
 
-def keep_private() -> int:
-    """Let no other user read what is written from now on, and return the umask until then."""
+@contextmanager
+def keep_private() -> Generator[None]:
+    """Let no other user read what is written meanwhile, but for what `usual_modes` is around."""
     if data_folder().is_dir():
         with suppress(PermissionError):
             data_folder().chmod(0o700)
-    return os.umask(0o077)
+    umask = os.umask(PRIVATE)
+    told = _umask_of_person.set(umask)
+    try:
+        yield
+    finally:
+        _umask_of_person.reset(told)
+        os.umask(umask)
+
+
+@contextmanager
+def usual_modes() -> Generator[None]:
+    """Write with the person's own permissions what the person has asked for by name."""
+    umask = _umask_of_person.get()
+    if umask is None:
+        yield
+        return
+    before = os.umask(umask)
+    try:
+        yield
+    finally:
+        os.umask(before)
 
 
 def data_folder() -> Path:

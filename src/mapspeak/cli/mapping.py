@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from mapspeak.cli.guarding import usual_modes
 from mapspeak.cli.options import FILE
 from mapspeak.errors import MapError
 
@@ -73,7 +74,8 @@ def map_command(
         anchor=place,
         outputs={output: path for output, path in wanted.items() if path is not None},
     )
-    n_failed = _show_maps(jobs)
+    with usual_modes():
+        n_failed = _show_maps(jobs)
     if n_failed and len(jobs) > 1:
         click.echo(f"{n_failed} of {len(jobs)} maps could not be read.", err=True)
     sys.exit(1 if n_failed else 0)

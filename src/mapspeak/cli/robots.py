@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import anyio
 
+from mapspeak.cli.guarding import usual_modes
 from mapspeak.cli.options import DEFAULT_WORLD
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Pose
@@ -271,4 +272,5 @@ async def _open_simulated(choice: RobotChoice) -> AsyncGenerator["Robot"]:
         if log is not None:
             log.close()
         if choice.final_map is not None:
-            write_map(simulation.map(), choice.final_map, mode=MapMode.RAW)
+            with usual_modes():
+                write_map(simulation.map(), choice.final_map, mode=MapMode.RAW)

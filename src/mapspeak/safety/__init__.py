@@ -38,7 +38,7 @@ from mapspeak.safety.policy import (
 from mapspeak.safety.policyfile import load_policy
 from mapspeak.safety.robot import GuardedRobot
 from mapspeak.safety.surveying import Surveyor
-from mapspeak.safety.velocities import HandDriving, publishing_for
+from mapspeak.safety.velocities import HandDriving, publishing_for, zero_velocity_of
 
 __all__ = [
     "NOBODY",
@@ -84,4 +84,5 @@ __all__ = [
     "publishing_for",
     "read_audit",
     "say_command",
+    "zero_velocity_of",
 ]

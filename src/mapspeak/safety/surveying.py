@@ -69,22 +69,20 @@ class Surveyor:
     def describe(self, revision: MapRevision) -> tuple[str, ...]:
         """Gives events in words, and which rules are about regions that are not on the map."""
         events, now = self._read_events(), self._wall_clock()
-        unplaced = tuple(
-            f"The policy closes {rule.region_id} ({rule.name}), which is not on this map."
-            for rule in self._rules
-            if rule.region_id and revision.rooms.find_region(rule.region_id) is None
+        return (
+            *self._say_off(revision),
+            *say_events(events, now),
+            *say_unplaced(events, revision, now),
         )
-        off = tuple(
-            f"The policy's area {rule.name!r} lies off this map: it closes nothing here."
-            for rule in self._rules
-            if rule.outline and _is_off(rule, revision.grid)
-        )
-        unplaced = (*unplaced, *off)
-        for each in unplaced:
-            if each not in self._warned:
-                self._warned.add(each)
-                logger.warning("%s", each)
-        return (*unplaced, *say_events(events, now), *say_unplaced(events, revision, now))
+
+    def _say_off(self, revision: MapRevision) -> Iterator[str]:
+        """Tell each rule that closes nothing on a map."""
+        for rule in self._rules:
+            if rule.region_id and revision.rooms.find_region(rule.region_id) is None:
+                yield f"The policy closes {rule.region_id} ({rule.name}), which is not on this map."
+        for rule in self._rules:
+            if rule.outline and _is_off(rule, revision.grid):
+                yield f"The policy's area {rule.name!r} lies off this map: it closes nothing here."
 
     def _survey(self, grid: OccupancyGrid, radius_m: float) -> MapRevision:
         before = self._latest
@@ -96,12 +94,21 @@ class Surveyor:
                 grid, radius_m=radius_m, previous=before, leaves_pockets=self._leaves_pockets
             )
         )
+        if not is_known:
+            self._warn(revision)
         events, now = self._read_events(), self._wall_clock()
         areas = (*self._find_closed(revision), *close_floor_of(events, revision, now))
         hindrances = tuple(find_hindrances(events, revision, now))
         if areas == revision.areas and hindrances == revision.hindrances:
             return revision
         return revision.with_areas(areas, hindrances)
+
+    def _warn(self, revision: MapRevision) -> None:
+        """Tell the operator at once, and once, which rules close nothing."""
+        for each in self._say_off(revision):
+            if each not in self._warned:
+                self._warned.add(each)
+                logger.warning("%s", each)
 
     def _find_closed(self, revision: MapRevision) -> Iterator[ClosedArea]:
         now = self._wall_clock()

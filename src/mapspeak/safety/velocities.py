@@ -178,10 +178,17 @@ def _is_zero(value: object) -> bool:
 
 
 def _zero_of(value: Any) -> Any:  # noqa: ANN401 - ROS JSON
-    if isinstance(value, Mapping):
-        return zero_velocity_of(value)
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return type(value)(0) if is_number else value
+    match value:
+        case bool() | str():
+            return value
+        case int() | float():
+            return type(value)(0)
+        case Mapping():
+            return zero_velocity_of(value)
+        case list():
+            return [_zero_of(each) for each in value]
+        case _:
+            return value
 
 
 def _is_moving(message: Message) -> bool:

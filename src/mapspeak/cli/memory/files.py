@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mapspeak.cli.guarding import data_folder
+from mapspeak.cli.guarding import data_folder, usual_modes
 from mapspeak.cli.options import FILE
 from mapspeak.errors import ConfigError
 
@@ -108,7 +108,8 @@ def write_out(text: str, out: Path | None) -> None:
         click.echo(text, nl=False)
         return
     try:
-        out.write_text(text, encoding="utf-8", newline="\n")
+        with usual_modes():
+            out.write_text(text, encoding="utf-8", newline="\n")
     except OSError as error:
         message = f"--out: {out} cannot be written: {error.strerror or error}."
         raise ConfigError(

@@ -226,11 +226,9 @@ class RosbridgeClient(Rosapi):
         return self._send_everywhere(text)
 
     def _send_everywhere(self, text: bytes) -> int:
-        open_channels = [channel for channel in (self._urgent, self._control) if channel.is_up]
-        for channel in open_channels:
-            channel.send_if_up(text)
+        n_sent = sum([each.send_if_up(text) for each in (self._urgent, self._control)])
         self._published_s = anyio.current_time()
-        return len(open_channels)
+        return n_sent
 
     async def call_service(
         self,

@@ -9,7 +9,14 @@ import anyio
 from mapspeak.errors import LinkError
 from mapspeak.ros import RosConnection
 from mapspeak.ros.messages import Message
-from mapspeak.safety import Act, Call, GuardedConnection, Publish, SetParameter
+from mapspeak.safety import (
+    Act,
+    Call,
+    GuardedConnection,
+    Publish,
+    SetParameter,
+    zero_velocity_of,
+)
 
 SETTLE_S = 0.3
 """From the first advertisement until the robot's nodes hear what is published, in wall time."""
@@ -89,14 +96,14 @@ class RosCommands:
 
     def note_velocity(self, topic: str, message: Message) -> None:
         """Let every stop from now on publish zero velocity on a topic too."""
-        self._connection().started.note_velocity(topic, zero=stand_of(message))
+        self._connection().started.note_velocity(topic, zero=zero_velocity_of(message))
 
     async def stand(self, topic: str, message: Message) -> bool:
         """Publishes the stand for a velocity, whatever happens to the call that moved the robot.
 
         Where the connection is lost it is waited for a moment. Gives whether a stand was sent.
         """
-        zero = stand_of(message)
+        zero = zero_velocity_of(message)
         n_sent = 0
         with anyio.CancelScope(shield=True), anyio.move_on_after(STAND_S):
             while n_sent < N_STANDS:
@@ -121,22 +128,3 @@ class RosCommands:
     ) -> None:
         """Sets a node's parameter."""
         await self._connection().set_parameter(node, name, value)
-
-
-def stand_of(message: Message) -> dict[str, Any]:
-    """Gives a velocity message with every number at zero; header and texts stay."""
-    return {name: value if name == "header" else _zero_of(value) for name, value in message.items()}
-
-
-def _zero_of(value: Any) -> Any:  # noqa: ANN401 - ROS JSON
-    match value:
-        case bool() | str():
-            return value
-        case int() | float():
-            return type(value)(0)
-        case Mapping():
-            return stand_of(value)
-        case list():
-            return [_zero_of(each) for each in value]
-        case _:
-            return value

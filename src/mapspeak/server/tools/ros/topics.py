@@ -11,10 +11,10 @@ from pydantic import Field
 from mapspeak.errors import LinkError
 from mapspeak.ros.definitions import check_message
 from mapspeak.ros.messages import Message, bare_type
-from mapspeak.safety import Publish
+from mapspeak.safety import Publish, zero_velocity_of
 from mapspeak.server.rosreports import cut
 from mapspeak.server.tools.ros.census import Census, fetch_hearers, fetch_publishers, take_census
-from mapspeak.server.tools.ros.commands import VELOCITIES, RosCommands, stand_of
+from mapspeak.server.tools.ros.commands import VELOCITIES, RosCommands
 from mapspeak.server.tools.ros.frames import check_frames
 from mapspeak.server.tools.ros.inquiry import ACTION_GOAL, RosInquiry, full_name
 from mapspeak.server.tools.ros.lists import Filter, Page, choose, say_page
@@ -198,7 +198,7 @@ class TopicTools:
         checked = check_message(described.book, type_name, fields)
         if type_name == GOAL_POSE or type_name.endswith(ACTION_GOAL):
             await check_frames(self._inquiry, checked)
-        is_moving = type_name in VELOCITIES and stand_of(checked) != checked
+        is_moving = type_name in VELOCITIES and zero_velocity_of(checked) != checked
         if is_moving and duration_s is None:
             raise LinkError(
                 f"{name} takes velocities: without an end the robot would go on.",
