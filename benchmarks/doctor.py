@@ -25,8 +25,8 @@ from mapspeak.cli.examining import examine_choice
 from mapspeak.cli.robots import RobotChoice, open_robot
 from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Pose
-from mapspeak.links.ros import RosRobot
 from mapspeak.robot import Health
+from mapspeak.ros.robot import RosRobot
 
 __all__ = ["measure"]
 

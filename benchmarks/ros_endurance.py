@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 from benchmarks.figure import Figure
 from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Pose
-from mapspeak.links.ros import RosRobot
 from mapspeak.links.rosbridge import RosbridgeClient, Timing, open_rosbridge_robot
 from mapspeak.links.rosbridge.protocol import Conversation, FrameRefused, Published
 from mapspeak.links.rosbridge.protocol.codec import to_cbor, to_json
 from mapspeak.robot import GoalState
 from mapspeak.ros.messages import Dialect, read_grid, write_grid
+from mapspeak.ros.robot import RosRobot
 from mapspeak.spatial import OccupancyGrid
 
 __all__ = ["measure"]

@@ -25,9 +25,9 @@ import click
 from mcp.client import Client
 
 from benchmarks.figure import Figure
-from mapspeak.links.ros import RosRobot
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.ros.messages import Dialect
+from mapspeak.ros.robot import RosRobot
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server import build_server
 from mapspeak.session import Session

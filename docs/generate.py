@@ -30,7 +30,7 @@ SNAPSHOT = ROOT / "tests" / "snapshots" / "tools.json"
 WITH_TABLES = (ROOT / "README.md",)
 TROUBLES = ROOT / "docs" / "howto" / "troubleshooting.md"
 SOURCES = {
-    "robot": ("links", "server/tools/ros/inquiry.py"),
+    "robot": ("links", "ros", "server/tools/ros/inquiry.py"),
     "start": ("cli", "settings.py", "server/transport.py", "server/app.py"),
     "refused": ("safety", "places/goalcheck.py", "driving/drive.py"),
     "files": ("spatial/mapfiles.py", "simulator/worldfiles.py", "server/mapcommand"),

@@ -7,15 +7,17 @@ from typing import Any
 import anyio
 
 from mapspeak.geometry import Pose
-from mapspeak.links.ros import DrivingPatience, RobotOverrides, RosRobot
 from mapspeak.links.rosbridge import Timing, open_rosbridge_robot
 from mapspeak.links.rosbridge.protocol.codec import to_cbor
+from mapspeak.ros.discovery import RobotOverrides
+from mapspeak.ros.driving import DrivingPatience
 from mapspeak.ros.messages import (
     Dialect,
     FrameTransform,
     write_grid,
     write_transforms,
 )
+from mapspeak.ros.robot import RosRobot
 from mapspeak.spatial import OccupancyGrid
 from rosbridge_script import PATIENCE_S, Operation, ScriptedServer, Visitor, running
 

@@ -13,8 +13,8 @@ from fakes import two_rooms
 from guarding import make_guard
 from mapspeak.errors import ConfigError
 from mapspeak.links.arrival import Arrival
-from mapspeak.links.ros import DrivingPatience
 from mapspeak.links.rosbridge import open_rosbridge_robot
+from mapspeak.ros.driving import DrivingPatience
 from mapspeak.ros.messages import Dialect
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.semantic import SemanticMapStore

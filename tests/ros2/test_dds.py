@@ -21,7 +21,7 @@ from ros2.robot_process import RobotProcess
 
 if TYPE_CHECKING:
     from mapspeak.links.dds import DdsConnection
-    from mapspeak.links.ros import RosRobot
+    from mapspeak.ros.robot import RosRobot
 
 pytest.importorskip("cyclonedds", reason="has no wheel for this Python")
 

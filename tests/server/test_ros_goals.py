@@ -11,8 +11,8 @@ import pytest
 from fakes import FakeRobot, two_rooms
 from guarding import audit_of, make_guard
 from mapspeak.geometry import Pose
-from mapspeak.links.ros.actions import ActionPatience, ActionState, SentGoal
 from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, open_client
+from mapspeak.ros.actions import ActionPatience, ActionState, SentGoal
 from mapspeak.ros.messages import Dialect, write_header, write_pose
 from mapspeak.safety import Kind, Policy
 from mapspeak.semantic import SemanticMapStore

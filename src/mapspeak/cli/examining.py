@@ -46,11 +46,9 @@ def doctor(
 async def examine_choice(choice: RobotChoice) -> "list[Finding]":
     """Return what the robot offers, once all of it has been found, and what it really gives."""
     from mapspeak.driving.checkup import examine  # noqa: PLC0415
-    from mapspeak.links.ros import (  # noqa: PLC0415 - heavy; help must be quick
-        RosRobot,
-        describe_profile,
-    )
     from mapspeak.ros import LinkKind  # noqa: PLC0415
+    from mapspeak.ros.discovery import describe_profile  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.ros.robot import RosRobot  # noqa: PLC0415 - heavy; help must be quick
 
     async with open_robot(choice) as robot:
         if not isinstance(robot, RosRobot):

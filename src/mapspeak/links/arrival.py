@@ -13,9 +13,9 @@ from typing import Any, cast
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.links.ros import RosRobot
 from mapspeak.robot import Robot
 from mapspeak.ros import RosConnection, Started
+from mapspeak.ros.robot import RosRobot
 
 PAUSE_S = 2.0
 """Between two looks for a robot while nobody asks for it."""

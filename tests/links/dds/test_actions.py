@@ -14,8 +14,8 @@ from dds_node import until as until_so
 from mapspeak.errors import LinkError
 from mapspeak.links.dds import DdsConnection
 from mapspeak.links.dds.discovery import Framing
-from mapspeak.links.ros.actions import ActionPatience, ActionState, open_action
 from mapspeak.ros import ActionGoal
+from mapspeak.ros.actions import ActionPatience, ActionState, open_action
 from mapspeak.ros.messages import Dialect
 
 pytestmark = pytest.mark.anyio

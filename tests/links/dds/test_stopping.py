@@ -6,7 +6,8 @@ pytest.importorskip("cyclonedds", reason="has no wheel for this Python")
 
 from dds_node import open_both, until
 from mapspeak.errors import LinkError
-from mapspeak.links.ros import DrivingPatience, build_ros_robot
+from mapspeak.ros.driving import DrivingPatience
+from mapspeak.ros.robot import build_ros_robot
 
 pytestmark = pytest.mark.anyio
 

@@ -8,16 +8,16 @@ import pytest
 
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
-from mapspeak.links.ros import RosRobot
-from mapspeak.links.ros.driving import DrivingPatience
 from mapspeak.links.rosbridge import Timing
 from mapspeak.robot import GoalState, GoalStatus
+from mapspeak.ros.driving import DrivingPatience
 from mapspeak.ros.messages import (
     Dialect,
     FramedPose,
     write_pose_stamped,
     write_stamp,
 )
+from mapspeak.ros.robot import RosRobot
 from rosbridge_robot import ScriptedRobot, connect_scripted, eventually
 from rosbridge_script import PATIENCE_S, Operation
 

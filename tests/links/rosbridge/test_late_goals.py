@@ -8,12 +8,12 @@ import pytest
 
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
-from mapspeak.links.ros import RosRobot
-from mapspeak.links.ros.actions import ActionClient, SentGoal
-from mapspeak.links.ros.driving import DrivingPatience
 from mapspeak.links.rosbridge import Timing
 from mapspeak.robot import GoalState
+from mapspeak.ros.actions import ActionClient, SentGoal
+from mapspeak.ros.driving import DrivingPatience
 from mapspeak.ros.messages import Dialect, write_stamp
+from mapspeak.ros.robot import RosRobot
 from rosbridge_robot import (
     ABORTED,
     CANCEL_SERVICE,

@@ -14,15 +14,14 @@ from PIL import Image
 from drawing import grid_from_text, text_from_grid
 from mapspeak.errors import GoalError, LinkError, MapError
 from mapspeak.geometry import Pose
-from mapspeak.links.ros import RobotOverrides, RosRobot, RosSettings
-from mapspeak.links.ros.clock import RobotClock
-from mapspeak.links.ros.discovery import PoseSource
-from mapspeak.links.ros.driving import DrivingPatience
-from mapspeak.links.ros.maps import MapKeeper
-from mapspeak.links.ros.poses import PoseKeeper
 from mapspeak.links.rosbridge import RosbridgeClient, Timing, open_rosbridge_robot
 from mapspeak.robot import GoalState, GoalStatus
+from mapspeak.ros.discovery import PoseSource, RobotOverrides, RosSettings
+from mapspeak.ros.driving import DrivingPatience
 from mapspeak.ros.messages import Dialect, write_header, write_pose
+from mapspeak.ros.robot import RosRobot
+from mapspeak.ros.robot.maps import MapKeeper
+from mapspeak.ros.robot.poses import PoseKeeper, RobotClock
 from rosbridge_robot import (
     ABORTED,
     CANCEL_SERVICE,

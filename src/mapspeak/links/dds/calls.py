@@ -21,9 +21,10 @@ from mapspeak.links.dds.participant import Participant
 from mapspeak.links.dds.services import ServiceClient
 from mapspeak.links.dds.topics import Topics
 from mapspeak.links.dds.types import Types
-from mapspeak.links.ros import PursuedGoal, check_name, wrong_type
 from mapspeak.ros import ActionGoal
+from mapspeak.ros.goal import PursuedGoal
 from mapspeak.ros.messages import Message, bare_type
+from mapspeak.ros.native import check_name, wrong_type
 
 StartSoon = Callable[[Callable[[], Coroutine[Any, Any, None]]], None]
 Learn = Callable[..., Awaitable[None]]

@@ -18,9 +18,11 @@ from mapspeak.links.dds.participant import Participant
 from mapspeak.links.dds.timing import DdsTiming
 from mapspeak.links.dds.topics import Topics
 from mapspeak.links.dds.types import Types
-from mapspeak.links.ros import NativeConnection, PursuedGoal, plain_errors
 from mapspeak.ros import ActionGoal, LinkKind, LinkName
+from mapspeak.ros.goal import PursuedGoal
 from mapspeak.ros.messages import Message
+from mapspeak.ros.native import NativeConnection
+from mapspeak.ros.subscribing import plain_errors
 
 NODES_QUALITY = Quality(is_reliable=True, is_latched=True, depth=1000)
 LONG_NODES_TYPE = "rmw_dds_common/LongParticipantEntitiesInfo"

@@ -12,8 +12,8 @@ import anyio
 
 from mapspeak.errors import LinkError
 from mapspeak.links.dds.services import Answer, ServiceClient
-from mapspeak.links.ros import PursuedGoal
 from mapspeak.ros import ActionEnd, new_id
+from mapspeak.ros.goal import PursuedGoal
 from mapspeak.ros.messages import Message
 
 FINAL = (4, 5, 6)

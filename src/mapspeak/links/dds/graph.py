@@ -11,9 +11,9 @@ from mapspeak.links.dds.discovery import Discovery, Endpoint
 from mapspeak.links.dds.endpoints import Sample
 from mapspeak.links.dds.names import SERVICE_PART, is_hidden
 from mapspeak.links.dds.types import Types
-from mapspeak.links.ros import NodeParameters
 from mapspeak.ros import NodeLinks, RosGraph
 from mapspeak.ros.messages import Dialect
+from mapspeak.ros.parameters import NodeParameters
 
 DESCRIBE = "get_type_description"
 DESCRIBE_TYPE = "type_description_interfaces/srv/GetTypeDescription"

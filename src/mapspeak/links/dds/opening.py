@@ -6,7 +6,9 @@ from contextlib import asynccontextmanager
 from mapspeak.links.dds.connection import open_dds_connection
 from mapspeak.links.dds.network import DdsNetwork
 from mapspeak.links.dds.timing import DdsTiming
-from mapspeak.links.ros import DrivingPatience, RobotOverrides, RosRobot, build_ros_robot
+from mapspeak.ros.discovery import RobotOverrides
+from mapspeak.ros.driving import DrivingPatience
+from mapspeak.ros.robot import RosRobot, build_ros_robot
 
 USUAL_TIMING = DdsTiming()
 USUAL_PATIENCE = DrivingPatience()

@@ -37,7 +37,7 @@ from mapspeak.links.dds.endpoints import (
 )
 from mapspeak.links.dds.names import dds_type
 from mapspeak.links.dds.network import DdsNetwork
-from mapspeak.links.ros import environment_with
+from mapspeak.ros.native import environment_with
 
 logger = logging.getLogger(__name__)
 

@@ -14,9 +14,10 @@ from mapspeak.links.dds.endpoints import Inlet, Outlet, Quality, Sample
 from mapspeak.links.dds.names import dds_topic, full_type
 from mapspeak.links.dds.participant import Participant
 from mapspeak.links.dds.types import Types
-from mapspeak.links.ros import NativeTopics, TopicSubscription, check_name, wrong_type
 from mapspeak.ros import TYPE
 from mapspeak.ros.messages import Message, bare_type
+from mapspeak.ros.native import NativeTopics, check_name, wrong_type
+from mapspeak.ros.subscribing import TopicSubscription
 
 logger = logging.getLogger(__name__)
 

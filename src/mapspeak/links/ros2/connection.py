@@ -9,14 +9,16 @@ from anyio.abc import TaskGroup
 from anyio.from_thread import BlockingPortal
 
 from mapspeak.errors import LinkError
-from mapspeak.links.ros import NativeConnection, PursuedGoal, plain_errors
 from mapspeak.links.ros2.goals import Goals
 from mapspeak.links.ros2.graph import GraphQuestions
 from mapspeak.links.ros2.participant import Participant, errors_of_ros, wait_until
 from mapspeak.links.ros2.services import Services
 from mapspeak.links.ros2.topics import Topics
 from mapspeak.ros import ActionGoal, LinkKind, LinkName, NodeLinks, RosGraph
+from mapspeak.ros.goal import PursuedGoal
 from mapspeak.ros.messages import Message
+from mapspeak.ros.native import NativeConnection
+from mapspeak.ros.subscribing import plain_errors
 
 ANSWER_S = 5.0
 """For a service's answer, where the caller says nothing else, and for a first node."""

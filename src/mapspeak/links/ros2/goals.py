@@ -12,14 +12,15 @@ from typing import Any
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.links.ros import PursuedGoal, check_name, wrong_type
 from mapspeak.links.ros2.participant import Participant, errors_of_ros
 from mapspeak.links.ros2.reading import read_message
 from mapspeak.links.ros2.services import SERVER_S, Client, Services
 from mapspeak.links.ros2.types import find_action, name_of
 from mapspeak.links.ros2.writing import write_message
 from mapspeak.ros import ActionEnd, ActionGoal, new_id
+from mapspeak.ros.goal import PursuedGoal
 from mapspeak.ros.messages import Message, bare_type
+from mapspeak.ros.native import check_name, wrong_type
 
 FEEDBACK_DEPTH = 10
 CANCEL_S = 5.0

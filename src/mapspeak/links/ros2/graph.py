@@ -8,11 +8,12 @@ import numpy as np
 from rclpy.exceptions import NameValidationException
 
 from mapspeak.errors import LinkError
-from mapspeak.links.ros import NodeParameters, check_name
 from mapspeak.links.ros2.definitions import find_definitions
 from mapspeak.links.ros2.participant import Participant
 from mapspeak.ros import NodeLinks, RosGraph
 from mapspeak.ros.messages import Dialect, bare_type
+from mapspeak.ros.native import check_name
+from mapspeak.ros.parameters import NodeParameters
 
 UNNAMED = "_NODE_NAME_UNKNOWN_"
 """A node of which more is not known yet."""

@@ -5,8 +5,10 @@ from contextlib import asynccontextmanager
 from types import MappingProxyType
 
 from mapspeak.errors import ConfigError
-from mapspeak.links.ros import DrivingPatience, RobotOverrides, RosRobot, build_ros_robot
 from mapspeak.ros import RosConnection
+from mapspeak.ros.discovery import RobotOverrides
+from mapspeak.ros.driving import DrivingPatience
+from mapspeak.ros.robot import RosRobot, build_ros_robot
 
 USUAL_PATIENCE = DrivingPatience()
 NOTHING_SAID = RobotOverrides()

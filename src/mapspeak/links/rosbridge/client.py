@@ -10,14 +10,6 @@ import anyio
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError
-from mapspeak.links.ros import (
-    NOTICE_S,
-    Announcements,
-    PursuedGoal,
-    TopicSubscription,
-    plain_errors,
-    say_again,
-)
 from mapspeak.links.rosbridge import protocol
 from mapspeak.links.rosbridge.address import RobotAddress, Timing
 from mapspeak.links.rosbridge.channel import Channel
@@ -32,7 +24,15 @@ from mapspeak.links.rosbridge.protocol import (
 from mapspeak.links.rosbridge.requests import ServiceCaller, TopicRequest
 from mapspeak.links.rosbridge.rosapi import Rosapi
 from mapspeak.ros import ActionEnd, ActionGoal, LinkName, OwnEnds, Started, Subscription, new_id
+from mapspeak.ros.goal import PursuedGoal
 from mapspeak.ros.messages import Message
+from mapspeak.ros.subscribing import (
+    NOTICE_S,
+    Announcements,
+    TopicSubscription,
+    plain_errors,
+    say_again,
+)
 
 N_REMARKS_KEPT = 50
 NODE = "rosbridge_websocket"

@@ -3,8 +3,10 @@
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
 
-from mapspeak.links.ros import DrivingPatience, RobotOverrides, RosRobot, build_ros_robot
 from mapspeak.links.rosbridge import RobotAddress, Timing, open_client
+from mapspeak.ros.discovery import RobotOverrides
+from mapspeak.ros.driving import DrivingPatience
+from mapspeak.ros.robot import RosRobot, build_ros_robot
 
 USUAL_TIMING = Timing()
 USUAL_PATIENCE = DrivingPatience()

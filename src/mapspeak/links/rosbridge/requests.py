@@ -7,11 +7,11 @@ from typing import Any
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.links.ros import TopicSubscription
 from mapspeak.links.rosbridge import protocol
 from mapspeak.links.rosbridge.channel import Channel
 from mapspeak.links.rosbridge.protocol import Encoding
 from mapspeak.ros import new_id
+from mapspeak.ros.subscribing import TopicSubscription
 
 ROSAPI = "/rosapi/"
 UNKNOWN = "does not exist"

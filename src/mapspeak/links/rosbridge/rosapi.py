@@ -6,7 +6,6 @@ from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
 from mapspeak.errors import LinkError
-from mapspeak.links.ros import NodeParameters
 from mapspeak.ros import NodeLinks, RosGraph
 from mapspeak.ros.definitions import (
     TypeBook,
@@ -16,6 +15,7 @@ from mapspeak.ros.definitions import (
     split_definition,
 )
 from mapspeak.ros.messages import Dialect, bare_type, read_stamp
+from mapspeak.ros.parameters import NodeParameters
 
 Call = Callable[[str, Mapping[str, Any]], Awaitable[dict[str, Any]]]
 KINDS = ("msg", "srv", "action")

@@ -7,7 +7,7 @@ from mcp.server.mcpserver import Context
 from pydantic import Field
 
 from mapspeak.errors import GoalError, LinkError
-from mapspeak.links.ros.actions import ActionState, SentGoal
+from mapspeak.ros.actions import ActionState, SentGoal
 from mapspeak.ros.definitions import check_message
 from mapspeak.ros.messages import Message, bare_type
 from mapspeak.safety import Act

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import anyio
 
 from mapspeak.errors import GoalError
-from mapspeak.links.ros.actions import (
+from mapspeak.ros.actions import (
     ActionClient,
     ActionPatience,
     ActionState,

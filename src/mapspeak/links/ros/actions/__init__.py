@@ -1,7 +1,0 @@
-"""One client for the actions of ROS 1 and ROS 2: goals sent, followed, and ended for certain."""
-
-from mapspeak.links.ros.actions.client import ActionClient, ActionPatience
-from mapspeak.links.ros.actions.goal import ActionState, SentGoal
-from mapspeak.links.ros.actions.opening import open_action
-
-__all__ = ["ActionClient", "ActionPatience", "ActionState", "SentGoal", "open_action"]

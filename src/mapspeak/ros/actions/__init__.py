@@ -1,0 +1,7 @@
+"""One client for the actions of ROS 1 and ROS 2: goals sent, followed, and ended for certain."""
+
+from mapspeak.ros.actions.client import ActionClient, ActionPatience
+from mapspeak.ros.actions.goal import ActionState, SentGoal
+from mapspeak.ros.actions.opening import open_action
+
+__all__ = ["ActionClient", "ActionPatience", "ActionState", "SentGoal", "open_action"]

@@ -1,0 +1,342 @@
+"""What sending goals, following them and ending them means, whichever ROS it is."""
+
+import logging
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import anyio
+
+from mapspeak.errors import GoalError, LinkError
+from mapspeak.ros import RosConnection
+from mapspeak.ros.actions.goal import ActionState, SentGoal
+from mapspeak.ros.messages import Message
+
+__all__ = ["GONE", "RESULT_LATE", "ActionClient", "ActionPatience"]
+
+NOT_TAKEN = "The action server gave no sign of taking the goal within {:g} s; it was withdrawn."
+GIVEN_UP = "Its sender gave up waiting."
+STOPPED = "The robot was stopped before the goal was sent."
+TOO_EARLY = "It was ended before the action server took it."
+GONE = "The connection was lost meanwhile, and the action server does not know the goal any more."
+SILENT = "The action server has said nothing for {:.0f} s."
+UNSERVED = "The action server is there no more."
+RESULT_LATE = "Its result has not come."
+TAKEN_LATE = "The action server took it {:.1f} s after it was sent; it was cancelled at once."
+BACK_LATE = "The action server spoke of it {:.1f} s after it was sent; it was cancelled at once."
+PAUSES_S = (0.1, 0.2, 0.4, 0.8, 1.6, *30 * (4.0,))
+"""Between two attempts to cancel a goal that goes on though it was withdrawn."""
+N_KEPT = 50
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ActionPatience:
+    """How long to wait for an action server, in wall time; a test shortens it.
+
+    Between nodes on Fast DDS, a message that was lost comes again after three seconds: to wait for
+    less would be to take a lost message for a silent robot.
+
+    Attributes:
+        acceptance_s: For the first sign that a goal was taken.
+        listing_s: For the list of the goals there are, before our own first one.
+        end_s: For a goal to end that was cancelled or replaced.
+        result_s: For the result of a goal whose end is known already.
+        return_s: After a reconnection, for word of a goal that was under way.
+    """
+
+    acceptance_s: float = 5.0
+    listing_s: float = 0.3
+    end_s: float = 4.0
+    result_s: float = 1.0
+    return_s: float = 5.0
+
+
+class ActionClient(ABC):
+    """Sends goals to one action, and knows each of them until the action server has ended it.
+
+    A goal that we said to be over is *withdrawn*: one that was not taken in time, that was ended
+    before it was taken, or whose server fell silent. Should the server take it, or still have it,
+    it is cancelled again and again until the server has ended it, and `afterwards` tells so.
+
+    Args:
+        connection: To the robot.
+        action: The action's full name.
+        type_name: As "package/Type".
+        patience: All time limits.
+
+    Attributes:
+        ends_others: Ending means the goals of other clients too: they move the robot as ours do.
+        listeners: Called whenever anything was heard of any goal; they must not raise.
+    """
+
+    def __init__(
+        self,
+        connection: RosConnection,
+        action: str,
+        *,
+        type_name: str,
+        patience: ActionPatience,
+    ) -> None:
+        self.action = action
+        self.type_name = type_name
+        self.ends_others = False
+        self.listeners: list[Callable[[], None]] = []
+        self._connection = connection
+        self._patience = patience
+        self._goals: dict[str, SentGoal] = {}
+        self._being_ended: set[str] = set()
+        self._statuses: dict[str, ActionState] = {}
+
+    # --- what is known
+
+    @property
+    def is_busy(self) -> bool:
+        """True while a goal of ours is under way, or may be."""
+        return bool(self.open_goals)
+
+    @property
+    def owners(self) -> frozenset[str]:
+        """The clients with whom goals end that are under way."""
+        return frozenset(goal.owner for goal in self.open_goals if goal.owner is not None)
+
+    @property
+    def goals(self) -> list[SentGoal]:
+        """Our goals, in the order in which they were sent; of those that are over, the latest."""
+        return list(self._goals.values())
+
+    @property
+    def open_goals(self) -> list[SentGoal]:
+        """Our goals that are not over, in the order in which they were sent."""
+        return [goal for goal in self.goals if not goal.is_over]
+
+    @property
+    def listed(self) -> Mapping[str, ActionState]:
+        """The goals that the action server knows, ours and others', by its own ids."""
+        return self._statuses
+
+    @property
+    def ours(self) -> Mapping[str, SentGoal]:
+        """Our own goals by the server's ids, as far as these are known."""
+        return {goal.server_id: goal for goal in self._goals.values() if goal.server_id}
+
+    @property
+    def others(self) -> Mapping[str, ActionState]:
+        """How goals of other clients stand that are under way, as far as they can be told."""
+        ours = self.ours
+        return {
+            server_id: state
+            for server_id, state in self._statuses.items()
+            if not state.is_final and server_id not in ours
+        }
+
+    @property
+    @abstractmethod
+    def listed_s(self) -> float:
+        """When the list of the goals came, by the event loop's clock."""
+
+    @abstractmethod
+    async def wait_for_list(self) -> None:
+        """Wait a moment for the goals there are, so that none is taken for ours."""
+
+    def look(self) -> None:
+        """Take in that time has passed: that nothing was heard for long says something too."""
+        for goal in self.open_goals:
+            self._look_at(goal)
+        self._tell()
+
+    # --- what is done
+
+    def advertise(self, through: RosConnection) -> dict[str, str]:
+        """Say that we will publish, where that is needed; return the types by topic."""
+        del through
+        return {}
+
+    async def send(
+        self,
+        arguments: Message,
+        *,
+        through: RosConnection,
+        owner: str | None = None,
+        n_stops: int | None = None,
+    ) -> SentGoal:
+        """Send a goal; `wait_until_taken` has to follow.
+
+        Args:
+            arguments: The goal's fields.
+            through: The connection to send it over, and to cancel it; it may be guarded.
+            owner: The client with whom it ends; None where somebody else sees to that.
+            n_stops: Those that there had been when the goal was wanted; None for up to now.
+
+        Raises:
+            GoalError: There was a stop since the goal was wanted.
+            LinkError: It could not be sent.
+        """
+        started = self._connection.started
+        n_stops = started.n_stops if n_stops is None else n_stops
+        await self.wait_for_list()
+        if n_stops != started.n_stops:
+            raise GoalError(STOPPED, hint="Send it again when the robot may move.")
+        started.n_begun += 1
+        goal = await self._begin(arguments, through, anyio.current_time())
+        goal.owner = owner
+        self._forget_settled()
+        self._goals[goal.id] = goal
+        if n_stops != started.n_stops:
+            self._withdraw(goal, ActionState.CANCELLED, TOO_EARLY)
+        return goal
+
+    async def wait_until_taken(self, goal: SentGoal) -> None:
+        """Return when the server has taken or refused a goal; withdraw one that it does not."""
+        try:
+            is_taken = await goal.wait_until_taken(within_s=self._patience.acceptance_s)
+        except anyio.get_cancelled_exc_class():
+            # Only its sender knows of this goal: without him it would drive on.
+            await self._give_up(goal)
+            raise
+        if not is_taken:
+            reason = NOT_TAKEN.format(self._patience.acceptance_s)
+            self._withdraw(goal, ActionState.REJECTED, reason)
+
+    async def cancel(self, goal: SentGoal) -> None:
+        """End one goal, and wait a moment for its end.
+
+        Raises:
+            LinkError: The server refuses, cannot be told, or goes on with the goal.
+        """
+        if goal.state is ActionState.SENT:
+            self._withdraw(goal, ActionState.CANCELLED, TOO_EARLY)
+        elif not goal.is_over:
+            await self._cancel(goal)
+            await self._check_ended([goal])
+
+    async def end(self) -> None:
+        """End every goal of ours, and where they move the robot too, those of others.
+
+        Raises:
+            LinkError: Says what could not be ended.
+        """
+        self._connection.started.n_stops += 1
+        taken = [goal for goal in self.open_goals if goal.state is not ActionState.SENT]
+        for goal in self.open_goals:
+            if goal not in taken:
+                self._withdraw(goal, ActionState.CANCELLED, TOO_EARLY)
+            elif self.ends_others:
+                self._ask_to_cancel(goal)
+        if self.ends_others:
+            await self.cancel_all()
+        else:
+            await self._cancel_each(taken)
+        await self._check_ended(taken)
+        self._tell()
+
+    @abstractmethod
+    async def cancel_all(self, through: RosConnection | None = None) -> int:
+        """Cancel every goal of the action, whoever sent it; return how many there were.
+
+        Raises:
+            LinkError: The server refuses, or cannot be told.
+        """
+
+    # --- inside: each ROS in its own way
+
+    @abstractmethod
+    async def _begin(self, arguments: Message, through: RosConnection, sent_s: float) -> SentGoal:
+        """Send a goal."""
+
+    @abstractmethod
+    def _ask_to_cancel(self, goal: SentGoal) -> None:
+        """Ask at once for the end of a goal, whatever comes of it."""
+
+    @abstractmethod
+    async def _cancel(self, goal: SentGoal) -> bool:
+        """Ask for the end of a goal; return True when the server says that it has ended.
+
+        Raises:
+            LinkError: The server refuses, or cannot be told.
+        """
+
+    @abstractmethod
+    def _look_at(self, goal: SentGoal) -> None:
+        """Take in that time has passed for a goal."""
+
+    # --- inside: withdrawing, once for all
+
+    def _withdraw(self, goal: SentGoal, state: ActionState, reason: str) -> None:
+        """Say that a goal is over, and see to it that the server sees it so."""
+        goal.withdraw(state, reason=reason)
+        self._ask_to_cancel(goal)
+        self._tell()
+
+    async def _give_up(self, goal: SentGoal) -> None:
+        """End a goal whose sender has gone."""
+        if goal.state is ActionState.SENT:
+            self._withdraw(goal, ActionState.CANCELLED, GIVEN_UP)
+        elif not goal.is_over:
+            self._ask_to_cancel(goal)
+
+    def _note_life(self, goal: SentGoal) -> None:
+        """Take in that the server has a goal; one that was withdrawn is cancelled at once."""
+        if goal.is_withdrawn and not goal.is_settled and goal.id not in self._being_ended:
+            self._being_ended.add(goal.id)
+            said = BACK_LATE if goal.state is ActionState.LOST else TAKEN_LATE
+            goal.afterwards = said.format(anyio.current_time() - goal.sent_s)
+            logger.warning("A goal of %s that was withdrawn: %s", self.action, goal.afterwards)
+            self._connection.start_soon(partial(self._end_for_certain, goal))
+
+    def _note_server_end(self, goal: SentGoal) -> None:
+        """Take in that the server has ended a goal that was withdrawn."""
+        if goal.is_withdrawn and not goal.is_settled:
+            goal.settle()
+
+    async def _end_for_certain(self, goal: SentGoal) -> None:
+        """Cancel a goal until the server has ended it."""
+        for pause_s in PAUSES_S:
+            try:
+                if goal.is_settled or await self._cancel(goal):
+                    goal.settle()
+            except LinkError as error:
+                logger.warning("A late goal of %s is not cancelled yet: %s", self.action, error)
+            if await goal.wait_until_settled(within_s=pause_s):
+                break
+        self._being_ended.discard(goal.id)
+
+    async def _cancel_each(self, goals: Iterable[SentGoal]) -> None:
+        """Ask for the end of all goals; raise `LinkError` when one of them was refused."""
+        faults: list[LinkError] = []
+        for goal in goals:
+            try:
+                await self._cancel(goal)
+            except LinkError as error:
+                faults.append(error)
+        if faults:
+            raise faults[0]
+
+    async def _check_ended(self, goals: Iterable[SentGoal]) -> None:
+        with anyio.move_on_after(self._patience.end_s):
+            for goal in goals:
+                await goal.wait_until_over(within_s=self._patience.end_s)
+        going = sum(not goal.is_over for goal in goals)
+        if going:
+            raise LinkError(
+                f"{self.action} was told to end {'its goal' if going == 1 else f'{going} goals'}, "
+                f"but has not within {self._patience.end_s:g} s.",
+                hint="If the robot still moves, stop it by hand.",
+            )
+
+    def _forget_settled(self) -> None:
+        """Forget goals that are over on both sides; of withdrawn ones the latest are kept."""
+        over = [goal for goal in self._goals.values() if goal.is_over]
+        for goal in over[: max(len(over) - N_KEPT, 0)]:
+            del self._goals[goal.id]
+            self._forget(goal)
+
+    @abstractmethod
+    def _forget(self, goal: SentGoal) -> None:
+        """Forget what else is known of a goal."""
+
+    def _tell(self) -> None:
+        for listener in self.listeners:
+            listener()

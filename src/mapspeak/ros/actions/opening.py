@@ -1,0 +1,40 @@
+"""The client of an action: one for each connection and action, whoever uses it."""
+
+from mapspeak.ros import RosConnection
+from mapspeak.ros.actions.client import ActionClient, ActionPatience
+from mapspeak.ros.actions.ros1 import Ros1ActionClient
+from mapspeak.ros.actions.ros2 import Ros2ActionClient
+from mapspeak.ros.messages import Dialect
+
+__all__ = ["open_action"]
+
+USUAL_PATIENCE = ActionPatience()
+
+
+def open_action(
+    connection: RosConnection,
+    action: str,
+    *,
+    dialect: Dialect,
+    type_name: str,
+    patience: ActionPatience = USUAL_PATIENCE,
+) -> ActionClient:
+    """Return the client of an action; the first who asks for it decides how patient it is.
+
+    Args:
+        connection: To the robot.
+        action: The action's full name.
+        dialect: Which ROS.
+        type_name: As "package/Type".
+        patience: All time limits.
+    """
+    known = connection.started.actions.get(action)
+    if isinstance(known, ActionClient):
+        # A type that somebody got wrong must not stay for ever.
+        is_right = known.type_name == type_name or known.ends_others
+        if is_right or known.is_busy:
+            return known
+    kind = Ros2ActionClient if dialect is Dialect.ROS2 else Ros1ActionClient
+    client = kind(connection, action, type_name=type_name, patience=patience)
+    connection.started.actions[action] = client
+    return client

@@ -1,0 +1,391 @@
+"""Actions of ROS 2: goals over the connection, and the latched list of all goals' states."""
+
+from collections.abc import Mapping
+from functools import partial
+
+import anyio
+
+from mapspeak.errors import LinkError
+from mapspeak.ros import ActionEnd, ActionGoal, RosConnection
+from mapspeak.ros.actions.client import (
+    GONE,
+    RESULT_LATE,
+    UNSERVED,
+    ActionClient,
+    ActionPatience,
+)
+from mapspeak.ros.actions.goal import ActionState, SentGoal
+from mapspeak.ros.actions.statuses import STATES, read_statuses
+from mapspeak.ros.messages import Message
+
+__all__ = ["Ros2ActionClient"]
+
+CANCEL_TYPE, STATUS_TYPE = "action_msgs/srv/CancelGoal", "action_msgs/msg/GoalStatusArray"
+REFUSED = 1
+ENDED = (2, 3)
+"""action_msgs/CancelGoal: the server knows no such goal, or has ended it."""
+RESULT_GONE = "Its result went with the connection."
+UNSAID = "The action server ended the goal without saying how."
+SUSPECTED_S = (0.05, 0.05, 0.1, 0.1, 0.2, 0.5, 1.0, 1.0)
+"""Between two attempts to find out whether a goal that has appeared is a withdrawn one."""
+UNNAMED_S = 0.3
+"""So long a goal that may be a withdrawn one may go on, where safety comes first."""
+RECENT_S = 60.0
+"""So long after the end of a goal the list may name it for the first time."""
+N_SEEN_KEPT = 1_000
+
+
+class _Track:
+    """What the connection knows of one goal of ours."""
+
+    def __init__(self, goal: SentGoal, wire: ActionGoal, *, n_seen: int) -> None:
+        self.goal = goal
+        self.wire = wire
+        self.n_seen = n_seen
+        self.feedback: Message | None = None
+        self.ended_s: float | None = None
+        self.n_lists_at_loss: int | None = None
+        self.n_lists_at_end = 0
+        self.heard_s = anyio.current_time()
+
+
+class Ros2ActionClient(ActionClient):
+    """Sends goals, and joins what is heard of them: from the connection, and from the list.
+
+    In ROS 2 itself the server knows a goal by the id that we gave it. rosbridge gives it another,
+    and does not tell which: there, the goal that newly appears in the list, and is not over, is
+    ours. As long as it may be an older one of ours, which has ended without an id, no newer one
+    gets that id: how that stands, feedback and result tell. rosbridge is told again to cancel a
+    withdrawn goal by the id it has for it, which touches no other client's; a goal that goes on
+    nevertheless is left alone. Only where rosbridge may have forgotten the id, because the
+    connection was lost since, or where the robot was told to stop, no difference can be made for
+    certain, and safety comes first: the goal is cancelled, whoever sent it.
+    """
+
+    def __init__(
+        self, connection: RosConnection, action: str, *, type_name: str, patience: ActionPatience
+    ) -> None:
+        super().__init__(connection, action, type_name=type_name, patience=patience)
+        self._tracks: dict[str, _Track] = {}
+        self._seen: dict[str, int] = {}
+        self._n_seen = 0
+        self._suspected: set[str] = set()
+        self._lists = connection.subscribe(f"{action}/_action/status", type_name=STATUS_TYPE)
+        self._lists.listen(self._take_list)
+        if self._lists.latest is not None:
+            self._take_list(self._lists.latest)
+
+    @property
+    def listed_s(self) -> float:
+        """When the list of the goals came, by the event loop's clock."""
+        return self._lists.arrived_s
+
+    @property
+    def others(self) -> Mapping[str, ActionState]:
+        """How goals of other clients stand; nothing while it is unknown which of them is ours."""
+        if self._suspected or any(goal.server_id is None for goal in self.open_goals):
+            return {}
+        return super().others
+
+    async def wait_for_list(self) -> None:
+        """Wait a moment for the goals there are; a server without goals need not have said so."""
+        age_s = anyio.current_time() - self._lists.begun_s
+        if self._lists.n_received == 0 and age_s < self._patience.listing_s:
+            try:
+                left_s = self._patience.listing_s - age_s
+                await self._lists.wait_for_more_than(0, timeout_s=left_s)
+            except LinkError:
+                return
+
+    async def cancel_all(self, through: RosConnection | None = None) -> int:
+        """Cancel every goal of the action, whoever sent it; return how many there were."""
+        connection = through or self._connection
+        connection.clear_the_way()
+        answer = await self._call_cancel(connection, {})
+        return len(answer.get("goals_canceling") or [])
+
+    async def _begin(self, arguments: Message, through: RosConnection, sent_s: float) -> SentGoal:
+        n_seen = self._n_seen
+        wire = await through.send_goal(self.action, arguments, type_name=self.type_name)
+        goal = SentGoal(
+            wire.goal_id,
+            action=self.action,
+            type_name=self.type_name,
+            through=through,
+            sent_s=sent_s,
+            server_id=wire.ros_id,
+        )
+        self._goals[goal.id] = goal
+        track = self._tracks[goal.id] = _Track(goal, wire, n_seen=n_seen)
+        wire.listen(partial(self._hear, track))
+        # The list may have come while the goal was still being sent.
+        self._claim(self._seen_since(track))
+        self._hear(track)
+        return goal
+
+    def _ask_to_cancel(self, goal: SentGoal) -> None:
+        track = self._tracks[goal.id]
+        goal.through.cancel_goal(track.wire)
+        if goal.is_withdrawn:
+            track.n_lists_at_end = self._lists.n_received
+            goal.through.give_up_goal(track.wire)
+            if goal.server_id is None:
+                # It may be one of those that could not be told apart until now.
+                self._claim(self._seen_since(track))
+
+    def _forget(self, goal: SentGoal) -> None:
+        del self._tracks[goal.id]
+
+    async def _cancel(self, goal: SentGoal) -> bool:
+        wire = self._tracks[goal.id].wire
+        if wire.ros_id is None:
+            goal.through.cancel_goal(wire)
+        if goal.server_id is None:
+            return False
+        uuid = list(bytes.fromhex(goal.server_id))
+        arguments = {"goal_info": {"goal_id": {"uuid": uuid}}}
+        answer = await self._call_cancel(goal.through, arguments)
+        if answer.get("return_code", 0) == 0 and answer.get("goals_canceling") == []:
+            raise self._refusal(REFUSED)
+        return answer.get("return_code", 0) in ENDED
+
+    async def _call_cancel(self, through: RosConnection, arguments: Message) -> Message:
+        service = f"{self.action}/_action/cancel_goal"
+        call = partial(
+            through.call_service,
+            service,
+            arguments,
+            type_name=CANCEL_TYPE,
+            timeout_s=self._patience.end_s,
+        )
+        try:
+            answer = await call()
+        except LinkError:
+            # Something before us is stuck in the socket, and that was replaced: once more.
+            answer = await call()
+        code = answer.get("return_code", 0)
+        if code not in (0, *ENDED):
+            raise self._refusal(code)
+        return answer
+
+    def _refusal(self, code: object) -> LinkError:
+        return LinkError(
+            f"{self.action} refused to cancel: code {code}.",
+            hint="If the robot still moves, stop it by hand.",
+        )
+
+    # --- what is heard
+
+    def _hear(self, track: _Track) -> None:
+        """Take in what the connection tells of a goal."""
+        track.heard_s = anyio.current_time()
+        self._consider(track)
+        self._tell()
+
+    def _look_at(self, goal: SentGoal) -> None:
+        track = self._tracks[goal.id]
+        self._consider(track)
+        silent_s = anyio.current_time() - track.heard_s
+        is_sent = goal.state is ActionState.SENT
+        if not (is_sent or goal.is_over) and silent_s > self._patience.return_s:
+            track.heard_s = anyio.current_time()
+            self._connection.start_soon(partial(self._check_served, goal))
+
+    async def _check_served(self, goal: SentGoal) -> None:
+        """Withdraw a goal whose server is no more: over rosbridge nobody else would tell."""
+        try:
+            servers = await self._connection.fetch_publishers(f"{self.action}/_action/status")
+        except LinkError:
+            return
+        if not servers and not goal.is_over:
+            self._withdraw(goal, ActionState.LOST, UNSERVED)
+
+    def _take_list(self, message: Message) -> None:
+        self._statuses = dict(read_statuses(message))
+        fresh = [each for each in self._statuses if each not in self._seen]
+        for server_id in fresh:
+            self._seen[server_id] = self._n_seen
+            self._n_seen += 1
+        for server_id in list(self._seen)[: max(len(self._seen) - N_SEEN_KEPT, 0)]:
+            del self._seen[server_id]
+        self._claim(fresh)
+        self._consider_all()
+
+    def _consider_all(self) -> None:
+        for goal in self.goals:
+            self._consider(self._tracks[goal.id])
+        self._tell()
+
+    def _consider(self, track: _Track) -> None:
+        """Draw from all that has been heard how a goal stands."""
+        goal, wire = track.goal, track.wire
+        status = self._statuses.get(goal.server_id or "")
+        if goal.is_withdrawn:
+            self._consider_withdrawn(track, status)
+            return
+        if wire.end is not None:
+            self._end_by_result(goal, wire.end)
+            return
+        if wire.feedback is not None and wire.feedback is not track.feedback:
+            track.feedback = wire.feedback
+            goal.take_feedback(wire.feedback)
+        if wire.is_accepted:
+            goal.move_on(ActionState.ACCEPTED)
+        if status is not None and not status.is_final:
+            goal.move_on(status)
+        elif status is not None:
+            self._end_by_list(track, status)
+        if wire.is_lost and not goal.is_over:
+            self._consider_loss(track, is_listed=status is not None)
+
+    def _consider_withdrawn(self, track: _Track, status: ActionState | None) -> None:
+        goal, wire = track.goal, track.wire
+        is_server_gone = wire.is_lost and wire.ros_id is not None
+        if wire.end is not None or is_server_gone or (status is not None and status.is_final):
+            self._note_server_end(goal)
+            return
+        is_listed = status is not None and self._lists.n_received > track.n_lists_at_end
+        # That a lost goal was taken once is no sign of life.
+        is_taken = wire.is_accepted and goal.state is not ActionState.LOST
+        if is_taken or is_listed or wire.feedback is not track.feedback:
+            self._note_life(goal)
+
+    def _end_by_result(self, goal: SentGoal, end: ActionEnd) -> None:
+        values = end.values if isinstance(end.values, Mapping) else None
+        if not end.is_result:
+            said = end.values if isinstance(end.values, str) else ""
+            goal.end(ActionState.REJECTED, reason=said or "The action server refused it.")
+            return
+        # Without a status of its own the result says nothing; the list of all goals may.
+        state = STATES.get(end.status or 0) or self._statuses.get(goal.server_id or "")
+        if state is None or not state.is_final:
+            goal.end(ActionState.LOST, reason=UNSAID, result=values)
+        else:
+            goal.end(state, reason=_reason_of(values, state), result=values)
+
+    def _end_by_list(self, track: _Track, state: ActionState) -> None:
+        now_s = anyio.current_time()
+        track.ended_s = track.ended_s or now_s
+        track.goal.move_on(ActionState.ACCEPTED)
+        # The result says why; it follows its status at once unless its connection has gone.
+        if track.wire.is_lost:
+            track.goal.end(state, reason=RESULT_GONE)
+        elif now_s - track.ended_s > self._patience.result_s:
+            track.goal.end(state, reason=RESULT_LATE)
+
+    def _consider_loss(self, track: _Track, *, is_listed: bool) -> None:
+        n_lists = self._lists.n_received
+        if track.n_lists_at_loss is None:
+            track.n_lists_at_loss = n_lists
+        has_news = n_lists > track.n_lists_at_loss
+        if has_news and is_listed:
+            return
+        since_s = self._connection.connected_for_s
+        if has_news or (since_s is not None and since_s > self._patience.return_s):
+            self._withdraw(track.goal, ActionState.LOST, GONE)
+
+    # --- which goal is ours, where only rosbridge knows
+
+    def _seen_since(self, track: _Track) -> list[str]:
+        """Return the listed goals that were first seen after a goal was sent."""
+        return [each for each in self._statuses if self._seen.get(each, -1) >= track.n_seen]
+
+    def _claim(self, server_ids: list[str]) -> None:
+        """Take for ours the goals that have appeared, the oldest first, as far as that is sure."""
+        for server_id in server_ids:
+            state = self._statuses[server_id]
+            if server_id in self.ours or server_id in self._suspected:
+                continue
+            if state.is_final:
+                self._give_to_ended(server_id, state)
+            elif self._suspects():
+                self._suspected.add(server_id)
+                self._connection.start_soon(partial(self._find_out, server_id))
+            else:
+                self._give_to_open(server_id)
+
+    def _unresolved(self) -> list[SentGoal]:
+        """Return the withdrawn goals that the server may still take under an unknown id."""
+        return [goal for goal in self._suspects() if goal.is_withdrawn and not goal.is_settled]
+
+    def _suspects(self) -> list[SentGoal]:
+        """Return our goals that are over, and that the list may still name for the first time."""
+        return [
+            goal
+            for goal in self.goals
+            if goal.is_over
+            and goal.server_id is None
+            and (self._is_recent(goal) or (goal.is_withdrawn and not goal.is_settled))
+        ]
+
+    def _is_recent(self, goal: SentGoal) -> bool:
+        heard_s = max(goal.ended_s or 0.0, self._tracks[goal.id].heard_s)
+        return anyio.current_time() - heard_s < RECENT_S
+
+    def _give_to_open(self, server_id: str) -> None:
+        """Give an id to a goal under way that was sent before the id was seen."""
+        for goal in self.open_goals:
+            is_older = self._tracks[goal.id].n_seen <= self._seen.get(server_id, -1)
+            if goal.server_id is None and is_older:
+                goal.server_id = server_id
+                return
+
+    def _give_to_ended(self, server_id: str, state: ActionState) -> None:
+        """Give an id to a goal that has ended in the same way, or was to be cancelled."""
+        for goal in self._suspects():
+            end = self._tracks[goal.id].wire.end
+            told = STATES.get(end.status or 0) if end is not None else ActionState.CANCELLED
+            if told is state and (end is not None or goal.is_withdrawn):
+                self._resolve(goal, server_id)
+                return
+
+    def _resolve(self, goal: SentGoal, server_id: str) -> None:
+        """Give an id to a goal that is over; what it may have been is then known to be another."""
+        goal.server_id = server_id
+        self._note_life(goal)
+        if not self._suspects():
+            for track in [self._tracks[each.id] for each in self.open_goals]:
+                self._claim(self._seen_since(track))
+
+    async def _find_out(self, server_id: str) -> None:
+        """Cancel a goal that has appeared where it is one of ours that was withdrawn."""
+        begun_s = anyio.current_time()
+        for pause_s in SUSPECTED_S:
+            for goal in self._unresolved():
+                goal.through.cancel_goal(self._tracks[goal.id].wire)
+            await anyio.sleep(pause_s)
+            state = self._statuses.get(server_id, ActionState.CANCELLED)
+            is_late = anyio.current_time() - begun_s > UNNAMED_S
+            if state is ActionState.CANCELLING or (is_late and self._is_safety_first()):
+                for goal in self._unresolved()[:1]:
+                    self._resolve(goal, server_id)
+                break
+            if state.is_final:
+                self._give_to_ended(server_id, state)
+                break
+        else:
+            # No goal goes on for so long that the server has ended.
+            if not any(self._is_recent(goal) for goal in self._unresolved()):
+                self._give_to_open(server_id)
+        self._suspected.discard(server_id)
+        self._consider_all()
+
+    def _is_safety_first(self) -> bool:
+        """True where nothing else would end a goal that may be a withdrawn one."""
+        if any(goal.server_id is None for goal in self.open_goals):
+            # It may be the one that is wanted, and that is told as under way.
+            return False
+        return any(
+            (goal.state is ActionState.CANCELLED or self._tracks[goal.id].wire.is_lost)
+            and self._is_recent(goal)
+            for goal in self._unresolved()
+        )
+
+
+def _reason_of(values: Message | None, state: ActionState) -> str:
+    if state is ActionState.SUCCEEDED or values is None:
+        return ""
+    text, code = values.get("error_msg"), values.get("error_code")
+    if isinstance(text, str) and text.strip():
+        return text
+    return f"Its error code is {code}." if isinstance(code, int) and code else ""

@@ -1,0 +1,124 @@
+"""Goals for a robot that takes a pose on a topic and says nothing: its own pose has to tell."""
+
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+
+from mapspeak.geometry import Point, Pose
+from mapspeak.robot import GoalState, StampedPose
+from mapspeak.ros import RosConnection, new_id
+from mapspeak.ros.driving.driver import LATEST_S
+from mapspeak.ros.driving.record import GoalRecord
+from mapspeak.ros.messages import Dialect, FramedPose, write_pose_stamped
+
+ARRIVAL_M = 0.35
+"""Nav2 and move_base stop within 0.25 m by default, and the pose may be a step behind."""
+STANDING_M = 0.05
+GIVEN_UP_S = 20.0
+"""A robot that has stood still for so long has come as far as it could."""
+
+
+@dataclass(slots=True)
+class _Progress:
+    """Where the robot was when it last moved, and when."""
+
+    place: Point
+    since_s: float
+
+
+class GoalTopicDriver:
+    """Publishes goals and judges by the robot's pose what becomes of them.
+
+    Args:
+        connection: Connected to the robot.
+        topic: Takes geometry_msgs/PoseStamped.
+        dialect: Which ROS.
+        map_frame: In which goals are given.
+        fetch_pose: Tells where the robot is.
+        now_s: Tells robot time.
+    """
+
+    def __init__(
+        self,
+        connection: RosConnection,
+        topic: str,
+        *,
+        dialect: Dialect,
+        map_frame: str,
+        fetch_pose: Callable[[], Awaitable[StampedPose]],
+        now_s: Callable[[], float],
+    ) -> None:
+        self._connection = connection
+        self._topic = topic
+        self._dialect = dialect
+        self._map_frame = map_frame
+        self._fetch_pose = fetch_pose
+        self._now_s = now_s
+        self._current: GoalRecord | None = None
+        self._progress: _Progress | None = None
+        connection.advertise(topic, type_name=dialect.type_name("geometry_msgs/PoseStamped"))
+        connection.started.actions[topic] = self
+
+    @property
+    def is_busy(self) -> bool:
+        """True while a goal of ours is under way."""
+        return self._current is not None and not self._current.is_over
+
+    @property
+    def owners(self) -> frozenset[str]:
+        """None: whoever drives sees to the end."""
+        return frozenset()
+
+    @property
+    def foreign_goals(self) -> tuple[GoalState, ...]:
+        """Nothing: a topic for goals does not tell what became of them."""
+        return ()
+
+    async def send(self, goal: Pose) -> GoalRecord:
+        """Publishes a goal; nobody confirms it."""
+        record = GoalRecord(new_id(), goal)
+        self._connection.started.n_begun += 1
+        await self._publish(goal)
+        if self._current is not None:
+            self._current.end(GoalState.PREEMPTED, "A newer goal replaced it.")
+        self._current = record
+        self._progress = None
+        record.drive()
+        return record
+
+    async def look_at(self, record: GoalRecord) -> None:
+        """Judges by the robot's pose how the goal stands."""
+        if record is not self._current or record.is_over:
+            return
+        place = (await self._fetch_pose()).pose.point
+        left_m = place.distance_to(record.goal.point)
+        record.drive(distance_left_m=left_m)
+        stood_s = self._stood_for_s(place)
+        if left_m <= ARRIVAL_M and stood_s > 0.0:
+            record.end(GoalState.ARRIVED)
+        elif stood_s > GIVEN_UP_S:
+            record.end(
+                GoalState.BLOCKED,
+                f"The robot has stood still for {stood_s:.0f} s, {left_m:.2f} m from the goal.",
+            )
+
+    async def cancel(self, record: GoalRecord) -> None:
+        """Sends the robot to where it is; it has no other way to end a goal."""
+        if not record.is_over and record is self._current:
+            await self._publish((await self._fetch_pose()).pose)
+            record.end(GoalState.CANCELLED)
+
+    async def end(self) -> None:
+        """Sends the robot to where it is."""
+        await self._publish((await self._fetch_pose()).pose)
+        if self._current is not None:
+            self._current.end(GoalState.CANCELLED)
+
+    async def _publish(self, goal: Pose) -> None:
+        pose = FramedPose(pose=goal, frame_id=self._map_frame, stamp_s=LATEST_S)
+        await self._connection.publish(self._topic, write_pose_stamped(pose, dialect=self._dialect))
+
+    def _stood_for_s(self, place: Point) -> float:
+        now_s = self._now_s()
+        if self._progress is None or place.distance_to(self._progress.place) > STANDING_M:
+            self._progress = _Progress(place, now_s)
+        return max(now_s - self._progress.since_s, 0.0)

@@ -1,0 +1,5 @@
+"""A robot made of a ROS system: what it offers, its map, its goals, over any connection."""
+
+from mapspeak.ros.robot.robot import RosRobot, build_ros_robot
+
+__all__ = ["RosRobot", "build_ros_robot"]

@@ -1,0 +1,162 @@
+"""The robot's map: the whole of it once, and what changes."""
+
+from collections.abc import Mapping
+from contextlib import suppress
+
+import anyio.to_thread
+
+from mapspeak.errors import LinkError, MapspeakError
+from mapspeak.ros import LinkKind, RosConnection, Subscription
+from mapspeak.ros.discovery import RobotProfile
+from mapspeak.ros.discovery.parts import MAP as MAP_PART
+from mapspeak.ros.discovery.ranking import MAP, MAP_UPDATE
+from mapspeak.ros.messages import Message, apply_grid_update, read_grid, read_stamp
+from mapspeak.spatial import OccupancyGrid
+
+MAP_HINT = (
+    "Start SLAM or a map server (slam_toolbox, Cartographer, nav2_map_server; ROS 1: gmapping, "
+    "map_server)."
+)
+ROSBRIDGE_HINT = " A map of more than 10 MB needs rosbridge's max_message_size:=200000000."
+
+WAITS_S = (2.0, 4.0)
+"""For the first map, in wall time; between two waits it is asked for anew.
+
+A subscription made before the robot's side knew the publisher never gets the latched map.
+"""
+ROSBRIDGE_WAITS_S = (2.0, 3.0, 10.0)
+"""rosbridge writes large maps for many seconds."""
+IN_VAIN_S = 2.0
+"""For a map that nobody publishes, and for one that was waited for in vain before."""
+
+
+class MapKeeper:
+    """Keeps the latest map, and makes a value of it when somebody wants it.
+
+    Args:
+        connection: Connected to the robot.
+        profile: Says which topics.
+        waits_s: How long to wait for the first map before asking anew, in wall time; None for
+            what is usual over the connection.
+        in_vain_s: How long to wait when all that has passed.
+    """
+
+    def __init__(
+        self,
+        connection: RosConnection,
+        profile: RobotProfile,
+        *,
+        waits_s: tuple[float, ...] | None = None,
+        in_vain_s: float = IN_VAIN_S,
+    ) -> None:
+        self._connection = connection
+        self._profile = profile
+        is_bridged = connection.link.kind is LinkKind.ROSBRIDGE
+        usual_s = ROSBRIDGE_WAITS_S if is_bridged else WAITS_S
+        self._waits_s = (waits_s or usual_s) if MAP_PART.is_alive(profile) else ()
+        self._in_vain_s = in_vain_s
+        self._hint = MAP_HINT + (ROSBRIDGE_HINT if is_bridged else "")
+        self._maps: Subscription | None = None
+        self._updates: Subscription | None = None
+        self._n_waits = 0
+        self._n_read = 0
+        self._grid: OccupancyGrid | None = None
+        self.n_updates_refused = 0
+        """Updates that did not fit the map; the next whole map mends that."""
+
+    async def fetch(self) -> OccupancyGrid:
+        """Gives the latest map; the same value until it changes.
+
+        Raises:
+            LinkError: There is none, or it is none.
+            MapError: What came is no map.
+        """
+        maps = self._subscribe()
+        await self._wait_for_first(maps)
+        if maps.latest is not None and isinstance(maps.latest.get("data"), str):
+            # Base64 takes long enough to hold up a stop.
+            return await anyio.to_thread.run_sync(self._read_latest, maps)
+        return self._read_latest(maps)
+
+    def close(self) -> None:
+        """End the subscriptions."""
+        for subscription in (self._maps, self._updates):
+            if subscription is not None:
+                self._connection.unsubscribe(subscription)
+        self._maps = self._updates = None
+
+    def _subscribe(self) -> Subscription:
+        if self._maps is None:
+            topic = self._profile.map_topic
+            if topic is None:
+                raise LinkError(
+                    "The robot publishes no map (nav_msgs/OccupancyGrid).", hint=self._hint
+                )
+            self._maps = self._connection.subscribe(
+                topic,
+                type_name=self._profile.dialect.type_name(MAP),
+                is_bulky=True,
+            )
+            if self._profile.map_updates_topic is not None:
+                self._updates = self._connection.subscribe(
+                    self._profile.map_updates_topic,
+                    type_name=self._profile.dialect.type_name(MAP_UPDATE),
+                    is_bulky=True,
+                )
+                self._updates.listen(self._take_update)
+        return self._maps
+
+    async def _wait_for_first(self, maps: Subscription) -> None:
+        """Waits for the map, and asks anew as often as that is worth it.
+
+        The last one goes on however often it was waited for in vain: a map of 4000x4000 cells as
+        JSON takes rosbridge twenty seconds, and asking anew would begin them again.
+        """
+        while maps.latest is None and self._n_waits < len(self._waits_s):
+            if self._n_waits:
+                self._connection.renew(maps)
+            with suppress(LinkError):
+                await maps.wait_for_more_than(0, timeout_s=self._waits_s[self._n_waits])
+                return
+            self._n_waits += 1
+            if self._n_waits == len(self._waits_s):
+                raise self._silence(maps)
+        if maps.latest is None:
+            try:
+                await maps.wait_for_more_than(0, timeout_s=self._in_vain_s)
+            except LinkError:
+                raise self._silence(maps) from None
+
+    def _silence(self, maps: Subscription) -> LinkError:
+        nobody = "" if MAP_PART.is_alive(self._profile) else ": nobody publishes it"
+        return LinkError(
+            f"No map has come on {maps.topic} yet{nobody}.",
+            hint=f"{self._hint} We stay subscribed: ask again.",
+        )
+
+    @property
+    def stamp_s(self) -> float | None:
+        """Robot time of the latest map; None where there is none, or where it has no stamp."""
+        header = (self._maps.latest or {}).get("header") if self._maps else None
+        stamp = header.get("stamp") if isinstance(header, Mapping) else None
+        try:
+            return (read_stamp(stamp) or None) if isinstance(stamp, dict) else None
+        except LinkError:
+            return None
+
+    def _read_latest(self, maps: Subscription) -> OccupancyGrid:
+        if maps.latest is not None and (self._grid is None or self._n_read != maps.n_received):
+            self._grid = None
+            self._n_read = maps.n_received
+            self._grid = read_grid(maps.latest)
+        if self._grid is None:
+            raise LinkError("The robot's map is gone.", hint=self._hint)
+        return self._grid
+
+    def _take_update(self, message: Message) -> None:
+        if self._maps is None or self._maps.latest is None:
+            return
+        try:
+            self._grid = apply_grid_update(self._read_latest(self._maps), message)
+        except MapspeakError:
+            self.n_updates_refused += 1

@@ -1,0 +1,236 @@
+"""Where the robot believes it is, and what time it is for the robot."""
+
+from dataclasses import replace
+
+import anyio
+
+from mapspeak.errors import LinkError
+from mapspeak.robot import StampedPose
+from mapspeak.ros import RosConnection, Subscription
+from mapspeak.ros.discovery import PoseSource, RobotProfile
+from mapspeak.ros.discovery.profile import POSE_STAMPED, POSE_WITH_COVARIANCE
+from mapspeak.ros.messages import (
+    FramedPose,
+    Message,
+    read_pose_stamped,
+    read_pose_with_covariance,
+    read_stamp,
+)
+from mapspeak.ros.transforms import FrameListener
+
+STANDSTILL_S = 5.0
+"""Of the wall clock; a simulation that slow is paused or has ended."""
+FIRST_TICK_S = 1.0
+"""A clock topic that stays silent for so long is left over from something else."""
+ASK_AGAIN_S = 1.0
+"""Whoever could tell the time may be found only after we have connected."""
+EPSILON_S = 1e-6
+
+
+class RobotClock:
+    """Tells robot time, and waits for it.
+
+    Args:
+        connection: Connected to the robot.
+        standstill_s: Wall time after which a clock that does not move on stands still.
+    """
+
+    def __init__(self, connection: RosConnection, *, standstill_s: float = STANDSTILL_S) -> None:
+        self._connection = connection
+        self._standstill_s = standstill_s
+        self._offset_s: float | None = None
+        self._simulated_s: float | None = None
+        self._moved_on = anyio.Event()
+
+    @property
+    def now_s(self) -> float:
+        """Robot time."""
+        if self._simulated_s is not None:
+            return self._simulated_s
+        return anyio.current_time() + (self._offset_s or 0.0)
+
+    @property
+    def is_set(self) -> bool:
+        """True when the robot has said what time it is."""
+        return self._simulated_s is not None or self._offset_s is not None
+
+    async def start(self, clock_topic: str | None) -> None:
+        """Sets the clock by what the robot says now."""
+        await self._ask_the_time()
+        if clock_topic is not None:
+            self._connection.subscribe(clock_topic).listen(self._take)
+            with anyio.move_on_after(FIRST_TICK_S):
+                await self._moved_on.wait()
+
+    async def set_late(self) -> None:
+        """Ask until the robot has said what time it is; for the background."""
+        while not self.is_set:
+            await anyio.sleep(ASK_AGAIN_S)
+            await self._ask_the_time()
+
+    async def sleep(self, duration_s: float) -> None:
+        """Returns when that much robot time has passed.
+
+        Raises:
+            LinkError: The simulation's clock stands still.
+        """
+        if self._simulated_s is None:
+            await anyio.sleep(duration_s)
+            return
+        left_s, before_s = duration_s, self.now_s
+        while left_s > EPSILON_S:
+            await self._wait_for_tick()
+            # A clock that was set back, by a simulation begun anew, has not run backwards.
+            left_s -= max(self.now_s - before_s, 0.0)
+            before_s = self.now_s
+
+    async def _ask_the_time(self) -> None:
+        try:
+            robot_s = await self._connection.fetch_time_s()
+        except LinkError:
+            return
+        if robot_s is not None:
+            self._offset_s = robot_s - anyio.current_time()
+
+    async def _wait_for_tick(self) -> None:
+        with anyio.move_on_after(self._standstill_s):
+            await self._moved_on.wait()
+            return
+        raise LinkError(
+            f"The robot's simulated clock has stood still for {self._standstill_s:g} s.",
+            hint="Unpause the simulation, or check that /clock is still published.",
+        )
+
+    def _take(self, message: Message) -> None:
+        stamp = message.get("clock")
+        if not isinstance(stamp, dict):
+            return
+        before_s = self._simulated_s
+        try:
+            self._simulated_s = read_stamp(stamp)
+        except LinkError:
+            return
+        if self._simulated_s == before_s:
+            return
+        moved_on, self._moved_on = self._moved_on, anyio.Event()
+        moved_on.set()
+
+
+PATIENCE_S = 3.0
+SILENCE_S = 10.0
+
+
+class PoseKeeper:
+    """Tells the pose from the tree of frames, or from a topic where the tree does not reach.
+
+    Args:
+        connection: Connected to the robot.
+        profile: Says where the pose comes from.
+        frames: Listens to the tree.
+        silence_s: Without anything new from a source that speaks all the time, in wall time, after
+            which the pose is too old.
+    """
+
+    def __init__(
+        self,
+        connection: RosConnection,
+        profile: RobotProfile,
+        frames: FrameListener,
+        *,
+        silence_s: float = SILENCE_S,
+    ) -> None:
+        self._connection = connection
+        self._silence_s = silence_s
+        self._profile = profile
+        self._frames = frames
+        self._topic: Subscription | None = None
+        if profile.pose_topic is not None:
+            type_name = profile.dialect.type_name(profile.pose_type or POSE_WITH_COVARIANCE)
+            self._topic = connection.subscribe(profile.pose_topic, type_name=type_name)
+
+    def close(self) -> None:
+        """End the subscription."""
+        if self._topic is not None:
+            self._connection.unsubscribe(self._topic)
+
+    async def fetch(self, *, timeout_s: float = PATIENCE_S) -> StampedPose:
+        """Gives the latest pose in the map frame; waits for the first.
+
+        Raises:
+            LinkError: The robot does not say where it is.
+        """
+        with anyio.move_on_after(timeout_s):
+            while True:
+                try:
+                    return self.latest
+                except LinkError:
+                    await self._wait_for_news()
+        return self.latest
+
+    @property
+    def latest(self) -> StampedPose:
+        """The latest pose in the map frame.
+
+        Raises:
+            LinkError: The robot has not said where it is.
+        """
+        if self._topic is None:
+            return self._from_frames(self._profile.base_frame)
+        if self._topic.latest is None:
+            raise LinkError(
+                f"No pose has come on {self._topic.topic}.",
+                hint="Start localisation (AMCL, slam_toolbox), or name another pose_topic in "
+                "robot.yaml.",
+            )
+        return self._from_topic(self._topic, self._topic.latest)
+
+    def _from_frames(self, frame: str) -> StampedPose:
+        found = self._frames.tree.find(outer=self._profile.map_frame, inner=frame)
+        silent_s = self._measure_silence(self._frames.arrived_s, what="transform")
+        return StampedPose(found.outer_from_inner, found.stamp_s, silent_s=silent_s)
+
+    def _measure_silence(self, arrived_s: float | None, *, what: str) -> float:
+        """Return the wall time since the source of the pose said anything new.
+
+        Raises:
+            LinkError: It is too long ago.
+        """
+        if arrived_s is None:
+            return 0.0
+        silent_s = max(anyio.current_time() - arrived_s, 0.0)
+        if silent_s > self._silence_s:
+            raise LinkError(
+                f"The robot's pose is old: no {what} has come for {silent_s:.0f} s.",
+                hint="Check that SLAM or localisation and the robot's drivers still run, and that "
+                "a simulation is not paused.",
+            )
+        return silent_s
+
+    def _from_topic(self, topic: Subscription, message: Message) -> StampedPose:
+        framed = self._read(message)
+        outer = self._profile.map_frame
+        is_on_map = framed.frame_id in ("", outer)
+        if not is_on_map and self._frames.has_way(outer=outer, inner=framed.frame_id):
+            outer_from_frame = self._from_frames(framed.frame_id)
+            return replace(
+                outer_from_frame,
+                pose=outer_from_frame.pose @ framed.pose,
+                stamp_s=framed.stamp_s,
+            )
+        if self._profile.pose_source is not PoseSource.ODOMETRY:
+            # Localisation speaks when the robot has moved: its silence says nothing.
+            return StampedPose(framed.pose, framed.stamp_s)
+        # Odometry without a map has no other frame: it is taken for the map's.
+        silent_s = self._measure_silence(topic.arrived_s, what="odometry")
+        return StampedPose(framed.pose, framed.stamp_s, silent_s=silent_s, is_odometry=True)
+
+    def _read(self, message: Message) -> FramedPose:
+        if self._profile.pose_type == POSE_STAMPED:
+            return read_pose_stamped(message)
+        return read_pose_with_covariance(message)
+
+    async def _wait_for_news(self) -> None:
+        if self._topic is None:
+            await self._frames.wait_for_news()
+        else:
+            await self._topic.wait_for_more_than(self._topic.n_received, timeout_s=PATIENCE_S)

@@ -1,0 +1,346 @@
+"""The port implemented over any connection to ROS 1 or ROS 2."""
+
+from collections import OrderedDict
+from contextlib import suppress
+from functools import partial
+
+from mapspeak.errors import GoalError, LinkError
+from mapspeak.geometry import Pose
+from mapspeak.robot import (
+    CameraPicture,
+    Detection,
+    GoalState,
+    GoalStatus,
+    RangeScan,
+    RobotDescription,
+    StampedPose,
+)
+from mapspeak.ros import RosConnection
+from mapspeak.ros.discovery import (
+    FRAMES_S,
+    NavigationKind,
+    RobotOverrides,
+    RobotProfile,
+    RobotWatch,
+)
+from mapspeak.ros.discovery.parts import (
+    CAMERA,
+    LASER,
+    MAP,
+    NAVIGATION,
+    POSE,
+    RADIUS,
+    VELOCITY,
+    Part,
+)
+from mapspeak.ros.driving import (
+    MOVE_BASE,
+    NAV2,
+    ActionDriver,
+    Driver,
+    DrivingPatience,
+    GoalRecord,
+    GoalTopicDriver,
+)
+from mapspeak.ros.robot.camera import Camera
+from mapspeak.ros.robot.laser import Laser
+from mapspeak.ros.robot.maps import MapKeeper
+from mapspeak.ros.robot.poses import PoseKeeper, RobotClock
+from mapspeak.ros.robot.stopping import stop_everything
+from mapspeak.ros.robot.velocity import Brake
+from mapspeak.ros.transforms import FrameListener
+from mapspeak.spatial import OccupancyGrid
+
+MOST_GOALS_KEPT = 1_000
+USUAL_PATIENCE = DrivingPatience()
+NOTHING_SAID = RobotOverrides()
+
+
+class RosRobot:
+    """A `Robot` that speaks ROS.
+
+    Args:
+        connection: Connected to the robot.
+        watch: Has looked at the robot, and goes on while something is missing.
+        frames: Listens to its coordinate frames.
+        clock: Tells its time.
+        patience: How long to wait for what it offers, and for its navigation.
+    """
+
+    def __init__(
+        self,
+        connection: RosConnection,
+        watch: RobotWatch,
+        *,
+        frames: FrameListener,
+        clock: RobotClock,
+        patience: DrivingPatience = USUAL_PATIENCE,
+    ) -> None:
+        self.connection = connection
+        self._watch = watch
+        self._frames = frames
+        self._clock = clock
+        self._patience = patience
+        self._goals: OrderedDict[str, GoalRecord] = OrderedDict()
+        self._n_sending = 0
+        profile = watch.profile
+        self._maps = MapKeeper(connection, profile)
+        self._camera = self._build_camera()
+        self._laser = self._build_laser()
+        self._poses = PoseKeeper(connection, profile, frames)
+        self._brake = self._build_brake()
+        self._driver = self._build_driver()
+        watch.is_driving = self._is_driving
+        watch.on_change = self._take_change
+
+    @property
+    def profile(self) -> RobotProfile:
+        """What the robot offers, as far as it has been found."""
+        return self._watch.profile
+
+    @property
+    def description(self) -> RobotDescription:
+        """What is fixed about this robot."""
+        return RobotDescription(
+            name=self.profile.name,
+            radius_m=self.profile.radius_m,
+            map_name=self.profile.map_name,
+            has_camera=CAMERA.is_alive(self.profile),
+            has_laser=LASER.is_alive(self.profile),
+            detector=None,
+            map_frame=self.profile.map_frame,
+        )
+
+    @property
+    def map_age_s(self) -> float | None:
+        """Since the stamp of the latest map; None where that is not known."""
+        stamp_s = self._maps.stamp_s
+        if stamp_s is None or not self._clock.is_set:
+            return None
+        return max(self.now_s - stamp_s, 0.0)
+
+    @property
+    def now_s(self) -> float:
+        """Robot time: that of /clock in a simulation, else of the robot's own clock."""
+        return self._clock.now_s
+
+    async def sleep(self, duration_s: float) -> None:
+        """Returns when that much robot time has passed."""
+        await self._clock.sleep(duration_s)
+
+    async def fetch_map(self) -> OccupancyGrid:
+        """Gives the latest map; the same value as long as it has not changed."""
+        await self.connection.wait_until_connected()
+        await self._watch.find(MAP)
+        # Where the robot fits on it depends on that.
+        await self._watch.wait_for(RADIUS)
+        return await self._maps.fetch()
+
+    async def fetch_pose(self) -> StampedPose:
+        """Gives where the robot believes it is; see the profile for how it is known."""
+        await self.connection.wait_until_connected()
+        await self._watch.wait_for(POSE)
+        return await self._poses.fetch()
+
+    async def fetch_picture(self) -> CameraPicture:
+        """Takes a picture with the front camera."""
+        await self.connection.wait_until_connected()
+        await self._watch.find(CAMERA)
+        picture = await self._camera.fetch()
+        here = await self._poses.fetch()
+        return CameraPicture(
+            data=picture.data,
+            media_type=picture.media_type,
+            width_px=picture.width_px,
+            height_px=picture.height_px,
+            horizontal_fov_rad=await self._camera.fetch_fov_rad(),
+            pose=here.pose,
+            stamp_s=picture.stamp_s,
+            pose_doubt=here.find_doubt(self.now_s),
+        )
+
+    async def fetch_detections(self) -> tuple[Detection, ...]:
+        """Gives nothing: no message for detections is common to robots."""
+        return ()
+
+    async def fetch_scan(self) -> RangeScan | None:
+        """Gives a scan of the laser that arrives after it was asked for; None where none does."""
+        return await self._laser.fetch(self._poses)
+
+    async def send_goal(self, goal: Pose) -> str:
+        """Starts a drive; returns when navigation has taken or refused it."""
+        await self.connection.wait_until_connected()
+        await self._watch.find(NAVIGATION)
+        # Whoever drives may have to stop before long.
+        self.connection.advertise_early()
+        self._n_sending += 1
+        try:
+            record = await self._wanted_driver().send(goal)
+        finally:
+            self._n_sending -= 1
+        self._goals[record.goal_id] = record
+        while len(self._goals) > MOST_GOALS_KEPT:
+            self._goals.popitem(last=False)
+        return record.goal_id
+
+    async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
+        """Gives how a drive stands, also long after its end and after a reconnection."""
+        record = self._record(robot_goal_id)
+        if not record.is_over:
+            await self.connection.wait_until_connected()
+            await self._wanted_driver().look_at(record)
+        return record.status
+
+    async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
+        """Gives how goals stand that other clients have sent, as far as navigation tells."""
+        return () if self._driver is None else self._driver.foreign_goals
+
+    async def cancel_goal(self, robot_goal_id: str) -> None:
+        """Asks navigation to end a drive, and waits a moment until it has."""
+        record = self._record(robot_goal_id)
+        if not record.is_over:
+            await self.connection.wait_until_connected()
+            await self._wanted_driver().cancel(record)
+
+    async def stop(self) -> None:
+        """Ends all that we have started, and every drive of others; commands zero velocity.
+
+        Raises:
+            LinkError: Names what could not be told, or goes on.
+        """
+        if not self.connection.is_open:
+            await self.connection.wait_until_connected()
+        self._brake.pull()
+        if self._driver is None:
+            # Others may have sent goals to a navigation that we have not found yet.
+            brake = self._brake
+            with suppress(LinkError):
+                await self._watch.look()
+            if self._brake is not brake:
+                self._brake.pull()
+        await stop_everything(self.connection, brake=self._brake)
+
+    async def settle(self) -> None:
+        """Return when all that the robot offers counts as found."""
+        await self._watch.settle()
+
+    def _is_driving(self) -> bool:
+        is_under_way = any(not record.is_over for record in self._goals.values())
+        return is_under_way or self._n_sending > 0
+
+    def _take_change(self, before: RobotProfile) -> None:
+        """Use what has been found since; what has stayed the same goes on being used."""
+        now = self.profile
+
+        def is_new(part: Part) -> bool:
+            return part.values(before) != part.values(now)
+
+        if is_new(MAP):
+            self._maps.close()
+            self._maps = MapKeeper(self.connection, now)
+        if is_new(CAMERA):
+            self._camera = self._build_camera()
+        if is_new(LASER) or is_new(POSE):
+            self._laser = self._build_laser()
+        if is_new(POSE):
+            self._poses.close()
+            self._poses = PoseKeeper(self.connection, now, self._frames)
+        if is_new(VELOCITY):
+            self._brake = self._build_brake()
+        is_elsewhere = now.map_frame != before.map_frame and not self._is_driving()
+        if is_new(NAVIGATION) or is_elsewhere:
+            self._driver = self._build_driver()
+        if now.clock_topic != before.clock_topic:
+            self.connection.start_soon(partial(self._clock.start, now.clock_topic))
+
+    def _build_camera(self) -> Camera:
+        camera = Camera(self.connection, self.profile)
+        self.connection.start_soon(camera.close_when_idle)
+        return camera
+
+    def _build_laser(self) -> Laser:
+        laser = Laser(self.connection, self.profile, frames=self._frames, clock=self._clock)
+        self.connection.start_soon(laser.close_when_idle)
+        return laser
+
+    def _build_brake(self) -> Brake:
+        return Brake(self.connection, self.profile, latest_pose=lambda: self._poses.latest)
+
+    def _stand(self) -> None:
+        """Stops the base itself: whoever drove it has gone, and some keep to the last velocity."""
+        self._brake.pull()
+
+    def _build_driver(self) -> Driver | None:
+        profile, name = self.profile, self.profile.navigation_name
+        if name is None:
+            return None
+        match profile.navigation:
+            case NavigationKind.NAV2 | NavigationKind.MOVE_BASE:
+                return ActionDriver(
+                    self.connection,
+                    name,
+                    NAV2 if profile.navigation is NavigationKind.NAV2 else MOVE_BASE,
+                    map_frame=profile.map_frame,
+                    patience=self._patience,
+                    on_lost=self._stand,
+                )
+            case NavigationKind.GOAL_TOPIC:
+                return GoalTopicDriver(
+                    self.connection,
+                    name,
+                    dialect=profile.dialect,
+                    map_frame=profile.map_frame,
+                    fetch_pose=self.fetch_pose,
+                    now_s=lambda: self.now_s,
+                )
+            case NavigationKind.NONE:
+                return None
+
+    def _wanted_driver(self) -> Driver:
+        if self._driver is None:
+            raise LinkError(
+                "The robot offers no navigation.",
+                hint="Start Nav2 (ROS 1: move_base) on the robot, or name `navigation` and "
+                "`navigation_name` in robot.yaml.",
+            )
+        return self._driver
+
+    def _record(self, robot_goal_id: str) -> GoalRecord:
+        record = self._goals.get(robot_goal_id)
+        if record is None:
+            raise GoalError(
+                f"No goal with the id {robot_goal_id[:80]!r} was sent over this link.",
+                hint="Use the id that sending the goal gave.",
+            )
+        return record
+
+
+async def build_ros_robot(
+    connection: RosConnection,
+    *,
+    overrides: RobotOverrides = NOTHING_SAID,
+    patience: DrivingPatience = USUAL_PATIENCE,
+    frames_s: float = FRAMES_S,
+) -> RosRobot:
+    """Gives the robot at the other end of a connection, once it has said what it offers.
+
+    Args:
+        connection: To the robot; stays open as long as the robot is used.
+        overrides: What robot.yaml says.
+        patience: Time limits for what it offers, and of navigation.
+        frames_s: How long to wait for its frames, in wall time.
+
+    Raises:
+        LinkError: The robot does not say what it offers.
+    """
+    # Whether it is to be driven or only watched, whoever uses it says.
+    connection.advertise_late()
+    frames = FrameListener(connection)
+    clock = RobotClock(connection)
+    watch = RobotWatch(connection, frames, overrides, settling_s=patience.settling_s)
+    await watch.begin(frames_s=frames_s)
+    await clock.start(watch.profile.clock_topic)
+    robot = RosRobot(connection, watch, frames=frames, clock=clock, patience=patience)
+    connection.start_soon(watch.run)
+    connection.start_soon(clock.set_late)
+    return robot

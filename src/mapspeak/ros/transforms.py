@@ -1,0 +1,199 @@
+"""The tree of coordinate frames that ROS keeps in /tf and /tf_static, as far as it was heard."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import anyio
+
+from mapspeak.errors import LinkError
+from mapspeak.geometry import Pose
+from mapspeak.ros import RosConnection, Subscription
+from mapspeak.ros.messages import Dialect, FrameTransform, Message, read_transforms
+
+MAX_FRAMES = 10_000
+CLOCK_JUMP_S = 10.0
+"""A transform this much older than the last one is no latecomer: the robot's clock was set back."""
+TF_HINT = (
+    "Start SLAM or localisation (slam_toolbox, Cartographer, AMCL, gmapping) and the robot's "
+    "drivers; `ros2 run tf2_tools view_frames` (ROS 1: `rosrun tf view_frames`) draws the tree."
+)
+
+
+@dataclass(frozen=True, slots=True)
+class FoundTransform:
+    """Where a frame lies in another.
+
+    Attributes:
+        outer_from_inner: The inner frame's pose in the outer one.
+        stamp_s: Robot time of the oldest part that moves; 0 where nothing moves.
+    """
+
+    outer_from_inner: Pose
+    stamp_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Known:
+    transform: FrameTransform
+    is_static: bool
+
+
+class TransformTree:
+    """The newest transform of each frame to its parent."""
+
+    def __init__(self) -> None:
+        self._to_parent: dict[str, _Known] = {}
+
+    @property
+    def frames(self) -> frozenset[str]:
+        """All frames that have been heard of."""
+        parents = (known.transform.parent for known in self._to_parent.values())
+        return frozenset(self._to_parent) | frozenset(parents)
+
+    def take(self, transforms: Iterable[FrameTransform], *, is_static: bool) -> bool:
+        """Keep transforms, and return whether any of them says something new.
+
+        Each is kept unless a newer one of the same frame is known.
+        """
+        is_news = False
+        for transform in transforms:
+            known = self._to_parent.get(transform.child)
+            if known is None and len(self._to_parent) >= MAX_FRAMES:
+                continue
+            if known is None or not _is_latecomer(transform, known):
+                is_news = is_news or known is None or known.transform != transform
+                self._to_parent[transform.child] = _Known(transform, is_static)
+        return is_news
+
+    def find(self, *, outer: str, inner: str) -> FoundTransform:
+        """Gives where a frame lies in one that is above it in the tree.
+
+        Raises:
+            LinkError: There is no such way, or it goes round in a circle.
+        """
+        outer_from_inner = Pose(0.0, 0.0, 0.0)
+        stamps: list[float] = []
+        for known in self._way_up(outer=outer, inner=inner):
+            outer_from_inner = known.transform.parent_from_child @ outer_from_inner
+            if not known.is_static:
+                stamps.append(known.transform.stamp_s)
+        return FoundTransform(outer_from_inner, min(stamps, default=0.0))
+
+    def find_ways(
+        self, one: str, other: str
+    ) -> tuple[tuple[FrameTransform, ...], tuple[FrameTransform, ...]]:
+        """Gives the transforms from each of two frames up to the first that both lie in.
+
+        Raises:
+            LinkError: They lie in no common frame.
+        """
+        above = [one]
+        while (known := self._to_parent.get(above[-1])) and known.transform.parent not in above:
+            above.append(known.transform.parent)
+        for outer in above:
+            try:
+                up = self._way_up(outer=outer, inner=other)
+            except LinkError:
+                continue
+            own = self._way_up(outer=outer, inner=one)
+            return tuple(k.transform for k in own), tuple(k.transform for k in up)
+        raise self._gap(outer=one, passed=[other])
+
+    def _way_up(self, *, outer: str, inner: str) -> list[_Known]:
+        way: list[_Known] = []
+        passed = [inner]
+        while passed[-1] != outer:
+            known = self._to_parent.get(passed[-1])
+            if known is None:
+                raise self._gap(outer=outer, passed=passed)
+            if known.transform.parent in passed:
+                circle = " -> ".join([*passed, known.transform.parent])
+                raise LinkError(
+                    f"The robot's TF tree goes round in a circle: {circle}.",
+                    hint="Two nodes publish contradicting transforms: stop one of them.",
+                )
+            way.append(known)
+            passed.append(known.transform.parent)
+        return way
+
+    def _gap(self, *, outer: str, passed: list[str]) -> LinkError:
+        frames = self.frames
+        if not frames:
+            return LinkError("The robot publishes no TF transforms.", hint=TF_HINT)
+        for name in (outer, passed[0]):
+            if name not in frames:
+                known = ", ".join(sorted(frames)[:12])
+                return LinkError(
+                    f"The robot's TF tree has no frame {name!r}; it has {known}.", hint=TF_HINT
+                )
+        return LinkError(
+            f"The robot's TF tree has a gap: from {passed[0]!r} it reaches {passed[-1]!r} and not "
+            f"{outer!r}.",
+            hint=TF_HINT,
+        )
+
+
+def _is_latecomer(transform: FrameTransform, known: _Known) -> bool:
+    behind_s = known.transform.stamp_s - transform.stamp_s
+    return 0.0 < behind_s < CLOCK_JUMP_S
+
+
+class FrameListener:
+    """Keeps a tree of frames up to date from /tf and /tf_static.
+
+    Neither is throttled: that would drop whole transforms, not repetitions of one.
+
+    Args:
+        connection: Connected to the robot.
+    """
+
+    def __init__(self, connection: RosConnection) -> None:
+        self.tree = TransformTree()
+        self.arrived_s: float | None = None
+        """When something new was told of one that moves, by the event loop's clock; None before."""
+        self.n_refused = 0
+        """Messages that were no transforms."""
+        self._connection = connection
+        self._subscriptions: dict[str, Subscription] = {}
+        self._news = anyio.Event()
+
+    def listen(self, moving_topic: str, static_topic: str, *, dialect: Dialect) -> None:
+        """Subscribe to both topics, also before anybody publishes them, and to no others."""
+        wanted = {moving_topic: self._take_moving, static_topic: self._take_static}
+        for topic in self._subscriptions.keys() - wanted.keys():
+            self._connection.unsubscribe(self._subscriptions.pop(topic))
+        type_name = dialect.type_name("tf2_msgs/TFMessage")
+        for topic, take in wanted.items():
+            if topic not in self._subscriptions:
+                subscription = self._connection.subscribe(topic, type_name=type_name)
+                subscription.listen(take)
+                self._subscriptions[topic] = subscription
+
+    def has_way(self, *, outer: str, inner: str) -> bool:
+        """True when the tree leads from one frame to the other."""
+        try:
+            self.tree.find(outer=outer, inner=inner)
+        except LinkError:
+            return False
+        return True
+
+    async def wait_for_news(self) -> None:
+        """Returns after the next message."""
+        await self._news.wait()
+
+    def _take_moving(self, message: Message) -> None:
+        self._take(message, is_static=False)
+
+    def _take_static(self, message: Message) -> None:
+        self._take(message, is_static=True)
+
+    def _take(self, message: Message, *, is_static: bool) -> None:
+        try:
+            transforms = read_transforms(message)
+        except LinkError:
+            self.n_refused += 1
+            return
+        if self.tree.take(transforms, is_static=is_static) and not is_static:
+            self.arrived_s = anyio.current_time()
+        news, self._news = self._news, anyio.Event()
+        news.set()
