@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from mapspeak.links.ros2.fields import fields_of
+from mapspeak.links.ros2.fields import write_definition
 from mapspeak.links.ros2.types import KINDS, find_class
 from mapspeak.ros.definitions import ACTION_PARTS, SERVICE_PARTS, TypeBook, split_parts
 from mapspeak.ros.messages import bare_type
@@ -53,7 +53,7 @@ def _texts_of(bare: str, kind: str) -> Mapping[str, str]:
     text = _read_file(found, bare, kind)
     if text is not None and split_parts(bare, text).keys() == parts.keys():
         return split_parts(bare, text)
-    return {name: _write_text(part) for name, part in parts.items()}
+    return {name: write_definition(part) for name, part in parts.items()}
 
 
 def _read_file(found: Any, bare: str, kind: str) -> str | None:  # noqa: ANN401 - rclpy has no types
@@ -64,8 +64,3 @@ def _read_file(found: Any, bare: str, kind: str) -> str | None:  # noqa: ANN401 
         if path.is_file():
             return path.read_text(encoding="utf-8")
     return None
-
-
-def _write_text(message_class: Any) -> str:  # noqa: ANN401 - likewise
-    fields = fields_of(message_class)
-    return "\n".join(f"{kind.definition} {name}" for name, kind in fields.items())

@@ -64,6 +64,12 @@ def fields_of(message_class: Any) -> dict[str, FieldType]:  # noqa: ANN401 - rcl
     }
 
 
+def write_definition(message_class: Any) -> str:  # noqa: ANN401 - likewise
+    """Return the definition of a class of messages, as far as rclpy tells it."""
+    fields = fields_of(message_class)
+    return "\n".join(f"{kind.definition} {name}" for name, kind in fields.items())
+
+
 def _read_type(text: str) -> FieldType:
     found = FIELD.fullmatch(text)
     if found is None:

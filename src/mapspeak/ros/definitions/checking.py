@@ -67,7 +67,8 @@ def _check_field(book: TypeBook, field: Field, value: object, *, path: str, dept
         return _check_value(book, field, value, path=path, depth=depth)
     n_values = _count(field, value)
     if n_values is None:
-        raise _misfit(path, f"a list ({field.shown_type})", value)
+        or_bytes = ", or bytes in base64" if field.type in BYTES else ""
+        raise _misfit(path, f"a list ({field.shown_type}){or_bytes}", value)
     _check_length(field, n_values, path)
     if isinstance(value, np.ndarray):
         return _check_array(book, field, value, path=path)

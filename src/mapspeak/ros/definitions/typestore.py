@@ -60,9 +60,10 @@ def look_up(book: TypeBook, name: str, *, above: tuple[str, ...]) -> MessageType
     Raises:
         LinkError: It is not known, or holds itself.
     """
-    if not book.knows(name) or bare_type(name) in above or len(above) > MOST_NESTED:
+    bare = bare_type(name)
+    if not book.knows(name) or bare in above or len(above) > MOST_NESTED:
         raise LinkError(
-            f"We do not know what a {bare_type(name)[:80]} looks like.",
+            f"We do not know what a {bare[:80]} looks like.",
             hint="Robots of ROS 2 Jazzy and later tell it for topics; for others take rosbridge, "
             "or give its definition where a tool asks for one.",
         )
