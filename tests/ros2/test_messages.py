@@ -87,7 +87,11 @@ def test_an_empty_message_has_no_fields() -> None:
         ("std_msgs/msg/String", {"data": "\ud800"}, "data wants a text"),
         ("std_msgs/msg/String", {"data": None}, "data wants a text"),
         ("sensor_msgs/msg/CameraInfo", {"k": [1.0]}, "k has 1 values; its type is float64.9."),
-        ("sensor_msgs/msg/Image", {"data": "!"}, "data wants a list .uint8....?, or bytes in base64"),
+        (
+            "sensor_msgs/msg/Image",
+            {"data": "!"},
+            "data wants .*bytes in base64",
+        ),
         ("sensor_msgs/msg/LaserScan", {"ranges": [1.0, float("nan")]}, r"ranges\[1\] wants a fin"),
         ("sensor_msgs/msg/LaserScan", {"ranges": np.array([np.inf])}, "ranges wants a finite"),
         ("sensor_msgs/msg/LaserScan", {"ranges": 1.0}, "ranges wants a list"),
