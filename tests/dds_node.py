@@ -18,6 +18,7 @@ from cyclonedds.qos import Policy, Qos
 
 from mapspeak.links.dds import DdsConnection, DdsTiming, open_dds_connection
 from mapspeak.links.dds.cdr import HEADER_BYTES
+from mapspeak.links.dds.connection import LONG_NODES_TYPE
 from mapspeak.links.dds.definitions import build_type_book
 from mapspeak.links.dds.discovery import Framing
 from mapspeak.links.dds.endpoints import Inlet, Outlet, Quality, Sample
@@ -29,7 +30,7 @@ from mapspeak.links.dds.names import (
 )
 from mapspeak.links.dds.network import DdsNetwork
 from mapspeak.links.dds.participant import Participant
-from mapspeak.links.dds.types import Types
+from mapspeak.links.dds.types import HUMBLE, Types
 from mapspeak.ros.definitions import hash_type
 
 RELIABLE = Quality(is_reliable=True, is_latched=False, depth=10)
@@ -37,6 +38,7 @@ LATCHED = Quality(is_reliable=True, is_latched=True, depth=10)
 BEST_EFFORT = Quality(is_reliable=False, is_latched=False, depth=10)
 QUICK = DdsTiming(quiet_s=0.05)
 SET_BOOL = "std_srvs/srv/SetBool"
+GID_BYTES, LONG_GID_BYTES = 16, 24
 NUMBER_BYTES = struct.calcsize("<Qq")
 
 Request = dict[str, Any]
@@ -79,7 +81,8 @@ class DdsNode:
     Args:
         network: Where.
         name: Its own.
-        distro: Of ROS 2, whose types it has; empty for a node that tells no hashes of them.
+        distro: Of ROS 2, whose types it has; empty for a node that tells no hashes of them. One of
+            Humble tells none either, and has longer ids.
 
     Attributes:
         heard: What came on each topic it listens to.
@@ -90,7 +93,8 @@ class DdsNode:
         self.name = name
         self.participant = Participant(network)
         self.types = Types(distro=distro)
-        self._book = build_type_book(distro) if distro else None
+        self._has_long_ids = distro == HUMBLE
+        self._book = build_type_book(distro) if distro and not self._has_long_ids else None
         self.heard: dict[str, list[Request]] = {}
         self._outlets: dict[str, tuple[str, Outlet]] = {}
         self._inlets: list[Inlet] = []
@@ -174,14 +178,15 @@ class DdsNode:
         node = {
             "node_namespace": namespace or "/",
             "node_name": last,
-            "reader_gid_seq": [{"data": reader.guid.bytes} for reader in readers],
-            "writer_gid_seq": [{"data": writer.guid.bytes} for writer in writers],
+            "reader_gid_seq": [self._gid(reader.guid.bytes) for reader in readers],
+            "writer_gid_seq": [self._gid(writer.guid.bytes) for writer in writers],
         }
-        message = {
-            "gid": {"data": self.participant.key.ljust(16, b"\x00")},
-            "node_entities_info_seq": [node],
-        }
-        self._introduction.write(self.types.encode(DISCOVERY_TYPE, message))
+        message = {"gid": self._gid(self.participant.key), "node_entities_info_seq": [node]}
+        type_name = LONG_NODES_TYPE if self._has_long_ids else DISCOVERY_TYPE
+        self._introduction.write(self.types.encode(type_name, message))
+
+    def _gid(self, key: bytes) -> Request:
+        return {"data": key.ljust(LONG_GID_BYTES if self._has_long_ids else GID_BYTES, b"\x00")}
 
     def _hashed(self, quality: Quality, type_name: str) -> Quality:
         if self._book is None:

@@ -1,7 +1,8 @@
 """Types that differ from one distribution of ROS 2 to the next: the robot's own are found."""
 
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
+from functools import partial
 from typing import Any
 
 import anyio
@@ -56,45 +57,78 @@ def test_a_service_is_found_by_the_hash_of_its_request() -> None:
     assert types.definitions(name) == {each: book.texts[each] for each in types.definitions(name)}
 
 
+def serve_action(
+    node: DdsNode,
+    name: str,
+    action_type: str,
+    take: Callable[[Request], None],
+    result: Request | None = None,
+) -> None:
+    """Serves an action whose goals are reached at once."""
+
+    def accept(request: Request, reply: Reply) -> None:
+        take(request)
+        reply({"accepted": True})
+
+    def finish(_request: Request, reply: Reply) -> None:
+        reply({"status": SUCCEEDED, "result": result or {}})
+
+    node.advertise(f"{name}/_action/feedback", f"{action_type}_FeedbackMessage")
+    node.advertise(f"{name}/_action/status", "action_msgs/msg/GoalStatusArray")
+    node.serve(f"{name}/_action/send_goal", f"{action_type}_SendGoal", accept)
+    node.serve(f"{name}/_action/get_result", f"{action_type}_GetResult", finish)
+    node.serve(
+        f"{name}/_action/cancel_goal",
+        "action_msgs/srv/CancelGoal",
+        lambda _request, reply: reply({}),
+    )
+
+
 @asynccontextmanager
 async def open_spinner(distro: str) -> AsyncGenerator[tuple[list[Request], DdsConnection]]:
     """A robot that turns at once, and says that it took a second."""
     network = some_network()
     taken: list[Request] = []
 
-    def serve(node: DdsNode) -> None:
-        def accept(request: Request, reply: Reply) -> None:
-            taken.append(request)
-            reply({"accepted": True})
-
-        def finish(_request: Request, reply: Reply) -> None:
-            reply({"status": SUCCEEDED, "result": {"total_elapsed_time": {"sec": 1}}})
-
-        node.advertise(f"{SPIN}/_action/feedback", f"{SPIN_TYPE}_FeedbackMessage")
-        node.advertise(f"{SPIN}/_action/status", "action_msgs/msg/GoalStatusArray")
-        node.serve(f"{SPIN}/_action/send_goal", f"{SPIN_TYPE}_SendGoal", accept)
-        node.serve(f"{SPIN}/_action/get_result", f"{SPIN_TYPE}_GetResult", finish)
-        node.serve(
-            f"{SPIN}/_action/cancel_goal",
-            "action_msgs/srv/CancelGoal",
-            lambda _request, reply: reply({}),
-        )
-
     async with open_dds_node(network, distro=distro) as node:
-        serve(node)
+        result = {"total_elapsed_time": {"sec": 1}}
+        serve_action(node, SPIN, SPIN_TYPE, taken.append, result)
         async with open_here(network) as connection:
             yield taken, connection
 
 
-@pytest.mark.parametrize("distro", [distro for distro in DISTROS if distro != "humble"])
+@pytest.mark.parametrize("distro", DISTROS)
 async def test_a_robot_of_each_distribution_spins(distro: str) -> None:
     async with open_spinner(distro) as (taken, connection):
         goal = await connection.send_goal(SPIN, {"target_yaw": 1.5}, type_name=SPIN_TYPE)
         ended = await until_over(goal)
     (request,) = taken
     assert request["goal"]["target_yaw"] == 1.5
-    assert ("disable_collision_checks" in request["goal"]) is (distro != "jazzy")
+    assert ("disable_collision_checks" in request["goal"]) is (distro in ("kilted", "lyrical"))
     assert ended["total_elapsed_time"] == {"sec": 1, "nanosec": 0}
+
+
+async def test_every_action_of_nav2_runs_on_a_robot_of_humble() -> None:
+    book, network = build_type_book("humble"), some_network()
+    actions = {f"/{action.rpartition('/')[2].lower()}": action for action in actions_of("humble")}
+    taken: dict[str, Request] = {}
+    async with open_dds_node(network, distro="humble") as node:
+        for name, action in actions.items():
+            full = action.replace("/", "/action/")
+            serve_action(node, name, full, partial(taken.__setitem__, action))
+        async with open_here(network) as connection:
+            await until(lambda: connection.discovery.nodes)
+            assert (await connection.fetch_graph()).distro == "humble"
+            for name, action in actions.items():
+                goal = await connection.send_goal(
+                    name, {}, type_name=action.replace("/", "/action/")
+                )
+                result = await until_over(goal)
+                assert result.keys() == {field.name for field in book[f"{action}_Result"].fields}
+    assert taken.keys() == set(actions.values())
+    for action, request in taken.items():
+        fields = book[f"{action}_Goal"].fields
+        assert request["goal"].keys() == {field.name for field in fields}
 
 
 async def test_a_version_that_nobody_knows_is_refused_before_anything_is_sent() -> None:
