@@ -149,7 +149,7 @@ def test_a_message_that_fits_may_be_sent(message: dict[str, Any]) -> None:
         ({"on": 1}, "on wants true or false (bool), not 1"),
         ({"on": None}, "on wants true or false (bool), not None"),
         ({"data": [256]}, "data[0] wants a whole number from 0 to 255 (uint8), not 256"),
-        ({"data": "?"}, "data wants a list (uint8[]), not '?'"),
+        ({"data": "?"}, "data wants a list (uint8[]), or bytes in base64, not '?'"),
         ({"joints": [{}, {}, {}]}, "joints has 3 values; its type is arm_msgs/Joint[<=2]"),
         ({"joints": [{"angel": 1}]}, "no field 'joints[0].angel'. Did you mean joints[0].angle?"),
         ({"joints": [1]}, "joints[0] wants an object of type arm_msgs/Joint, not 1"),
