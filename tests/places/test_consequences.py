@@ -9,7 +9,7 @@ from closing import EAST, LATER, NOW, RADIUS_M, WEST, atlas_on, event, office, r
 from fakes import FakeRobot
 from guarding import WallClock, corners, make_guard, rectangle
 from mapspeak.driving.exploration import ExplorationState
-from mapspeak.driving.exploration.progress import CLOSED_OFF, find_unreachable, judge_end
+from mapspeak.driving.exploration.progress import find_unreachable, judge_end
 from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Pose
 from mapspeak.places.choosing import check_place, find_place
@@ -24,8 +24,10 @@ from mapspeak.semantic.events import Effect
 from mapspeak.server.mapview.tables import describe_atlas
 from mapspeak.server.mapview.views import MapLook, view_of
 from mapspeak.server.measures import describe_measures
+from mapspeak.server.text.frontiers import say_refusal
 from mapspeak.session import Session
 from mapspeak.spatial import UNKNOWN
+from mapspeak.spatial.frontiers import RefusalReason
 from mapspeak.worldmodel.model import Atlas
 from mapspeak.worldmodel.revision import MapRevision
 
@@ -90,8 +92,9 @@ def test_what_nobody_saw_behind_a_closure_is_told_as_closed_off() -> None:
     assert state is ExplorationState.REST_UNREACHABLE
     assert "behind what is closed (the area 'C1', closed by event E2 until 14:00" in sentence
     assert "behind walls" not in sentence
-    assert {each.sentence for each in find_unreachable(atlas_on(closed))} == {CLOSED_OFF}
-    assert CLOSED_OFF in describe_atlas(view_of(atlas_on(closed), MapLook()))
+    unreachable = find_unreachable(atlas_on(closed))
+    assert {each.reason for each in unreachable} == {RefusalReason.CLOSED_OFF}
+    assert say_refusal(unreachable[0]) in describe_atlas(view_of(atlas_on(closed), MapLook()))
 
 
 def test_a_way_that_is_closed_is_measured_as_none_with_what_closes_it() -> None:

@@ -4,7 +4,7 @@ import pytest
 from mapspeak.geometry import Point
 from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.frontiers import FrontierReport, find_frontiers
-from mapspeak.spatial.frontiers.view import find_views
+from mapspeak.spatial.frontiers.viewpoints import find_views
 from mapspeak.spatial.paths import clearance_m
 
 RADIUS_M = 0.2
@@ -46,7 +46,7 @@ def test_nothing_is_promised_behind_a_wall() -> None:
     cells[:, 101:] = -1
     grid = OccupancyGrid(cells=np.pad(cells, 1, constant_values=100), resolution_m=0.05)
     views = find_views(grid, clearance_m(grid), [Cell(100, 50)])
-    assert views.find_prospects()[0].area_m2 == 0.0
+    assert views.find_gains()[0].area_m2 == 0.0
 
 
 def test_known_floor_is_no_gain_and_unknown_in_sight_counts_in_full_where_nothing_hides_it() -> (
@@ -57,7 +57,7 @@ def test_known_floor_is_no_gain_and_unknown_in_sight_counts_in_full_where_nothin
     grid = OccupancyGrid(cells=cells, resolution_m=0.05)
     views = find_views(grid, clearance_m(grid), [Cell(200, 200)])
     assert views.areas_m2(1e9).sum() == pytest.approx(np.pi * 8.0**2 / 2, rel=0.05)
-    prospect = views.find_prospects()[0]
+    prospect = views.find_gains()[0]
     assert prospect.bearing_rad is not None
     assert np.cos(prospect.bearing_rad) == pytest.approx(-1.0, abs=0.01)
 

@@ -40,7 +40,7 @@ def test_a_robot_that_stayed_has_its_frontiers_in_the_same_order() -> None:
     again = rerank_frontiers(report, distances_from(HALF_SEEN, HERE, radius_m=0.2))
     assert again is not None
     assert [each.id for each in again.frontiers] == [each.id for each in report.frontiers]
-    assert [each.reason for each in again.frontiers] == [each.reason for each in report.frontiers]
+    assert [each.merits for each in again.frontiers] == [each.merits for each in report.frontiers]
 
 
 def test_the_order_after_a_move_is_that_of_a_fresh_look() -> None:

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.frontiers import Frontier, find_frontiers
-from mapspeak.spatial.frontiers.merging import merge_by_place
+from mapspeak.spatial.frontiers.judging import merge_by_place
 from mapspeak.spatial.paths import clearance_m
 from mapspeak.spatial.visibility import cells_on_line
 
@@ -79,7 +79,6 @@ def frontier_at(x: float, *, gain_m2: float) -> Frontier:
         distance_m=2.0,
         openness_m=3.0,
         pose=Pose(x, 0.0, 0.0),
-        reason="",
     )
 
 
@@ -89,7 +88,7 @@ def test_borders_that_are_looked_over_from_one_place_are_one_frontier() -> None:
         frontier_at(0.3, gain_m2=3.0),
         frontier_at(0.8, gain_m2=1.0),
     ]
-    merged, alone = merge_by_place(found, apart_m=0.4)
+    merged, alone = merge_by_place(found)
     assert (merged.pose.x, merged.gain_m2, merged.length_m) == (0.3, 3.0, 2.0)
     assert merged.points[:, 0].tolist() == [0.3, 0.0]
     assert alone is found[2]

@@ -10,6 +10,7 @@ from mapspeak.semantic import group_views
 from mapspeak.semantic.quoting import quote
 from mapspeak.server.mapview.roomtables import say_walk
 from mapspeak.server.memory.things import say_landmark, say_things_from, say_things_in, thing_lines
+from mapspeak.server.text.frontiers import say_merits
 from mapspeak.server.wording import (
     join_words,
     say_direction,
@@ -138,7 +139,7 @@ def _frontier_lines(atlas: Atlas, frontier: Frontier) -> Iterator[str]:
         f"About {frontier.gain_m2:.1f} m2 of new floor may come into view from "
         f"{say_pose(frontier.pose)}, in {atlas.find_room_id(frontier.pose.point) or 'no room'}."
     )
-    yield f"Why it stands there in the list: {frontier.reason}."
+    yield f"Why it stands there in the list: {say_merits(frontier)}."
 
 
 def _remembered_lines(atlas: Atlas, remembered: RememberedPlace) -> Iterator[str]:

@@ -7,6 +7,7 @@ from pydantic import Field
 from mapspeak.driving.exploration import BlockedPlace, ExplorationState, Progress
 from mapspeak.driving.search import Candidate, SearchState, Standing
 from mapspeak.server.reports import PoseReport, Report
+from mapspeak.server.text.frontiers import say_merits, say_refusal
 from mapspeak.server.wording import say_point, say_pose_doubt
 from mapspeak.spatial.frontiers import RefusedFrontier
 
@@ -76,9 +77,11 @@ class ExploreAnswer(Report):
 
 def _say_next(progress: Progress) -> str:
     if progress.trip is not None:
-        return f"{progress.trip.target.id}: {progress.trip.target.reason}"
+        target = progress.trip.target
+        why = target.reason or (say_merits(target.frontier) if target.frontier else "")
+        return f"{target.id}: {why}"
     best = next(iter(progress.frontiers), None)
-    return "" if best is None else f"{best.id}: {best.reason}"
+    return "" if best is None else f"{best.id}: {say_merits(best)}"
 
 
 def _say_rest(progress: Progress) -> list[str]:
@@ -96,7 +99,8 @@ def _say_blocked(place: BlockedPlace) -> str:
 
 
 def _say_refused(border: RefusedFrontier) -> str:
-    return f"{border.length_m:.1f} m of border at {say_point(border.anchor)}: {border.sentence}"
+    where = f"{border.length_m:.1f} m of border at {say_point(border.anchor)}"
+    return f"{where}: {say_refusal(border)}"
 
 
 SEARCH_STEP = {

@@ -164,11 +164,10 @@ def _corners(cells: IntArray) -> IntArray:
 def _passed(starts: _Reals, offsets: _Reals) -> NDArray[np.int32]:
     """Return the rows, or the columns, in which places lie that are so far off the starts."""
     whole = np.floor(starts)
-    within = starts - whole
-    if (within == within[:1]).all():
-        # From the middle of every cell the steps are the same.
-        within = within[:1]
-    steps = np.floor(offsets + within[:, None, None]).astype(np.int32)
+    if not (starts - whole == 0.5).all():
+        return np.floor(starts[:, None, None] + offsets).astype(np.int32)
+    # From the middle of every cell the steps are the same.
+    steps = np.floor(offsets + 0.5).astype(np.int32)
     return np.asarray(whole.astype(np.int32)[:, None, None] + steps, dtype=np.int32)
 
 

@@ -189,9 +189,7 @@ class Explorer:
         ]
         if frontiers:
             frontier = self._pick(frontiers, atlas)
-            return Target(
-                id=frontier.id, pose=frontier.pose, reason=frontier.reason, frontier=frontier
-            )
+            return Target(id=frontier.id, pose=frontier.pose, reason="", frontier=frontier)
         retry = self._trips.blocked.worth_another_try(atlas.grid)
         nearest = min(retry, key=lambda each: _path_m(atlas, each), default=None)
         if nearest is None or not math.isfinite(_path_m(atlas, nearest)):

@@ -21,10 +21,9 @@ from mapspeak.spatial.paths import DistanceField
 from mapspeak.worldmodel.model import Atlas
 
 MOST_NAMED = 3
-CLOSED_OFF = "behind what is closed: no way while it is"
 NEAR_M = 0.5
 """A border is looked at from the floor that is so much more than the robot's radius around it."""
-OUT_OF_REACH = frozenset({RefusalReason.NO_WAY, RefusalReason.TOO_NARROW})
+OUT_OF_REACH = frozenset({RefusalReason.NO_WAY, RefusalReason.TOO_NARROW, RefusalReason.CLOSED_OFF})
 
 
 class ExplorationState(StrEnum):
@@ -105,7 +104,7 @@ def find_unreachable(atlas: Atlas) -> tuple[RefusedFrontier, ...]:
 def find_refused(atlas: Atlas) -> tuple[RefusedFrontier, ...]:
     """Gives the borders with the unknown that are no place to go, those closed off as such."""
     return tuple(
-        replace(each, sentence=CLOSED_OFF)
+        replace(each, reason=RefusalReason.CLOSED_OFF)
         if each.reason in OUT_OF_REACH and _is_closed_off(atlas, each)
         else each
         for each in atlas.frontiers.refused
@@ -132,7 +131,7 @@ def judge_end(atlas: Atlas, blocked: tuple[BlockedPlace, ...]) -> tuple[Explorat
     """Says what it means that there is no frontier to go to: all seen, or the rest out of reach."""
     report = atlas.frontiers
     if report.verdict is FrontierVerdict.NOTHING_KNOWN:
-        return ExplorationState.NOTHING_KNOWN, report.sentence
+        return ExplorationState.NOTHING_KNOWN, "No free floor is known yet."
     unreachable = find_unreachable(atlas)
     if not unreachable and not blocked:
         return ExplorationState.NOTHING_LEFT, f"Nothing is left to explore{_say_dull(report)}."
@@ -163,10 +162,9 @@ def _is_dull(border: RefusedFrontier) -> bool:
 def _count(
     unreachable: tuple[RefusedFrontier, ...], blocked: tuple[BlockedPlace, ...], closing: str
 ) -> tuple[tuple[int, str], ...]:
-    n_closed_off = sum(each.sentence == CLOSED_OFF for each in unreachable)
-    reasons = Counter(each.reason for each in unreachable if each.sentence != CLOSED_OFF)
+    reasons = Counter(each.reason for each in unreachable)
     return (
-        (n_closed_off, f"behind what is closed ({closing})"),
+        (reasons[RefusalReason.CLOSED_OFF], f"behind what is closed ({closing})"),
         (reasons[RefusalReason.TOO_NARROW], "behind gaps too narrow for the robot"),
         (reasons[RefusalReason.NO_WAY], "behind walls"),
         (len(blocked), "where driving there failed"),

@@ -83,7 +83,7 @@ class Target:
     Attributes:
         id: F3, W2, or the words for a place that has no id.
         pose: Where to stand.
-        reason: Why there, in words.
+        reason: Why there, in words; empty for a frontier whose merits say it.
         frontier: The frontier to look over; None where it is none.
     """
 

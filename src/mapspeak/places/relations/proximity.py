@@ -348,5 +348,5 @@ def _least_m(atlas: Atlas, region: Region, distances: DistanceField) -> float:
 
 def _say_none(atlas: Atlas, kind: Kind) -> str:
     if kind is Kind.FRONTIER:
-        return f"There is no frontier to go to: {atlas.frontiers.sentence}"
+        return f"There is no frontier to go to: {str(atlas.frontiers.verdict).replace('_', ' ')}."
     return f"There is no {kind} that the robot can get to."

@@ -6,6 +6,7 @@ from itertools import groupby
 from mapspeak.semantic.quoting import quote
 from mapspeak.server.mapview.roomtables import room_tables, say_walk
 from mapspeak.server.mapview.views import Layer, MapLook, MapView
+from mapspeak.server.text.frontiers import say_merits, say_refusal, say_verdict
 from mapspeak.server.wording import (
     build_table,
     join_words,
@@ -54,7 +55,7 @@ def _summary(atlas: Atlas, look: MapLook) -> str:
         *say_warnings(atlas),
         f"Robot: {say_pose(robot)}, in {room_id}, {2 * atlas.radius_m:.2f} m wide.",
         f"Map: {extent}, {grid.resolution_m:g} m per cell. {AXES} {MEANINGS}",
-        f"Explored: {free_m2:.1f} m2 of free floor. {atlas.frontiers.sentence}",
+        f"Explored: {free_m2:.1f} m2 of free floor. {say_verdict(atlas.frontiers)}",
     ]
     if look.zoom is not None and look.around is not None:
         square = f"{look.zoom.radius_m:.1f} m to all sides of {say_point(look.zoom.centre)}"
@@ -145,7 +146,7 @@ def _frontier_row(atlas: Atlas, frontier: Frontier) -> Sequence[str]:
         f"{frontier.gain_m2:.1f}",
         f"{frontier.distance_m:.1f}",
         atlas.find_room_id(pose.point) or "-",
-        frontier.reason,
+        say_merits(frontier),
     )
 
 
@@ -154,11 +155,11 @@ def _say_refused(view: MapView) -> Iterator[str]:
     refused = view.refused
     if not refused.items:
         return
-    by_reason = sorted(refused.items, key=lambda border: border.sentence)
+    by_reason = sorted(refused.items, key=say_refusal)
     told = [
         f"{sentence}: "
         + ", ".join(f"{border.length_m:.1f} m at {say_point(border.anchor)}" for border in group)
-        for sentence, group in groupby(by_reason, key=lambda border: border.sentence)
+        for sentence, group in groupby(by_reason, key=say_refusal)
     ]
     n_more = refused.n_all - len(refused.items)
     more = f"; {n_more} shorter ones" if n_more else ""

@@ -1,18 +1,20 @@
 """Where known floor meets the unknown, and where to go to look beyond."""
 
-from mapspeak.spatial.frontiers.find import find_frontiers, rerank_frontiers
 from mapspeak.spatial.frontiers.frontier import (
     Frontier,
+    FrontierMerit,
     FrontierReport,
     FrontierVerdict,
     RefusalReason,
     RefusedFrontier,
+    match_frontiers,
 )
-from mapspeak.spatial.frontiers.identity import match_frontiers
-from mapspeak.spatial.frontiers.progress import remaining_ratio
+from mapspeak.spatial.frontiers.judging import find_frontiers, rerank_frontiers
+from mapspeak.spatial.frontiers.viewpoints import remaining_ratio
 
 __all__ = [
     "Frontier",
+    "FrontierMerit",
     "FrontierReport",
     "FrontierVerdict",
     "RefusalReason",

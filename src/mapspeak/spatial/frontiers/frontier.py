@@ -1,5 +1,6 @@
-"""Frontiers as values: where to go to see more, and where not, and why."""
+"""Frontiers as values, and their ids from call to call."""
 
+import dataclasses
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -8,14 +9,22 @@ import numpy as np
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial.grid import FloatArray
 
-__all__ = [
-    "Frontier",
-    "FrontierReport",
-    "FrontierVerdict",
-    "RefusalReason",
-    "RefusedFrontier",
-    "WaysBetween",
-]
+TOUCH_M = 0.3
+"""Points of one frontier on two maps are no further apart."""
+SAME_PLACE_M = 2.0
+"""An id that led farther than this from where it did would mislead."""
+SAME_RATIO = 0.25
+"""Two frontiers are one when this share of the shorter lies on the other."""
+
+
+class FrontierMerit(StrEnum):
+    """What sets a frontier apart from the others."""
+
+    ONLY = "only"
+    BEST = "best"
+    MOST_PER_METRE = "most_per_metre"
+    MOST_TO_SEE = "most_to_see"
+    NEAREST = "nearest"
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -31,7 +40,9 @@ class Frontier:
         distance_m: From the robot to the pose, by path.
         openness_m: What that was reckoned with: how far one sees on this map, on average.
         pose: Where to go: a place the robot can reach and stand in, facing the unknown.
-        reason: Why it stands where it stands in the ranking, in words with numbers.
+        merits: What sets it apart from the others of its ranking.
+        detour_m: By how much the round through all grows that begins with it; None where that was
+            not computed, because others promise more.
     """
 
     id: str
@@ -42,7 +53,8 @@ class Frontier:
     distance_m: float
     openness_m: float
     pose: Pose
-    reason: str
+    merits: tuple[FrontierMerit, ...] = ()
+    detour_m: float | None = None
 
     def __post_init__(self) -> None:
         points = np.array(self.points, dtype=np.float64)
@@ -57,6 +69,8 @@ class RefusalReason(StrEnum):
     TOO_NARROW = "too_narrow"
     NOTHING_TO_SEE = "nothing_to_see"
     LOOKED_ALREADY = "looked_already"
+    CLOSED_OFF = "closed_off"
+    """No way while areas are closed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,14 +80,20 @@ class RefusedFrontier:
     Attributes:
         anchor: One of its cells, near its middle.
         length_m: Along the border.
-        reason: What kind of refusal it is.
-        sentence: The same in words with numbers.
+        reason: Why.
+        gap_width_m: Where it is too narrow: how wide the way is at its narrowest.
+        needed_width_m: Where it is too narrow: how wide the robot is.
+        gain_m2: Where there is nothing to see: how much there is.
+        least_gain_m2: Where there is nothing to see: how much is worth a drive.
     """
 
     anchor: Point
     length_m: float
     reason: RefusalReason
-    sentence: str
+    gap_width_m: float = 0.0
+    needed_width_m: float = 0.0
+    gain_m2: float = 0.0
+    least_gain_m2: float = 0.0
 
 
 class FrontierVerdict(StrEnum):
@@ -82,6 +102,7 @@ class FrontierVerdict(StrEnum):
     SOME_LEFT = "some_left"
     NONE_LEFT = "none_left"
     ALL_REFUSED = "all_refused"
+    NONE_REACHABLE = "none_reachable"
     NOTHING_KNOWN = "nothing_known"
 
 
@@ -105,21 +126,70 @@ class FrontierReport:
     Attributes:
         frontiers: Where to go, best first.
         refused: Where not to go, longest first.
-        n_specks: Borders so short that they are nothing but noise, which are not listed.
+        n_unlisted: Borders so short that they are nothing but noise.
         verdict: Whether anything is left.
-        sentence: The verdict in words with numbers.
         ways: Between those that were weighed against each other; they hold while the map does.
         n_named: The highest number given to a frontier so far; the next new one gets one more.
     """
 
     frontiers: tuple[Frontier, ...]
     refused: tuple[RefusedFrontier, ...]
-    n_specks: int
+    n_unlisted: int
     verdict: FrontierVerdict
-    sentence: str
     n_named: int
     ways: WaysBetween | None = None
 
     def find(self, frontier_id: str) -> Frontier | None:
-        """Finds a frontier by its id; None where it is gone or was never there."""
+        """Find a frontier by its id; None where it is gone or was never there."""
         return next((each for each in self.frontiers if each.id == frontier_id), None)
+
+
+def match_frontiers(previous: FrontierReport, current: FrontierReport) -> FrontierReport:
+    """Return the current report with the ids of the previous one where a frontier still exists.
+
+    Frontiers are compared by where they lie in the world, so the map may grow and move its origin
+    in between. New ones get numbers that were never given before.
+    """
+    ids = _inherited(previous.frontiers, current.frontiers)
+    n_named = previous.n_named
+    named = []
+    for index, frontier in enumerate(current.frontiers):
+        if index not in ids:
+            n_named += 1
+        named.append(dataclasses.replace(frontier, id=ids.get(index, f"F{n_named}")))
+    return dataclasses.replace(current, frontiers=tuple(named), n_named=n_named)
+
+
+def _inherited(previous: tuple[Frontier, ...], current: tuple[Frontier, ...]) -> dict[int, str]:
+    """Return the ids that pass on, largest overlap first, by index among the current ones."""
+    overlaps = [
+        (_overlap_ratio(old.points, new.points), index, old.id)
+        for old in previous
+        for index, new in enumerate(current)
+    ]
+    ids: dict[int, str] = {}
+    for ratio, index, old_id in sorted(overlaps, key=lambda each: (-each[0], each[1], each[2])):
+        if ratio >= SAME_RATIO and index not in ids and old_id not in ids.values():
+            ids[index] = old_id
+    return {
+        index: old_id for index, old_id in ids.items() if _is_near(previous, current, index, old_id)
+    }
+
+
+def _is_near(
+    previous: tuple[Frontier, ...], current: tuple[Frontier, ...], index: int, old_id: str
+) -> bool:
+    """Return True when the pose has hardly moved: an id that leads somewhere else would mislead."""
+    old = next(frontier for frontier in previous if frontier.id == old_id)
+    return old.pose.point.distance_to(current[index].pose.point) <= SAME_PLACE_M
+
+
+def _overlap_ratio(first: FloatArray, second: FloatArray) -> float:
+    """Return the share of the shorter set of points that lies on the other."""
+    shorter, longer = sorted((first, second), key=len)
+    low, high = longer.min(axis=0) - TOUCH_M, longer.max(axis=0) + TOUCH_M
+    near = shorter[((shorter >= low) & (shorter <= high)).all(axis=1)]
+    if not len(near):
+        return 0.0
+    gaps = np.hypot(*(near[:, None, :] - longer[None, :, :]).transpose(2, 0, 1)).min(axis=1)
+    return float((gaps <= TOUCH_M).sum()) / len(shorter)

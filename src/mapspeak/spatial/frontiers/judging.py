@@ -1,5 +1,6 @@
-"""Which borders with the unknown are places to go, and why the others are not."""
+"""Frontiers of a map: which borders with the unknown are places to go, and why others are not."""
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import repeat
@@ -7,148 +8,268 @@ from itertools import repeat
 import numpy as np
 
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.spatial.frontiers.edges import Border
-from mapspeak.spatial.frontiers.frontier import Frontier, RefusedFrontier
-from mapspeak.spatial.frontiers.gaps import find_parts_beyond
-from mapspeak.spatial.frontiers.lookouts import Lookout, find_lookouts
-from mapspeak.spatial.frontiers.merging import merge_by_place
-from mapspeak.spatial.frontiers.ranking import gain_rate
-from mapspeak.spatial.frontiers.refusing import refuse_cut_off, refuse_dull, refuse_looked
-from mapspeak.spatial.frontiers.terrain import Terrain
-from mapspeak.spatial.frontiers.view import Prospect, find_views
-
-__all__ = ["Judgement", "judge"]
+from mapspeak.spatial.frontiers.borders import (
+    Border,
+    ReachableFloor,
+    build_reachable_floor,
+    find_borders,
+    find_gap_widths_m,
+    find_middle,
+    find_parts_beyond,
+)
+from mapspeak.spatial.frontiers.frontier import (
+    Frontier,
+    FrontierReport,
+    FrontierVerdict,
+    RefusalReason,
+    RefusedFrontier,
+)
+from mapspeak.spatial.frontiers.ranking import gain_rate, rank
+from mapspeak.spatial.frontiers.viewpoints import (
+    ExpectedGain,
+    Viewpoint,
+    find_viewpoints,
+    find_views,
+)
+from mapspeak.spatial.grid import Cell, OccupancyGrid
+from mapspeak.spatial.paths.distances import DistanceField, distances_from
 
 LOOKED_NEAR_M = 0.4
 """A robot that has looked from this near to a pose has looked from there."""
-SPECK_M = 0.8
-"""A shorter border is narrower than any doorway: where it is no place to go, nobody wonders why."""
+NOISE_M = 0.8
+"""A shorter border is narrower than any doorway: where it is no place to go, it is not listed."""
 
 
-@dataclass(frozen=True, slots=True)
-class Judgement:
-    """What came of some borders.
+def find_frontiers(
+    grid: OccupancyGrid,
+    position: Point,
+    *,
+    radius_m: float,
+    distances: DistanceField | None = None,
+    looked_from: Sequence[Point] = (),
+) -> FrontierReport:
+    """Find where the robot can go to see more, best first, and what is refused and why.
 
-    Attributes:
-        frontiers: Where to go; not yet named.
-        refused: Where not to go, and why.
-        n_specks: Other borders where not to go, not worth a word.
+    Args:
+        grid: The map.
+        position: Where the robot is.
+        radius_m: Of the robot.
+        distances: From that position on that map, where they are known already.
+        looked_from: Poses of frontiers that the robot has been to: what is still unknown from
+            there cannot be seen, and is refused instead of being offered for ever.
     """
+    if distances is None:
+        distances = distances_from(grid, position, radius_m=radius_m)
+    borders = find_borders(grid, least_length_m=radius_m)
+    floor = build_reachable_floor(distances)
+    frontiers, refused = _judge(floor, borders.kept, looked_from)
+    n_unlisted = borders.n_short + len(borders.kept) - len(frontiers) - len(refused)
+    ranked, ways = rank(floor, merge_by_place(frontiers))
+    return FrontierReport(
+        frontiers=tuple(
+            dataclasses.replace(frontier, id=f"F{number}")
+            for number, frontier in enumerate(ranked, start=1)
+        ),
+        refused=tuple(sorted(refused, key=lambda border: -border.length_m)),
+        n_unlisted=n_unlisted,
+        verdict=_verdict(floor, ranked, is_refused=bool(refused or n_unlisted)),
+        n_named=len(ranked),
+        ways=ways,
+    )
 
-    frontiers: list[Frontier]
-    refused: list[RefusedFrontier]
-    n_specks: int
+
+def rerank_frontiers(report: FrontierReport, distances: DistanceField) -> FrontierReport | None:
+    """Return the same frontiers as seen from another place on the same map; ids and poses stay.
+
+    Args:
+        report: Of the map that the distances belong to.
+        distances: From where the robot is now.
+
+    Returns:
+        The report in its new order; None where a frontier cannot be reached from there.
+    """
+    moved = []
+    for frontier in report.frontiers:
+        distance_m = distances.distance_to(frontier.pose.point)
+        if distance_m is None:
+            return None
+        moved.append(dataclasses.replace(frontier, distance_m=distance_m))
+    ranked, ways = rank(build_reachable_floor(distances), moved, report.ways)
+    return dataclasses.replace(report, frontiers=tuple(ranked), ways=ways)
 
 
-def judge(
-    terrain: Terrain, borders: Sequence[Border], *, looked_from: Sequence[Point]
-) -> Judgement:
-    """Gives each border as a frontier with its best pose, or as refused.
+def _verdict(
+    floor: ReachableFloor, frontiers: Sequence[Frontier], *, is_refused: bool
+) -> FrontierVerdict:
+    if frontiers:
+        return FrontierVerdict.SOME_LEFT
+    if is_refused:
+        is_shut_in = not floor.reachable.any()
+        return FrontierVerdict.NONE_REACHABLE if is_shut_in else FrontierVerdict.ALL_REFUSED
+    return FrontierVerdict.NONE_LEFT if floor.free.any() else FrontierVerdict.NOTHING_KNOWN
 
-    A short border is a speck, unless there is something to see beyond it.
+
+# --- judging -----------------------------------------------------------------------------------
+
+
+def _judge(
+    floor: ReachableFloor, borders: Sequence[Border], looked_from: Sequence[Point]
+) -> tuple[list[Frontier], list[RefusedFrontier]]:
+    """Return each border as a frontier with its best pose, or as refused.
+
+    A short border is neither, unless there is something to see beyond it.
     """
     frontiers: list[Frontier] = []
     refused: list[RefusedFrontier] = []
-    dull: list[tuple[Border, float]] = []
+    poor: list[tuple[Border, float]] = []
     cut_off: list[Border] = []
-    open_ones: list[tuple[Border, list[Lookout]]] = []
-    for border, lookouts in zip(borders, find_lookouts(terrain, borders), strict=True):
-        new = _without_looked(terrain, lookouts, looked_from)
+    open_ones: list[tuple[Border, list[Viewpoint]]] = []
+    for border, viewpoints in zip(borders, find_viewpoints(floor, borders), strict=True):
+        new = _without_looked(floor, viewpoints, looked_from)
         if new:
             open_ones.append((border, new))
-        elif lookouts:
-            refused.append(refuse_looked(terrain, border))
-        elif border.length_m >= SPECK_M:
+        elif viewpoints:
+            refused.append(_refuse(floor, border, RefusalReason.LOOKED_ALREADY))
+        elif border.length_m >= NOISE_M:
             cut_off.append(border)
-    least_m2 = _least_gain_m2(terrain)
-    for border, best in _find_best_chances(terrain, open_ones):
-        if best.prospect.area_m2 >= least_m2:
-            frontiers.append(_frontier(terrain, border, best))
-        elif border.length_m >= SPECK_M:
-            dull.append((border, best.prospect.area_m2))
-    for (border, gain_m2), beyond in zip(
-        dull, find_parts_beyond(terrain, [border for border, _ in dull]), strict=True
-    ):
+    least_m2 = _least_gain_m2(floor)
+    for border, best in _find_best_options(floor, open_ones):
+        if best.gain.area_m2 >= least_m2:
+            frontiers.append(_frontier(floor, border, best))
+        elif border.length_m >= NOISE_M:
+            poor.append((border, best.gain.area_m2))
+    parts_beyond = find_parts_beyond(floor, [border for border, _ in poor])
+    for (border, gain_m2), beyond in zip(poor, parts_beyond, strict=True):
         if beyond is None:
-            refused.append(refuse_dull(terrain, border, gain_m2, least_m2))
+            nothing = _refuse(floor, border, RefusalReason.NOTHING_TO_SEE)
+            refused.append(dataclasses.replace(nothing, gain_m2=gain_m2, least_gain_m2=least_m2))
         else:
             cut_off.append(beyond)
-    refused += refuse_cut_off(terrain, cut_off)
-    n_specks = len(borders) - len(frontiers) - len(refused)
-    return Judgement(merge_by_place(frontiers, apart_m=LOOKED_NEAR_M), refused, n_specks)
+    return frontiers, refused + _refuse_cut_off(floor, cut_off)
 
 
 @dataclass(frozen=True, slots=True)
-class _Chance:
-    lookout: Lookout
-    prospect: Prospect
+class _Option:
+    """A viewpoint of a border with what speaks for it."""
+
+    viewpoint: Viewpoint
+    gain: ExpectedGain
     distance_m: float
     openness_m: float
 
     @property
     def rate(self) -> float:
-        return gain_rate(self.prospect.area_m2, self.distance_m)
+        return gain_rate(self.gain.area_m2, self.distance_m)
 
 
 def _without_looked(
-    terrain: Terrain, lookouts: list[Lookout], looked_from: Sequence[Point]
-) -> list[Lookout]:
-    """Gives the places to look from that the robot has not looked from yet."""
+    floor: ReachableFloor, viewpoints: list[Viewpoint], looked_from: Sequence[Point]
+) -> list[Viewpoint]:
+    """Return the viewpoints from which the robot has not looked yet."""
     if not looked_from:
-        return lookouts
-    stands = [(each, terrain.grid.point_at(each.stand)) for each in lookouts]
+        return viewpoints
+    places = [(viewpoint, floor.grid.point_at(viewpoint.cell)) for viewpoint in viewpoints]
     return [
-        lookout
-        for lookout, stand in stands
-        if all(stand.distance_to(place) > LOOKED_NEAR_M for place in looked_from)
+        viewpoint
+        for viewpoint, place in places
+        if all(place.distance_to(looked) > LOOKED_NEAR_M for looked in looked_from)
     ]
 
 
-def _find_best_chances(
-    terrain: Terrain, borders: Sequence[tuple[Border, list[Lookout]]]
-) -> list[tuple[Border, _Chance]]:
-    """Gives borders with the place from which most comes into view per metre of way to it."""
-    lookouts = [each for _, own in borders for each in own]
-    stands = [each.stand for each in lookouts]
-    views = find_views(terrain.grid, terrain.clearances_m, stands)
-    rows = np.array([stand.row for stand in stands], dtype=np.intp)
-    cols = np.array([stand.col for stand in stands], dtype=np.intp)
-    distances_m = terrain.distances.distances_at(rows, cols).tolist()
-    chances = map(_Chance, lookouts, views.find_prospects(), distances_m, repeat(views.openness_m))
+def _find_best_options(
+    floor: ReachableFloor, borders: Sequence[tuple[Border, list[Viewpoint]]]
+) -> list[tuple[Border, _Option]]:
+    """Return borders with the viewpoint that shows most per metre of way to it."""
+    viewpoints = [viewpoint for _, own in borders for viewpoint in own]
+    cells = [viewpoint.cell for viewpoint in viewpoints]
+    views = find_views(floor.grid, floor.clearances_m, cells)
+    rows = np.array([cell.row for cell in cells], dtype=np.intp)
+    cols = np.array([cell.col for cell in cells], dtype=np.intp)
+    distances_m = floor.distances.distances_at(rows, cols).tolist()
+    options = map(_Option, viewpoints, views.find_gains(), distances_m, repeat(views.openness_m))
     return [
-        (border, max((next(chances) for _ in own), key=lambda each: each.rate))
+        (border, max((next(options) for _ in own), key=lambda option: option.rate))
         for border, own in borders
     ]
 
 
-def _frontier(terrain: Terrain, border: Border, chance: _Chance) -> Frontier:
-    grid = terrain.grid
-    stand = grid.point_at(chance.lookout.stand)
+def _frontier(floor: ReachableFloor, border: Border, option: _Option) -> Frontier:
+    grid = floor.grid
+    place, target = (grid.point_at(at) for at in (option.viewpoint.cell, option.viewpoint.target))
+    bearing_rad = option.gain.bearing_rad
+    # Where the unknown lies all around, the robot faces the border.
+    yaw_rad = (
+        place.bearing_to(target)
+        if bearing_rad is None
+        else wrap_angle(bearing_rad + grid.origin.yaw_rad)
+    )
     return Frontier(
         id="",
         points=grid.points_at(border.rows, border.cols),
-        anchor=grid.point_at(chance.lookout.target),
+        anchor=target,
         length_m=border.length_m,
-        gain_m2=chance.prospect.area_m2,
-        distance_m=chance.distance_m,
-        openness_m=chance.openness_m,
-        pose=Pose(stand.x, stand.y, _facing(terrain, chance.lookout, chance.prospect)),
-        reason="",
+        gain_m2=option.gain.area_m2,
+        distance_m=option.distance_m,
+        openness_m=option.openness_m,
+        pose=Pose(place.x, place.y, yaw_rad),
     )
 
 
-def _facing(terrain: Terrain, lookout: Lookout, prospect: Prospect) -> float:
-    """Gives the heading towards the unknown; towards the border where it lies all around."""
-    grid = terrain.grid
-    if prospect.bearing_rad is not None:
-        return wrap_angle(prospect.bearing_rad + grid.origin.yaw_rad)
-    return grid.point_at(lookout.stand).bearing_to(grid.point_at(lookout.target))
-
-
-def _least_gain_m2(terrain: Terrain) -> float:
-    """Gives the gain that is worth a drive: the less, the smaller the robot and the known floor.
+def _least_gain_m2(floor: ReachableFloor) -> float:
+    """Return the gain that is worth a drive: the less, the smaller the robot and the known floor.
 
     That is one and a half robots' width squared, a hundredth of the floor, or 0.5 m2.
     """
-    floor_m2 = int(np.count_nonzero(terrain.free)) * terrain.grid.resolution_m**2
-    return min((3 * terrain.radius_m) ** 2, 0.01 * floor_m2, 0.5)
+    floor_m2 = int(np.count_nonzero(floor.free)) * floor.grid.resolution_m**2
+    return min((3 * floor.radius_m) ** 2, 0.01 * floor_m2, 0.5)
+
+
+def _refuse(floor: ReachableFloor, border: Border, reason: RefusalReason) -> RefusedFrontier:
+    middle = find_middle(border.rows, border.cols)
+    anchor = Cell(int(border.rows[middle]), int(border.cols[middle]))
+    return RefusedFrontier(
+        anchor=floor.grid.point_at(anchor), length_m=border.length_m, reason=reason
+    )
+
+
+def _refuse_cut_off(floor: ReachableFloor, borders: Sequence[Border]) -> list[RefusedFrontier]:
+    """Refuse borders that no viewpoint is near to."""
+    refused = []
+    for border, width_m in zip(borders, find_gap_widths_m(floor, borders), strict=True):
+        if width_m is None:
+            refused.append(_refuse(floor, border, RefusalReason.NO_WAY))
+        else:
+            narrow = _refuse(floor, border, RefusalReason.TOO_NARROW)
+            needed_m = 2 * floor.radius_m
+            refused.append(
+                dataclasses.replace(narrow, gap_width_m=width_m, needed_width_m=needed_m)
+            )
+    return refused
+
+
+def merge_by_place(frontiers: list[Frontier]) -> list[Frontier]:
+    """Return frontiers whose poses are farther from each other than a look is.
+
+    The pose with most to see stands for all that are near to it: the gain, which is the same
+    unknown, is counted once, and the borders become one.
+    """
+    waiting = sorted(frontiers, key=lambda frontier: -frontier.gain_m2)
+    places = np.array([[frontier.pose.x, frontier.pose.y] for frontier in waiting]).reshape(-1, 2)
+    is_waiting = np.ones(len(waiting), dtype=np.bool_)
+    merged = []
+    for index, frontier in enumerate(waiting):
+        if is_waiting[index]:
+            gaps_m = np.hypot(*(places - places[index]).T)
+            near = np.flatnonzero(is_waiting & (gaps_m <= LOOKED_NEAR_M))
+            is_waiting[near] = False
+            others = [waiting[other] for other in near if other != index]
+            merged.append(_joined(frontier, others) if others else frontier)
+    return merged
+
+
+def _joined(first: Frontier, others: list[Frontier]) -> Frontier:
+    return dataclasses.replace(
+        first,
+        points=np.concatenate([first.points, *(frontier.points for frontier in others)]),
+        length_m=first.length_m + sum(frontier.length_m for frontier in others),
+    )

@@ -1,15 +1,17 @@
 """Which frontier first: much to see soon, without having to come back for the rest."""
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from mapspeak.spatial.frontiers.frontier import Frontier, WaysBetween
-from mapspeak.spatial.frontiers.reasons import with_reasons
-from mapspeak.spatial.frontiers.rounds import find_shortest_rounds, find_ways_between
-from mapspeak.spatial.frontiers.terrain import Terrain
-
-__all__ = ["gain_rate", "rank"]
+from mapspeak.geometry import Point
+from mapspeak.spatial.frontiers.borders import ReachableFloor
+from mapspeak.spatial.frontiers.frontier import Frontier, FrontierMerit, WaysBetween
+from mapspeak.spatial.grid import FloatArray, IntArray, Mask
+from mapspeak.spatial.paths.lattice import moves_within
+from mapspeak.spatial.paths.wavefront import Seeds, spread
 
 N_WEIGHED = 9
 """The round is reckoned through so many frontiers, the most promising ones; others come after."""
@@ -17,23 +19,25 @@ DETOUR_WORTH_M2 = 0.5
 """A metre that has to be driven later, to come back, is worth this much new floor now."""
 STOP_M = 0.5
 """What a stop costs beside the way to it."""
+MOST_CELLS = 4_000_000
+"""So many cells are held in memory for waves that spread together."""
 
 
 def gain_rate(gain_m2: float, distance_m: float) -> float:
-    """Gives the square metres that come into view per metre of way."""
+    """Return the square metres that come into view per metre of way."""
     return gain_m2 / (distance_m + STOP_M)
 
 
 def rank(
-    terrain: Terrain, frontiers: Sequence[Frontier], known_ways: WaysBetween | None = None
+    floor: ReachableFloor, frontiers: Sequence[Frontier], known_ways: WaysBetween | None = None
 ) -> tuple[list[Frontier], WaysBetween]:
-    """Gives frontiers in the order in which to think of them, each with its reason.
+    """Return frontiers in the order in which to think of them, each with its merits.
 
     Gain per metre of way is what shows most of a building soon. It leaves corners behind, though,
     so the metres by which the round through all frontiers grows are set against the gain.
 
     Args:
-        terrain: The map, seen from where the robot is.
+        floor: The map, seen from where the robot is.
         frontiers: In any order.
         known_ways: Between frontiers of the same map; used if they are those that matter.
 
@@ -42,43 +46,138 @@ def rank(
     """
     by_rate = sorted(frontiers, key=lambda each: -gain_rate(each.gain_m2, each.distance_m))
     weighed, others = by_rate[:N_WEIGHED], by_rate[N_WEIGHED:]
-    ways = _find_ways(terrain, weighed, known_ways)
+    ways = _find_ways(floor, weighed, known_ways)
     detours_m = _detours_m(weighed, ways)
     scores = [_score(each, detour_m) for each, detour_m in zip(weighed, detours_m, strict=True)]
     order = np.argsort(-np.array(scores), kind="stable")
-    ranked = [*(weighed[index] for index in order), *others]
-    reasoned = with_reasons(
-        ranked,
-        [*(detours_m[index] for index in order), *([None] * len(others))],
-        [gain_rate(each.gain_m2, each.distance_m) for each in ranked],
-    )
-    return reasoned, ways
+    ranked = [
+        *(replace(weighed[index], detour_m=detours_m[index]) for index in order),
+        *(replace(frontier, detour_m=None) for frontier in others),
+    ]
+    return _with_merits(ranked), ways
+
+
+def _with_merits(ranked: Sequence[Frontier]) -> list[Frontier]:
+    """Return frontiers in their order, each with what sets it apart."""
+    if len(ranked) == 1:
+        return [replace(ranked[0], merits=(FrontierMerit.ONLY,))]
+    rates = [gain_rate(frontier.gain_m2, frontier.distance_m) for frontier in ranked]
+    best_rate = max(rates, default=0.0)
+    most_m2 = max((frontier.gain_m2 for frontier in ranked), default=0.0)
+    least_m = min((frontier.distance_m for frontier in ranked), default=0.0)
+    found = []
+    for index, (frontier, rate) in enumerate(zip(ranked, rates, strict=True)):
+        has = {
+            FrontierMerit.BEST: index == 0,
+            FrontierMerit.MOST_PER_METRE: rate == best_rate,
+            FrontierMerit.MOST_TO_SEE: frontier.gain_m2 == most_m2 and rate < best_rate,
+            FrontierMerit.NEAREST: frontier.distance_m == least_m,
+        }
+        merits = tuple(merit for merit, is_true in has.items() if is_true)
+        found.append(replace(frontier, merits=merits))
+    return found
 
 
 def _score(frontier: Frontier, detour_m: float) -> float:
-    """Gives what is left of the gain after the detour: per metre of way, where anything is left."""
+    """Return the gain less the detour, per metre of way where anything is left of it."""
     left_m2 = frontier.gain_m2 - DETOUR_WORTH_M2 * detour_m
     return gain_rate(left_m2, frontier.distance_m) if left_m2 > 0 else left_m2
 
 
 def _find_ways(
-    terrain: Terrain, frontiers: list[Frontier], known: WaysBetween | None
+    floor: ReachableFloor, frontiers: list[Frontier], known: WaysBetween | None
 ) -> WaysBetween:
-    """Gives the ways between frontiers in their order, out of known ones where these have all."""
+    """Return the ways between frontiers in their order, out of known ones where these have all."""
     stops = tuple(each.pose.point for each in frontiers)
     if known is not None and set(stops) <= set(known.stops):
         picked = [known.stops.index(stop) for stop in stops]
         return WaysBetween(stops, known.metres[np.ix_(picked, picked)])
     if len(stops) < 2:
         return WaysBetween(stops, np.zeros((len(stops), len(stops))))
-    return WaysBetween(stops, find_ways_between(terrain, list(stops)))
+    return WaysBetween(stops, find_ways_between(floor, list(stops)))
 
 
 def _detours_m(frontiers: list[Frontier], ways: WaysBetween) -> list[float]:
-    """Gives how much longer than the shortest round the one is that begins with each."""
+    """Return how much longer than the shortest round the one is that begins with each."""
     if len(frontiers) < 2:
         return [0.0] * len(frontiers)
     from_robot_m = np.array([each.distance_m for each in frontiers])
     through_robot_m = from_robot_m[:, None] + from_robot_m
     rounds_m = find_shortest_rounds(from_robot_m, np.minimum(ways.metres, through_robot_m))
     return [float(round_m - rounds_m.min()) for round_m in rounds_m]
+
+
+def find_ways_between(floor: ReachableFloor, stops: list[Point]) -> FloatArray:
+    """Return the lengths of ways between reachable places, shape (n, n), in metres.
+
+    They are estimates: the floor is looked at in cells so coarse that walls, which keep the robot's
+    radius on both sides, just do not vanish.
+    """
+    grid = floor.grid
+    factor = max(int(floor.radius_m / math.sqrt(2) / grid.resolution_m), 1)
+    rows, cols = grid.cells_at(np.array([[stop.x, stop.y] for stop in stops]))
+    window = _window(floor, rows, cols)
+    coarse = _coarser(floor.reachable[window], factor)
+    cells: IntArray = np.ravel_multi_index(
+        ((rows - window[0].start) // factor, (cols - window[1].start) // factor), coarse.shape
+    )
+    at_once = max(MOST_CELLS // coarse.size, 1)
+    ways = [
+        _spread_together(coarse, cells[start : start + at_once], cells)
+        for start in range(0, cells.size, at_once)
+    ]
+    return np.concatenate(ways) * factor * grid.resolution_m
+
+
+def _window(floor: ReachableFloor, rows: IntArray, cols: IntArray) -> tuple[slice, slice]:
+    """Return the part of the map that shortest ways between some cells cannot leave.
+
+    By way of the robot's own place there is a way between any two of them.
+    """
+    from_robot_m = floor.distances.distances_at(rows, cols)
+    reach = math.ceil(float(from_robot_m.max()) / floor.grid.resolution_m) + 1
+    return floor.grid.window(rows, cols, margin=reach)
+
+
+def _spread_together(floor: Mask, starts: IntArray, goals: IntArray) -> FloatArray:
+    """Return the ways in cells from each start to all goals, shape (starts, goals).
+
+    Each wave has a copy of the floor of its own, one above the other, as it is the number of steps
+    that takes the time.
+    """
+    n_copies = len(starts)
+    moves = np.tile(moves_within(floor), (n_copies, 1))
+    first = np.arange(n_copies) * floor.size
+    seeds = Seeds(first + starts, np.zeros(n_copies, dtype=np.float32))
+    ends = first[:, None] + goals
+    costs = spread(moves, None, seeds, goals=ends.ravel())
+    return np.asarray(costs[ends], dtype=np.float64)
+
+
+def find_shortest_rounds(from_start_m: FloatArray, between_m: FloatArray) -> FloatArray:
+    """Return for each stop the length of the shortest way that passes it first and then all others.
+
+    Exact, by dynamic programming over sets of stops (Held and Karp, 1962); for a dozen at most.
+
+    Args:
+        from_start_m: To each of n stops, shape (n,).
+        between_m: From stop to stop, shape (n, n).
+    """
+    n_stops = len(from_start_m)
+    bits = 1 << np.arange(n_stops)
+    rest_m = np.full((1 << n_stops, n_stops), np.inf)
+    rest_m[bits, np.arange(n_stops)] = 0.0
+    for visited in range(1, 1 << n_stops):
+        for first in np.flatnonzero(visited & bits):
+            others = visited & ~bits[first]
+            if others:
+                rest_m[visited, first] = (between_m[first] + rest_m[others]).min()
+    return np.asarray(from_start_m + rest_m[-1], dtype=np.float64)
+
+
+def _coarser(mask: Mask, factor: int) -> Mask:
+    """Return the mask in cells of factor by factor; true where one of them was."""
+    n_rows, n_cols = mask.shape
+    padded = np.pad(mask, ((0, -n_rows % factor), (0, -n_cols % factor)))
+    blocks = padded.reshape(padded.shape[0] // factor, factor, -1, factor)
+    return np.asarray(blocks.any(axis=(1, 3)), dtype=np.bool_)

@@ -1,0 +1,1 @@
+"""All words for the model: a module for each subject."""

@@ -1,0 +1,226 @@
+"""The cells where known floor meets the unknown, gathered into borders, and how to get to them."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.spatial.grid import IntArray, Mask, OccupancyGrid
+from mapspeak.spatial.paths.distances import DistanceField
+from mapspeak.spatial.paths.lattice import Clearance
+
+THINNEST_UNKNOWN_M = 0.15
+"""Thinner unknown is what lies between two beams of a LiDAR, or along a wall: nothing to see."""
+
+JOIN_M = 0.6
+"""Pieces of border that are no further apart on the floor are one."""
+
+PLUS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], dtype=np.uint8)
+
+Labels = NDArray[np.int32]
+Picture = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Border:
+    """Free cells beside the unknown that hang together.
+
+    Attributes:
+        rows: Of its cells.
+        cols: Of its cells.
+        length_m: Along it.
+    """
+
+    rows: IntArray
+    cols: IntArray
+    length_m: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Borders:
+    """All borders of a map.
+
+    Attributes:
+        kept: Those long enough to be worth a look.
+        n_short: How many others there are.
+    """
+
+    kept: tuple[Border, ...]
+    n_short: int
+
+
+def find_borders(grid: OccupancyGrid, *, least_length_m: float) -> Borders:
+    """Find all borders of the known floor with unknown that is worth a look.
+
+    Only cells that touch by a side count as neighbours, so that nothing is seen between walls
+    that touch at a corner. Outside the array everything is unknown.
+    """
+    free = grid.free.view(np.uint8)
+    edge = _edge(grid.unknown.view(np.uint8), free, side=max(_cells(THINNEST_UNKNOWN_M, grid), 1))
+    labels = _labelled(edge, free, reach=_cells(JOIN_M, grid))
+    cells = np.flatnonzero(edge)
+    of_cell = labels.ravel()[cells]
+    order = np.argsort(of_cell, kind="stable")
+    starts = np.flatnonzero(np.diff(of_cell[order], prepend=0))
+    if not starts.size:
+        return Borders((), 0)
+    rows, cols = np.divmod(cells[order], grid.n_cols)
+    lengths_m = _lengths(rows, cols, starts) * grid.resolution_m
+    kept = np.flatnonzero(lengths_m >= least_length_m)
+    ends = np.append(starts[1:], rows.size)
+    borders = (
+        Border(
+            rows=rows[starts[index] : ends[index]],
+            cols=cols[starts[index] : ends[index]],
+            length_m=float(lengths_m[index]),
+        )
+        for index in kept
+    )
+    return Borders(tuple(borders), starts.size - kept.size)
+
+
+def find_middle(rows: IntArray, cols: IntArray) -> int:
+    """Return which of some cells is nearest to their mean."""
+    off_rows, off_cols = rows - rows.sum() / rows.size, cols - cols.sum() / cols.size
+    return int((off_rows * off_rows + off_cols * off_cols).argmin())
+
+
+def _edge(unknown: Picture, free: Picture, *, side: int) -> Picture:
+    """Return True in free cells that have unknown at a side, and not just a sliver of it."""
+    square = np.ones((side, side), dtype=np.uint8)
+    thick = np.asarray(cv2.erode(unknown, square, anchor=(0, 0)), dtype=np.uint8)
+    # One dilation gives the squares of unknown back and looks as far around them again.
+    near_thick = _dilate(thick, np.ones((3 * side, 3 * side), np.uint8), (2 * side - 1,) * 2)
+    beside = _dilate(unknown, PLUS, (1, 1))
+    beside &= near_thick
+    beside &= free
+    return beside
+
+
+def _dilate(picture: Picture, kernel: Picture, anchor: tuple[int, int]) -> Picture:
+    """Dilate a picture that is set everywhere outside the array."""
+    dilated = cv2.dilate(
+        picture, kernel, anchor=anchor, borderType=cv2.BORDER_CONSTANT, borderValue=1
+    )
+    return np.asarray(dilated, dtype=np.uint8)
+
+
+def _labelled(edge: Picture, free: Picture, *, reach: int) -> Labels:
+    """Numbers the borders from 1; pieces near each other on the floor share a number."""
+    grown = edge
+    for _ in range(max(reach // 2, 1)):
+        grown = np.asarray(cv2.bitwise_and(cv2.dilate(grown, PLUS), free), dtype=np.uint8)
+    _, labels = cv2.connectedComponents(grown, connectivity=4)
+    return np.asarray(labels, dtype=np.int32)
+
+
+def _lengths(rows: IntArray, cols: IntArray, starts: IntArray) -> NDArray[np.float64]:
+    """Return the lengths in cells of borders whose cells follow each other from each start on."""
+    n_cells = np.diff(starts, append=rows.size)
+    high = np.maximum.reduceat(rows, starts) - np.minimum.reduceat(rows, starts) + 1
+    wide = np.maximum.reduceat(cols, starts) - np.minimum.reduceat(cols, starts) + 1
+    across = np.where(n_cells > 1, np.hypot(high, wide), 1.0)
+    return np.asarray(np.maximum(n_cells, across), dtype=np.float64)
+
+
+def _cells(length_m: float, grid: OccupancyGrid) -> int:
+    return round(length_m / grid.resolution_m)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ReachableFloor:
+    """The floor that the robot can get to, and what matters for looking over its borders.
+
+    Attributes:
+        distances: From the robot, by path.
+        free: Where floor is known.
+        reachable: Where the robot can get to.
+        clearances_m: From every cell to the nearest obstacle.
+    """
+
+    distances: DistanceField
+    free: Mask
+    reachable: Mask
+    clearances_m: Clearance
+
+    @property
+    def grid(self) -> OccupancyGrid:
+        """The map."""
+        return self.distances.lattice.grid
+
+    @property
+    def radius_m(self) -> float:
+        """The robot's."""
+        return self.distances.radius_m
+
+
+def build_reachable_floor(distances: DistanceField) -> ReachableFloor:
+    """Build the floor of the map that the distances belong to, once for all its borders."""
+    grid = distances.lattice.grid
+    return ReachableFloor(
+        distances=distances,
+        free=grid.free,
+        reachable=distances.build_reachable_mask(),
+        clearances_m=distances.lattice.fine_clearance_m,
+    )
+
+
+WIDTH_STEP_M = 0.1
+"""Gaps are measured in steps of this."""
+ROUNDING_CELLS = 2
+"""By so much the reachable floor of a large map may be off, as its cells are joined."""
+
+
+def find_parts_beyond(floor: ReachableFloor, borders: Sequence[Border]) -> list[Border | None]:
+    """Find of each border the part where the robot does not fit; None where it is the lesser part.
+
+    The body of a robot that drives wherever it can covers all floor but slits, what lies behind
+    them, and corners, which are no deeper than that of a right angle.
+    """
+    if not borders:
+        return []
+    away = cv2.distanceTransform((~floor.reachable).view(np.uint8), cv2.DIST_L2, 5)
+    deepest = math.sqrt(2) * floor.radius_m / floor.grid.resolution_m + ROUNDING_CELLS
+    return [_part_where(border, away[border.rows, border.cols] > deepest) for border in borders]
+
+
+def _part_where(border: Border, is_part: Mask) -> Border | None:
+    ratio = float(is_part.mean())
+    if ratio <= 0.5:
+        return None
+    return dataclasses.replace(
+        border,
+        rows=border.rows[is_part],
+        cols=border.cols[is_part],
+        length_m=ratio * border.length_m,
+    )
+
+
+def find_gap_widths_m(floor: ReachableFloor, borders: Sequence[Border]) -> list[float | None]:
+    """Find for each border how wide the widest way to it is at its narrowest; None without a way.
+
+    The floor is taken in that has so much room around it, step by step more; a border hangs
+    together with where the robot is until its way is too narrow.
+    """
+    widths_m: list[float | None] = [None] * len(borders)
+    joined = list(range(len(borders))) if floor.reachable.any() else []
+    for width_m in np.arange(0.0, 2 * floor.radius_m - 1e-9, WIDTH_STEP_M):
+        if not joined:
+            break
+        labels, robot = _label_wide_floor(floor, float(width_m))
+        joined = [i for i in joined if (labels[borders[i].rows, borders[i].cols] == robot).any()]
+        for index in joined:
+            widths_m[index] = float(width_m)
+    return widths_m
+
+
+def _label_wide_floor(floor: ReachableFloor, width_m: float) -> tuple[Labels, int]:
+    """Numbers the pieces of floor that are nowhere narrower, and says where the robot is."""
+    wide = floor.free & (floor.clearances_m >= width_m / 2 - 1e-6)
+    wide |= floor.reachable
+    _, labels = cv2.connectedComponents(wide.view(np.uint8), connectivity=4)
+    return np.asarray(labels, dtype=np.int32), int(labels.flat[floor.reachable.argmax()])

@@ -1,0 +1,282 @@
+"""From where the robot can look beyond a border, and what may come into view there.
+
+Walls end the rays of a look, and the unknown wears them out: something hides what lies behind it in
+the unknown as it does on known floor. So a ray lasts there as far as rays last on this map: it is
+met by a wall once per so many metres, by chance, and what it may show is weighed by how likely it
+gets there.
+"""
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.spatial.frontiers.borders import Border, ReachableFloor, find_middle
+from mapspeak.spatial.frontiers.frontier import Frontier
+from mapspeak.spatial.grid import UNKNOWN, Cell, FloatArray, IntArray, Mask, OccupancyGrid
+from mapspeak.spatial.paths.lattice import Clearance, clearance_m
+from mapspeak.spatial.visibility import cast_rays
+
+TARGET_EVERY_M = 1.0
+"""Of a longer border, several places are looked at."""
+MOST_TARGETS = 6
+REACH_M = 0.5
+"""A border further than this from where the robot can stand cannot be looked over from there."""
+COMFORT_M = 0.1
+"""How much more than its radius the robot should have around it where it is sent to look.
+
+A navigator plans on its own map with its own rounding and padding; what is just wide enough here
+it refuses. Two cells of a usual map make up for both.
+"""
+_TARGET_ANGLES_RAD = np.linspace(0.0, math.tau, 32, endpoint=False)
+AT_ONCE = 256
+"""Places whose rays are held in memory together."""
+
+SIGHT_M = 8.0
+"""How far a look goes at most; rooms end what a LiDAR could see beyond."""
+STEP_M = 0.15
+"""Rays are looked at so often; walls are thicker, as nothing is seen through small holes."""
+WALL_HOLE_M = 0.3
+"""Beams far apart leave holes in walls; through one this wide nothing can be seen."""
+N_RAYS = 72
+_ANGLES_RAD = np.linspace(0.0, math.tau, N_RAYS, endpoint=False)
+LEAST_LEANING_RATIO = 0.02
+"""Unknown that leans less than this to one side lies all around."""
+
+Depths = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class Viewpoint:
+    """A place to look beyond a border from.
+
+    Attributes:
+        cell: One that the robot can reach.
+        target: The border's cell that it was chosen for.
+    """
+
+    cell: Cell
+    target: Cell
+
+
+def find_viewpoints(floor: ReachableFloor, borders: Sequence[Border]) -> list[list[Viewpoint]]:
+    """Find for each border places to look beyond it from, all along it; none where none is near.
+
+    A place is in sight of the border. It has room for the robot and some more where there is such
+    a place in reach, else it is the one with most room; of equals it is the nearest one.
+    """
+    if not borders:
+        return []
+    targets = [_choose_targets(floor, border) for border in borders]
+    rows = np.concatenate([target[0] for target in targets])
+    cols = np.concatenate([target[1] for target in targets])
+    cells = _find_cells(floor, rows, cols)
+    ends = np.cumsum([target[0].size for target in targets])
+    return [
+        _viewpoints(floor, cells[own], rows[own], cols[own])
+        for own in (slice(*pair) for pair in itertools.pairwise([0, *ends.tolist()]))
+    ]
+
+
+def _viewpoints(
+    floor: ReachableFloor, cells: IntArray, rows: IntArray, cols: IntArray
+) -> list[Viewpoint]:
+    """Return each cell of a border once, where there is any."""
+    targets = {
+        cell: Cell(row, col)
+        for cell, row, col in zip(cells.tolist(), rows.tolist(), cols.tolist(), strict=True)
+        if cell >= 0
+    }
+    n_cols = floor.grid.n_cols
+    return [Viewpoint(Cell(*divmod(cell, n_cols)), target) for cell, target in targets.items()]
+
+
+def _choose_targets(floor: ReachableFloor, border: Border) -> tuple[IntArray, IntArray]:
+    """Pick cells of a border, where the robot can go right to it if there is such a piece."""
+    near = np.flatnonzero(floor.reachable[border.rows, border.cols])
+    every_m = TARGET_EVERY_M if near.size else REACH_M
+    rows, cols = (border.rows[near], border.cols[near]) if near.size else (border.rows, border.cols)
+    n_targets = min(max(round(border.length_m / every_m), 1), MOST_TARGETS)
+    picked = _spread_out(rows, cols, n_targets)
+    return rows[picked], cols[picked]
+
+
+def _spread_out(rows: IntArray, cols: IntArray, n_cells: int) -> list[int]:
+    """Pick cells far from each other: first the middle one, then always the furthest."""
+    picked = [find_middle(rows, cols)]
+    gaps = np.full(rows.size if n_cells > 1 else 0, np.inf)
+    while len(picked) < n_cells:
+        last = picked[-1]
+        gaps = np.minimum(gaps, np.hypot(rows - rows[last], cols - cols[last]))
+        picked.append(int(gaps.argmax()))
+    return picked
+
+
+def _find_cells(floor: ReachableFloor, rows: IntArray, cols: IntArray) -> IntArray:
+    """Return the flat index of the best cell to stand in for each target; -1 for none."""
+    comfort_m = floor.radius_m + COMFORT_M
+    cells = rows * floor.grid.n_cols + cols
+    is_good = floor.reachable[rows, cols] & (floor.clearances_m[rows, cols] >= comfort_m)
+    others = np.flatnonzero(~is_good)
+    for start in range(0, others.size, AT_ONCE):
+        some = others[start : start + AT_ONCE]
+        cells[some] = _find_cells_off(floor, rows[some], cols[some])
+    return cells
+
+
+def _find_cells_off(floor: ReachableFloor, rows: IntArray, cols: IntArray) -> IntArray:
+    """Return the same for targets that the robot cannot stand on well, by looking around them."""
+    reach_m = floor.radius_m + REACH_M
+    n_steps = math.ceil(reach_m / floor.grid.resolution_m)
+    steps = np.arange(n_steps + 1, dtype=np.float64)
+    middles = np.stack([rows, cols], axis=1) + 0.5
+    rays = cast_rays(floor.free.shape, middles, angles_rad=_TARGET_ANGLES_RAD, steps=steps)
+    clearances_m = floor.clearances_m.ravel()[rays.cells]
+    is_reachable = floor.reachable.ravel()[rays.cells] & rays.is_inside
+    # Beside an obstacle a ray might slip between two cells of wall that touch at a corner.
+    is_wide = clearances_m > floor.grid.resolution_m
+    is_passed = floor.free.ravel()[rays.cells] & rays.is_inside & (is_wide | is_reachable)
+    is_passed[:, :, 0] = True
+    is_seen = np.logical_and.accumulate(is_passed, axis=2)
+    room_m = np.minimum(clearances_m, floor.radius_m + COMFORT_M)
+    # A step further away must be worth more room than the distance's whole weight.
+    worth = np.where(is_seen & is_reachable, room_m - steps * 1e-6, -np.inf)
+    flat = worth.reshape(rows.size, -1)
+    best = flat.argmax(axis=1)
+    each = np.arange(rows.size)
+    found = rays.cells.reshape(rows.size, -1)[each, best]
+    return np.where(np.isfinite(flat[each, best]), found, -1)
+
+
+@dataclass(frozen=True, slots=True)
+class ExpectedGain:
+    """The unknown that may come into view from a place.
+
+    Attributes:
+        area_m2: As much as is to be expected.
+        bearing_rad: Towards most of it, from the grid's own x axis; None where it lies all around.
+    """
+
+    area_m2: float
+    bearing_rad: float | None
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Views:
+    """The rays from some places, step by step.
+
+    Attributes:
+        depths: Steps into the unknown, this one included; 0 on known floor and behind walls.
+            Shape (places, rays, steps).
+        steps_m: From the place to each step.
+        stride_m: The length of a step.
+        openness_m: How far a ray goes over known floor, on average, until it meets a wall.
+    """
+
+    depths: Depths
+    steps_m: FloatArray
+    stride_m: float
+    openness_m: float
+
+    def areas_m2(self, openness_m: float) -> FloatArray:
+        """Return what may come into view along each ray, where rays last so far on average."""
+        passed_m = np.arange(self.steps_m.size + 1) * self.stride_m
+        lasting = np.exp(-passed_m / openness_m).astype(np.float32)
+        lasting[0] = 0.0
+        sectors_m2 = (self.steps_m * self.stride_m * (math.tau / N_RAYS)).astype(np.float32)
+        areas_m2 = np.empty(self.depths.shape[:2])
+        for start in range(0, len(self.depths), AT_ONCE):
+            some = slice(start, start + AT_ONCE)
+            areas_m2[some] = lasting[self.depths[some]] @ sectors_m2
+        return areas_m2
+
+    def find_gains(self) -> list[ExpectedGain]:
+        """Find the gain that is to be expected at each place."""
+        areas_m2 = self.areas_m2(self.openness_m)
+        totals_m2 = areas_m2.sum(axis=1)
+        along_x, along_y = areas_m2 @ np.cos(_ANGLES_RAD), areas_m2 @ np.sin(_ANGLES_RAD)
+        is_leaning = np.hypot(along_x, along_y) > LEAST_LEANING_RATIO * totals_m2
+        return [
+            ExpectedGain(float(total_m2), float(bearing_rad) if leans else None)
+            for total_m2, bearing_rad, leans in zip(
+                totals_m2, np.arctan2(along_y, along_x), is_leaning, strict=True
+            )
+        ]
+
+
+def find_views(grid: OccupancyGrid, clearances_m: Clearance, places: Sequence[Cell]) -> Views:
+    """Find what there is to see from the centre of each of some cells inside the array.
+
+    Outside the array everything is unknown.
+
+    Args:
+        grid: The map.
+        clearances_m: From each of its cells to the nearest obstacle.
+        places: The cells.
+    """
+    stride = max(round(STEP_M / grid.resolution_m), 1)
+    steps = np.arange(stride, SIGHT_M / grid.resolution_m + 1e-6, stride)
+    depths, n_passed, n_met = [np.zeros((0, N_RAYS, steps.size), dtype=np.uint8)], 0, 0
+    for start in range(0, len(places), AT_ONCE):
+        is_unknown, is_open = _look(grid, clearances_m, places[start : start + AT_ONCE], steps)
+        is_shown = is_unknown & is_open
+        depths.append(np.cumsum(is_shown, axis=2, dtype=np.uint8) * is_shown)
+        is_surely_open = is_open & ~np.logical_or.accumulate(is_unknown, axis=2)
+        n_passed += int(is_surely_open.sum())
+        n_met += int((is_surely_open[:, :, :-1] & ~is_open[:, :, 1:]).sum())
+    stride_m = stride * grid.resolution_m
+    return Views(
+        depths=np.concatenate(depths),
+        steps_m=steps * grid.resolution_m,
+        stride_m=stride_m,
+        openness_m=stride_m * max(n_passed, 1) / max(n_met, 1),
+    )
+
+
+def _look(
+    grid: OccupancyGrid, clearances_m: Clearance, places: Sequence[Cell], steps: FloatArray
+) -> tuple[Mask, Mask]:
+    """Return where rays are over the unknown, and where no wall hides them; by place, ray, step."""
+    rows = np.array([place.row for place in places], dtype=np.intp)
+    cols = np.array([place.col for place in places], dtype=np.intp)
+    middles = np.stack([rows, cols], axis=1) + 0.5
+    rays = cast_rays(grid.cells.shape, middles, angles_rad=_ANGLES_RAD, steps=steps)
+    solid_m = np.minimum(clearances_m[rows, cols], WALL_HOLE_M / 2)
+    # A ray that has left the array beside a wall has crossed it: the nearest cell inside counts.
+    is_wall = clearances_m.ravel()[rays.cells] < solid_m[:, None, None]
+    is_unknown = (grid.cells.ravel()[rays.cells] < 0) | ~rays.is_inside
+    return is_unknown, ~np.logical_or.accumulate(is_wall, axis=2)
+
+
+def find_area_m2(grid: OccupancyGrid, place: Cell, *, openness_m: float) -> float:
+    """Find how much may come into view from the centre of one cell, which may lie anywhere."""
+    near = _crop(grid, place, math.ceil((SIGHT_M + WALL_HOLE_M) / grid.resolution_m))
+    middle = Cell(near.n_rows // 2, near.n_cols // 2)
+    views = find_views(near, clearance_m(near), [middle])
+    return float(views.areas_m2(openness_m).sum())
+
+
+def _crop(grid: OccupancyGrid, centre: Cell, reach: int) -> OccupancyGrid:
+    """Return the map around a cell, with that cell in the middle and unknown outside the array."""
+    cells = np.full((2 * reach + 1, 2 * reach + 1), UNKNOWN, dtype=np.int8)
+    top, left = centre.row - reach, centre.col - reach
+    rows = slice(max(top, 0), min(top + 2 * reach + 1, grid.n_rows))
+    cols = slice(max(left, 0), min(left + 2 * reach + 1, grid.n_cols))
+    if rows.start < rows.stop and cols.start < cols.stop:
+        cells[rows.start - top : rows.stop - top, cols.start - left : cols.stop - left] = (
+            grid.cells[rows, cols]
+        )
+    return OccupancyGrid(cells=cells, resolution_m=grid.resolution_m)
+
+
+def remaining_ratio(grid: OccupancyGrid, frontier: Frontier) -> float:
+    """Return the share of a frontier's gain that its pose still promises.
+
+    A robot under way to a frontier can turn to the next one when this falls: it has seen from afar
+    what it was sent to see. The map may have grown and moved its origin since.
+    """
+    place = grid.cell_at(frontier.pose.point)
+    return find_area_m2(grid, place, openness_m=frontier.openness_m) / frontier.gain_m2
