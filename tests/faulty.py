@@ -51,6 +51,7 @@ class Faults:
         aborts: Navigation ends each goal as soon as it has taken it.
         ignores_cancels: Navigation drives on when it is asked to end a goal.
         hangs: Navigation takes goals, drives nowhere and ends none.
+        feeds_back: Navigation says how far its goals are.
         is_paused: The robot's clock stands, and all of the robot with it, as in a simulator.
         silent: Topics on which nothing comes any more, though their publishers are there.
         has_watchdog: The base stands half a second after the last velocity; without it the base
@@ -62,6 +63,7 @@ class Faults:
     aborts: bool = False
     ignores_cancels: bool = False
     hangs: bool = False
+    feeds_back: bool = True
     is_paused: bool = False
     silent: set[str] = field(default_factory=set)
     has_watchdog: bool = True

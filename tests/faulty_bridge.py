@@ -145,6 +145,8 @@ class FaultyStack(RosStack):
             source.due_s = 0.0
 
     async def _watch_drives(self) -> None:
+        if not self._faulty.faults.feeds_back:
+            self._feedback_due_s = self._faulty.now_s + 1.0
         if self._faulty.is_navigation_alive:
             await super()._watch_drives()
 

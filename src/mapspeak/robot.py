@@ -49,6 +49,7 @@ class PoseDoubt(StrEnum):
     NO_ANSWER = "no_answer"
     NO_POSE = "no_pose"
     OLD_POSE = "old_pose"
+    SILENT_POSE = "silent_pose"
     CLOCK_STANDS = "clock_stands"
     ODOMETRY = "odometry"
 
@@ -61,6 +62,7 @@ class StampedPose:
         pose: In the map frame.
         stamp_s: Robot time of the estimate.
         silent_s: Wall time since its source said anything new; 0 for one that need not.
+        is_clock_still: The robot's clock does not move on.
         is_odometry: It was taken from odometry, which drifts, for want of a pose on the map.
     """
 
@@ -68,6 +70,7 @@ class StampedPose:
     stamp_s: float
     silent_s: float = 0.0
     is_odometry: bool = False
+    is_clock_still: bool = False
 
     def measure_age_s(self, now_s: float) -> float:
         """Return how old the estimate is, by robot time or, while that stands, by the wall."""
@@ -75,10 +78,10 @@ class StampedPose:
 
     def find_doubt(self, now_s: float) -> PoseDoubt | None:
         """Return why the robot may be elsewhere; None for a fresh pose on the map."""
+        if self.silent_s > OLD_POSE_S:
+            return PoseDoubt.CLOCK_STANDS if self.is_clock_still else PoseDoubt.SILENT_POSE
         if now_s - self.stamp_s > OLD_POSE_S:
             return PoseDoubt.OLD_POSE
-        if self.silent_s > OLD_POSE_S:
-            return PoseDoubt.CLOCK_STANDS
         return PoseDoubt.ODOMETRY if self.is_odometry else None
 
 
@@ -183,6 +186,7 @@ class GoalStatus:
         n_recoveries: How often it had to try again.
         reason: Why it ended as it did; empty while it drives.
         is_unanswered: It is rejected because the navigation has not answered at all.
+        afterwards: What became of it after its end, where navigation took it up after all.
     """
 
     state: GoalState
@@ -190,6 +194,7 @@ class GoalStatus:
     n_recoveries: int = 0
     reason: str = ""
     is_unanswered: bool = False
+    afterwards: str = ""
 
 
 class Health(StrEnum):

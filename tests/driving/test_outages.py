@@ -1,5 +1,7 @@
 """What becomes of a drive while the robot, its navigation or its pose is away, and after."""
 
+from dataclasses import replace
+
 import anyio
 import pytest
 
@@ -9,7 +11,7 @@ from mapspeak.driving.drive import DriveBook
 from mapspeak.driving.drivereport import Drive, DriveReport
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
-from mapspeak.robot import GoalState, PoseDoubt, StampedPose
+from mapspeak.robot import GoalState, GoalStatus, PoseDoubt, StampedPose
 
 pytestmark = pytest.mark.anyio
 
@@ -228,6 +230,29 @@ class StandingClock(FakeRobot):
         raise LinkError(f"{duration_s} s cannot be waited for: the clock stands.", hint="Unpause.")
 
 
+class LateNavigation(FailingRobot):
+    """Takes up a goal that it had called rejected."""
+
+    afterwards = ""
+
+    async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
+        status = await super().fetch_goal_status(robot_goal_id)
+        return replace(status, state=GoalState.REJECTED, afterwards=self.afterwards)
+
+
+async def test_what_becomes_of_a_drive_after_its_end_is_told_with_it() -> None:
+    robot = LateNavigation()
+    drives = DriveBook(robot, wall_s=lambda: robot.now_s)
+    with drives.preparing() as ticket:
+        drive = await drives.start(FAR, place="there", ticket=ticket)
+    before = await drives.wait(drive.goal_id, wait_s=20.0, on_progress=tell_nobody)
+    robot.afterwards = "It was taken 7.0 s after it was sent; it was cancelled at once."
+    after = await drives.wait(drive.goal_id, wait_s=20.0, on_progress=tell_nobody)
+    assert (before.status.state, before.status.afterwards) == (GoalState.REJECTED, "")
+    assert after.status.state is GoalState.REJECTED
+    assert after.status.afterwards == robot.afterwards
+
+
 async def test_waiting_ends_when_the_robots_clock_stands() -> None:
     drives = DriveBook(StandingClock(two_rooms()))
     with drives.preparing() as ticket:
@@ -241,7 +266,10 @@ def test_a_pose_is_doubted_when_it_is_old_silent_or_odometry() -> None:
     here = Pose(1.0, 2.0)
     assert StampedPose(here, 9.0).find_doubt(10.0) is None
     assert StampedPose(here, 5.0).find_doubt(10.0) is PoseDoubt.OLD_POSE
-    assert StampedPose(here, 10.0, silent_s=9.0).find_doubt(10.0) is PoseDoubt.CLOCK_STANDS
+    assert StampedPose(here, 10.0, silent_s=9.0).find_doubt(10.0) is PoseDoubt.SILENT_POSE
+    assert StampedPose(here, 1.0, silent_s=9.0).find_doubt(10.0) is PoseDoubt.SILENT_POSE
+    paused = StampedPose(here, 10.0, silent_s=9.0, is_clock_still=True)
+    assert paused.find_doubt(10.0) is PoseDoubt.CLOCK_STANDS
     assert StampedPose(here, 9.0, is_odometry=True).find_doubt(10.0) is PoseDoubt.ODOMETRY
     assert StampedPose(here, 12.0).measure_age_s(10.0) == 0.0
     assert StampedPose(here, 10.0, silent_s=9.0).measure_age_s(10.0) == 9.0

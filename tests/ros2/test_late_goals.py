@@ -58,13 +58,13 @@ def open_link(request: pytest.FixtureRequest) -> OpenLink:
     return over_rosbridge
 
 
-async def reason_of(robot: RosRobot, goal_id: str) -> str:
-    return (await robot.fetch_goal_status(goal_id)).reason
+async def note_of(robot: RosRobot, goal_id: str) -> str:
+    return (await robot.fetch_goal_status(goal_id)).afterwards
 
 
 async def until_cancelled(robot: RosRobot, goal_id: str) -> None:
     with anyio.fail_after(PATIENCE_S):
-        while "cancelled at once" not in await reason_of(robot, goal_id):  # noqa: ASYNC110 - asked for
+        while "cancelled at once" not in await note_of(robot, goal_id):  # noqa: ASYNC110 - asked for
             await anyio.sleep(0.05)
 
 

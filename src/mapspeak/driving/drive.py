@@ -9,7 +9,6 @@ or replaced, is stopped; where the robot cannot be reached, as soon as it can.
 """
 
 import logging
-import re
 from collections.abc import Awaitable, Callable, Generator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -17,7 +16,7 @@ from dataclasses import replace
 import anyio
 
 from mapspeak.driving.drivemonitor import DriveMonitor, Look
-from mapspeak.driving.drivereport import JUST_SENT, Drive, DriveReport
+from mapspeak.driving.drivereport import JUST_SENT, Drive, DriveReport, find_tried_frontiers
 from mapspeak.driving.owedstop import NEEDS_NO_STOP, OwedStop
 from mapspeak.errors import GoalError, LinkError, MapspeakError
 from mapspeak.geometry import Point, Pose
@@ -29,8 +28,6 @@ __all__ = ["Drive", "DriveBook", "DriveReport"]
 POLL_S = 0.2
 PROGRESS_S = 1.0
 N_KEPT = 200
-N_BLOCKED_KEPT = 8
-FRONTIER = re.compile(r"F\d+")
 
 
 OnProgress = Callable[[DriveReport], Awaitable[None]]
@@ -83,22 +80,8 @@ class DriveBook:
 
     @property
     def frontiers_tried(self) -> tuple[Point, ...]:
-        """Where the robot has arrived, or lately could not get to, when sent to a frontier.
-
-        One that was blocked is worth another try later, when more is known of the way.
-        """
-        ended = [drive for drive in self._drives.values() if drive.final is not None]
-        lately = {drive.goal_id for drive in ended[-N_BLOCKED_KEPT:]}
-        return tuple(
-            drive.goal.point
-            for drive in ended
-            if FRONTIER.fullmatch(drive.place)
-            and drive.final is not None
-            and (
-                drive.final.state is GoalState.ARRIVED
-                or (drive.final.state is GoalState.BLOCKED and drive.goal_id in lately)
-            )
-        )
+        """Where the robot has arrived, or lately could not get to, when sent to a frontier."""
+        return find_tried_frontiers(self._drives.values())
 
     @property
     def is_busy(self) -> bool:

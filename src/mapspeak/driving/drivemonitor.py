@@ -1,15 +1,15 @@
 """Looking at a robot that drives: how its drive stands, where it is, and whether it may go on."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mapspeak.driving.drivereport import Drive, DriveReport
 from mapspeak.driving.watchdog import DriveWatchdog, Odometer
-from mapspeak.errors import LinkError
+from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState, GoalStatus, PoseDoubt, Robot, StampedPose
 
-STALE = (PoseDoubt.OLD_POSE, PoseDoubt.CLOCK_STANDS)
+STALE = (PoseDoubt.OLD_POSE, PoseDoubt.SILENT_POSE, PoseDoubt.CLOCK_STANDS)
 WAITS = GoalStatus(state=GoalState.PLANNED, reason="It waits for the drive before it.")
 
 
@@ -74,8 +74,7 @@ class DriveMonitor:
         """Ask how a drive stands and where the robot is."""
         status, doubt = drive.final or drive.heard, PoseDoubt.NO_ANSWER
         try:
-            if drive.final is None:
-                status = await self._fetch_status(drive)
+            status = await self._fetch_status(drive)
             doubt = PoseDoubt.NO_POSE
             return Look(status=status, jump_m=await self.find_robot())
         except LinkError as error:
@@ -99,7 +98,7 @@ class DriveMonitor:
         unseen_s = 0.0 if look.error is None else self._wall_s() - self._seen_s
         return DriveReport(
             drive=drive,
-            status=drive.final or look.status,
+            status=_end_of(drive, look.status),
             pose=self._seen.pose,
             pose_age_s=max(self._seen.measure_age_s(now_s), unseen_s),
             pose_doubt=look.doubt or self._seen.find_doubt(now_s),
@@ -111,5 +110,15 @@ class DriveMonitor:
 
     async def _fetch_status(self, drive: Drive) -> GoalStatus:
         if drive.robot_goal_id is None:
-            return WAITS
-        return await self._robot.fetch_goal_status(drive.robot_goal_id)
+            return drive.final or WAITS
+        try:
+            return await self._robot.fetch_goal_status(drive.robot_goal_id)
+        except MapspeakError:
+            if drive.final is None:
+                raise
+            return drive.final
+
+
+def _end_of(drive: Drive, heard: GoalStatus) -> GoalStatus:
+    """Return how a drive stands: once it has ended as then, with what became of it since."""
+    return heard if drive.final is None else replace(drive.final, afterwards=heard.afterwards)

@@ -1,11 +1,15 @@
 """A drive that was sent to the robot, and how it stands."""
 
+import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import GoalState, GoalStatus, PoseDoubt
 
 JUST_SENT = GoalStatus(state=GoalState.ACCEPTED)
+N_BLOCKED_KEPT = 8
+FRONTIER = re.compile(r"F\d+")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,3 +65,18 @@ class DriveReport:
     silence: str
     is_stop_owed: bool
     elapsed_s: float
+
+
+def find_tried_frontiers(drives: Iterable[Drive]) -> tuple[Point, ...]:
+    """Return the frontiers at which the robot has arrived, or to which it lately found no way.
+
+    A blocked one is worth another try later, when more is known of the way.
+
+    Args:
+        drives: The oldest first.
+    """
+    ends = [(drive, drive.final.state) for drive in drives if drive.final is not None]
+    arrived = [drive for drive, state in ends if state is GoalState.ARRIVED]
+    blocked = [drive for drive, state in ends[-N_BLOCKED_KEPT:] if state is GoalState.BLOCKED]
+    tried = [drive for drive in [*arrived, *blocked] if FRONTIER.fullmatch(drive.place)]
+    return tuple(drive.goal.point for drive in tried)

@@ -127,7 +127,7 @@ class DriveAnswer(Report):
             pose_uncertain=say_pose_doubt(report.pose_doubt, report.pose_age_s, report.silence),
             distance_left_m=None if left_m is None else round(left_m, 2),
             elapsed_s=round(report.elapsed_s, 1),
-            reason=report.status.reason,
+            reason=" ".join(filter(None, (report.status.reason, report.status.afterwards))),
             next_step=FOREIGN_DRIVE if foreign_goals else _say_next_step(report),
         )
 

@@ -33,6 +33,8 @@ POSE_DOUBTS = {
     PoseDoubt.NO_POSE: "the robot does not say where it is; the pose is the last one",
     PoseDoubt.OLD_POSE: "unless the robot stood still since, it is elsewhere; check that "
     "localisation runs and that the clocks agree",
+    PoseDoubt.SILENT_POSE: "nothing new has come from what tells the pose; check that SLAM or "
+    "localisation and the robot's drivers still run",
     PoseDoubt.CLOCK_STANDS: "the robot's clock stands; check that a simulation is not paused",
     PoseDoubt.ODOMETRY: "it is odometry, which drifts away from the map; start SLAM or "
     "localisation",

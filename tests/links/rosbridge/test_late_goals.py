@@ -405,7 +405,7 @@ async def until_state(robot: RosRobot, goal_id: str, state: GoalState) -> None:
 
 async def eventually_says(robot: RosRobot, goal_id: str, said: str) -> None:
     async def is_said() -> bool:
-        return said in (await robot.fetch_goal_status(goal_id)).reason
+        return said in (await robot.fetch_goal_status(goal_id)).afterwards
 
     await eventually(is_said)
 

@@ -1,6 +1,7 @@
 """What sending goals, following them and ending them means, whichever ROS it is."""
 
 import logging
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ STOPPED = "The robot was stopped before the goal was sent."
 TOO_EARLY = "It was ended before the action server took it."
 GONE = "The connection was lost meanwhile, and the action server does not know the goal any more."
 SILENT = "The action server has said nothing for {:.0f} s."
+NO_FEEDBACK = "The action server has told of no progress for {:.0f} s."
 UNSERVED = "The action server is there no more."
 RESULT_LATE = "Its result has not come."
 TAKEN_LATE = "The action server took it {:.1f} s after it was sent; it was cancelled at once."
@@ -28,6 +30,8 @@ BACK_LATE = "The action server spoke of it {:.1f} s after it was sent; it was ca
 PAUSES_S = (0.1, 0.2, 0.4, 0.8, 1.6, *30 * (4.0,))
 """Between two attempts to cancel a goal that goes on though it was withdrawn."""
 N_KEPT = 50
+LONGEST_LOOK_S = 2.0
+"""Of robot time between two looks no more is silence: a clock that is set is none."""
 
 logger = logging.getLogger(__name__)
 
@@ -89,6 +93,9 @@ class ActionClient(ABC):
         self._goals: dict[str, SentGoal] = {}
         self._being_ended: set[str] = set()
         self._statuses: dict[str, ActionState] = {}
+        self._feedback_within_s = math.inf
+        self._now_s: Callable[[], float] = anyio.current_time
+        self._looked_s = math.inf
 
     # --- what is known
 
@@ -143,9 +150,25 @@ class ActionClient(ABC):
 
     def look(self) -> None:
         """Take in that time has passed: that nothing was heard for long says something too."""
+        now_s = self._now_s()
+        passed_s = min(max(now_s - self._looked_s, 0.0), LONGEST_LOOK_S)
+        self._looked_s = now_s
         for goal in self.open_goals:
             self._look_at(goal)
+            if goal.n_feedback > 0 and self._connection.connected_for_s is not None:
+                goal.silent_s += passed_s
+            if goal.silent_s > self._feedback_within_s and not goal.is_over:
+                self._withdraw(goal, ActionState.LOST, NO_FEEDBACK.format(goal.silent_s))
         self._tell()
+
+    def expect_feedback(self, *, within_s: float, now_s: Callable[[], float]) -> None:
+        """Take for lost a goal whose feedback has come once, and then stays away for so long.
+
+        Args:
+            within_s: In robot time.
+            now_s: Tells robot time.
+        """
+        self._feedback_within_s, self._now_s = within_s, now_s
 
     # --- what is done
 

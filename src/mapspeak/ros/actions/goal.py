@@ -57,6 +57,7 @@ class SentGoal:
         state: How it stands.
         feedback: The latest; None before the first.
         n_feedback: How many came.
+        silent_s: Robot time since the latest, as far as somebody looked.
         result: None as long as there is none.
         reason: Why it ended so, where that was said.
         afterwards: What became of a withdrawn goal that the server took after all.
@@ -86,6 +87,7 @@ class SentGoal:
         self.state = ActionState.SENT
         self.feedback: Message | None = None
         self.n_feedback = 0
+        self.silent_s = 0.0
         self.result: Message | None = None
         self.reason = ""
         self.afterwards = ""
@@ -111,6 +113,7 @@ class SentGoal:
         if not self.is_over:
             self.feedback = feedback
             self.n_feedback += 1
+            self.silent_s = 0.0
             self.move_on(ActionState.RUNNING)
 
     def end(self, state: ActionState, *, reason: str = "", result: Message | None = None) -> None:

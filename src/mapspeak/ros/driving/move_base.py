@@ -32,4 +32,6 @@ MOVE_BASE = Navigation(
     write_goal=_write_goal,
     read_feedback=_read_feedback,
     hint="Check that move_base runs and that the robot knows where it is.",
+    # It gives none while a recovery turns the robot once round.
+    feedback_s=20.0,
 )

@@ -22,7 +22,7 @@ STATE_OF = {
 }
 REPLACED = "another goal was received"
 """actionlib's words for a goal that gave way, where the number says only that it was ended."""
-RESTARTED = "{} or the robot was restarted, or has ended. {}"
+RESTARTED = "{} hangs, or it or the robot was restarted, or has ended. {}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,6 +36,7 @@ class Navigation:
         write_goal: Gives the goal's fields for a pose.
         read_feedback: Gives how far is left, and how often it had to try again, for a goal.
         hint: What to check when it does not answer.
+        feedback_s: Robot time within which it gives feedback as long as it works.
     """
 
     title: str
@@ -44,6 +45,7 @@ class Navigation:
     write_goal: Callable[[FramedPose], Message]
     read_feedback: Callable[[Message, Pose], tuple[float | None, int]]
     hint: str
+    feedback_s: float = 10.0
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -63,6 +65,7 @@ class ActionDriver:
         navigation: Which kind it is.
         map_frame: In which goals are given.
         patience: All time limits.
+        now_s: Tells robot time.
         on_lost: Called when navigation has gone under a drive; nobody stops the base then.
     """
 
@@ -74,6 +77,7 @@ class ActionDriver:
         *,
         map_frame: str,
         patience: DrivingPatience,
+        now_s: Callable[[], float],
         on_lost: Callable[[], None] = lambda: None,
     ) -> None:
         self._connection = connection
@@ -91,6 +95,7 @@ class ActionDriver:
         )
         self._client.advertise(connection)
         self._client.ends_others = True
+        self._client.expect_feedback(within_s=navigation.feedback_s, now_s=now_s)
         self._client.listeners.append(self._consider_all)
 
     @property

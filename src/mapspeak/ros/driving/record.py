@@ -33,8 +33,9 @@ class GoalRecord:
             state=self.state,
             distance_left_m=self._distance_left_m,
             n_recoveries=self._n_recoveries,
-            reason=" ".join(part for part in (self._reason, self.afterwards) if part),
+            reason=self._reason,
             is_unanswered=self._is_unanswered,
+            afterwards=self.afterwards,
         )
 
     @property

@@ -24,6 +24,8 @@ FIRST_TICK_S = 1.0
 """A clock topic that stays silent for so long is left over from something else."""
 ASK_AGAIN_S = 1.0
 """Whoever could tell the time may be found only after we have connected."""
+STILL_S = 2.0
+"""Of the wall clock; a simulated clock that has not moved on for so long may stand."""
 EPSILON_S = 1e-6
 
 
@@ -40,6 +42,7 @@ class RobotClock:
         self._standstill_s = standstill_s
         self._offset_s: float | None = None
         self._simulated_s: float | None = None
+        self._ticked_s = 0.0
         self._moved_on = anyio.Event()
 
     @property
@@ -53,6 +56,11 @@ class RobotClock:
     def is_set(self) -> bool:
         """True when the robot has said what time it is."""
         return self._simulated_s is not None or self._offset_s is not None
+
+    @property
+    def is_still(self) -> bool:
+        """True while a simulation's clock does not move on."""
+        return self._simulated_s is not None and anyio.current_time() - self._ticked_s > STILL_S
 
     async def start(self, clock_topic: str | None) -> None:
         """Sets the clock by what the robot says now."""
@@ -112,6 +120,7 @@ class RobotClock:
             return
         if self._simulated_s == before_s:
             return
+        self._ticked_s = anyio.current_time()
         moved_on, self._moved_on = self._moved_on, anyio.Event()
         moved_on.set()
 

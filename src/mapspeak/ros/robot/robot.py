@@ -2,6 +2,7 @@
 
 from collections import OrderedDict
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 
 from mapspeak.errors import GoalError, LinkError
@@ -140,14 +141,14 @@ class RosRobot:
         """Gives where the robot believes it is; see the profile for how it is known."""
         await self.connection.wait_until_connected()
         await self._watch.wait_for(POSE)
-        return await self._poses.fetch()
+        return await self._find_pose()
 
     async def fetch_picture(self) -> CameraPicture:
         """Takes a picture with the front camera."""
         await self.connection.wait_until_connected()
         await self._watch.find(CAMERA)
         picture = await self._camera.fetch()
-        here = await self._poses.fetch()
+        here = await self._find_pose()
         return CameraPicture(
             data=picture.data,
             media_type=picture.media_type,
@@ -224,6 +225,9 @@ class RosRobot:
         """Return when all that the robot offers counts as found."""
         await self._watch.settle()
 
+    async def _find_pose(self) -> StampedPose:
+        return replace(await self._poses.fetch(), is_clock_still=self._clock.is_still)
+
     def _is_driving(self) -> bool:
         is_under_way = any(not record.is_over for record in self._goals.values())
         return is_under_way or self._n_sending > 0
@@ -282,6 +286,7 @@ class RosRobot:
                     NAV2 if profile.navigation is NavigationKind.NAV2 else MOVE_BASE,
                     map_frame=profile.map_frame,
                     patience=self._patience,
+                    now_s=lambda: self.now_s,
                     on_lost=self._stand,
                 )
             case NavigationKind.GOAL_TOPIC:

@@ -11,7 +11,7 @@ from mapspeak.ros.actions import ActionState, SentGoal
 from mapspeak.ros.definitions import check_message
 from mapspeak.ros.messages import Message, bare_type
 from mapspeak.safety import Act
-from mapspeak.server.callers import client_of
+from mapspeak.server.callers import LONGEST_WAIT_S, client_of
 from mapspeak.server.rosreports import cut, show_message
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.frames import check_frames
@@ -23,7 +23,6 @@ from mapspeak.server.tools.ros.views import view_fields
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.server.wording import say_count
 
-LONGEST_WAIT_S = 25.0
 MOST_LISTED = 20
 
 Action = Annotated[str, Field(description="full name, such as /spin", max_length=200)]
