@@ -7,8 +7,6 @@ from collections.abc import Iterator
 from mapspeak.ros.actions.goal import ActionState
 from mapspeak.ros.messages import Message
 
-__all__ = ["STATES", "read_statuses"]
-
 STATES = {
     1: ActionState.ACCEPTED,
     2: ActionState.RUNNING,
