@@ -12,8 +12,7 @@ from mcp.client import Client
 from faulty import Faults
 from faulty_bridge import NEXT_ROOM, FaultyBridge, open_faulty_bridge
 from mapspeak.links.ros import DrivingPatience
-from mapspeak.links.rosbridge import open_rosbridge_robot
-from mapspeak.links.rosbridge.client import Timing
+from mapspeak.links.rosbridge import Timing, open_rosbridge_robot
 from mapspeak.ros.messages import Dialect
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server import build_server
@@ -33,11 +32,16 @@ BOTH = pytest.mark.parametrize("dialect", list(Dialect))
 
 @asynccontextmanager
 async def driving(
-    folder: Path, dialect: Dialect, *, patience: DrivingPatience = LONG, faults: Faults
+    folder: Path,
+    dialect: Dialect,
+    *,
+    patience: DrivingPatience = LONG,
+    faults: Faults,
+    speed_mps: float = 0.5,
 ) -> AsyncGenerator[tuple[FaultyBridge, Caller]]:
     with anyio.fail_after(2 * PATIENCE_S):
         async with (
-            open_faulty_bridge(dialect, rate=RATE, faults=faults) as bridge,
+            open_faulty_bridge(dialect, rate=RATE, faults=faults, speed_mps=speed_mps) as bridge,
             open_rosbridge_robot(bridge.url, timing=QUICK, patience=patience) as robot,
         ):
             session = Session(
@@ -62,8 +66,11 @@ async def until(is_so: Callable[[], bool]) -> None:
 async def test_waiting_for_a_drive_while_rosbridge_is_away_answers_with_its_goal_id(
     tmp_path: Path, dialect: Dialect
 ) -> None:
-    async with driving(tmp_path, dialect, faults=Faults()) as (bridge, caller):
+    # So slow that it drives on for longer than feedback may stay away.
+    driven = driving(tmp_path, dialect, faults=Faults(), speed_mps=0.1)
+    async with driven as (bridge, caller):
         await until(lambda: bridge.robot.base.driven_m > 0.1)
+        await caller.ask("wait_for_goal", wait_s=0)
         await bridge.close()
         away = json.loads(await caller.ask("wait_for_goal", wait_s=0.5))
         await bridge.open()

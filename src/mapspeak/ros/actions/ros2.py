@@ -185,6 +185,9 @@ class Ros2ActionClient(ActionClient):
     def _look_at(self, goal: SentGoal) -> None:
         track = self._tracks[goal.id]
         self._consider(track)
+        if track.wire.is_lost:
+            # What brought its feedback is gone; the list goes on.
+            goal.silent_s = 0.0
         silent_s = anyio.current_time() - track.heard_s
         is_sent = goal.state is ActionState.SENT
         if not (is_sent or goal.is_over) and silent_s > self._patience.return_s:
@@ -287,8 +290,12 @@ class Ros2ActionClient(ActionClient):
     # --- which goal is ours, where only rosbridge knows
 
     def _seen_since(self, track: _Track) -> list[str]:
-        """Return the listed goals that were first seen after a goal was sent."""
-        return [each for each in self._statuses if self._seen.get(each, -1) >= track.n_seen]
+        """Return the listed goals that go on, and were first seen after a goal was sent."""
+        return [
+            server_id
+            for server_id, state in self._statuses.items()
+            if not state.is_final and self._seen.get(server_id, -1) >= track.n_seen
+        ]
 
     def _claim(self, server_ids: list[str]) -> None:
         """Take for ours the goals that have appeared, the oldest first, as far as that is sure."""
