@@ -288,7 +288,8 @@ class Session:
         if surveyor is None:
             return None, ()
         revision = await surveyor.survey(grid, radius_m=self.robot.description.radius_m)
-        return revision, await self.compute(lambda: surveyor.describe(revision))
+        others = () if self.guard is None else self.guard.warn_of_servers()
+        return revision, (*others, *await self.compute(lambda: surveyor.describe(revision)))
 
     async def _learn(self, revision: MapRevision) -> bool:
         """Remembers what the last drive tells of doors; true when that changes ways."""
@@ -332,7 +333,9 @@ class Session:
         if self._guarded is None or self.guard is None:
             yield
             return
-        self.guard.hold.join(self._guarded.name)
+        for warning in self.guard.warn_of_servers():
+            logger.warning("%s", warning)
+        self.guard.hold.join(self._guarded.name, address=self.guard.address)
         try:
             yield
         finally:

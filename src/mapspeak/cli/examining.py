@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING
 import anyio
 import click
 
+from mapspeak.cli.guarding import control_folder
 from mapspeak.cli.options import ROBOT_OPTIONS, add_options
 from mapspeak.cli.robots import RobotChoice, open_robot
+from mapspeak.safety.hold import Hold
 
 if TYPE_CHECKING:
     from mapspeak.robot import Finding
@@ -59,7 +61,22 @@ async def examine_choice(choice: RobotChoice) -> "list[Finding]":
         is_second_choice = choice.robot.startswith("ros2") and link.kind is LinkKind.DDS
         reason = "because this Python has no rclpy" if is_second_choice else ""
         lines = describe_profile(robot.profile, link, reason=reason, map_age_s=robot.map_age_s)
-        return [*lines, *found]
+        return [*lines, *find_servers(choice), *found]
+
+
+def find_servers(choice: RobotChoice) -> "list[Finding]":
+    """Return which servers of this user drive the same robot; nothing where none does."""
+    from mapspeak.robot import Finding, Health  # noqa: PLC0415 - heavy; help must be quick
+
+    processes = Hold(control_folder(None)).servers_of(choice.address)
+    if not processes:
+        return []
+    if len(processes) == 1:
+        said = f"1 serves this robot: process {processes[0]}"
+        return [Finding(what="servers", health=Health.FINE, said=said)]
+    said = f"{len(processes)} serve this robot: processes {', '.join(map(str, processes))}"
+    hint = "Their goals replace each other and their velocities alternate: end all but one."
+    return [Finding(what="servers", health=Health.DOUBTFUL, said=said, hint=hint)]
 
 
 def _show(findings: "Sequence[Finding]") -> None:

@@ -58,12 +58,13 @@ class GuardChoice:
     control: Path | None = None
 
 
-def build_guard(choice: GuardChoice, *, robot: str) -> "Guard":
+def build_guard(choice: GuardChoice, *, robot: str, address: str = "") -> "Guard":
     """Builds what commands to a robot are held to.
 
     Args:
         choice: Of files.
         robot: What it is called in the log.
+        address: Where it is; empty for one that nobody else can reach.
 
     Raises:
         ConfigError: The policy has a mistake; says the line and the key.
@@ -88,6 +89,7 @@ def build_guard(choice: GuardChoice, *, robot: str) -> "Guard":
         approvals=Approvals(WaitingRoom(control / "approvals"), time.monotonic),
         wall_clock=wall_clock,
         robot=robot,
+        address=address,
     )
 
 

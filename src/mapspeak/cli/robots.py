@@ -73,6 +73,11 @@ class RobotChoice:
 
         return RobotAddress(url=self.robot).shown
 
+    @property
+    def address(self) -> str:
+        """Where others reach the same robot; empty for a simulated one, which nobody shares."""
+        return "" if _is_simulated(self) else self.shown
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServedRobot:

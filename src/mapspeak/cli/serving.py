@@ -341,8 +341,9 @@ async def _open_session(
     from mapspeak.semantic import SemanticMapStore  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.session import Session  # noqa: PLC0415
 
-    guard = build_guard(start.guard, robot=name or start.choice.shown)
-    served = await links.enter_async_context(open_served_robot(start.choice))
+    choice = start.choice
+    guard = build_guard(start.guard, robot=name or choice.shown, address=choice.address)
+    served = await links.enter_async_context(open_served_robot(choice))
     path = start.semantic_map
     if path is None:
         folder = scratch / name if served.ros is None else data_folder()

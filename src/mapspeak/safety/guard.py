@@ -67,6 +67,7 @@ class Guard:
         approvals: What waits for a person's word.
         wall_clock: The operator's.
         robot: What the operator calls it; empty leaves that to the robot.
+        address: Where the robot is; empty for one that nobody else can reach.
     """
 
     policy: Policy
@@ -75,8 +76,17 @@ class Guard:
     approvals: Approvals
     wall_clock: Callable[[], datetime]
     robot: str = ""
+    address: str = ""
     _rates: RateLog = field(default_factory=RateLog)
     _errands: Errands = field(default_factory=Errands)
+
+    def warn_of_servers(self) -> tuple[str, ...]:
+        """Tell of other servers that drive the same robot."""
+        return tuple(
+            f"Another mapspeak server, process {process}, drives this robot too: their goals "
+            "replace each other and their velocities alternate. Let a person end one of them."
+            for process in self.hold.servers_of(self.address)
+        )
 
     def clear(
         self, command: Command, *, robot_s: float, objection: Refused | None = None

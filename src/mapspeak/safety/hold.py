@@ -96,13 +96,26 @@ class Hold:
             if told.get("held_by") == held_by:
                 yield str(told.get("robot", path.stem)), str(told.get("failure") or "")
 
-    def join(self, robot: str) -> None:
-        """Tells that a robot is served from here, so that a stop knows whose answer it awaits."""
+    def join(self, robot: str, *, address: str = "") -> None:
+        """Tell that a robot is served from here, so that a stop knows whose answer it awaits.
+
+        Args:
+            robot: What the operator calls it.
+            address: Where it is; empty for one that only this process has.
+        """
+        told = {"robot": robot, "process": os.getpid(), "address": address}
         with suppress(OSError):
-            self._write(
-                self.folder / SERVED / _file_of(robot),
-                json.dumps({"robot": robot, "process": os.getpid()}),
-            )
+            self._write(self.folder / SERVED / _file_of(robot), json.dumps(told))
+
+    def servers_of(self, address: str) -> tuple[int, ...]:
+        """Return the other processes that serve the robot at an address."""
+        served = (told for _, told in _read_all(self.folder / SERVED))
+        found = {
+            int(told["process"])
+            for told in served
+            if address and told.get("address") == address and _is_running(told.get("process"))
+        }
+        return tuple(sorted(found - {os.getpid()}))
 
     def leave(self, robot: str) -> None:
         """Tells that it no longer is."""

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose
@@ -249,6 +250,21 @@ def test_a_thing_seen_through_two_doors_in_a_row_is_no_finding() -> None:
     assert wrong_rooms(through_doors) == []
     told = [each.sentence for each in wrong_rooms(through_walls)]
     assert all("no door on the line" in each for each in told)
+
+
+def test_a_thing_that_may_be_on_this_side_of_the_wall_is_no_finding() -> None:
+    west, east = both_rooms()
+    seen = place("a", 1.0, 2.2, mark("sink", range_m=2.0), yaw_deg=0.0, room_id=west)
+    found, findings = check(seen)
+    (sink,) = found.things
+    beyond = find_rooms(GRID).find_region_at(sink.position or Point(0.0, 0.0))
+    assert beyond is not None
+    assert beyond.id == east
+    assert findings == ()
+    further = replace(sink, position=Point(4.5, 2.2), uncertainty_m=0.5)
+    memory, rooms = SemanticMap(waypoints=(seen,)), find_rooms(GRID)
+    (finding,) = check_memory(memory, replace(found, things=(further,)), rooms=rooms)
+    assert finding.kind is FindingKind.WRONG_ROOM
 
 
 def test_trust_falls_with_every_finding_and_says_why() -> None:

@@ -244,11 +244,13 @@ def check_rooms(
 
 
 def _regions_on(rooms: RoomMap, waypoint: Waypoint, thing: Thing) -> tuple[Region, ...]:
-    """Gives the rooms on the line from a place to a thing: the thing itself may be in a wall."""
+    """Return the rooms on the line from a place to the nearest point where a thing may be."""
     assert thing.position is not None, "only what has a place has a room"  # noqa: S101 - our belief
     start, end = waypoint.pose.point, thing.position
-    n_steps = max(math.ceil(start.distance_to(end) / _STEP_M), 1)
-    shares = (step / n_steps for step in range(n_steps + 1))
+    far_m = start.distance_to(end)
+    near_ratio = max(1.0 - (thing.uncertainty_m or 0.0) / max(far_m, 1e-9), 0.0)
+    n_steps = max(math.ceil(near_ratio * far_m / _STEP_M), 1)
+    shares = (near_ratio * step / n_steps for step in range(n_steps + 1))
     points = (
         Point(start.x + share * (end.x - start.x), start.y + share * (end.y - start.y))
         for share in shares

@@ -77,7 +77,9 @@ class Publisher:
             await self._check_that_nothing_moves(wanted.topic)
             self._commands.note_velocity(wanted.topic, wanted.message)
             with self._moving(wanted):
-                return f"{await self._send(wanted, ticket)}."
+                said = f"{await self._send(wanted, ticket)}."
+            guard = self._session.guard
+            return " ".join((said, *(() if guard is None else guard.warn_of_servers())))
 
     async def _send(self, wanted: Publication, ticket: int) -> str:
         await self._commands.prepare(wanted.topic, wanted.type)
