@@ -30,13 +30,13 @@ from mapspeak.simulator import (
     world_names,
 )
 from mapspeak.simulator.models import Category, find_kind, footprint
-from mapspeak.simulator.plans import draw_plan, style_names
 from mapspeak.simulator.sight import EYE_BAND_M, OWN_SIZE_M, SIDEWAYS_M
 from mapspeak.simulator.slices import slice_world
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import clearance_m
 from mapspeak.spatial.rooms import RoomMap
 from mapspeak.worldmodel.revision import MapRevision
+from tools.worldgen import draw_plan, style_names
 
 __all__ = [
     "Site",

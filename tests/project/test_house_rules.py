@@ -7,7 +7,7 @@ from pathlib import Path
 
 CHECKOUT = Path(__file__).parents[2]
 SOURCE = CHECKOUT / "src" / "mapspeak"
-FOLDERS = ("src", "tests", "benchmarks", "docs", ".ci")
+FOLDERS = ("src", "tests", "benchmarks", "docs", "tools", ".ci")
 TEXT_SUFFIXES = {"", ".cfg", ".in", ".json", ".md", ".py", ".toml", ".txt", ".yaml", ".yml"}
 
 MOST_LINES_OF_A_FILE = 400

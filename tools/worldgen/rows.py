@@ -5,9 +5,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from mapspeak.simulator.plans.dice import Dice
-from mapspeak.simulator.plans.layout import Layout, Rect, Space
-from mapspeak.simulator.plans.purposes import PURPOSES
+from tools.worldgen.layout import Dice, Layout, Rect, Space
+from tools.worldgen.purposes import PURPOSES
 
 __all__ = ["Programme", "Row", "Side", "open_into"]
 
@@ -58,7 +57,7 @@ class Programme:
         return not self.needed and not self.small
 
     def next_for(self, width_m: float) -> str | None:
-        """Gives the next room that fits into what is left of a row."""
+        """Return the next room that fits into what is left of a row."""
         for purpose in self.needed:
             if PURPOSES[purpose].width_m[0] <= width_m:
                 self.needed.remove(purpose)
@@ -96,7 +95,7 @@ class Row:
         return self.rect.height_m if is_level else self.rect.width_m
 
     def part(self, low: float, high: float, near: float, far: float) -> Rect:
-        """Gives what lies between two places along the row and two depths."""
+        """Return what lies between two places along the row and two depths."""
         rect = self.rect
         match self.front:
             case Side.BOTTOM:
@@ -114,7 +113,7 @@ class Row:
         return Rect(rect.left + low, bottom, rect.left + high, top)
 
     def fill(self, layout: Layout, dice: Dice, programme: Programme) -> None:
-        """Lays out the rooms of the row.
+        """Lay out the rooms of the row.
 
         Raises:
             ValueError: They do not fit.
@@ -145,12 +144,12 @@ class Row:
 
 
 def open_into(layout: Layout, dice: Dice, space: Space, other: Space) -> None:
-    """Puts the door of a room where it leads to another space."""
+    """Put the door of a room where it leads to another space."""
     layout.connect(dice, space, other, dice.length_m(*PURPOSES[space.purpose].door_m))
 
 
 def _choose_rooms(dice: Dice, length_m: float, programme: Programme) -> Iterator[tuple[str, float]]:
-    """Gives rooms and their widths, which fill the row."""
+    """Return rooms and their widths, which fill the row."""
     chosen: list[tuple[str, float]] = []
     left_m = length_m
     while (purpose := programme.next_for(left_m)) is not None:

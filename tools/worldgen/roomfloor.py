@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.simulator.motion import BODY_RADIUS_M
-from mapspeak.simulator.plans.layout import Corner, Rect, Space
+from tools.worldgen.layout import Corner, Rect, Space
 
 __all__ = ["RoomFloor"]
 
@@ -39,15 +39,15 @@ class RoomFloor:
         self._entries: list[Corner] = []
 
     def keep_free(self, rect: Rect) -> None:
-        """Keeps things off a rectangle."""
+        """Keep things off a rectangle."""
         self._kept |= self._mask(rect)
 
     def add_entry(self, point: Corner) -> None:
-        """Adds a place that the robot must get to from every other one."""
+        """Add a place that the robot must get to from every other one."""
         self._entries.append(point)
 
     def add(self, solids: Sequence[Rect], *, kept: Rect, fronts: Sequence[Corner]) -> bool:
-        """Places solid things, if they fit and leave a way; gives whether they do.
+        """Place solid things, if they fit and leave a way; gives whether they do.
 
         Args:
             solids: What they take up.
@@ -140,6 +140,6 @@ def _walls(space: Space, half_m: float) -> Iterator[Rect]:
 
 
 def _cells(ends_m: Sequence[float], n: int) -> slice:
-    """Gives the cells whose middles lie between two places."""
+    """Return the cells whose middles lie between two places."""
     low, high = (min(max(round(end_m / CELL_M), 0), n) for end_m in ends_m)
     return slice(low, high)

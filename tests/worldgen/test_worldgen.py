@@ -10,9 +10,9 @@ import pytest
 from mapspeak.errors import ConfigError
 from mapspeak.simulator import World, load_world, world_names
 from mapspeak.simulator.models import KINDS
-from mapspeak.simulator.plans import draw_plan, find_faults, style_names
 from mapspeak.simulator.worldfiles import parse_world, read_world_text
 from mapspeak.spatial.rooms import RoomClass
+from tools.worldgen import draw_plan, find_faults, style_names
 
 SHIPPED = [(style, seed) for style in style_names() for seed in (1, 2)]
 MORE_SEEDS = (3, 4)
@@ -97,7 +97,7 @@ def test_two_rooms_of_one_size_break_the_law(tmp_path: Path) -> None:
 
 
 def test_the_command_writes_the_world_file() -> None:
-    command = [sys.executable, "-m", "mapspeak.simulator.plans", "flat", "--seed", "1"]
+    command = [sys.executable, "-m", "tools.worldgen", "flat", "--seed", "1"]
 
     written = subprocess.run(command, capture_output=True, check=True, timeout=120)  # noqa: S603 - our own module
 

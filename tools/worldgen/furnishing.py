@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from functools import cache
 
 from mapspeak.simulator.models import build_parts, find_kind
-from mapspeak.simulator.plans.dice import Dice
-from mapspeak.simulator.plans.layout import Corner, Doorway, Layout, Rect, Space
-from mapspeak.simulator.plans.pieces import How, Piece
-from mapspeak.simulator.plans.purposes import PURPOSES
-from mapspeak.simulator.plans.roomfloor import RoomFloor
+from tools.worldgen.layout import Corner, Dice, Doorway, Layout, Rect, Space
+from tools.worldgen.purposes import PURPOSES, How, Piece
+from tools.worldgen.roomfloor import RoomFloor
 
 __all__ = ["Spot", "Thing", "furnish"]
 
@@ -40,7 +38,7 @@ class Spot:
     yaw_deg: int
 
     def place(self, x: float, y: float) -> Corner:
-        """Gives where a point of the piece's own frame lies."""
+        """Return where a point of the piece's own frame lies."""
         cosine, sine = _TURNS[self.yaw_deg % 360]
         return (
             round(self.at[0] + cosine * x - sine * y, 3),
@@ -48,7 +46,7 @@ class Spot:
         )
 
     def place_rect(self, rect: Rect) -> Rect:
-        """Gives where a rectangle of the piece's own frame lies."""
+        """Return where a rectangle of the piece's own frame lies."""
         ends = [self.place(rect.left, rect.bottom), self.place(rect.right, rect.top)]
         (left, right), (bottom, top) = (sorted(each) for each in zip(*ends, strict=True))
         return Rect(left, bottom, right, top)
@@ -75,7 +73,7 @@ class Thing:
 def furnish(
     layout: Layout, space: Space, dice: Dice, *, wall_thickness_m: float, first: tuple[Piece, ...]
 ) -> list[Thing] | None:
-    """Furnishes a space; gives None where something it needs finds no place in several tries.
+    """Furnish a space; gives None where something it needs finds no place in several tries.
 
     Args:
         layout: With the doors.
@@ -124,7 +122,7 @@ def _before_door(door: Doorway) -> Iterator[Rect]:
 
 
 def _entry(door: Doorway, space: Space) -> Corner:
-    """Gives the place before a door on which the robot enters a space."""
+    """Return the place before a door on which the robot enters a space."""
     x, y = door.at
     along = y if door.is_upright else x
     at = x if door.is_upright else y
@@ -144,7 +142,7 @@ class _Furnisher:
         self._wall_m = wall_m
 
     def place(self, piece: Piece, n: int) -> list[list[Thing]]:
-        """Places up to so many of a piece; gives each with what belongs to it."""
+        """Place up to so many of a piece; gives each with what belongs to it."""
         placed = self._place_at(piece, self._spots(piece), n) if n else []
         n_missing = piece.n[0] - len(placed)
         if n_missing > 0 and piece.how is How.ROWS:
@@ -182,7 +180,7 @@ class _Furnisher:
                 yield Spot(at=edge.point(along, back_m), yaw_deg=edge.inward_yaw_deg)
 
     def _in_rows(self, piece: Piece) -> Iterator[Spot]:
-        """Gives the places of a block of rows in the middle of the space, in order."""
+        """Return the places of a block of rows in the middle of the space, in order."""
         blocks = [self._block(piece, yaw_deg) for yaw_deg in self._dice.shuffle([0, 90])]
         return (spot for block in sorted(blocks, key=len, reverse=True) for spot in block)
 
@@ -231,7 +229,7 @@ def _things(piece: Piece, spot: Spot) -> list[Thing]:
 
 
 def _spread(low: float, high: float, size: tuple[float, float], pitch_m: float) -> list[float]:
-    """Gives as many places as a length has room for, the block of them in its middle."""
+    """Return as many places as a length has room for, the block of them in its middle."""
     margin_m = 1.0
     free_m = high - low - 2 * margin_m - (size[1] - size[0])
     n = max(math.floor(free_m / pitch_m) + 1, 1)
@@ -241,7 +239,7 @@ def _spread(low: float, high: float, size: tuple[float, float], pitch_m: float) 
 
 @cache
 def _box(kind: str) -> Rect:
-    """Gives the rectangle that a kind takes up on the floor plan, all heights, in its own frame."""
+    """Return the rectangle around a kind on the floor plan, all heights, in its own frame."""
     corners = [part.corners.reshape(-1, 3) for part in build_parts(kind) if part.is_solid]
     xs = [float(x) for each in corners for x in each[:, 0]]
     ys = [float(y) for each in corners for y in each[:, 1]]

@@ -1,4 +1,4 @@
-"""The layout of a floor: spaces, the doors between them and the walls around them.
+"""The layout of a floor, drawn by chance: spaces, the doors between them and the walls around them.
 
 All walls run along x or y. Lengths are metres in the world's own frame.
 """
@@ -6,11 +6,44 @@ All walls run along x or y. Lengths are metres in the world's own frame.
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar
 
-from mapspeak.simulator.plans.dice import Dice
+import numpy as np
+
 from mapspeak.spatial.rooms import RoomClass
 
-__all__ = ["Corner", "Doorway", "Edge", "Layout", "Rect", "Space"]
+__all__ = ["Corner", "Dice", "Doorway", "Edge", "Layout", "Rect", "Space"]
+
+T = TypeVar("T")
+
+
+class Dice:
+    """Draws from a seed; only plain random numbers, so that the draws outlast NumPy's versions."""
+
+    def __init__(self, *seed: int) -> None:
+        self._random = np.random.Generator(np.random.PCG64(list(seed)))
+
+    def length_m(self, low_m: float, high_m: float) -> float:
+        """Return a length between two others, in whole decimetres."""
+        return round(low_m + (high_m - low_m) * float(self._random.random()), 1)
+
+    def count(self, low: int, high: int) -> int:
+        """Return a whole number from low to high, both included."""
+        return low + min(int(self._random.random() * (high - low + 1)), high - low)
+
+    def happens(self, ratio: float) -> bool:
+        """True in so many of all cases."""
+        return float(self._random.random()) < ratio
+
+    def choose(self, of: Sequence[T]) -> T:
+        """Return one of several."""
+        return of[self.count(0, len(of) - 1)]
+
+    def shuffle(self, things: Sequence[T]) -> list[T]:
+        """Return the same things in another order."""
+        keys = self._random.random(len(things))
+        return [things[at] for at in np.argsort(keys, kind="stable").tolist()]
+
 
 Corner = tuple[float, float]
 
@@ -58,7 +91,7 @@ class Rect:
         return not (is_beside or is_above)
 
     def without(self, corner: "Rect") -> tuple[Corner, ...]:
-        """Gives the L that is left when a rectangle is cut out of one corner."""
+        """Return the L that is left when a rectangle is cut out of one corner."""
         outline: list[Corner] = []
         for x, y in self.outline:
             if (x, y) not in corner.outline:
@@ -92,7 +125,7 @@ class Edge:
     inward: int
 
     def point(self, along: float, inside_m: float = 0.0) -> Corner:
-        """Gives the point that lies so far along the edge and so far inside the space."""
+        """Return the point that lies so far along the edge and so far inside the space."""
         across = round(self.at + self.inward * inside_m, 3)
         return (across, along) if self.is_upright else (along, across)
 
@@ -145,7 +178,7 @@ class Space:
         return Rect(min(xs), min(ys), max(xs), max(ys))
 
     def shared_with(self, other: "Space") -> Iterator[Edge]:
-        """Gives the pieces of its sides that are sides of another space too."""
+        """Return the pieces of its sides that are sides of another space too."""
         for mine, theirs in itertools.product(self.edges, other.edges):
             low, high = max(mine.low, theirs.low), min(mine.high, theirs.high)
             is_in_line = mine.is_upright == theirs.is_upright and mine.at == theirs.at
@@ -196,7 +229,7 @@ class Layout:
         *,
         name: str | None = None,
     ) -> Space:
-        """Adds a space; a purpose that comes again is numbered by `number_names`."""
+        """Add a space; a purpose that comes again is numbered by `number_names`."""
         space = Space(
             name=name or f"{purpose}#{len(self.spaces)}",
             purpose=purpose,
@@ -207,11 +240,11 @@ class Layout:
         return space
 
     def join(self, first: Space, second: Space) -> None:
-        """Leaves out the wall between two spaces."""
+        """Leave out out the wall between two spaces."""
         self.open_edges += first.shared_with(second)
 
     def connect(self, dice: Dice, space: Space, other: Space, width_m: float) -> None:
-        """Puts a door somewhere into the longest wall between two spaces.
+        """Put a door somewhere into the longest wall between two spaces.
 
         Raises:
             ValueError: They have no wall in common that is long enough.
@@ -234,11 +267,11 @@ class Layout:
         )
 
     def doors_of(self, space: Space) -> Iterator[Doorway]:
-        """Gives the doors that lead into a space."""
+        """Return the doors that lead into a space."""
         return (door for door in self.doors if space.name in door.spaces)
 
     def walls(self) -> Iterator[tuple[Corner, Corner]]:
-        """Gives the ends of all walls: each line as long as it goes, doors not cut yet."""
+        """Return the ends of all walls: each line as long as it goes, doors not cut yet."""
         sides = [edge for space in self.spaces for edge in space.edges]
         for is_upright, at in sorted({(edge.is_upright, edge.at) for edge in sides}):
             here = [edge for edge in sides if (edge.is_upright, edge.at) == (is_upright, at)]

@@ -38,7 +38,7 @@ OVERLAP_M2 = 0.01
 
 
 def find_faults(world: World) -> Iterator[str]:
-    """Gives a sentence for every law that a world breaks."""
+    """Return a sentence for every law that a world breaks."""
     floor = TrueFloor(world)
     yield from _find_unclear_sizes(floor)
     insides = {room.name: _inside(world, floor, room) for room in world.rooms}

@@ -1,0 +1,1 @@
+"""What makes parts of the product, and does not ship with it."""
