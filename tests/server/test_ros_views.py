@@ -43,6 +43,17 @@ async def test_a_scan_with_one_wrong_field_is_told_without_it(
     assert rest in text
 
 
+async def test_beams_of_a_ros1_laser_that_end_at_its_range_met_nothing(tmp_path: Path) -> None:
+    scripted = ScriptedRobot(ros=1)
+    scripted.topics["/base_scan"] = "sensor_msgs/LaserScan"
+    header = write_header("laser", 1.0, dialect=Dialect.ROS1)
+    scripted.latched["/base_scan"] = {**SCAN, "header": header, "ranges": [10.0, 10.0, 4.0]}
+    async with on_script(scripted, tmp_path) as caller:
+        text = await caller.ask("ros_read", topic="/base_scan")
+    assert "3 beams, 1 met something" in text
+    assert "Nearest: 4.00 m" in text
+
+
 async def test_a_path_without_a_frame_is_said_to_have_none(tmp_path: Path) -> None:
     message = {"header": write_header("", 1.0, dialect=Dialect.ROS2), "poses": []}
     text = await read(tmp_path, "nav_msgs/msg/Path", message)
