@@ -93,7 +93,7 @@ async def test_navigation_that_falls_silent_leaves_no_drive_that_is_told_as_over
         driven_m = robot.driven_m
 
         async def stands() -> bool:
-            return robot.velocities[-1] == (0.0, 0.0)
+            return robot.velocities[-1:] == [(0.0, 0.0)]
 
         await until(stands)
     assert status.state is GoalState.LOST
