@@ -82,7 +82,7 @@ class Calls:
         if type_name is not None and found not in (None, bare_type(type_name)):
             raise wrong_type(service, str(found), type_name)
         client = await self._service(service)
-        return await client.call(arguments, timeout_s=timeout_s)
+        return await client.call(client.encode(arguments), timeout_s=timeout_s)
 
     async def send_goal(
         self, action: str, arguments: Message, *, type_name: str, timeout_s: float

@@ -64,8 +64,7 @@ class ActionClient:
         for service in (self._send, self._result, self._cancel):
             await service.wait_for_server(timeout_s=timeout_s)
         goal_id = new_id()
-        request = {"goal_id": _uuid(goal_id), "goal": arguments}
-        self._send.check(request)
+        request = self._send.encode({"goal_id": _uuid(goal_id), "goal": arguments})
         goal = PursuedGoal(goal_id=goal_id, action=action, ros_id=goal_id)
         self._goals[goal_id] = goal
         self._start_soon(partial(self._wait_for_answer, goal, request, timeout_s))
@@ -73,7 +72,7 @@ class ActionClient:
 
     def cancel_goal(self, goal_id: str) -> None:
         """Asks for the end of a goal."""
-        self._cancel.post({"goal_info": {"goal_id": _uuid(goal_id)}})
+        self._cancel.post(self._cancel.encode({"goal_info": {"goal_id": _uuid(goal_id)}}))
 
     def note_servers(self, keys: list[bytes]) -> None:
         """Takes in who serves the action now; goals are lost with the one that took them."""
@@ -112,7 +111,7 @@ class ActionClient:
 
     # --- acceptance
 
-    async def _wait_for_answer(self, goal: PursuedGoal, request: Message, timeout_s: float) -> None:
+    async def _wait_for_answer(self, goal: PursuedGoal, request: bytes, timeout_s: float) -> None:
         try:
             answer = (await self._send.call(request, timeout_s=timeout_s)).content
         except LinkError:
@@ -140,7 +139,7 @@ class ActionClient:
     def _accept(self, goal_id: str) -> None:
         goal = self._goals[goal_id]
         if not goal.is_accepted:
-            number = self._result.post({"goal_id": _uuid(goal_id)})
+            number = self._result.post(self._result.encode({"goal_id": _uuid(goal_id)}))
             self._asked[number] = goal_id
             goal.take_acceptance()
 

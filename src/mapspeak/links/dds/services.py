@@ -96,17 +96,17 @@ class ServiceClient:
             name.request_topic, name.request_type, quality=QUALITY
         )
 
-    async def call(self, arguments: Mapping[str, Any], *, timeout_s: float) -> Sample:
-        """Gives what the service answers.
+    async def call(self, request: bytes, *, timeout_s: float) -> Sample:
+        """Gives what the service answers to a request that `encode` gave.
 
         Raises:
-            LinkError: It does not answer in time, or the request does not fit.
+            LinkError: It does not answer in time.
         """
         deadline_s = anyio.current_time() + timeout_s
         await self.wait_for_server(timeout_s=timeout_s)
         with anyio.move_on_at(deadline_s):
             async with self._turns:
-                return await self._call(arguments, deadline_s=deadline_s, timeout_s=timeout_s)
+                return await self._call(request, deadline_s=deadline_s, timeout_s=timeout_s)
         raise self._silence(timeout_s)
 
     async def wait_for_server(self, *, timeout_s: float) -> None:
@@ -134,26 +134,21 @@ class ServiceClient:
             self._framing = framing
             self._turns.total_tokens = MOST_AT_ONCE if self.tells_whom else 1
 
-    def check(self, arguments: Mapping[str, Any]) -> None:
-        """Does nothing for a request that fits.
+    def encode(self, arguments: Mapping[str, Any]) -> bytes:
+        """Return a request.
 
         Raises:
-            LinkError: It does not.
+            LinkError: It does not fit.
         """
-        self._encode(self.name.request_type, arguments)
+        return self._encode(self.name.request_type, arguments)
 
-    def post(self, arguments: Mapping[str, Any]) -> int:
-        """Sends a request without waiting for the answer, and gives its number.
-
-        Raises:
-            LinkError: The request does not fit.
-        """
-        data = self._encode(self.name.request_type, arguments)
+    def post(self, request: bytes) -> int:
+        """Send a request without waiting for the answer, and return its number."""
         self._number += 1
         if self._framing is Framing.NUMBERED:
             number = NUMBER.pack(self._id, self._number)
-            data = data[:HEADER_BYTES] + number + data[HEADER_BYTES:]
-        self._outlet.write(data)
+            request = request[:HEADER_BYTES] + number + request[HEADER_BYTES:]
+        self._outlet.write(request)
         self._n_open += 1
         return self._number
 
@@ -162,11 +157,9 @@ class ServiceClient:
         self._participant.end_reading(self._inlet)
         self._participant.end_writing(self._outlet)
 
-    async def _call(
-        self, arguments: Mapping[str, Any], *, deadline_s: float, timeout_s: float
-    ) -> Sample:
+    async def _call(self, request: bytes, *, deadline_s: float, timeout_s: float) -> Sample:
         n_before = 0 if self.tells_whom else self._n_open
-        number = self.post(arguments)
+        number = self.post(request)
         call = self._calls[number] = _Call(n_before)
         try:
             with anyio.move_on_at(deadline_s) as scope:
