@@ -138,6 +138,7 @@ async def test_the_graph_tells_topics_nodes_and_services() -> None:
         node.serve("/switch", SET_BOOL, answer_set_bool)
 
     async with open_both(prepare) as (_, connection):
+        await until(lambda: "/robot" in connection.discovery.nodes)
         graph = await connection.fetch_graph()
         node = await connection.fetch_node("/robot")
         assert await connection.fetch_nodes() == ("/robot",)
