@@ -33,7 +33,12 @@ SOURCES = {
     "robot": ("links", "ros", "server/tools/ros/inquiry.py"),
     "start": ("cli", "settings.py", "server/transport.py", "server/app.py"),
     "refused": ("safety", "places/goalcheck.py", "driving/drive.py"),
-    "files": ("spatial/mapfiles.py", "simulator/worldfiles.py", "server/mapcommand"),
+    "files": (
+        "spatial/mapfiles.py",
+        "simulator/worldfiles.py",
+        "cli/mapjobs.py",
+        "cli/mapshowing.py",
+    ),
 }
 """Where the messages of each group are written, below src/mapspeak."""
 ERRORS = {"ConfigError", "LinkError", "MapError", "GoalError", "PolicyError", "Refused"}

@@ -6,7 +6,7 @@ from click.testing import CliRunner
 
 from drawing import grid_from_text
 from mapspeak.cli import cli, main
-from mapspeak.cli.memory.files import usual_memory
+from mapspeak.cli.episodes import usual_memory
 from mapspeak.spatial.mapfiles import write_map
 
 ROOM = """

@@ -24,7 +24,7 @@ from served import connect, text_of
 SERVES = """
 import sys
 from pathlib import Path
-from mapspeak.safety.hold import Hold
+from mapspeak.hold import Hold
 Hold(Path(sys.argv[1])).join("robot", address=sys.argv[2])
 print("serves", flush=True)
 sys.stdin.read()

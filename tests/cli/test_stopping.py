@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 from fakes import FakeRobot, two_rooms
 from guarding import make_guard
 from mapspeak.cli import cli
-from mapspeak.cli.stopping import hold_robots
+from mapspeak.cli.operating import hold_robots
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.semantic import SemanticMapStore

@@ -8,8 +8,7 @@ import pytest
 
 from fakes import two_rooms
 from mapspeak.ros.messages import Dialect, write_grid, write_header
-from mapspeak.server.tools.ros.reading import Heard, say_rate
-from mapspeak.server.tools.ros.stamps import say_stamp
+from mapspeak.server.tools.ros.reading import Heard, say_rate, say_stamp
 from rosbridge_robot import ScriptedRobot
 from rosserved import at_time, on_our_server, on_script, publishing
 

@@ -7,7 +7,7 @@ import pytest
 
 from mapspeak.geometry import Pose
 from mapspeak.ros.messages import Dialect, FrameTransform, write_transforms
-from mapspeak.server.tools.ros.frames import FrameLink, say_frames
+from mapspeak.server.tools.ros.measuring import FrameLink, say_frames
 from rosbridge_robot import ScriptedRobot
 from rosserved import at_time, on_script, publishing
 

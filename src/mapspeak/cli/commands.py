@@ -5,17 +5,15 @@ import sys
 import click
 
 from mapspeak import __version__
-from mapspeak.cli.approving import approve
 from mapspeak.cli.demonstrating import demo
 from mapspeak.cli.evaluating import evaluate
 from mapspeak.cli.examining import doctor
 from mapspeak.cli.guarding import keep_private
 from mapspeak.cli.mapping import map_command
 from mapspeak.cli.memory import memory
-from mapspeak.cli.replaying import replay
+from mapspeak.cli.operating import approve, release, replay, stop
 from mapspeak.cli.serving import serve
 from mapspeak.cli.simulating import simulate
-from mapspeak.cli.stopping import release, stop
 from mapspeak.errors import MapspeakError
 
 

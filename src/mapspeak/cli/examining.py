@@ -13,7 +13,7 @@ import click
 from mapspeak.cli.guarding import control_folder
 from mapspeak.cli.options import ROBOT_OPTIONS, add_options
 from mapspeak.cli.robots import RobotChoice, open_robot
-from mapspeak.safety.hold import Hold
+from mapspeak.hold import Hold
 
 if TYPE_CHECKING:
     from mapspeak.robot import Finding

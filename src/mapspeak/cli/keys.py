@@ -8,7 +8,7 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
-from mapspeak.cli.stopping import hold_robots
+from mapspeak.cli.operating import hold_robots
 from mapspeak.errors import ConfigError
 
 if TYPE_CHECKING:

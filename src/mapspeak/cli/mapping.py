@@ -13,7 +13,7 @@ from mapspeak.cli.options import FILE
 from mapspeak.errors import MapError
 
 if TYPE_CHECKING:
-    from mapspeak.server.mapcommand import MapJob
+    from mapspeak.cli.mapjobs import MapJob
 
 
 @click.command("map")
@@ -53,7 +53,7 @@ def map_command(
     "maps/**/map.yaml". With several maps, --out, --json, --rooms, --graph, --geojson and --osm
     name folders.
     """
-    from mapspeak.server.mapcommand import Output, find_maps, plan_jobs  # noqa: PLC0415
+    from mapspeak.cli.mapjobs import Output, find_maps, plan_jobs  # noqa: PLC0415
     from mapspeak.spatial.areagraph import MapAnchor  # noqa: PLC0415
 
     wanted = {
@@ -83,7 +83,7 @@ def map_command(
 
 def _show_maps(jobs: "list[MapJob]") -> int:
     """Shows one map after the other, and gives how many could not be."""
-    from mapspeak.server.mapcommand import show_map  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.cli.mapshowing import show_map  # noqa: PLC0415 - heavy; help must be quick
 
     n_failed = 0
     tell = _tell_watcher if len(jobs) > 1 and sys.stderr.isatty() else _tell_nobody

@@ -17,9 +17,8 @@ from typing import TYPE_CHECKING
 import anyio
 import click
 
-from mapspeak.cli.fleet import file_for, name_robots, split_files
+from mapspeak.cli.episodes import rename_memory, usual_memory
 from mapspeak.cli.guarding import GUARD_OPTIONS, GuardChoice, build_guard, data_folder
-from mapspeak.cli.memory.files import rename_memory, usual_memory
 from mapspeak.cli.options import (
     DEFAULT_WORLD,
     FILE,
@@ -28,7 +27,7 @@ from mapspeak.cli.options import (
     add_options,
     read_pose,
 )
-from mapspeak.cli.robots import RobotChoice, open_served_robot
+from mapspeak.cli.robots import RobotChoice, file_for, name_robots, open_served_robot, split_files
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Pose
 from mapspeak.installation import shell_command

@@ -1,5 +1,6 @@
 """Limits that are on: a policy, a guard in front of the robot, a hold, an audit log."""
 
+from mapspeak.hold import Hold
 from mapspeak.safety.approvals import Approvals, WaitingRoom
 from mapspeak.safety.audit import AuditLine, AuditLog, read_audit
 from mapspeak.safety.caller import NOBODY, Caller, calling, current_caller
@@ -24,7 +25,6 @@ from mapspeak.safety.deciding import (
 )
 from mapspeak.safety.errands import Errand, on_errand
 from mapspeak.safety.guard import ApprovalNeededError, Guard, Permit
-from mapspeak.safety.hold import Hold
 from mapspeak.safety.policy import (
     Approval,
     AreaRule,

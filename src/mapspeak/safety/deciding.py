@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from mapspeak.hold import say_hold
 from mapspeak.installation import shell_command
 from mapspeak.places.goalcheck import GoalCheck, GoalVerdict
 from mapspeak.ros.messages import bare_type
@@ -18,7 +19,6 @@ from mapspeak.safety.commands import (
     SetParameter,
     say_command,
 )
-from mapspeak.safety.hold import say_hold
 from mapspeak.safety.policy import RATE_KEYS, Policy
 
 MOST_NESTED = 8

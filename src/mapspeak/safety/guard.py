@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 
 from mapspeak.errors import GoalError, PolicyError
+from mapspeak.hold import Hold
 from mapspeak.installation import shell_command
 from mapspeak.safety.approvals import Approvals
 from mapspeak.safety.audit import AuditLog
@@ -20,7 +21,6 @@ from mapspeak.safety.deciding import (
     decide,
 )
 from mapspeak.safety.errands import Errand, Errands, current_errand
-from mapspeak.safety.hold import Hold
 from mapspeak.safety.policy import Otherwise, Policy
 from mapspeak.safety.rates import RateLog
 

@@ -8,6 +8,7 @@ import anyio
 
 from mapspeak.errors import ConfigError, LinkError, MapspeakError, PolicyError
 from mapspeak.geometry import Pose
+from mapspeak.hold import say_hold
 from mapspeak.robot import (
     CameraPicture,
     Detection,
@@ -21,7 +22,6 @@ from mapspeak.robot import (
 from mapspeak.safety.caller import NOBODY, current_caller
 from mapspeak.safety.commands import Drive, say_command
 from mapspeak.safety.guard import Guard, Permit
-from mapspeak.safety.hold import say_hold
 from mapspeak.safety.monitor import GoalMonitor, KeepOutMonitor, Mover
 from mapspeak.safety.planning import Plan, Planner
 from mapspeak.safety.standing import HoldKeeper, StandingCheck

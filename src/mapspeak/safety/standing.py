@@ -6,8 +6,8 @@ import anyio
 
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.hold import Hold
 from mapspeak.robot import Robot
-from mapspeak.safety.hold import Hold
 
 WAVER_M = 0.01
 WAVER_RAD = 0.02

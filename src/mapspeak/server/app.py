@@ -19,7 +19,6 @@ from mapspeak.safety import ApprovalNeededError, Caller, calling
 from mapspeak.semantic.waypoint import clean_line
 from mapspeak.server.asking import Asking
 from mapspeak.server.calllog import CallLog
-from mapspeak.server.leanness import lean_input, lean_output
 from mapspeak.server.mapview.representations import Representation
 from mapspeak.server.offering import (
     keep_offered,
@@ -29,7 +28,7 @@ from mapspeak.server.offering import (
 )
 from mapspeak.server.prompts import add_prompts
 from mapspeak.server.tools import build_toolsets
-from mapspeak.server.toolset import Effect, Tool
+from mapspeak.server.toolset import Effect, Tool, lean_input, lean_output
 from mapspeak.server.visible import show_controls, show_controls_of
 from mapspeak.session import Session
 

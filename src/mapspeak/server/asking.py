@@ -1,4 +1,4 @@
-"""A person's word, asked for through the client: in its call, or by letting it call again."""
+"""Who calls a tool, how they hear of a drive, and a person's word asked for through the client."""
 
 from typing import Any
 
@@ -14,14 +14,42 @@ from mcp_types import (
     InputRequiredResult,
 )
 from mcp_types.version import is_version_at_least
-from pydantic import BaseModel, Field, StrictBool
+from pydantic import BaseModel, BeforeValidator, Field, StrictBool
 
-from mapspeak.safety import (
-    Approval,
-    ApprovalNeededError,
-    Approvals,
-    Otherwise,
-)
+from mapspeak.driving.drive import OnProgress
+from mapspeak.driving.drivereport import DriveReport
+from mapspeak.safety import Approval, ApprovalNeededError, Approvals, Otherwise
+
+LONGEST_WAIT_S = 25.0
+"""Clients give up on a call that takes much longer."""
+
+
+def _shorten_wait(wait_s: Any) -> Any:  # noqa: ANN401 - what is no number is refused later
+    is_number = isinstance(wait_s, int | float) and not isinstance(wait_s, bool)
+    return min(wait_s, LONGEST_WAIT_S) if is_number else wait_s
+
+
+AT_MOST_LONGEST_WAIT = BeforeValidator(_shorten_wait)
+"""Who would wait longer is answered sooner, and can call again."""
+
+
+def client_of(context: Context) -> str:
+    """Gives the HTTP session that calls; empty on stdio and for clients without one."""
+    return (context.headers or {}).get("mcp-session-id", "")
+
+
+def tell_progress(context: Context) -> OnProgress:
+    """Gives what tells the caller how a drive stands."""
+
+    async def tell(report: DriveReport) -> None:
+        left_m = report.status.distance_left_m
+        left = "" if left_m is None else f", {left_m:.1f} m left"
+        await context.report_progress(
+            report.elapsed_s, message=f"{report.drive.goal_id} {report.status.state}{left}"
+        )
+
+    return tell
+
 
 CALLS_AGAIN = "2026-07-28"
 """From this version of the protocol on a client is asked by an answer that it calls again with."""

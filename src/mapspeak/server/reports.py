@@ -14,7 +14,7 @@ from mapspeak.places.goalcheck import GoalVerdict
 from mapspeak.robot import GoalState, StampedPose
 from mapspeak.semantic import Landmark, Merge, SemanticMap, WriteReceipt, name_key
 from mapspeak.semantic.quoting import quote_name
-from mapspeak.server.memory.remembering import say_landmarks, say_replaced
+from mapspeak.server.memory.texts import say_landmarks, say_replaced
 from mapspeak.server.wording import say_pose, say_pose_doubt
 from mapspeak.worldmodel.recollection import RememberedPlace, number_places
 

@@ -1,16 +1,37 @@
-"""What the robot's camera shows now: the picture, with its caption as text."""
+"""What the robot's camera and laser show now: the picture with its caption, rings for records."""
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import anyio
 from mcp.server.mcpserver import Image
 
-from mapspeak.robot import CameraPicture, Detection
-from mapspeak.semantic import Reading
-from mapspeak.server.memory.lasers import fetch_ring
+from mapspeak.errors import LinkError
+from mapspeak.robot import SCAN_PATIENCE_S, CameraPicture, Detection, Robot
+from mapspeak.semantic import LaserRing, Reading, build_ring
 from mapspeak.server.wording import say_pose, say_pose_doubt
 from mapspeak.session import Session
+
+
+async def fetch_ring(robot: Robot) -> LaserRing | None:
+    """Gives what the laser meets; None where there is none, or none that answers in time.
+
+    No picture and no write fails for want of it, nor takes longer than `SCAN_PATIENCE_S` for it.
+    """
+    if not robot.description.has_laser:
+        return None
+    scan = None
+    with anyio.move_on_after(SCAN_PATIENCE_S):
+        try:
+            scan = await robot.fetch_scan()
+        except LinkError:
+            return None
+    if scan is None:
+        return None
+    return build_ring(
+        scan.pose, angles_rad=scan.angles_rad, ranges_m=scan.ranges_m, reach_m=scan.reach_m
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -28,6 +28,33 @@ from mapspeak.spatial.picture import Region as Area
 from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap
 from mapspeak.worldmodel.model import Atlas
 
+
+def say_plain(grid: OccupancyGrid, picture: MapPicture) -> str:
+    """Gives the caption of the map in grey levels and nothing else."""
+    return (
+        f"{_say_placement(grid, picture)} Grey 127 is unknown, 255 free, darker the more surely "
+        "occupied. x grows to the right and y upwards."
+    )
+
+
+def say_axes(grid: OccupancyGrid, picture: MapPicture) -> str:
+    """Gives the caption of the map with its axes."""
+    return (
+        f"{_say_placement(grid, picture)} A grid line every {picture.spacing_m:g} m, numbered in "
+        "metres of the map frame; x grows to the right and y upwards."
+    )
+
+
+def _say_placement(grid: OccupancyGrid, picture: MapPicture) -> str:
+    view = picture.view
+    left, bottom = view.area_corners()[3]
+    return (
+        f"Map picture, {view.width_px} x {view.height_px} px; the map in it has "
+        f"{view.pixels_per_m * grid.resolution_m:g} px per cell of {grid.resolution_m:g} m; "
+        f"lower left corner at x {left:.3f}, y {bottom:.3f}."
+    )
+
+
 LEGEND = (
     LegendEntry(sample=Sample.PLAIN_REGION, text="room"),
     LegendEntry(sample=Sample.HATCHED_REGION, text="corridor"),

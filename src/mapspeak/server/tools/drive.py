@@ -6,7 +6,7 @@ from mcp.server.mcpserver import Context
 from pydantic import Field
 
 from mapspeak.errors import LinkError
-from mapspeak.server.callers import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S, client_of, tell_progress
+from mapspeak.server.asking import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S, client_of, tell_progress
 from mapspeak.server.reports import DriveAnswer
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.server.wording import say_pose, say_pose_doubt

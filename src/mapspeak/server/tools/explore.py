@@ -22,7 +22,7 @@ from mapspeak.errors import GoalError, LinkError, SemanticMapError
 from mapspeak.robot import CameraPicture, GoalState
 from mapspeak.safety import Errand, on_errand
 from mapspeak.semantic import TakenPicture
-from mapspeak.server.callers import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S, client_of, tell_progress
+from mapspeak.server.asking import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S, client_of, tell_progress
 from mapspeak.server.explorereports import ExploreAnswer, SearchAnswer
 from mapspeak.server.reports import DriveAnswer, Report
 from mapspeak.server.sightings import Sighting, look_ahead

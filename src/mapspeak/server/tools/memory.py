@@ -21,11 +21,13 @@ from mapspeak.semantic.episodes import (
 from mapspeak.semantic.events import Effect as EventEffect
 from mapspeak.semantic.events import is_name_of_robot
 from mapspeak.semantic.things import name_the_same
-from mapspeak.server.memory.moments import AHEAD, PAST, read_moment
 from mapspeak.server.memory.texts import (
+    AHEAD,
+    PAST,
     describe_check,
     describe_episodes,
     describe_nearby,
+    read_moment,
     say_episode,
 )
 from mapspeak.server.tools.finding import FindTools, find_point, find_room

@@ -13,11 +13,11 @@ from mapspeak.places.naming import is_taken_name
 from mapspeak.places.recall import find_speaking_places
 from mapspeak.robot import PoseDoubt
 from mapspeak.semantic import TakenPicture, Waypoint, WriteReceipt
-from mapspeak.server.mapview.captions import say_axes, say_plain
+from mapspeak.server.mapview.drawing import say_axes, say_plain
 from mapspeak.server.memory.annotating import Annotator, Landmarks
-from mapspeak.server.memory.lasers import fetch_ring
-from mapspeak.server.memory.remembering import say_far
+from mapspeak.server.memory.texts import say_far
 from mapspeak.server.reports import MemoryAnswer, WriteAnswer
+from mapspeak.server.sightings import fetch_ring
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.server.wording import say_pose, say_pose_doubt
 from mapspeak.session import Session

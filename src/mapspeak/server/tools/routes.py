@@ -9,7 +9,7 @@ from pydantic import Field
 
 from mapspeak.driving.routes import RouteBook, RouteState, WhenBlocked
 from mapspeak.safety import Errand, on_errand
-from mapspeak.server.callers import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S, client_of, tell_progress
+from mapspeak.server.asking import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S, client_of, tell_progress
 from mapspeak.server.routereports import RouteAnswer
 from mapspeak.server.sightings import Sighting, look_ahead
 from mapspeak.server.toolset import Effect, Tool

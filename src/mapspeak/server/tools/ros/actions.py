@@ -11,14 +11,20 @@ from mapspeak.ros.actions import ActionState, SentGoal
 from mapspeak.ros.definitions import check_message
 from mapspeak.ros.messages import Message, bare_type
 from mapspeak.safety import Act
-from mapspeak.server.callers import LONGEST_WAIT_S, client_of
-from mapspeak.server.rosreports import cut, show_message
+from mapspeak.server.asking import LONGEST_WAIT_S, client_of
 from mapspeak.server.tools.ros.commands import RosCommands
-from mapspeak.server.tools.ros.frames import check_frames
 from mapspeak.server.tools.ros.goals import ActionBook, Job
 from mapspeak.server.tools.ros.inquiry import Described, RosInquiry, full_name
-from mapspeak.server.tools.ros.lists import Filter, Page, choose, say_page
-from mapspeak.server.tools.ros.losses import say_loss
+from mapspeak.server.tools.ros.measuring import check_frames
+from mapspeak.server.tools.ros.reports import (
+    Filter,
+    Page,
+    choose,
+    cut,
+    say_loss,
+    say_page,
+    show_message,
+)
 from mapspeak.server.tools.ros.views import view_fields
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.server.wording import say_count

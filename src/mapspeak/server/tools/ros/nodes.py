@@ -10,11 +10,18 @@ from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.ros import RosGraph, find_nearest
 from mapspeak.ros.messages import Dialect
 from mapspeak.safety import SetParameter
-from mapspeak.server.rosreports import cut, show_value
 from mapspeak.server.tools.ros.census import mark_ours
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.inquiry import RosInquiry, full_name
-from mapspeak.server.tools.ros.lists import PAGE_SIZE, Filter, Page, choose, say_page
+from mapspeak.server.tools.ros.reports import (
+    PAGE_SIZE,
+    Filter,
+    Page,
+    choose,
+    cut,
+    say_page,
+    show_value,
+)
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.server.wording import list_some
 

@@ -10,12 +10,11 @@ from pydantic import Field
 
 from mapspeak.ros.definitions import check_message
 from mapspeak.safety import Call
-from mapspeak.server.rosreports import cut, show_message
 from mapspeak.server.tools.ros.census import find_server
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.inquiry import Described, RosInquiry, full_name
-from mapspeak.server.tools.ros.lists import Filter, Page, choose, say_page
-from mapspeak.server.tools.ros.stamps import say_stamp
+from mapspeak.server.tools.ros.reading import say_stamp
+from mapspeak.server.tools.ros.reports import Filter, Page, choose, cut, say_page, show_message
 from mapspeak.server.tools.ros.views import view_fields
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.session import Session

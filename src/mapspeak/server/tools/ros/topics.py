@@ -12,17 +12,12 @@ from mapspeak.errors import LinkError
 from mapspeak.ros.definitions import check_message
 from mapspeak.ros.messages import Message, bare_type
 from mapspeak.safety import Publish, zero_velocity_of
-from mapspeak.server.rosreports import cut
 from mapspeak.server.tools.ros.census import Census, fetch_hearers, fetch_publishers, take_census
-from mapspeak.server.tools.ros.commands import VELOCITIES, RosCommands
-from mapspeak.server.tools.ros.frames import check_frames
+from mapspeak.server.tools.ros.commands import VELOCITIES, Publication, Publisher, RosCommands
 from mapspeak.server.tools.ros.inquiry import ACTION_GOAL, RosInquiry, full_name
-from mapspeak.server.tools.ros.lists import Filter, Page, choose, say_page
-from mapspeak.server.tools.ros.losses import say_loss
-from mapspeak.server.tools.ros.measuring import say_silence
-from mapspeak.server.tools.ros.publishing import Publication, Publisher
-from mapspeak.server.tools.ros.reading import Heard, hear, say_rate
-from mapspeak.server.tools.ros.stamps import say_stamp
+from mapspeak.server.tools.ros.measuring import check_frames, say_silence
+from mapspeak.server.tools.ros.reading import Heard, hear, say_rate, say_stamp
+from mapspeak.server.tools.ros.reports import Filter, Page, choose, cut, say_loss, say_page
 from mapspeak.server.tools.ros.views import BULKY, View, view_message
 from mapspeak.server.toolset import Effect, Tool
 from mapspeak.server.wording import list_some

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from mapspeak.cli.mapjobs import MapJob, Output, is_description
 from mapspeak.errors import ConfigError
-from mapspeak.server.mapcommand.jobs import MapJob, Output
-from mapspeak.server.mapcommand.selection import is_description
 from mapspeak.server.mapview.drawing import draw_rooms
 from mapspeak.server.mapview.facts import MapFacts, RegionFacts
 from mapspeak.spatial.areagraph import (

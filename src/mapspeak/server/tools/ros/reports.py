@@ -1,12 +1,17 @@
-"""ROS messages as a model reads them: short, whatever they hold."""
+"""ROS messages and lists as a model reads them: short, whatever they hold, a page at a time."""
 
+import fnmatch
 import json
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, Any, TypeVar
 
+import anyio
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
+
+from mapspeak.ros import RosConnection
 
 LONGEST_ANSWER = 20_000
 """No answer has more letters; most have a tenth of that."""
@@ -145,3 +150,75 @@ def _show_text(text: str) -> str:
         return json.dumps(text, ensure_ascii=False)
     shown = json.dumps(f"{text[:LONGEST_TEXT]}...", ensure_ascii=False)
     return f"{shown} ({len(text):,} letters)"
+
+
+Item = TypeVar("Item")
+
+PAGE_SIZE = 40
+
+Filter = Annotated[
+    str | None,
+    Field(description='part of a name, or a pattern: "scan", "/robot1/*"', max_length=200),
+]
+Page = Annotated[int, Field(description="1 is the first", ge=1, le=1000)]
+
+
+def choose(
+    items: Sequence[Item], pattern: str | None, *, texts: Callable[[Item], Sequence[str]]
+) -> list[Item]:
+    """Gives the items one of whose texts a pattern fits; one without a star fits any part."""
+    if not pattern:
+        return list(items)
+    wanted = pattern if any(sign in pattern for sign in "*?[") else f"*{pattern}*"
+    return [
+        item
+        for item in items
+        if any(fnmatch.fnmatchcase(text.lower(), wanted.lower()) for text in texts(item))
+    ]
+
+
+def say_page(
+    what: str, items: Sequence[Item], page: int, *, line: Callable[[Item], str], n_all: int
+) -> str:
+    """Gives a heading and a line for each item of a page.
+
+    Args:
+        what: The items are, in the plural.
+        items: All that were chosen.
+        page: 1 is the first.
+        line: Says one.
+        n_all: How many there were to choose from.
+    """
+    shown = items[(page - 1) * PAGE_SIZE : page * PAGE_SIZE]
+    of_all = "" if len(items) == n_all else f" of {n_all}"
+    head = f"{what}: {len(items)}{of_all}"
+    n_pages = max(1, -(-len(items) // PAGE_SIZE))
+    if page > n_pages:
+        last = "the only one" if n_pages == 1 else "the last"
+        return f"{head}. There is no page {page}: page {n_pages} is {last}."
+    if n_pages > 1:
+        head += f", page {page} of {n_pages}"
+    return "\n".join([head, *(line(item) for item in shown)])
+
+
+def say_loss(connection: RosConnection, *, since_s: float) -> str:
+    """Says that the connection is lost, or was lost after a moment; empty where it held.
+
+    Args:
+        connection: To the robot.
+        since_s: That moment, by the event loop's clock; minus infinity where nothing was asked or
+            heard before.
+    """
+    lost_s = connection.lost_for_s
+    if lost_s is not None:
+        return (
+            f"The connection was lost {lost_s:.1f} s ago and is not back yet: this is as old as "
+            "that."
+        )
+    up_s = connection.connected_for_s
+    if up_s is not None and anyio.current_time() - up_s > since_s > -math.inf:
+        return (
+            f"The connection was lost meanwhile and is back since {up_s:.1f} s: what came before "
+            "may be old."
+        )
+    return ""

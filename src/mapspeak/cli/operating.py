@@ -1,16 +1,38 @@
-"""`mapspeak stop` and `mapspeak release`: the operator's word, past any client and any model."""
+"""`mapspeak approve`, `stop`, `release` and `replay`: the operator's word and what came of it."""
 
 import sys
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from mapspeak.cli.guarding import CONTROL_OPTION, control_folder, wall_clock
+from mapspeak.cli.options import FILE
+from mapspeak.hold import Hold
 from mapspeak.installation import shell_command
 
-# Nothing heavier may be imported here: a stop waits for it.
-from mapspeak.safety.hold import Hold
+if TYPE_CHECKING:
+    from mapspeak.safety import AuditLine
+
+
+@click.command()
+@click.argument("wish_id", required=False)
+@CONTROL_OPTION
+def approve(wish_id: str | None, control: Path | None) -> None:
+    """Approves a command that waits, once; without an id it lists what waits."""
+    from mapspeak.safety import WaitingRoom  # noqa: PLC0415 - heavy; help must be quick
+
+    room = WaitingRoom(control_folder(control) / "approvals")
+    if wish_id is not None:
+        click.echo(f"Approved: {room.approve(wish_id)}.")
+        return
+    waiting = room.list_waiting()
+    for waiting_id, what in waiting.items():
+        click.echo(f"{waiting_id}  {what}")
+    if not waiting:
+        click.echo("Nothing waits for approval.")
+
 
 POLL_S = 0.01
 
@@ -78,3 +100,34 @@ def _wait_for_answers(hold: Hold, *, wait_s: float) -> None:
         if hold.answers() and not hold.unanswered() and not hold.failures():
             return
         time.sleep(POLL_S)
+
+
+@click.command()
+@click.argument("file", type=FILE)
+@click.option("--refused", "only_refused", is_flag=True, help="Only what was refused.")
+def replay(file: Path, only_refused: bool) -> None:  # noqa: FBT001 - a flag
+    """Shows an audit log: who wanted what, what became of it, and why."""
+    from mapspeak.safety import read_audit  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.semantic.waypoint import clean_line  # noqa: PLC0415
+
+    n_shown = n_refused = 0
+    run = ""
+    for line in read_audit(file):
+        n_refused += line.verdict == "refused"
+        if only_refused and line.verdict != "refused":
+            continue
+        if line.run != run:
+            run = line.run
+            click.echo(clean_line(f"--- server {run} {line.robot}"))
+        click.echo(clean_line(_say(line)))
+        n_shown += 1
+    click.echo(f"{n_shown} lines shown; {n_refused} commands were refused.")
+
+
+def _say(line: "AuditLine") -> str:
+    robot_s = "-" if line.robot_s is None else f"{line.robot_s:.1f} s"
+    who = " by ".join(filter(None, (line.tool, line.client))) or "mapspeak"
+    what = f" {line.what}" if line.what and line.event == "decision" else ""
+    verdict = line.verdict or line.event
+    said = f": {line.said}" if line.said else ""
+    return f"{line.wall_time[:23]}  {robot_s:>9}  #{line.number} {who}:{what} -> {verdict}{said}"
