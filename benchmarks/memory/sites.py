@@ -29,9 +29,9 @@ from mapspeak.simulator import (
     load_world,
     world_names,
 )
-from mapspeak.simulator.models import Category, find_kind, footprint
+from mapspeak.simulator.models import ObjectCategory, find_kind
 from mapspeak.simulator.sight import EYE_BAND_M, OWN_SIZE_M, SIDEWAYS_M
-from mapspeak.simulator.slices import slice_world
+from mapspeak.simulator.slices import footprint, slice_world
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import clearance_m
 from mapspeak.spatial.rooms import RoomMap
@@ -126,7 +126,7 @@ class Site:
             TrueThing(
                 seen=thing,
                 label=find_kind(thing.kind).label,
-                is_safety=find_kind(thing.kind).category is Category.SAFETY,
+                is_safety=find_kind(thing.kind).category is ObjectCategory.SAFETY,
                 pose=map_from_world @ thing.pose,
             )
             for thing in world.objects

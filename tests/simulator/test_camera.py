@@ -6,7 +6,7 @@ import pytest
 
 from mapspeak.geometry import Pose
 from mapspeak.simulator.camera import CAMERA_HEIGHT_M, Camera
-from mapspeak.simulator.models import KINDS, find_kind
+from mapspeak.simulator.models import find_kind, kind_names
 from staging import END_WALL, ROOM_LENGTH_M, ROOM_WIDTH_M, START, make_room, make_wall
 
 SMALL = {"width_px": 160, "height_px": 120}
@@ -77,7 +77,7 @@ def test_a_thing_hung_higher_shows_higher() -> None:
     assert rows[1] < rows[0]
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kind_names())
 def test_every_kind_shows_from_its_front(kind: str) -> None:
     place = END_WALL if find_kind(kind).is_wall_hung else Pose(6, 3, math.pi)
     view = Camera(make_room((kind, place))).observe(Pose(3.5, 3, 0), **SMALL)

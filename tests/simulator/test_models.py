@@ -5,12 +5,13 @@ from hypothesis import strategies as st
 
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Point
-from mapspeak.simulator.models import KINDS, Part, build_parts, find_kind, footprint
+from mapspeak.simulator.models import Mesh, build_parts, find_kind, kind_names
+from mapspeak.simulator.slices import footprint
 
 ROUNDING_M = 0.01
-WALL_HUNG = [name for name in KINDS if find_kind(name).is_wall_hung]
-FREE_STANDING = [name for name in KINDS if not find_kind(name).is_wall_hung]
-kinds = st.sampled_from(KINDS)
+WALL_HUNG = [name for name in kind_names() if find_kind(name).is_wall_hung]
+FREE_STANDING = [name for name in kind_names() if not find_kind(name).is_wall_hung]
+kinds = st.sampled_from(kind_names())
 heights = st.floats(0.0, 2.6)
 
 
@@ -31,7 +32,7 @@ def is_inside(point: Point, outline: tuple[Point, ...]) -> bool:
     )
 
 
-def signed_volume(part: Part) -> float:
+def signed_volume(part: Mesh) -> float:
     a, b, c = np.moveaxis(part.corners - part.corners.reshape(-1, 3).mean(axis=0), 1, 0)
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
 
@@ -59,7 +60,7 @@ def test_a_wider_band_of_heights_holds_all_that_a_narrower_one_does(
         assert any(all(is_inside(point, other) for point in outline) for other in wide)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kind_names())
 def test_every_kind_can_be_felt_at_some_height(kind: str) -> None:
     assert footprint(kind, 0.0, 3.0)
 
@@ -85,13 +86,13 @@ def test_what_stands_free_has_its_origin_in_its_middle(kind: str) -> None:
     assert np.abs(corners.min(axis=0) + corners.max(axis=0)).max() / 2 < 0.07
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kind_names())
 def test_no_part_is_inside_out(kind: str) -> None:
     closed = [part for part in build_parts(kind) if len(part.corners) > 2]
     assert all(signed_volume(part) > 0 for part in closed)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kind_names())
 def test_normals_point_out_of_their_triangles(kind: str) -> None:
     for part in build_parts(kind):
         first, second, third = np.moveaxis(part.corners, 1, 0)
@@ -100,7 +101,7 @@ def test_normals_point_out_of_their_triangles(kind: str) -> None:
         assert np.linalg.norm(part.normals, axis=-1) == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kind_names())
 def test_drawn_surfaces_are_not_stretched_beyond_their_edges(kind: str) -> None:
     drawn = [part.uv for part in build_parts(kind) if part.surface is not None]
     assert all(uv.min() >= -1e-9 and uv.max() <= 1 + 1e-9 for uv in drawn)

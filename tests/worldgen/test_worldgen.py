@@ -9,7 +9,7 @@ import pytest
 
 from mapspeak.errors import ConfigError
 from mapspeak.simulator import World, load_world, world_names
-from mapspeak.simulator.models import KINDS
+from mapspeak.simulator.models import kind_names
 from mapspeak.simulator.worldfiles import parse_world, read_world_text
 from mapspeak.spatial.rooms import RoomClass
 from tools.worldgen import draw_plan, find_faults, style_names
@@ -52,7 +52,7 @@ def test_a_world_has_what_the_papers_tasks_ask_for(style: str, seed: int) -> Non
 def test_the_drawn_worlds_hold_every_kind_of_thing() -> None:
     worlds = [load_world(f"{style}_{seed}") for style, seed in SHIPPED]
 
-    assert {thing.kind for world in worlds for thing in world.objects} == set(KINDS)
+    assert {thing.kind for world in worlds for thing in world.objects} == set(kind_names())
 
 
 def test_the_drawn_worlds_go_from_a_flat_to_a_large_school() -> None:

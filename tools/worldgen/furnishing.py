@@ -61,7 +61,7 @@ class Thing:
 
     Attributes:
         label: What it is called, before numbers.
-        kind: One of `KINDS`.
+        kind: One of `kind_names`.
         spot: Where it stands.
     """
 

@@ -26,7 +26,7 @@ class Piece:
 
     Attributes:
         label: What it is called, before numbers.
-        kind: One of `KINDS`.
+        kind: One of `kind_names`.
         how: Where it goes.
         n: The fewest and the most of them; a room without the fewest is drawn again. Of what stands
             in rows there are as many as have room.

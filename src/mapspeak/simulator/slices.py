@@ -4,21 +4,23 @@ What the LiDAR meets, what the robot bumps into and what is free floor all come 
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.simulator.models import find_kind, footprint
+from mapspeak.simulator.models import Mesh, build_parts, find_kind
 from mapspeak.simulator.world import Wall, World, WorldObject
 
-__all__ = ["Slice", "fill_outlines", "slice_world"]
+__all__ = ["Slice", "fill_outlines", "footprint", "slice_world"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
+Contour = NDArray[np.float32]
 
 _SUBCELL_BITS = 6
 """Binary places of a pixel that OpenCV keeps when it fills an outline."""
@@ -26,6 +28,9 @@ _FINER = 4
 """Outlines are filled on so many times finer pixels: OpenCV fills each pixel that it touches."""
 _CELL_BITS = _SUBCELL_BITS + 2
 """Binary places of a cell: those of a pixel, and two for the `_FINER` pixels."""
+_SMALLEST_AREA_M2 = 1e-5
+_ROUNDING_M = 0.003
+"""Of the outlines of an object's parts."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,3 +191,60 @@ def _outline_object(thing: WorldObject, low_m: float, high_m: float) -> Iterator
 def _place(corners: Sequence[Point], world_from_part: Pose) -> FloatArray:
     placed = [world_from_part.transform(corner) for corner in corners]
     return np.array([(point.x, point.y) for point in placed])
+
+
+@lru_cache(maxsize=1024)
+def footprint(kind: str, low_m: float, high_m: float) -> tuple[tuple[Point, ...], ...]:
+    """Return the convex outlines of a kind's solid parts between two heights above the floor.
+
+    They are counter-clockwise in the object's own frame (x to its front), for an object at its
+    kind's usual base height. For one that hangs d metres higher, ask for the band d metres lower.
+    An outline that lies within another one is left out.
+
+    Raises:
+        ConfigError: There is no kind of that name.
+    """
+    base_m = find_kind(kind).base_height_m
+    return tuple(
+        tuple(Point(float(x), float(y)) for x, y in hull)
+        for hull in _find_hulls(build_parts(kind), low_m - base_m, high_m - base_m)
+    )
+
+
+def _find_hulls(parts: Iterable[Mesh], low_m: float, high_m: float) -> list[Contour]:
+    """Return the convex hulls of the solid parts between two heights of their frame."""
+    slices = (_points_between(part.corners, low_m, high_m) for part in parts if part.is_solid)
+    hulls = [_hull(points) for points in slices if len(points) >= 3]
+    large = [hull for hull in hulls if cv2.contourArea(hull) > _SMALLEST_AREA_M2]
+    large.sort(key=cv2.contourArea, reverse=True)
+    kept: list[Contour] = []
+    for hull in large:
+        if not any(_holds(other, hull) for other in kept):
+            kept.append(hull)
+    return kept
+
+
+def _points_between(corners: FloatArray, low_m: float, high_m: float) -> FloatArray:
+    """Return (x, y) of what spans the triangles' part between two heights."""
+    points = corners.reshape(-1, 3)
+    found = [points[(points[:, 2] >= low_m) & (points[:, 2] <= high_m)]]
+    start = points
+    end = np.roll(corners, -1, axis=1).reshape(-1, 3)
+    for height in (low_m, high_m):
+        crosses = (start[:, 2] < height) != (end[:, 2] < height)
+        a, b = start[crosses], end[crosses]
+        share = (height - a[:, 2:]) / (b[:, 2:] - a[:, 2:])
+        found.append(a + share * (b - a))
+    return np.concatenate(found)[:, :2]
+
+
+def _hull(points: FloatArray) -> Contour:
+    hull = cv2.convexHull(points.astype(np.float32), clockwise=False)
+    return np.asarray(cv2.approxPolyDP(hull, _ROUNDING_M, closed=True))[:, 0, :].astype(np.float32)
+
+
+def _holds(outer: Contour, inner: Contour) -> bool:
+    return all(
+        cv2.pointPolygonTest(outer, (float(x), float(y)), measureDist=True) > -_ROUNDING_M
+        for x, y in inner
+    )

@@ -46,7 +46,7 @@ class WorldObject:
 
     Attributes:
         name: Unique in its world.
-        kind: One of `mapspeak.simulator.models.KINDS`.
+        kind: One of `mapspeak.simulator.models.kind_names`.
         pose: Where its own frame stands on the floor plan; its front faces along its x axis.
         base_height_m: How high above the floor it hangs; None for the kind's usual height.
     """

@@ -34,7 +34,7 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from mapspeak.errors import ConfigError, say_cause
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.simulator.mapworld import build_map_world
-from mapspeak.simulator.models import KINDS
+from mapspeak.simulator.models import kind_names
 from mapspeak.simulator.motion import BODY_BAND_M, BODY_RADIUS_M
 from mapspeak.simulator.slices import slice_world
 from mapspeak.simulator.world import Door, TrueRoom, Wall, World, WorldObject
@@ -260,8 +260,10 @@ def _check_names(section: str, names: Sequence[str]) -> None:
 
 def _check_kinds(objects: Sequence[_WrittenObject]) -> None:
     for index, thing in enumerate(objects):
-        if thing.kind not in KINDS:
-            near = difflib.get_close_matches(thing.kind, sorted(KINDS), n=3) or sorted(KINDS)
+        if thing.kind not in kind_names():
+            near = difflib.get_close_matches(thing.kind, sorted(kind_names()), n=3) or sorted(
+                kind_names()
+            )
             raise _FaultError(
                 ("objects", index, "kind"),
                 f"there is no kind {thing.kind!r}; perhaps one of {', '.join(near)}",
