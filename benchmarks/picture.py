@@ -15,14 +15,14 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.picture import (
     LegendEntry,
+    LegendSample,
     Line,
     LineStyle,
     MapLayers,
     MapPicture,
     Mark,
-    Region,
+    PictureRegion,
     RegionLayer,
-    Sample,
     Shape,
     Zoom,
     draw_map,
@@ -72,11 +72,11 @@ def _measure_crowd() -> Iterator[Figure]:
         layers,
         marks=_marks(grid, N_CROWDED_MARKS),
         legend=(
-            LegendEntry(sample=Sample.PLAIN_REGION, text="room"),
-            LegendEntry(sample=Sample.HATCHED_REGION, text="corridor"),
+            LegendEntry(sample=LegendSample.PLAIN_REGION, text="room"),
+            LegendEntry(sample=LegendSample.HATCHED_REGION, text="corridor"),
             LegendEntry(sample=Shape.CIRCLE, text="place"),
             LegendEntry(sample=LineStyle.DASHED, text="path"),
-            LegendEntry(sample=Sample.ROBOT, text="robot"),
+            LegendEntry(sample=LegendSample.ROBOT, text="robot"),
         ),
     )
     zoom = Zoom(centre=robot.point, radius_m=6.0)
@@ -143,7 +143,7 @@ def _layers(grid: OccupancyGrid, robot: Pose) -> MapLayers:
     labels = block_of[:, np.newaxis] * np.uint16(n_across) + block_of + np.uint16(1)
     labels[~grid.free] = 0
     regions = tuple(
-        Region(
+        PictureRegion(
             label=label, text=f"R{label} {block * RESOLUTION_M:.1f} m2", is_hatched=label % 9 == 0
         )
         for label in range(1, n_across**2 + 1)

@@ -55,12 +55,11 @@ anchors = st.builds(
 texts = st.text(st.characters(exclude_categories=("Cc", "Cs"), exclude_characters="\ufffe\uffff"))
 
 
-def region_of(index: int, reason: str = "drawn", others: frozenset[int] = frozenset()) -> Region:
+def region_of(index: int, others: frozenset[int] = frozenset()) -> Region:
     return Region(
         id=f"R{index}",
         index=index,
         room_class=list(RoomClass)[index % 3],
-        reason=reason,
         free_area_m2=1 / 3,
         floor_area_m2=0.1 + 0.2,
         length_m=1e-17 * index,
@@ -73,7 +72,7 @@ def region_of(index: int, reason: str = "drawn", others: frozenset[int] = frozen
     )
 
 
-def rooms_of(labels: Labels, *, origin: Pose | None = None, reason: str = "drawn") -> RoomMap:
+def rooms_of(labels: Labels, *, origin: Pose | None = None) -> RoomMap:
     """Gives regions as drawn, with a door between each two that touch."""
     grid = OccupancyGrid(
         cells=np.zeros(labels.shape, np.int8), resolution_m=0.05, origin=origin or Pose(0, 0, 0)
@@ -90,7 +89,7 @@ def rooms_of(labels: Labels, *, origin: Pose | None = None, reason: str = "drawn
     return RoomMap(
         grid=grid,
         labels=labels,
-        regions=tuple(region_of(index, reason, behind[index]) for index in indices),
+        regions=tuple(region_of(index, behind[index]) for index in indices),
         doors=tuple(
             Door(id=f"D{a}{b}", place=place, width_m=1 / 3, region_ids=(f"R{a}", f"R{b}"))
             for (a, b), place in touching.items()
@@ -302,11 +301,13 @@ def test_no_outline_crosses_or_touches_itself(labels: Labels) -> None:
 
 
 @settings(max_examples=100, deadline=None)
-@given(labels=label_arrays, origin=origins, name=texts, reason=texts)
+@given(labels=label_arrays, origin=origins, name=texts, text=texts)
 def test_nothing_is_lost_on_the_way_through_a_file(
-    labels: Labels, origin: Pose, name: str, reason: str
+    labels: Labels, origin: Pose, name: str, text: str
 ) -> None:
-    graph = build_area_graph(rooms_of(labels, origin=origin, reason=reason), name=name)
+    rooms = rooms_of(labels, origin=origin)
+    words = {region.id: text for region in rooms.regions}
+    graph = build_area_graph(rooms, name=name, texts=words)
 
     assert from_json(to_json(graph)) == graph
     assert from_geojson(to_geojson(graph)) == graph

@@ -16,7 +16,7 @@ from mapspeak.spatial.picture import (
     MapLayers,
     MapPicture,
     Mark,
-    Region,
+    PictureRegion,
     RegionLayer,
     Shape,
     draw_map,
@@ -161,7 +161,7 @@ def test_no_label_covers_another_or_a_symbol(seed: int) -> None:
         for n in range(10, 50)
     )
     labels = np.broadcast_to(1 + np.arange(160) // 80, (120, 160)).astype(np.uint16)
-    regions = (Region(label=1, text="R1 24.0 m2"), Region(label=2, text="R2 24.0 m2"))
+    regions = (PictureRegion(label=1, text="R1 24.0 m2"), PictureRegion(label=2, text="R2 24.0 m2"))
     layers = MapLayers(regions=RegionLayer(labels, regions), marks=marks, robot=Pose(104.0, 203.0))
     picture = draw_map(FLOOR, layers=layers, max_edge_px=500)
     for mark in marks:
@@ -185,7 +185,7 @@ def test_a_room_keeps_its_label_inside_though_it_is_full_of_marks() -> None:
         Mark(point=Point(101.2 + 5.6 * x, 201.2 + 3.6 * y), label=f"F{n}", shape=Shape.TRIANGLE)
         for n, (x, y) in enumerate(generator.uniform(0, 1, (45, 2)), start=10)
     )
-    layer = RegionLayer(labels, (Region(label=1, text="R1"),))
+    layer = RegionLayer(labels, (PictureRegion(label=1, text="R1"),))
     picture = draw_map(FLOOR, layers=MapLayers(regions=layer, marks=marks))
     x, y = picture.view.points_at(np.array([place_of(picture, "R1")]))[0]
     assert 101.0 < x < 107.0

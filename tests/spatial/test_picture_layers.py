@@ -13,7 +13,7 @@ from mapspeak.spatial.picture import (
     LineStyle,
     MapLayers,
     Mark,
-    Region,
+    PictureRegion,
     RegionLayer,
     Shape,
     Zoom,
@@ -26,7 +26,7 @@ from mapspeak.spatial.picture.palette import (
     PALETTE,
     FillPart,
 )
-from mapspeak.spatial.picture.spacing import even_spacing_m
+from mapspeak.spatial.picture.view import even_spacing_m
 from seeing import (
     FREE_RGB,
     WALL_RGB,
@@ -221,8 +221,8 @@ ROOMS = grid_from_text(
 def two_rooms(*, colour: Colour | None = None, is_hatched: bool = False) -> RegionLayer:
     labels = np.zeros((9, 21), dtype=np.uint16)
     labels[1:-1, 1:10], labels[1:-1, 11:-1] = 3, 8
-    right = Region(label=8, text="C1", colour=colour, is_hatched=is_hatched)
-    return RegionLayer(labels, (Region(label=3, text="R1 12.4 m2"), right))
+    right = PictureRegion(label=8, text="C1", colour=colour, is_hatched=is_hatched)
+    return RegionLayer(labels, (PictureRegion(label=3, text="R1 12.4 m2"), right))
 
 
 def test_regions_have_pale_fills_that_differ_from_room_to_room() -> None:
@@ -268,7 +268,7 @@ def test_a_region_too_small_for_its_label_is_joined_to_it_by_a_line() -> None:
     grid = OccupancyGrid(cells=cells, resolution_m=0.05, origin=Pose(100.0, 200.0))
     labels = np.zeros((100, 100), dtype=np.uint16)
     labels[50:53, 50:53] = 1
-    layer = RegionLayer(labels, (Region(label=1, text="closet"),))
+    layer = RegionLayer(labels, (PictureRegion(label=1, text="closet"),))
     picture = draw_map(grid, layers=MapLayers(regions=layer))
     assert find_text(picture, "closet", LABEL_SIZE_PX)
     assert colour_at(picture, Point(102.575, 202.575)) == full_colour(Colour.INK)

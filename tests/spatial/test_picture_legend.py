@@ -8,14 +8,14 @@ from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.picture import (
     Colour,
     LegendEntry,
+    LegendSample,
     Line,
     LineStyle,
     MapLayers,
     MapPicture,
     Mark,
-    Region,
+    PictureRegion,
     RegionLayer,
-    Sample,
     Shape,
     Zoom,
     draw_map,
@@ -28,23 +28,23 @@ FLOOR = OccupancyGrid(
     cells=np.zeros((120, 160), dtype=np.int8), resolution_m=0.05, origin=Pose(-1.0, -1.0)
 )
 LEGEND = (
-    LegendEntry(sample=Sample.PLAIN_REGION, text="room"),
-    LegendEntry(sample=Sample.HATCHED_REGION, text="corridor"),
-    LegendEntry(sample=Sample.DOTTED_REGION, text="open space"),
-    LegendEntry(sample=Sample.HIGHLIGHTED_REGION, text="asked for"),
+    LegendEntry(sample=LegendSample.PLAIN_REGION, text="room"),
+    LegendEntry(sample=LegendSample.HATCHED_REGION, text="corridor"),
+    LegendEntry(sample=LegendSample.DOTTED_REGION, text="open space"),
+    LegendEntry(sample=LegendSample.HIGHLIGHTED_REGION, text="asked for"),
     LegendEntry(sample=Shape.SQUARE, text="door"),
     LegendEntry(sample=Shape.TRIANGLE, text="frontier"),
     LegendEntry(sample=Shape.DIAMOND, text="remembered place"),
     LegendEntry(sample=Shape.CROSS, text="refused"),
-    LegendEntry(sample=Sample.ROBOT, text="robot"),
+    LegendEntry(sample=LegendSample.ROBOT, text="robot"),
     LegendEntry(sample=LineStyle.DASHED, text="path"),
-    LegendEntry(sample=Sample.ORIGIN, text="origin"),
+    LegendEntry(sample=LegendSample.ORIGIN, text="origin"),
 )
 DOOR = Mark(point=Point(1.0, 1.0), label="D1", shape=Shape.SQUARE, colour=Colour.ORANGE)
 PATH = Line(points=(Point(1.0, 1.0), Point(4.0, 3.0)), style=LineStyle.DASHED, colour=Colour.GREEN)
 
 
-def strips(*regions: Region) -> RegionLayer:
+def strips(*regions: PictureRegion) -> RegionLayer:
     """Gives regions 1, 2, 3, ... as strips two metres wide from left to right."""
     labels = np.broadcast_to(1 + np.arange(160) // 40, (120, 160))
     return RegionLayer(labels.astype(np.uint16), regions)
@@ -52,10 +52,10 @@ def strips(*regions: Region) -> RegionLayer:
 
 EVERYTHING = MapLayers(
     regions=strips(
-        Region(label=1, text="R1"),
-        Region(label=2, text="C2", is_hatched=True),
-        Region(label=3, text="O3", is_dotted=True),
-        Region(label=4, text="R4", is_highlighted=True),
+        PictureRegion(label=1, text="R1"),
+        PictureRegion(label=2, text="C2", is_hatched=True),
+        PictureRegion(label=3, text="O3", is_dotted=True),
+        PictureRegion(label=4, text="R4", is_highlighted=True),
     ),
     marks=tuple(
         Mark(point=Point(1.0 + n, 2.0), label=f"W{n}", shape=shape) for n, shape in enumerate(Shape)
@@ -99,7 +99,9 @@ def test_a_legend_explains_nothing_that_is_not_to_be_seen() -> None:
 def test_what_lies_outside_a_closer_look_is_not_explained() -> None:
     far = Mark(point=Point(6.0, 4.0), label="F1", shape=Shape.TRIANGLE)
     layers = MapLayers(
-        regions=strips(Region(label=1, text="R1"), Region(label=4, text="C4", is_hatched=True)),
+        regions=strips(
+            PictureRegion(label=1, text="R1"), PictureRegion(label=4, text="C4", is_hatched=True)
+        ),
         marks=(DOOR, far),
         robot=Pose(6.0, 4.5),
         legend=LEGEND,
@@ -130,7 +132,7 @@ def test_ground_that_is_not_to_be_seen_is_not_explained() -> None:
     ],
 )
 def test_a_sample_has_the_colour_of_what_it_explains(text: str, rgb: tuple[int, ...]) -> None:
-    regions = strips(Region(label=2, text="C2", is_hatched=True))
+    regions = strips(PictureRegion(label=2, text="C2", is_hatched=True))
     layers = MapLayers(
         regions=regions, marks=(DOOR,), lines=(PATH,), robot=Pose(3.0, 4.0), legend=LEGEND
     )

@@ -16,7 +16,7 @@ from mapspeak.spatial.picture import (
     grey_levels,
     paper_spacing_m,
 )
-from mapspeak.spatial.picture.symbols import arrow_pixels
+from mapspeak.spatial.picture.ink import arrow_pixels
 from seeing import colours_at, full_colour, is_colour, pixels_of
 
 ROOM = """

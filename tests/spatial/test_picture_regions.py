@@ -13,14 +13,14 @@ from mapspeak.spatial.picture import (
     Colour,
     MapLayers,
     MapPicture,
-    Region,
+    PictureRegion,
     RegionLayer,
     Zoom,
     draw_map,
 )
-from mapspeak.spatial.picture.colouring import colour_regions
 from mapspeak.spatial.picture.ink import LABEL_SIZE_PX
 from mapspeak.spatial.picture.palette import FILLS, PALETTE, FillPart
+from mapspeak.spatial.picture.regions import colour_regions
 from seeing import (
     WALL_RGB,
     colour_at,
@@ -61,9 +61,10 @@ def grid_of(labels: Labels, resolution_m: float = 0.1) -> OccupancyGrid:
     return OccupancyGrid(cells=np.zeros(labels.shape, dtype=np.int8), resolution_m=resolution_m)
 
 
-def keyed(*keys: int) -> tuple[Region, ...]:
+def keyed(*keys: int) -> tuple[PictureRegion, ...]:
     return tuple(
-        Region(label=label, text=f"R{key}", key=key) for label, key in enumerate(keys, start=1)
+        PictureRegion(label=label, text=f"R{key}", key=key)
+        for label, key in enumerate(keys, start=1)
     )
 
 
@@ -133,7 +134,7 @@ def test_a_map_that_grew_towards_its_origin_keeps_its_colours() -> None:
 
 
 def test_a_dotted_region_has_dots_in_its_fill() -> None:
-    region = Region(label=2, text="", colour=Colour.GREEN, is_dotted=True)
+    region = PictureRegion(label=2, text="", colour=Colour.GREEN, is_dotted=True)
     picture = draw_map(THREE_ROOMS, layers=MapLayers(regions=RegionLayer(THREE, (region,))))
     area = picture.view.area_of(pixels_of(picture))
     n_dots = np.count_nonzero(is_colour(area, fill(Colour.GREEN, FillPart.HATCH)))
@@ -142,7 +143,10 @@ def test_a_dotted_region_has_dots_in_its_fill() -> None:
 
 
 def highlighted(zoom: Zoom | None = None) -> MapPicture:
-    regions = (Region(label=1, text="R1"), Region(label=2, text="R2", is_highlighted=True))
+    regions = (
+        PictureRegion(label=1, text="R1"),
+        PictureRegion(label=2, text="R2", is_highlighted=True),
+    )
     return draw_map(THREE_ROOMS, layers=MapLayers(regions=RegionLayer(THREE, regions)), zoom=zoom)
 
 

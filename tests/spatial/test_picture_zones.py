@@ -6,23 +6,23 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.picture import (
     LegendEntry,
+    LegendSample,
     MapLayers,
-    Region,
+    PictureRegion,
     RegionLayer,
-    Sample,
     Zone,
     Zoom,
     draw_map,
 )
 from mapspeak.spatial.picture.ink import LABEL_SIZE_PX, NUMBER_SIZE_PX
 from mapspeak.spatial.picture.palette import PALETTE
-from mapspeak.spatial.picture.zones import ZONE_NUMBER
+from mapspeak.spatial.picture.regions import ZONE_NUMBER
 from seeing import WALL_RGB, colours_at, find_text, is_colour, pixels_of
 
 ZONE_RGB = tuple(PALETTE[ZONE_NUMBER].tolist())
 SQUARE = (Point(2.0, 2.0), Point(8.0, 2.0), Point(8.0, 8.0), Point(2.0, 8.0))
 HOLE = (Point(4.0, 4.0), Point(6.0, 4.0), Point(6.0, 6.0), Point(4.0, 6.0))
-LEGEND = (LegendEntry(sample=Sample.ZONE, text="closed"),)
+LEGEND = (LegendEntry(sample=LegendSample.ZONE, text="closed"),)
 
 
 def floor() -> OccupancyGrid:
@@ -96,7 +96,9 @@ def test_a_zone_that_another_one_covers_is_said_to_have_no_label() -> None:
 
 
 def test_a_room_below_a_zone_stays_to_be_seen() -> None:
-    regions = RegionLayer(np.ones((100, 100), dtype=np.uint16), (Region(label=1, text="R1"),))
+    regions = RegionLayer(
+        np.ones((100, 100), dtype=np.uint16), (PictureRegion(label=1, text="R1"),)
+    )
     with_zone = MapLayers(regions=regions, zones=(Zone(outlines=(SQUARE,), label="pit"),))
     plain = colours_at(draw_map(floor(), layers=MapLayers(regions=regions)), lattice(6.2, 7.0))
     zoned = colours_at(draw_map(floor(), layers=with_zone), lattice(6.2, 7.0))

@@ -117,7 +117,7 @@ def test_offices_open_on_a_corridor() -> None:
     assert corridor.room_class is RoomClass.CORRIDOR
     assert corridor.neighbour_ids == ("R2", "R3", "R4", "R5", "R6")
     assert len(rooms.doors) == 5
-    assert corridor.reason == "12.3 x 1.5 m, 5 doors"
+    assert (corridor.length_m, corridor.width_m) == pytest.approx((12.3, 1.5), abs=0.05)
 
 
 def test_labels_say_which_region_a_cell_belongs_to() -> None:
@@ -168,7 +168,8 @@ def test_a_large_hall_is_an_open_space() -> None:
 
     assert region.id == "O1"
     assert region.room_class is RoomClass.OPEN_SPACE
-    assert region.reason == "15.5 x 10.5 m, 0 doors, 10 m wide at the widest"
+    assert (region.length_m, region.width_m) == pytest.approx((15.5, 10.5), abs=0.05)
+    assert 2 * region.clearance_m == pytest.approx(10.0, abs=0.5)
 
 
 def test_places_are_given_in_the_map_frame_of_a_turned_map() -> None:
@@ -290,7 +291,7 @@ def test_a_partition_that_stands_free_makes_no_corridor_of_a_room() -> None:
     (region,) = find_rooms(OccupancyGrid(cells=room, resolution_m=0.05)).regions
 
     assert region.room_class is RoomClass.ROOM
-    assert region.reason == "8.6 x 8.6 m, 0 doors"
+    assert (region.length_m, region.width_m) == pytest.approx((8.6, 8.6), abs=0.05)
 
 
 CORRIDOR_WITH_OFFICES = np.full((140, 400), 100, np.int8)

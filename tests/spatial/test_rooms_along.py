@@ -6,10 +6,10 @@ from drawing import grid_from_text
 from mapspeak.geometry import Pose
 from mapspeak.spatial.rooms import (
     CorridorWalk,
+    DoorSide,
     Region,
     RoomClass,
     RoomMap,
-    Side,
     find_rooms,
     walk_along,
 )
@@ -48,8 +48,8 @@ def _walk(origin: Pose, resolution_m: float = 0.3) -> CorridorWalk:
 
 def test_the_doors_of_a_corridor_come_in_their_order_on_their_sides() -> None:
     walk = _walk(Pose(0.0, 0.0))
-    left = [stop.along_m for stop in walk.stops if stop.side is Side.LEFT]
-    right = [stop.along_m for stop in walk.stops if stop.side is Side.RIGHT]
+    left = [stop.along_m for stop in walk.stops if stop.side is DoorSide.LEFT]
+    right = [stop.along_m for stop in walk.stops if stop.side is DoorSide.RIGHT]
     assert (len(left), len(right)) == (4, 2)
     doors_x = [1.95, 5.25, 8.85, 12.75]
     assert left == pytest.approx([x - walk.start.x for x in doors_x], abs=0.5)
@@ -64,7 +64,7 @@ def test_a_turned_map_leaves_left_and_right_as_they_are() -> None:
 
 def test_seen_from_the_other_end_left_is_right_and_the_first_door_is_the_last() -> None:
     walk, back = _walk(Pose(0.0, 0.0)), _walk(Pose(0.0, 0.0, math.pi))
-    assert [stop.side for stop in back.stops].count(Side.LEFT) == 2
+    assert [stop.side for stop in back.stops].count(DoorSide.LEFT) == 2
     assert back.stops[0].along_m == pytest.approx(walk.length_m - walk.stops[-1].along_m, abs=0.3)
 
 
@@ -95,7 +95,7 @@ def test_a_door_at_the_end_of_a_corridor_is_ahead_of_who_walks_there() -> None:
     corridor = next(each for each in rooms.regions if each.room_class is RoomClass.CORRIDOR)
     walk = walk_along(rooms, corridor)
     assert walk is not None
-    assert [stop.side for stop in walk.stops] == [Side.AHEAD]
+    assert [stop.side for stop in walk.stops] == [DoorSide.AHEAD]
 
 
 BRANCHING = """
@@ -180,9 +180,9 @@ def test_a_door_on_a_branch_is_neither_left_nor_right_of_the_walk_past_it() -> N
     places = {door.id: door.place for door in rooms.doors}
     sides = {stop.door_id: stop.side for stop in walk.stops}
     above = {door_id for door_id, place in places.items() if place.y > 4.8}
-    assert {sides[door_id] for door_id in above} == {Side.LEFT}
+    assert {sides[door_id] for door_id in above} == {DoorSide.LEFT}
     (branch,) = sides.keys() - above
-    assert sides[branch] is Side.ELSEWHERE
+    assert sides[branch] is DoorSide.ELSEWHERE
 
 
 def test_a_corridor_that_leads_all_around_is_walked_on_one_side_of_its_core() -> None:
@@ -190,6 +190,6 @@ def test_a_corridor_that_leads_all_around_is_walked_on_one_side_of_its_core() ->
     assert rooms.find_region_at(walk.middle) == corridor
     places = {door.id: door.place for door in rooms.doors}
     is_above = walk.middle.y > 5.2
-    elsewhere = {stop.door_id for stop in walk.stops if stop.side is Side.ELSEWHERE}
+    elsewhere = {stop.door_id for stop in walk.stops if stop.side is DoorSide.ELSEWHERE}
     assert elsewhere
     assert all((places[door_id].y > 5.2) != is_above for door_id in elsewhere)

@@ -11,6 +11,7 @@ from mapspeak.cli.mapjobs import MapJob, Output, is_description
 from mapspeak.errors import ConfigError
 from mapspeak.server.mapview.drawing import draw_rooms
 from mapspeak.server.mapview.facts import MapFacts, RegionFacts
+from mapspeak.server.text.maps import say_size
 from mapspeak.spatial.areagraph import (
     AreaGraph,
     MapAnchor,
@@ -32,7 +33,8 @@ def show_map(job: MapJob) -> str:
     """
     loaded = _load(job.file, job.resolution_m)
     rooms = find_rooms(loaded.grid)
-    graph = build_area_graph(rooms, name=job.name)
+    texts = {region.id: say_size(region) for region in rooms.regions}
+    graph = build_area_graph(rooms, name=job.name, texts=texts)
     facts = MapFacts.of(loaded, graph)
     contents = {output: _content(output, rooms, graph, facts, job.anchor) for output in job.outputs}
     for output, content in contents.items():

@@ -11,6 +11,7 @@ from mapspeak.semantic.quoting import quote
 from mapspeak.server.mapview.roomtables import say_walk
 from mapspeak.server.memory.things import say_landmark, say_things_from, say_things_in, thing_lines
 from mapspeak.server.text.frontiers import say_merits
+from mapspeak.server.text.maps import say_size
 from mapspeak.server.wording import (
     join_words,
     say_direction,
@@ -60,7 +61,7 @@ def _way_lines(atlas: Atlas, place: Place, goal: CheckedGoal) -> Iterator[str]:
 
 
 def _region_lines(atlas: Atlas, region: Region) -> Iterator[str]:
-    yield f"{region.id} is a {say_kind(region)}: {region.reason}."
+    yield f"{region.id} is a {say_kind(region)}: {say_size(region)}."
     yield (
         f"Floor {region.floor_area_m2:.1f} m2 with what stands on it, {region.free_area_m2:.1f} m2 "
         f"of it free; {_say_rank(atlas, region)}."

@@ -5,10 +5,12 @@ The rules are those of `nav2_map_server` since 2025: single precision, `occupied
 before that left out the equality and averaged transparency into the grey of trinary maps.)
 """
 
+import os
+import stat
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,17 +24,6 @@ from ruamel.yaml.events import AliasEvent
 from mapspeak.errors import MapError, say_cause
 from mapspeak.geometry import Pose
 from mapspeak.spatial.grid import FREE_MAX, UNKNOWN, OccupancyGrid
-from mapspeak.spatial.opening import open_regular
-
-__all__ = [
-    "MAX_CELLS",
-    "LoadedMap",
-    "MapFileWarning",
-    "MapMode",
-    "load_map",
-    "load_picture",
-    "write_map",
-]
 
 Grey = NDArray[np.uint8]
 
@@ -69,17 +60,29 @@ class MapMode(StrEnum):
     RAW = "raw"
 
 
-@dataclass(frozen=True, slots=True)
+class MapOddity(StrEnum):
+    """What makes a map file load, but hardly as its maker meant it."""
+
+    UNKNOWN_IS_FREE = "unknown_is_free"
+    CROSSED_THRESHOLDS = "crossed_thresholds"
+    NOTHING_FREE = "nothing_free"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MapFileWarning:
-    """Something in a map file that loads, but hardly as its maker meant it.
+    """Something in a map file that deserves a second look.
 
     Attributes:
-        message: What is odd, with numbers.
-        hint: What to change.
+        oddity: What it is.
+        n_cells: Cells that have the grey of unknown, and load as free.
+        share_ratio: Their share of all cells.
     """
 
-    message: str
-    hint: str
+    oddity: MapOddity
+    free_thresh: float
+    occupied_thresh: float
+    n_cells: int = 0
+    share_ratio: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -87,7 +90,6 @@ class LoadedMap:
     """A map from files; compared by identity.
 
     Attributes:
-        grid: The map.
         name: The file's name without its ending.
         warnings: What deserves a second look.
     """
@@ -126,18 +128,17 @@ def load_map(path: Path) -> LoadedMap:
     return _build_map(description, grey, alpha, path)
 
 
-def load_picture(path: Path, *, resolution_m: float, origin: Pose | None = None) -> LoadedMap:
+def load_picture(path: Path, *, resolution_m: float) -> LoadedMap:
     """Reads a map's picture that has no .yaml: dark is occupied, 205 unknown, 254 and 255 free.
 
     Raises:
         MapError: The file is missing, damaged or too large, or the resolution is not positive.
     """
     grey, alpha = _read_picture(path)
-    pose = origin or Pose(0.0, 0.0, 0.0)
     description = _Description.model_construct(
         image=path.name,
         resolution=resolution_m,
-        origin=(pose.x, pose.y, pose.yaw_rad),
+        origin=(0.0, 0.0, 0.0),
         occupied_thresh=_DEFAULT_OCCUPIED_THRESH,
         free_thresh=_DEFAULT_FREE_THRESH,
         negate=False,
@@ -213,35 +214,26 @@ def _find_warnings(
     grey: Grey,
     grid: OccupancyGrid,
 ) -> tuple[MapFileWarning, ...]:
-    warnings = []
-    n_unknown_grey = int(np.count_nonzero(grey == _UNKNOWN_GREY))
-    is_trinary = description.mode is MapMode.TRINARY
-    if is_trinary and n_unknown_grey and 0 <= occupancy_of[_UNKNOWN_GREY] <= FREE_MAX:
-        warnings.append(
-            MapFileWarning(
-                f"{n_unknown_grey:,} cells ({n_unknown_grey / grey.size:.0%}) have the grey 205 "
-                f"that map_saver writes for unknown, but load as free: free_thresh is "
-                f"{description.free_thresh:g}.",
-                "If nobody has seen those places, set free_thresh: 0.196.",
-            )
+    n_unknown = int(np.count_nonzero(grey == _UNKNOWN_GREY))
+    mode, is_crossed = description.mode, description.free_thresh >= description.occupied_thresh
+    has = {
+        MapOddity.UNKNOWN_IS_FREE: mode is MapMode.TRINARY
+        and n_unknown > 0
+        and 0 <= occupancy_of[_UNKNOWN_GREY] <= FREE_MAX,
+        MapOddity.CROSSED_THRESHOLDS: is_crossed and mode is not MapMode.RAW,
+        MapOddity.NOTHING_FREE: not grid.free.any(),
+    }
+    return tuple(
+        MapFileWarning(
+            oddity=oddity,
+            free_thresh=description.free_thresh,
+            occupied_thresh=description.occupied_thresh,
+            n_cells=n_unknown,
+            share_ratio=n_unknown / max(grey.size, 1),
         )
-    is_crossed = description.free_thresh >= description.occupied_thresh
-    if is_crossed and description.mode is not MapMode.RAW:
-        warnings.append(
-            MapFileWarning(
-                f"free_thresh {description.free_thresh:g} is not below occupied_thresh "
-                f"{description.occupied_thresh:g}.",
-                "The usual values are free_thresh: 0.196 and occupied_thresh: 0.65.",
-            )
-        )
-    if not grid.free.any():
-        warnings.append(
-            MapFileWarning(
-                "No cell of the map is free.",
-                "Check negate and the thresholds: with negate: 0 white is free.",
-            )
-        )
-    return tuple(warnings)
+        for oddity, is_true in has.items()
+        if is_true
+    )
 
 
 def _read_description(path: Path) -> _Description:
@@ -259,7 +251,7 @@ def _read_description(path: Path) -> _Description:
 
 def _parse_yaml(path: Path) -> CommentedMap:
     try:
-        with open_regular(path) as file:
+        with _open_regular(path) as file:
             document = _load_without_aliases(file.read(_MAX_YAML_BYTES).decode())
     except FileNotFoundError as error:
         raise MapError(
@@ -315,8 +307,9 @@ def _say_wrong_value(path: Path, document: CommentedMap, error: ValidationError)
 def _read_picture(path: Path) -> tuple[Grey, Grey | None]:
     """Gives the greys of a picture, and its alpha channel if it has one."""
     try:
-        with open_regular(path) as file, Image.open(file, formats=_PICTURE_FORMATS) as picture:
-            _check_size(path, picture.width, picture.height)
+        with _open_regular(path) as file, Image.open(file, formats=_PICTURE_FORMATS) as picture:
+            if picture.width * picture.height > MAX_CELLS:
+                raise _say_too_large(path, f"{picture.width:,} x {picture.height:,}")
             return _channels(picture)
     except FileNotFoundError as error:
         raise MapError(
@@ -330,11 +323,6 @@ def _read_picture(path: Path) -> tuple[Grey, Grey | None]:
             f"The map's picture {path.name} cannot be read: {say_cause(error)}.",
             hint="It may be cut off or of another type; a .pgm or .png is wanted.",
         ) from error
-
-
-def _check_size(path: Path, width: int, height: int) -> None:
-    if width * height > MAX_CELLS:
-        raise _say_too_large(path, f"{width:,} x {height:,}")
 
 
 def _say_too_large(path: Path, size: str) -> MapError:
@@ -396,3 +384,16 @@ def _save_description(grid: OccupancyGrid, path: Path, image: str, mode: MapMode
     }
     with path.open("w", encoding="utf-8") as file:
         YAML(pure=True).dump(document, file)
+
+
+def _open_regular(path: Path) -> BinaryIO:
+    """Open a file for reading, unless it is a pipe or a device, which might never end.
+
+    Raises:
+        OSError: It cannot be opened, or is not a regular file.
+    """
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise OSError("it is not a regular file")
+    return os.fdopen(descriptor, "rb")

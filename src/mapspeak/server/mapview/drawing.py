@@ -13,18 +13,18 @@ from mapspeak.spatial.picture import (
     NORTH_UP_RAD,
     Colour,
     LegendEntry,
+    LegendSample,
     Line,
     LineStyle,
     MapLayers,
     MapPicture,
     Mark,
     RegionLayer,
-    Sample,
     Shape,
     Zone,
     draw_map,
 )
-from mapspeak.spatial.picture import Region as Area
+from mapspeak.spatial.picture import PictureRegion as Area
 from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap
 from mapspeak.worldmodel.model import Atlas
 
@@ -56,17 +56,17 @@ def _say_placement(grid: OccupancyGrid, picture: MapPicture) -> str:
 
 
 LEGEND = (
-    LegendEntry(sample=Sample.PLAIN_REGION, text="room"),
-    LegendEntry(sample=Sample.HATCHED_REGION, text="corridor"),
-    LegendEntry(sample=Sample.DOTTED_REGION, text="open space"),
+    LegendEntry(sample=LegendSample.PLAIN_REGION, text="room"),
+    LegendEntry(sample=LegendSample.HATCHED_REGION, text="corridor"),
+    LegendEntry(sample=LegendSample.DOTTED_REGION, text="open space"),
     LegendEntry(sample=Shape.SQUARE, text="door"),
     LegendEntry(sample=Shape.CROSS, text="door, no way for the robot"),
     LegendEntry(sample=Shape.TRIANGLE, text="frontier"),
     LegendEntry(sample=Shape.DIAMOND, text="remembered place"),
-    LegendEntry(sample=Sample.ZONE, text="closed to the robot"),
-    LegendEntry(sample=Sample.ROBOT, text="robot"),
+    LegendEntry(sample=LegendSample.ZONE, text="closed to the robot"),
+    LegendEntry(sample=LegendSample.ROBOT, text="robot"),
     LegendEntry(sample=LineStyle.DASHED, text="way to the best frontier"),
-    LegendEntry(sample=Sample.ORIGIN, text="origin"),
+    LegendEntry(sample=LegendSample.ORIGIN, text="origin"),
 )
 GREYS = "White free, grey unknown, black walls; the legend below the map explains the rest."
 

@@ -7,6 +7,7 @@ from pydantic import Field
 
 from mapspeak.geometry import Point
 from mapspeak.server.reports import PoseReport, Report
+from mapspeak.server.text.maps import say_map_warning, say_size
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.areagraph import AreaGraph, Passage
 from mapspeak.spatial.coverage import measure_known_area
@@ -50,7 +51,7 @@ class RegionFacts(Report):
             id=region.id,
             label=region.index,
             kind=str(region.room_class),
-            reason=region.reason,
+            reason=say_size(region),
             floor_area_m2=round(region.floor_area_m2, 2),
             free_area_m2=round(region.free_area_m2, 2),
             length_m=round(region.length_m, 2),
@@ -127,5 +128,5 @@ class MapFacts(Report):
             open_border_m=round(known.open_border_m, 2),
             regions=[RegionFacts.of(region) for region in by_size],
             doors=[DoorFacts.of(passage) for passage in graph.passages],
-            warnings=[f"{warning.message} {warning.hint}" for warning in loaded.warnings],
+            warnings=[say_map_warning(warning) for warning in loaded.warnings],
         )

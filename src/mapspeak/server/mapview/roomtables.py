@@ -13,7 +13,7 @@ from mapspeak.server.wording import (
     say_path,
     say_point,
 )
-from mapspeak.spatial.rooms import CorridorWalk, Door, Region, RoomClass, Side, Stop
+from mapspeak.spatial.rooms import CorridorWalk, Door, DoorSide, PassedDoor, Region, RoomClass
 from mapspeak.worldmodel.model import Atlas
 
 MOST_STOPS = 15
@@ -66,7 +66,13 @@ def say_sizes(atlas: Atlas, regions: Sequence[Region]) -> str:
 def say_walk(region: Region, walk: CorridorWalk) -> str:
     """Says which doors come as somebody walks a corridor, side by side in their order."""
     sides = []
-    for side in (Side.BEHIND, Side.LEFT, Side.RIGHT, Side.AHEAD, Side.ELSEWHERE):
+    for side in (
+        DoorSide.BEHIND,
+        DoorSide.LEFT,
+        DoorSide.RIGHT,
+        DoorSide.AHEAD,
+        DoorSide.ELSEWHERE,
+    ):
         stops = [_say_stop(stop) for stop in walk.stops if stop.side is side]
         if stops:
             sides.append(f"{side}: {list_some(stops, most=MOST_STOPS)}")
@@ -79,8 +85,8 @@ def say_walk(region: Region, walk: CorridorWalk) -> str:
     )
 
 
-def _say_stop(stop: Stop) -> str:
-    if stop.side is Side.ELSEWHERE:
+def _say_stop(stop: PassedDoor) -> str:
+    if stop.side is DoorSide.ELSEWHERE:
         return f"{stop.region_id} ({stop.door_id})"
     return f"{stop.region_id} ({stop.door_id}, {stop.along_m:.1f} m)"
 

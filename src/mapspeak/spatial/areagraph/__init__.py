@@ -1,12 +1,11 @@
 """The area graph: rooms as polygons, doors as the edges between them, and its text forms."""
 
 from mapspeak.spatial.areagraph.anchor import LatLon, MapAnchor
-from mapspeak.spatial.areagraph.as_geojson import from_geojson, to_geojson
-from mapspeak.spatial.areagraph.as_json import from_json, to_json
-from mapspeak.spatial.areagraph.as_osm import from_osm, to_osm
 from mapspeak.spatial.areagraph.building import build_area_graph
-from mapspeak.spatial.areagraph.files import read_area_graph
+from mapspeak.spatial.areagraph.geojson import from_geojson, to_geojson
 from mapspeak.spatial.areagraph.graph import Area, AreaGraph, Line, Passage, Polygon, Ring
+from mapspeak.spatial.areagraph.osm import from_osm, read_area_graph, to_osm
+from mapspeak.spatial.areagraph.records import from_json, to_json
 
 __all__ = [
     "Area",

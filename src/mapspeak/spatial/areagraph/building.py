@@ -1,6 +1,8 @@
 """From rooms on a grid to the area graph."""
 
-from collections import defaultdict
+from collections import Counter, defaultdict
+from collections.abc import Mapping
+from itertools import combinations
 
 import numpy as np
 
@@ -14,21 +16,26 @@ from mapspeak.spatial.areagraph.graph import (
     Polygon,
     Ring,
 )
-from mapspeak.spatial.areagraph.lines import VertexLine, find_lines
-from mapspeak.spatial.areagraph.outlines import (
-    Border,
+from mapspeak.spatial.grid import OccupancyGrid
+from mapspeak.spatial.outlines import (
+    BorderRun,
     Vertex,
     VertexPolygon,
     VertexRing,
     find_borders,
     trace_polygons,
 )
-from mapspeak.spatial.grid import OccupancyGrid
 from mapspeak.spatial.rooms import Door, RoomMap
 
+VertexLine = tuple[Vertex, Vertex]
+Place = tuple[float, float]
+"""Row and column of a point, as real numbers on the scale of vertices."""
 
-def build_area_graph(rooms: RoomMap, *, name: str) -> AreaGraph:
-    """Gives the regions of a map with their outlines, and its doors with their lines.
+
+def build_area_graph(
+    rooms: RoomMap, *, name: str, texts: Mapping[str, str] | None = None
+) -> AreaGraph:
+    """Return the regions of a map with their outlines, and its doors with their lines.
 
     Outlines run exactly along the borders of cells, so areas neither overlap nor leave gaps, and
     the area inside an outline is that of its cells.
@@ -36,9 +43,10 @@ def build_area_graph(rooms: RoomMap, *, name: str) -> AreaGraph:
     Args:
         rooms: A map divided into regions.
         name: What the map is called.
+        texts: What people read about regions, by their ids.
 
     Raises:
-        MapError: The name holds control characters.
+        MapError: A text holds control characters.
     """
     borders = find_borders(rooms.labels)
     polygons = trace_polygons(borders)
@@ -46,6 +54,7 @@ def build_area_graph(rooms: RoomMap, *, name: str) -> AreaGraph:
     areas = tuple(
         Area(
             region=region,
+            text=(texts or {}).get(region.id, ""),
             polygons=tuple(_polygon(rooms.grid, each) for each in polygons.get(region.index, ())),
         )
         for region in rooms.regions
@@ -56,10 +65,10 @@ def build_area_graph(rooms: RoomMap, *, name: str) -> AreaGraph:
     return AreaGraph(name=name, areas=areas, passages=passages)
 
 
-def _find_lines(rooms: RoomMap, borders: list[Border]) -> dict[str, VertexLine | None]:
-    """Gives the line of each door by its id."""
+def _find_lines(rooms: RoomMap, borders: list[BorderRun]) -> dict[str, VertexLine | None]:
+    """Return the line of each door by its id."""
     index = {region.id: region.index for region in rooms.regions}
-    shared: defaultdict[tuple[int, int], list[Border]] = defaultdict(list)
+    shared: defaultdict[tuple[int, int], list[BorderRun]] = defaultdict(list)
     for border in borders:
         if 0 < border.label < border.other:
             shared[border.label, border.other].append(border)
@@ -95,9 +104,68 @@ def _line(grid: OccupancyGrid, line: VertexLine | None) -> Line | None:
 
 
 def _points(grid: OccupancyGrid, vertices: tuple[Vertex, ...]) -> tuple[Point, ...]:
-    """Gives the places of corners of cells; the grid speaks of cells by their centres."""
+    """Return the places of corners of cells; the grid speaks of cells by their centres."""
     rows, cols = np.array(vertices).T - 0.5
     return tuple(
         Point(round(x, MICROMETRE_DECIMALS) + 0.0, round(y, MICROMETRE_DECIMALS) + 0.0)
         for x, y in grid.points_at(rows, cols).tolist()
     )
+
+
+def find_lines(borders: list[BorderRun], places: list[Place]) -> list[VertexLine | None]:
+    """Return the line of each door between two areas, in the order of the doors.
+
+    Args:
+        borders: All that these two areas have in common, from one side.
+        places: The middle of each door.
+    """
+    ends: list[list[Vertex]] = [[] for _ in places]
+    for run in _runs(borders):
+        nearest = min(range(len(places)), key=lambda i: _distance(run, places[i]))
+        ends[nearest] += _ends(run)
+    return [_farthest_pair(each) for each in ends]
+
+
+def _runs(borders: list[BorderRun]) -> list[list[BorderRun]]:
+    """Return the borders that hang together."""
+    at: defaultdict[Vertex, list[int]] = defaultdict(list)
+    for index, border in enumerate(borders):
+        at[border.start].append(index)
+        at[border.end].append(index)
+    left = dict.fromkeys(range(len(borders)))
+    runs = []
+    while left:
+        open_ends = [next(iter(left))]
+        run = []
+        while open_ends:
+            index = open_ends.pop()
+            if index not in left:
+                continue
+            del left[index]
+            border = borders[index]
+            run.append(border)
+            open_ends += at[border.start] + at[border.end]
+        runs.append(run)
+    return runs
+
+
+def _ends(run: list[BorderRun]) -> list[Vertex]:
+    """Return the vertices at which a run begins and ends; none when it is closed."""
+    touches = Counter(vertex for border in run for vertex in (border.start, border.end))
+    return sorted(vertex for vertex, n in touches.items() if n % 2)
+
+
+def _farthest_pair(ends: list[Vertex]) -> VertexLine | None:
+    pairs = list(combinations(sorted(set(ends)), 2))
+    return max(pairs, key=lambda pair: _squared_length(*pair)) if pairs else None
+
+
+def _squared_length(one: Vertex, other: Vertex) -> int:
+    return (one[0] - other[0]) ** 2 + (one[1] - other[1]) ** 2
+
+
+def _distance(run: list[BorderRun], place: Place) -> float:
+    """Return the distance in cells from a point to the nearest border of a run."""
+    corners = np.array([(border.start, border.end) for border in run], np.float64)
+    nearest = np.clip(np.array(place), corners.min(axis=1), corners.max(axis=1))
+    return float(np.hypot(*(nearest - np.array(place)).T).min())

@@ -60,10 +60,12 @@ class Area:
     Attributes:
         region: What is known about it.
         polygons: Where it lies; several when it is cut into parts, the largest first.
+        text: What people read about it; files call it its `reason`.
     """
 
     region: Region
     polygons: tuple[Polygon, ...]
+    text: str = ""
 
     @property
     def id(self) -> str:
@@ -111,12 +113,12 @@ class AreaGraph:
     def __post_init__(self) -> None:
         _check_ids([area.id for area in self.areas], "areas")
         _check_ids([passage.id for passage in self.passages], "passages")
-        _check_texts((self.name, *(area.region.reason for area in self.areas)))
+        _check_texts((self.name, *(area.text for area in self.areas)))
         _check_ends(self)
         _check_doors(self)
 
     def area(self, area_id: str) -> Area:
-        """Gives the area with this id.
+        """Return the area with this id.
 
         Raises:
             MapError: There is none.
@@ -130,7 +132,7 @@ class AreaGraph:
         )
 
     def passages_by_area(self) -> Mapping[str, tuple[Passage, ...]]:
-        """Gives for every area the passages that lead out of it: the graph as adjacency."""
+        """Return for every area the passages that lead out of it: the graph as adjacency."""
         found: dict[str, list[Passage]] = {area.id: [] for area in self.areas}
         for passage in self.passages:
             for area_id in passage.door.region_ids:
@@ -139,7 +141,7 @@ class AreaGraph:
 
 
 def signed_area_m2(ring: Ring) -> float:
-    """Gives the area inside a closed ring, positive when it runs counter-clockwise."""
+    """Return the area inside a closed ring, positive when it runs counter-clockwise."""
     base = ring[0]
     return 0.5 * sum(
         (one.x - base.x) * (other.y - base.y) - (other.x - base.x) * (one.y - base.y)

@@ -27,7 +27,7 @@ from mapspeak.spatial.frontiers.frontier import (
 from mapspeak.spatial.frontiers.ranking import gain_rate, rank
 from mapspeak.spatial.frontiers.viewpoints import (
     ExpectedGain,
-    Viewpoint,
+    FrontierViewpoint,
     find_viewpoints,
     find_views,
 )
@@ -123,7 +123,7 @@ def _judge(
     refused: list[RefusedFrontier] = []
     poor: list[tuple[Border, float]] = []
     cut_off: list[Border] = []
-    open_ones: list[tuple[Border, list[Viewpoint]]] = []
+    open_ones: list[tuple[Border, list[FrontierViewpoint]]] = []
     for border, viewpoints in zip(borders, find_viewpoints(floor, borders), strict=True):
         new = _without_looked(floor, viewpoints, looked_from)
         if new:
@@ -152,7 +152,7 @@ def _judge(
 class _Option:
     """A viewpoint of a border with what speaks for it."""
 
-    viewpoint: Viewpoint
+    viewpoint: FrontierViewpoint
     gain: ExpectedGain
     distance_m: float
     openness_m: float
@@ -163,8 +163,8 @@ class _Option:
 
 
 def _without_looked(
-    floor: ReachableFloor, viewpoints: list[Viewpoint], looked_from: Sequence[Point]
-) -> list[Viewpoint]:
+    floor: ReachableFloor, viewpoints: list[FrontierViewpoint], looked_from: Sequence[Point]
+) -> list[FrontierViewpoint]:
     """Return the viewpoints from which the robot has not looked yet."""
     if not looked_from:
         return viewpoints
@@ -177,7 +177,7 @@ def _without_looked(
 
 
 def _find_best_options(
-    floor: ReachableFloor, borders: Sequence[tuple[Border, list[Viewpoint]]]
+    floor: ReachableFloor, borders: Sequence[tuple[Border, list[FrontierViewpoint]]]
 ) -> list[tuple[Border, _Option]]:
     """Return borders with the viewpoint that shows most per metre of way to it."""
     viewpoints = [viewpoint for _, own in borders for viewpoint in own]

@@ -50,7 +50,7 @@ Depths = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True)
-class Viewpoint:
+class FrontierViewpoint:
     """A place to look beyond a border from.
 
     Attributes:
@@ -62,7 +62,9 @@ class Viewpoint:
     target: Cell
 
 
-def find_viewpoints(floor: ReachableFloor, borders: Sequence[Border]) -> list[list[Viewpoint]]:
+def find_viewpoints(
+    floor: ReachableFloor, borders: Sequence[Border]
+) -> list[list[FrontierViewpoint]]:
     """Find for each border places to look beyond it from, all along it; none where none is near.
 
     A place is in sight of the border. It has room for the robot and some more where there is such
@@ -83,7 +85,7 @@ def find_viewpoints(floor: ReachableFloor, borders: Sequence[Border]) -> list[li
 
 def _viewpoints(
     floor: ReachableFloor, cells: IntArray, rows: IntArray, cols: IntArray
-) -> list[Viewpoint]:
+) -> list[FrontierViewpoint]:
     """Return each cell of a border once, where there is any."""
     targets = {
         cell: Cell(row, col)
@@ -91,7 +93,9 @@ def _viewpoints(
         if cell >= 0
     }
     n_cols = floor.grid.n_cols
-    return [Viewpoint(Cell(*divmod(cell, n_cols)), target) for cell, target in targets.items()]
+    return [
+        FrontierViewpoint(Cell(*divmod(cell, n_cols)), target) for cell, target in targets.items()
+    ]
 
 
 def _choose_targets(floor: ReachableFloor, border: Border) -> tuple[IntArray, IntArray]:

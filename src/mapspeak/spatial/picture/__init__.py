@@ -3,12 +3,12 @@
 from mapspeak.spatial.picture.drawing import MapLayers, MapPicture, draw_map
 from mapspeak.spatial.picture.marks import (
     LegendEntry,
+    LegendSample,
     Line,
     LineStyle,
     Mark,
-    Region,
+    PictureRegion,
     RegionLayer,
-    Sample,
     Shape,
     Zone,
 )
@@ -20,25 +20,24 @@ from mapspeak.spatial.picture.paper import (
     grey_levels,
 )
 from mapspeak.spatial.picture.plan import Zoom
-from mapspeak.spatial.picture.spacing import paper_spacing_m
-from mapspeak.spatial.picture.view import NORTH_UP_RAD, Box, Pixel, View
+from mapspeak.spatial.picture.view import NORTH_UP_RAD, Box, PictureView, Pixel, paper_spacing_m
 
 __all__ = [
     "NORTH_UP_RAD",
     "Box",
     "Colour",
     "LegendEntry",
+    "LegendSample",
     "Line",
     "LineStyle",
     "MapLayers",
     "MapPicture",
     "Mark",
+    "PictureRegion",
+    "PictureView",
     "Pixel",
-    "Region",
     "RegionLayer",
-    "Sample",
     "Shape",
-    "View",
     "Zone",
     "Zoom",
     "draw_map",

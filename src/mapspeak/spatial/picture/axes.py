@@ -11,6 +11,7 @@ from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.picture.ink import (
     NUMBER_SIZE_PX,
     clip_segment,
+    draw_zero_ring,
     stamp,
     text_patch,
 )
@@ -22,21 +23,7 @@ from mapspeak.spatial.picture.palette import (
     Canvas,
 )
 from mapspeak.spatial.picture.plan import Extent, Margins
-from mapspeak.spatial.picture.spacing import decimals_of
-from mapspeak.spatial.picture.symbols import draw_zero_ring
-from mapspeak.spatial.picture.view import Box, View, is_north_up
-
-__all__ = [
-    "MetricLine",
-    "draw_frame",
-    "draw_lines_under_walls",
-    "draw_numbers",
-    "draw_zero",
-    "legend_top",
-    "lines_in_view",
-    "margins_for",
-]
-
+from mapspeak.spatial.picture.view import Box, PictureView, decimals_of, is_north_up
 
 _NUMBER_GAP_PX = 6
 _CORNER_PX = 1e-6
@@ -71,13 +58,13 @@ def margins_for(extent: Extent, spacing_m: float, *, up_rad: float, legend_px: i
     )
 
 
-def legend_top(view: View) -> int:
+def legend_top(view: PictureView) -> int:
     """Gives the first row below the numbers under the map."""
     height = text_patch("0", NUMBER_SIZE_PX).shape[0]
     return view.area.bottom + int(height) + 2 * _NUMBER_GAP_PX
 
 
-def lines_in_view(view: View, spacing_m: float) -> tuple[MetricLine, ...]:
+def lines_in_view(view: PictureView, spacing_m: float) -> tuple[MetricLine, ...]:
     """Gives the lines at whole multiples of the spacing that cross the map area."""
     corners = view.area_corners()
     lines = []
@@ -106,7 +93,7 @@ def draw_lines_under_walls(inside: Canvas, lines: tuple[MetricLine, ...]) -> Non
 
 
 def draw_numbers(
-    canvas: Canvas, view: View, lines: tuple[MetricLine, ...], spacing_m: float
+    canvas: Canvas, view: PictureView, lines: tuple[MetricLine, ...], spacing_m: float
 ) -> None:
     """Writes each line's coordinate outside the map at both of its ends.
 
@@ -134,7 +121,7 @@ def draw_frame(canvas: Canvas, area: Box) -> None:
     cv2.rectangle(canvas, (area.left - 1, area.top - 1), (area.right, area.bottom), (FRAME,))
 
 
-def draw_zero(inside: Canvas, view: View) -> None:
+def draw_zero(inside: Canvas, view: PictureView) -> None:
     """Marks the map's origin, (0, 0), with a ring under the walls, where the picture shows it."""
     if not view.shows(Point(0.0, 0.0)):
         return
@@ -143,7 +130,7 @@ def draw_zero(inside: Canvas, view: View) -> None:
     np.copyto(inside, before, where=cv2.LUT(before, IS_BUSY) > 0)
 
 
-def _ends_in_area(view: View, index: int, value_m: float) -> FloatArray | None:
+def _ends_in_area(view: PictureView, index: int, value_m: float) -> FloatArray | None:
     """Gives where the line of constant x (index 0) or y (1) meets the sides of the map area."""
     corners = view.area_corners()
     along = 1 - index

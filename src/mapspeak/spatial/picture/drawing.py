@@ -11,8 +11,7 @@ from PIL import Image
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial.grid import FloatArray, OccupancyGrid
-from mapspeak.spatial.picture import axes, ground, plan, symbols
-from mapspeak.spatial.picture.colouring import colour_regions
+from mapspeak.spatial.picture import axes, ground, ink, plan
 from mapspeak.spatial.picture.labels import (
     draw_leaders,
     draw_texts,
@@ -25,11 +24,11 @@ from mapspeak.spatial.picture.legend import (
     ROW_PX,
     GroundEntry,
     Legend,
-    Scene,
+    PictureScene,
     grounds_in,
     n_rows_of,
 )
-from mapspeak.spatial.picture.marks import LegendEntry, Line, Mark, Region, RegionLayer, Zone
+from mapspeak.spatial.picture.marks import LegendEntry, Line, Mark, PictureRegion, RegionLayer, Zone
 from mapspeak.spatial.picture.palette import (
     FREE,
     PALETTE,
@@ -38,13 +37,14 @@ from mapspeak.spatial.picture.palette import (
     WALL,
     Canvas,
 )
-from mapspeak.spatial.picture.poles import find_poles
-from mapspeak.spatial.picture.spacing import even_spacing_m
-from mapspeak.spatial.picture.view import NORTH_UP_RAD, View
-from mapspeak.spatial.picture.zones import paint_zones
-
-__all__ = ["MapLayers", "MapPicture", "draw_axes", "draw_map", "encode", "finish", "plan_sheet"]
-
+from mapspeak.spatial.picture.regions import (
+    check_layer,
+    colour_regions,
+    find_poles,
+    paint_regions,
+    paint_zones,
+)
+from mapspeak.spatial.picture.view import NORTH_UP_RAD, PictureView, even_spacing_m
 
 _GROUNDS = (
     GroundEntry(FREE, "free"),
@@ -92,7 +92,7 @@ class MapPicture:
     """
 
     png: bytes
-    view: View
+    view: PictureView
     spacing_m: float | None = None
     labels_left_out: tuple[str, ...] = ()
     marks_outside: tuple[str, ...] = ()
@@ -155,7 +155,7 @@ def plan_sheet(
     up_rad: float,
     max_edge_px: int,
     steps_per_pixel: int = 1,
-) -> View:
+) -> PictureView:
     """Gives the view with room for numbers and legend; see `plan.plan_view`.
 
     The more rows the legend gets, the smaller the map, and the more rows the legend needs.
@@ -178,7 +178,7 @@ def plan_sheet(
         n_rows = n_needed
 
 
-def draw_axes(canvas: Canvas, view: View, spacing_m: float) -> None:
+def draw_axes(canvas: Canvas, view: PictureView, spacing_m: float) -> None:
     """Draws the metric grid under the walls, and the frame and numbers around the map."""
     lines = axes.lines_in_view(view, spacing_m)
     inside = view.area_of(canvas)
@@ -190,7 +190,7 @@ def draw_axes(canvas: Canvas, view: View, spacing_m: float) -> None:
 
 def finish(
     canvas: Canvas,
-    view: View,
+    view: PictureView,
     layers: MapLayers,
     *,
     legend: Legend,
@@ -236,7 +236,7 @@ def encode(canvas: Canvas) -> bytes:
 class _Sight:
     """What a picture shows, and where in it the labels of regions and zones stand best."""
 
-    scene: Scene
+    scene: PictureScene
     poles: dict[int, tuple[float, float]]
     zones: dict[Zone, tuple[float, float] | None]
 
@@ -255,13 +255,13 @@ def _extent(
     return plan.extent_of_zoom(grid, up_rad, zoom)
 
 
-def _regions_of(layers: MapLayers) -> tuple[Region, ...]:
+def _regions_of(layers: MapLayers) -> tuple[PictureRegion, ...]:
     return () if layers.regions is None else layers.regions.regions
 
 
-def _everything(layers: MapLayers) -> Scene:
+def _everything(layers: MapLayers) -> PictureScene:
     """Gives all that a picture of the whole map would show."""
-    return Scene(
+    return PictureScene(
         regions=_regions_of(layers),
         zones=layers.zones,
         lines=layers.lines,
@@ -272,7 +272,7 @@ def _everything(layers: MapLayers) -> Scene:
 
 
 def _look(
-    view: View,
+    view: PictureView,
     layers: MapLayers,
     regions: NDArray[np.uint16] | None,
     zones: dict[Zone, tuple[float, float] | None],
@@ -281,10 +281,10 @@ def _look(
     named = _regions_of(layers)
     poles = {} if regions is None else find_poles(regions, tuple(r.label for r in named))
     robot = layers.robot
-    scene = Scene(
+    scene = PictureScene(
         regions=tuple(region for region in named if region.label in poles),
         zones=tuple(zones),
-        lines=tuple(line for line in layers.lines if symbols.is_in_view(view, line)),
+        lines=tuple(line for line in layers.lines if ink.is_in_view(view, line)),
         marks=tuple(itertools.compress(layers.marks, view.shows_each(_points_of(layers.marks)))),
         robot=robot if robot is not None and view.shows(robot.point) else None,
         has_origin=view.shows(Point(0.0, 0.0)),
@@ -293,27 +293,27 @@ def _look(
 
 
 def _paint_regions(
-    inside: Canvas, grid: OccupancyGrid, view: View, layer: RegionLayer | None
+    inside: Canvas, grid: OccupancyGrid, view: PictureView, layer: RegionLayer | None
 ) -> NDArray[np.uint16] | None:
     """Paints the regions and gives the region of each pixel."""
     if layer is None:
         return None
-    ground.check_layer(layer, grid)
+    check_layer(layer, grid)
     regions = ground.sample(layer.labels, grid, view)
-    ground.paint_regions(inside, regions, layer.regions, colour_regions(layer, grid))
+    paint_regions(inside, regions, layer.regions, colour_regions(layer, grid))
     return regions
 
 
 def _draw_scene(
-    inside: Canvas, view: View, sight: _Sight, regions: NDArray[np.uint16] | None
+    inside: Canvas, view: PictureView, sight: _Sight, regions: NDArray[np.uint16] | None
 ) -> tuple[str, ...]:
     """Draws lines, symbols, the robot and all labels; gives the names left out."""
     scene = sight.scene
     for line in scene.lines:
-        symbols.draw_line(inside, view, line)
+        ink.draw_line(inside, view, line)
     places = view.area_pixels_at(_points_of(scene.marks))
     obstacles = [
-        symbols.symbol_box(place, symbols.SYMBOL_REACH_PX)
+        ink.symbol_box(place, ink.SYMBOL_REACH_PX)
         for mark, place in zip(scene.marks, places, strict=True)
         if mark.shape is not None
     ]
@@ -327,23 +327,23 @@ def _draw_scene(
         *labels_of_marks(scene.marks, places),
     ]
     if scene.robot is not None:
-        at, reach_px = _place_of(scene.robot, view), symbols.ARROW_REACH_PX
-        obstacles.append(symbols.symbol_box(at, reach_px))
+        at, reach_px = _place_of(scene.robot, view), ink.ARROW_REACH_PX
+        obstacles.append(ink.symbol_box(at, reach_px))
         labels.insert(0, label_at(at, _robot_label(scene.robot), clearance_px=reach_px))
     placed, left_out = place_labels(inside, labels, obstacles=obstacles, regions=regions)
     draw_leaders(inside, placed)
     for mark, place in zip(scene.marks, places, strict=True):
         if mark.shape is not None:
-            symbols.draw_shape(inside, place, mark.shape, mark.colour)
+            ink.draw_shape(inside, place, mark.shape, mark.colour)
     if scene.robot is not None:
         heading_rad = view.heading_at(scene.robot.yaw_rad)
-        symbols.draw_arrow(inside, _place_of(scene.robot, view), heading_rad)
+        ink.draw_arrow(inside, _place_of(scene.robot, view), heading_rad)
     draw_texts(inside, placed)
     covered = (zone.label for zone, pole in sight.zones.items() if zone.label and pole is None)
     return (*covered, *left_out)
 
 
-def _place_of(robot: Pose, view: View) -> FloatArray:
+def _place_of(robot: Pose, view: PictureView) -> FloatArray:
     return np.asarray(view.area_pixels_at(np.array([[robot.x, robot.y]]))[0])
 
 

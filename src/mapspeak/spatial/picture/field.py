@@ -13,9 +13,6 @@ from mapspeak.spatial.picture.ink import LABEL_SIZE_PX, text_patch
 from mapspeak.spatial.picture.palette import Canvas
 from mapspeak.spatial.picture.view import Box
 
-__all__ = ["FAR_RINGS", "HALO_PX", "NEAR_RINGS", "Field", "Label", "Placed", "Positions", "Rings"]
-
-
 HALO_PX = 3
 _N_DIRECTIONS = 16
 _LEADER_FROM_PX = 10.0
@@ -138,7 +135,7 @@ class Positions:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Field:
+class LabelField:
     """What labels meet on the map: drawn things and regions.
 
     Attributes:

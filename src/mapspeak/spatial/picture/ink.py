@@ -1,4 +1,4 @@
-"""Drawing with ink: smooth polygons, strokes and text on a canvas of palette numbers.
+"""Drawing with ink: smooth polygons, strokes, symbols and text on a canvas of palette numbers.
 
 Coordinates are real pixels: the middle of the pixel in the top left corner is (0.5, 0.5).
 Everything is drawn the same way: a patch says how much of each pixel is covered, which becomes a
@@ -6,6 +6,8 @@ step between white and the colour, on a white halo that keeps it apart from what
 """
 
 import functools
+import itertools
+import math
 import unicodedata
 
 import cv2
@@ -15,18 +17,9 @@ from PIL import Image, ImageDraw, ImageFont
 
 from mapspeak.errors import MapspeakError
 from mapspeak.spatial.grid import FloatArray
+from mapspeak.spatial.picture.marks import Line, LineStyle, Shape
 from mapspeak.spatial.picture.palette import N_RAMP_LEVELS, PAPER, RAMPS, Canvas, Colour
-
-__all__ = [
-    "LABEL_SIZE_PX",
-    "NUMBER_SIZE_PX",
-    "clip_segment",
-    "draw_polygon",
-    "draw_stroke",
-    "stamp",
-    "text_patch",
-]
-
+from mapspeak.spatial.picture.view import Box, PictureView
 
 LABEL_SIZE_PX = 16
 NUMBER_SIZE_PX = 14
@@ -38,7 +31,7 @@ _GAP_RATIO = 0.4
 
 
 def draw_polygon(canvas: Canvas, corners: FloatArray, colour: Colour, *, halo_px: int = 2) -> None:
-    """Fills a polygon with corners (u, v) of shape (n, 2)."""
+    """Fill a polygon with corners (u, v) of shape (n, 2)."""
     patch, top_left = _patch_around(corners, 2)
     cv2.fillPoly(patch, [_in_subpixels(corners, top_left)], (255,), cv2.LINE_AA, _SHIFT)
     stamp(canvas, patch, top_left, colour, halo_px=halo_px)
@@ -47,7 +40,7 @@ def draw_polygon(canvas: Canvas, corners: FloatArray, colour: Colour, *, halo_px
 def draw_stroke(
     canvas: Canvas, points: FloatArray, colour: Colour, *, width_px: int, halo_px: int = 1
 ) -> None:
-    """Draws a line through points (u, v) of shape (n, 2) that lie on the canvas or near it."""
+    """Draw a line through points (u, v) of shape (n, 2) that lie on the canvas or near it."""
     patch, top_left = _patch_around(points, width_px + 2)
     cv2.polylines(
         patch,
@@ -62,7 +55,7 @@ def draw_stroke(
 
 
 def clip_segment(start: FloatArray, end: FloatArray, size: FloatArray) -> FloatArray | None:
-    """Gives the part of a segment inside the box from (0, 0) to size, shape (2, 2), or None.
+    """Return the part of a segment inside the box from (0, 0) to size, shape (2, 2), or None.
 
     The method is that of Liang and Barsky (1984): the parameters at which each side is crossed.
     """
@@ -80,7 +73,7 @@ def clip_segment(start: FloatArray, end: FloatArray, size: FloatArray) -> FloatA
 
 @functools.lru_cache(maxsize=2048)
 def text_patch(text: str, size_px: int) -> Canvas:
-    """Gives lines of text as a patch, centred; all single lines of one size are equally high.
+    """Return lines of text as a patch, centred; all single lines of one size are equally high.
 
     A tab sets words apart that do not belong together. Patches are kept, and locked, because the
     same numbers and ids are written again and again.
@@ -100,7 +93,7 @@ def stamp(
     *,
     halo_px: int = 2,
 ) -> None:
-    """Puts a patch on the canvas with its halo, cut off where it leaves the canvas.
+    """Put a patch on the canvas with its halo, cut off where it leaves the canvas.
 
     Args:
         canvas: Palette numbers; changed in place.
@@ -138,20 +131,20 @@ def _disc(radius_px: int) -> Canvas:
 
 
 def _patch_around(points: FloatArray, rim_px: int) -> tuple[Canvas, tuple[int, int]]:
-    """Gives an empty patch with room for the points, and where its first pixel lies."""
+    """Return an empty patch with room for the points, and where its first pixel lies."""
     left, top = (int(value) - rim_px for value in np.floor(points.min(axis=0)))
     right, bottom = (int(value) + rim_px for value in np.ceil(points.max(axis=0)))
     return np.zeros((bottom - top, right - left), dtype=np.uint8), (left, top)
 
 
 def _in_subpixels(points: FloatArray, top_left: tuple[int, int]) -> NDArray[np.int32]:
-    """Gives the points as OpenCV wants them: integers, and (0, 0) in the middle of a pixel."""
+    """Return the points as OpenCV wants them: integers, and (0, 0) in the middle of a pixel."""
     local = points - np.array(top_left) - 0.5
     return np.asarray(np.rint(local * (1 << _SHIFT)), dtype=np.int32)
 
 
 def _row_of_words(words: list[str], size_px: int) -> Canvas:
-    """Gives patches side by side, as far apart as words that do not belong together."""
+    """Return patches side by side, as far apart as words that do not belong together."""
     first, *others = (_word_patch(word, size_px) for word in words)
     gap = np.zeros((first.shape[0], round(_GAP_RATIO * size_px)), dtype=np.uint8)
     return np.hstack([first, *(part for other in others for part in (gap, other))])
@@ -169,7 +162,7 @@ def _word_patch(text: str, size_px: int) -> Canvas:
 
 @functools.cache
 def _font(size_px: int) -> tuple[ImageFont.FreeTypeFont, int, int]:
-    """Gives Pillow's own scalable font, how far it rises over the base line, and a line's height.
+    """Return Pillow's own scalable font, how far it rises over the base line, and a line's height.
 
     Raises:
         MapspeakError: Pillow was built without FreeType, and so has no such font.
@@ -190,7 +183,130 @@ def _centred(row: Canvas, width: int) -> Canvas:
 
 
 def _printable(text: str) -> str:
-    """Gives the text in the letters the font has: accents dropped, others replaced."""
+    """Return the text in the letters the font has: accents dropped, others replaced."""
     plain = unicodedata.normalize("NFKD", text)
     kept = (sign for sign in plain if not unicodedata.combining(sign))
     return "".join(sign if " " <= sign <= "~" or sign == "°" else "?" for sign in kept)
+
+
+ARROW_REACH_PX = 19.0
+SYMBOL_REACH_PX = 9.0
+
+_ARROW_PX = np.array([[17.0, 0.0], [-9.0, 9.0], [-4.0, 0.0], [-9.0, -9.0]])
+"""The arrow in the robot's own frame, x forward and y left, around the robot's position."""
+
+_DASH_PX, _GAP_PX = 11.0, 7.0
+_ZERO_RADIUS_PX = 6
+_CORNER_TURNS = {
+    Shape.SQUARE: np.arange(4) * math.tau / 4 + math.tau / 8,
+    Shape.DIAMOND: np.arange(4) * math.tau / 4,
+    Shape.TRIANGLE: np.arange(3) * math.tau / 3 - math.tau / 4,
+    Shape.CIRCLE: np.arange(24) * math.tau / 24,
+}
+_CROSS_PX = np.array(
+    [
+        [0, -3], [5, -8], [8, -5], [3, 0], [8, 5], [5, 8],
+        [0, 3], [-5, 8], [-8, 5], [-3, 0], [-8, -5], [-5, -8],
+    ],
+    dtype=np.float64,
+)  # fmt: skip
+
+
+def arrow_pixels(arrow: FloatArray, heading_rad: float) -> FloatArray:
+    """Return an arrow's displacements (u, v) in the picture (paper eq. 7).
+
+    Args:
+        arrow: Its points in the robot's frame, x forward and y left, shape (n, 2), in pixels.
+        heading_rad: The robot's heading in the picture, counter-clockwise from its right.
+    """
+    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+    right = arrow[:, 0] * cos - arrow[:, 1] * sin
+    down = -(arrow[:, 0] * sin + arrow[:, 1] * cos)
+    return np.stack([right, down], axis=1)
+
+
+def symbol_box(place: FloatArray, reach_px: float) -> Box:
+    """Return the box of the map area that a symbol at (u, v) takes."""
+    u, v = place
+    return Box(
+        math.floor(u - reach_px),
+        math.floor(v - reach_px),
+        math.ceil(u + reach_px),
+        math.ceil(v + reach_px),
+    )
+
+
+def draw_arrow(canvas: Canvas, place: FloatArray, heading_rad: float, *, scale: float = 1) -> None:
+    """Draw the robot's arrow, with a white edge, at (u, v); see `arrow_pixels` for the heading."""
+    arrow = arrow_pixels(scale * _ARROW_PX, heading_rad)
+    draw_polygon(canvas, place + arrow, Colour.VERMILION, halo_px=3)
+
+
+def draw_shape(canvas: Canvas, place: FloatArray, shape: Shape, colour: Colour) -> None:
+    """Draw a shape around a place (u, v)."""
+    if shape is Shape.CROSS:
+        draw_polygon(canvas, place + _CROSS_PX, colour)
+        return
+    turns = _CORNER_TURNS[shape]
+    reach = 6.0 if shape is Shape.CIRCLE else 8.0
+    corners = place + reach * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    draw_polygon(canvas, corners, colour)
+
+
+def draw_zero_ring(canvas: Canvas, place: FloatArray) -> None:
+    """Draw the ring that marks the map's origin, around (u, v)."""
+    turns = np.linspace(0.0, math.tau, 33)
+    circle = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    draw_stroke(canvas, place + _ZERO_RADIUS_PX * circle, Colour.INK, width_px=2)
+    draw_polygon(canvas, place + circle, Colour.INK, halo_px=0)
+
+
+def is_in_view(view: PictureView, line: Line) -> bool:
+    """Return True when some of a line lies in the map area."""
+    points = view.area_pixels_at(np.array([[point.x, point.y] for point in line.points]))
+    return bool(_runs_inside(points, view.area))
+
+
+def draw_line(inside: Canvas, view: PictureView, line: Line) -> None:
+    """Draw the part of a line that lies in the map area."""
+    points = view.area_pixels_at(np.array([[point.x, point.y] for point in line.points]))
+    for run in _runs_inside(points, view.area):
+        draw_run(inside, run, line.style, line.colour, width_px=line.width_px)
+
+
+def draw_run(
+    canvas: Canvas, run: FloatArray, style: LineStyle, colour: Colour, *, width_px: int
+) -> None:
+    """Draw an unbroken line through points (u, v) of shape (n, 2), solid or in dashes."""
+    for piece in [run] if style is LineStyle.SOLID else _dashes(run):
+        draw_stroke(canvas, piece, colour, width_px=width_px)
+
+
+def _runs_inside(points: FloatArray, area: Box) -> list[FloatArray]:
+    """Return the pieces of a polyline inside the area, each as an unbroken polyline."""
+    size = np.array([area.width, area.height], dtype=np.float64)
+    if ((points >= 0) & (points <= size)).all():
+        return [points]
+    runs: list[list[FloatArray]] = []
+    for start, end in itertools.pairwise(points):
+        part = clip_segment(start, end, size)
+        if part is None:
+            continue
+        if runs and np.allclose(runs[-1][-1], part[0]):
+            runs[-1].append(part[1])
+        else:
+            runs.append([part[0], part[1]])
+    return [np.array(run) for run in runs]
+
+
+def _dashes(run: FloatArray) -> list[FloatArray]:
+    """Cut a polyline into dashes of equal length along it, keeping its corners."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(run, axis=0).T))])
+    dashes = []
+    for start in np.arange(0.0, along[-1], _DASH_PX + _GAP_PX):
+        end = min(start + _DASH_PX, along[-1])
+        between = along[(along > start) & (along < end)]
+        stops = np.concatenate([[start], between, [end]])
+        columns = [np.interp(stops, along, run[:, axis]) for axis in (0, 1)]
+        dashes.append(np.stack(columns, axis=1))
+    return dashes

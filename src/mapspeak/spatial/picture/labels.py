@@ -10,23 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.spatial.grid import FloatArray
-from mapspeak.spatial.picture.field import HALO_PX, Field, Label, Placed
-from mapspeak.spatial.picture.ink import draw_polygon, draw_stroke, stamp
-from mapspeak.spatial.picture.marks import Mark, Region
+from mapspeak.spatial.picture.field import HALO_PX, Label, LabelField, Placed
+from mapspeak.spatial.picture.ink import SYMBOL_REACH_PX, draw_polygon, draw_stroke, stamp
+from mapspeak.spatial.picture.marks import Mark, PictureRegion
 from mapspeak.spatial.picture.palette import IS_BUSY, Canvas, Colour
 from mapspeak.spatial.picture.placing import find_places, leader_of
-from mapspeak.spatial.picture.symbols import SYMBOL_REACH_PX
 from mapspeak.spatial.picture.view import Box
-
-__all__ = [
-    "draw_leaders",
-    "draw_texts",
-    "label_at",
-    "labels_of_marks",
-    "labels_of_regions",
-    "place_labels",
-]
-
 
 _SAME_PLACE_PX = 10.0
 """Symbols that near cover each other by more than half."""
@@ -38,7 +27,7 @@ _MAX_LINE_LETTERS = 16
 
 
 def label_at(place: FloatArray, text: str, *, clearance_px: float) -> Label:
-    """Gives the label of something at (u, v) that reaches that far around."""
+    """Return the label of something at (u, v) that reaches that far around."""
     return Label(
         wordings=(text,),
         names=(text,),
@@ -49,7 +38,7 @@ def label_at(place: FloatArray, text: str, *, clearance_px: float) -> Label:
 
 
 def labels_of_marks(marks: tuple[Mark, ...], places: FloatArray) -> list[Label]:
-    """Gives the labels of marks at (u, v), one for all that stand in nearly the same place."""
+    """Return the labels of marks at (u, v), one for all that stand in nearly the same place."""
     is_open = np.array([bool(mark.label) for mark in marks], dtype=bool)
     labels = []
     for number, place in enumerate(places):
@@ -63,9 +52,9 @@ def labels_of_marks(marks: tuple[Mark, ...], places: FloatArray) -> list[Label]:
 
 
 def labels_of_regions(
-    regions: tuple[Region, ...], poles: dict[int, tuple[float, float]]
+    regions: tuple[PictureRegion, ...], poles: dict[int, tuple[float, float]]
 ) -> list[Label]:
-    """Gives the labels of regions, each at the place with the most room."""
+    """Return the labels of regions, each at the place with the most room."""
     return [
         Label(
             wordings=tuple(dict.fromkeys((region.text, region.text.replace(" ", "\n", 1)))),
@@ -86,7 +75,7 @@ def place_labels(
     obstacles: list[Box],
     regions: NDArray[np.uint16] | None,
 ) -> tuple[list[Placed], tuple[str, ...]]:
-    """Gives the labels with their places, and the names of those that found none.
+    """Return the labels with their places, and the names of those that found none.
 
     Args:
         inside: The map area in palette numbers, with the lines but without the symbols.
@@ -97,20 +86,20 @@ def place_labels(
     if not labels:
         return [], ()
     covered_before = cv2.integral(cv2.LUT(inside, IS_BUSY)).astype(np.int32, copy=False)
-    field = Field(covered_before=covered_before, regions=regions)
+    field = LabelField(covered_before=covered_before, regions=regions)
     placed, left_out = find_places(tuple(labels), field, tuple(obstacles))
     return placed, tuple(name for label in left_out for name in label.names)
 
 
 def draw_leaders(inside: Canvas, placed: list[Placed]) -> None:
-    """Draws thin lines from places to their labels; symbols belong above them."""
+    """Draw thin lines from places to their labels; symbols belong above them."""
     for spot in placed:
         if spot.has_leader:
             draw_stroke(inside, leader_of(spot.label, spot.box), Colour.INK, width_px=1)
 
 
 def draw_texts(inside: Canvas, placed: list[Placed]) -> None:
-    """Writes the labels, and draws a dot into each region whose label stands outside it."""
+    """Write the labels, and draws a dot into each region whose label stands outside it."""
     for spot in placed:
         if spot.has_leader and spot.label.region is not None:
             pole = np.array([spot.label.u, spot.label.v])
@@ -132,7 +121,7 @@ def _shared_label(members: list[Mark], place: FloatArray, spread_px: float) -> L
 
 
 def _in_lines(names: tuple[str, ...]) -> str:
-    """Gives names side by side, in as many lines as keep them short."""
+    """Return names side by side, in as many lines as keep them short."""
     lines = [names[0]]
     for name in names[1:]:
         if len(lines[-1]) + 1 + len(name) <= _MAX_LINE_LETTERS:

@@ -13,15 +13,22 @@ import cv2
 import numpy as np
 
 from mapspeak.geometry import Pose
-from mapspeak.spatial.picture.colouring import AUTOMATIC_COLOURS
-from mapspeak.spatial.picture.ink import NUMBER_SIZE_PX, stamp, text_patch
+from mapspeak.spatial.picture.ink import (
+    NUMBER_SIZE_PX,
+    draw_arrow,
+    draw_run,
+    draw_shape,
+    draw_zero_ring,
+    stamp,
+    text_patch,
+)
 from mapspeak.spatial.picture.marks import (
     LegendEntry,
+    LegendSample,
     Line,
     LineStyle,
     Mark,
-    Region,
-    Sample,
+    PictureRegion,
     Shape,
     Zone,
 )
@@ -35,13 +42,8 @@ from mapspeak.spatial.picture.palette import (
     Colour,
     FillPart,
 )
-from mapspeak.spatial.picture.spacing import round_length_m
-from mapspeak.spatial.picture.symbols import draw_arrow, draw_run, draw_shape, draw_zero_ring
-from mapspeak.spatial.picture.view import View, is_north_up
-from mapspeak.spatial.picture.zones import ZONE_NUMBER
-
-__all__ = ["ROW_PX", "GroundEntry", "Legend", "Scene", "grounds_in", "n_rows_of"]
-
+from mapspeak.spatial.picture.regions import AUTOMATIC_COLOURS, ZONE_NUMBER
+from mapspeak.spatial.picture.view import PictureView, is_north_up, round_length_m
 
 ROW_PX = 23
 _GAP_PX = 18
@@ -64,7 +66,7 @@ class GroundEntry:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Scene:
+class PictureScene:
     """What is to be seen in a picture, or may be, besides the ground.
 
     Attributes:
@@ -76,24 +78,24 @@ class Scene:
         has_origin: The map's origin is in the picture.
     """
 
-    regions: tuple[Region, ...] = ()
+    regions: tuple[PictureRegion, ...] = ()
     zones: tuple[Zone, ...] = ()
     lines: tuple[Line, ...] = ()
     marks: tuple[Mark, ...] = ()
     robot: Pose | None = None
     has_origin: bool = False
 
-    def shows(self, sample: Sample) -> bool:
+    def shows(self, sample: LegendSample) -> bool:
         """True when that kind of thing is to be seen."""
         regions = self.regions
         is_shown = {
-            Sample.ZONE: bool(self.zones),
-            Sample.ROBOT: self.robot is not None,
-            Sample.ORIGIN: self.has_origin,
-            Sample.HATCHED_REGION: any(region.is_hatched for region in regions),
-            Sample.DOTTED_REGION: any(region.is_dotted for region in regions),
-            Sample.HIGHLIGHTED_REGION: any(region.is_highlighted for region in regions),
-            Sample.PLAIN_REGION: any(not (r.is_hatched or r.is_dotted) for r in regions),
+            LegendSample.ZONE: bool(self.zones),
+            LegendSample.ROBOT: self.robot is not None,
+            LegendSample.ORIGIN: self.has_origin,
+            LegendSample.HATCHED_REGION: any(region.is_hatched for region in regions),
+            LegendSample.DOTTED_REGION: any(region.is_dotted for region in regions),
+            LegendSample.HIGHLIGHTED_REGION: any(region.is_highlighted for region in regions),
+            LegendSample.PLAIN_REGION: any(not (r.is_hatched or r.is_dotted) for r in regions),
         }
         return is_shown[sample]
 
@@ -118,18 +120,18 @@ class Legend:
     grounds: tuple[GroundEntry, ...]
     entries: tuple[LegendEntry, ...] = ()
 
-    def limited_to(self, scene: Scene) -> "Legend":
+    def limited_to(self, scene: PictureScene) -> "Legend":
         """Gives the legend with only the entries for what a scene shows, each with a colour."""
         shown = []
         for entry in self.entries:
-            if isinstance(entry.sample, Sample):
+            if isinstance(entry.sample, LegendSample):
                 if scene.shows(entry.sample):
                     shown.append(entry)
             elif (colour := scene.find_colour(entry)) is not None:
                 shown.append(replace(entry, colour=colour))
         return replace(self, entries=tuple(shown))
 
-    def draw(self, canvas: Canvas, view: View, top: int) -> int:
+    def draw(self, canvas: Canvas, view: PictureView, top: int) -> int:
         """Draws the rows that have room from a row of the canvas on; gives the row below them."""
         for row in _rows(self, view):
             if top + ROW_PX > view.height_px:
@@ -163,7 +165,7 @@ class _Item:
         stamp(canvas, patch, (text_left, middle - int(patch.shape[0]) // 2), halo_px=0)
 
 
-def n_rows_of(legend: Legend, view: View) -> int:
+def n_rows_of(legend: Legend, view: PictureView) -> int:
     """Gives how many rows a legend takes at the width of a picture."""
     return len(_rows(legend, view))
 
@@ -173,7 +175,7 @@ def grounds_in(inside: Canvas, grounds: tuple[GroundEntry, ...]) -> tuple[Ground
     return tuple(entry for entry in grounds if (inside == entry.palette_number).any())
 
 
-def _rows(legend: Legend, view: View) -> list[list[_Item]]:
+def _rows(legend: Legend, view: PictureView) -> list[list[_Item]]:
     rows: list[list[_Item]] = []
     right = view.width_px
     for item in _items(legend, view):
@@ -185,7 +187,7 @@ def _rows(legend: Legend, view: View) -> list[list[_Item]]:
     return rows
 
 
-def _items(legend: Legend, view: View) -> list[_Item]:
+def _items(legend: Legend, view: PictureView) -> list[_Item]:
     length_m = round_length_m(_SCALE_BAR_PX / view.pixels_per_m)
     length_px = round(length_m * view.pixels_per_m)
     return [
@@ -215,11 +217,11 @@ def _item_of_entry(entry: LegendEntry) -> _Item:
         return _Item(text=entry.text, sample_px=_SWATCH_PX, draw=draw)
     if isinstance(sample, LineStyle):
         draw = partial(_draw_line, style=sample, colour=colour)
-    elif sample is Sample.ROBOT:
+    elif sample is LegendSample.ROBOT:
         draw = _draw_robot
-    elif sample is Sample.ZONE:
+    elif sample is LegendSample.ZONE:
         draw = _draw_zone
-    elif sample is Sample.ORIGIN:
+    elif sample is LegendSample.ORIGIN:
         return _Item(text=entry.text, sample_px=_SWATCH_PX, draw=_draw_origin)
     else:
         draw = partial(_draw_region, sample=sample)
@@ -275,9 +277,9 @@ def _draw_zone(canvas: Canvas, left: int, middle: int) -> None:
     cv2.rectangle(canvas, (left, middle - half_px), (right, middle + half_px), (ZONE_NUMBER,), 2)
 
 
-def _draw_region(canvas: Canvas, left: int, middle: int, *, sample: Sample) -> None:
+def _draw_region(canvas: Canvas, left: int, middle: int, *, sample: LegendSample) -> None:
     """Draws a swatch in two of the colours that regions have, with the pattern."""
-    if sample is Sample.HIGHLIGHTED_REGION:
+    if sample is LegendSample.HIGHLIGHTED_REGION:
         _draw_swatch(canvas, left, middle, number=FREE, width_px=_WIDE_SWATCH_PX)
         corners = (left + 2, middle - 5), (left + _WIDE_SWATCH_PX - 2, middle + 5)
         cv2.rectangle(canvas, *corners, (int(RAMPS[Colour.VERMILION][-1]),), 4)
@@ -289,7 +291,7 @@ def _draw_region(canvas: Canvas, left: int, middle: int, *, sample: Sample) -> N
         _draw_swatch(canvas, at, middle, number=number, width_px=half_px)
         inner = canvas[middle - 5 : middle + 6, at + 2 : at + half_px - 1]
         row, col = np.indices(inner.shape)
-        if sample is Sample.HATCHED_REGION:
+        if sample is LegendSample.HATCHED_REGION:
             inner[(row + col) % 6 < 1] = FILLS[colour, FillPart.HATCH]
-        elif sample is Sample.DOTTED_REGION:
+        elif sample is LegendSample.DOTTED_REGION:
             inner[(row % 5 < 2) & (col % 5 < 2)] = FILLS[colour, FillPart.HATCH]

@@ -10,18 +10,6 @@ from mapspeak.errors import MapError
 from mapspeak.geometry import Point
 from mapspeak.spatial.picture.palette import Colour
 
-__all__ = [
-    "LegendEntry",
-    "Line",
-    "LineStyle",
-    "Mark",
-    "Region",
-    "RegionLayer",
-    "Sample",
-    "Shape",
-    "Zone",
-]
-
 _MAX_LABEL = np.iinfo(np.uint16).max
 
 
@@ -42,7 +30,7 @@ class LineStyle(StrEnum):
     DASHED = "dashed"
 
 
-class Sample(StrEnum):
+class LegendSample(StrEnum):
     """What a legend can explain besides the shapes of marks and the styles of lines."""
 
     PLAIN_REGION = "plain region"
@@ -89,7 +77,7 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Region:
+class PictureRegion:
     """An area of the floor with a name.
 
     Attributes:
@@ -125,7 +113,7 @@ class RegionLayer:
     """
 
     labels: NDArray[np.uint16]
-    regions: tuple[Region, ...]
+    regions: tuple[PictureRegion, ...]
 
     def __post_init__(self) -> None:
         labels = np.asarray(self.labels)
@@ -164,6 +152,6 @@ class LegendEntry:
         colour: Only for marks and lines of this colour; None for those of any.
     """
 
-    sample: Shape | LineStyle | Sample
+    sample: Shape | LineStyle | LegendSample
     text: str
     colour: Colour | None = None

@@ -8,25 +8,6 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "FILLS",
-    "FRAME",
-    "FREE",
-    "GREYS",
-    "GRID_OVER",
-    "IS_BUSY",
-    "N_RAMP_LEVELS",
-    "PALETTE",
-    "PAPER",
-    "RAMPS",
-    "UNKNOWN_GROUND",
-    "WALL",
-    "ZERO_LINE_OVER",
-    "Canvas",
-    "Colour",
-    "FillPart",
-]
-
 Canvas = NDArray[np.uint8]
 """Palette numbers, shape (rows, cols); row 0 is the top."""
 

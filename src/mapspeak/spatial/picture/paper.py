@@ -21,10 +21,7 @@ from mapspeak.spatial.picture.drawing import (
 )
 from mapspeak.spatial.picture.legend import GroundEntry, Legend
 from mapspeak.spatial.picture.palette import GREYS, PALETTE, PAPER
-from mapspeak.spatial.picture.spacing import paper_spacing_m
-from mapspeak.spatial.picture.view import NORTH_UP_RAD
-
-__all__ = ["draw_map_axis", "draw_map_plain", "draw_robot_pose", "grey_levels"]
+from mapspeak.spatial.picture.view import NORTH_UP_RAD, paper_spacing_m
 
 _GROUNDS = (
     GroundEntry(int(GREYS[1]), "free"),

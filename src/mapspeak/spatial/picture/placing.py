@@ -14,15 +14,12 @@ from mapspeak.spatial.picture.field import (
     FAR_RINGS,
     HALO_PX,
     NEAR_RINGS,
-    Field,
     Label,
+    LabelField,
     Placed,
     Positions,
 )
 from mapspeak.spatial.picture.view import Box
-
-__all__ = ["find_places", "leader_of"]
-
 
 _COST_OF_CROSSING = 12.0
 _COST_OF_HINDERING = 1.2
@@ -36,7 +33,7 @@ _CORNER_REACH = 1.5
 
 
 def find_places(
-    labels: tuple[Label, ...], field: Field, obstacles: tuple[Box, ...]
+    labels: tuple[Label, ...], field: LabelField, obstacles: tuple[Box, ...]
 ) -> tuple[list[Placed], list[Label]]:
     """Gives the labels that found a place, and those that did not.
 
@@ -79,7 +76,9 @@ class _Search:
         wishes: Where each region's label would stand inside it if there were no other labels.
     """
 
-    def __init__(self, labels: tuple[Label, ...], field: Field, obstacles: tuple[Box, ...]) -> None:
+    def __init__(
+        self, labels: tuple[Label, ...], field: LabelField, obstacles: tuple[Box, ...]
+    ) -> None:
         self.placed: dict[Label, Placed] = {}
         self._field = field
         self._near = dict(zip(labels, field.positions(labels, NEAR_RINGS), strict=True))

@@ -9,18 +9,7 @@ from mapspeak.errors import MapError
 from mapspeak.geometry import Point
 from mapspeak.spatial.grid import FloatArray, IntArray, OccupancyGrid
 from mapspeak.spatial.picture.ground import is_aligned
-from mapspeak.spatial.picture.view import Box, View
-
-__all__ = [
-    "Extent",
-    "Margins",
-    "Zoom",
-    "extent_of_known",
-    "extent_of_map",
-    "extent_of_zoom",
-    "plan_view",
-]
-
+from mapspeak.spatial.picture.view import Box, PictureView
 
 MAX_EDGE_PX = 1072
 """A square picture of this edge has 1.15 megapixels, as much as vision models take in whole."""
@@ -155,7 +144,7 @@ def plan_view(
     margins: Margins,
     max_edge_px: int,
     steps_per_pixel: int = 1,
-) -> View:
+) -> PictureView:
     """Gives the view that shows an extent as large as the edge allows.
 
     Cells of a grid whose axes are the picture's become blocks of pixels, or pixels cover several
@@ -192,14 +181,14 @@ def _laid_out(
     pixels_per_m: float,
     size_px: tuple[int, int],
     margins: Margins,
-) -> View:
+) -> PictureView:
     width_px = max(size_px[0] + 2 * margins.side_px, margins.min_width_px)
     left = (width_px - size_px[0]) // 2
     cos, sin = math.cos(up_rad), math.sin(up_rad)
     corner = Point(
         sin * extent.left_m + cos * extent.top_m, -cos * extent.left_m + sin * extent.top_m
     )
-    return View(
+    return PictureView(
         corner=corner,
         up_rad=up_rad,
         pixels_per_m=pixels_per_m,

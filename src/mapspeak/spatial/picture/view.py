@@ -1,4 +1,4 @@
-"""Where a map lies in a picture: pixels, and the one conversion between them and the world."""
+"""Where a map lies in a picture: pixels, their conversion to the world, and grid spacings."""
 
 import math
 from dataclasses import dataclass
@@ -9,9 +9,6 @@ from numpy.typing import NDArray
 from mapspeak.geometry import Point
 from mapspeak.spatial.grid import FloatArray
 
-__all__ = ["NORTH_UP_RAD", "Box", "Pixel", "View", "is_north_up"]
-
-
 NORTH_UP_RAD = math.pi / 2
 """The view in which the map's y axis points up and its x axis to the right."""
 
@@ -21,7 +18,7 @@ _BORDER_SLACK_PX = 1e-6
 
 
 def is_north_up(up_rad: float) -> bool:
-    """True for the view with the map's y axis up."""
+    """Return True for the view with the map's y axis up."""
     return abs(math.remainder(up_rad - NORTH_UP_RAD, math.tau)) < _ANGLE_SLACK_RAD
 
 
@@ -53,11 +50,11 @@ class Box:
         return self.bottom - self.top
 
     def contains(self, pixel: Pixel) -> bool:
-        """True when the pixel lies inside."""
+        """Return True when the pixel lies inside."""
         return self.left <= pixel.u < self.right and self.top <= pixel.v < self.bottom
 
     def overlaps(self, other: "Box") -> bool:
-        """True when the two share a pixel."""
+        """Return True when the two share a pixel."""
         return (
             self.left < other.right
             and other.left < self.right
@@ -67,7 +64,7 @@ class Box:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class View:
+class PictureView:
     """The exact transform between metres in the map and pixels of one picture.
 
     Attributes:
@@ -87,21 +84,21 @@ class View:
     height_px: int
 
     def pixel_at(self, point: Point) -> Pixel:
-        """Gives the pixel a point falls in, which may lie outside the picture (see `shows`)."""
+        """Return the pixel a point falls in, which may lie outside the picture (see `shows`)."""
         u, v = self.fractional_pixels_at(np.array([[point.x, point.y]]))[0]
         return Pixel(math.floor(u + _BORDER_SLACK_PX), math.floor(v + _BORDER_SLACK_PX))
 
     def point_at(self, pixel: Pixel) -> Point:
-        """Gives the point of the map in the middle of a pixel."""
+        """Return the point of the map in the middle of a pixel."""
         x, y = self.points_at(np.array([[pixel.u + 0.5, pixel.v + 0.5]]))[0]
         return Point(float(x), float(y))
 
     def shows(self, point: Point) -> bool:
-        """True when the point lies in the part of the map that the picture shows."""
+        """Return True when the point lies in the part of the map that the picture shows."""
         return self.area.contains(self.pixel_at(point))
 
     def fractional_pixels_at(self, points: FloatArray) -> FloatArray:
-        """Gives (u, v) of shape (n, 2) as real numbers; a pixel's middle is at +0.5, +0.5.
+        """Return (u, v) of shape (n, 2) as real numbers; a pixel's middle is at +0.5, +0.5.
 
         For an unturned map that fills the picture at one pixel per cell this is eq. 3 of the paper.
         """
@@ -112,22 +109,22 @@ class View:
         return np.stack([u, v], axis=1)
 
     def shows_each(self, points: FloatArray) -> NDArray[np.bool_]:
-        """Gives `shows` for points of shape (n, 2)."""
+        """Return `shows` for points of shape (n, 2)."""
         pixels = np.floor(self.fractional_pixels_at(points) + _BORDER_SLACK_PX)
         first, end = (self.area.left, self.area.top), (self.area.right, self.area.bottom)
         return np.asarray(((pixels >= first) & (pixels < end)).all(axis=1))
 
     def area_pixels_at(self, points: FloatArray) -> FloatArray:
-        """Gives (u, v) as real numbers, counted from the top left corner of the map area."""
+        """Return (u, v) as real numbers, counted from the top left corner of the map area."""
         pixels = self.fractional_pixels_at(points)
         return np.stack([pixels[:, 0] - self.area.left, pixels[:, 1] - self.area.top], axis=1)
 
     def area_of(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Gives the map area of a picture's array, sharing its memory."""
+        """Return the map area of a picture's array, sharing its memory."""
         return picture[self.area.top : self.area.bottom, self.area.left : self.area.right]
 
     def points_at(self, pixels: FloatArray) -> FloatArray:
-        """Gives the points of the map for (u, v) as real numbers, shape (n, 2)."""
+        """Return the points of the map for (u, v) as real numbers, shape (n, 2)."""
         right_m = (pixels[:, 0] - self.area.left) / self.pixels_per_m
         up_m = (self.area.top - pixels[:, 1]) / self.pixels_per_m
         cos, sin = math.cos(self.up_rad), math.sin(self.up_rad)
@@ -136,7 +133,7 @@ class View:
         return np.stack([x, y], axis=1)
 
     def area_corners(self) -> FloatArray:
-        """Gives the four corners of the map area as points of the map, shape (4, 2)."""
+        """Return the four corners of the map area as points of the map, shape (4, 2)."""
         area = self.area
         return self.points_at(
             np.array(
@@ -151,5 +148,44 @@ class View:
         )
 
     def heading_at(self, yaw_rad: float) -> float:
-        """Gives a yaw of the map as an angle in the picture, counter-clockwise from its right."""
+        """Return a yaw of the map as an angle in the picture, counter-clockwise from its right."""
         return yaw_rad - self.up_rad + NORTH_UP_RAD
+
+
+_N_LINES_ALONG_LONG_SIDE = 8.5
+"""Between 6 and 12: enough to read coordinates from, few enough to see the map."""
+
+_PAPER_N_LINES = 15
+_PAPER_MAX_LINES = 90
+_STEPS = (1.0, 2.0, 5.0)
+
+
+def even_spacing_m(longest_m: float) -> float:
+    """Return the spacing that puts about 6 to 12 lines across the longest side of a map."""
+    return round_length_m(longest_m / _N_LINES_ALONG_LONG_SIDE)
+
+
+def round_length_m(wanted_m: float) -> float:
+    """Return the 1, 2 or 5 times a power of ten that comes nearest to a length."""
+    return min(_candidates(wanted_m), key=lambda step_m: abs(math.log(step_m / wanted_m)))
+
+
+def paper_spacing_m(width_m: float, height_m: float, resolution_m: float) -> float:
+    """Return the paper's adaptive spacing: the next intuitive value from s_base on (eq. 5).
+
+    On maps more than six times as long as wide it grows beyond the paper's, for the same purpose:
+    so that the lines across the long side do not merge into a grey floor.
+    """
+    base_m = max(min(width_m, height_m) / _PAPER_N_LINES, resolution_m)
+    base_m = max(base_m, max(width_m, height_m) / _PAPER_MAX_LINES)
+    return next(step_m for step_m in _candidates(base_m) if step_m >= base_m * (1 - 1e-9))
+
+
+def decimals_of(spacing_m: float) -> int:
+    """Return how many decimals the numbers at multiples of a spacing need."""
+    return max(0, -math.floor(math.log10(spacing_m) + 1e-9))
+
+
+def _candidates(around_m: float) -> list[float]:
+    exponent = math.floor(math.log10(around_m))
+    return [step * 10.0**power for power in range(exponent - 1, exponent + 2) for step in _STEPS]

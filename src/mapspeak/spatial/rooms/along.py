@@ -13,8 +13,6 @@ from mapspeak.spatial.grid import FloatArray, Mask, OccupancyGrid
 from mapspeak.spatial.paths import DistanceField, distances_from, known_clearance_m
 from mapspeak.spatial.rooms.room_map import Door, Region, RoomMap
 
-__all__ = ["CorridorWalk", "Side", "Stop", "walk_along"]
-
 AHEAD_RAD = math.radians(50)
 """A door within this of the walking direction is ahead, not beside."""
 CELL_M = 0.25
@@ -30,7 +28,7 @@ WALL_M = 0.5
 """A door that a walk leads past is behind no thicker a wall."""
 
 
-class Side(StrEnum):
+class DoorSide(StrEnum):
     """Where a door is as somebody walks past it."""
 
     LEFT = "left"
@@ -41,7 +39,7 @@ class Side(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stop:
+class PassedDoor:
     """A door of a corridor.
 
     Attributes:
@@ -55,7 +53,7 @@ class Stop:
     door_id: str
     region_id: str
     along_m: float
-    side: Side
+    side: DoorSide
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,7 +76,7 @@ class CorridorWalk:
     heading_rad: float
     end_heading_rad: float
     length_m: float
-    stops: tuple[Stop, ...]
+    stops: tuple[PassedDoor, ...]
 
 
 def walk_along(rooms: RoomMap, region: Region) -> CorridorWalk | None:
@@ -203,23 +201,25 @@ def _find_middle_line(points: FloatArray, away_m: FloatArray) -> _Line:
     return _Line(np.stack(means[:2], axis=1), along_m * stretch)
 
 
-def _stop_at(line: _Line, region: Region, door: Door) -> Stop:
+def _stop_at(line: _Line, region: Region, door: Door) -> PassedDoor:
     along_m = line.nearest_to(door.place)
     to_door_rad = line.point_at(along_m).bearing_to(door.place)
     turn_rad = wrap_angle(to_door_rad - line.heading_at(along_m))
     is_beside = line.point_at(along_m).distance_to(door.place) <= region.width_m + WALL_M
     one, other = door.region_ids
-    return Stop(
+    return PassedDoor(
         door_id=door.id,
         region_id=other if one == region.id else one,
         along_m=along_m,
-        side=_side_of(turn_rad, along_m, line.length_m - along_m) if is_beside else Side.ELSEWHERE,
+        side=_side_of(turn_rad, along_m, line.length_m - along_m)
+        if is_beside
+        else DoorSide.ELSEWHERE,
     )
 
 
-def _side_of(turn_rad: float, from_start_m: float, from_end_m: float) -> Side:
+def _side_of(turn_rad: float, from_start_m: float, from_end_m: float) -> DoorSide:
     if from_end_m <= TANGENT_M / 2 and abs(turn_rad) <= AHEAD_RAD:
-        return Side.AHEAD
+        return DoorSide.AHEAD
     if from_start_m <= TANGENT_M / 2 and abs(turn_rad) >= math.pi - AHEAD_RAD:
-        return Side.BEHIND
-    return Side.LEFT if turn_rad > 0 else Side.RIGHT
+        return DoorSide.BEHIND
+    return DoorSide.LEFT if turn_rad > 0 else DoorSide.RIGHT

@@ -1,10 +1,11 @@
-"""What a person would say about each region: its size, its shape, what it is and why."""
+"""What a person would say about regions and doors: sizes, shapes, and what each region is."""
 
 import math
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from mapspeak.geometry import Point
 from mapspeak.spatial.grid import Mask
@@ -27,7 +28,7 @@ OPEN_SPACE_AREA_M2 = 100.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Shape:
+class RegionShape:
     """The measures of one region; the fields are those of `Region`, and two more.
 
     Attributes:
@@ -56,8 +57,8 @@ class Shape:
         return self.elongation > STRIP and self.length_m > STRIP * self.width_m
 
 
-def measure_regions(segmentation: Segmentation) -> list[Shape]:
-    """Gives the measures of every region, in the order of their numbers."""
+def measure_regions(segmentation: Segmentation) -> list[RegionShape]:
+    """Return the measures of every region, in the order of their numbers."""
     windows = _find_windows(segmentation)
     return [_measure(segmentation, index, window) for index, window in enumerate(windows, start=1)]
 
@@ -81,13 +82,13 @@ def _find_windows(segmentation: Segmentation) -> list[tuple[slice, slice]]:
     ]
 
 
-def _measure(segmentation: Segmentation, index: int, window: tuple[slice, slice]) -> Shape:
+def _measure(segmentation: Segmentation, index: int, window: tuple[slice, slice]) -> RegionShape:
     raster = segmentation.raster
     inside = segmentation.labels[window] == index
     clearance = np.where(inside, segmentation.floor.clearance_m[window], 0)
     row, col = np.unravel_index(int(np.argmax(clearance)), clearance.shape)
     length, width, heading = _bounding_rectangle(inside)
-    return Shape(
+    return RegionShape(
         free_area_m2=int((inside & (raster.free[window] > 0)).sum()) * raster.cell_area_m2,
         floor_area_m2=int(inside.sum()) * raster.cell_area_m2,
         length_m=length * raster.cell_size_m,
@@ -101,7 +102,7 @@ def _measure(segmentation: Segmentation, index: int, window: tuple[slice, slice]
 
 
 def _open_clearance(inside: Mask) -> float:
-    """Gives the clearance in cells once small holes are filled, such as a partition's; or 0."""
+    """Return the clearance in cells once small holes are filled, such as a partition's; or 0."""
     outside = cv2.copyMakeBorder(
         (~inside).astype(np.uint8), 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=1
     )
@@ -117,7 +118,7 @@ def _open_clearance(inside: Mask) -> float:
 
 
 def _bounding_rectangle(inside: Mask) -> tuple[float, float, float]:
-    """Gives length, width and direction of the smallest turned rectangle, in cells and radians."""
+    """Return length, width and direction of the smallest turned rectangle, in cells and radians."""
     outline, _ = cv2.findContours(
         inside.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE
     )
@@ -128,24 +129,21 @@ def _bounding_rectangle(inside: Mask) -> tuple[float, float, float]:
     return one + 1, other + 1, math.radians(angle_deg)
 
 
-def classify(shape: Shape, *, n_doors: int, n_neighbours: int) -> tuple[RoomClass, str]:
-    """Gives what a region is, and the numbers that say so."""
+def classify(shape: RegionShape, *, n_neighbours: int) -> RoomClass:
+    """Return what a person would call a region."""
     is_corridor = shape.is_strip or any(
         shape.elongation > elongation and n_neighbours >= least
         for elongation, least in CORRIDOR_LADDER
     )
-    length_m, width_m = walked_size(shape) if is_corridor else (shape.length_m, shape.width_m)
-    size = f"{length_m:.1f} x {width_m:.1f} m, {_count(n_doors, 'door')}"
     if is_corridor:
-        return RoomClass.CORRIDOR, size
+        return RoomClass.CORRIDOR
     is_wide = 2 * shape.clearance_m >= OPEN_SPACE_WIDTH_M
-    if is_wide and shape.floor_area_m2 >= OPEN_SPACE_AREA_M2:
-        return RoomClass.OPEN_SPACE, f"{size}, {2 * shape.clearance_m:.2g} m wide at the widest"
-    return RoomClass.ROOM, size
+    is_open = is_wide and shape.floor_area_m2 >= OPEN_SPACE_AREA_M2
+    return RoomClass.OPEN_SPACE if is_open else RoomClass.ROOM
 
 
-def walked_size(shape: Shape) -> tuple[float, float]:
-    """Gives length along and width across a corridor, however often it bends.
+def walked_size(shape: RegionShape) -> tuple[float, float]:
+    """Return length along and width across a corridor, however often it bends.
 
     In a long strip the mean distance from the nearer side is a quarter of the width.
     """
@@ -153,5 +151,77 @@ def walked_size(shape: Shape) -> tuple[float, float]:
     return shape.floor_area_m2 / width_m, width_m
 
 
-def _count(n: int, noun: str) -> str:
-    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
+_REACH_M = 0.3
+"""Border cells nearer than this to each other are one opening."""
+_LEAST_M = 0.25
+"""A narrower gap is a crack in the map of a wall: no person and hardly a robot gets through."""
+_ROUNDING_M = 1e-3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Opening:
+    """A door before it has an id; `first` and `second` are region numbers, first the smaller."""
+
+    first: int
+    second: int
+    place: Point
+    width_m: float
+
+
+def find_openings(segmentation: Segmentation) -> list[Opening]:
+    """Return every way between two regions, ordered by regions, widest first."""
+    row, col, first, second = _border_cells(segmentation.labels)
+    openings = []
+    order = np.lexsort((second, first))
+    starts = np.flatnonzero(np.diff(first[order]) | np.diff(second[order])) + 1
+    for here in np.split(order, starts) if order.size else ():
+        pair = int(first[here[0]]), int(second[here[0]])
+        openings += _split(segmentation, pair, row[here], col[here])
+    return [opening for opening in openings if opening.width_m >= _LEAST_M - _ROUNDING_M]
+
+
+def _border_cells(labels: NDArray[np.int32]) -> tuple[NDArray[np.intp], ...]:
+    """Return rows, columns and both regions of cells that touch a region with a higher number."""
+    found = []
+    for here, there, down, right in (
+        (np.s_[:-1, :], np.s_[1:, :], 1, 0),
+        (np.s_[:, :-1], np.s_[:, 1:], 0, 1),
+    ):
+        one, other = labels[here], labels[there]
+        rows, cols = find_cells((one != other) & (one > 0) & (other > 0))
+        a, b = one[rows, cols], other[rows, cols]
+        higher = a > b
+        rows, cols = rows + down * higher, cols + right * higher
+        found.append(np.stack([rows, cols, np.minimum(a, b), np.maximum(a, b)]))
+    joined = np.unique(np.concatenate(found, axis=1), axis=1)
+    return tuple(joined.astype(np.intp))
+
+
+def _split(
+    segmentation: Segmentation,
+    pair: tuple[int, int],
+    rows: NDArray[np.intp],
+    cols: NDArray[np.intp],
+) -> list[Opening]:
+    """Return the separate openings of a pair of regions: border cells that hang together."""
+    cell_size_m = segmentation.raster.cell_size_m
+    top, left = int(rows.min()), int(cols.min())
+    picture = np.zeros((int(rows.max()) - top + 1, int(cols.max()) - left + 1), np.uint8)
+    picture[rows - top, cols - left] = 1
+    reach = 2 * round(_REACH_M / 2 / cell_size_m) + 1
+    n, run = cv2.connectedComponents(cv2.dilate(picture, np.ones((reach, reach), np.uint8)))
+    number = run[rows - top, cols - left]
+    openings = []
+    for i in range(1, n):
+        mine = np.flatnonzero(number == i)
+        clearance = segmentation.floor.clearance_m[rows[mine], cols[mine]]
+        best = mine[int(np.argmax(clearance))]
+        openings.append(
+            Opening(
+                first=pair[0],
+                second=pair[1],
+                place=segmentation.raster.point_at(rows[best] + 0.5, cols[best] + 0.5),
+                width_m=2 * float(clearance.max()),
+            )
+        )
+    return sorted(openings, key=lambda opening: -opening.width_m)

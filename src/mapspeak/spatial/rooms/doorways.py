@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.spatial.rooms.floor import Floor
-from mapspeak.spatial.rooms.raster import Picture, Raster
-from mapspeak.spatial.rooms.settings import RoomSettings
+from mapspeak.spatial.rooms.raster import Picture, Raster, RoomSettings
 
 _UPRIGHT_DEG = 0.6
 """A map whose walls are this near to its rows and columns need not be turned."""

@@ -1,19 +1,24 @@
 """Rooms, corridors and doors found on an occupancy grid."""
 
-from collections import defaultdict
+from itertools import permutations
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.spatial.grid import OccupancyGrid
-from mapspeak.spatial.rooms.description import Shape, classify, measure_regions, walked_size
-from mapspeak.spatial.rooms.doors import Opening, find_openings
-from mapspeak.spatial.rooms.identity import match_rooms
-from mapspeak.spatial.rooms.raster import Raster, build_raster
+from mapspeak.spatial.rooms.description import (
+    Opening,
+    RegionShape,
+    classify,
+    find_openings,
+    measure_regions,
+    walked_size,
+)
+from mapspeak.spatial.rooms.identity import match_rooms, sort_key
+from mapspeak.spatial.rooms.raster import Raster, RoomSettings, build_raster
 from mapspeak.spatial.rooms.room_map import LETTER, Door, Labels, Region, RoomClass, RoomMap
 from mapspeak.spatial.rooms.segmentation import segment
-from mapspeak.spatial.rooms.settings import RoomSettings
 
 
 def find_rooms(
@@ -44,14 +49,31 @@ def find_rooms(
 
 
 def _name(
-    shapes: list[Shape], openings: list[Opening]
+    shapes: list[RegionShape], openings: list[Opening]
 ) -> tuple[tuple[Region, ...], tuple[Door, ...]]:
-    """Gives regions and doors with ids that count from 1, per class in order of area."""
+    """Return regions and doors with ids that count from 1, per class in order of area."""
+    behind: list[set[int]] = [set() for _ in shapes]
+    door_ids: list[list[str]] = [[] for _ in shapes]
+    for number, opening in enumerate(openings, start=1):
+        for one, other in permutations((opening.first - 1, opening.second - 1)):
+            behind[one].add(other)
+            door_ids[one].append(f"D{number}")
     classes = [
-        classify(shape, n_doors=len(own), n_neighbours=len(set(own)))
-        for shape, own in zip(shapes, _others(len(shapes), openings), strict=True)
+        classify(shape, n_neighbours=len(others))
+        for shape, others in zip(shapes, behind, strict=True)
     ]
-    ids = _ids([room_class for room_class, _ in classes])
+    ids = [f"{LETTER[room_class]}{number}" for number, room_class in enumerate(classes, start=1)]
+    regions = tuple(
+        _region(
+            shape,
+            classes[index],
+            id=ids[index],
+            index=index + 1,
+            door_ids=tuple(door_ids[index]),
+            neighbour_ids=tuple(sorted((ids[other] for other in behind[index]), key=sort_key)),
+        )
+        for index, shape in enumerate(shapes)
+    )
     doors = tuple(
         Door(
             id=f"D{number}",
@@ -61,50 +83,24 @@ def _name(
         )
         for number, opening in enumerate(openings, start=1)
     )
-    own_doors = _doors_by_region(doors)
-    regions = tuple(
-        _region(index, ids[index - 1], shape, classes[index - 1], own_doors[ids[index - 1]])
-        for index, shape in enumerate(shapes, start=1)
-    )
     return regions, doors
 
 
-def _doors_by_region(doors: tuple[Door, ...]) -> defaultdict[str, list[Door]]:
-    by_region: defaultdict[str, list[Door]] = defaultdict(list)
-    for door in doors:
-        for region_id in door.region_ids:
-            by_region[region_id].append(door)
-    return by_region
-
-
-def _others(n_regions: int, openings: list[Opening]) -> list[list[int]]:
-    """Gives for each region the region behind each of its doors."""
-    others: list[list[int]] = [[] for _ in range(n_regions)]
-    for opening in openings:
-        others[opening.first - 1].append(opening.second)
-        others[opening.second - 1].append(opening.first)
-    return others
-
-
-def _ids(classes: list[RoomClass]) -> list[str]:
-    return [f"{LETTER[room_class]}{number}" for number, room_class in enumerate(classes, start=1)]
-
-
 def _region(
+    shape: RegionShape,
+    room_class: RoomClass,
+    *,
+    id: str,  # noqa: A002 - the field's name
     index: int,
-    region_id: str,
-    shape: Shape,
-    room_class: tuple[RoomClass, str],
-    doors: list[Door],
+    door_ids: tuple[str, ...],
+    neighbour_ids: tuple[str, ...],
 ) -> Region:
-    behind = {other for door in doors for other in door.region_ids if other != region_id}
-    is_corridor = room_class[0] is RoomClass.CORRIDOR
+    is_corridor = room_class is RoomClass.CORRIDOR
     length_m, width_m = walked_size(shape) if is_corridor else (shape.length_m, shape.width_m)
     return Region(
-        id=region_id,
+        id=id,
         index=index,
-        room_class=room_class[0],
-        reason=room_class[1],
+        room_class=room_class,
         free_area_m2=shape.free_area_m2,
         floor_area_m2=shape.floor_area_m2,
         length_m=length_m,
@@ -112,8 +108,8 @@ def _region(
         heading_rad=shape.heading_rad,
         widest=shape.widest,
         clearance_m=shape.clearance_m,
-        door_ids=tuple(door.id for door in doors),
-        neighbour_ids=tuple(sorted(behind, key=lambda other: (other[0], int(other[1:])))),
+        door_ids=door_ids,
+        neighbour_ids=neighbour_ids,
     )
 
 

@@ -1,5 +1,9 @@
-"""The floor that rooms are cut from: what a robot could drive on if the furniture were gone."""
+"""The floor that rooms are cut from: what a robot could drive on if the furniture were gone.
 
+Walls are told apart from furniture by what walls do: they run straight, far, and in line.
+"""
+
+import math
 from dataclasses import dataclass, replace
 
 import cv2
@@ -7,9 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.spatial.rooms.furniture import find_blocks
-from mapspeak.spatial.rooms.raster import Picture, Raster, find_cells
-from mapspeak.spatial.rooms.settings import RoomSettings
-from mapspeak.spatial.rooms.walls import find_wall_directions, find_walls
+from mapspeak.spatial.rooms.raster import Picture, Raster, RoomSettings, find_cells
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -36,7 +38,7 @@ class Floor:
 
 
 def build_floor(raster: Raster, settings: RoomSettings) -> Floor:
-    """Gives the floor with its furniture cleared away."""
+    """Return the floor with its furniture cleared away."""
     directions = find_wall_directions(raster.occupied, least_ratio=settings.direction_ratio)
     wall, obstacle = find_walls(raster, directions, settings)
     pocket = settings.pocket_area_m2 / raster.cell_area_m2
@@ -62,19 +64,19 @@ def build_floor(raster: Raster, settings: RoomSettings) -> Floor:
 
 
 def _clear(free: Picture, occupied: Picture, wall: Picture, largest_pocket: float) -> Picture:
-    """Gives the floor under all that is no wall, small unseen pockets included."""
+    """Return the floor under all that is no wall, small unseen pockets included."""
     floor = free | (occupied & (1 - wall))
     return floor | _find_pockets(floor, wall, largest_pocket)
 
 
 def cut_away(floor: Floor, cut: Picture, cell_size_m: float) -> Floor:
-    """Gives the floor without the cells that are set, and its clearances; the walls stay."""
+    """Return the floor without the cells that are set, and its clearances; the walls stay."""
     rest = floor.floor & (1 - cut)
     return replace(floor, floor=rest, clearance_m=_clearance(rest, cell_size_m))
 
 
 def _drop_crumbs(floor: Picture, smallest: float) -> Picture:
-    """Gives the floor without parts that nothing joins and that are too small for a room."""
+    """Return the floor without parts that nothing joins and that are too small for a room."""
     _, label, stats, _ = cv2.connectedComponentsWithStats(floor, connectivity=4)
     is_kept = stats[:, cv2.CC_STAT_AREA] >= smallest
     is_kept[0] = False
@@ -82,7 +84,7 @@ def _drop_crumbs(floor: Picture, smallest: float) -> Picture:
 
 
 def _clearance(floor: Picture, cell_size_m: float) -> NDArray[np.float32]:
-    """Gives the way from each cell's centre to the edge of the nearest cell that is no floor."""
+    """Return the way from each cell's centre to the edge of the nearest cell that is no floor."""
     framed = cv2.copyMakeBorder(floor, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
     cells = cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     to_edge = np.maximum(cells[1:-1, 1:-1] - 0.5, 0.0) * cell_size_m
@@ -90,7 +92,7 @@ def _clearance(floor: Picture, cell_size_m: float) -> NDArray[np.float32]:
 
 
 def _find_pockets(floor: Picture, wall: Picture, largest: float) -> Picture:
-    """Gives the small unseen areas that border on floor more than on wall."""
+    """Return the small unseen areas that border on floor more than on wall."""
     unseen = (1 - floor) & (1 - wall)
     n, label, stats, _ = cv2.connectedComponentsWithStats(unseen, connectivity=4)
     small = stats[:, cv2.CC_STAT_AREA] < largest
@@ -113,3 +115,132 @@ _NEIGHBOURS = (
     (np.s_[:, 1:], np.s_[:, :-1]),
 )
 """The cells that have a neighbour below, above, right and left; and those neighbours."""
+
+
+MAX_DIRECTIONS = 8
+OBLIQUE_STEP_DEG = 7.5
+SLENDER_RATIO = 0.37
+"""Area over the square of the diagonal: 0.5 for a square, 0.39 for a disc, 0.3 for 3 to 1."""
+_EDGE_BLUR_CELLS = 1.5
+_BELL_DEG = 2.0
+_APART_DEG = 6
+"""Main directions differ by more than this."""
+
+
+def find_walls(
+    raster: Raster, directions_deg: list[float], settings: RoomSettings
+) -> tuple[Picture, Picture]:
+    """Return 1 where an obstacle is wall, and 1 where it is no island that furniture could be.
+
+    Wall is a long run in a main direction, or in line with one.
+
+    A run of twice that length is wall in any direction, and so are long curved walls. What is
+    thicker than a wall, such as a cupboard, is no piece of one that it stands in line with.
+    """
+    cells = _Lengths(raster, settings)
+    occupied = raster.occupied
+    thick = cv2.dilate(occupied, np.ones((3, 3), np.uint8))
+    large, slender = _sort_obstacles(raster.free, cells.island)
+    can_be_piece = (large | slender) & (1 - _thick(occupied, cells.thickness))
+    wall = np.zeros_like(occupied)
+    for angle_deg in directions_deg:
+        for turned_deg in (angle_deg, angle_deg + 90):
+            long_run = _open(thick, cells.wall, turned_deg) & occupied & large
+            piece = _open(thick, cells.piece, turned_deg) & occupied & can_be_piece
+            in_line = _dilate(long_run, 2 * cells.reach, turned_deg)
+            wall |= long_run | (piece & in_line)
+    for turned_deg in np.arange(0.0, 180.0, OBLIQUE_STEP_DEG).tolist():
+        wall |= _open(thick, cells.oblique, turned_deg) & occupied & large
+    return wall, occupied & large
+
+
+class _Lengths:
+    """The settings for walls, in raster cells."""
+
+    def __init__(self, raster: Raster, settings: RoomSettings) -> None:
+        self.wall = settings.wall_length_m / raster.cell_size_m
+        self.oblique = settings.oblique_length_m / raster.cell_size_m
+        self.reach = settings.wall_reach_m / raster.cell_size_m
+        self.piece = settings.wall_piece_m / raster.cell_size_m
+        self.thickness = settings.wall_thickness_m / raster.cell_size_m
+        self.island = settings.island_size_m / raster.cell_size_m
+
+
+def _open(picture: cv2.typing.MatLike, length: float, angle_deg: float) -> Picture:
+    kernel = _line(length, angle_deg)
+    return np.asarray(cv2.morphologyEx(picture, cv2.MORPH_OPEN, kernel), np.uint8)
+
+
+def _thick(occupied: Picture, least: float) -> Picture:
+    """Return 1 where a disc of this diameter in cells fits into an obstacle."""
+    side = max(round(least), 1)
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    return np.asarray(cv2.morphologyEx(occupied, cv2.MORPH_OPEN, disc), np.uint8)
+
+
+def _dilate(picture: Picture, length: float, angle_deg: float) -> Picture:
+    return np.asarray(cv2.dilate(picture, _line(length, angle_deg)), np.uint8)
+
+
+def _line(length: float, angle_deg: float) -> Picture:
+    half = math.ceil(length / 2)
+    picture = np.zeros((2 * half + 1, 2 * half + 1), np.uint8)
+    dx = math.cos(math.radians(angle_deg)) * length / 2
+    dy = math.sin(math.radians(angle_deg)) * length / 2
+    ends = [(round(half + sign * dx), round(half + sign * dy)) for sign in (-1, 1)]
+    cv2.line(picture, ends[0], ends[1], 1)
+    return picture
+
+
+def _sort_obstacles(free: Picture, largest_island: float) -> tuple[Picture, Picture]:
+    """Return 1 on obstacles too large to be islands of furniture, and 1 on slender islands.
+
+    An island is an obstacle that can be driven around. A piece of wall is slender; a pillar, a
+    chair and a box are not.
+    """
+    solid = cv2.copyMakeBorder(1 - free, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=1)
+    _, label, stats, _ = cv2.connectedComponentsWithStats(solid, connectivity=8)
+    label = label[1:-1, 1:-1]
+    across = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
+    is_large = across >= largest_island
+    is_slender = stats[:, cv2.CC_STAT_AREA] <= SLENDER_RATIO * across**2
+    is_large[0] = is_slender[0] = False
+    return is_large.astype(np.uint8)[label], is_slender.astype(np.uint8)[label]
+
+
+def find_wall_directions(occupied: Picture, *, least_ratio: float) -> list[float]:
+    """Return the main directions of walls in degrees from 0 to 90, the strongest first.
+
+    They are the peaks of the histogram of gradient angles modulo 90 degrees, each with at least
+    `least_ratio` of the highest; and last, halfway between the strongest and its right angle, the
+    direction of cut corners, which would else be found or not as the raster happens to lie.
+    """
+    histogram = _angle_histogram(occupied)
+    highest = float(histogram.max())
+    if highest <= 0:
+        return []
+    around = np.stack(
+        [np.roll(histogram, shift) for shift in range(-_APART_DEG, _APART_DEG + 1)]
+    ).max(axis=0)
+    peaks = np.flatnonzero((histogram >= around) & (histogram >= least_ratio * highest))
+    strongest = sorted(peaks.tolist(), key=lambda peak: (-histogram[peak], peak))
+    directions = [peak + 0.5 for peak in strongest[:MAX_DIRECTIONS]]
+    halfway = (directions[0] + 45.0) % 90.0
+    is_new = all(abs((halfway - other + 45.0) % 90.0 - 45.0) > _APART_DEG for other in directions)
+    return [*directions, halfway] if is_new else directions
+
+
+def _angle_histogram(occupied: Picture) -> NDArray[np.float64]:
+    soft = cv2.GaussianBlur(occupied.astype(np.float32), (0, 0), _EDGE_BLUR_CELLS)
+    across = cv2.Sobel(soft, cv2.CV_32F, 1, 0)
+    along = cv2.Sobel(soft, cv2.CV_32F, 0, 1)
+    strength, angle = cv2.cartToPolar(across, along, angleInDegrees=True)
+    strong = strength > 0.3 * strength.max()
+    counts = np.bincount(
+        angle[strong].astype(np.intp) % 90,
+        weights=strength[strong].astype(np.float64),
+        minlength=90,
+    )
+    bell = np.exp(-0.5 * (np.arange(-8, 9) / _BELL_DEG) ** 2)
+    wrapped = np.concatenate([counts[-8:], counts, counts[:8]])
+    return np.convolve(wrapped, bell / bell.sum(), mode="valid")

@@ -8,8 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.spatial.rooms.raster import Picture, Raster
-from mapspeak.spatial.rooms.settings import RoomSettings
+from mapspeak.spatial.rooms.raster import Picture, Raster, RoomSettings
 from mapspeak.spatial.rooms.solids import (
     Truths,
     drop_small,

@@ -175,12 +175,13 @@ def _rename(region: Region, ids: dict[str, str], door_ids: dict[str, str]) -> Re
     return replace(
         region,
         id=ids[region.id],
-        door_ids=tuple(sorted((door_ids[name] for name in region.door_ids), key=_order)),
-        neighbour_ids=tuple(sorted((ids[name] for name in region.neighbour_ids), key=_order)),
+        door_ids=tuple(sorted((door_ids[name] for name in region.door_ids), key=sort_key)),
+        neighbour_ids=tuple(sorted((ids[name] for name in region.neighbour_ids), key=sort_key)),
     )
 
 
-def _order(name: str) -> tuple[str, int]:
+def sort_key(name: str) -> tuple[str, int]:
+    """Return what ids are sorted by: their letter, then their number."""
     return name[0], int(name[1:])
 
 
@@ -213,7 +214,9 @@ def _remember(
         for door in previous.doors
     ]
     lost += [replace(gone, became=_regions_at(current, gone, ids)) for gone in previous.vanished]
-    return tuple(sorted((gone for gone in lost if gone.id not in kept), key=lambda g: _order(g.id)))
+    return tuple(
+        sorted((gone for gone in lost if gone.id not in kept), key=lambda g: sort_key(g.id))
+    )
 
 
 def _regions_at(current: RoomMap, gone: Vanished, ids: dict[str, str]) -> tuple[str, ...]:
@@ -225,4 +228,4 @@ def _regions_at(current: RoomMap, gone: Vanished, ids: dict[str, str]) -> tuple[
 def _heirs(shared: NDArray[np.float64], final: dict[int, str]) -> tuple[str, ...]:
     seen = float(shared[1:].sum())
     heirs = np.flatnonzero((shared > 0) & (shared >= _REMAINS_RATIO * seen)).tolist()
-    return tuple(sorted((final[index] for index in heirs if index), key=_order))
+    return tuple(sorted((final[index] for index in heirs if index), key=sort_key))

@@ -35,7 +35,6 @@ class Region:
             no two regions share it; the letter says what the region is now.
         index: The region's number in the label array of its map.
         room_class: What it is.
-        reason: Why it is that, in words with numbers.
         free_area_m2: Floor on which nothing stands.
         floor_area_m2: Floor with what stands on it.
         length_m: The longer side of the smallest rectangle around it; of a corridor, along it.
@@ -50,7 +49,6 @@ class Region:
     id: str
     index: int
     room_class: RoomClass
-    reason: str
     free_area_m2: float
     floor_area_m2: float
     length_m: float
@@ -102,8 +100,8 @@ class RoomMap:
 
     Attributes:
         grid: The map that was divided.
-        labels: Shape of the grid; 0 belongs to no region, else `Region.index`. Furniture counts
-            to the region it stands in.
+        labels: `Region.index` of each cell of the grid, 0 for no region. Furniture counts to the
+            region it stands in.
         regions: Ordered by index, largest first when nothing came before.
         doors: All of them.
         vanished: Ids of earlier maps that are no longer used; given out again only when the same

@@ -6,13 +6,17 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.spatial.rooms.basins import BasinLabels, Saddle, build_basins, find_saddles
 from mapspeak.spatial.rooms.doorways import Doorway, find_doorways
 from mapspeak.spatial.rooms.floor import Floor, build_floor, cut_away
-from mapspeak.spatial.rooms.frames import Frames
-from mapspeak.spatial.rooms.merging import merge_basins
-from mapspeak.spatial.rooms.raster import Picture, Raster, find_cells
-from mapspeak.spatial.rooms.settings import RoomSettings
+from mapspeak.spatial.rooms.merging import (
+    BasinLabels,
+    Frames,
+    Saddle,
+    build_basins,
+    find_saddles,
+    merge_basins,
+)
+from mapspeak.spatial.rooms.raster import Picture, Raster, RoomSettings, find_cells
 
 Labels = NDArray[np.int32]
 

@@ -12,15 +12,15 @@ from pydantic import Discriminator, Field, FiniteFloat, Tag, ValidationError
 
 from mapspeak.geometry import Point
 from mapspeak.spatial.areagraph.anchor import LatLon, MapAnchor
-from mapspeak.spatial.areagraph.as_json import compose
 from mapspeak.spatial.areagraph.graph import Area, AreaGraph, Line, Passage, Polygon
 from mapspeak.spatial.areagraph.records import (
     FILE_VERSION,
     AreaRecord,
+    GraphRecord,
     PassageRecord,
     PolygonPositions,
     Position,
-    Record,
+    compose,
     polygon_from,
     position_of,
     refusal_of,
@@ -31,7 +31,7 @@ _ToPosition = Callable[[Point], tuple[float, float]]
 _ToPoint = Callable[[Position], Point]
 
 
-class _Anchor(Record):
+class _Anchor(GraphRecord):
     lat_deg: FiniteFloat
     lon_deg: FiniteFloat
     yaw_deg: FiniteFloat
@@ -42,13 +42,13 @@ class _Anchor(Record):
         )
 
 
-class _Member(Record):
+class _Member(GraphRecord):
     version: Literal[1]
     name: str
     anchor: _Anchor | None
 
 
-class _PolygonGeometry(Record):
+class _PolygonGeometry(GraphRecord):
     type: Literal["Polygon"]
     coordinates: PolygonPositions
 
@@ -56,7 +56,7 @@ class _PolygonGeometry(Record):
         return (_polygon(self.coordinates, point_of),)
 
 
-class _MultiPolygonGeometry(Record):
+class _MultiPolygonGeometry(GraphRecord):
     type: Literal["MultiPolygon"]
     coordinates: list[PolygonPositions]
 
@@ -64,14 +64,14 @@ class _MultiPolygonGeometry(Record):
         return tuple(_polygon(each, point_of) for each in self.coordinates)
 
 
-class _PointGeometry(Record):
+class _PointGeometry(GraphRecord):
     type: Literal["Point"]
 
     def to_line(self, _point_of: _ToPoint) -> Line | None:
         return None
 
 
-class _LineGeometry(Record):
+class _LineGeometry(GraphRecord):
     type: Literal["LineString"]
     coordinates: tuple[Position, Position]
 
@@ -79,17 +79,18 @@ class _LineGeometry(Record):
         return point_of(self.coordinates[0]), point_of(self.coordinates[1])
 
 
-class _AreaFeature(Record):
+class _AreaFeature(GraphRecord):
     type: Literal["Feature"]
     geometry: _PolygonGeometry | _MultiPolygonGeometry | None = Field(discriminator="type")
     properties: AreaRecord
 
     def to_area(self, point_of: _ToPoint) -> Area:
         polygons = self.geometry.to_polygons(point_of) if self.geometry else ()
-        return Area(region=self.properties.to_region(), polygons=polygons)
+        facts = self.properties
+        return Area(region=facts.to_region(), polygons=polygons, text=facts.reason)
 
 
-class _PassageFeature(Record):
+class _PassageFeature(GraphRecord):
     type: Literal["Feature"]
     geometry: _LineGeometry | _PointGeometry = Field(discriminator="type")
     properties: PassageRecord
@@ -110,14 +111,14 @@ _Feature = Annotated[
 ]
 
 
-class _Collection(Record):
+class _Collection(GraphRecord):
     type: Literal["FeatureCollection"]
     mapspeak: _Member
     features: list[_Feature]
 
 
 def to_geojson(graph: AreaGraph, *, anchor: MapAnchor | None = None) -> str:
-    """Gives the area graph as GeoJSON.
+    """Return the area graph as GeoJSON.
 
     Args:
         graph: What is written.
@@ -134,7 +135,7 @@ def to_geojson(graph: AreaGraph, *, anchor: MapAnchor | None = None) -> str:
 
 
 def from_geojson(text: str) -> AreaGraph:
-    """Reads the area graph that `to_geojson` wrote, back to metres in the map frame.
+    """Read the area graph that `to_geojson` wrote, back to metres in the map frame.
 
     Raises:
         MapError: It is not GeoJSON, or no area graph.
@@ -193,7 +194,7 @@ def _area_feature(area: Area, position: _ToPosition) -> dict[str, object]:
         geometry = {"type": "Polygon", "coordinates": polygons[0]}
     elif polygons:
         geometry = {"type": "MultiPolygon", "coordinates": polygons}
-    return _feature(area.id, geometry, {"feature": "area"} | AreaRecord.facts_of(area.region))
+    return _feature(area.id, geometry, {"feature": "area"} | AreaRecord.facts_of(area))
 
 
 def _passage_feature(passage: Passage, position: _ToPosition) -> dict[str, object]:

@@ -7,7 +7,8 @@ that begin with `mapspeak:`.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
 
 from pydantic import FiniteFloat, ValidationError
 
@@ -15,6 +16,7 @@ from mapspeak.errors import MapError
 from mapspeak.geometry import Point
 from mapspeak.installation import shell_command
 from mapspeak.spatial.areagraph.anchor import MapAnchor
+from mapspeak.spatial.areagraph.geojson import from_geojson
 from mapspeak.spatial.areagraph.graph import Area, AreaGraph, Line, Passage, Polygon, Ring
 from mapspeak.spatial.areagraph.osm_xml import (
     OsmDocument,
@@ -26,8 +28,9 @@ from mapspeak.spatial.areagraph.osm_xml import (
 from mapspeak.spatial.areagraph.records import (
     FILE_VERSION,
     AreaRecord,
+    GraphRecord,
     PassageRecord,
-    Record,
+    from_json,
     polygon_from,
     refusal_of,
 )
@@ -45,7 +48,7 @@ LEVEL = "0"
 Tags = Mapping[str, str]
 
 
-class _Root(Record):
+class _Root(GraphRecord):
     """The node at the map frame's (0, 0)."""
 
     version: int
@@ -54,7 +57,7 @@ class _Root(Record):
 
 
 def to_osm(graph: AreaGraph, *, anchor: MapAnchor | None = None) -> str:
-    """Gives the area graph as osmAG.
+    """Return the area graph as osmAG.
 
     Args:
         graph: What is written.
@@ -73,7 +76,7 @@ def to_osm(graph: AreaGraph, *, anchor: MapAnchor | None = None) -> str:
 
 
 def from_osm(text: str) -> AreaGraph:
-    """Reads the area graph that `to_osm` wrote, also after it was edited in JOSM.
+    """Read the area graph that `to_osm` wrote, also after it was edited in JOSM.
 
     Raises:
         MapError: It is not OSM XML, or no area graph of ours.
@@ -104,7 +107,7 @@ class _Writer:
         )
 
     def add_area(self, area: Area) -> None:
-        """Adds the outline as a way; further rings as ways that a multipolygon holds together."""
+        """Add the outline as a way; further rings as ways that a multipolygon holds together."""
         region = area.region
         tags = {
             "indoor": "room",
@@ -112,7 +115,7 @@ class _Writer:
             "name": area.id,
             "osmAG:type": "area",
             "osmAG:areaType": AREA_TYPES[region.room_class],
-        } | _own_tags(AreaRecord.facts_of(region))
+        } | _own_tags(AreaRecord.facts_of(area))
         if not area.polygons:
             self._add_node(region.widest, tags)
             return
@@ -128,7 +131,7 @@ class _Writer:
             )
 
     def add_passage(self, passage: Passage) -> None:
-        """Adds the line as a way of two nodes, or the door as a node when there is no line."""
+        """Add the line as a way of two nodes, or the door as a node when there is no line."""
         door = passage.door
         first, second = door.region_ids
         tags = {
@@ -197,7 +200,7 @@ class _Assembler:
         )
 
     def _elements(self, kind: str) -> Iterator[OsmElement]:
-        """Gives the elements of a kind, in the order in which they were written.
+        """Return the elements of a kind, in the order in which they were written.
 
         Ids count down while writing; an editor keeps the order within ways, and within nodes.
         """
@@ -207,18 +210,18 @@ class _Assembler:
 
     def _area(self, element: OsmElement) -> Area:
         values = _own_values(element.tags) | {"id": element.tags.get("name", "")}
-        region = AreaRecord.model_validate(values).to_region()
-        relation = self._multipolygons.get(region.id)
+        record = AreaRecord.model_validate(values)
+        relation = self._multipolygons.get(record.id)
         if relation is not None:
             polygons = self._polygons(relation.members)
         elif element.refs:
             polygons = (polygon_from([self._points(element.refs)]),)
         else:
             polygons = ()
-        return Area(region=region, polygons=polygons)
+        return Area(region=record.to_region(), polygons=polygons, text=record.reason)
 
     def _polygons(self, members: Iterable[OsmMember]) -> tuple[Polygon, ...]:
-        """Gives the polygons of a relation: every outer ring with the inner ones after it."""
+        """Return the polygons of a relation: every outer ring with the inner ones after it."""
         polygons: list[list[Ring]] = []
         for member in members:
             if member.type != "way" or member.ref not in self._ways:
@@ -263,7 +266,7 @@ def _find_root(nodes: Iterable[OsmElement]) -> OsmElement:
 
 
 def _own_tags(facts: Mapping[str, object]) -> dict[str, str]:
-    """Gives facts as tags; id and joins are osmAG's name, from and to."""
+    """Return facts as tags; id and joins are osmAG's name, from and to."""
     tags = {}
     for key, value in facts.items():
         if key in {"id", "joins"}:
@@ -274,7 +277,7 @@ def _own_tags(facts: Mapping[str, object]) -> dict[str, str]:
 
 
 def _own_values(tags: Tags) -> dict[str, object]:
-    """Gives the facts again, lists split and the rest as text."""
+    """Return the facts again, lists split and the rest as text."""
     values: dict[str, object] = {}
     for key, text in tags.items():
         if key.startswith(OWN):
@@ -289,3 +292,33 @@ def _say_missing(kind: str, ref: int) -> MapError:
         f"This area graph as OSM mentions a {kind!a} {ref} that is not there.",
         hint="Download or restore it in the editor, or write the file anew.",
     )
+
+
+READERS: dict[str, Callable[[str], AreaGraph]] = {
+    ".geojson": from_geojson,
+    ".json": from_json,
+    ".osm": from_osm,
+}
+
+
+def read_area_graph(path: Path) -> AreaGraph:
+    """Read an area graph from a .json, .geojson or .osm file that mapspeak wrote.
+
+    Raises:
+        MapError: The file is missing, damaged or something else.
+    """
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise MapError(
+            f"{path.name} is no file of an area graph.",
+            hint=f"Give one that ends in {', '.join(READERS)}.",
+        )
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise MapError(
+            f"{path} cannot be read: {error.strerror or error}.", hint="Check its path."
+        ) from error
+    except UnicodeError as error:
+        raise MapError(f"{path.name} is not UTF-8 text.", hint="Save it as UTF-8.") from error
+    return reader(text)

@@ -24,7 +24,7 @@ _LEFT, _STRAIGHT, _RIGHT = 1, 0, 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Border:
+class BorderRun:
     """A straight piece of border, with its label on the left.
 
     Attributes:
@@ -50,8 +50,8 @@ class VertexPolygon:
     holes: tuple[VertexRing, ...]
 
 
-def find_borders(labels: Labels) -> list[Border]:
-    """Gives all borders of all labels above 0."""
+def find_borders(labels: Labels) -> list[BorderRun]:
+    """Return all borders of all labels above 0."""
     padded = np.pad(labels, 1)
     here = padded[1:-1, 1:-1]
     return [
@@ -62,8 +62,8 @@ def find_borders(labels: Labels) -> list[Border]:
     ]
 
 
-def _pieces(here: Labels, there: Labels, *, direction: int) -> list[Border]:
-    """Gives the borders towards one side: runs of cells with the same two labels."""
+def _pieces(here: Labels, there: Labels, *, direction: int) -> list[BorderRun]:
+    """Return the borders towards one side: runs of cells with the same two labels."""
     rows, cols = np.nonzero((here != there) & (here > 0))
     is_upright = direction in {1, 3}
     order = np.lexsort((rows, cols)) if is_upright else np.arange(rows.size)
@@ -85,11 +85,11 @@ def _pieces(here: Labels, there: Labels, *, direction: int) -> list[Border]:
     return [_border(piece, direction) for piece in ends]
 
 
-def _border(piece: tuple[int, int, int, int, int], direction: int) -> Border:
+def _border(piece: tuple[int, int, int, int, int], direction: int) -> BorderRun:
     label, other, low, high, line = piece
     start, end = (low, high) if direction in {0, 1} else (high, low)
     is_upright = direction in {1, 3}
-    return Border(
+    return BorderRun(
         label=label,
         other=other,
         direction=direction,
@@ -98,8 +98,8 @@ def _border(piece: tuple[int, int, int, int, int], direction: int) -> Border:
     )
 
 
-def trace_polygons(borders: list[Border]) -> dict[int, tuple[VertexPolygon, ...]]:
-    """Gives the polygons of every label, the largest first.
+def trace_polygons(borders: list[BorderRun]) -> dict[int, tuple[VertexPolygon, ...]]:
+    """Return the polygons of every label, the largest first.
 
     Cells that touch at a corner only are apart: each gets a polygon of its own. No ring visits a
     vertex twice; a hole may touch an outer ring or another hole at single vertices.
@@ -112,8 +112,8 @@ def trace_polygons(borders: list[Border]) -> dict[int, tuple[VertexPolygon, ...]
     return {label: _assemble(rings[label]) for label in sorted(rings)}
 
 
-def _follow(following: dict[tuple[int, Vertex, int], Border], first: Border) -> list[Vertex]:
-    """Takes one closed line out of the borders.
+def _follow(following: dict[tuple[int, Vertex, int], BorderRun], first: BorderRun) -> list[Vertex]:
+    """Take one closed line out of the borders.
 
     The left turn comes first where two cells touch at a corner: it stays with the same cell.
     """
@@ -133,7 +133,7 @@ def _follow(following: dict[tuple[int, Vertex, int], Border], first: Border) -> 
 
 
 def _split(vertices: list[Vertex]) -> list[VertexRing]:
-    """Cuts a closed line that touches itself into rings that do not."""
+    """Cut a closed line that touches itself into rings that do not."""
     rings: list[VertexRing] = []
     path: list[Vertex] = []
     place: dict[Vertex, int] = {}
@@ -150,7 +150,7 @@ def _split(vertices: list[Vertex]) -> list[VertexRing]:
 
 
 def _assemble(rings: list[VertexRing]) -> tuple[VertexPolygon, ...]:
-    """Gives each hole to the smallest outer ring around it."""
+    """Return each hole to the smallest outer ring around it."""
     outers = sorted((ring for ring in rings if twice_area(ring) > 0), key=twice_area)
     holes: list[list[VertexRing]] = [[] for _ in outers]
     for ring in rings:
@@ -167,7 +167,7 @@ def _assemble(rings: list[VertexRing]) -> tuple[VertexPolygon, ...]:
 
 
 def twice_area(ring: VertexRing) -> int:
-    """Gives twice the area in cells, positive when the ring runs counter-clockwise."""
+    """Return twice the area in cells, positive when the ring runs counter-clockwise."""
     ahead = (*ring[1:], ring[0])
     return sum(
         one[1] * other[0] - other[1] * one[0] for one, other in zip(ring, ahead, strict=True)
@@ -175,14 +175,14 @@ def twice_area(ring: VertexRing) -> int:
 
 
 def _centre_left_of(ring: VertexRing) -> tuple[float, float]:
-    """Gives the centre of the cell to the left of the ring's first piece."""
+    """Return the centre of the cell to the left of the ring's first piece."""
     (row, col), (next_row, next_col) = ring[:2]
     down, right = np.sign(next_row - row), np.sign(next_col - col)
     return row + 0.5 * (down + right), col + 0.5 * (right - down)
 
 
 def _holds(ring: VertexRing, point: tuple[float, float]) -> bool:
-    """Says by crossings whether a cell's centre lies in a ring."""
+    """Say by crossings whether a cell's centre lies in a ring."""
     corners: _Ints = np.array(ring)
     rows, cols = corners[:, 0], corners[:, 1]
     next_rows = np.roll(rows, -1)

@@ -1,0 +1,283 @@
+"""Regions and zones painted on the map area: colours, patterns, outlines, places for labels."""
+
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.errors import MapError
+from mapspeak.spatial.grid import IntArray, Mask, OccupancyGrid
+from mapspeak.spatial.picture.marks import PictureRegion, RegionLayer, Zone
+from mapspeak.spatial.picture.palette import FILLS, FREE, RAMPS, WALL, Canvas, Colour, FillPart
+from mapspeak.spatial.picture.view import PictureView
+
+AUTOMATIC_COLOURS = (
+    Colour.SKY,
+    Colour.ORANGE,
+    Colour.GREEN,
+    Colour.PURPLE,
+    Colour.YELLOW,
+    Colour.VERMILION,
+)
+
+_LATTICE_M = 0.2
+_NEIGHBOUR_M = (0.2, 0.6, 1.2)
+"""Regions that far apart, as on both sides of a wall, look like neighbours."""
+_EDGE_PX = 2
+_REGION_HATCH_PX = 9
+_DOT_STEP_PX = 10
+_DOT_PX = 2
+_HIGHLIGHT_PX = 5
+_HIGHLIGHT = int(RAMPS[Colour.VERMILION][-1])
+
+
+def paint_regions(
+    ground: Canvas,
+    labels: NDArray[np.uint16],
+    regions: tuple[PictureRegion, ...],
+    colours: dict[int, Colour],
+) -> None:
+    """Fills the free pixels of each region, with its pattern and outline, on the ground given.
+
+    Args:
+        ground: Palette numbers of the map area; changed in place.
+        labels: The region of each pixel, from `sample`.
+        regions: What is to be seen of them.
+        colours: Of each region's label.
+    """
+    fill = np.take(_fill_by_label(regions, colours, FillPart.PLAIN), labels)
+    is_filled = (ground == FREE) & (fill > 0)
+    np.copyto(ground, fill, where=is_filled)
+    for places, wanted in (
+        (_hatch_pixels, tuple(region for region in regions if region.is_hatched)),
+        (_dot_pixels, tuple(region for region in regions if region.is_dotted)),
+    ):
+        if wanted:
+            hatch = _fill_by_label(wanted, colours, FillPart.HATCH)
+            _paint_pattern(ground, labels, is_filled, places(ground.shape), hatch)
+    edge = _is_edge(labels) & is_filled
+    ground[edge] = _fill_by_label(regions, colours, FillPart.OUTLINE)[labels[edge]]
+    for region in regions:
+        if region.is_highlighted:
+            _highlight(ground, labels == region.label)
+
+
+def check_layer(layer: RegionLayer, grid: OccupancyGrid) -> None:
+    """Raises `MapError` where a layer of regions was made for another grid."""
+    if layer.labels.shape != grid.cells.shape:
+        raise MapError(
+            f"The regions cover {layer.labels.shape} cells, the map has {grid.cells.shape}.",
+            hint="Find the regions of this map again.",
+        )
+
+
+def _fill_by_label(
+    regions: tuple[PictureRegion, ...], colours: dict[int, Colour], part: FillPart
+) -> Canvas:
+    """Gives the palette number of each label's fill; 0 for labels without a region."""
+    fills = np.zeros(np.iinfo(np.uint16).max + 1, dtype=np.uint8)
+    for region in regions:
+        fills[region.label] = FILLS[colours[region.label], part]
+    return fills
+
+
+def _paint_pattern(
+    ground: Canvas,
+    labels: NDArray[np.uint16],
+    is_filled: Mask,
+    places: tuple[IntArray, IntArray],
+    fills: Canvas,
+) -> None:
+    """Paints those of the rows and columns given that lie in a filled region with a pattern."""
+    row, col = places
+    numbers = fills[labels[row, col]]
+    is_painted = is_filled[row, col] & (numbers > 0)
+    ground[row[is_painted], col[is_painted]] = numbers[is_painted]
+
+
+def _hatch_pixels(shape: tuple[int, ...]) -> tuple[IntArray, IntArray]:
+    """Gives rows and columns on diagonal lines."""
+    row = np.arange(shape[0])[:, np.newaxis]
+    col = -row % _REGION_HATCH_PX + np.arange(0, shape[1], _REGION_HATCH_PX)
+    return np.broadcast_to(row, col.shape)[col < shape[1]], col[col < shape[1]]
+
+
+def _dot_pixels(shape: tuple[int, ...]) -> tuple[IntArray, IntArray]:
+    """Gives rows and columns of small square dots."""
+    row, col = (np.flatnonzero(np.arange(length) % _DOT_STEP_PX < _DOT_PX) for length in shape)
+    return np.repeat(row, col.size), np.tile(col, row.size)
+
+
+def _highlight(ground: Canvas, is_region: Mask) -> None:
+    """Draws a bold line inside a region along its outer border, beside its walls.
+
+    Where the picture cuts the region off there is no border.
+    """
+    rim_px = 2 * _HIGHLIGHT_PX
+    mask = np.pad(is_region.astype(np.uint8), rim_px, mode="edge")
+    borders, _ = cv2.findContours(
+        mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE, offset=(-rim_px, -rim_px)
+    )
+    bold = np.zeros(ground.shape, dtype=np.uint8)
+    cv2.drawContours(bold, borders, -1, (1,), 2 * _HIGHLIGHT_PX - 1)
+    ground[(bold > 0) & is_region & (ground != WALL)] = _HIGHLIGHT
+
+
+def _is_edge(labels: NDArray[np.uint16]) -> Mask:
+    """Gives True where another label, or none, is at most the outline's width away."""
+    kernel = np.ones((2 * _EDGE_PX + 1, 2 * _EDGE_PX + 1), dtype=np.uint8)
+    is_edge: Mask = cv2.dilate(labels, kernel) != cv2.erode(labels, kernel)
+    return is_edge
+
+
+def colour_regions(layer: RegionLayer, grid: OccupancyGrid) -> dict[int, Colour]:
+    """Return the colour of each region's label, different from that of the regions near by.
+
+    A colour depends on the region's key, and on the neighbours with a lower key only where they
+    have that colour already. All is found in the whole map and in metres, so that a closer look or
+    another region elsewhere changes no colour.
+    """
+    neighbours = _find_neighbours(layer.labels, grid)
+    chosen = {region.label: region.colour for region in layer.regions if region.colour is not None}
+    for region in sorted(layer.regions, key=lambda region: (_key(region), region.label)):
+        if region.label not in chosen:
+            near = neighbours.get(region.label, set())
+            taken = {chosen[label] for label in near if label in chosen}
+            chosen[region.label] = _pick_colour(_key(region), taken)
+    return chosen
+
+
+def _key(region: PictureRegion) -> int:
+    return region.label if region.key is None else region.key
+
+
+def _pick_colour(key: int, taken: set[Colour]) -> Colour:
+    """Return the first colour not taken, beginning at one that depends on the key alone."""
+    start = key % len(AUTOMATIC_COLOURS)
+    turned = AUTOMATIC_COLOURS[start:] + AUTOMATIC_COLOURS[:start]
+    return next((colour for colour in turned if colour not in taken), turned[0])
+
+
+def _find_neighbours(labels: NDArray[np.uint16], grid: OccupancyGrid) -> dict[int, set[int]]:
+    """Return, for each label, those that come near it along a row or a column of cells."""
+    step = max(1, round(_LATTICE_M / grid.resolution_m))
+    first_row, first_col = _lattice_start(grid, step)
+    lattice = np.ascontiguousarray(labels[first_row::step, first_col::step])
+    found: dict[int, set[int]] = {}
+    for n in {max(1, round(apart_m / (step * grid.resolution_m))) for apart_m in _NEIGHBOUR_M}:
+        for one, other in ((lattice[:-n], lattice[n:]), (lattice[:, :-n], lattice[:, n:])):
+            for a, b in _different_pairs(one, other):
+                found.setdefault(a, set()).add(b)
+                found.setdefault(b, set()).add(a)
+    return found
+
+
+def _lattice_start(grid: OccupancyGrid, step: int) -> tuple[int, int]:
+    """Return the first row and column of a lattice that stays where it is as a map grows."""
+    origin = grid.origin
+    cos, sin = math.cos(origin.yaw_rad), math.sin(origin.yaw_rad)
+    along_x = (cos * origin.x + sin * origin.y) / grid.resolution_m
+    along_y = (cos * origin.y - sin * origin.x) / grid.resolution_m
+    return -round(along_y) % step, -round(along_x) % step
+
+
+def _different_pairs(one: NDArray[np.uint16], other: NDArray[np.uint16]) -> list[list[int]]:
+    """Return each pair of different labels, neither 0, that stand in the same place."""
+    differ = (one != other) & (one > 0) & (other > 0)
+    joint = np.unique(one[differ].astype(np.uint32) << 16 | other[differ])
+    return [[int(pair >> 16), int(pair & 0xFFFF)] for pair in joint]
+
+
+def find_poles(
+    regions: NDArray[np.uint16], wanted: tuple[int, ...]
+) -> dict[int, tuple[float, float]]:
+    """Return (u, v) of the point farthest from the border of each region in sight, to two pixels.
+
+    That is the pole of inaccessibility: the place with the most room for a label. The sides of the
+    picture are borders too, so the pole of a region that is only partly in sight lies in that part.
+
+    Args:
+        regions: The region of each pixel of the map area; 0 for none.
+        wanted: The regions that are looked for.
+    """
+    coarse = cv2.copyMakeBorder(regions[::2, ::2], 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=(0,))
+    kernel = np.ones((3, 3), dtype=np.uint8)
+    is_inner = (cv2.dilate(coarse, kernel) == cv2.erode(coarse, kernel)) & (coarse > 0)
+    depth = cv2.distanceTransform(is_inner.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    is_peak = (depth >= cv2.dilate(depth, kernel)) & (coarse > 0)
+    rows, cols = np.nonzero(is_peak)
+    order = np.argsort(-depth[rows, cols], kind="stable")
+    labels, first = np.unique(coarse[rows[order], cols[order]], return_index=True)
+    peaks = order[first]
+    poles = {
+        int(label): (2.0 * float(cols[peak]) - 1.5, 2.0 * float(rows[peak]) - 1.5)
+        for label, peak in zip(labels, peaks, strict=True)
+    }
+    return poles | _find_slivers(regions, set(wanted) - poles.keys())
+
+
+def _find_slivers(regions: NDArray[np.uint16], missing: set[int]) -> dict[int, tuple[float, float]]:
+    """Return the first pixel of regions so small that every second row and column misses them."""
+    if not missing:
+        return {}
+    is_seen = cv2.calcHist([regions], [0], None, [1 << 16], [0, 1 << 16]).ravel() > 0
+    found = {}
+    for label in sorted(label for label in missing if is_seen[label]):
+        row, col = np.unravel_index(int(np.argmax(regions == label)), regions.shape)
+        found[label] = (float(col) + 0.5, float(row) + 0.5)
+    return found
+
+
+ZONE_NUMBER = FILLS[Colour.VERMILION, FillPart.OUTLINE]
+_OUTLINE_PX = 3
+_HATCH_STEP_PX = 12
+_HATCH_PX = 2
+_SHIFT = 4
+_FAR_PX = 1 << 20
+"""OpenCV draws with whole numbers; what lies so far out of sight needs no exact place."""
+
+
+def paint_zones(
+    ground: Canvas, view: PictureView, zones: tuple[Zone, ...]
+) -> dict[Zone, tuple[float, float] | None]:
+    """Draw zones over the ground, and gives those in sight with the place for each label.
+
+    Args:
+        ground: Palette numbers of the map area; changed in place, but for walls.
+        view: Where the map lies.
+        zones: The later ones lie above; what they cover wholly has no place for a label.
+    """
+    numbers = np.zeros(ground.shape, dtype=np.uint16)
+    shown = {}
+    row = np.arange(ground.shape[0])[:, np.newaxis]
+    col = np.arange(ground.shape[1])
+    is_hatch = (row - col) % _HATCH_STEP_PX < _HATCH_PX
+    for number, zone in enumerate(zones, start=1):
+        is_inside, is_edge = _cover(ground.shape, view, zone)
+        is_floor = ground != WALL
+        ground[(is_edge | (is_inside & is_hatch)) & is_floor] = ZONE_NUMBER
+        if (is_inside | is_edge).any():
+            # Walls are left out, so that the label stands beside them.
+            numbers[(is_inside | is_edge) & is_floor] = number
+            shown[number] = zone
+    poles = find_poles(numbers, tuple(shown))
+    return {zone: poles.get(number) for number, zone in shown.items()}
+
+
+def _cover(shape: tuple[int, ...], view: PictureView, zone: Zone) -> tuple[Mask, Mask]:
+    """Return which pixels lie in a zone, and which on its outlines."""
+    corners = [
+        _in_subpixels(np.array([[corner.x, corner.y] for corner in outline]), view)
+        for outline in zone.outlines
+    ]
+    inside = np.zeros(shape, dtype=np.uint8)
+    cv2.fillPoly(inside, corners, (1,), cv2.LINE_8, _SHIFT)
+    edge = np.zeros(shape, dtype=np.uint8)
+    cv2.polylines(edge, corners, isClosed=True, color=(1,), thickness=_OUTLINE_PX, shift=_SHIFT)
+    return inside > 0, edge > 0
+
+
+def _in_subpixels(points: NDArray[np.float64], view: PictureView) -> NDArray[np.int32]:
+    pixels = np.clip(view.area_pixels_at(points) - 0.5, -_FAR_PX, _FAR_PX)
+    return np.asarray(np.rint(pixels * (1 << _SHIFT)), dtype=np.int32)
