@@ -22,7 +22,7 @@ import numpy as np
 
 from benchmarks.figure import Figure
 from mapspeak.errors import LinkError
-from mapspeak.links.ros2 import open_ros2_connection
+from mapspeak.links.rclpy import open_ros2_connection
 from mapspeak.links.rosbridge import RobotAddress, open_client
 from mapspeak.ros import RosConnection
 from mapspeak.ros.messages import Dialect, read_grid, write_grid
@@ -105,9 +105,8 @@ def _map(side: int) -> OccupancyGrid:
 
 
 async def _receive(grid: OccupancyGrid) -> tuple[list[float], list[float]]:
-    from mapspeak.links.ros2.reading import read_message  # noqa: PLC0415 - needs rclpy
-    from mapspeak.links.ros2.types import find_message  # noqa: PLC0415
-    from mapspeak.links.ros2.writing import write_message  # noqa: PLC0415
+    from mapspeak.links.rclpy.messages import read_message, write_message  # noqa: PLC0415
+    from mapspeak.links.rclpy.types import find_message  # noqa: PLC0415
 
     domain_id = _enter_domain()
     message = write_message(find_message(TYPE), write_grid(grid, dialect=Dialect.ROS2))
@@ -166,8 +165,8 @@ async def _is_published(connection: RosConnection) -> bool:
 
 def _offer(side: int, domain_id: int, is_there: Any, is_over: Any) -> None:  # noqa: ANN401
     """Publishes a map from one event until the other; a process of its own."""
-    from mapspeak.links.ros2.types import find_message  # noqa: PLC0415 - needs rclpy
-    from mapspeak.links.ros2.writing import write_message  # noqa: PLC0415
+    from mapspeak.links.rclpy.messages import write_message  # noqa: PLC0415
+    from mapspeak.links.rclpy.types import find_message  # noqa: PLC0415 - needs rclpy
 
     message_class = find_message(TYPE)
     with _publisher(message_class, domain_id) as publish:

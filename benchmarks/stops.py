@@ -275,7 +275,7 @@ async def _on_ros2(link: str) -> AsyncGenerator[_Rig]:
 @asynccontextmanager
 async def _open_link(link: str, environment: dict[str, str]) -> AsyncGenerator[RosRobot]:
     if link == "rclpy":
-        from mapspeak.links.ros2 import open_ros2_robot  # noqa: PLC0415 - needs rclpy
+        from mapspeak.links.rclpy import open_ros2_robot  # noqa: PLC0415 - needs rclpy
 
         for name in ("ROS_AUTOMATIC_DISCOVERY_RANGE", "AMENT_PREFIX_PATH", "ROS_DISTRO"):
             os.environ[name] = environment[name]

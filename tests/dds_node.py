@@ -19,18 +19,20 @@ from cyclonedds.qos import Policy, Qos
 from mapspeak.links.dds import DdsConnection, DdsTiming, open_dds_connection
 from mapspeak.links.dds.cdr import HEADER_BYTES
 from mapspeak.links.dds.connection import LONG_NODES_TYPE
-from mapspeak.links.dds.definitions import build_type_book
 from mapspeak.links.dds.discovery import Framing
-from mapspeak.links.dds.endpoints import Inlet, Outlet, Quality, Sample
-from mapspeak.links.dds.names import (
+from mapspeak.links.dds.endpoints import (
     DISCOVERY_TOPIC,
     DISCOVERY_TYPE,
+    Inlet,
+    Outlet,
+    Quality,
+    Sample,
     ServiceName,
     dds_topic,
 )
 from mapspeak.links.dds.network import DdsNetwork
 from mapspeak.links.dds.participant import Participant
-from mapspeak.links.dds.types import HUMBLE, Types
+from mapspeak.links.dds.types import HUMBLE, Types, build_type_book
 from mapspeak.ros.definitions import hash_type
 
 RELIABLE = Quality(is_reliable=True, is_latched=False, depth=10)

@@ -10,7 +10,6 @@ from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import Timing, open_rosbridge_robot
 from mapspeak.links.rosbridge.protocol.codec import to_cbor
 from mapspeak.ros.discovery import RobotOverrides
-from mapspeak.ros.driving import DrivingPatience
 from mapspeak.ros.messages import (
     Dialect,
     FrameTransform,
@@ -18,6 +17,7 @@ from mapspeak.ros.messages import (
     write_transforms,
 )
 from mapspeak.ros.robot import RosRobot
+from mapspeak.ros.robot.driving import DrivingPatience
 from mapspeak.spatial import OccupancyGrid
 from rosbridge_script import PATIENCE_S, Operation, ScriptedServer, Visitor, running
 

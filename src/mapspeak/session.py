@@ -15,7 +15,7 @@ import anyio.to_thread
 from mapspeak.driving.diary import Diary, Keeping
 from mapspeak.driving.doorlearning import learn_from_drive
 from mapspeak.driving.drive import DriveBook
-from mapspeak.driving.lease import Lease
+from mapspeak.driving.stops import Lease
 from mapspeak.errors import LinkError, MapError, MapspeakError, SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.places.choosing import CheckedGoal, choose_goal

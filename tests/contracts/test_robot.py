@@ -16,7 +16,7 @@ from fakes import FakeRobot, scan_of, two_rooms
 from mapspeak.cli.robots import read_network
 from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Point, Pose
-from mapspeak.links.ros2 import open_ros2_robot
+from mapspeak.links.rclpy import open_ros2_robot
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.links.simulated import Clock, open_simulated_robot
 from mapspeak.robot import GoalState, GoalStatus, Robot

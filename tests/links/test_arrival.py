@@ -14,8 +14,8 @@ from guarding import make_guard
 from mapspeak.errors import ConfigError
 from mapspeak.links.arrival import Arrival
 from mapspeak.links.rosbridge import open_rosbridge_robot
-from mapspeak.ros.driving import DrivingPatience
 from mapspeak.ros.messages import Dialect
+from mapspeak.ros.robot.driving import DrivingPatience
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server import build_server

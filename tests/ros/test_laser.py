@@ -13,8 +13,8 @@ from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import Timing
 from mapspeak.robot import RangeScan
 from mapspeak.ros.discovery import RobotOverrides
-from mapspeak.ros.driving import DrivingPatience
 from mapspeak.ros.messages import Dialect, FrameTransform, LaserScan, write_scan, write_transforms
+from mapspeak.ros.robot.driving import DrivingPatience
 from mapspeak.ros.robot.laser import Laser
 from rosbridge_robot import ScriptedRobot, connect_scripted, eventually
 from rosbridge_script import Operation

@@ -3,7 +3,7 @@
 import pytest
 
 from mapspeak.ros.actions import ActionPatience
-from mapspeak.ros.driving import DrivingPatience
+from mapspeak.ros.robot.driving import DrivingPatience
 
 FAST_DDS_REPEATS_S = 3.0
 """The period of its heartbeats, unless a robot's profile says otherwise."""

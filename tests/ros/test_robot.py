@@ -11,9 +11,9 @@ from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import Timing
 from mapspeak.robot import Health
 from mapspeak.ros.discovery import NavigationKind, PoseSource, RobotOverrides, describe_profile
-from mapspeak.ros.driving import DrivingPatience
 from mapspeak.ros.messages import Dialect, write_header
 from mapspeak.ros.robot import RosRobot
+from mapspeak.ros.robot.driving import DrivingPatience
 from rosbridge_robot import CANCEL_SERVICE, ScriptedRobot, connect_scripted
 from rosbridge_script import PATIENCE_S, Operation
 

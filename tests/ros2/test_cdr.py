@@ -46,8 +46,8 @@ TYPES = [
 def written_by_rclpy(type_name: str, message: object) -> bytes:
     from rclpy.serialization import serialize_message  # noqa: PLC0415 - needs ROS
 
-    from mapspeak.links.ros2.types import find_message  # noqa: PLC0415
-    from mapspeak.links.ros2.writing import write_message  # noqa: PLC0415
+    from mapspeak.links.rclpy.messages import write_message  # noqa: PLC0415
+    from mapspeak.links.rclpy.types import find_message  # noqa: PLC0415
 
     written: bytes = serialize_message(write_message(find_message(type_name), message))
     return written
@@ -56,8 +56,8 @@ def written_by_rclpy(type_name: str, message: object) -> bytes:
 def read_by_rclpy(type_name: str, data: bytes) -> dict[str, Any]:
     from rclpy.serialization import deserialize_message  # noqa: PLC0415 - needs ROS
 
-    from mapspeak.links.ros2.reading import read_message  # noqa: PLC0415
-    from mapspeak.links.ros2.types import find_message  # noqa: PLC0415
+    from mapspeak.links.rclpy.messages import read_message  # noqa: PLC0415
+    from mapspeak.links.rclpy.types import find_message  # noqa: PLC0415
 
     return read_message(deserialize_message(data, find_message(type_name)))
 
@@ -66,7 +66,7 @@ def read_by_rclpy(type_name: str, data: bytes) -> dict[str, Any]:
 def tools() -> tuple[Any, Any]:
     import_what_warns()
     from mapspeak.links.dds.cdr import Codec  # noqa: PLC0415 - optional
-    from mapspeak.links.dds.definitions import build_type_book  # noqa: PLC0415
+    from mapspeak.links.dds.types import build_type_book  # noqa: PLC0415
 
     book = build_type_book(DISTRO)
     return book, Codec(book)

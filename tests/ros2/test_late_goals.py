@@ -9,11 +9,11 @@ import pytest
 from mapspeak.cli.robots import read_network
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
-from mapspeak.links.ros2 import open_ros2_robot
+from mapspeak.links.rclpy import open_ros2_robot
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.robot import GoalState
-from mapspeak.ros.driving import DrivingPatience
 from mapspeak.ros.robot import RosRobot
+from mapspeak.ros.robot.driving import DrivingPatience
 from ros2.robot_process import RobotProcess
 
 pytestmark = [pytest.mark.ros2, pytest.mark.anyio]

@@ -13,7 +13,7 @@ from drawing import grid_from_text
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.links.arrival import Arrival
-from mapspeak.links.ros2 import open_ros2_connection, open_ros2_robot
+from mapspeak.links.rclpy import open_ros2_connection, open_ros2_robot
 from mapspeak.robot import GoalState, GoalStatus, Robot
 from mapspeak.ros import NodeLinks, RosConnection, RosGraph
 from mapspeak.ros.messages import Dialect, FramedPose, write_pose_stamped
@@ -332,7 +332,7 @@ async def test_a_topic_sent_with_best_effort_is_heard(domain: dict[str, str]) ->
 
 
 async def test_a_node_of_which_only_the_name_is_known_is_not_all_there_is() -> None:
-    from mapspeak.links.ros2.connection import wait_until_quiet  # noqa: PLC0415 - needs rclpy
+    from mapspeak.links.rclpy.connection import wait_until_quiet  # noqa: PLC0415 - needs rclpy
 
     class Unfolding:
         def __init__(self) -> None:

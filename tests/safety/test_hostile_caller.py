@@ -5,7 +5,7 @@ import pytest
 from benchmarks.safety import find_busiest_minute
 from mapspeak.safety import AuditLine
 from mapspeak.safety.commands import Kind
-from mapspeak.safety.rates import RateLog
+from mapspeak.safety.guard import RateLog
 
 
 def line(robot_s: float, *, verdict: str = "allowed") -> AuditLine:

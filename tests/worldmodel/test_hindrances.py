@@ -13,7 +13,7 @@ from mapspeak.places.notices import (
     say_unplaced,
 )
 from mapspeak.places.ways import find_way
-from mapspeak.safety.legs import plan_legs
+from mapspeak.safety.detours import plan_legs
 from mapspeak.semantic.events import Effect, Event
 from mapspeak.worldmodel.revision import MapRevision
 

@@ -247,7 +247,7 @@ def _choose_rosbridge(choice: RobotChoice, overrides: "RobotOverrides") -> "Open
 
 
 def _choose_ros2(domain: str, overrides: "RobotOverrides") -> "OpenLink":
-    from mapspeak.links.ros2 import open_ros2_robot  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.links.rclpy import open_ros2_robot  # noqa: PLC0415 - heavy; help must be quick
 
     return partial(
         open_ros2_robot,

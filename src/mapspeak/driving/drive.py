@@ -17,7 +17,7 @@ import anyio
 
 from mapspeak.driving.drivemonitor import DriveMonitor, Look
 from mapspeak.driving.drivereport import JUST_SENT, Drive, DriveReport, find_tried_frontiers
-from mapspeak.driving.owedstop import NEEDS_NO_STOP, OwedStop
+from mapspeak.driving.stops import NEEDS_NO_STOP, OwedStop
 from mapspeak.errors import GoalError, LinkError, MapspeakError
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import GoalState, GoalStatus, PoseDoubt, Robot

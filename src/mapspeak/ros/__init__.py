@@ -5,8 +5,17 @@ works with any ROS robot is written against it. Messages are mappings as rosbrid
 """
 
 from mapspeak.ros.definitions import split_definition
-from mapspeak.ros.graph import LinkKind, LinkName, NodeLinks, OwnEnds, RosGraph
-from mapspeak.ros.names import NAME, TYPE, find_nearest, new_id
+from mapspeak.ros.graph import (
+    NAME,
+    TYPE,
+    LinkKind,
+    LinkName,
+    NodeLinks,
+    OwnEnds,
+    RosGraph,
+    find_nearest,
+    new_id,
+)
 from mapspeak.ros.port import (
     ActionEnd,
     ActionGoal,

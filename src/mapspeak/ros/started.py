@@ -4,8 +4,6 @@ from typing import Protocol
 
 from mapspeak.ros.messages import Message
 
-__all__ = ["Startable", "Started"]
-
 
 class Startable(Protocol):
     """An action on which goals of ours may be under way."""

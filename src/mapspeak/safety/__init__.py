@@ -1,9 +1,16 @@
 """Limits that are on: a policy, a guard in front of the robot, a hold, an audit log."""
 
 from mapspeak.hold import Hold
-from mapspeak.safety.approvals import Approvals, WaitingRoom
-from mapspeak.safety.audit import AuditLine, AuditLog, read_audit
-from mapspeak.safety.caller import NOBODY, Caller, calling, current_caller
+from mapspeak.safety.approvals import Approvals, Errand, WaitingRoom, on_errand
+from mapspeak.safety.audit import (
+    NOBODY,
+    AuditLine,
+    AuditLog,
+    Caller,
+    calling,
+    current_caller,
+    read_audit,
+)
 from mapspeak.safety.commands import (
     Act,
     Call,
@@ -23,7 +30,6 @@ from mapspeak.safety.deciding import (
     Situation,
     decide,
 )
-from mapspeak.safety.errands import Errand, on_errand
 from mapspeak.safety.guard import ApprovalNeededError, Guard, Permit
 from mapspeak.safety.policy import (
     Approval,

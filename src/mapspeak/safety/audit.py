@@ -1,4 +1,4 @@
-"""The audit log: append-only JSON lines, one for each decision and one for each result."""
+"""The audit log: append-only JSON lines, one for each decision and result, and who asked."""
 
 import fcntl
 import itertools
@@ -6,16 +6,51 @@ import json
 import math
 import os
 import secrets
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from mapspeak.errors import ConfigError, PolicyError, say_cause
-from mapspeak.safety.caller import Caller
 from mapspeak.safety.commands import Command, Drive, say_command
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Caller:
+    """Whose call is being carried out.
+
+    Attributes:
+        client: The client's session; empty where mapspeak acts by itself.
+        tool: The tool it called.
+    """
+
+    client: str = ""
+    tool: str = ""
+
+
+NOBODY = Caller()
+
+# State of a task, not of the module: each call sees its own, also in the threads it starts.
+_CALLER: ContextVar[Caller] = ContextVar("caller", default=NOBODY)
+
+
+def current_caller() -> Caller:
+    """Gives whose call this is; nobody's where mapspeak acts by itself."""
+    return _CALLER.get()
+
+
+@contextmanager
+def calling(caller: Caller) -> Generator[None]:
+    """Marks what is done in the `with` block as done for a caller."""
+    token = _CALLER.set(caller)
+    try:
+        yield
+    finally:
+        _CALLER.reset(token)
+
 
 MOST_CHARACTERS = 2_000
 """Of one argument that somebody gave; what is longer is cut, and said to be."""

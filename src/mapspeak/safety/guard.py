@@ -1,6 +1,7 @@
-"""The one door that every command passes on its way to a robot: decided, noted, counted."""
+"""How many commands of each kind were allowed lately."""
 
 import logging
+from collections import defaultdict, deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -8,21 +9,33 @@ from datetime import datetime
 from mapspeak.errors import GoalError, PolicyError
 from mapspeak.hold import Hold
 from mapspeak.installation import shell_command
-from mapspeak.safety.approvals import Approvals
-from mapspeak.safety.audit import AuditLog
-from mapspeak.safety.caller import Caller, current_caller
-from mapspeak.safety.commands import Command, Drive
-from mapspeak.safety.deciding import (
-    Allowed,
-    Decision,
-    NeedsApproval,
-    Refused,
-    Situation,
-    decide,
-)
-from mapspeak.safety.errands import Errand, Errands, current_errand
+from mapspeak.safety.approvals import Approvals, Errand, Errands, current_errand
+from mapspeak.safety.audit import AuditLog, Caller, current_caller
+from mapspeak.safety.commands import Command, Drive, Kind
+from mapspeak.safety.deciding import Allowed, Decision, NeedsApproval, Refused, Situation, decide
 from mapspeak.safety.policy import Otherwise, Policy
-from mapspeak.safety.rates import RateLog
+
+MINUTE_S = 60.0
+MOST_KEPT = 10_000
+
+
+class RateLog:
+    """Counts commands in the last minute of robot time, whichever way its clock jumps."""
+
+    def __init__(self) -> None:
+        self._times_s: dict[Kind, deque[float]] = defaultdict(lambda: deque(maxlen=MOST_KEPT))
+
+    def note(self, kind: Kind, now_s: float) -> None:
+        """Counts a command."""
+        self._times_s[kind].append(now_s)
+
+    def count(self, kind: Kind, now_s: float) -> int:
+        """Gives how many commands there were within a minute of now."""
+        times_s = self._times_s[kind]
+        while times_s and now_s - times_s[0] >= MINUTE_S:
+            times_s.popleft()
+        return sum(abs(now_s - each_s) < MINUTE_S for each_s in times_s)
+
 
 logger = logging.getLogger(__name__)
 

@@ -11,7 +11,7 @@ from mapspeak.geometry import Pose
 from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, check_goal
 from mapspeak.robot import Robot
 from mapspeak.safety.deciding import MOST_NESTED, Refused, judge_check
-from mapspeak.safety.legs import plan_legs
+from mapspeak.safety.detours import plan_legs
 from mapspeak.safety.policy import Policy
 from mapspeak.safety.surveying import Surveyor
 from mapspeak.worldmodel.revision import MapRevision

@@ -19,14 +19,14 @@ from mapspeak.robot import (
     RobotDescription,
     StampedPose,
 )
-from mapspeak.safety.caller import NOBODY, current_caller
+from mapspeak.safety.audit import NOBODY, current_caller
 from mapspeak.safety.commands import Drive, say_command
+from mapspeak.safety.detours import GuardedDrive
 from mapspeak.safety.guard import Guard, Permit
+from mapspeak.safety.holding import HoldKeeper, StandingCheck
 from mapspeak.safety.monitor import GoalMonitor, KeepOutMonitor, Mover
 from mapspeak.safety.planning import Plan, Planner
-from mapspeak.safety.standing import HoldKeeper, StandingCheck
 from mapspeak.safety.surveying import Surveyor
-from mapspeak.safety.underway import GuardedDrive
 from mapspeak.safety.velocities import HandDriving
 from mapspeak.spatial import OccupancyGrid
 

@@ -10,7 +10,7 @@ pytest.importorskip("cyclonedds", reason="has no wheel for this Python")
 
 from mapspeak.errors import LinkError
 from mapspeak.links.dds.cdr import Codec
-from mapspeak.links.dds.definitions import action_parts, build_type_book, read_type_description
+from mapspeak.links.dds.types import action_parts, build_type_book, read_type_description
 from mapspeak.ros.definitions import TypeBook
 from messaging import messages_of, plain
 

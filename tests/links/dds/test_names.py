@@ -2,7 +2,7 @@ import pytest
 
 pytest.importorskip("cyclonedds", reason="has no wheel for this Python")
 
-from mapspeak.links.dds.names import (
+from mapspeak.links.dds.endpoints import (
     ServiceName,
     action_type_of,
     dds_topic,

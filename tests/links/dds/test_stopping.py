@@ -6,8 +6,8 @@ pytest.importorskip("cyclonedds", reason="has no wheel for this Python")
 
 from dds_node import open_both, until
 from mapspeak.errors import LinkError
-from mapspeak.ros.driving import DrivingPatience
 from mapspeak.ros.robot import build_ros_robot
+from mapspeak.ros.robot.driving import DrivingPatience
 
 pytestmark = pytest.mark.anyio
 

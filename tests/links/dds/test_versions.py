@@ -13,8 +13,7 @@ pytest.importorskip("cyclonedds", reason="has no wheel for this Python")
 from dds_node import DdsNode, Reply, Request, open_dds_node, open_here, some_network, until
 from mapspeak.errors import LinkError
 from mapspeak.links.dds import DdsConnection
-from mapspeak.links.dds.definitions import build_type_book
-from mapspeak.links.dds.types import Types
+from mapspeak.links.dds.types import Types, build_type_book
 from mapspeak.ros import ActionGoal
 from mapspeak.ros.definitions import DISTROS, hash_type
 

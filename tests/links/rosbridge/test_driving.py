@@ -10,7 +10,6 @@ from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import Timing
 from mapspeak.robot import GoalState, GoalStatus
-from mapspeak.ros.driving import DrivingPatience
 from mapspeak.ros.messages import (
     Dialect,
     FramedPose,
@@ -18,6 +17,7 @@ from mapspeak.ros.messages import (
     write_stamp,
 )
 from mapspeak.ros.robot import RosRobot
+from mapspeak.ros.robot.driving import DrivingPatience
 from rosbridge_robot import ScriptedRobot, connect_scripted, eventually
 from rosbridge_script import PATIENCE_S, Operation
 

@@ -17,9 +17,9 @@ from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import RosbridgeClient, Timing, open_rosbridge_robot
 from mapspeak.robot import GoalState, GoalStatus
 from mapspeak.ros.discovery import PoseSource, RobotOverrides, RosSettings
-from mapspeak.ros.driving import DrivingPatience
 from mapspeak.ros.messages import Dialect, write_header, write_pose
 from mapspeak.ros.robot import RosRobot
+from mapspeak.ros.robot.driving import DrivingPatience
 from mapspeak.ros.robot.maps import MapKeeper
 from mapspeak.ros.robot.poses import PoseKeeper, RobotClock
 from rosbridge_robot import (

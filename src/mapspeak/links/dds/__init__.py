@@ -3,9 +3,7 @@
 Needs the optional packages of mapspeak[dds].
 """
 
-from mapspeak.links.dds.connection import DdsConnection, open_dds_connection
-from mapspeak.links.dds.network import DdsNetwork
-from mapspeak.links.dds.opening import open_dds_robot
-from mapspeak.links.dds.timing import DdsTiming
+from mapspeak.links.dds.connection import DdsConnection, open_dds_connection, open_dds_robot
+from mapspeak.links.dds.network import DdsNetwork, DdsTiming
 
 __all__ = ["DdsConnection", "DdsNetwork", "DdsTiming", "open_dds_connection", "open_dds_robot"]

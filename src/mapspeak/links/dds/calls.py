@@ -7,16 +7,16 @@ import anyio
 
 from mapspeak.errors import LinkError
 from mapspeak.links.dds.discovery import Discovery, Endpoint
-from mapspeak.links.dds.endpoints import Sample
-from mapspeak.links.dds.goals import ActionClient
-from mapspeak.links.dds.names import (
+from mapspeak.links.dds.endpoints import (
     SERVICE_PART,
+    Sample,
     ServiceName,
     action_type_of,
     dds_topic,
     reply_topic,
     request_topic,
 )
+from mapspeak.links.dds.goals import ActionClient
 from mapspeak.links.dds.participant import Participant
 from mapspeak.links.dds.services import ServiceClient
 from mapspeak.links.dds.topics import Topics

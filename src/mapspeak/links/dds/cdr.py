@@ -23,8 +23,6 @@ from mapspeak.ros.definitions import (
 )
 from mapspeak.ros.messages import Message
 
-__all__ = ["HEADER_BYTES", "MOST_BYTES", "MOST_FIELDS", "MOST_MESSAGES", "Codec", "Store"]
-
 HEADER_BYTES = 4
 """They tell the byte order, and stand before what is encoded."""
 MOST_BYTES = 100_000_000

@@ -1,4 +1,4 @@
-"""A ROS 2 system over DDS, with no ROS here and nothing else on the robot."""
+"""A ROS 2 domain over DDS as a connection, and the robot behind it opened."""
 
 from collections.abc import AsyncGenerator, Callable, Coroutine, Mapping
 from contextlib import asynccontextmanager
@@ -10,18 +10,19 @@ from anyio.abc import TaskGroup
 from mapspeak.errors import LinkError
 from mapspeak.links.dds.calls import Calls
 from mapspeak.links.dds.discovery import Discovery, FramingOf, framing_by_vendor
-from mapspeak.links.dds.endpoints import Quality, Sample
+from mapspeak.links.dds.endpoints import DISCOVERY_TOPIC, DISCOVERY_TYPE, Quality, Sample
 from mapspeak.links.dds.graph import GraphQuestions
-from mapspeak.links.dds.names import DISCOVERY_TOPIC, DISCOVERY_TYPE
-from mapspeak.links.dds.network import DdsNetwork
+from mapspeak.links.dds.network import DdsNetwork, DdsTiming
 from mapspeak.links.dds.participant import Participant
-from mapspeak.links.dds.timing import DdsTiming
 from mapspeak.links.dds.topics import Topics
 from mapspeak.links.dds.types import Types
 from mapspeak.ros import ActionGoal, LinkKind, LinkName
+from mapspeak.ros.discovery import RobotOverrides
 from mapspeak.ros.goal import PursuedGoal
 from mapspeak.ros.messages import Message
 from mapspeak.ros.native import NativeConnection
+from mapspeak.ros.robot import RosRobot, build_ros_robot
+from mapspeak.ros.robot.driving import DrivingPatience
 from mapspeak.ros.subscribing import plain_errors
 
 NODES_QUALITY = Quality(is_reliable=True, is_latched=True, depth=1000)
@@ -236,3 +237,32 @@ async def open_dds_connection(
                 with anyio.CancelScope(shield=True):
                     await connection.aclose()
                 tasks.cancel_scope.cancel()
+
+
+USUAL_PATIENCE = DrivingPatience()
+NOTHING_SAID = RobotOverrides()
+
+
+@asynccontextmanager
+async def open_dds_robot(
+    network: DdsNetwork,
+    *,
+    overrides: RobotOverrides = NOTHING_SAID,
+    timing: DdsTiming = USUAL_TIMING,
+    patience: DrivingPatience = USUAL_PATIENCE,
+) -> AsyncGenerator[RosRobot]:
+    """Offers the ROS 2 robot in a DDS domain while the context lasts.
+
+    Leaving the context does not stop the robot: call `stop` before, where that is wanted.
+
+    Args:
+        network: Which domain, and how others in it are found.
+        overrides: What robot.yaml says.
+        timing: Time limits of the connection.
+        patience: Time limits of navigation.
+
+    Raises:
+        LinkError: No robot is found there, or it does not say what it offers.
+    """
+    async with open_dds_connection(network, timing=timing) as connection:
+        yield await build_ros_robot(connection, overrides=overrides, patience=patience)

@@ -11,8 +11,8 @@ import anyio
 from cyclonedds.core import InstanceState
 from cyclonedds.qos import Policy
 
-from mapspeak.links.dds.endpoints import Sample
-from mapspeak.links.dds.names import (
+from mapspeak.links.dds.endpoints import (
+    Sample,
     action_type_of,
     dds_topic,
     is_hidden,

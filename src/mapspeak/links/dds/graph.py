@@ -8,8 +8,7 @@ import numpy as np
 
 from mapspeak.errors import LinkError
 from mapspeak.links.dds.discovery import Discovery, Endpoint
-from mapspeak.links.dds.endpoints import Sample
-from mapspeak.links.dds.names import SERVICE_PART, is_hidden
+from mapspeak.links.dds.endpoints import SERVICE_PART, Sample, is_hidden
 from mapspeak.links.dds.types import Types
 from mapspeak.ros import NodeLinks, RosGraph
 from mapspeak.ros.messages import Dialect

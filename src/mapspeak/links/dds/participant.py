@@ -34,8 +34,8 @@ from mapspeak.links.dds.endpoints import (
     RawMessage,
     Sample,
     Take,
+    dds_type,
 )
-from mapspeak.links.dds.names import dds_type
 from mapspeak.links.dds.network import DdsNetwork
 from mapspeak.ros.native import environment_with
 

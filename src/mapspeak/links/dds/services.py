@@ -16,8 +16,7 @@ import anyio
 from mapspeak.errors import LinkError
 from mapspeak.links.dds.cdr import HEADER_BYTES
 from mapspeak.links.dds.discovery import Framing
-from mapspeak.links.dds.endpoints import Outlet, Quality, Sample
-from mapspeak.links.dds.names import ServiceName
+from mapspeak.links.dds.endpoints import Outlet, Quality, Sample, ServiceName
 from mapspeak.links.dds.participant import Participant
 from mapspeak.ros import new_id
 

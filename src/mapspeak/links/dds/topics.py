@@ -10,8 +10,7 @@ import anyio
 
 from mapspeak.errors import LinkError
 from mapspeak.links.dds.discovery import Discovery, Endpoint
-from mapspeak.links.dds.endpoints import Inlet, Outlet, Quality, Sample
-from mapspeak.links.dds.names import dds_topic, full_type
+from mapspeak.links.dds.endpoints import Inlet, Outlet, Quality, Sample, dds_topic, full_type
 from mapspeak.links.dds.participant import Participant
 from mapspeak.links.dds.types import Types
 from mapspeak.ros import TYPE

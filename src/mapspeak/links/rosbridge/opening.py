@@ -5,8 +5,8 @@ from contextlib import asynccontextmanager
 
 from mapspeak.links.rosbridge import RobotAddress, Timing, open_client
 from mapspeak.ros.discovery import RobotOverrides
-from mapspeak.ros.driving import DrivingPatience
 from mapspeak.ros.robot import RosRobot, build_ros_robot
+from mapspeak.ros.robot.driving import DrivingPatience
 
 USUAL_TIMING = Timing()
 USUAL_PATIENCE = DrivingPatience()

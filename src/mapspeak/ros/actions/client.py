@@ -14,8 +14,6 @@ from mapspeak.ros import RosConnection
 from mapspeak.ros.actions.goal import ActionState, SentGoal
 from mapspeak.ros.messages import Message
 
-__all__ = ["GONE", "RESULT_LATE", "ActionClient", "ActionPatience"]
-
 NOT_TAKEN = "The action server gave no sign of taking the goal within {:g} s; it was withdrawn."
 GIVEN_UP = "Its sender gave up waiting."
 STOPPED = "The robot was stopped before the goal was sent."

@@ -1,14 +1,14 @@
-"""One goal of an action, from its sending to its end, and beyond."""
+"""One goal of an action, from its sending to its end and beyond, and the states servers tell."""
 
-from collections.abc import Callable
+import base64
+import binascii
+from collections.abc import Callable, Iterator
 from enum import StrEnum
 
 import anyio
 
 from mapspeak.ros import RosConnection
 from mapspeak.ros.messages import Message
-
-__all__ = ["ActionState", "SentGoal"]
 
 LONGEST_REASON = 300
 
@@ -157,3 +157,27 @@ class SentGoal:
             while not is_so():
                 await self._news.wait()
         return is_so()
+
+
+STATES = {
+    1: ActionState.ACCEPTED,
+    2: ActionState.RUNNING,
+    3: ActionState.CANCELLING,
+    4: ActionState.SUCCEEDED,
+    5: ActionState.CANCELLED,
+    6: ActionState.ABORTED,
+}
+"""action_msgs/GoalStatus."""
+
+
+def read_statuses(message: Message) -> Iterator[tuple[str, ActionState]]:
+    """Yield id and state of each goal of a list; leave out what is none."""
+    entries = message.get("status_list")
+    for entry in entries if isinstance(entries, list) else []:
+        try:
+            # The 16 bytes of an id come as a list, as base64 or as bytes.
+            uuid = entry["goal_info"]["goal_id"]["uuid"]
+            raw = base64.b64decode(uuid, validate=True) if isinstance(uuid, str) else bytes(uuid)
+            yield raw.hex(), STATES[entry["status"]]
+        except (KeyError, TypeError, ValueError, binascii.Error):
+            continue

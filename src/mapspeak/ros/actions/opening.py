@@ -6,8 +6,6 @@ from mapspeak.ros.actions.ros1 import Ros1ActionClient
 from mapspeak.ros.actions.ros2 import Ros2ActionClient
 from mapspeak.ros.messages import Dialect
 
-__all__ = ["open_action"]
-
 USUAL_PATIENCE = ActionPatience()
 
 

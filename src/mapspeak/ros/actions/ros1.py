@@ -16,8 +16,6 @@ from mapspeak.ros.actions.client import (
 from mapspeak.ros.actions.goal import ActionState, SentGoal
 from mapspeak.ros.messages import Dialect, Message, write_header, write_stamp
 
-__all__ = ["Ros1ActionClient"]
-
 CANCEL_TYPE, STATUS_TYPE = "actionlib_msgs/GoalID", "actionlib_msgs/GoalStatusArray"
 STATES = {
     0: ActionState.ACCEPTED,

@@ -14,11 +14,8 @@ from mapspeak.ros.actions.client import (
     ActionClient,
     ActionPatience,
 )
-from mapspeak.ros.actions.goal import ActionState, SentGoal
-from mapspeak.ros.actions.statuses import STATES, read_statuses
+from mapspeak.ros.actions.goal import STATES, ActionState, SentGoal, read_statuses
 from mapspeak.ros.messages import Message
-
-__all__ = ["Ros2ActionClient"]
 
 CANCEL_TYPE, STATUS_TYPE = "action_msgs/srv/CancelGoal", "action_msgs/msg/GoalStatusArray"
 REFUSED = 1

@@ -14,8 +14,6 @@ from mapspeak.ros.definitions.parsing import (
 )
 from mapspeak.ros.messages import bare_type
 
-__all__ = ["TypeBook"]
-
 TIME_OF_ROS1 = {
     "time": "uint32 secs\nuint32 nsecs",
     "duration": "int32 secs\nint32 nsecs",

@@ -15,8 +15,6 @@ from mapspeak.ros.definitions.book import MOST_NESTED, TypeBook
 from mapspeak.ros.definitions.describing import say_fields
 from mapspeak.ros.definitions.parsing import FLOATS, TEXTS, TIMES, WHOLES, Field, MessageType
 
-__all__ = ["check_message"]
-
 LARGEST_FLOAT32 = 3.4028234663852886e38
 BYTES = ("uint8", "char", "byte")
 NUMBERS = frozenset((*FLOATS, *WHOLES, "bool"))

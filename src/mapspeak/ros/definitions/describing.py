@@ -3,8 +3,6 @@
 from mapspeak.ros.definitions.book import MOST_NESTED, TypeBook
 from mapspeak.ros.definitions.parsing import Field, MessageType
 
-__all__ = ["describe_type", "say_fields"]
-
 MOST_INLINE = 4
 MOST_CONSTANTS = 40
 INDENT = "  "

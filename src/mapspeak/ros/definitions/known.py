@@ -12,8 +12,6 @@ from importlib.resources import files
 from mapspeak.ros.definitions.parts import find_actions_of_ros1, split_definition, split_parts
 from mapspeak.ros.messages import Dialect
 
-__all__ = ["DISTROS", "known_definitions"]
-
 DISTROS = ("kilted", "jazzy", "humble", "lyrical")
 """Of ROS 2, whose interfaces of Nav2 are known; the first stands for those that are not."""
 ENTRY = re.compile(r"^(?:MSG|SRV|ACTION): (?P<name>\S+)\n", re.MULTILINE)

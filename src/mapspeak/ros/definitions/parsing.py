@@ -5,17 +5,6 @@ from dataclasses import dataclass
 
 from mapspeak.ros.messages import bare_type
 
-__all__ = [
-    "FLOATS",
-    "TIMES",
-    "WHOLES",
-    "Constant",
-    "Field",
-    "MessageType",
-    "find_odd_lines",
-    "parse_definition",
-]
-
 LINE = re.compile(
     r"(?P<type>[\w/]+)(?:<=(?P<most_letters>\d+))?"
     r"(?P<list>\[(?:(?P<length>\d+)|<=(?P<most>\d+))?\])?\s+(?P<name>\w+)\s*(?P<rest>.*)"

@@ -5,18 +5,6 @@ from collections.abc import Iterable, Mapping
 
 from mapspeak.ros.messages import bare_type
 
-__all__ = [
-    "ACTION_PARTS",
-    "GENERATED",
-    "SERVICE_PARTS",
-    "find_actions_of_ros1",
-    "kinds_of",
-    "name_parts",
-    "split_definition",
-    "split_parts",
-    "write_definition",
-]
-
 RULER_LINE = "=" * 80
 RULER = re.compile(r"^=+\nMSG: (?P<name>\S+)\n?", re.MULTILINE)
 DIVIDER = re.compile(r"^---[ \t]*$\n?", re.MULTILINE)

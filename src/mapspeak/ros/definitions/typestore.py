@@ -7,8 +7,6 @@ from mapspeak.ros.definitions.book import MOST_NESTED, TypeBook
 from mapspeak.ros.definitions.parsing import Field, MessageType
 from mapspeak.ros.messages import bare_type
 
-__all__ = ["NOTHING", "describe_field", "hash_type", "look_up", "name_in_ros2"]
-
 NOTHING = Field(name="structure_needs_at_least_one_member", type="uint8")
 """What ROS 2 puts in a message without fields."""
 OF_ACTION = ("Goal", "Result", "Feedback", "FeedbackMessage")

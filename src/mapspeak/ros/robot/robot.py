@@ -34,21 +34,20 @@ from mapspeak.ros.discovery.parts import (
     VELOCITY,
     Part,
 )
-from mapspeak.ros.driving import (
+from mapspeak.ros.robot.camera import Camera
+from mapspeak.ros.robot.driving import (
     MOVE_BASE,
     NAV2,
     ActionDriver,
     Driver,
     DrivingPatience,
     GoalRecord,
-    GoalTopicDriver,
 )
-from mapspeak.ros.robot.camera import Camera
+from mapspeak.ros.robot.goaltopic import GoalTopicDriver
 from mapspeak.ros.robot.laser import Laser
 from mapspeak.ros.robot.maps import MapKeeper
 from mapspeak.ros.robot.poses import PoseKeeper, RobotClock
-from mapspeak.ros.robot.stopping import stop_everything
-from mapspeak.ros.robot.velocity import Brake
+from mapspeak.ros.robot.stopping import Brake, stop_everything
 from mapspeak.ros.transforms import FrameListener
 from mapspeak.spatial import OccupancyGrid
 

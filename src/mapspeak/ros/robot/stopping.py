@@ -1,10 +1,127 @@
-"""The one way to stop: it ends everything that was started, and says what it could not end."""
+"""The one way to stop: all that was started is ended, and zero velocity is sent until it stands."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
 
 import anyio
 
 from mapspeak.errors import LinkError
+from mapspeak.geometry import wrap_angle
+from mapspeak.robot import StampedPose
 from mapspeak.ros import RosConnection, Startable
-from mapspeak.ros.robot.velocity import Brake
+from mapspeak.ros.discovery import RobotProfile
+from mapspeak.ros.discovery.profile import TWIST, TWIST_STAMPED
+from mapspeak.ros.messages import Message, Twist, write_header, write_twist
+from mapspeak.ros.robot.driving import LATEST_S
+
+PAUSE_S = 0.05
+N_AT_LEAST = 2
+STANDING_S = 0.5
+"""So long the pose must not have changed, by its own stamps."""
+STANDING_M = 0.02
+STANDING_RAD = 0.03
+BLIND_S = 3.0
+"""So long zero velocity is repeated where no pose tells whether the robot stands."""
+LONGEST_S = 15.0
+STAND = Twist(forward_mps=0.0, left_mps=0.0, turn_radps=0.0)
+
+
+class Brake:
+    """Publishes zero velocity; says beforehand that it will, so that the robot listens in time.
+
+    Args:
+        connection: Connected to the robot.
+        profile: Says which topic.
+        latest_pose: Tells where the robot was last; raises `LinkError` where nobody knows.
+    """
+
+    def __init__(
+        self,
+        connection: RosConnection,
+        profile: RobotProfile,
+        *,
+        latest_pose: Callable[[], StampedPose],
+    ) -> None:
+        self._connection = connection
+        self._profile = profile
+        self._latest_pose = latest_pose
+        if profile.velocity_topic is not None:
+            type_name = profile.dialect.type_name(profile.velocity_type or TWIST)
+            connection.advertise(profile.velocity_topic, type_name=type_name)
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """Where zero velocity is published: the robot's topic, and those that we have used."""
+        return tuple(self._zeros())
+
+    def pull(self) -> None:
+        """Command a stand at once, and go on until the robot stands or something new is begun."""
+        self._publish()
+        self._connection.start_soon(partial(self._repeat, self._connection.started.n_begun))
+
+    def _publish(self) -> None:
+        for topic, zero in self._zeros().items():
+            self._connection.publish_everywhere(topic, zero)
+
+    async def _repeat(self, n_begun: int) -> None:
+        """A message may be overtaken by another, and a base may keep to the last one it heard."""
+        standing = _Standing()
+        begun_s = seen_s = anyio.current_time()
+        n_sent = 0
+        while self._connection.started.n_begun == n_begun:
+            await anyio.sleep(PAUSE_S)
+            now_s = anyio.current_time()
+            with suppress(LinkError):
+                self._publish()
+                n_sent += 1
+                if standing.take(self._latest_pose()):
+                    seen_s = now_s
+            is_known = n_sent >= N_AT_LEAST and standing.is_so
+            if is_known or now_s - seen_s > BLIND_S or now_s - begun_s > LONGEST_S:
+                return
+
+    def _zeros(self) -> dict[str, Message]:
+        zeros = dict(self._connection.started.velocities)
+        if self._profile.velocity_topic is not None:
+            zeros[self._profile.velocity_topic] = self._zero()
+        return zeros
+
+    def _zero(self) -> Message:
+        if self._profile.velocity_type != TWIST_STAMPED:
+            return write_twist(STAND)
+        header = write_header(self._profile.base_frame, LATEST_S, dialect=self._profile.dialect)
+        return {"header": header, "twist": write_twist(STAND)}
+
+
+class _Standing:
+    """Whether poses say that the robot stands.
+
+    Attributes:
+        is_so: The pose has not changed for long enough.
+    """
+
+    def __init__(self) -> None:
+        self.is_so = False
+        self._since: StampedPose | None = None
+        self._latest_s = float("-inf")
+
+    def take(self, stamped: StampedPose) -> bool:
+        """Take a pose; return whether it is newer than those before."""
+        is_new = stamped.stamp_s != self._latest_s
+        self._latest_s = stamped.stamp_s
+        since = self._since
+        if since is None or _has_moved(since, stamped) or stamped.stamp_s < since.stamp_s:
+            self._since = stamped
+        else:
+            self.is_so = stamped.stamp_s - since.stamp_s >= STANDING_S
+        return is_new
+
+
+def _has_moved(before: StampedPose, now: StampedPose) -> bool:
+    turned_rad = abs(wrap_angle(now.pose.yaw_rad - before.pose.yaw_rad))
+    moved_m = now.pose.point.distance_to(before.pose.point)
+    return moved_m > STANDING_M or turned_rad > STANDING_RAD
 
 
 async def stop_everything(connection: RosConnection, *, brake: Brake) -> None:

@@ -11,8 +11,6 @@ from mapspeak.spatial.frontiers import (
     RefusedFrontier,
 )
 
-__all__ = ["say_merits", "say_refusal", "say_verdict"]
-
 MOST_SIGNS = 59
 LEAST_DETOUR_M = 2.0
 """A round that grows by less is as short as another."""

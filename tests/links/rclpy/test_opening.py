@@ -4,7 +4,7 @@ import pytest
 
 from mapspeak.cli.robots import RobotChoice, open_robot
 from mapspeak.errors import ConfigError
-from mapspeak.links.ros2 import open_ros2_robot
+from mapspeak.links.rclpy import open_ros2_robot
 
 pytestmark = pytest.mark.anyio
 

@@ -12,11 +12,10 @@ from typing import Any
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.links.ros2.participant import Participant, errors_of_ros
-from mapspeak.links.ros2.reading import read_message
-from mapspeak.links.ros2.services import SERVER_S, Client, Services
-from mapspeak.links.ros2.types import find_action, name_of
-from mapspeak.links.ros2.writing import write_message
+from mapspeak.links.rclpy.messages import read_message, write_message
+from mapspeak.links.rclpy.participant import Participant, errors_of_ros
+from mapspeak.links.rclpy.services import SERVER_S, Client, Services
+from mapspeak.links.rclpy.types import find_action, name_of
 from mapspeak.ros import ActionEnd, ActionGoal, new_id
 from mapspeak.ros.goal import PursuedGoal
 from mapspeak.ros.messages import Message, bare_type

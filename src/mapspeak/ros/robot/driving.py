@@ -1,17 +1,130 @@
-"""Driving by an action of the robot's navigation: what a pose means as its goal, and its end."""
+"""Goals for the robot's own navigation, Nav2 or move_base, and what is known of each drive."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import anyio
 
+from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
-from mapspeak.robot import GoalState
+from mapspeak.robot import GoalState, GoalStatus
 from mapspeak.ros import RosConnection
-from mapspeak.ros.actions import ActionState, SentGoal, open_action
-from mapspeak.ros.driving.driver import LATEST_S, DrivingPatience
-from mapspeak.ros.driving.record import GoalRecord
-from mapspeak.ros.messages import Dialect, FramedPose, Message
+from mapspeak.ros.actions import ActionPatience, ActionState, SentGoal, open_action
+from mapspeak.ros.messages import (
+    Dialect,
+    FramedPose,
+    Message,
+    read_pose_stamped,
+    write_pose_stamped,
+)
+
+
+class GoalRecord:
+    """A goal that was sent, and how it stands. Once ended, its state stays.
+
+    Attributes:
+        goal_id: Ours, used nowhere else.
+        goal: In the map frame.
+        state: How it stands.
+        is_replaced: We have sent another goal since.
+        afterwards: What became of it after its end.
+    """
+
+    def __init__(self, goal_id: str, goal: Pose) -> None:
+        self.goal_id = goal_id
+        self.goal = goal
+        self.state = GoalState.ACCEPTED
+        self.is_replaced = False
+        self.afterwards = ""
+        self._distance_left_m: float | None = None
+        self._n_recoveries = 0
+        self._reason = ""
+        self._is_unanswered = False
+
+    @property
+    def status(self) -> GoalStatus:
+        """How it stands, as the port tells it."""
+        return GoalStatus(
+            state=self.state,
+            distance_left_m=self._distance_left_m,
+            n_recoveries=self._n_recoveries,
+            reason=self._reason,
+            is_unanswered=self._is_unanswered,
+            afterwards=self.afterwards,
+        )
+
+    @property
+    def is_over(self) -> bool:
+        """True when nothing more will happen."""
+        return self.state.is_final
+
+    def drive(self, *, distance_left_m: float | None = None, n_recoveries: int = 0) -> None:
+        """Note that the robot is on its way."""
+        if self.is_over:
+            return
+        self.state = GoalState.DRIVING
+        if distance_left_m is not None:
+            self._distance_left_m = distance_left_m
+        self._n_recoveries = max(self._n_recoveries, n_recoveries)
+
+    def end(self, state: GoalState, reason: str = "", *, is_unanswered: bool = False) -> None:
+        """Note how it ended; the first word counts."""
+        if self.is_over:
+            return
+        if self.is_replaced and state in (GoalState.BLOCKED, GoalState.CANCELLED):
+            # Navigation tells a replaced goal as aborted or cancelled.
+            state, reason = GoalState.PREEMPTED, "A newer goal replaced it."
+        self.state, self._reason = state, reason
+        self._is_unanswered = is_unanswered
+        if state is GoalState.ARRIVED:
+            self._distance_left_m = 0.0
+
+
+LATEST_S = 0.0
+"""A stamp that ROS takes for "as it is now"; our idea of robot time may be off."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DrivingPatience(ActionPatience):
+    """How long to wait for the robot's navigation, in wall time; a test shortens it.
+
+    Attributes:
+        settling_s: After connecting, without anything new, until all that is there is found.
+    """
+
+    settling_s: float = 5.0
+
+
+class Driver(Protocol):
+    """One way of sending goals."""
+
+    @property
+    def foreign_goals(self) -> tuple[GoalState, ...]:
+        """How goals stand that others have sent and that are under way, as last heard."""
+        ...
+
+    async def send(self, goal: Pose) -> GoalRecord:
+        """Send a goal in the map frame; return the record of what becomes of it.
+
+        Raises:
+            LinkError: It could not be sent.
+        """
+        ...
+
+    async def look_at(self, record: GoalRecord) -> None:
+        """Bring a record up to date."""
+        ...
+
+    async def cancel(self, record: GoalRecord) -> None:
+        """End one goal, and wait a moment for the end.
+
+        Raises:
+            LinkError: It goes on, or navigation could not be told.
+        """
+        ...
+
 
 STATE_OF = {
     ActionState.SUCCEEDED: GoalState.ARRIVED,
@@ -195,3 +308,58 @@ class ActionDriver:
         record.end(state, reason, is_unanswered=is_unanswered)
         if state is GoalState.LOST:
             self._on_lost()
+
+
+def _write_move_base_goal(pose: FramedPose) -> Message:
+    return {"target_pose": write_pose_stamped(pose, dialect=Dialect.ROS1)}
+
+
+def _read_move_base_feedback(feedback: Message, goal: Pose) -> tuple[float | None, int]:
+    try:
+        here = read_pose_stamped(feedback.get("base_position") or {}).pose
+    except LinkError:
+        return None, 0
+    # move_base does not say how long its path is; the straight line is the least it can be.
+    return here.point.distance_to(goal.point), 0
+
+
+MOVE_BASE = Navigation(
+    title="move_base",
+    dialect=Dialect.ROS1,
+    type_name="move_base_msgs/MoveBase",
+    write_goal=_write_move_base_goal,
+    read_feedback=_read_move_base_feedback,
+    hint="Check that move_base runs and that the robot knows where it is.",
+    # It gives none while a recovery turns the robot once round.
+    feedback_s=20.0,
+)
+
+
+LARGEST = 1e9
+"""No distance and no count is larger; what is, is no number of Nav2's."""
+
+
+def _write_nav2_goal(pose: FramedPose) -> Message:
+    return {"pose": write_pose_stamped(pose, dialect=Dialect.ROS2), "behavior_tree": ""}
+
+
+def _read_nav2_feedback(feedback: Message, _goal: Pose) -> tuple[float | None, int]:
+    left_m = _number(feedback.get("distance_remaining"))
+    return left_m, int(_number(feedback.get("number_of_recoveries")) or 0)
+
+
+def _number(value: object) -> float | None:
+    if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > LARGEST:
+        return None
+    return None if math.isnan(value) else float(value)
+
+
+NAV2 = Navigation(
+    title="Navigation",
+    dialect=Dialect.ROS2,
+    type_name="nav2_msgs/action/NavigateToPose",
+    write_goal=_write_nav2_goal,
+    read_feedback=_read_nav2_feedback,
+    hint="Check that Nav2 is active (`ros2 lifecycle get /bt_navigator`), that the robot knows "
+    "where it is, and that the goal lies on the map.",
+)

@@ -3,6 +3,6 @@
 Needs a Python that has rclpy: that of a sourced ROS, or one with ROS's wheels.
 """
 
-from mapspeak.links.ros2.opening import open_ros2_connection, open_ros2_robot
+from mapspeak.links.rclpy.opening import open_ros2_connection, open_ros2_robot
 
 __all__ = ["open_ros2_connection", "open_ros2_robot"]

@@ -8,8 +8,8 @@ import numpy as np
 from rclpy.exceptions import NameValidationException
 
 from mapspeak.errors import LinkError
-from mapspeak.links.ros2.definitions import find_definitions
-from mapspeak.links.ros2.participant import Participant
+from mapspeak.links.rclpy.participant import Participant
+from mapspeak.links.rclpy.types import find_definitions
 from mapspeak.ros import NodeLinks, RosGraph
 from mapspeak.ros.messages import Dialect, bare_type
 from mapspeak.ros.native import check_name

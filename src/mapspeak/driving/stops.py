@@ -1,12 +1,13 @@
-"""A stop that the robot could not be told yet: it is told as soon as it can be reached."""
+"""A stop that is still owed to a robot out of reach, and the lease that every drive needs."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 
 import anyio
 
 from mapspeak.driving.drivereport import Drive
-from mapspeak.errors import LinkError, MapspeakError
+from mapspeak.errors import ConfigError, LinkError, MapspeakError
 from mapspeak.robot import GoalState, GoalStatus, Robot
 
 NEWS_S = 0.5
@@ -88,3 +89,35 @@ class OwedStop:
         if truth.state.is_final or now_s - self._answered_s >= NEWS_S:
             await self.stop()
         return None
+
+
+class Lease:
+    """Knows since when no client has been heard. Wall time: it is about clients, not the robot.
+
+    Raises:
+        ConfigError: The duration is not above zero.
+    """
+
+    def __init__(self, duration_s: float) -> None:
+        if not duration_s > 0:
+            raise ConfigError(
+                f"A lease of {duration_s} s is no lease.", hint="Give a positive number of seconds."
+            )
+        self.duration_s = duration_s
+        self._n_calls = 0
+        self._last_heard_s = float("-inf")
+
+    @contextmanager
+    def call(self) -> Generator[None]:
+        """Marks a client's call: heard when it begins and when it ends."""
+        self._n_calls += 1
+        try:
+            yield
+        finally:
+            self._n_calls -= 1
+            self._last_heard_s = anyio.current_time()
+
+    @property
+    def is_over(self) -> bool:
+        """True when no call is under way and the last one is too long ago."""
+        return not self._n_calls and anyio.current_time() - self._last_heard_s > self.duration_s

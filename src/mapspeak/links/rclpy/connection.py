@@ -9,11 +9,11 @@ from anyio.abc import TaskGroup
 from anyio.from_thread import BlockingPortal
 
 from mapspeak.errors import LinkError
-from mapspeak.links.ros2.goals import Goals
-from mapspeak.links.ros2.graph import GraphQuestions
-from mapspeak.links.ros2.participant import Participant, errors_of_ros, wait_until
-from mapspeak.links.ros2.services import Services
-from mapspeak.links.ros2.topics import Topics
+from mapspeak.links.rclpy.goals import Goals
+from mapspeak.links.rclpy.graph import GraphQuestions
+from mapspeak.links.rclpy.participant import Participant, errors_of_ros, wait_until
+from mapspeak.links.rclpy.services import Services
+from mapspeak.links.rclpy.topics import Topics
 from mapspeak.ros import ActionGoal, LinkKind, LinkName, NodeLinks, RosGraph
 from mapspeak.ros.goal import PursuedGoal
 from mapspeak.ros.messages import Message

@@ -7,8 +7,8 @@ from types import MappingProxyType
 from mapspeak.errors import ConfigError
 from mapspeak.ros import RosConnection
 from mapspeak.ros.discovery import RobotOverrides
-from mapspeak.ros.driving import DrivingPatience
 from mapspeak.ros.robot import RosRobot, build_ros_robot
+from mapspeak.ros.robot.driving import DrivingPatience
 
 USUAL_PATIENCE = DrivingPatience()
 NOTHING_SAID = RobotOverrides()
@@ -39,7 +39,7 @@ async def open_ros2_connection(
         LinkError: ROS cannot be started.
     """
     try:
-        from mapspeak.links.ros2.connection import open_connection  # noqa: PLC0415 - needs rclpy
+        from mapspeak.links.rclpy.connection import open_connection  # noqa: PLC0415 - needs rclpy
     except ImportError as error:
         # Without its libraries rclpy fails as if it were not there, and says which one is missing.
         raise ConfigError(f"This Python has no rclpy: {error}.", hint=HINT) from error

@@ -11,10 +11,9 @@ from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from mapspeak.errors import LinkError
-from mapspeak.links.ros2.participant import Participant, errors_of_ros, wait_until
-from mapspeak.links.ros2.reading import read_message
-from mapspeak.links.ros2.types import find_message
-from mapspeak.links.ros2.writing import write_message
+from mapspeak.links.rclpy.messages import read_message, write_message
+from mapspeak.links.rclpy.participant import Participant, errors_of_ros, wait_until
+from mapspeak.links.rclpy.types import find_message
 from mapspeak.ros.messages import Message, bare_type
 from mapspeak.ros.native import NativeTopics, check_name, wrong_type
 from mapspeak.ros.subscribing import TopicSubscription

@@ -6,10 +6,9 @@ from typing import Any
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.links.ros2.participant import Participant, errors_of_ros, wait_until
-from mapspeak.links.ros2.reading import read_message
-from mapspeak.links.ros2.types import find_service
-from mapspeak.links.ros2.writing import write_message
+from mapspeak.links.rclpy.messages import read_message, write_message
+from mapspeak.links.rclpy.participant import Participant, errors_of_ros, wait_until
+from mapspeak.links.rclpy.types import find_service
 from mapspeak.ros.messages import bare_type
 from mapspeak.ros.native import check_name, wrong_type
 

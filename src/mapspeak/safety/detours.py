@@ -1,13 +1,15 @@
-"""A drive round closed areas in legs, for a robot whose own navigation knows nothing of them."""
+"""A drive round closed areas in parts, for navigation that knows nothing of them."""
 
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.safety.monitor import KEEP_M
+from mapspeak.safety.guard import Permit
+from mapspeak.safety.monitor import KEEP_M, GoalMonitor
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import Path, find_path
 from mapspeak.worldmodel.closures import MARGIN_M, ClosedArea, distance_to_line
@@ -130,3 +132,29 @@ def _is_clear(points: Sequence[Point], areas: Sequence[ClosedArea], reach_m: flo
 
 def _between(start: Point, end: Point, share: float) -> Point:
     return Point(start.x + share * (end.x - start.x), start.y + share * (end.y - start.y))
+
+
+@dataclass(slots=True, kw_only=True)
+class GuardedDrive:
+    """A drive under way, as far as anyone has asked.
+
+    Attributes:
+        goal_id: The id it is known by: that of its first leg.
+        leg_id: What the robot calls the leg that it drives now.
+        legs: Those after it.
+        permit: By which it was allowed.
+        goal_monitor: Watches its goal.
+    """
+
+    goal_id: str
+    leg_id: str
+    legs: list[Pose]
+    leg: Pose
+    permit: Permit
+    goal_monitor: GoalMonitor
+
+    @property
+    def further_m(self) -> float:
+        """How far it is from the end of this leg to the goal."""
+        ends = [self.leg, *self.legs]
+        return sum(a.point.distance_to(b.point) for a, b in itertools.pairwise(ends))

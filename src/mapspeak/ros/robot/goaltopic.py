@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import GoalState, StampedPose
 from mapspeak.ros import RosConnection, new_id
-from mapspeak.ros.driving.driver import LATEST_S
-from mapspeak.ros.driving.record import GoalRecord
 from mapspeak.ros.messages import Dialect, FramedPose, write_pose_stamped
+from mapspeak.ros.robot.driving import LATEST_S, GoalRecord
 
 ARRIVAL_M = 0.35
 """Nav2 and move_base stop within 0.25 m by default, and the pose may be a step behind."""
