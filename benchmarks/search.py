@@ -47,7 +47,7 @@ from mapspeak.simulator import (
     WorldObject,
     load_world,
 )
-from mapspeak.simulator.models import find_kind
+from mapspeak.simulator.worlds.models import find_kind
 from mapspeak.spatial.paths import DistanceField, clearance_m, distances_from
 
 __all__ = ["main", "measure"]

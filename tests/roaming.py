@@ -9,7 +9,7 @@ from mapspeak.robot import GoalState, GoalStatus
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, World
-from mapspeak.simulator.mapworld import build_map_world
+from mapspeak.simulator.worlds.mapworld import build_map_world
 
 CELL_M = 0.25
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.simulator.world import Door, TrueRoom, Wall, World, WorldObject
+from mapspeak.simulator.worlds.world import Door, TrueRoom, Wall, World, WorldObject
 from mapspeak.spatial.rooms import RoomClass
 
 ROOM_LENGTH_M = 8.0

@@ -6,8 +6,8 @@ from benchmarks.memory.sites import Site
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.semantic import LaserRing, build_ring
 from mapspeak.simulator import BEAM_ANGLES_RAD
-from mapspeak.simulator.lidar import MAX_RANGE_M, NOISE_M, measure_ranges
-from mapspeak.simulator.slices import slice_world
+from mapspeak.simulator.robot.lidar import MAX_RANGE_M, NOISE_M, measure_ranges
+from mapspeak.simulator.worlds.slices import slice_world
 
 __all__ = ["BODY_LIDAR_M", "FLAT_LASER_M", "Laser"]
 

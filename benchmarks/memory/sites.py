@@ -29,9 +29,9 @@ from mapspeak.simulator import (
     load_world,
     world_names,
 )
-from mapspeak.simulator.models import ObjectCategory, find_kind
-from mapspeak.simulator.sight import EYE_BAND_M, OWN_SIZE_M, SIDEWAYS_M
-from mapspeak.simulator.slices import footprint, slice_world
+from mapspeak.simulator.truth import EYE_BAND_M, OWN_SIZE_M, SIDEWAYS_M
+from mapspeak.simulator.worlds.models import ObjectCategory, find_kind
+from mapspeak.simulator.worlds.slices import footprint, slice_world
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import clearance_m
 from mapspeak.spatial.rooms import RoomMap

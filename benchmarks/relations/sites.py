@@ -14,7 +14,7 @@ import numpy as np
 from mapspeak.geometry import Point, Pose
 from mapspeak.semantic import Landmark, SemanticMap, Waypoint
 from mapspeak.simulator.truth import TrueFloor
-from mapspeak.simulator.worldfiles import load_world
+from mapspeak.simulator.worlds.worldfiles import load_world
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from benchmarks.figure import Figure
 from benchmarks.rooms.people import Numbers, find_agreement, find_overlap
 from mapspeak.simulator import TrueFloor, TrueRoom, World, load_world, world_names
-from mapspeak.simulator.worldfiles import parse_world
+from mapspeak.simulator.worlds.worldfiles import parse_world
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.rooms import RoomClass, RoomMap, find_rooms
 from tools.worldgen import draw_plan, style_names

@@ -9,8 +9,8 @@ import pytest
 
 from mapspeak.errors import ConfigError
 from mapspeak.simulator import World, load_world, world_names
-from mapspeak.simulator.models import kind_names
-from mapspeak.simulator.worldfiles import parse_world, read_world_text
+from mapspeak.simulator.worlds.models import kind_names
+from mapspeak.simulator.worlds.worldfiles import parse_world, read_world_text
 from mapspeak.spatial.rooms import RoomClass
 from tools.worldgen import draw_plan, find_faults, style_names
 

@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from mapspeak.errors import ConfigError
-from mapspeak.simulator.worldfiles import parse_world
+from mapspeak.simulator.worlds.worldfiles import parse_world
 from mapspeak.spatial.rooms import RoomClass
 from tools.worldgen.furnishing import Spot, Thing, furnish
 from tools.worldgen.laws import APART_RATIO, find_faults

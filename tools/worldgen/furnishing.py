@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 
-from mapspeak.simulator.models import build_parts, find_kind
+from mapspeak.simulator.worlds.models import build_parts, find_kind
 from tools.worldgen.layout import Corner, Dice, Doorway, Layout, Rect, Space
 from tools.worldgen.purposes import PURPOSES, How, Piece
 from tools.worldgen.roomfloor import RoomFloor

@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.geometry import Point
-from mapspeak.simulator.gridmap import CELL_SIZE_M
-from mapspeak.simulator.motion import BODY_RADIUS_M
-from mapspeak.simulator.sight import is_in_sight
-from mapspeak.simulator.slices import fill_outlines, slice_world
-from mapspeak.simulator.truth import TrueFloor
-from mapspeak.simulator.world import TrueRoom, World, WorldObject
+from mapspeak.simulator.robot.gridmap import CELL_SIZE_M
+from mapspeak.simulator.truth import TrueFloor, is_in_sight
+from mapspeak.simulator.worlds.slices import fill_outlines, slice_world
+from mapspeak.simulator.worlds.world import BODY_RADIUS_M, TrueRoom, World, WorldObject
 from mapspeak.spatial.paths import clearance_m
 from mapspeak.spatial.rooms import RoomClass
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.simulator.motion import BODY_RADIUS_M
+from mapspeak.simulator.worlds.world import BODY_RADIUS_M
 from tools.worldgen.layout import Corner, Rect, Space
 
 __all__ = ["RoomFloor"]

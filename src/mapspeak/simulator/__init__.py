@@ -1,16 +1,15 @@
 """A world with one robot, stepped by hand: no clock, no network, no port."""
 
-from mapspeak.simulator.avoidance import KEEP_OFF_M
-from mapspeak.simulator.detector import SimulatedDetection
-from mapspeak.simulator.lidar import BEAM_ANGLES_RAD, MAX_RANGE_M, LidarScan
-from mapspeak.simulator.motion import BODY_RADIUS_M, MAX_SPEED_MPS, MAX_TURN_RADPS, Velocity
-from mapspeak.simulator.navigator import DriveState, DriveStatus
-from mapspeak.simulator.sight import is_in_sight, slice_at_eye_level
+from mapspeak.simulator.camera.camera import SimulatedDetection
+from mapspeak.simulator.robot.controller import KEEP_OFF_M
+from mapspeak.simulator.robot.lidar import BEAM_ANGLES_RAD, MAX_RANGE_M, LidarScan
+from mapspeak.simulator.robot.navigator import DriveState, DriveStatus
+from mapspeak.simulator.robot.physics import MAX_SPEED_MPS, MAX_TURN_RADPS, Velocity
 from mapspeak.simulator.simulation import TICK_S, CameraShot, Simulation
 from mapspeak.simulator.statelog import StateLog, StateRecord, read_state_log
-from mapspeak.simulator.truth import MeasuredRoom, TrueFloor, Truth
-from mapspeak.simulator.world import Door, TrueRoom, Wall, World, WorldObject
-from mapspeak.simulator.worldfiles import load_world, world_names
+from mapspeak.simulator.truth import MeasuredRoom, TrueFloor, Truth, is_in_sight, slice_at_eye_level
+from mapspeak.simulator.worlds.world import BODY_RADIUS_M, Door, TrueRoom, Wall, World, WorldObject
+from mapspeak.simulator.worlds.worldfiles import load_world, world_names
 
 __all__ = [
     "BEAM_ANGLES_RAD",

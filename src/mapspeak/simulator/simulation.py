@@ -13,18 +13,20 @@ from numpy.typing import NDArray
 
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose
-from mapspeak.simulator.avoidance import Obstacles
-from mapspeak.simulator.body import RobotBody
-from mapspeak.simulator.camera import HORIZONTAL_FOV_RAD, Camera
-from mapspeak.simulator.detector import SimulatedDetection, SimulatedDetector
-from mapspeak.simulator.lidar import Lidar, LidarScan
-from mapspeak.simulator.localising import Localiser
-from mapspeak.simulator.mapping import Mapper
-from mapspeak.simulator.motion import BODY_BAND_M, STANDING, Odometry, Velocity
-from mapspeak.simulator.navigator import DriveState, DriveStatus, Navigator, Senses
-from mapspeak.simulator.slices import slice_world
+from mapspeak.simulator.camera.camera import (
+    HORIZONTAL_FOV_RAD,
+    Camera,
+    SimulatedDetection,
+    SimulatedDetector,
+)
+from mapspeak.simulator.robot.controller import Obstacles
+from mapspeak.simulator.robot.lidar import Lidar, LidarScan
+from mapspeak.simulator.robot.navigator import DriveState, DriveStatus, Navigator, Senses
+from mapspeak.simulator.robot.physics import STANDING, Odometry, RobotBody, Velocity
+from mapspeak.simulator.robot.slam import Localiser, Mapper
 from mapspeak.simulator.truth import Truth
-from mapspeak.simulator.world import World
+from mapspeak.simulator.worlds.slices import slice_world
+from mapspeak.simulator.worlds.world import BODY_BAND_M, World
 from mapspeak.spatial import OccupancyGrid
 
 __all__ = ["TICK_S", "CameraShot", "Simulation"]
@@ -102,7 +104,7 @@ class Simulation:
         return self._n_ticks * TICK_S
 
     def step(self) -> None:
-        """Lets one tick of robot time pass."""
+        """Let one tick of robot time pass."""
         step = self._body.move(self._command(), TICK_S)
         self._n_ticks += 1
         self._odometry.record(step)
@@ -143,16 +145,16 @@ class Simulation:
         return self.pose_in_map @ self._now_from_scan
 
     def map(self) -> OccupancyGrid:
-        """Gives the SLAM map; the same one until it has changed."""
+        """Return the SLAM map; the same one until it has changed."""
         return self._mapper.publish(stamp_s=self.time_s)
 
     def take_picture(self) -> CameraShot:
-        """Takes a picture with the front camera."""
+        """Take a picture with the front camera."""
         rgb = self._camera.render(self._body.world_from_base)
         return CameraShot(rgb=rgb, horizontal_fov_rad=HORIZONTAL_FOV_RAD)
 
     def detect(self) -> tuple[SimulatedDetection, ...]:
-        """Gives what the simulated detector reports of the camera's view, from left to right."""
+        """Return what the simulated detector reports of the camera's view, from left to right."""
         width_px, height_px = _DETECTOR_SIZE_PX
         view = self._camera.observe(
             self._body.world_from_base, width_px=width_px, height_px=height_px
@@ -162,7 +164,7 @@ class Simulation:
     # --- driving ---
 
     def start_goal(self, goal: Pose) -> int:
-        """Sends the robot to a pose in the map and gives the drive's id; an earlier drive ends."""
+        """Send the robot to a pose in the map and return the drive's id; an earlier drive ends."""
         self._navigator.give_up(DriveState.PREEMPTED, "A newer goal replaced it.")
         self._keep_status()
         self._goal_id += 1
@@ -171,7 +173,7 @@ class Simulation:
         return self._goal_id
 
     def goal_status(self, goal_id: int) -> DriveStatus:
-        """Gives how a drive stands, also after it has ended.
+        """Return how a drive stands, also after it has ended.
 
         Raises:
             GoalError: No drive has that id.
@@ -186,7 +188,7 @@ class Simulation:
         return self._ended[goal_id]
 
     def cancel_goal(self, goal_id: int) -> None:
-        """Ends a drive if it still goes on; the robot comes to a stand.
+        """End a drive if it still goes on; the robot comes to a stand.
 
         Raises:
             GoalError: No drive has that id.
@@ -195,12 +197,12 @@ class Simulation:
             self._navigator.give_up(DriveState.CANCELLED, "It was cancelled.")
 
     def stop(self) -> None:
-        """Ends every drive and brings the robot to a stand."""
+        """End every drive and brings the robot to a stand."""
         self._teleoperated_until_s = -math.inf
         self._navigator.give_up(DriveState.CANCELLED, "The robot was stopped.")
 
     def set_velocity(self, velocity: Velocity) -> None:
-        """Drives by hand for half a second at most; a drive under way ends.
+        """Drive by hand for half a second at most; a drive under way ends.
 
         Nothing but the bumper protects the robot meanwhile, as on a real one.
         """

@@ -43,7 +43,7 @@ class StateRecord:
 
     @classmethod
     def of(cls, simulation: Simulation) -> Self:
-        """Gives how a simulation truly stands now."""
+        """Return how a simulation truly stands now."""
         truth = simulation.truth
         pose = truth.pose
         return cls(
@@ -73,7 +73,7 @@ class StateLog:
             ) from error
 
     def note(self) -> None:
-        """Writes a record when the last one is old enough."""
+        """Write a record when the last one is old enough."""
         now_s = self._simulation.time_s
         if now_s - self._last_s < PERIOD_S:
             return
@@ -83,13 +83,13 @@ class StateLog:
         self._file.flush()
 
     def close(self) -> None:
-        """Writes the last record and closes the file."""
+        """Write the last record and close the file."""
         self._last_s = float("-inf")
         self.note()
         self._file.close()
 
 
 def read_state_log(path: Path) -> tuple[StateRecord, ...]:
-    """Reads every whole line of a state log, which may still be growing."""
+    """Read every whole line of a state log, which may still be growing."""
     whole_lines = path.read_text(encoding="utf-8").rpartition("\n")[0].splitlines()
     return tuple(StateRecord(**json.loads(line)) for line in whole_lines)

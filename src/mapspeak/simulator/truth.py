@@ -4,6 +4,7 @@ Cells of truth grids lie in the map frame, which starts where the robot starts, 
 borders with the cells of the robot's own map.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,18 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.simulator.body import RobotBody
-from mapspeak.simulator.gridmap import CELL_SIZE_M
-from mapspeak.simulator.lidar import BEAM_DIRECTIONS, MAX_RANGE_M, measure_ranges
-from mapspeak.simulator.localising import Localiser
-from mapspeak.simulator.mapping import Mapper
-from mapspeak.simulator.motion import BODY_BAND_M, BODY_RADIUS_M
-from mapspeak.simulator.scanmatch import place_points
-from mapspeak.simulator.slices import FloatArray, Slice, fill_outlines, slice_world
-from mapspeak.simulator.world import TrueRoom, World
+from mapspeak.simulator.robot.gridmap import CELL_SIZE_M
+from mapspeak.simulator.robot.lidar import (
+    BEAM_ANGLES_RAD,
+    BEAM_DIRECTIONS,
+    MAX_RANGE_M,
+    measure_ranges,
+)
+from mapspeak.simulator.robot.physics import RobotBody
+from mapspeak.simulator.robot.scanmatch import place_points
+from mapspeak.simulator.robot.slam import Localiser, Mapper
+from mapspeak.simulator.worlds.models import find_kind
+from mapspeak.simulator.worlds.slices import FloatArray, Slice, fill_outlines, slice_world
+from mapspeak.simulator.worlds.world import BODY_BAND_M, BODY_RADIUS_M, TrueRoom, World, WorldObject
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 
-__all__ = ["MeasuredRoom", "TrueFloor", "Truth"]
+__all__ = ["MeasuredRoom", "TrueFloor", "Truth", "is_in_sight", "slice_at_eye_level"]
 
 Mask = NDArray[np.bool_]
 
@@ -69,7 +74,7 @@ class TrueFloor:
 
     @cached_property
     def solid(self) -> OccupancyGrid:
-        """Gives 100 where something solid takes half of a cell, 0 elsewhere, over the world."""
+        """Cells: 100 where something solid takes half of a cell, 0 elsewhere, over the world."""
         return self._rasterise(least_ratio=0.5)
 
     def _rasterise(self, *, least_ratio: float) -> OccupancyGrid:
@@ -121,7 +126,7 @@ class TrueFloor:
         return np.asarray(distance, dtype=np.float64) * CELL_SIZE_M
 
     def _lookouts(self) -> list[Point]:
-        """Gives places where the robot can stand, spread over a square lattice."""
+        """Return places where the robot can stand, spread over a square lattice."""
         rows, cols = np.nonzero(self.standable)
         every = round(_LOOK_EVERY_M / CELL_SIZE_M)
         # One place for each square of the lattice, so that narrow places have theirs too.
@@ -193,3 +198,43 @@ def _grid(cells: NDArray[np.integer[Any]], origin: Point) -> OccupancyGrid:
     return OccupancyGrid(
         cells=cells.astype(np.int8), resolution_m=CELL_SIZE_M, origin=Pose(origin.x, origin.y)
     )
+
+
+EYE_BAND_M = (1.05, 1.15)
+"""What is as high as the camera hides what lies behind it."""
+OWN_SIZE_M = 0.5
+"""The thing itself, and the wall it hangs on, do not hide it."""
+SIDEWAYS_M = (-0.2, -0.1, 0.0, 0.1, 0.2)
+"""A thing has some width: it is in sight when any part of it is."""
+
+
+def slice_at_eye_level(world: World) -> Slice:
+    """Return what hides things: all that is as high as the camera."""
+    return slice_world(world, low_m=EYE_BAND_M[0], high_m=EYE_BAND_M[1])
+
+
+def is_in_sight(
+    world: World, place: Point, thing: WorldObject, *, hiding: Slice | None = None
+) -> bool:
+    """True when nothing as high as the camera hides all of a thing from a place.
+
+    What hangs on a wall is hidden from everywhere behind that wall.
+
+    Args:
+        world: With the thing.
+        place: In the world's own frame.
+        thing: Which one.
+        hiding: The world at eye level, where it is at hand; else it is cut anew.
+    """
+    if find_kind(thing.kind).is_wall_hung and thing.pose.inverse().transform(place).x <= 0:
+        return False
+    solids = slice_at_eye_level(world) if hiding is None else hiding
+    ahead = int(np.argmin(np.abs(BEAM_ANGLES_RAD)))
+    across = Pose(thing.pose.x, thing.pose.y, place.bearing_to(thing.pose.point))
+    for sideways_m in SIDEWAYS_M:
+        part = across.transform(Point(0.0, sideways_m))
+        facing = Pose(place.x, place.y, place.bearing_to(part))
+        free_m = float(measure_ranges(solids.edges, facing)[ahead])
+        if math.isinf(free_m) or free_m >= place.distance_to(part) - OWN_SIZE_M:
+            return True
+    return False

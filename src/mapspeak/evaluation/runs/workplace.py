@@ -24,7 +24,7 @@ from mapspeak.semantic import SemanticMapStore
 from mapspeak.server import DEFAULT_TOOLSETS, Representation, build_server
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, StateLog, StateRecord, World
-from mapspeak.simulator.worldchanges import write_with_more
+from mapspeak.simulator.worlds.worldfiles import write_with_more
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import MapMode, load_map, write_map
 

@@ -23,8 +23,8 @@ from mapspeak.simulator import (
     is_in_sight,
     slice_at_eye_level,
 )
-from mapspeak.simulator.models import find_kind
-from mapspeak.simulator.slices import Slice
+from mapspeak.simulator.worlds.models import find_kind
+from mapspeak.simulator.worlds.slices import Slice
 from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.grid import Mask
 from mapspeak.spatial.paths import DistanceField, clearance_m, distances_from

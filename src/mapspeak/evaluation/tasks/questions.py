@@ -12,7 +12,7 @@ from mapspeak.evaluation.tasks.task import dice, draw_start, point_text
 from mapspeak.evaluation.trials import Failure, Limits, Score, Setting
 from mapspeak.geometry import Point, Pose
 from mapspeak.simulator import MeasuredRoom
-from mapspeak.simulator.lidar import MAX_RANGE_M
+from mapspeak.simulator.robot.lidar import MAX_RANGE_M
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.rooms import RoomClass
 

@@ -61,4 +61,4 @@ WISHES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         ),
     }
 )
-"""By kind; each meant by nothing else in `mapspeak.simulator.models`."""
+"""By kind; each meant by nothing else in `mapspeak.simulator.worlds.models`."""

@@ -1,0 +1,220 @@
+"""Drawn surfaces: signs, goods, devices, floor and walls, drawn with Pillow when asked for.
+
+`textures.json` lists the shapes of those that are drawn; the signs follow the idea of ISO 7010: red
+for fire equipment, green for escape and first aid. What is grain alone is computed here.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from importlib import resources
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import orjson
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from mapspeak.simulator.worlds.models import Colour, Surface
+
+__all__ = ["GLOWING", "TILED", "draw"]
+
+FloatArray = NDArray[np.float64]
+Picture = NDArray[np.uint8]
+Place = tuple[float, float]
+
+TILED = frozenset({Surface.FLOOR, Surface.WALL, Surface.CEILING})
+"""Surfaces that repeat without a seam beyond 0..1; all others are drawn once."""
+
+GLOWING = frozenset(
+    {Surface.EXIT_SIGN, Surface.SCREEN, Surface.PRINTER_PANEL, Surface.COFFEE_PANEL}
+)
+"""Surfaces that shine by themselves."""
+
+_SMOOTHING = 3
+_SEED = 7
+
+
+@cache
+def draw(surface: Surface) -> Picture:
+    """Return a drawn surface as red, green and blue, 0 to 255, shape (height, width, 3)."""
+    if surface in _COMPUTED:
+        values = _COMPUTED[surface]()
+    elif surface in _GRAINS:
+        values = _draw_shapes(surface) + _GRAINS[surface]()
+    else:
+        values = _draw_shapes(surface).astype(np.float64)
+    picture = np.clip(values, 0, 255).astype(np.uint8)
+    picture.setflags(write=False)
+    return picture
+
+
+# --- drawn -----------------------------------------------------------------------------------
+
+
+class _Canvas:
+    """A picture in the making: x to the right and y down, 100 units high, with smooth edges."""
+
+    def __init__(self, width_px: int, height_px: int, background: Colour) -> None:
+        self._size = (width_px, height_px)
+        self._scale = _SMOOTHING * height_px / 100.0
+        large = (width_px * _SMOOTHING, height_px * _SMOOTHING)
+        self._image = Image.new("RGB", large, background)
+        self._draw = ImageDraw.Draw(self._image)
+
+    def polygon(self, *, points: Sequence[Place], fill: Colour) -> None:
+        """Fill a polygon."""
+        self._draw.polygon([self._place(point) for point in points], fill=fill)
+
+    def rectangle(self, *, low: Place, high: Place, fill: Colour, rounding: float = 0.0) -> None:
+        """Fill a rectangle between its upper left and its lower right corner."""
+        self._draw.rounded_rectangle(
+            [self._place(low), self._place(high)], radius=rounding * self._scale, fill=fill
+        )
+
+    def disc(self, *, centre: Place, radius: float, fill: Colour) -> None:
+        """Fill a circle."""
+        self._draw.circle(self._place(centre), radius * self._scale, fill=fill)
+
+    def line(self, *, points: Sequence[Place], width: float, fill: Colour) -> None:
+        """Draw a line with round ends and joints."""
+        pixels = round(width * self._scale)
+        self._draw.line([self._place(point) for point in points], fill=fill, width=pixels)
+        for point in points:
+            self.disc(centre=point, radius=width / 2, fill=fill)
+
+    def arc(
+        self, *, centre: Place, radius: float, turn_deg: Place, stroke: float, fill: Colour
+    ) -> None:
+        """Draw part of a circle, from one angle to the other; 0 is right, 90 is down."""
+        n = max(int(abs(turn_deg[1] - turn_deg[0]) / 6), 2)
+        angles = [
+            math.radians(turn_deg[0] + (turn_deg[1] - turn_deg[0]) * i / n) for i in range(n + 1)
+        ]
+        x, y = centre
+        points = [(x + radius * math.cos(angle), y + radius * math.sin(angle)) for angle in angles]
+        self.line(points=points, width=stroke, fill=fill)
+
+    def text(self, *, centre: Place, words: str, height: float, fill: Colour) -> None:
+        """Write words around a centre."""
+        self._draw.text(
+            self._place(centre),
+            words,
+            fill=fill,
+            font=ImageFont.load_default(size=height * self._scale),
+            anchor="mm",
+            stroke_width=height * self._scale / 28,
+            stroke_fill=fill,
+        )
+
+    def finish(self) -> Picture:
+        """Return the picture, shape (height, width, 3)."""
+        return np.asarray(self._image.resize(self._size, Image.Resampling.BOX))
+
+    def _place(self, point: Place) -> Place:
+        return (point[0] * self._scale, point[1] * self._scale)
+
+
+_SHAPES: Mapping[str, Callable[..., None]] = MappingProxyType(
+    {
+        "arc": _Canvas.arc,
+        "disc": _Canvas.disc,
+        "line": _Canvas.line,
+        "polygon": _Canvas.polygon,
+        "rectangle": _Canvas.rectangle,
+        "text": _Canvas.text,
+    }
+)
+
+
+def _draw_shapes(surface: Surface) -> Picture:
+    """Draw the shapes that the file lists, each over those before it."""
+    drawing = _read_drawings()[surface]
+    width_px, height_px = drawing["size_px"]
+    canvas = _Canvas(width_px, height_px, tuple(drawing["background"]))
+    for shape in drawing["shapes"]:
+        arguments = dict(shape)
+        arguments["fill"] = tuple(arguments["fill"])
+        _SHAPES[arguments.pop("shape")](canvas, **arguments)
+    return canvas.finish()
+
+
+@cache
+def _read_drawings() -> Mapping[str, Any]:
+    """Read all drawings by their surface; the reader must not change anything in them."""
+    text = resources.files("mapspeak.simulator.camera").joinpath("textures.json").read_bytes()
+    return MappingProxyType(orjson.loads(text))
+
+
+# --- computed --------------------------------------------------------------------------------
+
+
+def _compute_wood() -> FloatArray:
+    """Compute the grain of a board along the picture's width; its tint is that of the part."""
+    return 232.0 + 16.0 * _grain(256, 256, rows=0.25, columns=0.015)
+
+
+def _compute_floor() -> FloatArray:
+    """Compute four metres of sealed concrete with its joints."""
+    n = 1024
+    clouds = 3.5 * _ripples(n, n, rows=0.006, columns=0.006)
+    specks = 2.2 * _ripples(n, n, rows=0.4, columns=0.4)
+    grey = 158.0 + clouds + specks
+    floor = np.stack([grey, grey * 0.995, grey * 0.97], axis=2)
+    for edge in (slice(0, 3), slice(n - 2, n)):
+        floor[edge, :] *= 0.72
+        floor[:, edge] *= 0.72
+    return floor
+
+
+def _compute_wall() -> FloatArray:
+    """Compute two metres of painted plaster."""
+    n = 256
+    clouds = 0.8 * _ripples(n, n, rows=0.02, columns=0.02)
+    specks = 1.2 * _ripples(n, n, rows=0.4, columns=0.4)
+    plaster = 240.0 + (clouds + specks)[:, :, None] + np.array([0.0, 0.0, -5.0])
+    return np.asarray(plaster)
+
+
+def _compute_ceiling() -> FloatArray:
+    """Compute a suspended ceiling: two by two boards of 0.6 m."""
+    n = 256
+    ceiling = 232.0 + 3.0 * _ripples(n, n, rows=0.4, columns=0.4)
+    for edge in (slice(0, 2), slice(n // 2 - 2, n // 2 + 2), slice(n - 2, n)):
+        ceiling[edge, :] *= 0.86
+        ceiling[:, edge] *= 0.86
+    return np.repeat(ceiling[:, :, None], 3, axis=2)
+
+
+def _grain(n_rows: int, n_columns: int, *, rows: float, columns: float) -> FloatArray:
+    """Return ripples for all three colours alike, shape (n_rows, n_columns, 3)."""
+    ripples = _ripples(n_rows, n_columns, rows=rows, columns=columns)
+    return np.repeat(ripples[:, :, None], 3, axis=2)
+
+
+def _ripples(n_rows: int, n_columns: int, *, rows: float, columns: float) -> FloatArray:
+    """Return noise that repeats without a seam; the arguments are its highest frequencies."""
+    noise = np.random.default_rng(_SEED).normal(size=(n_rows, n_columns))
+    across = np.fft.fftfreq(n_rows)[:, None] / rows
+    along = np.fft.fftfreq(n_columns)[None, :] / columns
+    smooth = np.fft.ifft2(np.fft.fft2(noise) * np.exp(-(across**2) - along**2)).real
+    return np.asarray(smooth / smooth.std())
+
+
+_COMPUTED: Mapping[Surface, Callable[[], FloatArray]] = MappingProxyType(
+    {
+        Surface.WOOD: _compute_wood,
+        Surface.FLOOR: _compute_floor,
+        Surface.WALL: _compute_wall,
+        Surface.CEILING: _compute_ceiling,
+    }
+)
+
+_GRAINS: Mapping[Surface, Callable[[], FloatArray]] = MappingProxyType(
+    {
+        Surface.CARDBOARD: lambda: 7.0 * _grain(192, 256, rows=0.35, columns=0.02),
+        Surface.CRATE_SIDE: lambda: 12.0 * _grain(256, 256, rows=0.3, columns=0.03),
+    }
+)
+"""What makes paper and wood rough, beside what is drawn on them."""

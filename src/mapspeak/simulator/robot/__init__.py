@@ -1,0 +1,1 @@
+"""The simulated robot: its body, its LiDAR, its SLAM and its navigation."""

@@ -1,0 +1,277 @@
+"""The robot's own navigation: plans on its map, drives on its own pose, and says how it went.
+
+It sees what a real navigation stack sees: the SLAM map and pose, odometry and the latest scan.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from mapspeak.geometry import Point, Pose
+from mapspeak.simulator.robot.controller import Obstacles, PathFollower
+from mapspeak.simulator.robot.physics import STANDING, Velocity
+from mapspeak.simulator.worlds.world import BODY_RADIUS_M
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.paths import Path, clearance_m, distances_from, find_path
+
+__all__ = ["DriveState", "DriveStatus", "Navigator", "Senses"]
+
+_PLANNING_RADII_M = (BODY_RADIUS_M + 0.05, BODY_RADIUS_M + 0.01)
+"""The radius to plan with, and the one for places that are too narrow for it."""
+_CHECK_PERIOD_S = 1.0
+_SLACK_M = 0.06
+"""A path stays good while the map lacks no more than this of the radius it was planned with."""
+
+_UNDER_ROBOT_POINTS = 8
+"""So many points of a path, one every 5 cm, are not looked at anew: the robot is all but there."""
+
+_PATIENCE_S = 6.0
+"""Longer than it takes to turn right round on the spot."""
+_PROGRESS_M = 0.1
+_MOST_RECOVERIES = 4
+_BACK_OFF_MPS = -0.15
+_BACK_OFF_S = 2.5
+_LOOK_AROUND_RADPS = 0.8
+_LOOK_AROUND_S = 2.5
+
+
+class DriveState(StrEnum):
+    """How a drive stands."""
+
+    DRIVING = "driving"
+    ARRIVED = "arrived"
+    BLOCKED = "blocked"
+    CANCELLED = "cancelled"
+    PREEMPTED = "preempted"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveStatus:
+    """How a drive stands, and why it ended.
+
+    Attributes:
+        state: See `DriveState`.
+        distance_left_m: Along the latest path; None before there was one.
+        n_recoveries: How often the robot backed off or turned to get free.
+        reason: Why it ended as it did; empty while it drives and when it has arrived.
+    """
+
+    state: DriveState
+    distance_left_m: float | None = None
+    n_recoveries: int = 0
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Senses:
+    """What the robot knows at one moment.
+
+    Attributes:
+        now_s: Robot time.
+        pose: By SLAM, in the map frame.
+        speed_mps: By the wheels.
+        obstacles: By the latest scan.
+        map: By SLAM.
+    """
+
+    now_s: float
+    pose: Pose
+    speed_mps: float
+    obstacles: Obstacles
+    map: OccupancyGrid
+
+
+@dataclass(frozen=True, slots=True)
+class _Recovery:
+    """A motion that is done for a while to get free."""
+
+    velocity: Velocity
+    ends_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Milestone:
+    """How near the robot had come to its goal, and when."""
+
+    left_m: float
+    passed_s: float
+
+
+class Navigator:
+    """Drives to one goal at a time."""
+
+    def __init__(self) -> None:
+        self._goal: Pose | None = None
+        self._follower: PathFollower | None = None
+        self._planning_radius_m = _PLANNING_RADII_M[0]
+        self._checked_s = -math.inf
+        self._checked_map: OccupancyGrid | None = None
+        self._recovery: _Recovery | None = None
+        self._milestone: _Milestone | None = None
+        self._status = DriveStatus(state=DriveState.CANCELLED, reason="There was no goal yet.")
+
+    @property
+    def status(self) -> DriveStatus:
+        """How the latest drive stands."""
+        return self._status
+
+    @property
+    def is_driving(self) -> bool:
+        """True while there is a goal to drive to."""
+        return self._goal is not None
+
+    def start(self, goal: Pose) -> None:
+        """Take up a new goal."""
+        self._goal = goal
+        self._follower = None
+        self._recovery = None
+        self._milestone = None
+        self._status = DriveStatus(state=DriveState.DRIVING)
+
+    def give_up(self, state: DriveState, reason: str) -> None:
+        """End the drive because somebody wants something else, if there is one."""
+        if self.is_driving:
+            self._end(state, reason)
+
+    def steer(self, senses: Senses) -> Velocity:
+        """Return the velocity to drive with now."""
+        if self._goal is None:
+            return STANDING
+        wanted = self._recover(senses) or self._follow(senses, self._goal)
+        return senses.obstacles.limit(wanted)
+
+    def _follow(self, senses: Senses, goal: Pose) -> Velocity:
+        if not self._has_good_path(senses) and not self._plan(senses, goal):
+            return STANDING
+        follower = self._follower
+        if follower is None:
+            return STANDING
+        if follower.has_arrived(senses.pose):
+            self._end(DriveState.ARRIVED, "")
+            return STANDING
+        velocity = follower.steer(senses.pose, senses.speed_mps, senses.obstacles)
+        self._tell(follower.distance_left_m)
+        self._watch_progress(senses.now_s, follower.distance_left_m)
+        return velocity
+
+    # --- planning ---
+
+    def _plan(self, senses: Senses, goal: Pose) -> bool:
+        """Plan anew; without a way try to get free, and in the end give up."""
+        path = self._find_path(senses, goal)
+        if path is not None:
+            self._follower = PathFollower(path, goal)
+            self._milestone = None
+            self._note_check(senses)
+            return True
+        self._follower = None
+        fault = _fault_of(senses.map, goal.point)
+        if fault is not None:
+            self._end(DriveState.BLOCKED, fault)
+        elif self._status.distance_left_m is None:
+            self._end(DriveState.BLOCKED, "No way to the goal over floor the map knows to be free.")
+        else:
+            self._start_recovery(senses.now_s, "The way to the goal is blocked.")
+        return False
+
+    def _find_path(self, senses: Senses, goal: Pose) -> Path | None:
+        for radius in _PLANNING_RADII_M:
+            path = find_path(senses.map, senses.pose.point, goal.point, radius_m=radius)
+            if path is not None:
+                self._planning_radius_m = radius
+                return path
+        # The gap by which it came in may lack a cell in the map's next state.
+        ways = distances_from(
+            senses.map, senses.pose.point, radius_m=_PLANNING_RADII_M[-1], leaves_pockets=True
+        )
+        return ways.path_to(goal.point)
+
+    def _has_good_path(self, senses: Senses) -> bool:
+        """Look about once a second whether the map still shows the path as free."""
+        if self._follower is None:
+            return False
+        is_early = senses.now_s - self._checked_s < _CHECK_PERIOD_S
+        if is_early or senses.map is self._checked_map:
+            return True
+        self._note_check(senses)
+        return _is_free_along(
+            senses.map, self._follower.points_left, self._planning_radius_m - _SLACK_M
+        )
+
+    def _note_check(self, senses: Senses) -> None:
+        self._checked_s = senses.now_s
+        self._checked_map = senses.map
+
+    # --- getting free ---
+
+    def _watch_progress(self, now_s: float, distance_left_m: float) -> None:
+        """Start a recovery when the robot has come no nearer for some seconds."""
+        if self._milestone is None or distance_left_m <= self._milestone.left_m - _PROGRESS_M:
+            self._milestone = _Milestone(distance_left_m, now_s)
+        elif now_s - self._milestone.passed_s > _PATIENCE_S:
+            self._follower = None
+            self._start_recovery(now_s, "The robot made no progress.")
+
+    def _start_recovery(self, now_s: float, reason: str) -> None:
+        n_recoveries = self._status.n_recoveries
+        if n_recoveries >= _MOST_RECOVERIES:
+            self._end(DriveState.BLOCKED, f"{reason} {n_recoveries} attempts to get free failed.")
+            return
+        if n_recoveries % 2 == 0:
+            motion, duration_s = Velocity(_BACK_OFF_MPS, 0.0), _BACK_OFF_S
+        else:
+            motion, duration_s = Velocity(0.0, _LOOK_AROUND_RADPS), _LOOK_AROUND_S
+        self._recovery = _Recovery(motion, now_s + duration_s)
+        self._milestone = None
+        self._status = replace(self._status, n_recoveries=n_recoveries + 1)
+
+    def _recover(self, senses: Senses) -> Velocity | None:
+        """Return the motion of a recovery under way."""
+        if self._recovery is not None and senses.now_s >= self._recovery.ends_s:
+            self._recovery = None
+        return None if self._recovery is None else self._recovery.velocity
+
+    # --- telling ---
+
+    def _tell(self, distance_left_m: float) -> None:
+        self._status = replace(self._status, distance_left_m=distance_left_m)
+
+    def _end(self, state: DriveState, reason: str) -> None:
+        self._goal = None
+        self._follower = None
+        self._recovery = None
+        self._status = replace(self._status, state=state, reason=reason)
+
+
+def _fault_of(grid: OccupancyGrid, goal: Point) -> str | None:
+    """Return why the robot cannot stand at a goal, whatever the way; None when it can."""
+    cell = grid.cell_at(goal)
+    if grid.is_unknown(cell):
+        return "The goal lies where the map knows nothing."
+    room_m = float(clearance_m(grid)[cell.row, cell.col])
+    if not grid.is_free(cell) or room_m < _PLANNING_RADII_M[-1]:
+        return (
+            f"The goal lies {room_m:.2f} m from an obstacle, the robot's radius is"
+            f" {BODY_RADIUS_M} m: it does not fit there."
+        )
+    return None
+
+
+def _is_free_along(
+    grid: OccupancyGrid, points: np.ndarray[tuple[int, int], np.dtype[np.float64]], radius_m: float
+) -> bool:
+    # The robot may stand where it could not plan to be; only what lies ahead of it counts.
+    rows, cols = grid.cells_at(points[_UNDER_ROBOT_POINTS:])
+    if not rows.size:
+        return True
+    rows, cols = rows.clip(0, grid.n_rows - 1), cols.clip(0, grid.n_cols - 1)
+    # What lies farther from the path than the radius takes no room from it.
+    reach = math.ceil(radius_m / grid.resolution_m) + 1
+    top, left = max(int(rows.min()) - reach, 0), max(int(cols.min()) - reach, 0)
+    near = grid.crop(
+        slice(top, int(rows.max()) + reach + 1), slice(left, int(cols.max()) + reach + 1)
+    )
+    is_open = near.free & (clearance_m(near) >= radius_m)
+    return bool(is_open[rows - top, cols - left].all())

@@ -1,0 +1,1 @@
+"""Worlds: their files, their walls and objects, and cuts through them."""

@@ -1,0 +1,109 @@
+"""A world as it truly is: walls, doors, objects, rooms. `worldfiles` reads it from a file."""
+
+from dataclasses import dataclass
+
+from mapspeak.geometry import Point, Pose
+from mapspeak.spatial.rooms import RoomClass
+
+__all__ = ["BODY_BAND_M", "BODY_RADIUS_M", "Door", "TrueRoom", "Wall", "World", "WorldObject"]
+
+BODY_RADIUS_M = 0.28
+"""Of the robot: a world must have room for it."""
+BODY_BAND_M = (0.02, 1.2)
+"""The heights between which its body, camera mast included, bumps into things."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wall:
+    """A straight piece of wall, already cut where doors are.
+
+    Attributes:
+        start: One end of its centre line.
+        end: The other end.
+        thickness_m: Across the centre line.
+        height_m: From the floor.
+    """
+
+    start: Point
+    end: Point
+    thickness_m: float
+    height_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Door:
+    """A gap that was cut into a wall.
+
+    Attributes:
+        name: Unique in its world.
+        pose: The middle of the gap on the wall's centre line; its x axis looks along the wall.
+        width_m: Between the two ends of the wall.
+    """
+
+    name: str
+    pose: Pose
+    width_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorldObject:
+    """A thing in the world.
+
+    Attributes:
+        name: Unique in its world.
+        kind: One of `mapspeak.simulator.worlds.models.kind_names`.
+        pose: Where its own frame stands on the floor plan; its front faces along its x axis.
+        base_height_m: How high above the floor it hangs; None for the kind's usual height.
+    """
+
+    name: str
+    kind: str
+    pose: Pose
+    base_height_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrueRoom:
+    """A room, corridor or open space as a person would outline it on the plan.
+
+    Attributes:
+        name: Unique in its world.
+        room_class: What it is.
+        outline: The corners, in order.
+    """
+
+    name: str
+    room_class: RoomClass
+    outline: tuple[Point, ...]
+
+    def contains(self, point: Point) -> bool:
+        """True when a point of the world's own frame lies inside the outline."""
+        n_crossings = 0
+        for start, end in zip(self.outline, (*self.outline[1:], self.outline[0]), strict=True):
+            if (start.y > point.y) != (end.y > point.y):
+                share = (point.y - start.y) / (end.y - start.y)
+                n_crossings += start.x + share * (end.x - start.x) > point.x
+        return n_crossings % 2 == 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class World:
+    """Everything that is true of a world. Scoring may read it; tools never do.
+
+    Attributes:
+        name: Such as "warehouse".
+        title: A sentence about it.
+        walls: All walls.
+        objects: All things.
+        rooms: The truth about rooms.
+        start: Where the robot stands at first, in the world's own frame.
+        doors: Where walls were cut.
+    """
+
+    name: str
+    title: str
+    walls: tuple[Wall, ...]
+    objects: tuple[WorldObject, ...]
+    rooms: tuple[TrueRoom, ...]
+    start: Pose
+    doors: tuple[Door, ...] = ()
