@@ -35,7 +35,7 @@ SOURCES = {
     "refused": ("safety", "places/goalcheck.py", "driving/drive.py"),
     "files": (
         "spatial/mapfiles.py",
-        "simulator/worldfiles.py",
+        "simulator/worlds/worldfiles.py",
         "cli/mapjobs.py",
         "cli/mapshowing.py",
     ),
