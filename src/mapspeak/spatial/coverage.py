@@ -23,7 +23,6 @@ class Coverage:
         recall: Share of the reference's free floor that is free on the map.
         precision: Share of the map's free floor that is free in the reference; 1 for a map that
             shows none.
-        free_area_m2: Free floor on the map.
         reference_area_m2: Free floor of the reference.
     """
 
@@ -39,8 +38,6 @@ class KnownArea:
     """What a map shows, with nothing to compare it with.
 
     Attributes:
-        free_area_m2: Free floor.
-        occupied_area_m2: Walls and things.
         known_ratio: Share of the array that is free or occupied.
         open_border_m: Length of the border along which free floor meets the unknown, within the
             array or at its edge; 0 when there is nothing left to see.
@@ -55,7 +52,7 @@ class KnownArea:
 def measure_coverage(
     grid: OccupancyGrid, reference: OccupancyGrid, *, reachable: Mask | None = None
 ) -> Coverage:
-    """Compares the free floor of a map with that of a reference.
+    """Compare the free floor of a map with that of a reference.
 
     The two may differ in origin, size, yaw and resolution: each cell is looked up in the other
     map by the place of its middle.
@@ -88,7 +85,7 @@ def measure_coverage(
 
 
 def measure_known_area(grid: OccupancyGrid) -> KnownArea:
-    """Gives how much a map shows and how long its border to the unknown is."""
+    """Return how much a map shows and how long its border to the unknown is."""
     cell_area_m2 = grid.resolution_m**2
     n_known = np.count_nonzero(~grid.unknown)
     return KnownArea(
@@ -111,7 +108,7 @@ def _checked(reachable: Mask, reference: OccupancyGrid) -> Mask:
 def _share_found(
     wanted: Mask, wanted_grid: OccupancyGrid, found: Mask, found_grid: OccupancyGrid
 ) -> float:
-    """Gives the share of the wanted cells whose middle lies in a found cell of the other grid."""
+    """Return the share of the wanted cells whose middle lies in a found cell of the other grid."""
     rows, cols = np.nonzero(wanted)
     n_found = 0
     for start in range(0, rows.size, _BLOCK_CELLS):
@@ -133,7 +130,7 @@ def _count_found(
 
 
 def _count_open_sides(grid: OccupancyGrid) -> int:
-    """Gives how many sides of free cells have an unknown cell, or no cell, behind them."""
+    """Return how many sides of free cells have an unknown cell, or no cell, behind them."""
     free = np.pad(grid.free, 1)
     unknown = np.pad(grid.unknown, 1, constant_values=True)
     along_rows = (free[:-1] & unknown[1:]) | (unknown[:-1] & free[1:])

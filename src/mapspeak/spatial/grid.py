@@ -45,7 +45,6 @@ class OccupancyGrid:
 
     Attributes:
         cells: int8, shape (rows, cols): -1 unknown, 0..100 the probability of being occupied.
-        resolution_m: The side of one cell.
         origin: The pose of the outer corner of cell (0, 0).
         stamp_s: Robot time at which the map was made.
 

@@ -73,9 +73,7 @@ class MapFileWarning:
     """Something in a map file that deserves a second look.
 
     Attributes:
-        oddity: What it is.
         n_cells: Cells that have the grey of unknown, and load as free.
-        share_ratio: Their share of all cells.
     """
 
     oddity: MapOddity
@@ -118,7 +116,7 @@ class _Description(BaseModel):
 
 
 def load_map(path: Path) -> LoadedMap:
-    """Reads a map_server .yaml and the picture it names.
+    """Read a map_server .yaml and the picture it names.
 
     Raises:
         MapError: A file is missing, damaged, too large, or says what cannot be.
@@ -129,7 +127,7 @@ def load_map(path: Path) -> LoadedMap:
 
 
 def load_picture(path: Path, *, resolution_m: float) -> LoadedMap:
-    """Reads a map's picture that has no .yaml: dark is occupied, 205 unknown, 254 and 255 free.
+    """Read a map's picture that has no .yaml: dark is occupied, 205 unknown, 254 and 255 free.
 
     Raises:
         MapError: The file is missing, damaged or too large, or the resolution is not positive.
@@ -148,7 +146,7 @@ def load_picture(path: Path, *, resolution_m: float) -> LoadedMap:
 
 
 def write_map(grid: OccupancyGrid, path: Path, *, mode: MapMode = MapMode.TRINARY) -> Path:
-    """Writes a map as map_saver does: the .yaml at the path, the picture beside it.
+    """Write a map as map_saver does: the .yaml at the path, the picture beside it.
 
     Trinary keeps free (up to 25), occupied (from 65) and unknown, the values between become
     unknown. Scale and raw keep every value; scale needs a .png for its transparent pixels.
@@ -177,7 +175,7 @@ def write_map(grid: OccupancyGrid, path: Path, *, mode: MapMode = MapMode.TRINAR
 
 
 def _build_map(description: _Description, grey: Grey, alpha: Grey | None, path: Path) -> LoadedMap:
-    """Gives the grid of a picture's greys; row 0 is the lowest line of the picture."""
+    """Return the grid of a picture's greys; row 0 is the lowest line of the picture."""
     occupancy_of = _occupancy_of_grey(description)
     cells = occupancy_of[grey]
     if alpha is not None and description.mode is not MapMode.RAW:
@@ -191,7 +189,7 @@ def _build_map(description: _Description, grey: Grey, alpha: Grey | None, path: 
 
 
 def _occupancy_of_grey(description: _Description) -> NDArray[np.int8]:
-    """Gives the occupancy of each of the 256 greys, in the single precision map_server uses."""
+    """Return the occupancy of each of the 256 greys, in the single precision map_server uses."""
     shade = np.arange(256, dtype=np.float32) / np.float32(255)
     if description.mode is MapMode.RAW:
         greys = np.arange(256)
@@ -288,7 +286,7 @@ def _line_of(error: Exception) -> str:
 
 
 def _say_wrong_value(path: Path, document: CommentedMap, error: ValidationError) -> MapError:
-    """Gives the first fault pydantic found, with the line of the file it stands in."""
+    """Return the first fault pydantic found, with the line of the file it stands in."""
     fault = error.errors()[0]
     key = str(fault["loc"][0])
     if key not in document:
@@ -305,7 +303,7 @@ def _say_wrong_value(path: Path, document: CommentedMap, error: ValidationError)
 
 
 def _read_picture(path: Path) -> tuple[Grey, Grey | None]:
-    """Gives the greys of a picture, and its alpha channel if it has one."""
+    """Return the greys of a picture, and its alpha channel if it has one."""
     try:
         with _open_regular(path) as file, Image.open(file, formats=_PICTURE_FORMATS) as picture:
             if picture.width * picture.height > MAX_CELLS:
@@ -333,7 +331,7 @@ def _say_too_large(path: Path, size: str) -> MapError:
 
 
 def _channels(picture: Image.Image) -> tuple[Grey, Grey | None]:
-    """Gives grey and alpha of any kind of picture; colours count by their brightness (Rec. 601)."""
+    """Return grey and alpha of any picture; colours count by their brightness (Rec. 601)."""
     if picture.mode.startswith("I"):
         wide = np.asarray(picture).astype(np.int64)
         return ((wide * 255 + 32767) // 65535).astype(np.uint8), None
@@ -355,7 +353,7 @@ def _save_picture(grid: OccupancyGrid, path: Path, mode: MapMode) -> None:
 
 
 def _grey_of_occupancy(mode: MapMode) -> Grey:
-    """Gives the grey of each occupancy from 0 to 100, and last, at index -1, that of unknown."""
+    """Return the grey of each occupancy from 0 to 100, and last, at index -1, that of unknown."""
     occupancy = np.arange(101)
     if mode is MapMode.RAW:
         greys, unknown = occupancy, 255
@@ -369,7 +367,7 @@ def _grey_of_occupancy(mode: MapMode) -> Grey:
 
 
 def _save_description(grid: OccupancyGrid, path: Path, image: str, mode: MapMode) -> None:
-    """Writes the .yaml; in scale mode with thresholds that leave every value as it is."""
+    """Write the .yaml; in scale mode with thresholds that leave every value as it is."""
     origin = CommentedSeq(float(v) for v in (grid.origin.x, grid.origin.y, grid.origin.yaw_rad))
     origin.fa.set_flow_style()
     is_scale = mode is MapMode.SCALE

@@ -28,11 +28,8 @@ class BorderRun:
     """A straight piece of border, with its label on the left.
 
     Attributes:
-        label: Whose border it is.
         other: The label on the right; 0 for none.
         direction: 0 along columns, 1 along rows, 2 and 3 backwards.
-        start: Where it begins.
-        end: Where it ends.
     """
 
     label: int

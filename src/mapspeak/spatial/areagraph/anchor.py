@@ -59,7 +59,7 @@ class MapAnchor:
         return round(math.degrees(self.yaw_rad), 12)
 
     def locate(self, point: Point) -> LatLon:
-        """Gives the place on Earth of a point of the map, to a hundredth of a micrometre.
+        """Return the place on Earth of a point of the map, to a hundredth of a micrometre.
 
         Raises:
             MapError: It is so far from the anchor that degrees run out.
@@ -76,7 +76,7 @@ class MapAnchor:
         return LatLon(round(lat, DEGREE_DECIMALS), round(math.remainder(lon, 360), DEGREE_DECIMALS))
 
     def point_at(self, place: LatLon) -> Point:
-        """Gives the point of the map at a place on Earth, to the micrometre."""
+        """Return the point of the map at a place on Earth, to the micrometre."""
         east, north = self._metres_per_degree()
         turned = Point(
             math.remainder(place.lon_deg - self.lon_deg, 360) * east,
@@ -88,7 +88,7 @@ class MapAnchor:
         )
 
     def _metres_per_degree(self) -> tuple[float, float]:
-        """Gives the metres to the east and to the north that one degree covers."""
+        """Return the metres to the east and to the north that one degree covers."""
         lat_rad = math.radians(self.lat_deg)
         root = math.sqrt(1 - _SQUARED_ECCENTRICITY * math.sin(lat_rad) ** 2)
         normal_m = _EQUATORIAL_RADIUS_M / root

@@ -58,7 +58,6 @@ class Area:
     """A node of the graph: a region with its outline.
 
     Attributes:
-        region: What is known about it.
         polygons: Where it lies; several when it is cut into parts, the largest first.
         text: What people read about it; files call it its `reason`.
     """
@@ -78,7 +77,6 @@ class Passage:
     """An edge of the graph: a door with the line that one crosses there.
 
     Attributes:
-        door: What is known about it.
         line: From post to post: the ends of the border that its two areas share there, which are
             corners of both outlines. None when the areas do not touch on the map.
     """
@@ -95,11 +93,6 @@ class Passage:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AreaGraph:
     """Areas joined by passages, in metres in the map frame.
-
-    Attributes:
-        name: What the map is called.
-        areas: The nodes.
-        passages: The edges.
 
     Raises:
         MapError: Ids are not unique, passages lead nowhere, areas name other doors than those that

@@ -25,8 +25,6 @@ class OsmMember:
 
     Attributes:
         type: "node", "way" or "relation".
-        ref: Its id.
-        role: What it is there.
     """
 
     type: str
@@ -40,10 +38,8 @@ class OsmElement:
 
     Attributes:
         id: Negative in files that no OSM server knows.
-        tags: Keys and values.
         place: Of a node; else None.
         refs: Of a way, the ids of its nodes.
-        members: Of a relation.
     """
 
     id: int
@@ -63,7 +59,7 @@ class OsmDocument:
 
 
 def write_osm_xml(document: OsmDocument) -> str:
-    """Gives the file as JOSM reads it; all elements are new ones that no server knows."""
+    """Return the file as JOSM reads it; all elements are new ones that no server knows."""
     lines = [
         "<?xml version='1.0' encoding='UTF-8'?>",
         f'<osm version="0.6" generator="{GENERATOR}">',
@@ -76,7 +72,7 @@ def write_osm_xml(document: OsmDocument) -> str:
 
 
 def read_osm_xml(text: str) -> OsmDocument:
-    """Reads a file; elements that were deleted in an editor are left out.
+    """Read a file; elements that were deleted in an editor are left out.
 
     Raises:
         MapError: It is not XML, declares a document type, or has elements that OSM does not allow.
@@ -151,7 +147,7 @@ class _Reader:
                 raise self._refusal(name) from error
 
     def _add(self, name: str, attributes: dict[str, str]) -> None:
-        """Adds a part to the element that is open."""
+        """Add a part to the element that is open."""
         if name == "tag":
             self._tags[attributes["k"]] = attributes["v"]
         elif name == "nd":
@@ -215,5 +211,5 @@ def _element_lines(name: str, element: OsmElement) -> Iterable[str]:
 
 
 def _quoted(text: str) -> str:
-    """Gives a text as it stands between quotes; a bare line break there would read as a space."""
+    """Return a text as it stands between quotes; a bare line break there would read as a space."""
     return escape(text).replace("\n", "&#10;")

@@ -27,13 +27,7 @@ Picture = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Border:
-    """Free cells beside the unknown that hang together.
-
-    Attributes:
-        rows: Of its cells.
-        cols: Of its cells.
-        length_m: Along it.
-    """
+    """Free cells beside the unknown that hang together."""
 
     rows: IntArray
     cols: IntArray
@@ -46,7 +40,6 @@ class Borders:
 
     Attributes:
         kept: Those long enough to be worth a look.
-        n_short: How many others there are.
     """
 
     kept: tuple[Border, ...]
@@ -136,9 +129,6 @@ class ReachableFloor:
     """The floor that the robot can get to, and what matters for looking over its borders.
 
     Attributes:
-        distances: From the robot, by path.
-        free: Where floor is known.
-        reachable: Where the robot can get to.
         clearances_m: From every cell to the nearest obstacle.
     """
 

@@ -35,7 +35,6 @@ class Frontier:
         id: Such as "F2"; the same from call to call while the frontier exists.
         points: The centres of its cells in metres, shape (n, 2).
         anchor: The one of them that the pose looks over.
-        length_m: Along the border.
         gain_m2: Unknown floor that is to be expected to come into view at the pose.
         distance_m: From the robot to the pose, by path.
         openness_m: What that was reckoned with: how far one sees on this map, on average.
@@ -79,8 +78,6 @@ class RefusedFrontier:
 
     Attributes:
         anchor: One of its cells, near its middle.
-        length_m: Along the border.
-        reason: Why.
         gap_width_m: Where it is too narrow: how wide the way is at its narrowest.
         needed_width_m: Where it is too narrow: how wide the robot is.
         gain_m2: Where there is nothing to see: how much there is.
@@ -111,7 +108,6 @@ class WaysBetween:
     """How far it is from frontier to frontier.
 
     Attributes:
-        stops: Their poses' places.
         metres: By path, shape (n, n).
     """
 
@@ -127,7 +123,6 @@ class FrontierReport:
         frontiers: Where to go, best first.
         refused: Where not to go, longest first.
         n_unlisted: Borders so short that they are nothing but noise.
-        verdict: Whether anything is left.
         ways: Between those that were weighed against each other; they hold while the map does.
         n_named: The highest number given to a frontier so far; the next new one gets one more.
     """

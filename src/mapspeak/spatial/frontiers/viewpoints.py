@@ -176,7 +176,6 @@ class Views:
         depths: Steps into the unknown, this one included; 0 on known floor and behind walls.
             Shape (places, rays, steps).
         steps_m: From the place to each step.
-        stride_m: The length of a step.
         openness_m: How far a ray goes over known floor, on average, until it meets a wall.
     """
 

@@ -26,11 +26,8 @@ class DistanceField:
     around the same corners as the crow flies.
 
     Attributes:
-        start: Where the robot is.
-        radius_m: Of the robot.
         lattice: The cells that the distances belong to.
         costs: The distances in lattice cells, flat; infinite where the robot cannot go.
-        leaves_pockets: See `open_pocket`.
         closed_lattice: The map's, without a gap that was opened for this start.
     """
 

@@ -66,13 +66,11 @@ class Lattice:
     """A grid's passable cells, perhaps two by two, and where one can go from each.
 
     Attributes:
-        grid: The map it belongs to.
         passable: True where the robot's centre may be; the shape of the map.
         factor: How many of the map's cells make the side of one of the lattice.
         moves: The directions in which each lattice cell may be left, as bits.
         is_open: True where a lattice cell can be entered.
         clearance_m: The largest within each lattice cell.
-        fine_clearance_m: Of each of the map's cells.
     """
 
     grid: OccupancyGrid

@@ -43,7 +43,6 @@ class Path:
 
     Attributes:
         points: At least two places, in the order they are passed.
-        length_m: Along the way.
     """
 
     points: tuple[Point, ...]

@@ -48,7 +48,7 @@ class MetricLine:
 
 
 def margins_for(extent: Extent, spacing_m: float, *, up_rad: float, legend_px: int) -> Margins:
-    """Gives the room that the numbers along the sides need, and a legend of that height below."""
+    """Return the room that the numbers along the sides need, and a legend of that height below."""
     height, width = _widest_number(extent, spacing_m, up_rad).shape
     return Margins(
         side_px=width + 2 * _NUMBER_GAP_PX,
@@ -59,13 +59,13 @@ def margins_for(extent: Extent, spacing_m: float, *, up_rad: float, legend_px: i
 
 
 def legend_top(view: PictureView) -> int:
-    """Gives the first row below the numbers under the map."""
+    """Return the first row below the numbers under the map."""
     height = text_patch("0", NUMBER_SIZE_PX).shape[0]
     return view.area.bottom + int(height) + 2 * _NUMBER_GAP_PX
 
 
 def lines_in_view(view: PictureView, spacing_m: float) -> tuple[MetricLine, ...]:
-    """Gives the lines at whole multiples of the spacing that cross the map area."""
+    """Return the lines at whole multiples of the spacing that cross the map area."""
     corners = view.area_corners()
     lines = []
     for index, axis in enumerate("xy"):
@@ -78,7 +78,7 @@ def lines_in_view(view: PictureView, spacing_m: float) -> tuple[MetricLine, ...]
 
 
 def draw_lines_under_walls(inside: Canvas, lines: tuple[MetricLine, ...]) -> None:
-    """Draws the grid on the map area so that no wall pixel changes; zero's lines are stronger."""
+    """Draw the grid on the map area so that no wall pixel changes; zero's lines are stronger."""
     for over, wanted in (
         (GRID_OVER, [line for line in lines if line.multiple != 0]),
         (ZERO_LINE_OVER, [line for line in lines if line.multiple == 0]),
@@ -95,7 +95,7 @@ def draw_lines_under_walls(inside: Canvas, lines: tuple[MetricLine, ...]) -> Non
 def draw_numbers(
     canvas: Canvas, view: PictureView, lines: tuple[MetricLine, ...], spacing_m: float
 ) -> None:
-    """Writes each line's coordinate outside the map at both of its ends.
+    """Write each line's coordinate outside the map at both of its ends.
 
     Where the numbers would touch, only every second, fifth or tenth line gets one. At a corner
     the number of one side gives way to that of the other: it is pulled in, or left out.
@@ -117,12 +117,12 @@ def draw_numbers(
 
 
 def draw_frame(canvas: Canvas, area: Box) -> None:
-    """Draws a thin frame around the map, outside it."""
+    """Draw a thin frame around the map, outside it."""
     cv2.rectangle(canvas, (area.left - 1, area.top - 1), (area.right, area.bottom), (FRAME,))
 
 
 def draw_zero(inside: Canvas, view: PictureView) -> None:
-    """Marks the map's origin, (0, 0), with a ring under the walls, where the picture shows it."""
+    """Mark the map's origin, (0, 0), with a ring under the walls, where the picture shows it."""
     if not view.shows(Point(0.0, 0.0)):
         return
     before = inside.copy()
@@ -131,7 +131,7 @@ def draw_zero(inside: Canvas, view: PictureView) -> None:
 
 
 def _ends_in_area(view: PictureView, index: int, value_m: float) -> FloatArray | None:
-    """Gives where the line of constant x (index 0) or y (1) meets the sides of the map area."""
+    """Return where the line of constant x (index 0) or y (1) meets the sides of the map area."""
     corners = view.area_corners()
     along = 1 - index
     points = np.full((2, 2), value_m)
@@ -145,7 +145,7 @@ def _ends_in_area(view: PictureView, index: int, value_m: float) -> FloatArray |
 
 
 def _box_outside(line: MetricLine, end: FloatArray, patch: Canvas, area: Box) -> Box:
-    """Gives the box for a number beside the point in which its line leaves the map area.
+    """Return the box for a number beside the point in which its line leaves the map area.
 
     In a corner that is on the side which the line runs towards.
     """
@@ -164,7 +164,7 @@ def _box_outside(line: MetricLine, end: FloatArray, patch: Canvas, area: Box) ->
 
 
 def _pulled_in(box: Box, area: Box) -> Box:
-    """Gives a box beside the map area moved along its side until it does not pass the corner."""
+    """Return a box beside the map area moved along its side until it does not pass the corner."""
     left, top = box.left, box.top
     if area.top < box.bottom and box.top < area.bottom:
         top = min(max(top, area.top), area.bottom - box.height)
@@ -174,7 +174,7 @@ def _pulled_in(box: Box, area: Box) -> Box:
 
 
 def _is_near(box: Box, other: Box) -> bool:
-    """True when two numbers could be read as one."""
+    """Return True when two numbers could be read as one."""
     grown = Box(box.left - _APART_PX, box.top - 2, box.right + _APART_PX, box.bottom + 2)
     return grown.overlaps(other)
 
@@ -192,7 +192,7 @@ def _widest_number(extent: Extent, spacing_m: float, up_rad: float) -> Canvas:
 
 
 def _stride(needed_px: float, pitch_px: float) -> int:
-    """Gives the smallest of 1, 2, 5, 10, 20, ... lines that leaves room for a number each."""
+    """Return the smallest of 1, 2, 5, 10, 20, ... lines that leaves room for a number each."""
     ten = 1
     while True:
         for step in (1, 2, 5):

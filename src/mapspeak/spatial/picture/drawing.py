@@ -18,7 +18,6 @@ from mapspeak.spatial.picture.labels import (
     label_at,
     labels_of_marks,
     labels_of_regions,
-    place_labels,
 )
 from mapspeak.spatial.picture.legend import (
     ROW_PX,
@@ -37,6 +36,7 @@ from mapspeak.spatial.picture.palette import (
     WALL,
     Canvas,
 )
+from mapspeak.spatial.picture.placing import place_labels
 from mapspeak.spatial.picture.regions import (
     check_layer,
     colour_regions,
@@ -60,11 +60,7 @@ class MapLayers:
     """What is drawn over the ground, from the lowest to the highest.
 
     Attributes:
-        regions: Areas of the floor.
         zones: Parts of the map that are set apart from it, such as what is closed.
-        lines: Paths, doors, borders.
-        marks: Places, each with a label.
-        robot: Where the robot stands.
         legend: What symbols and patterns mean; only those that are to be seen are explained, in
             this order, below the map.
     """
@@ -82,7 +78,6 @@ class MapPicture:
     """A drawn map, and what a text beside it has to say about it.
 
     Attributes:
-        png: The encoded picture.
         view: The transform between the map and the pixels.
         spacing_m: Between the lines of the metric grid; None where none is drawn.
         labels_left_out: Texts of things in the picture whose label found no room.
@@ -116,7 +111,7 @@ def draw_map(
     zoom: plan.Zoom | None = None,
     max_edge_px: int = 1000,
 ) -> MapPicture:
-    """Draws the known part of a map, or a closer look at some of it, as a PNG.
+    """Draw the known part of a map, or a closer look at some of it, as a PNG.
 
     Args:
         grid: The map.
@@ -156,7 +151,7 @@ def plan_sheet(
     max_edge_px: int,
     steps_per_pixel: int = 1,
 ) -> PictureView:
-    """Gives the view with room for numbers and legend; see `plan.plan_view`.
+    """Return the view with room for numbers and legend; see `plan.plan_view`.
 
     The more rows the legend gets, the smaller the map, and the more rows the legend needs.
     """
@@ -179,7 +174,7 @@ def plan_sheet(
 
 
 def draw_axes(canvas: Canvas, view: PictureView, spacing_m: float) -> None:
-    """Draws the metric grid under the walls, and the frame and numbers around the map."""
+    """Draw the metric grid under the walls, and the frame and numbers around the map."""
     lines = axes.lines_in_view(view, spacing_m)
     inside = view.area_of(canvas)
     axes.draw_lines_under_walls(inside, lines)
@@ -196,7 +191,7 @@ def finish(
     legend: Legend,
     regions: NDArray[np.uint16] | None,
 ) -> MapPicture:
-    """Draws zones, lines, symbols, the robot, all labels and the legend; gives the picture."""
+    """Draw zones, lines, symbols, the robot, all labels and the legend; gives the picture."""
     zones = paint_zones(view.area_of(canvas), view, layers.zones)
     sight = _look(view, layers, regions, zones)
     left_out = _draw_scene(view.area_of(canvas), view, sight, regions)
@@ -224,7 +219,7 @@ def finish(
 
 
 def encode(canvas: Canvas) -> bytes:
-    """Gives a palette PNG; run lengths alone pack a map well, and in a fraction of the time."""
+    """Return a palette PNG; run lengths alone pack a map well, and in a fraction of the time."""
     picture = Image.fromarray(canvas)
     picture.putpalette(PALETTE.tobytes())
     file = io.BytesIO()
@@ -242,7 +237,7 @@ class _Sight:
 
 
 def _robot_label(robot: Pose) -> str:
-    """Gives the words beside the robot's arrow."""
+    """Return the words beside the robot's arrow."""
     return f"robot {robot.x:.2f}, {robot.y:.2f}, {robot.yaw_deg:.0f}°"
 
 
@@ -260,7 +255,7 @@ def _regions_of(layers: MapLayers) -> tuple[PictureRegion, ...]:
 
 
 def _everything(layers: MapLayers) -> PictureScene:
-    """Gives all that a picture of the whole map would show."""
+    """Return all that a picture of the whole map would show."""
     return PictureScene(
         regions=_regions_of(layers),
         zones=layers.zones,
@@ -277,7 +272,7 @@ def _look(
     regions: NDArray[np.uint16] | None,
     zones: dict[Zone, tuple[float, float] | None],
 ) -> _Sight:
-    """Gives the part of all that which lies in the view."""
+    """Return the part of all that which lies in the view."""
     named = _regions_of(layers)
     poles = {} if regions is None else find_poles(regions, tuple(r.label for r in named))
     robot = layers.robot
@@ -295,7 +290,7 @@ def _look(
 def _paint_regions(
     inside: Canvas, grid: OccupancyGrid, view: PictureView, layer: RegionLayer | None
 ) -> NDArray[np.uint16] | None:
-    """Paints the regions and gives the region of each pixel."""
+    """Paint the regions and gives the region of each pixel."""
     if layer is None:
         return None
     check_layer(layer, grid)
@@ -307,7 +302,7 @@ def _paint_regions(
 def _draw_scene(
     inside: Canvas, view: PictureView, sight: _Sight, regions: NDArray[np.uint16] | None
 ) -> tuple[str, ...]:
-    """Draws lines, symbols, the robot and all labels; gives the names left out."""
+    """Draw lines, symbols, the robot and all labels; gives the names left out."""
     scene = sight.scene
     for line in scene.lines:
         ink.draw_line(inside, view, line)

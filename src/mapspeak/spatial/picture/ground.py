@@ -30,12 +30,12 @@ _MAX_SAMPLE_STEP_CELLS = 0.7
 
 
 def is_aligned(grid: OccupancyGrid, up_rad: float) -> bool:
-    """True when the grid's own axes point right and up in a picture with that direction up."""
+    """Return True when the grid's axes point right and up in a picture with that direction up."""
     return abs(_turn_in_view(grid, up_rad)) < _ANGLE_SLACK_RAD
 
 
 def sample(values: NDArray[Number], grid: OccupancyGrid, view: PictureView) -> NDArray[Number]:
-    """Gives, for each pixel of the map area, the highest value of the cells it covers.
+    """Return, for each pixel of the map area, the highest value of the cells it covers.
 
     Pixels outside the grid get -1 (signed values) or 0 (unsigned ones).
     """
@@ -45,7 +45,7 @@ def sample(values: NDArray[Number], grid: OccupancyGrid, view: PictureView) -> N
 
 
 def paint_ground(grid: OccupancyGrid, view: PictureView) -> Canvas:
-    """Gives the map area in palette numbers: unknown, free, wall."""
+    """Return the map area in palette numbers: unknown, free, wall."""
     seen = sample(grid.cells, grid, view)
     ground = np.full(seen.shape, UNKNOWN_GROUND, dtype=np.uint8)
     ground[seen >= 0] = FREE
@@ -54,14 +54,14 @@ def paint_ground(grid: OccupancyGrid, view: PictureView) -> Canvas:
 
 
 def paint_paper_ground(grid: OccupancyGrid, view: PictureView) -> Canvas:
-    """Gives the map area in palette numbers of the paper's grey levels (eq. 1)."""
+    """Return the map area in palette numbers of the paper's grey levels (eq. 1)."""
     seen = sample(grid.cells, grid, view)
     painted: Canvas = GREYS[seen.astype(np.intp) - UNKNOWN]
     return painted
 
 
 def _turn_in_view(grid: OccupancyGrid, up_rad: float) -> float:
-    """Gives the angle of the grid's x axis in the picture, counter-clockwise from its right."""
+    """Return the angle of the grid's x axis in the picture, counter-clockwise from its right."""
     return math.remainder(grid.origin.yaw_rad - up_rad + math.pi / 2, math.tau)
 
 
@@ -85,7 +85,7 @@ def _sample_aligned(
 
 
 def _first_cells(n_pixels: int, cells_per_pixel: float) -> IntArray:
-    """Gives the first cell of each pixel in a row; a cell belongs to the pixel its middle is in."""
+    """Return the first cell of each pixel in a row; a cell belongs to the pixel of its middle."""
     pixels = np.arange(n_pixels)
     if cells_per_pixel < 1:
         earlier: IntArray = np.floor(pixels * cells_per_pixel + 1e-6).astype(np.intp)
@@ -95,14 +95,14 @@ def _first_cells(n_pixels: int, cells_per_pixel: float) -> IntArray:
 
 
 def _spans(starts: IntArray) -> tuple[IntArray, IntArray]:
-    """Gives the first and the last cell from each start to before the next; one at the least."""
+    """Return the first and the last cell from each start to before the next; one at the least."""
     return starts[:-1], np.maximum(starts[1:] - 1, starts[:-1])
 
 
 def _pool(
     values: NDArray[Number], firsts: IntArray, lasts: IntArray, *, axis: int
 ) -> NDArray[Number]:
-    """Gives the highest value from each first to its last place along an axis."""
+    """Return the highest value from each first to its last place along an axis."""
     n_cells = values.shape[axis]
     pooled = np.take(values, np.clip(firsts, 0, n_cells - 1), axis=axis)
     for offset in range(1, int((lasts - firsts).max(initial=0)) + 1):
@@ -120,7 +120,7 @@ def _outside_value(values: NDArray[Number]) -> int:
 def _sample_turned(
     values: NDArray[Number], grid: OccupancyGrid, view: PictureView
 ) -> NDArray[Number]:
-    """Reads a turned grid: made as coarse as the pixels, read densely, then pooled."""
+    """Read a turned grid: made as coarse as the pixels, read densely, then pooled."""
     cells_per_pixel = 1.0 / (view.pixels_per_m * grid.resolution_m)
     n_pooled = max(1, math.floor(cells_per_pixel))
     n_fine = math.ceil(cells_per_pixel / n_pooled / _MAX_SAMPLE_STEP_CELLS)
@@ -141,7 +141,7 @@ def _sample_turned(
 
 
 def _cells_in_view(grid: OccupancyGrid, view: PictureView) -> tuple[IntArray, IntArray]:
-    """Gives the first (row, col) that the view can show, and the first past the last."""
+    """Return the first (row, col) that the view can show, and the first past the last."""
     corners = grid.fractional_cells_at(view.area_corners())
     shape = np.array(grid.cells.shape)
     first = np.clip(np.floor(corners.min(axis=0)).astype(np.intp), 0, shape)
@@ -150,7 +150,7 @@ def _cells_in_view(grid: OccupancyGrid, view: PictureView) -> tuple[IntArray, In
 
 
 def _coarsen(values: NDArray[Number], n_pooled: int) -> NDArray[Number]:
-    """Gives the highest value of each block of n x n; blocks at the far sides may be smaller."""
+    """Return the highest value of each block of n x n; blocks at the far sides may be smaller."""
     for axis in (0, 1):
         n_blocks = -(-values.shape[axis] // n_pooled)
         values = _pool(values, *_spans(np.arange(n_blocks + 1) * n_pooled), axis=axis)
@@ -160,7 +160,7 @@ def _coarsen(values: NDArray[Number], n_pooled: int) -> NDArray[Number]:
 def _coarse_from_fine(
     grid: OccupancyGrid, view: PictureView, *, n_fine: int, n_pooled: int, first: IntArray
 ) -> NDArray[np.float64]:
-    """Gives the affine map from a point of the fine lattice to a coarse cell, both (x, y).
+    """Return the affine map from a point of the fine lattice to a coarse cell, both (x, y).
 
     Args:
         grid: The turned grid.

@@ -4,19 +4,18 @@ Marks in nearly the same place share one label, so that it is plain what it belo
 """
 
 import math
+from dataclasses import dataclass
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from mapspeak.spatial.grid import FloatArray
-from mapspeak.spatial.picture.field import HALO_PX, Label, LabelField, Placed
+from mapspeak.spatial.grid import FloatArray, IntArray
 from mapspeak.spatial.picture.ink import SYMBOL_REACH_PX, draw_polygon, draw_stroke, stamp
 from mapspeak.spatial.picture.marks import Mark, PictureRegion
-from mapspeak.spatial.picture.palette import IS_BUSY, Canvas, Colour
-from mapspeak.spatial.picture.placing import find_places, leader_of
+from mapspeak.spatial.picture.palette import Canvas, Colour
 from mapspeak.spatial.picture.view import Box
 
+HALO_PX = 3
+_N_DIRECTIONS = 16
 _SAME_PLACE_PX = 10.0
 """Symbols that near cover each other by more than half."""
 
@@ -24,6 +23,73 @@ _TURNS = np.linspace(0.0, math.tau, 9)
 _DOT = 3.0 * np.stack([np.cos(_TURNS), np.sin(_TURNS)], axis=1)
 _N_SHARING = 12
 _MAX_LINE_LETTERS = 16
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Label:
+    """A text and the place it belongs to, in pixels of the map area.
+
+    Attributes:
+        wordings: Ways to write it, the best first; see `text_patch`.
+        names: What it names, for a reader who has to do without it.
+        clearance_px: How far the symbol at that place reaches; 0 for a label that may lie on it.
+        region: The number of the region it names; None where it names a point.
+    """
+
+    wordings: tuple[str, ...]
+    names: tuple[str, ...]
+    u: float
+    v: float
+    clearance_px: float = 0.0
+    region: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Placed:
+    """A label with its place in the picture.
+
+    Attributes:
+        has_leader: A line joins it to what it names.
+    """
+
+    label: Label
+    patch: Canvas
+    box: Box
+    has_leader: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Rings:
+    """Positions on and around a place: the directions to them, and their distances from it."""
+
+    gaps_px: FloatArray
+    across: FloatArray
+    down: FloatArray
+
+    def boxes_around(self, label: Label, patch: Canvas) -> IntArray:
+        """Return the label's box, as (left, top, right, bottom), in each position."""
+        height, width = patch.shape
+        reach = self.gaps_px + label.clearance_px
+        boxes = np.empty((len(reach), 4), dtype=np.intp)
+        left = label.u - width / 2 + self.across * (reach + width / 2)
+        top = label.v - height / 2 + self.down * (reach + height / 2)
+        boxes[:, 0], boxes[:, 1] = np.rint(left), np.rint(top)
+        boxes[:, 2], boxes[:, 3] = boxes[:, 0] + width, boxes[:, 1] + height
+        return boxes
+
+
+def _build_rings(gaps_px: tuple[float, ...]) -> Rings:
+    turns = np.tile(np.arange(_N_DIRECTIONS) * math.tau / _N_DIRECTIONS, len(gaps_px))
+    gaps = np.repeat(np.array(gaps_px), _N_DIRECTIONS)
+    return Rings(
+        gaps_px=np.append(0.0, gaps),
+        across=np.append(0.0, np.cos(turns)),
+        down=np.append(0.0, -np.sin(turns)),
+    )
+
+
+NEAR_RINGS = _build_rings((2.0,))
+FAR_RINGS = _build_rings((6.0, 14.0, 24.0, 36.0, 50.0, 66.0, 84.0, 104.0, 130.0, 160.0))
 
 
 def label_at(place: FloatArray, text: str, *, clearance_px: float) -> Label:
@@ -68,29 +134,6 @@ def labels_of_regions(
     ]
 
 
-def place_labels(
-    inside: Canvas,
-    labels: list[Label],
-    *,
-    obstacles: list[Box],
-    regions: NDArray[np.uint16] | None,
-) -> tuple[list[Placed], tuple[str, ...]]:
-    """Return the labels with their places, and the names of those that found none.
-
-    Args:
-        inside: The map area in palette numbers, with the lines but without the symbols.
-        labels: In the order in which they may choose.
-        obstacles: Boxes that no label may touch, such as symbols.
-        regions: The region of each pixel, for labels that name one.
-    """
-    if not labels:
-        return [], ()
-    covered_before = cv2.integral(cv2.LUT(inside, IS_BUSY)).astype(np.int32, copy=False)
-    field = LabelField(covered_before=covered_before, regions=regions)
-    placed, left_out = find_places(tuple(labels), field, tuple(obstacles))
-    return placed, tuple(name for label in left_out for name in label.names)
-
-
 def draw_leaders(inside: Canvas, placed: list[Placed]) -> None:
     """Draw thin lines from places to their labels; symbols belong above them."""
     for spot in placed:
@@ -129,3 +172,11 @@ def _in_lines(names: tuple[str, ...]) -> str:
         else:
             lines.append(name)
     return "\n".join(lines)
+
+
+def leader_of(label: Label, box: Box) -> FloatArray:
+    """Return the line from what a label names to the nearest point of its box, shape (2, 2)."""
+    start = np.array([label.u, label.v])
+    end = np.clip(start, (box.left, box.top), (box.right, box.bottom)).astype(np.float64)
+    away = (end - start) / max(1e-9, float(np.hypot(*(end - start))))
+    return np.stack([start + label.clearance_px * away, end])

@@ -70,11 +70,6 @@ class PictureScene:
     """What is to be seen in a picture, or may be, besides the ground.
 
     Attributes:
-        regions: Areas of the floor.
-        zones: Hatched parts of the map.
-        lines: Paths and borders.
-        marks: Symbols with labels.
-        robot: The robot's pose.
         has_origin: The map's origin is in the picture.
     """
 
@@ -86,7 +81,7 @@ class PictureScene:
     has_origin: bool = False
 
     def shows(self, sample: LegendSample) -> bool:
-        """True when that kind of thing is to be seen."""
+        """Return True when that kind of thing is to be seen."""
         regions = self.regions
         is_shown = {
             LegendSample.ZONE: bool(self.zones),
@@ -100,7 +95,7 @@ class PictureScene:
         return is_shown[sample]
 
     def find_colour(self, entry: LegendEntry) -> Colour | None:
-        """Gives the colour of the first mark or line that an entry explains."""
+        """Return the colour of the first mark or line that an entry explains."""
         found = [mark.colour for mark in self.marks if mark.shape is entry.sample]
         found += [line.colour for line in self.lines if line.style is entry.sample]
         return next((colour for colour in found if entry.colour in {None, colour}), None)
@@ -112,8 +107,6 @@ class Legend:
 
     Attributes:
         spacing_m: Between the lines of the metric grid.
-        grounds: The colours of the ground.
-        entries: Symbols and patterns.
     """
 
     spacing_m: float
@@ -121,7 +114,7 @@ class Legend:
     entries: tuple[LegendEntry, ...] = ()
 
     def limited_to(self, scene: PictureScene) -> "Legend":
-        """Gives the legend with only the entries for what a scene shows, each with a colour."""
+        """Return the legend with only the entries for what a scene shows, each with a colour."""
         shown = []
         for entry in self.entries:
             if isinstance(entry.sample, LegendSample):
@@ -132,7 +125,7 @@ class Legend:
         return replace(self, entries=tuple(shown))
 
     def draw(self, canvas: Canvas, view: PictureView, top: int) -> int:
-        """Draws the rows that have room from a row of the canvas on; gives the row below them."""
+        """Draw the rows that have room from a row of the canvas on; gives the row below them."""
         for row in _rows(self, view):
             if top + ROW_PX > view.height_px:
                 break
@@ -166,12 +159,12 @@ class _Item:
 
 
 def n_rows_of(legend: Legend, view: PictureView) -> int:
-    """Gives how many rows a legend takes at the width of a picture."""
+    """Return how many rows a legend takes at the width of a picture."""
     return len(_rows(legend, view))
 
 
 def grounds_in(inside: Canvas, grounds: tuple[GroundEntry, ...]) -> tuple[GroundEntry, ...]:
-    """Gives those colours of the ground that are to be seen on the map area."""
+    """Return those colours of the ground that are to be seen on the map area."""
     return tuple(entry for entry in grounds if (inside == entry.palette_number).any())
 
 
@@ -278,7 +271,7 @@ def _draw_zone(canvas: Canvas, left: int, middle: int) -> None:
 
 
 def _draw_region(canvas: Canvas, left: int, middle: int, *, sample: LegendSample) -> None:
-    """Draws a swatch in two of the colours that regions have, with the pattern."""
+    """Draw a swatch in two of the colours that regions have, with the pattern."""
     if sample is LegendSample.HIGHLIGHTED_REGION:
         _draw_swatch(canvas, left, middle, number=FREE, width_px=_WIDE_SWATCH_PX)
         corners = (left + 2, middle - 5), (left + _WIDE_SWATCH_PX - 2, middle + 5)

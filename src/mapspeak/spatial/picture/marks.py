@@ -47,10 +47,8 @@ class Mark:
     """A symbol at a place, with a short label beside it.
 
     Attributes:
-        point: Where it stands.
         label: The text beside it, such as an id; empty for none.
         shape: The symbol; None for the label alone.
-        colour: Of the symbol.
     """
 
     point: Point
@@ -64,9 +62,6 @@ class Line:
     """A line through points of the map.
 
     Attributes:
-        points: At least two.
-        style: Solid or dashed.
-        colour: Of the line.
         width_px: Its thickness in the picture.
     """
 
@@ -85,7 +80,6 @@ class PictureRegion:
         text: What is written in it; empty for none.
         colour: Of its pale fill; None for one that differs from the neighbours'.
         is_hatched: Its fill has diagonal lines.
-        is_dotted: Its fill has dots.
         is_highlighted: It has a bold outline, for the one region that a picture is about.
         key: What stays the same from picture to picture, such as the number in its id; it decides
             on an automatic colour. None where the label itself stays the same.
@@ -106,7 +100,6 @@ class RegionLayer:
 
     Attributes:
         labels: uint16, the shape of the grid's cells; 0 belongs to no region.
-        regions: Those that are drawn.
 
     Raises:
         MapError: A label is not between 0 and 65535, or the array has not two dimensions.
@@ -147,7 +140,6 @@ class LegendEntry:
     """One symbol of a picture and what it stands for.
 
     Attributes:
-        sample: What is explained.
         text: Its meaning in a word or two.
         colour: Only for marks and lines of this colour; None for those of any.
     """

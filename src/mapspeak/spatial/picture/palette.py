@@ -72,7 +72,7 @@ GREYS: NDArray[np.uint8] = np.arange(102, dtype=np.uint8) + _GREY_START
 
 
 def _mix(colour: Rgb, other: Rgb, share: float) -> Rgb:
-    """Gives a mixture with that share of the first colour."""
+    """Return a mixture with that share of the first colour."""
     red, green, blue = (
         round(share * a + (1 - share) * b) for a, b in zip(colour, other, strict=True)
     )
@@ -109,7 +109,7 @@ def _grid_over_fill(colour: Colour) -> int:
 def _build_grid_over(
     *, on_free: int, on_unknown: int, on_paper_unknown: int, fill_offset: int
 ) -> NDArray[np.uint8]:
-    """Gives what a grid line turns each palette number into; walls stay what they are."""
+    """Return what a grid line turns each palette number into; walls stay what they are."""
     over = np.arange(256, dtype=np.uint8)
     over[FREE], over[UNKNOWN_GROUND], over[GREYS[0]] = on_free, on_unknown, on_paper_unknown
     over[GREYS[1:51]] = on_free
@@ -120,7 +120,7 @@ def _build_grid_over(
 
 
 def _build_is_busy() -> NDArray[np.uint8]:
-    """Gives 1 for what a label should not cover: walls and everything drawn over the map."""
+    """Return 1 for what a label should not cover: walls and everything drawn over the map."""
     busy = np.zeros(256, dtype=np.uint8)
     busy[WALL] = 1
     busy[_RAMP_START : _RAMP_START + N_RAMP_LEVELS * len(_RGB)] = 1

@@ -31,14 +31,14 @@ _GROUNDS = (
 
 
 def grey_levels(grid: OccupancyGrid) -> NDArray[np.uint8]:
-    """Gives one grey pixel per cell, row 0 of the grid at the bottom (paper eq. 1)."""
+    """Return one grey pixel per cell, row 0 of the grid at the bottom (paper eq. 1)."""
     grey_of_number = PALETTE[:, 0]
     levels: NDArray[np.uint8] = grey_of_number[GREYS[grid.cells[::-1].astype(np.intp) + 1]]
     return levels
 
 
 def draw_map_plain(grid: OccupancyGrid, *, max_edge_px: int = 1000) -> MapPicture:
-    """Draws the whole map in the paper's grey levels and nothing else."""
+    """Draw the whole map in the paper's grey levels and nothing else."""
     extent = plan.extent_of_map(grid, NORTH_UP_RAD)
     view = plan.plan_view(
         grid, extent, up_rad=NORTH_UP_RAD, margins=plan.Margins(), max_edge_px=max_edge_px
@@ -47,12 +47,12 @@ def draw_map_plain(grid: OccupancyGrid, *, max_edge_px: int = 1000) -> MapPictur
 
 
 def draw_map_axis(grid: OccupancyGrid, *, max_edge_px: int = 1000) -> MapPicture:
-    """Draws the whole map with its axes and the paper's adaptive metric grid (eqs. 2 to 6)."""
+    """Draw the whole map with its axes and the paper's adaptive metric grid (eqs. 2 to 6)."""
     return _draw_with_axes(grid, MapLayers(), max_edge_px)
 
 
 def draw_robot_pose(grid: OccupancyGrid, robot: Pose, *, max_edge_px: int = 1000) -> MapPicture:
-    """Draws the same with the robot as an arrow along its heading (eq. 7)."""
+    """Draw the same with the robot as an arrow along its heading (eq. 7)."""
     return _draw_with_axes(grid, MapLayers(robot=robot), max_edge_px)
 
 

@@ -4,21 +4,27 @@ Every label tries positions around its place, from near to far, and takes the on
 fewest walls and drawn things; a label with no free position gets none.
 """
 
+import itertools
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import astuple, dataclass
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
-from mapspeak.spatial.picture.field import (
+from mapspeak.spatial.picture.ink import LABEL_SIZE_PX, text_patch
+from mapspeak.spatial.picture.labels import (
     FAR_RINGS,
     HALO_PX,
     NEAR_RINGS,
     Label,
-    LabelField,
     Placed,
-    Positions,
+    Rings,
+    leader_of,
 )
+from mapspeak.spatial.picture.palette import IS_BUSY, Canvas
 from mapspeak.spatial.picture.view import Box
 
 _COST_OF_CROSSING = 12.0
@@ -30,12 +36,168 @@ _N_CHECKED = 16
 _BLOCK = 24
 _CORNER_REACH = 1.5
 """A symbol's box reaches this much farther at its corners than the symbol itself."""
+_LEADER_FROM_PX = 10.0
+_COST_OF_COVERING = 12.0
+_COST_OF_STRAYING = 6.0
+_COST_OF_MISLEADING = 12.0
+_COST_OF_LEADER = 2.0
+_COST_PER_BREAK = 0.5
+_COST_PER_PX = 0.04
+_SAMPLES_ACROSS = np.linspace(0, 1, 7)
+_SAMPLES_DOWN = np.linspace(0, 1, 3)[:, np.newaxis]
 
 
-def find_places(
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Positions:
+    """Possible positions of one label, in all its wordings.
+
+    Attributes:
+        wording: The number of the wording in each position.
+        boxes: Rows of (left, top, right, bottom).
+        is_astray: Some of it would lie outside its region.
+        cost: How bad the position is, other labels left aside.
+    """
+
+    label: Label
+    wording: IntArray
+    boxes: IntArray
+    needs_leader: Mask
+    is_astray: Mask
+    cost: FloatArray
+
+    def placed(self, index: int) -> Placed:
+        """Return the label in one of the positions."""
+        return Placed(
+            label=self.label,
+            patch=text_patch(self.label.wordings[self.wording[index]], LABEL_SIZE_PX),
+            box=Box(*self.boxes[index].tolist()),
+            has_leader=bool(self.needs_leader[index]),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LabelField:
+    """What labels meet on the map: drawn things and regions.
+
+    Attributes:
+        covered_before: The number of busy pixels above and left of each pixel corner.
+    """
+
+    covered_before: NDArray[np.int32]
+    regions: NDArray[np.uint16] | None
+
+    def is_on_map(self, boxes: IntArray) -> Mask:
+        """Return True for boxes that lie inside the map area with their halo."""
+        n_rows, n_cols = self.covered_before.shape[0] - 1, self.covered_before.shape[1] - 1
+        farthest = np.array([n_cols, n_rows]) - HALO_PX
+        return np.asarray((boxes[:, :2] >= HALO_PX).all(1) & (boxes[:, 2:] <= farthest).all(1))
+
+    def covered_ratio(self, boxes: IntArray) -> FloatArray:
+        """Return the share of each box that lies on walls or drawn things."""
+        left, top, right, bottom = boxes.T
+        before = self.covered_before
+        covered = before[bottom, right] - before[top, right] - before[bottom, left]
+        area_px = (right - left) * (bottom - top)
+        return np.asarray((covered + before[top, left]) / area_px, dtype=np.float64)
+
+    def needs_leader(self, boxes: IntArray, gaps_px: FloatArray, region: IntArray) -> Mask:
+        """Return True where a box is far from its place, and not in the middle of its region."""
+        is_far = gaps_px >= _LEADER_FROM_PX
+        if self.regions is None:
+            return is_far
+        row, col = (boxes[:, 1] + boxes[:, 3]) // 2, (boxes[:, 0] + boxes[:, 2]) // 2
+        return np.asarray(is_far & ((region == 0) | (self.regions[row, col] != region)))
+
+    def strayed_ratio(self, boxes: IntArray, region: IntArray, needs_leader: Mask) -> FloatArray:
+        """Return the share of each box where it should not be, judged at a few points of it.
+
+        That is outside its region, but for a box with a leader inside another region.
+        """
+        strayed = np.zeros(len(boxes))
+        if self.regions is None or not region.any():
+            return strayed
+        named = np.flatnonzero(region)
+        left, top, right, bottom = (boxes[named, i, np.newaxis, np.newaxis] for i in range(4))
+        cols = left + (right - 1 - left) * _SAMPLES_ACROSS
+        rows = top + (bottom - 1 - top) * _SAMPLES_DOWN
+        found = self.regions[rows.astype(np.intp), cols.astype(np.intp)]
+        is_wrong = found != region[named, np.newaxis, np.newaxis]
+        is_wrong &= (found > 0) | ~needs_leader[named, np.newaxis, np.newaxis]
+        strayed[named] = is_wrong.mean(axis=(1, 2))
+        return strayed
+
+    def positions(self, labels: tuple[Label, ...], rings: Rings) -> list[Positions]:
+        """Return the positions of each label that lie on the map; all are judged in one go."""
+        if not labels:
+            return []
+        boxes, of_wording = _spread(labels, rings)
+        gaps_px = np.tile(rings.gaps_px, len(boxes) // len(rings.gaps_px))
+        kept = np.flatnonzero(self.is_on_map(boxes))
+        boxes, gaps_px = boxes[kept], gaps_px[kept]
+        owner, wording, n_breaks = of_wording[kept].T
+        region = np.array([label.region or 0 for label in labels])[owner]
+        needs_leader = self.needs_leader(boxes, gaps_px, region)
+        strayed_ratio = self.strayed_ratio(boxes, region, needs_leader)
+        cost = (
+            _COST_OF_COVERING * self.covered_ratio(boxes)
+            + _COST_OF_STRAYING * strayed_ratio * np.where(needs_leader, 0.5, 1.0)
+            + _COST_OF_MISLEADING * np.maximum(0.0, strayed_ratio - 0.5) * ~needs_leader
+            + _COST_OF_LEADER * needs_leader
+            + _COST_PER_PX * gaps_px
+            + _COST_PER_BREAK * n_breaks
+        )
+        starts = np.searchsorted(owner, np.arange(len(labels) + 1))
+        parts = [slice(first, last) for first, last in itertools.pairwise(starts)]
+        return [
+            Positions(
+                label=label,
+                wording=wording[part],
+                boxes=boxes[part],
+                needs_leader=needs_leader[part],
+                is_astray=strayed_ratio[part] > 0,
+                cost=cost[part],
+            )
+            for label, part in zip(labels, parts, strict=True)
+        ]
+
+
+def _spread(labels: tuple[Label, ...], rings: Rings) -> tuple[IntArray, IntArray]:
+    """Return all boxes of all labels, and for each its label, its wording and that one's breaks."""
+    boxes, wordings = [], []
+    for owner, label in enumerate(labels):
+        for wording, text in enumerate(label.wordings):
+            boxes.append(rings.boxes_around(label, text_patch(text, LABEL_SIZE_PX)))
+            wordings.append((owner, wording, text.count("\n")))
+    return np.concatenate(boxes), np.repeat(np.array(wordings), len(rings.gaps_px), axis=0)
+
+
+def place_labels(
+    inside: Canvas,
+    labels: list[Label],
+    *,
+    obstacles: list[Box],
+    regions: NDArray[np.uint16] | None,
+) -> tuple[list[Placed], tuple[str, ...]]:
+    """Return the labels with their places, and the names of those that found none.
+
+    Args:
+        inside: The map area in palette numbers, with the lines but without the symbols.
+        labels: In the order in which they may choose.
+        obstacles: Boxes that no label may touch, such as symbols.
+        regions: The region of each pixel, for labels that name one.
+    """
+    if not labels:
+        return [], ()
+    covered_before = cv2.integral(cv2.LUT(inside, IS_BUSY)).astype(np.int32, copy=False)
+    field = LabelField(covered_before=covered_before, regions=regions)
+    placed, left_out = _find_places(tuple(labels), field, tuple(obstacles))
+    return placed, tuple(name for label in left_out for name in label.names)
+
+
+def _find_places(
     labels: tuple[Label, ...], field: LabelField, obstacles: tuple[Box, ...]
 ) -> tuple[list[Placed], list[Label]]:
-    """Gives the labels that found a place, and those that did not.
+    """Return the labels that found a place, and those that did not.
 
     Regions too small for their labels choose first, because these need the free ground around;
     then points, which have many good places, but spare the best one of a region's label; last
@@ -60,19 +222,10 @@ def find_places(
     return list(search.placed.values()), [label for label in labels if label not in search.placed]
 
 
-def leader_of(label: Label, box: Box) -> FloatArray:
-    """Gives the line from what a label names to the nearest point of its box, shape (2, 2)."""
-    start = np.array([label.u, label.v])
-    end = np.clip(start, (box.left, box.top), (box.right, box.bottom)).astype(np.float64)
-    away = (end - start) / max(1e-9, float(np.hypot(*(end - start))))
-    return np.stack([start + label.clearance_px * away, end])
-
-
 class _Search:
     """The state of the search.
 
     Attributes:
-        placed: Labels with their places.
         wishes: Where each region's label would stand inside it if there were no other labels.
     """
 
@@ -86,20 +239,20 @@ class _Search:
         self._taken = _Taken(obstacles)
         self._spared = np.zeros((0, 4), dtype=np.intp)
         self.wishes = {label: spot for label in labels if (spot := self._find_inside(label))}
-        wished = [_corners(spot.box) for spot in self.wishes.values()]
+        wished = [astuple(spot.box) for spot in self.wishes.values()]
         self._spared = np.array(wished, dtype=np.intp).reshape(-1, 4)
 
     def place(self, label: Label) -> bool:
-        """Places a label anywhere; gives False where there is no room."""
+        """Place a label anywhere; gives False where there is no room."""
         spot = self._find(label, lambda positions: np.ones(len(positions.boxes), dtype=bool))
         return self._add(label, spot)
 
     def place_inside(self, label: Label) -> bool:
-        """Places a region's label inside it; gives False where there is no room."""
+        """Place a region's label inside it; gives False where there is no room."""
         return self._add(label, self._find_inside(label))
 
     def make_room(self, label: Label) -> None:
-        """Places a region's label where it wished to be, and moves those of points from there."""
+        """Place a region's label where it wished to be, and moves those of points from there."""
         wish = self.wishes[label]
         in_its_way = [self.placed[other] for other in self._taken.owners_at(wish.box)]
         if any(spot.label.region is not None for spot in in_its_way):
@@ -129,7 +282,7 @@ class _Search:
         )
 
     def _find(self, label: Label, is_possible: Callable[[Positions], Mask]) -> Placed | None:
-        """Gives the cheapest possible place; far ones are tried where no near one is good."""
+        """Return the cheapest possible place; far ones are tried where no near one is good."""
         best: Placed | None = None
         best_cost = math.inf
         for positions in self._near_and_far(label):
@@ -150,7 +303,7 @@ class _Search:
         yield self._far[label]
 
     def _judge(self, positions: Positions, index: IntArray, taken: IntArray) -> tuple[float, int]:
-        """Gives the lowest cost among positions, the other labels counted, and where it is."""
+        """Return the lowest cost among positions, the other labels counted, and where it is."""
         label, boxes = positions.label, positions.boxes[index]
         cost, needs_leader = positions.cost[index], positions.needs_leader[index]
         if label.region is None:
@@ -166,13 +319,13 @@ class _Taken:
     """Boxes that no label may touch; grows as labels find their places."""
 
     def __init__(self, obstacles: tuple[Box, ...]) -> None:
-        self._boxes = np.array([_corners(box) for box in obstacles], dtype=np.intp).reshape(-1, 4)
+        self._boxes = np.array([astuple(box) for box in obstacles], dtype=np.intp).reshape(-1, 4)
         self._owners: list[Label | None] = [None] * len(obstacles)
 
     def add(self, spot: Placed) -> None:
-        """Takes a label's box, and a rim around it and its leader."""
+        """Take a label's box, and a rim around it and its leader."""
         rim = np.array([-HALO_PX, -HALO_PX, HALO_PX, HALO_PX])
-        boxes = np.array([_corners(spot.box)])
+        boxes = np.array([astuple(spot.box)])
         if spot.has_leader:
             leader = leader_of(spot.label, spot.box)
             length_px = float(np.hypot(*(leader[1] - leader[0])))
@@ -183,19 +336,19 @@ class _Taken:
         self._owners += [spot.label] * len(boxes)
 
     def remove(self, label: Label) -> None:
-        """Gives a label's boxes free."""
+        """Return a label's boxes free."""
         is_kept = [owner is not label for owner in self._owners]
         self._boxes = self._boxes[is_kept]
         self._owners = [owner for owner in self._owners if owner is not label]
 
     def owners_at(self, box: Box) -> tuple[Label, ...]:
-        """Gives the labels that have taken some of a box, each once."""
-        found = np.flatnonzero(_overlaps(np.array([_corners(box)]), self._boxes)[0])
+        """Return the labels that have taken some of a box, each once."""
+        found = np.flatnonzero(_overlaps(np.array([astuple(box)]), self._boxes)[0])
         owners = [self._owners[index] for index in found]
         return tuple(dict.fromkeys(owner for owner in owners if owner is not None))
 
     def near(self, boxes: IntArray) -> IntArray:
-        """Gives those boxes that other boxes, or lines between these, may touch."""
+        """Return those boxes that other boxes, or lines between these, may touch."""
         if not len(boxes):
             return self._boxes[:0]
         first, last = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
@@ -204,7 +357,7 @@ class _Taken:
 
 
 def _cheapest_free(positions: Positions, index: IntArray, taken: IntArray) -> IntArray:
-    """Gives the cheapest of some positions that touch nothing taken, in order of cost.
+    """Return the cheapest of some positions that touch nothing taken, in order of cost.
 
     They are looked at in blocks, because the first few often do.
     """
@@ -219,14 +372,14 @@ def _cheapest_free(positions: Positions, index: IntArray, taken: IntArray) -> In
 
 
 def _crossed_ratio(points: FloatArray, taken: IntArray) -> FloatArray:
-    """Gives the share of the points of each line that lie in a box taken."""
+    """Return the share of the points of each line that lie in a box taken."""
     u, v = points[..., 0, np.newaxis], points[..., 1, np.newaxis]
     is_in = (u >= taken[:, 0]) & (u < taken[:, 2]) & (v >= taken[:, 1]) & (v < taken[:, 3])
     return np.asarray(is_in.any(axis=2).mean(axis=1), dtype=np.float64)
 
 
 def _overlaps(boxes: IntArray, taken: IntArray) -> Mask:
-    """Gives True where a box, by row, shares a pixel with a taken one, by column."""
+    """Return True where a box, by row, shares a pixel with a taken one, by column."""
     left, top, right, bottom = (boxes[:, index, np.newaxis] for index in range(4))
     overlaps = (left < taken[:, 2]) & (taken[:, 0] < right)
     overlaps &= (top < taken[:, 3]) & (taken[:, 1] < bottom)
@@ -234,7 +387,7 @@ def _overlaps(boxes: IntArray, taken: IntArray) -> Mask:
 
 
 def _leaders(label: Label, boxes: IntArray) -> FloatArray:
-    """Gives points (u, v) along the line from a place to each box, shape (boxes, points, 2)."""
+    """Return points (u, v) along the line from a place to each box, shape (boxes, points, 2)."""
     place = np.array([label.u, label.v])
     ends = np.clip(place, boxes[:, :2], boxes[:, 2:])
     way = ends - place
@@ -243,7 +396,3 @@ def _leaders(label: Label, boxes: IntArray) -> FloatArray:
     shares = np.linspace(0.0, 1.0, _N_LEADER_POINTS)[:, np.newaxis]
     points: FloatArray = starts[:, np.newaxis] + (ends - starts)[:, np.newaxis] * shares
     return points
-
-
-def _corners(box: Box) -> tuple[int, int, int, int]:
-    return box.left, box.top, box.right, box.bottom

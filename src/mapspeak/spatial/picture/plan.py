@@ -26,7 +26,6 @@ class Zoom:
     """A part of the map to look at more closely.
 
     Attributes:
-        centre: Its middle.
         radius_m: From the middle to the nearest sides of the picture.
     """
 
@@ -34,16 +33,9 @@ class Zoom:
     radius_m: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Extent:
-    """The part of the map in a picture, in metres along the picture's axes from the map's zero.
-
-    Attributes:
-        left_m: The left side.
-        right_m: The right side.
-        bottom_m: The lower side.
-        top_m: The upper side.
-    """
+    """The part of the map in a picture, in metres along the picture's axes from the map's zero."""
 
     left_m: float
     right_m: float
@@ -67,9 +59,6 @@ class Margins:
 
     Attributes:
         side_px: Left, and as much on the right.
-        top_px: Above.
-        bottom_px: Below.
-        min_width_px: Of the whole picture.
     """
 
     side_px: int = 0
@@ -79,13 +68,13 @@ class Margins:
 
 
 def extent_of_map(grid: OccupancyGrid, up_rad: float) -> Extent:
-    """Gives the whole array."""
+    """Return the whole array."""
     _check_not_empty(grid)
     return _extent_of_corners(grid, up_rad, np.array([0, grid.n_rows]), np.array([0, grid.n_cols]))
 
 
 def extent_of_known(grid: OccupancyGrid, up_rad: float, *, place: Point | None = None) -> Extent:
-    """Gives the smallest part with all known cells in it, with a rim of a metre.
+    """Return the smallest part with all known cells in it, with a rim of a metre.
 
     A place on the array, such as the robot's, comes into it too.
     """
@@ -108,7 +97,7 @@ def extent_of_known(grid: OccupancyGrid, up_rad: float, *, place: Point | None =
 
 
 def extent_of_zoom(grid: OccupancyGrid, up_rad: float, zoom: Zoom) -> Extent:
-    """Gives a square around a point, as far as there is map.
+    """Return a square around a point, as far as there is map.
 
     Raises:
         MapError: The radius is not a positive number, or no part of the map is that near.
@@ -122,10 +111,10 @@ def extent_of_zoom(grid: OccupancyGrid, up_rad: float, zoom: Zoom) -> Extent:
     right, up = _in_picture_axes(np.array([[zoom.centre.x, zoom.centre.y]]), up_rad)[0]
     radius_m = max(zoom.radius_m, grid.resolution_m)
     near = Extent(
-        left_m=max(whole.left_m, right - radius_m),
-        right_m=min(whole.right_m, right + radius_m),
-        bottom_m=max(whole.bottom_m, up - radius_m),
-        top_m=min(whole.top_m, up + radius_m),
+        max(whole.left_m, right - radius_m),
+        min(whole.right_m, right + radius_m),
+        max(whole.bottom_m, up - radius_m),
+        min(whole.top_m, up + radius_m),
     )
     if not (near.width_m > 0 and near.height_m > 0):
         raise MapError(
@@ -145,7 +134,7 @@ def plan_view(
     max_edge_px: int,
     steps_per_pixel: int = 1,
 ) -> PictureView:
-    """Gives the view that shows an extent as large as the edge allows.
+    """Return the view that shows an extent as large as the edge allows.
 
     Cells of a grid whose axes are the picture's become blocks of pixels, or pixels cover several
     cells; a turned grid may have any scale. The side of a block is a whole number of pixels; with
@@ -207,7 +196,7 @@ def _check_not_empty(grid: OccupancyGrid) -> None:
 
 
 def _in_picture_axes(points: FloatArray, up_rad: float) -> FloatArray:
-    """Gives (right, up) in metres from the map's zero, for points of shape (n, 2)."""
+    """Return (right, up) in metres from the map's zero, for points of shape (n, 2)."""
     cos, sin = math.cos(up_rad), math.sin(up_rad)
     return np.stack(
         [sin * points[:, 0] - cos * points[:, 1], cos * points[:, 0] + sin * points[:, 1]], axis=1
@@ -217,13 +206,13 @@ def _in_picture_axes(points: FloatArray, up_rad: float) -> FloatArray:
 def _extent_of_corners(
     grid: OccupancyGrid, up_rad: float, rows: IntArray, cols: IntArray
 ) -> Extent:
-    """Gives the extent of cell corners: each row number with each column number."""
+    """Return the extent of cell corners: each row number with each column number."""
     row_grid, col_grid = (axis.ravel() for axis in np.meshgrid(rows, cols, indexing="ij"))
     return _extent_of_points(_corner_points(grid, row_grid, col_grid), up_rad)
 
 
 def _corner_points(grid: OccupancyGrid, rows: IntArray, cols: IntArray) -> FloatArray:
-    """Gives the corners of cells that lie towards the grid's origin."""
+    """Return the corners of cells that lie towards the grid's origin."""
     zero = np.array([0])
     half_cell = grid.points_at(zero, zero) - np.array([grid.origin.x, grid.origin.y])
     return np.asarray(grid.points_at(rows, cols) - half_cell)
@@ -231,15 +220,12 @@ def _corner_points(grid: OccupancyGrid, rows: IntArray, cols: IntArray) -> Float
 
 def _extent_of_points(points: FloatArray, up_rad: float) -> Extent:
     in_axes = _in_picture_axes(points, up_rad)
-    left_m, bottom_m = in_axes.min(axis=0)
-    right_m, top_m = in_axes.max(axis=0)
-    return Extent(
-        left_m=float(left_m), right_m=float(right_m), bottom_m=float(bottom_m), top_m=float(top_m)
-    )
+    (left_m, bottom_m), (right_m, top_m) = in_axes.min(axis=0), in_axes.max(axis=0)
+    return Extent(float(left_m), float(right_m), float(bottom_m), float(top_m))
 
 
 def _extent_of_known_turned(grid: OccupancyGrid, up_rad: float, rows: IntArray) -> Extent:
-    """Gives the extent of the known cells from the first and the last one of each row."""
+    """Return the extent of the known cells from the first and the last one of each row."""
     first, last = np.empty_like(rows), np.empty_like(rows)
     for start in range(0, rows.size, _BLOCK_ROWS):
         block = slice(start, start + _BLOCK_ROWS)
@@ -253,7 +239,7 @@ def _extent_of_known_turned(grid: OccupancyGrid, up_rad: float, rows: IntArray) 
 
 
 def _rim_m(grid: OccupancyGrid, longest_m: float) -> float:
-    """Gives a metre in whole cells, but never more than the map itself on very fine grids."""
+    """Return a metre in whole cells, but never more than the map itself on very fine grids."""
     n_cells = math.ceil(_RIM_M / grid.resolution_m - 1e-9)
     limit = max(_MIN_RIM_LIMIT_CELLS, math.ceil(longest_m / grid.resolution_m))
     return min(n_cells, limit) * grid.resolution_m
@@ -261,37 +247,26 @@ def _rim_m(grid: OccupancyGrid, longest_m: float) -> float:
 
 def _union(one: Extent, other: Extent) -> Extent:
     return Extent(
-        left_m=min(one.left_m, other.left_m),
-        right_m=max(one.right_m, other.right_m),
-        bottom_m=min(one.bottom_m, other.bottom_m),
-        top_m=max(one.top_m, other.top_m),
+        min(one.left_m, other.left_m),
+        max(one.right_m, other.right_m),
+        min(one.bottom_m, other.bottom_m),
+        max(one.top_m, other.top_m),
     )
 
 
 def _grown(extent: Extent, rim_m: float) -> Extent:
     return Extent(
-        left_m=extent.left_m - rim_m,
-        right_m=extent.right_m + rim_m,
-        bottom_m=extent.bottom_m - rim_m,
-        top_m=extent.top_m + rim_m,
+        extent.left_m - rim_m, extent.right_m + rim_m, extent.bottom_m - rim_m, extent.top_m + rim_m
     )
 
 
 def _snapped(extent: Extent, grid: OccupancyGrid, up_rad: float) -> Extent:
-    """Gives the extent grown outward to the borders of cells of a grid with the same axes."""
+    """Return the extent grown outward to the borders of cells of a grid with the same axes."""
     origin = np.array([[grid.origin.x, grid.origin.y]])
-    right_m, up_m = _in_picture_axes(origin, up_rad)[0]
-    cell_m = grid.resolution_m
-
-    def border_before(value_m: float, zero_m: float) -> float:
-        return float(zero_m + math.floor((value_m - zero_m) / cell_m + 1e-6) * cell_m)
-
-    def border_after(value_m: float, zero_m: float) -> float:
-        return float(zero_m + math.ceil((value_m - zero_m) / cell_m - 1e-6) * cell_m)
-
-    return Extent(
-        left_m=border_before(extent.left_m, right_m),
-        right_m=border_after(extent.right_m, right_m),
-        bottom_m=border_before(extent.bottom_m, up_m),
-        top_m=border_after(extent.top_m, up_m),
-    )
+    zeros_m = _in_picture_axes(origin, up_rad)[0].repeat(2)
+    sides_m = np.array([extent.left_m, extent.right_m, extent.bottom_m, extent.top_m])
+    cells, slack = (sides_m - zeros_m) / grid.resolution_m, 1e-6
+    left, _, bottom, _ = np.floor(cells + slack)
+    _, right, _, top = np.ceil(cells - slack)
+    snapped = zeros_m + np.array([left, right, bottom, top]) * grid.resolution_m
+    return Extent(*snapped.tolist())

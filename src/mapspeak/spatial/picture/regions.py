@@ -38,7 +38,7 @@ def paint_regions(
     regions: tuple[PictureRegion, ...],
     colours: dict[int, Colour],
 ) -> None:
-    """Fills the free pixels of each region, with its pattern and outline, on the ground given.
+    """Fill the free pixels of each region, with its pattern and outline, on the ground given.
 
     Args:
         ground: Palette numbers of the map area; changed in place.
@@ -64,7 +64,7 @@ def paint_regions(
 
 
 def check_layer(layer: RegionLayer, grid: OccupancyGrid) -> None:
-    """Raises `MapError` where a layer of regions was made for another grid."""
+    """Raise `MapError` where a layer of regions was made for another grid."""
     if layer.labels.shape != grid.cells.shape:
         raise MapError(
             f"The regions cover {layer.labels.shape} cells, the map has {grid.cells.shape}.",
@@ -75,7 +75,7 @@ def check_layer(layer: RegionLayer, grid: OccupancyGrid) -> None:
 def _fill_by_label(
     regions: tuple[PictureRegion, ...], colours: dict[int, Colour], part: FillPart
 ) -> Canvas:
-    """Gives the palette number of each label's fill; 0 for labels without a region."""
+    """Return the palette number of each label's fill; 0 for labels without a region."""
     fills = np.zeros(np.iinfo(np.uint16).max + 1, dtype=np.uint8)
     for region in regions:
         fills[region.label] = FILLS[colours[region.label], part]
@@ -89,7 +89,7 @@ def _paint_pattern(
     places: tuple[IntArray, IntArray],
     fills: Canvas,
 ) -> None:
-    """Paints those of the rows and columns given that lie in a filled region with a pattern."""
+    """Paint those of the rows and columns given that lie in a filled region with a pattern."""
     row, col = places
     numbers = fills[labels[row, col]]
     is_painted = is_filled[row, col] & (numbers > 0)
@@ -97,20 +97,20 @@ def _paint_pattern(
 
 
 def _hatch_pixels(shape: tuple[int, ...]) -> tuple[IntArray, IntArray]:
-    """Gives rows and columns on diagonal lines."""
+    """Return rows and columns on diagonal lines."""
     row = np.arange(shape[0])[:, np.newaxis]
     col = -row % _REGION_HATCH_PX + np.arange(0, shape[1], _REGION_HATCH_PX)
     return np.broadcast_to(row, col.shape)[col < shape[1]], col[col < shape[1]]
 
 
 def _dot_pixels(shape: tuple[int, ...]) -> tuple[IntArray, IntArray]:
-    """Gives rows and columns of small square dots."""
+    """Return rows and columns of small square dots."""
     row, col = (np.flatnonzero(np.arange(length) % _DOT_STEP_PX < _DOT_PX) for length in shape)
     return np.repeat(row, col.size), np.tile(col, row.size)
 
 
 def _highlight(ground: Canvas, is_region: Mask) -> None:
-    """Draws a bold line inside a region along its outer border, beside its walls.
+    """Draw a bold line inside a region along its outer border, beside its walls.
 
     Where the picture cuts the region off there is no border.
     """
@@ -125,7 +125,7 @@ def _highlight(ground: Canvas, is_region: Mask) -> None:
 
 
 def _is_edge(labels: NDArray[np.uint16]) -> Mask:
-    """Gives True where another label, or none, is at most the outline's width away."""
+    """Return True where another label, or none, is at most the outline's width away."""
     kernel = np.ones((2 * _EDGE_PX + 1, 2 * _EDGE_PX + 1), dtype=np.uint8)
     is_edge: Mask = cv2.dilate(labels, kernel) != cv2.erode(labels, kernel)
     return is_edge

@@ -73,7 +73,6 @@ class PictureView:
         pixels_per_m: The scale, the same along both axes.
         area: The part of the picture that shows the map.
         width_px: Columns of the whole picture.
-        height_px: Rows of the whole picture.
     """
 
     corner: Point

@@ -43,8 +43,6 @@ class PassedDoor:
     """A door of a corridor.
 
     Attributes:
-        door_id: The door.
-        region_id: Where it leads.
         along_m: From the start of the walk, along it, to the point nearest to the door.
         side: On which side it is; elsewhere where the walk does not lead past it, because the
             corridor branches or leads all around.
@@ -62,11 +60,6 @@ class CorridorWalk:
 
     Attributes:
         start: One end; of the two the one with the smaller x + y, so that it stays the same.
-        end: The other end.
-        middle: Half of the way along.
-        heading_rad: The direction at the start.
-        end_heading_rad: The direction at the end.
-        length_m: Of the way.
         stops: The doors in the order in which they come.
     """
 
@@ -80,7 +73,7 @@ class CorridorWalk:
 
 
 def walk_along(rooms: RoomMap, region: Region) -> CorridorWalk | None:
-    """Walks a region from end to end, past all its doors; None where it has no length.
+    """Walk a region from end to end, past all its doors; None where it has no length.
 
     The ends are the two places farthest from each other by path, and the walk leads through the
     middles of what is equally far from its start, near the shortest way to its end: so it keeps
@@ -131,7 +124,7 @@ class _Line:
 
 
 def _floor_of(rooms: RoomMap, region: Region) -> OccupancyGrid:
-    """Gives the region's floor with its furniture alone, in cells to walk by."""
+    """Return the region's floor with its furniture alone, in cells to walk by."""
     window = rooms.window_of(region)
     here = rooms.grid.crop(*window)
     n = max(round(CELL_M / here.resolution_m), 1)
@@ -146,7 +139,7 @@ def _floor_of(rooms: RoomMap, region: Region) -> OccupancyGrid:
 def _distances_from_end(
     floor: OccupancyGrid, region: Region
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Gives points of the floor, shape (n, 2), and how far each is from one end of it."""
+    """Return points of the floor, shape (n, 2), and how far each is from one end of it."""
     clear_m = known_clearance_m(floor)
     enough_m = min(END_RATIO * region.width_m, float(clear_m.max(initial=0.0)))
     candidates = floor.points_at(*np.nonzero(floor.free & (clear_m >= enough_m)))
@@ -170,7 +163,7 @@ def _distances_from_end(
 
 
 def _is_near(floor: OccupancyGrid, way: Sequence[Point], reach_m: float) -> Mask:
-    """True for the cells that are no farther than that from a way from cell to cell."""
+    """Return True for the cells that are no farther than that from a way from cell to cell."""
     off_way = np.ones(floor.cells.shape, dtype=np.uint8)
     off_way[floor.cells_at(np.array([[point.x, point.y] for point in way]))] = 0
     off_cells = cv2.distanceTransform(off_way, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
@@ -186,7 +179,7 @@ def _farthest(distances: DistanceField, candidates: FloatArray) -> Point | None:
 
 
 def _find_middle_line(points: FloatArray, away_m: FloatArray) -> _Line:
-    """Gives the middles of what is equally far, a point for each slice."""
+    """Return the middles of what is equally far, a point for each slice."""
     n = max(round(float(away_m.max()) / SLICE_M), 2)
     number = np.minimum((away_m / away_m.max() * n).astype(np.intp), n - 1)
     sizes = np.bincount(number, minlength=n)

@@ -32,10 +32,7 @@ class Doorway:
     """An opening between two jambs, given as columns and rows of the raster.
 
     Attributes:
-        start: The first jamb.
-        end: The other jamb.
         roots: Where the solid pieces begin of which the jambs are the ends.
-        width_m: From jamb to jamb.
     """
 
     start: Spot
@@ -44,7 +41,7 @@ class Doorway:
     width_m: float
 
     def beside(self, cells: float) -> tuple[int, int]:
-        """Gives the row and the column that many cells off the middle, at right angles."""
+        """Return the row and the column that many cells off the middle, at right angles."""
         across, along = self.end[0] - self.start[0], self.end[1] - self.start[1]
         share = cells / math.hypot(across, along)
         col = (self.start[0] + self.end[0]) / 2 - share * along
@@ -53,7 +50,7 @@ class Doorway:
 
 
 def find_doorways(raster: Raster, floor: Floor, settings: RoomSettings) -> list[Doorway]:
-    """Gives the wide openings in line with the strongest walls, or at right angles to them.
+    """Return the wide openings in line with the strongest walls, or at right angles to them.
 
     One jamb is the end of something thin that runs on in line; the other is such an end too, or
     the corner of a wall.
@@ -72,7 +69,7 @@ def find_doorways(raster: Raster, floor: Floor, settings: RoomSettings) -> list[
 
 
 def _turn(pictures: list[Picture], angle_deg: float, margin: int) -> tuple[list[Picture], Affine]:
-    """Gives pictures whose walls run along rows and columns, and the way back from them.
+    """Return pictures whose walls run along rows and columns, and the way back from them.
 
     Around them is a margin of what is neither jamb nor floor.
     """
@@ -117,7 +114,7 @@ def _find_along_rows(
 def _find_gaps(
     floor: Picture, jamb: Picture, raster: Raster, settings: RoomSettings
 ) -> tuple[Places, Places, Places]:
-    """Gives row, first column and the column behind the last of floor between jambs."""
+    """Return row, first column and the column behind the last of floor between jambs."""
     # The margin is no floor, so that changes come in pairs and no run goes on in the next row.
     change = np.flatnonzero(floor.ravel()[1:] != floor.ravel()[:-1]) + 1
     first, stop = change[::2], change[1::2]
@@ -145,7 +142,7 @@ class _Jambs:
         self._tip = max(round(settings.tip_m / cell_size_m), 1)
 
     def is_end(self, row: Places, col: Places, step: int) -> Truths:
-        """True at the end of something thin that runs on in the direction of the step."""
+        """Return True at the end of something thin that runs on in the direction of the step."""
         is_end = np.ones(row.size, bool)
         up, down = self._extent(row, col)
         at_first = up - down
@@ -158,12 +155,12 @@ class _Jambs:
         return is_end
 
     def is_corner(self, row: Places, col: Places, step: int) -> Truths:
-        """True where a wall ends above or below."""
+        """Return True where a wall ends above or below."""
         up, down = self._extent(row, col + step)
         return self._wall[row, col] & (np.minimum(up, down) <= self._tip)
 
     def _extent(self, row: Places, col: Places) -> tuple[Places, Places]:
-        """Gives how many solid cells follow above and below; one more than a tip has, at most."""
+        """Return how many solid cells follow above and below; one more than a tip has, at most."""
         extents = []
         for way in (-1, 1):
             is_solid = self._solid[row, col]
@@ -176,7 +173,7 @@ class _Jambs:
 
 
 def _choose_narrowest(row: Places, first: Places, stop: Places, reach: int) -> list[Opening]:
-    """Gives the narrowest of openings that lie one behind the other."""
+    """Return the narrowest of openings that lie one behind the other."""
     kept: list[Opening] = []
     for i in np.lexsort((first, row, stop - first)).tolist():
         here = int(row[i]), int(first[i]), int(stop[i])
@@ -206,14 +203,14 @@ def _doorway(
 
 
 def _run(solid: Picture) -> int:
-    """Gives how many cells are solid before the first that is not."""
+    """Return how many cells are solid before the first that is not."""
     return int(np.argmin(solid)) if not solid.all() else solid.size
 
 
 def _leave_out_crossing(
     doorways: list[Doorway], others: list[Doorway], reach: float
 ) -> list[Doorway]:
-    """Leaves out what crosses a corridor from the end of the wall between two rooms.
+    """Leave out what crosses a corridor from the end of the wall between two rooms.
 
     The doorways of those two rooms, at right angles to it, each have a jamb there.
     """

@@ -27,7 +27,7 @@ def find_rooms(
     previous: RoomMap | None = None,
     settings: RoomSettings | None = None,
 ) -> RoomMap:
-    """Divides a map into rooms, corridors and open spaces, joined by doors.
+    """Divide a map into rooms, corridors and open spaces, joined by doors.
 
     Args:
         grid: The map; may be empty, unexplored, furnished, noisy or turned.
@@ -114,7 +114,7 @@ def _region(
 
 
 def _labels_on_grid(raster: Raster, labels: NDArray[np.int32]) -> Labels:
-    """Takes raster labels to the cells of the grid."""
+    """Take raster labels to the cells of the grid."""
     grid = raster.grid
     full = np.zeros(grid.cells.shape, np.int16)
     if labels.size == 0:

@@ -48,7 +48,7 @@ Numbers = NDArray[np.int32]
 def find_blocks(
     raster: Raster, wall: Picture, angle_deg: float, settings: RoomSettings
 ) -> tuple[Picture, Picture]:
-    """Gives 1 on furniture with its inside, and 1 on the walls behind it.
+    """Return 1 on furniture with its inside, and 1 on the walls behind it.
 
     Args:
         raster: The map.
@@ -72,11 +72,8 @@ class _Sizes:
         depth: Nor is what is thinner without that wall.
         thick: Nor is what is thicker than this both ways.
         long: How far the floor beside a block may be.
-        stub: The shortest end of a wall.
         tip: A wall has floor so near to its middle.
         gap: The widest door whose wall runs on in line.
-        rim: See above.
-        crumb: See above.
     """
 
     def __init__(self, solid: Picture, cell_size_m: float, settings: RoomSettings) -> None:
@@ -95,7 +92,7 @@ class _Sizes:
 
 
 def _find_wall_thickness(solid: Picture, most: int, least: float) -> float:
-    """Gives how thick, in cells, what has floor on two sides and hangs on the outside mostly is."""
+    """Return how thick walls mostly are, in cells: what has floor on two sides and is fixed."""
     fixed = find_fixed(solid)
     found = []
     for axis in (0, 1):
@@ -127,7 +124,7 @@ def _find_blocks(
 
 
 def _find_bumps(solid: Picture, cells: _Sizes) -> Picture:
-    """Gives 1 where the floor is near along the row and along the column, or on both sides."""
+    """Return 1 where the floor is near along the row and along the column, or on both sides."""
     floor = 1 - solid
     bump = is_near(floor, cells.long, 0) & is_near(floor, cells.long, 1)
     for axis in (0, 1):
@@ -139,7 +136,7 @@ def _find_bumps(solid: Picture, cells: _Sizes) -> Picture:
 
 
 def _continue_walls(solid: Picture, bump: Picture, seen_wall: Picture, cells: _Sizes) -> Picture:
-    """Gives 1 in bumps where walls that end at them run on in line."""
+    """Return 1 in bumps where walls that end at them run on in line."""
     stubs = [_find_stubs(solid, bump, seen_wall, axis, cells) for axis in (0, 1)]
     wall = np.zeros_like(solid)
     for axis, stub in enumerate(stubs):
@@ -161,14 +158,14 @@ def _continue_walls(solid: Picture, bump: Picture, seen_wall: Picture, cells: _S
 
 
 def _find_lines(stub: Picture, bump: Picture, axis: int) -> Counts:
-    """Gives the lines along an axis on which a wall may run on into a bump."""
+    """Return the lines along an axis on which a wall may run on into a bump."""
     return np.flatnonzero(stub.any(axis=axis) & bump.any(axis=axis))
 
 
 def _find_stubs(
     solid: Picture, bump: Picture, seen_wall: Picture, axis: int, cells: _Sizes
 ) -> Picture:
-    """Gives pieces of thin wall along an axis.
+    """Return pieces of thin wall along an axis.
 
     What holds nothing that was taken for wall, and runs that way for twice the length, is none:
     such as the shadow of a chair, or a speck on a wall.
@@ -187,7 +184,7 @@ def _find_stubs(
 def _reach(
     stub: Picture, through: Picture, axis: int, cells: _Sizes
 ) -> list[tuple[Truths, Truths]]:
-    """Gives where a stub comes before a cell and no gap, and where a gap like a door or none.
+    """Return where a stub comes before a cell and no gap, and where a gap like a door or none.
 
     First for those that come before it along an axis, then for those that come behind. What may
     lie between is `through`.
@@ -207,7 +204,7 @@ def _reach(
 
 
 def _find_ends(solid: Picture, inner: Picture, axis: int) -> list[Truths]:
-    """Gives where the way back, and the way on, leads out of a bump into what is solid."""
+    """Return where the way back, and the way on, leads out of a bump into what is solid."""
     found = []
     is_end = (solid > 0) & (inner == 0)
     for flipped in (False, True):
@@ -223,7 +220,7 @@ def _find_ends(solid: Picture, inner: Picture, axis: int) -> list[Truths]:
 
 
 def _choose_blocks(piece: Picture, fixed: Picture, occupied: Picture, cells: _Sizes) -> Picture:
-    """Gives the pieces that are furniture."""
+    """Return the pieces that are furniture."""
     n, label = cv2.connectedComponents(piece, connectivity=4)
     numbers = np.asarray(label, np.int32)
     floor = 1 - (fixed | piece)
@@ -239,13 +236,13 @@ def _choose_blocks(piece: Picture, fixed: Picture, occupied: Picture, cells: _Si
 
 
 def _number_around(label: Numbers) -> Numbers:
-    """Gives the cells in and beside each piece its number."""
+    """Return the cells in and beside each piece its number."""
     around = cv2.dilate(label.astype(np.float32), np.ones((3, 3), np.uint8))
     return np.asarray(around, np.int32)
 
 
 def _count_sides(around: Numbers, n: int, floor: Picture, piece: Picture, cells: _Sizes) -> Counts:
-    """Gives how many stretches of floor that do not hang together near by each piece borders on.
+    """Return how many stretches of floor that do not hang together near by each piece borders on.
 
     A piece with two of them divides them, as walls do.
     """
@@ -258,7 +255,7 @@ def _count_sides(around: Numbers, n: int, floor: Picture, piece: Picture, cells:
 
 
 def _seen_ratio(label: Numbers, n: int, floor: Picture, occupied: Picture) -> NDArray[np.float64]:
-    """Gives the share of each piece's border to the floor at which something was seen."""
+    """Return the share of each piece's border to the floor at which something was seen."""
     edge = (widen(floor, 1) > 0) & (label > 0)
     n_edge = np.bincount(label[edge], minlength=n)
     n_seen = np.bincount(label[edge & (widen(occupied, 1) > 0)], minlength=n)
@@ -267,7 +264,7 @@ def _seen_ratio(label: Numbers, n: int, floor: Picture, occupied: Picture) -> ND
 
 
 def _fills_rectangle(label: Numbers, n: int, cells: _Sizes) -> Truths:
-    """True for each piece that fills the rectangle around it and is not too long."""
+    """Return True for each piece that fills the rectangle around it and is not too long."""
     inside = np.flatnonzero(label)
     rows, cols = np.divmod(inside, label.shape[1])
     number = label.ravel()[inside]
@@ -283,7 +280,7 @@ def _fills_rectangle(label: Numbers, n: int, cells: _Sizes) -> Truths:
 
 
 def _find_touching(crumbs: Picture, block: Picture) -> Picture:
-    """Gives the crumbs that touch a block."""
+    """Return the crumbs that touch a block."""
     n, label = cv2.connectedComponents(crumbs, connectivity=8)
     touches = np.zeros(n, np.uint8)
     touches[np.unique(label[widen(block, 1) > 0])] = 1

@@ -20,7 +20,7 @@ _REMAINS_RATIO = 0.25
 
 
 def match_rooms(previous: RoomMap, current: RoomMap) -> RoomMap:
-    """Gives the current map with the ids of the previous one where they mean the same place.
+    """Return the current map with the ids of the previous one where they mean the same place.
 
     Regions are matched one to one by overlap in world coordinates, the largest overlap first;
     doors by place. A region keeps its number; its letter says what it is taken for now. New ones
@@ -47,7 +47,7 @@ def match_rooms(previous: RoomMap, current: RoomMap) -> RoomMap:
 
 
 def _count_overlap(previous: RoomMap, current: RoomMap) -> NDArray[np.float64]:
-    """Gives the shared area in square metres; row by previous, column by current index."""
+    """Return the shared area in square metres; row by previous, column by current index."""
     rows, cols = np.nonzero(previous.labels)
     every = max(1, rows.size // _SAMPLES)
     rows, cols = rows[::every], cols[::every]
@@ -64,7 +64,7 @@ def _count_overlap(previous: RoomMap, current: RoomMap) -> NDArray[np.float64]:
 def _match_regions(
     previous: RoomMap, current: RoomMap, overlap: NDArray[np.float64]
 ) -> dict[str, str]:
-    """Gives the final id for each id of the current map."""
+    """Return the final id for each id of the current map."""
     old = {region.index: region.id for region in previous.regions}
     new = {region.index: region.id for region in current.regions}
     ids: dict[str, str] = {}
@@ -82,7 +82,7 @@ def _match_regions(
 
 
 def _revive_regions(previous: RoomMap, regions: list[Region]) -> dict[str, str]:
-    """Gives the ids of vanished regions that are back: about as large, and in their place."""
+    """Return the ids of vanished regions that are back: about as large, and in their place."""
     back = [
         (gone.place.distance_to(region.widest), gone.id, region.id)
         for gone in previous.vanished
@@ -99,7 +99,7 @@ def _revive_regions(previous: RoomMap, regions: list[Region]) -> dict[str, str]:
 
 
 def _former_ids(previous: RoomMap, now: dict[str, str]) -> dict[str, str]:
-    """Gives what regions were called before, by the names they keep and those they have now."""
+    """Return what regions were called before, by the names they keep and those they have now."""
     renamed = {kept: name for kept, name in now.items() if kept != name}
     earlier = {old: now[name] for old, name in previous.former_ids.items() if name in now}
     return {old: name for old, name in (earlier | renamed).items() if old != name}
@@ -111,7 +111,7 @@ def _used(previous: RoomMap) -> set[str]:
 
 
 def _fresh(wanted: Iterable[str], used: set[str]) -> dict[str, str]:
-    """Gives each wanted id the next number after all that regions, or doors, have used."""
+    """Return each wanted id the next number after all that regions, or doors, have used."""
     highest = dict.fromkeys((True, False), 0)
     for name in used:
         is_door = name[0] == "D"
@@ -125,7 +125,7 @@ def _fresh(wanted: Iterable[str], used: set[str]) -> dict[str, str]:
 
 
 def _match_doors(previous: RoomMap, current: RoomMap, ids: dict[str, str]) -> dict[str, str]:
-    """Gives the final id for each door id of the current map, the nearest doors matched first."""
+    """Return the final id for each door id of the current map, the nearest doors matched first."""
     near = [
         (before.place.distance_to(now.place), before.id, now.id)
         for before, now in _neighbours(previous.doors, current.doors)
@@ -152,7 +152,7 @@ def _match_doors(previous: RoomMap, current: RoomMap, ids: dict[str, str]) -> di
 def _neighbours(
     previous: tuple[Door, ...], current: tuple[Door, ...]
 ) -> Iterator[tuple[Door, Door]]:
-    """Gives the pairs of doors less than twice the matching distance apart, and a few more."""
+    """Return the pairs of doors less than twice the matching distance apart, and a few more."""
     tiles: defaultdict[tuple[int, int], list[Door]] = defaultdict(list)
     for before in previous:
         tiles[_tile(before)].append(before)
@@ -197,7 +197,7 @@ def _remember(
     ids: dict[str, str],
     door_ids: dict[str, str],
 ) -> tuple[Vanished, ...]:
-    """Gives everything that is no longer there, with what became of it by now."""
+    """Return everything that is no longer there, with what became of it by now."""
     kept = set(ids.values()) | set(door_ids.values())
     final = {region.index: ids[region.id] for region in current.regions}
     lost = [
@@ -220,7 +220,7 @@ def _remember(
 
 
 def _regions_at(current: RoomMap, gone: Vanished, ids: dict[str, str]) -> tuple[str, ...]:
-    """Gives the region that now covers the place of what vanished earlier."""
+    """Return the region that now covers the place of what vanished earlier."""
     region = None if gone.floor_area_m2 is None else current.find_region_at(gone.place)
     return () if region is None else (ids[region.id],)
 

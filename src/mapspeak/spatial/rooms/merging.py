@@ -33,8 +33,6 @@ class Saddle:
         height: In the unit of the height map.
         first: The basin with the lower number.
         second: The basin with the higher number.
-        row: Where the pass lies.
-        col: Where the pass lies.
         is_doorway: True between two wall ends, where the height map has been cut.
     """
 

@@ -102,7 +102,6 @@ class Raster:
         first_row: The row of the grid at which the raster begins.
         first_col: The column of the grid at which the raster begins.
         scale: Raster cells per grid cell along one side; below 1 when the raster is coarser.
-        grid: The map it was made from.
     """
 
     free: Picture

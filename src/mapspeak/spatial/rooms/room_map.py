@@ -34,7 +34,6 @@ class Region:
         id: "R3", "C1" or "O2". The number stays from call to call once regions were matched, and
             no two regions share it; the letter says what the region is now.
         index: The region's number in the label array of its map.
-        room_class: What it is.
         free_area_m2: Floor on which nothing stands.
         floor_area_m2: Floor with what stands on it.
         length_m: The longer side of the smallest rectangle around it; of a corridor, along it.
@@ -67,8 +66,6 @@ class Door:
     Attributes:
         id: "D4"; the same from call to call once regions were matched.
         place: The middle of its narrowest line.
-        width_m: From post to post.
-        region_ids: The two regions it joins.
     """
 
     id: str
@@ -82,7 +79,6 @@ class Vanished:
     """A region or door of an earlier map that is no longer found.
 
     Attributes:
-        id: What it was called.
         place: Where it was: of a region its widest point.
         floor_area_m2: Of a region; None for a door.
         became: The regions that now cover its place; empty when nothing does.
@@ -99,11 +95,9 @@ class RoomMap:
     """A map divided into regions; compared by identity.
 
     Attributes:
-        grid: The map that was divided.
         labels: `Region.index` of each cell of the grid, 0 for no region. Furniture counts to the
             region it stands in.
         regions: Ordered by index, largest first when nothing came before.
-        doors: All of them.
         vanished: Ids of earlier maps that are no longer used; given out again only when the same
             thing is back in its place.
         former_ids: What regions were called when they were taken for something else, and what
@@ -123,7 +117,7 @@ class RoomMap:
         object.__setattr__(self, "labels", labels)
 
     def region(self, region_id: str) -> Region:
-        """Gives the region with this number, following regions that were merged into another.
+        """Return the region with this number, following regions that were merged into another.
 
         Raises:
             MapError: No region has or had this id.
@@ -139,12 +133,12 @@ class RoomMap:
         raise MapError(f"This map has no region {region_id}.", hint=f"Its regions are: {names}.")
 
     def find_region(self, region_id: str) -> Region | None:
-        """Gives the region with this id, also one that was called so and is something else now."""
+        """Return the region with this id, also one that was called so and is something else now."""
         now = self.former_ids.get(region_id, region_id)
         return next((each for each in self.regions if each.id in (region_id, now)), None)
 
     def find_region_at(self, point: Point) -> Region | None:
-        """Gives the region a point lies in, or None."""
+        """Return the region a point lies in, or None."""
         cell = self.grid.cell_at(point)
         if not self.grid.contains(cell):
             return None
@@ -152,7 +146,7 @@ class RoomMap:
         return next((region for region in self.regions if region.index == index), None)
 
     def window_of(self, region: Region) -> tuple[slice, slice]:
-        """Gives the rows and columns that a region lies in."""
+        """Return the rows and columns that a region lies in."""
         cell = self.grid.cell_at(region.widest)
         reach = max(round(region.length_m / 2 / self.grid.resolution_m), 1)
         while True:
@@ -168,23 +162,23 @@ class RoomMap:
             reach *= 2
 
     def _is_cut(self, window: tuple[slice, slice], seen: tuple[slice, slice]) -> bool:
-        """True when a region, which hangs together, may go on beyond the part that was seen."""
+        """Return True when a region may go on beyond the part that was seen."""
         return any(
             (inner.start == outer.start > 0) or (inner.stop == outer.stop < size)
             for inner, outer, size in zip(window, seen, self.labels.shape, strict=True)
         )
 
     def doors_of(self, region: Region) -> tuple[Door, ...]:
-        """Gives the doors that lead out of a region."""
+        """Return the doors that lead out of a region."""
         return tuple(door for door in self.doors if region.id in door.region_ids)
 
     def doors_between(self, first_id: str, second_id: str) -> tuple[Door, ...]:
-        """Gives the doors that join two regions."""
+        """Return the doors that join two regions."""
         pair = {first_id, second_id}
         return tuple(door for door in self.doors if set(door.region_ids) == pair)
 
     def find_way(self, start_id: str, goal_id: str) -> tuple[str, ...] | None:
-        """Gives the regions from start to goal through the fewest doors, or None.
+        """Return the regions from start to goal through the fewest doors, or None.
 
         Raises:
             MapError: One of the two is not a region of this map.

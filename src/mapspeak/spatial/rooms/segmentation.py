@@ -31,7 +31,6 @@ class Segmentation:
     """Room numbers on a raster.
 
     Attributes:
-        raster: What was cut.
         floor: The floor of it, without furniture.
         labels: 0 for no room, else from 1, the largest room first.
     """
@@ -42,7 +41,7 @@ class Segmentation:
 
 
 def segment(raster: Raster, settings: RoomSettings) -> Segmentation:
-    """Cuts the floor at its narrow places, and at the doorways that these do not show."""
+    """Cut the floor at its narrow places, and at the doorways that these do not show."""
     floor = build_floor(raster, settings)
     labels = _divide(floor, floor, [], raster, settings)
     unseen = find_doorways(raster, floor, settings)
@@ -66,7 +65,7 @@ def _divide(
     raster: Raster,
     settings: RoomSettings,
 ) -> Labels:
-    """Gives room numbers; basins end where the floor has been cut at the doorways."""
+    """Return room numbers; basins end where the floor has been cut at the doorways."""
     sigma = settings.smoothing_m / raster.cell_size_m
     height = _smooth(cut_floor.clearance_m, cut_floor.floor, sigma)
     standing = floor.standing_m
@@ -89,7 +88,7 @@ def _smooth(clearance_m: NDArray[np.float32], floor: Picture, sigma: float) -> N
 
 
 def _draw(doorways: list[Doorway], floor: Picture) -> Picture:
-    """Gives 1 on the floor between the jambs, and on jambs that were taken for furniture."""
+    """Return 1 on the floor between the jambs, and on jambs that were taken for furniture."""
     cut = np.zeros_like(floor)
     for doorway in doorways:
         start, end = ([round(at) for at in root] for root in doorway.roots)
@@ -117,13 +116,13 @@ def _find_saddles_at(doorways: list[Doorway], basins: BasinLabels) -> list[Saddl
 
 
 def _first_number(doorway: Doorway, numbers: Labels, side: int) -> int:
-    """Gives the first number that is not 0 on one side of a doorway that has been cut."""
+    """Return the first number that is not 0 on one side of a doorway that has been cut."""
     found = (_number_at(numbers, doorway.beside(side * off)) for off in range(1, 3 * _CUT_CELLS))
     return next(filter(None, found), 0)
 
 
 def _is_inside(doorway: Doorway, labels: Labels, cells: int) -> bool:
-    """True if both sides of a doorway belong to one region."""
+    """Return True if both sides of a doorway belong to one region."""
     one, other = (_number_at(labels, doorway.beside(off)) for off in (-cells, cells))
     return one == other > 0
 
@@ -135,7 +134,7 @@ def _number_at(numbers: Labels, place: tuple[int, int]) -> int:
 
 
 def _fill(labels: Labels, cut: Picture) -> Labels:
-    """Gives the cells of a cut to the regions beside it."""
+    """Return the cells of a cut to the regions beside it."""
     rows, cols = (places + 1 for places in find_cells(cut > 0))
     framed = cv2.copyMakeBorder(labels, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
     for _ in range(_CUT_CELLS + 1):

@@ -20,7 +20,7 @@ _UPRIGHT_DEG = 0.6
 def turn_upright(
     free: Picture, occupied: Picture, wall: Picture, angle_deg: float
 ) -> tuple[Picture, ...]:
-    """Gives all three so turned that walls of this direction run along rows and columns."""
+    """Return all three so turned that walls of this direction run along rows and columns."""
     if _is_upright(angle_deg):
         return free, occupied, wall
     there, size = _find_turn(free.shape, angle_deg)
@@ -37,7 +37,7 @@ def turn_upright(
 
 
 def turn_back(picture: Picture, shape: tuple[int, int], angle_deg: float) -> Picture:
-    """Gives a picture that was found on turned ones as it lies on those of this shape."""
+    """Return a picture that was found on turned ones as it lies on those of this shape."""
     if _is_upright(angle_deg):
         return picture
     there, _ = _find_turn(shape, angle_deg)
@@ -61,7 +61,7 @@ def _find_turn(shape: tuple[int, ...], angle_deg: float) -> tuple[Affine, tuple[
 
 
 def open_box(picture: Picture, high: int, wide: int) -> Picture:
-    """Gives where a box of so many cells fits; what lies outside of the picture is not set."""
+    """Return where a box of so many cells fits; what lies outside of the picture is not set."""
     box = np.ones((high, wide), np.uint8)
     return np.asarray(
         cv2.morphologyEx(
@@ -72,18 +72,18 @@ def open_box(picture: Picture, high: int, wide: int) -> Picture:
 
 
 def widen(picture: Picture, cells: int) -> Picture:
-    """Gives what is set, and what is so near to it."""
+    """Return what is set, and what is so near to it."""
     side = 2 * cells + 1
     return np.asarray(cv2.dilate(picture, np.ones((side, side), np.uint8)), np.uint8)
 
 
 def is_near(picture: Picture, cells: int, axis: int) -> Truths:
-    """True where something is set at most so many cells away along an axis."""
+    """Return True where something is set at most so many cells away along an axis."""
     return np.asarray(cv2.dilate(picture, line_along(2 * cells + 1, axis)) > 0)
 
 
 def is_short(solid: Picture, most: int, axis: int) -> Truths:
-    """True in what is solid for at most so many cells along an axis, between floor."""
+    """Return True in what is solid for at most so many cells along an axis, between floor."""
     high, wide = (most, 0) if axis == 0 else (0, most)
     framed = cv2.copyMakeBorder(solid, high, high, wide, wide, cv2.BORDER_CONSTANT, value=1)
     line = line_along(most + 1, axis)
@@ -95,12 +95,12 @@ def is_short(solid: Picture, most: int, axis: int) -> Truths:
 
 
 def line_along(cells: int, axis: int) -> Picture:
-    """Gives a line of so many cells."""
+    """Return a line of so many cells."""
     return np.ones((cells, 1) if axis == 0 else (1, cells), np.uint8)
 
 
 def run_lengths(solid: Picture, axis: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Gives where the solid runs between floor begin, in the flat picture, and their lengths.
+    """Return where the solid runs between floor begin, in the flat picture, and their lengths.
 
     Along columns the flat picture is that of the transposed one.
     """
@@ -114,25 +114,25 @@ def run_lengths(solid: Picture, axis: int) -> tuple[NDArray[np.intp], NDArray[np
 
 
 def take_lines(picture: Picture, lines: Places, axis: int) -> Picture:
-    """Gives these lines of a picture along an axis: columns along 0, rows along 1."""
+    """Return these lines of a picture along an axis: columns along 0, rows along 1."""
     return np.take(picture, lines, axis=1 - axis)
 
 
 def put_lines(picture: Picture, found: Truths, lines: Places, axis: int) -> None:
-    """Sets in these lines of a picture what was found in them."""
+    """Set in these lines of a picture what was found in them."""
     here = (slice(None), lines) if axis == 0 else (lines, slice(None))
     picture[here] |= found.astype(np.uint8)
 
 
 def last_place(is_set: Truths, axis: int, *, none: int) -> Numbers:
-    """Gives for each cell the place of the last cell set up to it, along an axis."""
+    """Return for each cell the place of the last cell set up to it, along an axis."""
     here = places(is_set.shape, axis)
     marked = np.where(is_set, here, here.dtype.type(none))
     return np.asarray(np.maximum.accumulate(marked, axis=axis))
 
 
 def places(shape: tuple[int, ...], axis: int) -> Numbers:
-    """Gives the rows, or the columns, of all cells, to be broadcast."""
+    """Return the rows, or the columns, of all cells, to be broadcast."""
     # Small numbers are accumulated faster; the places of no cell are negative.
     n = shape[axis]
     is_small = 3 * n < np.iinfo(np.int16).max
@@ -141,7 +141,7 @@ def places(shape: tuple[int, ...], axis: int) -> Numbers:
 
 
 def drop_specks(free: Picture, least: float) -> Picture:
-    """Gives the floor without parts of fewer cells."""
+    """Return the floor without parts of fewer cells."""
     _, label, stats, _ = cv2.connectedComponentsWithStats(free, connectivity=4)
     is_kept = stats[:, cv2.CC_STAT_AREA] >= least
     is_kept[0] = False
@@ -149,7 +149,7 @@ def drop_specks(free: Picture, least: float) -> Picture:
 
 
 def drop_small(solid: Picture, least: float) -> Picture:
-    """Gives what is solid without what is smaller across and has floor all around."""
+    """Return what is solid without what is smaller across and has floor all around."""
     framed = cv2.copyMakeBorder(solid, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=1)
     _, label, stats, _ = cv2.connectedComponentsWithStats(framed, connectivity=8)
     across = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
@@ -159,7 +159,7 @@ def drop_small(solid: Picture, least: float) -> Picture:
 
 
 def find_fixed(solid: Picture) -> Picture:
-    """Gives what hangs together with the outside of the picture."""
+    """Return what hangs together with the outside of the picture."""
     framed = cv2.copyMakeBorder(solid, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=1)
     _, label = cv2.connectedComponents(framed, connectivity=8)
     return np.asarray(label[1:-1, 1:-1] == label[0, 0], np.uint8)
