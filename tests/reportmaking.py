@@ -11,7 +11,6 @@ from PIL import Image
 from drawing import grid_from_text
 from mapspeak.evaluation.trials import (
     Failure,
-    RunPlan,
     Score,
     ToolCall,
     Trial,
@@ -19,7 +18,6 @@ from mapspeak.evaluation.trials import (
     TrialState,
     Turn,
     trial_folder,
-    write_plan,
     write_result,
 )
 from mapspeak.evaluation.trials.records import turn_line
@@ -65,12 +63,6 @@ def make_result(trial: Trial, *, failure: Failure | None = None, **changes: obje
         wall_s=1.5,
     )
     return replace(plain, **changes)  # type: ignore[arg-type]  # fields of a result
-
-
-def write_run(run: Path, *trials: Trial) -> None:
-    """Writes what was asked for."""
-    options = {"agents": ["scripted"], "seed": 0, "thinking": [None]}
-    write_plan(run, RunPlan(trials=trials, versions={"mapspeak": "1.2.3"}, options=options))
 
 
 def write_course(run: Path, trial: Trial, *turns: Turn) -> Path:

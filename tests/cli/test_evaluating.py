@@ -9,14 +9,9 @@ from mapspeak.errors import ConfigError
 from mapspeak.evaluation.agents import agent_names
 from mapspeak.evaluation.agents.models import Thinking
 from mapspeak.evaluation.tasks import FAMILIES
-from mapspeak.evaluation.trials import (
-    RunPlan,
-    read_plan,
-    read_results,
-    trial_folder,
-    write_plan,
-)
+from mapspeak.evaluation.trials import read_results, trial_folder, write_result
 from mapspeak.server import Representation
+from reportmaking import make_result, make_trial
 
 TWO_ROOMS = """
 title: Two rooms with a door between them.
@@ -46,13 +41,10 @@ def test_an_evaluation_ends_with_a_table_and_goes_on_where_it_was(tmp_path: Path
     status, printed = run(*asked, "--trials", "1", "--out", str(folder))
     assert status == 0
     assert "question-way" in printed
-    plan = read_plan(folder)
-    assert [trial.agent for trial in plan.trials] == ["random", "scripted"]
-    assert [trial.task for trial in plan.preparations] == ["explore"]
-    results = list(read_results(folder))
-    assert results[1].score.is_success, results[1]
-
-    (folder / "trials" / plan.preparations[0].id / "map.pgm").unlink()
+    results = {result.trial.agent: result for result in read_results(folder)}
+    assert results["scripted"].score.is_success, results["scripted"]
+    explored = next(each for each in read_results(folder) if each.trial.task == "explore")
+    (trial_folder(folder, explored.trial) / "map.pgm").unlink()
     status, again = run(*asked, "--trials", "1", "--out", str(folder))
     assert status == 0
     assert again == printed
@@ -93,13 +85,10 @@ def test_two_runs_never_share_a_folder(tmp_path: Path) -> None:
 def test_a_folder_keeps_its_seed(tmp_path: Path) -> None:
     world = tmp_path / "two.yaml"
     world.write_text(TWO_ROOMS)
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "run.json").write_text(
-        '{"trials": [], "versions": {}, "options": {"seed": 7}}'
-    )
     asked = ("--task", "question-way", "--worlds", str(world), "--out", str(tmp_path / "out"))
+    run(*asked, "--agent", "random", "--trials", "1", "--seed", "7")
     with pytest.raises(ConfigError, match="seed 7"):
-        run(*asked)
+        run(*asked, "--agent", "random", "--trials", "1")
 
 
 def test_the_help_names_all_there_is_to_choose_from() -> None:
@@ -116,36 +105,32 @@ def test_what_is_named_twice_is_run_once(tmp_path: Path) -> None:
         *("--worlds", f"{world},{world}", "--trials", "1", "--out", str(tmp_path / "out")),
     )
     assert status == 0
-    assert len(read_plan(tmp_path / "out").trials) == 2
+    asked = [each for each in read_results(tmp_path / "out") if each.trial.task != "explore"]
+    assert len(asked) == 2
 
 
-def test_a_result_that_was_cut_off_is_run_again_and_told(tmp_path: Path) -> None:
-    world, folder = tmp_path / "two.yaml", tmp_path / "out"
-    world.write_text(TWO_ROOMS)
-    asked = ("--agent", "random", "--task", "question-way", "--worlds", str(world), "--trials", "1")
-    run(*asked, "--out", str(folder))
-    (trial,) = read_plan(folder).trials
-    (trial_folder(folder, trial) / "result.json").write_text("")
-    status, printed = run(*asked, "--out", str(folder))
-    assert status == 0
-    assert "1 result was cut off and is run again" in printed
-    assert [result.trial for result in read_results(folder)] == [trial]
-
-
-def test_with_fewer_agents_what_others_did_stays_in_table_and_report(tmp_path: Path) -> None:
+def test_a_report_is_made_anew_from_all_results_that_are_there(tmp_path: Path) -> None:
     world, folder = tmp_path / "two.yaml", tmp_path / "out"
     world.write_text(TWO_ROOMS)
     asked = ("--task", "question-way", "--worlds", str(world), "--trials", "1")
-    run(*asked, "--agent", "random,scripted", "--out", str(folder))
+    run(*asked, "--agent", "random", "--out", str(folder))
     status, printed = run(*asked, "--agent", "scripted", "--out", str(folder))
     assert status == 0
-    assert "1 trial that is not asked for any more has a result" in printed
-    assert "random" in printed
-    assert "random" in (folder / "report.csv").read_text()
+    assert "random" not in printed, "the table has what was asked for"
+    status, _ = run("--report", "--out", str(folder))
+    assert status == 0
+    page = (folder / "report.html").read_text()
+    assert "question-way/" in page
+    assert "/random/" in page
+
+
+def test_a_report_of_a_folder_without_results_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="holds no result"):
+        run("--report", "--out", str(tmp_path))
 
 
 def test_a_report_that_cannot_be_put_in_its_place_leaves_no_half_of_it(tmp_path: Path) -> None:
-    write_plan(tmp_path, RunPlan(trials=(), versions={}, options={"seed": 0}))
+    write_result(tmp_path, make_result(make_trial()))
     (tmp_path / "report.html").mkdir()
     with pytest.raises(IsADirectoryError):
         run("--report", "--out", str(tmp_path))

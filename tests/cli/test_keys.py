@@ -104,6 +104,13 @@ def test_a_program_that_pauses_goes_on_after_the_release_or_at_the_end(tmp_path:
     keys.wait_until_released()
 
 
+def test_a_stop_before_any_robot_is_there_holds_and_says_so(tmp_path: Path) -> None:
+    said: list[str] = []
+    StopKeys(Hold(tmp_path), tell=said.append).press(b" ")
+    assert said == ["Held: no robot is there yet. Press r to release."]
+    assert Hold(tmp_path).read() is not None
+
+
 def test_a_hold_that_cannot_be_written_is_said(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     said: list[str] = []

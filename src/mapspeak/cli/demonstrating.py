@@ -1,22 +1,27 @@
-"""`mapspeak demo`: the paper's three tasks, carried out and scored."""
+"""`mapspeak demo`: the paper's three tasks in one world, a trial of each, scored."""
 
+import shutil
 import sys
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import anyio
 import click
 
 from mapspeak.cli.guarding import usual_modes
-from mapspeak.cli.keys import StopKeys, stop_keys
+from mapspeak.cli.keys import StopKeys, Tell, stop_keys
 from mapspeak.cli.options import SEED_OPTION, WORLD_OPTION
 
 if TYPE_CHECKING:
-    from mapspeak.evaluation.page import Moment
+    from mapspeak.evaluation.runs import TrialBar
+    from mapspeak.evaluation.trials import TrialResult, Turn
     from mapspeak.safety import Hold
+
+MEMORY = "semantic_map.yaml"
+"""What the robot remembers, of the last trial also beside the report, where it is soon found."""
+INTERRUPTED = 130
+"""Exit status after Ctrl-C, as shells have it."""
 
 
 @click.command()
@@ -30,38 +35,85 @@ if TYPE_CHECKING:
 )
 @click.option("--quiet", "is_quiet", is_flag=True, help="Print the result only.")
 def demo(world: str, seed: int, folder: Path | None, is_quiet: bool) -> None:  # noqa: FBT001 - a flag
-    """Carries out the paper's three tasks on the simulated robot, over MCP, and scores them.
+    """Let a script do the paper's three tasks on the simulated robot, over MCP, and score them.
 
-    In a terminal, space or s stops the robot and r lets it go on.
+    It is what `mapspeak eval --worlds WORLD --trials 1` does, for you to watch. In a terminal,
+    space or s stops the robot and r lets it go on.
     """
-    from mapspeak.evaluation.demo import DemoOptions, run_demo  # noqa: PLC0415
-    from mapspeak.evaluation.progress import show_progress  # noqa: PLC0415
+    from rich.console import Console  # noqa: PLC0415 - heavy; help must be quick
+
+    from mapspeak.evaluation.report import write_page  # noqa: PLC0415
+    from mapspeak.evaluation.runs import say_result, show_trials, write_log  # noqa: PLC0415
+
+    folder = folder or Path("out") / f"demo-{Path(world).stem}-{seed}"
+    console = Console(soft_wrap=True, highlight=False)
+    try:
+        with show_trials(is_quiet=is_quiet) as bar, usual_modes():
+            results = _run_trials(world, seed, folder, bar)
+            page = write_page(folder, results)
+            write_log(folder, results, {}, is_whole=True)
+    except KeyboardInterrupt:
+        click.echo("Stopped.", err=True)
+        sys.exit(INTERRUPTED)
+    for result in results:
+        console.print(say_result(result))
+    click.echo(f"Everything can be replayed in {page}")
+    sys.exit(0 if all(result.score.is_success for result in results) else 1)
+
+
+def _run_trials(world: str, seed: int, folder: Path, bar: "TrialBar") -> "list[TrialResult]":
+    """Run the trials one after the other in this process, each with a server over stdio."""
+    from mapspeak.evaluation.agents import Connection  # noqa: PLC0415 - heavy
+    from mapspeak.evaluation.runs import (  # noqa: PLC0415
+        RunOptions,
+        attempt,
+        make_jobs,
+        plan_run,
+        writing_to,
+    )
+    from mapspeak.evaluation.trials import trial_folder  # noqa: PLC0415
     from mapspeak.safety import Hold  # noqa: PLC0415
 
-    options = DemoOptions(
-        world=world, seed=seed, folder=folder or Path("out") / f"demo-{Path(world).stem}-{seed}"
-    )
-    hold = Hold(options.folder / "control")
-    with show_progress(is_quiet=is_quiet) as show, _keys_of(hold) as keys:
+    options = RunOptions(worlds=(world,), n_trials=1, seed=seed, folder=folder)
+    worlds = options.load_worlds()
+    plan = plan_run(options, worlds)
+    hold = Hold(folder / "control")
+    results = []
+    with writing_to(folder), _keys_of(hold, bar.tell) as keys:
+        for job in make_jobs(options, plan, worlds):
+            bar.begin(job.trial.task)
+            shutil.rmtree(trial_folder(folder, job.trial), ignore_errors=True)
+            result = attempt(
+                folder,
+                job.trial,
+                worlds[job.trial.world],
+                job.after,
+                connection=Connection.STDIO,
+                control=hold.folder,
+                on_turn=_watch(bar, keys),
+            )
+            results.append(result)
+            memory = trial_folder(folder, job.trial) / MEMORY
+            if memory.exists():
+                shutil.copyfile(memory, folder / MEMORY)
+    return results
 
-        def on_progress(moment: "Moment") -> None:
-            show(moment)
-            if keys is not None:
-                keys.wait_until_released()
 
-        with usual_modes():
-            report = anyio.run(run_demo, options, on_progress)
-    click.echo(report.summary())
-    click.echo(f"Everything is in {options.folder}/report.html")
-    sys.exit(0 if report.is_success else 1)
+def _watch(bar: "TrialBar", keys: StopKeys | None) -> "Callable[[Turn], None]":
+    def on_turn(turn: "Turn") -> None:
+        bar.note(turn)
+        if keys is not None:
+            keys.wait_until_released()
+
+    return on_turn
 
 
 @contextmanager
-def _keys_of(hold: "Hold") -> "Generator[StopKeys | None]":
-    """Listens for keys; the demo's own robot is held by nothing that was before or stays after."""
+def _keys_of(hold: "Hold", tell: Tell) -> "Generator[StopKeys | None]":
+    """Listen for keys; the demo's own robot is held by nothing that was before or stays after."""
     hold.lift()
     try:
-        with stop_keys(hold, tell=partial(click.echo, err=True)) as keys:
+        with stop_keys(hold, tell=tell) as keys:
             yield keys
     finally:
         hold.lift()

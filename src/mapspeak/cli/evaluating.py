@@ -6,8 +6,13 @@ from typing import TYPE_CHECKING
 
 import click
 
+from mapspeak.errors import ConfigError
+
 if TYPE_CHECKING:
-    from mapspeak.evaluation.runs import RunOptions
+    from collections.abc import Mapping, Sequence
+
+    from mapspeak.evaluation.runs import RunOptions, RunPlan
+    from mapspeak.evaluation.trials import TrialResult
 
 TABLE_WIDTH = 180
 """Characters of the table where nobody knows the width, as in a file."""
@@ -16,7 +21,7 @@ INTERRUPTED = 130
 
 
 def _split(_context: click.Context, _parameter: click.Parameter, value: str) -> tuple[str, ...]:
-    """Gives what stands between the commas, each once."""
+    """Return what stands between the commas, each once."""
     return tuple(dict.fromkeys(part.strip() for part in value.split(",") if part.strip()))
 
 
@@ -42,7 +47,7 @@ def _split(_context: click.Context, _parameter: click.Parameter, value: str) -> 
 @click.option(
     "--worlds",
     callback=_split,
-    default="all",
+    default="flat_1",
     show_default=True,
     help="Worlds, world files or maps, comma-separated; all: those that come with mapspeak.",
 )
@@ -50,7 +55,7 @@ def _split(_context: click.Context, _parameter: click.Parameter, value: str) -> 
     "--trials",
     "n_trials",
     type=click.IntRange(min=1),
-    default=30,
+    default=3,
     show_default=True,
     help="Of each task in each world; a world is explored once.",
 )
@@ -111,7 +116,7 @@ def _split(_context: click.Context, _parameter: click.Parameter, value: str) -> 
     "--report",
     "is_report_only",
     is_flag=True,
-    help="Run nothing; make the report of --out anew from what is there.",
+    help="Run nothing; make page and log of --out anew from all results that are there.",
 )
 def evaluate(
     agents: tuple[str, ...],
@@ -128,13 +133,14 @@ def evaluate(
     is_quiet: bool,  # noqa: FBT001 - a flag
     is_report_only: bool,  # noqa: FBT001 - a flag
 ) -> None:
-    """Runs tasks in simulated worlds and scores them by the simulator's truth.
+    """Run tasks in simulated worlds and score them by the simulator's truth.
 
-    Try it with: mapspeak eval --worlds flat_1 --trials 2
+    Without options this is a small try: a script, the paper's three tasks, one flat. The paper's
+    trials in every world are: mapspeak eval --worlds all --trials 30
 
     Started again with the same folder, it goes on where it was left off. The exit status is 0 when
     every trial came to a result, whatever the result is; 1 when one crashed or hung; 2 when
-    something that was asked for does not exist.
+    something that was asked for does not exist; 130 after Ctrl-C.
     """
     from mapspeak.evaluation.agents import check_agent  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.evaluation.runs import RunOptions  # noqa: PLC0415
@@ -162,37 +168,69 @@ def evaluate(
 
 
 def _report(folder: Path) -> None:
-    """Makes the report of a run's folder and says where it is."""
-    from mapspeak.evaluation.report import write_report  # noqa: PLC0415 - heavy
-    from mapspeak.evaluation.runs import writing_to  # noqa: PLC0415
+    """Make page and log of a run's folder from all results in it."""
+    from mapspeak.evaluation.runs import writing_to  # noqa: PLC0415 - heavy
+    from mapspeak.evaluation.trials import read_results  # noqa: PLC0415
 
+    results = read_results(folder)
+    if not results:
+        raise ConfigError(
+            f"{folder} holds no result of an evaluation.",
+            hint="Name the folder that was given as --out.",
+        )
     with writing_to(folder):
-        report = write_report(folder)
-    for problem in report.problems:
-        click.echo(problem, err=True)
-    click.echo(f"The report is {report.page}.")
+        _write_report(folder, results, {}, is_whole=True)
+
+
+def _write_report(
+    folder: Path,
+    results: "Sequence[TrialResult]",
+    versions: "Mapping[str, str]",
+    *,
+    is_whole: bool,
+) -> None:
+    from mapspeak.evaluation.report import write_page  # noqa: PLC0415 - heavy
+    from mapspeak.evaluation.runs import write_log  # noqa: PLC0415
+
+    log = write_log(folder, results, versions, is_whole=is_whole)
+    click.echo(f"The trials can be replayed in {write_page(folder, results)}; the log is {log}.")
 
 
 def _run(options: "RunOptions", *, is_quiet: bool) -> int:
-    """Runs an evaluation, prints its table, and gives the exit status."""
+    """Run an evaluation, print its table, and return the exit status."""
     from rich.console import Console  # noqa: PLC0415 - heavy; help must be quick
 
-    from mapspeak.evaluation.report import read_run  # noqa: PLC0415
-    from mapspeak.evaluation.runs import build_table, run_evaluation, show_run  # noqa: PLC0415
+    from mapspeak.evaluation.runs import (  # noqa: PLC0415
+        announce,
+        build_table,
+        run_evaluation,
+        show_run,
+    )
     from mapspeak.evaluation.scores import count_rows  # noqa: PLC0415
 
+    done: list[TrialResult] = []
     with show_run(is_quiet=is_quiet) as bar:
+
+        def on_plan(plan: "RunPlan") -> None:
+            if not is_quiet:
+                click.echo(announce(options, plan), err=True)
+            bar.begin(plan)
+
+        def on_done(result: "TrialResult") -> None:
+            done.append(result)
+            bar.note(result)
+
         try:
-            run_evaluation(options, on_plan=bar.begin, on_done=bar.note, tell=bar.tell)
+            plan = run_evaluation(options, on_plan=on_plan, on_done=on_done)
         except KeyboardInterrupt:
-            bar.tell(
-                f"Stopped: {bar.n_done} of {bar.n_asked} are done. Start again with the same "
-                "options to go on; --report shows what there is."
-            )
+            bar.stop()
+            click.echo(f"Stopped: {bar.n_done} of {bar.n_asked} are done.", err=True)
             return INTERRUPTED
+    found = {result.trial: result for result in done}
+    results = [found[trial] for trial in plan.trials]
     console = Console()
     if not console.is_terminal:
         console.width = TABLE_WIDTH
-    console.print(build_table(count_rows(read_run(options.folder).results)))
-    _report(options.folder)
+    console.print(build_table(count_rows(results)))
+    _write_report(options.folder, results, plan.versions, is_whole=True)
     return 1 if bar.n_broken else 0

@@ -62,6 +62,9 @@ class StopKeys:
         if stopped and not unanswered:
             self._tell(f"STOPPED and held: {', '.join(stopped)}. Press r to let it go on.")
             return
+        if not stopped and not unanswered:
+            self._tell("Held: no robot is there yet. Press r to release.")
+            return
         names = f" by {', '.join(unanswered)}" if unanswered else ""
         self._tell(f"Held, but not answered{names} within {WAIT_S:g} s. Press r to release.")
 

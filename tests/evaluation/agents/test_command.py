@@ -174,3 +174,9 @@ def test_a_program_is_read_from_a_file(tmp_path: Path) -> None:
         find_program(str(file)).check(None)
     with pytest.raises(ConfigError, match="no client program 'hers'"):
         find_program("hers")
+
+
+async def test_gemini_is_told_to_trust_the_folder_or_it_would_start_no_server() -> None:
+    gemini = find_program("gemini")
+    assert gemini.settings == {"GEMINI_CLI_TRUST_WORKSPACE": "true"}
+    assert "GOOGLE_GEMINI_BASE_URL" in gemini.environment

@@ -1,20 +1,19 @@
-import json
-import shutil
 from importlib import resources
 from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
 
-from mapspeak.evaluation.report import write_report
+from mapspeak.evaluation.report import write_page
+from mapspeak.evaluation.report.paper import PAPER_TASKS
+from mapspeak.evaluation.tasks import FAMILIES
 from mapspeak.evaluation.trials import (
     Failure,
-    RunPlan,
-    Sitting,
+    Score,
     ToolCall,
     TrialState,
     Turn,
-    write_plan,
+    read_results,
     write_result,
 )
 from reportmaking import (
@@ -24,7 +23,6 @@ from reportmaking import (
     make_turns,
     write_course,
     write_picture,
-    write_run,
     write_trial,
 )
 
@@ -34,16 +32,15 @@ HOSTILE = (
 
 
 def page_of(run: Path, **limits: int) -> ReadPage:
-    """Writes the report of a run and reads its page."""
-    return ReadPage.of(write_report(run, **limits).page)
+    """Writes the page of a run and reads its page."""
+    return ReadPage.of(write_page(run, read_results(run), **limits))
 
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    """A run with a success, a failure, one cut short, and one that was not begun."""
+    """A run with a success, a failure, and a trial that was cut short and has no result."""
     run = tmp_path / "run"
-    trials = [make_trial(number) for number in (1, 2, 3, 4)]
-    write_run(run, *trials)
+    trials = [make_trial(number) for number in (1, 2, 3)]
     write_trial(run, trials[0])
     write_trial(run, trials[1], failure=Failure.CORRIDOR_FOR_ROOM)
     write_course(run, trials[2], *make_turns())
@@ -75,7 +72,6 @@ def test_the_page_needs_nothing_from_elsewhere(run: Path) -> None:
 
 def test_hostile_text_is_shown_as_text(tmp_path: Path) -> None:
     trial = make_trial(1, world=f"flat {HOSTILE}", agent=HOSTILE)
-    write_run(tmp_path, trial)
     call = ToolCall(tool=HOSTILE, arguments={HOSTILE: HOSTILE})
     turns = (Turn(role=HOSTILE, text=HOSTILE, call=call, pictures=(HOSTILE,), is_error=True),)
     write_course(tmp_path, trial, *turns)
@@ -93,52 +89,10 @@ def test_hostile_text_is_shown_as_text(tmp_path: Path) -> None:
 
 def test_what_nobody_can_see_in_a_text_is_spelled_out(tmp_path: Path) -> None:
     trial = make_trial(1)
-    write_run(tmp_path, trial)
     write_trial(tmp_path, trial, answer="room \u202egnorw\x00")
     text = page_of(tmp_path).text
     assert "room <U+202E>gnorw<U+0000>" in text
     assert "\u202e" not in text
-
-
-def test_the_figures_of_the_page_are_those_of_the_report(run: Path) -> None:
-    page = page_of(run)
-    rows = json.loads((run / "report.json").read_text())["rows"]
-    shown = {
-        tuple(float(cell.attributes[f"data-{end}"] or "") for end in ("value", "low", "high"))
-        for cell in page.all("td", "figure")
-    }
-    told = {
-        tuple(interval.values())
-        for row in rows
-        for interval in (
-            row["counted"]["success"],
-            *row["counted"]["figures"].values(),
-            *row["per_decision"].values(),
-        )
-    }
-    (row,) = rows
-    assert shown
-    assert shown <= told
-    assert tuple(row["counted"]["success"].values()) in shown
-    assert "1/3 (33.33 %)" in page.text
-
-
-def test_the_page_says_what_counts_and_what_was_not_run(run: Path) -> None:
-    text = page_of(run).text
-    assert "1 of 3 trials were done as asked." in text
-    assert "Asked for were 4: 2 finished, 1 unfinished, 1 not run." in text
-    assert "begun and has no result counts as not successful" in text
-    assert "corridor for room" in text
-
-
-def test_a_model_that_was_not_run_is_named_without_a_figure(run: Path) -> None:
-    trials = [make_trial(1), make_trial(1, agent="anthropic/some-model")]
-    write_run(run, *trials)
-    page = page_of(run)
-    lines = [row.text for row in page.all("tr") if "some-model" in row.text]
-    assert len(lines) == 2, "among the agents, and in the list of trials"
-    assert "not run: none of 1, so no figure is given" in lines[0]
-    assert "not run" in lines[1]
 
 
 def test_the_papers_figures_are_marked_as_the_papers(run: Path) -> None:
@@ -152,14 +106,6 @@ def test_the_papers_figures_are_marked_as_the_papers(run: Path) -> None:
 def test_a_script_beside_the_papers_models_is_called_one(run: Path) -> None:
     (line,) = [row.text for row in page_of(run).all("tr") if "here, picture-table" in row.text]
     assert "no model" in line
-
-
-def test_a_mean_of_one_trial_pretends_no_interval(tmp_path: Path) -> None:
-    trial = make_trial(1)
-    write_run(tmp_path, trial)
-    write_trial(tmp_path, trial)
-    shown = [cell.text for cell in page_of(tmp_path).all("td", "figure")]
-    assert "0.5" in shown, "its path length counts half, and nothing is said of others"
 
 
 def test_a_replay_shows_where_the_robot_stood_at_every_step(run: Path) -> None:
@@ -189,44 +135,20 @@ def test_a_picture_seen_twice_is_in_the_page_once(run: Path) -> None:
     page = page_of(run)
     seen = page.all("svg", "seen")
     images = page.all("image")
-    assert len(seen) == 2, "the trial that was cut short has lost its picture"
-    assert len(images) == 2, "that picture, and the map of all three"
-
-
-def test_pictures_are_linked_when_the_page_would_be_too_large(run: Path) -> None:
-    for number in (1, 2):
-        folder = run / "trials" / make_trial(number).id
-        write_picture(folder, "003.png", shade=number, size=(1500, 1500))
-    n_bytes = sum(len(path.read_bytes()) for path in run.rglob("turns.jsonl"))
-    page = page_of(run, page_limit_bytes=2 * n_bytes)
-    linked = [unquote(each.attributes["src"] or "") for each in page.all("img", "seen")]
-    assert len(linked) == 2
-    assert all((run / name).is_file() for name in linked)
-    assert "they are linked from the folder beside it" in page.text
-    assert "img-src data: 'self' file:" in " ".join(page.values("content"))
+    assert len(seen) == 2
+    assert len(images) == 2, "that picture, and the map of both"
 
 
 def test_replays_are_pages_of_their_own_when_they_are_too_long(run: Path) -> None:
     page = page_of(run, page_limit_bytes=10)
     assert page.all("details", "trial") == []
-    assert "page of its own in the folder beside this one" in page.text
     links = [unquote(v) for v in page.values("href") if v.endswith(".html")]
-    assert len(links) == 3
+    assert len(links) == 2
     for link in links:
         replay = ReadPage.of(run / link)
         (back,) = [value for value in replay.values("href") if value.endswith("report.html")]
         assert ((run / link).parent / back).resolve() == (run / "report.html").resolve()
         assert all((run / link).parent.joinpath(src).is_file() for src in replay.values("src"))
-
-
-def test_the_same_folder_gives_the_same_bytes_wherever_it_lies(run: Path, tmp_path: Path) -> None:
-    first = write_report(run)
-    copy = write_report(Path(shutil.copytree(run, tmp_path / "elsewhere")))
-    again = write_report(run)
-    for one, other in ((first, copy), (first, again)):
-        assert one.page.read_bytes() == other.page.read_bytes()
-        assert one.figures.read_bytes() == other.figures.read_bytes()
-        assert one.lines.read_bytes() == other.lines.read_bytes()
 
 
 def test_a_broken_conversation_is_told_and_the_rest_is_shown(run: Path) -> None:
@@ -257,32 +179,8 @@ def test_a_file_that_is_no_picture_is_not_shown_as_one(run: Path) -> None:
     assert "003.png is no picture." in replay.text
 
 
-def test_earlier_sittings_are_shown_with_what_was_different_in_them(tmp_path: Path) -> None:
-    first, second = make_trial(1), make_trial(2)
-    earlier = Sitting(versions={"mapspeak": "1.0.0"}, options={"seed": 0, "n_trials": 1}, n_done=1)
-    now = RunPlan(
-        trials=(first, second),
-        versions={"mapspeak": "2.0.0"},
-        options={"seed": 0, "n_trials": 2},
-        earlier=(earlier,),
-    )
-    write_plan(tmp_path, now)
-    write_trial(tmp_path, first)
-    write_trial(tmp_path, second)
-    page = page_of(tmp_path)
-    assert "run in several sittings" in page.text
-    assert "n_trials: 1; mapspeak: 1.0.0" in page.text
-    told = json.loads((tmp_path / "report.json").read_text())["earlier"]
-    assert [(each["versions"]["mapspeak"], each["n_done"]) for each in told] == [("1.0.0", 1)]
-
-
-def test_a_run_in_one_sitting_says_nothing_of_others(run: Path) -> None:
-    assert "sitting" not in page_of(run).text
-
-
 def test_a_broken_trial_says_in_the_list_what_broke_it(tmp_path: Path) -> None:
     trial = make_trial(1)
-    write_run(tmp_path, trial)
     error = (
         "Traceback (most recent call last):\n  ...\nValueError: the door is locked (exit code 1)"
     )
@@ -299,7 +197,42 @@ def test_a_broken_trial_says_in_the_list_what_broke_it(tmp_path: Path) -> None:
 
 def test_a_trial_that_was_out_of_budget_says_so_in_the_list(tmp_path: Path) -> None:
     trial = make_trial(1)
-    write_run(tmp_path, trial)
     write_trial(tmp_path, trial, failure=Failure.WRONG_PLACE, state=TrialState.OUT_OF_BUDGET)
     (trials,) = page_of(tmp_path).all("table", "trials")
     assert "wrong place, out of budget" in trials.text
+
+
+def test_the_papers_tasks_stand_beside_the_papers_figures(tmp_path: Path) -> None:
+    figures = {"coverage_paper_ratio": 0.98, "coverage_recall": 0.985, "coverage_known_ratio": 0.99}
+    score = Score(is_success=True, figures=figures, reason="98.50 %.")
+    write_trial(tmp_path, make_trial(1, task="explore"), score=score)
+    write_trial(tmp_path, make_trial(1))
+    (line,) = [row.text for row in page_of(tmp_path).all("tr") if "here, picture-table" in row.text]
+    assert "98.00 % by the paper's ratio, 98.50 % recall, 99.00 % known" in line
+    assert "1/1 (100.00 %)20.65 % to 100.00 %" in line
+    assert line.endswith("not run")
+
+
+def test_the_papers_tasks_are_those_of_the_catalogue() -> None:
+    assert FAMILIES["paper"] == PAPER_TASKS
+
+
+def test_no_script_is_taken_for_a_model(tmp_path: Path) -> None:
+    names = ("scripted", "mock", "mockllm/model", "command:codex", "openai/some-model")
+    for name in names:
+        write_trial(tmp_path, make_trial(1, agent=name))
+    lines = [row.text for row in page_of(tmp_path).all("tr") if "here, picture-table" in row.text]
+    kinds = {
+        name: any(f"{name}here" in each and "no model" in each for each in lines) for name in names
+    }
+    assert list(kinds.values()) == [True, True, True, False, False]
+
+
+def test_success_is_counted_with_wilsons_interval_and_broken_trials(tmp_path: Path) -> None:
+    write_trial(tmp_path, make_trial(1))
+    write_trial(tmp_path, make_trial(2), failure=Failure.WRONG_SIZE)
+    broken = make_result(make_trial(3), failure=Failure.BROKEN, state=TrialState.CRASHED)
+    write_result(tmp_path, broken)
+    (rows,) = page_of(tmp_path).all("table", "success")
+    assert "1/3 (33.33 %)6.15 % to 79.23 %; 1 broken" in rows.text
+    assert "wrong_size 1, broken 1" in rows.text

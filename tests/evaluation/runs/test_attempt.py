@@ -9,7 +9,6 @@ from mapspeak.evaluation.runs.attempt import attempt
 from mapspeak.evaluation.trials import (
     Trial,
     TrialResult,
-    read_result,
     read_turns,
     trial_folder,
 )
@@ -27,8 +26,7 @@ def run_one(run: Path, task: str, *, seed: int = 1, agent: str = "scripted") -> 
     trial = Trial(
         task=task, world="flat", seed=seed, agent=agent, representation="picture-table", number=1
     )
-    attempt(run, trial, world, preparation)
-    return read_result(run, trial)
+    return attempt(run, trial, world, preparation)
 
 
 def without_wall_time(run: Path, trial: Trial) -> tuple[str, list[object]]:
@@ -96,8 +94,7 @@ def test_a_server_of_its_own_leaves_the_robots_map_when_it_ends(tmp_path: Path) 
     world = load_world("flat_1")
     preparation = prepare(tmp_path, world)
     trial = replace(preparation, task="question-way", agent="mock")
-    attempt(tmp_path, trial, world, preparation)
-    assert read_result(tmp_path, trial).n_calls > 0
+    assert attempt(tmp_path, trial, world, preparation).n_calls > 0
     given, left = (
         load_map(trial_folder(tmp_path, each) / "map.yaml").grid for each in (preparation, trial)
     )

@@ -14,7 +14,6 @@ from mapspeak.evaluation.trials import (
     Trial,
     TrialResult,
     TrialState,
-    read_result,
     read_turns,
 )
 from sites import make_flat
@@ -26,8 +25,7 @@ def run_one(run: Path, task: str, *, agent: str) -> TrialResult:
     trial = Trial(
         task=task, world="flat", seed=4, agent=agent, representation="picture-table", number=1
     )
-    attempt(run, trial, world, None)
-    return read_result(run, trial)
+    return attempt(run, trial, world, None)
 
 
 @pytest.mark.parametrize("agent", ["scripted", "oracle"])

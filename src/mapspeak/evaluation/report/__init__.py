@@ -1,6 +1,5 @@
-"""The report of a run: its figures, a line for each trial, and a page that replays every one."""
+"""The page of a run: the paper's table with ours beside it, and every trial to be replayed."""
 
-from mapspeak.evaluation.report.gathering import read_run
-from mapspeak.evaluation.report.writing import PAGE_LIMIT_BYTES, WrittenReport, write_report
+from mapspeak.evaluation.report.page import PAGE_LIMIT_BYTES, write_page
 
-__all__ = ["PAGE_LIMIT_BYTES", "WrittenReport", "read_run", "write_report"]
+__all__ = ["PAGE_LIMIT_BYTES", "write_page"]

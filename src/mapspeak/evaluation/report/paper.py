@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-from mapspeak.evaluation.scores import Interval, wilson_interval
-
 __all__ = ["PAPER_NOTE", "PAPER_ROWS", "PAPER_TASKS", "PaperRow"]
 
 PAPER_TASKS = ("explore", "smallest-room", "fire-tool")
@@ -37,16 +35,6 @@ class PaperRow:
     n_smallest_room: int
     n_fire_tool: int
     n_trials: int = 30
-
-    @property
-    def smallest_room(self) -> Interval | None:
-        """The share of Task 2 that was done."""
-        return wilson_interval(self.n_smallest_room, self.n_trials)
-
-    @property
-    def fire_tool(self) -> Interval | None:
-        """The share of Task 3 that was done."""
-        return wilson_interval(self.n_fire_tool, self.n_trials)
 
 
 PAPER_ROWS = (

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mapspeak.evaluation.report.album import Album, find_picture
-from mapspeak.evaluation.report.gathering import PICTURES, Attempt, Course
+from mapspeak.evaluation.report.course import PICTURES, Course
 from mapspeak.evaluation.report.markup import Html, element, joined, text
 from mapspeak.evaluation.report.way import Stop, draw_way, lay_out_way
-from mapspeak.evaluation.report.wording import say_figure
 from mapspeak.evaluation.trials import TrialResult, Turn
 
 __all__ = ["build_replay", "show_standing"]
@@ -27,9 +26,17 @@ class _Step:
         return self.turns[-1]
 
 
-def build_replay(attempt: Attempt, course: Course, album: Album) -> Html:
-    """Gives the section of a trial; its id is the trial's."""
-    steps = tuple(_group(attempt.trial.id, course.turns))
+def build_replay(result: TrialResult, folder: Path, course: Course, album: Album) -> Html:
+    """Return the section of a trial; its id is the trial's.
+
+    Args:
+        result: What came of it.
+        folder: The trial's.
+        course: How it went.
+        album: Takes the pictures.
+    """
+    trial = result.trial
+    steps = tuple(_group(trial.id, course.turns))
     way = lay_out_way(course, [(step.anchor, step.last.pose, step.last.robot_s) for step in steps])
     if way is None:
         floor = element("p", {"class": "none"}, text("There is no map of it."))
@@ -38,54 +45,47 @@ def build_replay(attempt: Attempt, course: Course, album: Album) -> Html:
     stops = {} if way is None else way.stops
     return element(
         "details",
-        {"class": "trial", "id": attempt.trial.id},
-        _summary(attempt),
-        *_head(attempt, course),
+        {"class": "trial", "id": trial.id},
+        _summary(result),
+        *_head(result, course),
         element(
             "div",
             {"class": "replay"},
             element("div", {"class": "floor"}, floor),
-            _list_steps(steps, stops, attempt.folder / PICTURES, album),
+            _list_steps(steps, stops, folder / PICTURES, album),
         ),
     )
 
 
-def show_standing(attempt: Attempt) -> Html:
-    """Says in a coloured word how a trial stands."""
-    if attempt.result is None or attempt.is_broken:
-        return element("span", {"class": "word broken"}, text(attempt.standing))
-    if attempt.result.score.is_success:
+def show_standing(result: TrialResult) -> Html:
+    """Say in a coloured word how a trial ended."""
+    if result.state.is_broken:
+        return element("span", {"class": "word broken"}, text(result.state))
+    if result.score.is_success:
         return element("span", {"class": "word good"}, text("done"))
     return element("span", {"class": "word bad"}, text("not done"))
 
 
-def _summary(attempt: Attempt) -> Html:
-    trial = attempt.trial
-    who = trial.answerer
-    where = f" {trial.world} {trial.number:03d}"
-    said = f" {who}, {trial.representation}"
+def _summary(result: TrialResult) -> Html:
+    trial = result.trial
     return element(
         "summary",
         {},
-        show_standing(attempt),
+        show_standing(result),
         element("b", {}, text(f" {trial.task}")),
-        text(where),
-        element("small", {}, text(said)),
+        text(f" {trial.world} {trial.number:03d}"),
+        element("small", {}, text(f" {trial.answerer}, {trial.representation}")),
     )
 
 
-def _head(attempt: Attempt, course: Course) -> Iterator[Html]:
-    result = attempt.result
-    for problem in (attempt.problem, *course.problems):
-        if problem is not None:
-            yield element("p", {"class": "problem"}, text(problem))
-    if result is None:
-        return
+def _head(result: TrialResult, course: Course) -> Iterator[Html]:
+    for problem in course.problems:
+        yield element("p", {"class": "problem"}, text(problem))
     failure = result.score.failure
     kind = "" if failure is None else f"{failure.replace('_', ' ')}: "
     yield element("p", {"class": "reason"}, text(f"{kind}{result.score.reason}"))
-    spent = [] if attempt.is_broken else _say_spent(result)
-    facts = (attempt.standing, *spent, f"seed {attempt.trial.seed}")
+    spent = [] if result.state.is_broken else _say_spent(result)
+    facts = (result.state.replace("_", " "), *spent, f"seed {result.trial.seed}")
     yield element("p", {"class": "spent"}, text(", ".join(facts)))
     if result.prompt:
         yield _quote("Asked", result.prompt)
@@ -114,7 +114,7 @@ def _quote(who: str, said: str) -> Html:
 
 def _tokens(read: int | None, written: int | None, pictures: int | None) -> list[str]:
     named = ((read, "tokens read"), (written, "tokens written"), (pictures, "of them pictures"))
-    return [f"{say_figure(value)} {name}" for value, name in named if value is not None]
+    return [f"{value:,} {name}" for value, name in named if value is not None]
 
 
 def _group(trial_id: str, turns: Sequence[Turn]) -> Iterator[_Step]:

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from mapspeak.evaluation.report.album import Album
-from mapspeak.evaluation.report.gathering import Course
+from mapspeak.evaluation.report.course import Course
 from mapspeak.evaluation.report.markup import Html, element, joined, text
 from mapspeak.evaluation.report.sheet import Sheet, draw_sheet
 from mapspeak.geometry import Pose

@@ -1,18 +1,35 @@
 """Runs: many trials, each in a process of its own, and one run that can be taken up again."""
 
-from mapspeak.evaluation.runs.folder import writing_to
-from mapspeak.evaluation.runs.run import RunOptions, plan_run, run_evaluation
-from mapspeak.evaluation.runs.schedule import Job, run_jobs
-from mapspeak.evaluation.runs.showing import RunBar, build_table, show_run
+from mapspeak.evaluation.runs.attempt import attempt
+from mapspeak.evaluation.runs.inspectlog import write_log
+from mapspeak.evaluation.runs.plan import RunOptions, RunPlan, plan_run
+from mapspeak.evaluation.runs.runner import Job, make_jobs, run_evaluation, run_jobs, writing_to
+from mapspeak.evaluation.runs.showing import (
+    RunBar,
+    TrialBar,
+    announce,
+    build_table,
+    say_result,
+    show_run,
+    show_trials,
+)
 
 __all__ = [
     "Job",
     "RunBar",
     "RunOptions",
+    "RunPlan",
+    "TrialBar",
+    "announce",
+    "attempt",
     "build_table",
+    "make_jobs",
     "plan_run",
     "run_evaluation",
     "run_jobs",
+    "say_result",
     "show_run",
+    "show_trials",
+    "write_log",
     "writing_to",
 ]

@@ -1,6 +1,7 @@
 """One trial from its setting to its score, in this process."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -8,10 +9,17 @@ import anyio
 import cv2
 
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.agents import Agent, AgentEnd, Assignment, find_agent
+from mapspeak.evaluation.agents import Agent, AgentEnd, Assignment, Connection, find_agent
 from mapspeak.evaluation.client import OutOfBudgetError, ToolClient
 from mapspeak.evaluation.runs.transcript import Transcript
-from mapspeak.evaluation.runs.workplace import MAP, MEMORY, STATES, Workshop, open_workplace
+from mapspeak.evaluation.runs.workplace import (
+    CONTROL,
+    MAP,
+    MEMORY,
+    STATES,
+    Workshop,
+    open_workplace,
+)
 from mapspeak.evaluation.scores import Evidence, Site
 from mapspeak.evaluation.tasks import Task, find_task
 from mapspeak.evaluation.trials import (
@@ -19,6 +27,7 @@ from mapspeak.evaluation.trials import (
     Trial,
     TrialResult,
     TrialState,
+    Turn,
     trial_folder,
     write_result,
 )
@@ -39,14 +48,26 @@ class _Course:
     wall_s: float
 
 
-def attempt(run: Path, trial: Trial, world: World, preparation: Trial | None) -> None:
-    """Carries out a trial and writes everything about it; its result comes last.
+def attempt(
+    run: Path,
+    trial: Trial,
+    world: World,
+    preparation: Trial | None,
+    *,
+    connection: Connection | None = None,
+    control: Path | None = None,
+    on_turn: Callable[[Turn], None] | None = None,
+) -> TrialResult:
+    """Carry out a trial, write everything about it, its result last, and return that.
 
     Args:
         run: The run's folder.
         trial: Which attempt.
         world: Its world.
         preparation: The trial whose map and memory this one starts from; None where there is none.
+        connection: How the agent reaches the server; None for the way that the agent prefers.
+        control: Where the robot is held and released; None for a folder of the trial.
+        on_turn: Told of each piece of the conversation, a call before it is made.
     """
     begun_s = time.process_time()
     # Trials share the machine: one thread each costs least.
@@ -67,12 +88,15 @@ def attempt(run: Path, trial: Trial, world: World, preparation: Trial | None) ->
         world=world,
         known_map=prepared / MAP if prepared is not None and setting.is_known else None,
         folder=folder,
+        control=control or folder / CONTROL,
     )
     as_set = _as_set(site, setting)
     agent = find_agent(trial, setting, as_set)
-    course = anyio.run(_work, shop, agent)
+    course = anyio.run(_work, shop, agent, connection or agent.connection, on_turn)
     result = _judge(trial, setting, task, as_set, course)
-    write_result(run, replace(result, cpu_s=round(time.process_time() - begun_s, 3)))
+    result = replace(result, cpu_s=round(time.process_time() - begun_s, 3))
+    write_result(run, result)
+    return result
 
 
 def _as_set(site: Site, setting: Setting) -> Site:
@@ -82,11 +106,16 @@ def _as_set(site: Site, setting: Setting) -> Site:
     return site.with_more(setting.added)
 
 
-async def _work(shop: Workshop, agent: Agent) -> _Course:
+async def _work(
+    shop: Workshop,
+    agent: Agent,
+    connection: Connection,
+    on_turn: Callable[[Turn], None] | None,
+) -> _Course:
     begun_s = time.perf_counter()
     setting = shop.setting
-    async with open_workplace(shop, agent.connection) as place:
-        transcript = Transcript(shop.folder, setting.limits, place.look)
+    async with open_workplace(shop, connection) as place:
+        transcript = Transcript(shop.folder, setting.limits, place.look, on_turn)
         system = "\n\n".join(filter(None, (place.instructions, setting.guidance)))
         assignment = Assignment(
             prompt=setting.prompt,

@@ -1,14 +1,19 @@
-"""A run as people see it: a bar while it goes on, a table in the end."""
+"""A run and a trial as people see them: a bar while they go on, a table in the end.
+
+A bar is drawn only where standard error is a terminal; elsewhere each result is a line.
+"""
 
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
+    ProgressColumn,
     TaskID,
     TextColumn,
     TimeElapsedColumn,
@@ -16,10 +21,13 @@ from rich.progress import (
 )
 from rich.table import Column, Table
 
+from mapspeak.evaluation.agents.others import can_think
+from mapspeak.evaluation.runs.plan import RunOptions, RunPlan
 from mapspeak.evaluation.scores import TableRow
-from mapspeak.evaluation.trials import RunPlan, TrialResult, TrialState
+from mapspeak.evaluation.tasks import EXPLORE
+from mapspeak.evaluation.trials import TrialResult, Turn
 
-__all__ = ["RunBar", "build_table", "show_run"]
+__all__ = ["RunBar", "TrialBar", "announce", "build_table", "say_result", "show_run", "show_trials"]
 
 SHOWN = {
     "coverage_recall": "recall",
@@ -30,7 +38,38 @@ SHOWN = {
     "wall_s": "wall s",
 }
 """Figures with their headings, short enough for a terminal of eighty columns."""
-BAR_WIDTH = 16
+BAR_WIDTH = 12
+EXPLORATION_S, TRIAL_S = 26.0, 1.0
+"""What a script's trials took of one core in the mean over all worlds, for the announcement."""
+SPARE_TEXT = Column(ratio=1, no_wrap=True, overflow="ellipsis")
+"""What does not fit is cut, and not the numbers before it."""
+
+
+def announce(options: RunOptions, plan: RunPlan) -> str:
+    """Say how many trials there are, about how long they take, and how to interrupt."""
+    trials = (*plan.preparations, *plan.trials)
+    n_worlds = len({trial.world for trial in trials})
+    worlds = "1 world" if n_worlds == 1 else f"{n_worlds} worlds"
+    names = ", ".join(options.agents)
+    cost_s = sum(EXPLORATION_S if trial.task == EXPLORE else TRIAL_S for trial in trials)
+    minutes = max(round(cost_s / min(options.n_jobs, 2) / 60), 1)
+    long = f"about {minutes} min on two idle cores"
+    if any(map(can_think, options.agents)):
+        long = "as long as whoever answers takes"
+    return (
+        f"{len(trials)} trials in {worlds} by {names}, {options.n_jobs} at a time: {long}. "
+        "Ctrl-C stops; the same command goes on."
+    )
+
+
+def say_result(result: TrialResult) -> str:
+    """Say in a coloured line what came of a trial, as markup of rich."""
+    if result.score.is_success:
+        word = "[bold green]done  [/]"
+    else:
+        word = "[bold red]BROKEN[/]" if result.state.is_broken else "[bold red]FAILED[/]"
+    asked = (result.prompt or result.trial.task).rstrip(".")
+    return f"{word}  {escape(asked)}: {escape(result.score.reason)}"
 
 
 @dataclass(slots=True)
@@ -54,52 +93,103 @@ class RunBar:
     _preparations: frozenset[str] = frozenset()
 
     def begin(self, plan: RunPlan) -> None:
-        """Takes note of how much there is to do, and begins to show it."""
+        """Take note of how much there is to do, and begin to show it."""
         self._preparations = frozenset(trial.id for trial in plan.preparations)
         self.n_asked = len(plan.trials) + len(plan.preparations)
-        n_first = len(plan.preparations)
-        worlds = "a world" if n_first == 1 else f"{n_first} worlds"
-        first = f"exploring {worlds} first" if n_first else "starting"
-        self.progress.update(self.bar, total=self.n_asked, description=first)
+        self.progress.update(self.bar, total=self.n_asked, description="starting")
         self.progress.start()
 
     def note(self, result: TrialResult) -> None:
-        """Takes note of a result."""
-        self.n_broken += result.state in (TrialState.CRASHED, TrialState.HUNG)
+        """Take note of a result."""
+        self.n_broken += result.state.is_broken
         self.n_done += 1
         if result.trial.id not in self._preparations:
             self._n_successes += result.score.is_success
         said = f"{self._n_successes} done, {self.n_broken} broken; last {result.trial.id}"
         self.progress.update(self.bar, advance=1, description=said)
+        if not self.progress.console.is_terminal:
+            self.tell(f"{self.n_done}/{self.n_asked} {result.trial.id}: {result.score.reason}")
 
     def tell(self, said: str) -> None:
-        """Says something besides."""
-        self.progress.console.print(said, markup=False, highlight=False, soft_wrap=True)
+        """Say something besides."""
+        if not self.progress.disable or not self.progress.console.is_terminal:
+            self.progress.console.print(said, markup=False, highlight=False, soft_wrap=True)
+
+    def stop(self) -> None:
+        """Take the bar away for good."""
+        self.progress.stop()
 
 
 @contextmanager
 def show_run(*, is_quiet: bool) -> Generator[RunBar]:
-    """Offers something to tell results to; it draws on standard error, or nothing at all."""
-    columns = (
-        BarColumn(bar_width=BAR_WIDTH),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        # What does not fit is cut, and not the numbers before it.
-        TextColumn(
-            "{task.description}", table_column=Column(ratio=1, no_wrap=True, overflow="ellipsis")
-        ),
-    )
-    console = Console(stderr=True)
-    progress = Progress(*columns, console=console, disable=is_quiet, expand=True)
+    """Offer something to tell results to; it draws on standard error, or nothing at all."""
+    numbers = (MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    progress = _make_progress(is_quiet, BarColumn(bar_width=BAR_WIDTH), *numbers)
     try:
         yield RunBar(progress, progress.add_task("starting", total=None))
     finally:
         progress.stop()
 
 
+@dataclass(slots=True)
+class TrialBar:
+    """Shows a trial while it goes on.
+
+    Attributes:
+        progress: The bar.
+        bar: Its line.
+    """
+
+    progress: Progress
+    bar: TaskID
+    _n_calls: int = 0
+
+    def begin(self, task: str) -> None:
+        """Show that a trial begins."""
+        self._n_calls = 0
+        self.progress.update(self.bar, stage=task, n_calls=0, description="starting")
+        self.progress.start()
+
+    def note(self, turn: Turn) -> None:
+        """Show a turn of it."""
+        if turn.call is None:
+            return
+        if turn.role != "tool":
+            self._n_calls += 1
+            values = [str(value) for value in turn.call.arguments.values()]
+            said = " ".join((turn.call.tool, *values))
+            self.progress.update(self.bar, n_calls=self._n_calls, description=escape(said))
+
+    def tell(self, said: str) -> None:
+        """Say something above the bar."""
+        self.progress.console.print(said, markup=False, highlight=False, soft_wrap=True)
+
+
+@contextmanager
+def show_trials(*, is_quiet: bool) -> Generator[TrialBar]:
+    """Offer something to tell the turns of trials to; it draws on standard error, or nothing."""
+    progress = _make_progress(
+        is_quiet,
+        TextColumn("{task.fields[stage]:<13}"),
+        BarColumn(bar_width=BAR_WIDTH),
+        TextColumn("{task.fields[n_calls]:>4} calls"),
+        TimeElapsedColumn(),
+    )
+    try:
+        yield TrialBar(progress, progress.add_task("starting", total=None, stage="", n_calls=0))
+    finally:
+        progress.stop()
+
+
+def _make_progress(is_quiet: bool, *columns: ProgressColumn) -> Progress:  # noqa: FBT001 - a flag
+    console = Console(stderr=True)
+    text = TextColumn("{task.description}", table_column=SPARE_TEXT)
+    is_off = is_quiet or not console.is_terminal
+    return Progress(*columns, text, console=console, disable=is_off, expand=True, transient=True)
+
+
 def build_table(rows: Sequence[TableRow]) -> Table:
-    """Gives the rows as a table for the terminal, without columns that say nothing."""
+    """Return the rows as a table for the terminal, without columns that say nothing."""
     headings = ("task", "agent", "map shown as", "done", "95 %", *SHOWN.values())
     headings = (*headings, "broken", "failures")
     cells = [_cells_of(row) for row in rows]

@@ -20,6 +20,7 @@ class Transcript:
         folder: The trial's.
         limits: What it may cost; wall time is watched from outside.
         look: Gives how the simulation truly stands.
+        on_turn: Told of every turn; None for nobody.
 
     Attributes:
         n_turns: Written so far.
@@ -30,7 +31,13 @@ class Transcript:
         calls: Every call in its order.
     """
 
-    def __init__(self, folder: Path, limits: Limits, look: Callable[[], StateRecord]) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        limits: Limits,
+        look: Callable[[], StateRecord],
+        on_turn: Callable[[Turn], None] | None = None,
+    ) -> None:
         self.n_turns = 0
         self.n_calls = 0
         self.n_errors = 0
@@ -38,6 +45,7 @@ class Transcript:
         self.calls: list[ToolCall] = []
         self._limits = limits
         self._look = look
+        self._on_turn = on_turn
         self._begun_s = time.perf_counter()
         self._pictures = folder / "pictures"
         self._turns = (folder / TURNS).open("wb")
@@ -123,6 +131,8 @@ class Transcript:
         self.n_turns += 1
         self._turns.write(turn_line(turn))
         self._turns.flush()
+        if self._on_turn is not None:
+            self._on_turn(turn)
 
     def _keep(self, data: bytes, suffix: str) -> str:
         self._pictures.mkdir(exist_ok=True)

@@ -52,6 +52,7 @@ class Workshop:
         world: The world of the trial, without what the setting adds.
         known_map: A finished map (.yaml) for the robot; None where it has none.
         folder: The trial's.
+        control: Where the robot is held and released.
     """
 
     trial: Trial
@@ -59,6 +60,7 @@ class Workshop:
     world: World
     known_map: Path | None
     folder: Path
+    control: Path
 
     @property
     def toolsets(self) -> tuple[str, ...]:
@@ -88,7 +90,7 @@ class Workshop:
             *("--state-log", str(self.folder / STATES)),
             *("--final-map", str(self.folder / MAP)),
             *("--audit", str(self.folder / AUDIT)),
-            *("--control", str(self.folder / CONTROL)),
+            *("--control", str(self.control)),
         )
 
 
@@ -166,7 +168,7 @@ def _build_guard(shop: Workshop, robot: SimulatedRobot) -> Guard:
     def robot_clock() -> datetime:
         return CLOCK_ZERO + timedelta(seconds=robot.now_s)
 
-    control, name = shop.folder / CONTROL, f"sim:{shop.world.name}"
+    control, name = shop.control, f"sim:{shop.world.name}"
     return Guard(
         policy=Policy(),
         audit=AuditLog(shop.folder / AUDIT, wall_clock=robot_clock, robot=name),

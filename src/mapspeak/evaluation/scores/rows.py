@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from mapspeak.evaluation.scores.intervals import Interval, bootstrap_interval, wilson_interval
 from mapspeak.evaluation.scores.judging import spl
-from mapspeak.evaluation.trials import Failure, TrialResult, TrialState
+from mapspeak.evaluation.trials import Failure, TrialResult
 
 __all__ = ["TableRow", "count_rows"]
 
@@ -60,11 +60,10 @@ def _count(
     *,
     results: list[TrialResult],
 ) -> TableRow:
-    broken = (TrialState.CRASHED, TrialState.HUNG)
     n_successes = sum(result.score.is_success for result in results)
     values: dict[str, list[float]] = {}
     for result in results:
-        if result.state not in broken:
+        if not result.state.is_broken:
             for name, value in _figures_of(result).items():
                 values.setdefault(name, []).append(value)
     intervals = {name: bootstrap_interval(each) for name, each in values.items()}
@@ -75,7 +74,7 @@ def _count(
         representation=representation,
         n_trials=len(results),
         n_successes=n_successes,
-        n_broken=sum(result.state in broken for result in results),
+        n_broken=sum(result.state.is_broken for result in results),
         success=wilson_interval(n_successes, len(results)),
         figures={name: each for name, each in intervals.items() if each is not None},
         failures=dict(

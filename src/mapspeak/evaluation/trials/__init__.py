@@ -1,15 +1,12 @@
 """Trials: what is attempted, what came of it, and how both lie on the disk."""
 
 from mapspeak.evaluation.trials.records import (
-    RunPlan,
-    Sitting,
-    is_done,
-    read_plan,
+    find_result,
     read_result,
     read_results,
     read_turns,
+    say_fault,
     trial_folder,
-    write_plan,
     write_result,
 )
 from mapspeak.evaluation.trials.trial import (
@@ -27,21 +24,18 @@ from mapspeak.evaluation.trials.trial import (
 __all__ = [
     "Failure",
     "Limits",
-    "RunPlan",
     "Score",
     "Setting",
-    "Sitting",
     "ToolCall",
     "Trial",
     "TrialResult",
     "TrialState",
     "Turn",
-    "is_done",
-    "read_plan",
+    "find_result",
     "read_result",
     "read_results",
     "read_turns",
+    "say_fault",
     "trial_folder",
-    "write_plan",
     "write_result",
 ]

@@ -1,6 +1,5 @@
 """Trials on the disk: one folder each, whose result.json is written last and at once.
 
-OUT/run.json                      what was asked for
 OUT/trials/TRIAL_ID/turns.jsonl   the conversation, as it happens
                     pictures/     what the agent saw
                     state.jsonl   the simulator's truth (`simulator.read_state_log`)
@@ -10,96 +9,42 @@ OUT/trials/TRIAL_ID/turns.jsonl   the conversation, as it happens
 
 import json
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
 from mapspeak.evaluation.trials.trial import Trial, TrialResult, Turn
 
 __all__ = [
-    "RunPlan",
-    "Sitting",
-    "is_done",
-    "read_plan",
+    "find_result",
     "read_result",
     "read_results",
     "read_turns",
     "say_fault",
     "trial_folder",
     "turn_line",
-    "write_plan",
     "write_result",
 ]
 
 RESULT = "result.json"
 TURNS = "turns.jsonl"
-PLAN = "run.json"
+TRIALS = "trials"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sitting:
-    """A time that a run was started, before it was taken up with other versions or options.
-
-    Attributes:
-        versions: As in `RunPlan`.
-        options: As in `RunPlan`.
-        n_done: Trials that had a result when it ended, those of earlier sittings among them.
-    """
-
-    versions: dict[str, str]
-    options: dict[str, Any]
-    n_done: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RunPlan:
-    """What a run was asked for, and with what.
-
-    Attributes:
-        trials: All of them, in their order; preparations are not among them. Trials that were
-            asked for once and have a result stay.
-        preparations: Trials that were not asked for but that others start from: the scripted
-            exploration whose map and memory they are given.
-        versions: Of mapspeak, Python and numpy, of `inspect-ai` behind models and of client
-            programs, by name.
-        options: As on the command line.
-        earlier: Sittings before, with other versions or options.
-    """
-
-    trials: tuple[Trial, ...]
-    preparations: tuple[Trial, ...] = ()
-    versions: dict[str, str]
-    options: dict[str, Any]
-    earlier: tuple[Sitting, ...] = ()
-
-
-_PLAN: TypeAdapter[RunPlan] = TypeAdapter(RunPlan)
 _RESULT: TypeAdapter[TrialResult] = TypeAdapter(TrialResult)
 _TURN: TypeAdapter[Turn] = TypeAdapter(Turn)
 
 
 def trial_folder(run: Path, trial: Trial) -> Path:
     """Gives where a trial lies in a run's folder."""
-    return run / "trials" / trial.id
+    return run / TRIALS / trial.id
 
 
-def is_done(run: Path, trial: Trial) -> bool:
-    """True when a trial has a result, whatever it is."""
-    return (trial_folder(run, trial) / RESULT).exists()
-
-
-def write_plan(run: Path, plan: RunPlan) -> None:
-    """Writes run.json."""
-    run.mkdir(parents=True, exist_ok=True)
-    _write_at_once(run / PLAN, _PLAN.dump_json(plan, indent=2) + b"\n")
-
-
-def read_plan(run: Path) -> RunPlan:
-    """Reads run.json."""
-    return _PLAN.validate_json((run / PLAN).read_bytes())
+def find_result(run: Path, trial: Trial) -> Path | None:
+    """Return the file of a trial's result; None for a trial without one."""
+    path = trial_folder(run, trial) / RESULT
+    return path if path.exists() else None
 
 
 def write_result(run: Path, result: TrialResult) -> None:
@@ -109,16 +54,22 @@ def write_result(run: Path, result: TrialResult) -> None:
     _write_at_once(folder / RESULT, _RESULT.dump_json(result, indent=2) + b"\n")
 
 
-def read_result(run: Path, trial: Trial) -> TrialResult:
-    """Reads the result of a trial that is done."""
-    return _RESULT.validate_json((trial_folder(run, trial) / RESULT).read_bytes())
+def read_result(path: Path) -> TrialResult:
+    """Read a result.
+
+    Raises:
+        ValidationError: The file holds no result.
+    """
+    return _RESULT.validate_json(path.read_bytes())
 
 
-def read_results(run: Path) -> Iterator[TrialResult]:
-    """Reads the results of all trials that were asked for and are done, in their order."""
-    for trial in read_plan(run).trials:
-        if is_done(run, trial):
-            yield read_result(run, trial)
+def read_results(run: Path) -> tuple[TrialResult, ...]:
+    """Read all results of a run's folder, by their names, but for broken files."""
+    results = []
+    for path in sorted((run / TRIALS).glob(f"**/{RESULT}")):
+        with suppress(ValidationError):
+            results.append(read_result(path))
+    return tuple(results)
 
 
 def turn_line(turn: Turn) -> bytes:

@@ -123,6 +123,11 @@ class TrialState(StrEnum):
     CRASHED = "crashed"
     HUNG = "hung"
 
+    @property
+    def is_broken(self) -> bool:
+        """True when the trial itself failed: nothing is said of the agent."""
+        return self in (TrialState.CRASHED, TrialState.HUNG)
+
 
 class Failure(StrEnum):
     """What kind of mistake made a trial fail."""

@@ -260,7 +260,12 @@ _PROGRAMS = {
         ),
         config=".gemini/settings.json",
         server={"trust": True},
-        environment=("GEMINI_API_KEY", "GOOGLE_API_KEY", "GOOGLE_GENAI_USE_VERTEXAI"),
+        # Else it leaves out every MCP server: the trial's folder is a new one to it.
+        settings={"GEMINI_CLI_TRUST_WORKSPACE": "true"},
+        environment=(
+            *("GEMINI_API_KEY", "GOOGLE_API_KEY", "GOOGLE_GENAI_USE_VERTEXAI"),
+            "GOOGLE_GEMINI_BASE_URL",
+        ),
         answer=AnswerForm.JSON,
         answer_key="response",
         input_tokens=("stats.models.*.tokens.prompt",),

@@ -3,8 +3,9 @@ from pathlib import Path
 import pytest
 
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.runs import RunOptions, plan_run
-from mapspeak.evaluation.runs.run import make_jobs
+from mapspeak.evaluation.runs import RunOptions, make_jobs, plan_run
+from mapspeak.evaluation.runs.showing import announce
+from sites import make_flat
 
 
 def test_the_largest_world_is_explored_first_and_before_all_else(tmp_path: Path) -> None:
@@ -42,3 +43,17 @@ def test_a_script_is_asked_once_whatever_models_may_think(tmp_path: Path) -> Non
 def test_thinking_without_anyone_who_thinks_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="--thinking is for models"):
         RunOptions(folder=tmp_path, agents=("scripted", "oracle"), thinking=("low",))
+
+
+def test_two_trials_that_would_lie_in_one_folder_are_refused(tmp_path: Path) -> None:
+    world = make_flat(tmp_path)
+    options = RunOptions(worlds=("maps/a.yaml", "maps_a.yaml"), folder=tmp_path)
+    with pytest.raises(ConfigError, match=r"maps/a\.yaml and maps_a\.yaml"):
+        plan_run(options, dict.fromkeys(options.worlds, world))
+
+
+def test_it_is_announced_how_much_there_is_to_do_and_how_to_stop(tmp_path: Path) -> None:
+    options = RunOptions(worlds=("flat_1",), n_trials=3, folder=tmp_path)
+    said = announce(options, plan_run(options, options.load_worlds()))
+    assert said.startswith("7 trials in 1 world by scripted, 2 at a time: about 1 min")
+    assert "Ctrl-C stops; the same command goes on." in said

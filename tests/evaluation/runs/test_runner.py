@@ -1,6 +1,8 @@
+import errno
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -8,20 +10,40 @@ import pytest
 
 import trialworks
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.runs import Job, run_jobs
+from mapspeak.evaluation.runs import Job, RunOptions, run_evaluation, run_jobs, writing_to
 from mapspeak.evaluation.trials import (
     Failure,
+    Trial,
     TrialResult,
     TrialState,
-    is_done,
-    read_result,
+    find_result,
     trial_folder,
+    write_result,
 )
+from mapspeak.evaluation.trials import read_result as read_file
+from reportmaking import make_result
 from trialworks import make_trial
 
 LONG_S = 60.0
 
 GOOD, CRASHING, KILLED, HANGING, LAST = (make_trial(number) for number in range(1, 6))
+
+
+def read_result(run: Path, trial: Trial) -> TrialResult:
+    """Reads the result that a trial has left."""
+    return read_file(trial_folder(run, trial) / "result.json")
+
+
+def run_again(run: Path, trial: Trial, *, has_retry: bool = False) -> None:
+    """Runs a trial of which there may be a result, and which succeeds."""
+    job = Job(trial=trial, work=partial(trialworks.succeed, run, trial), wall_s=LONG_S)
+    run_jobs(run, [job], n_jobs=1, on_done=trialworks.ignore, has_retry=has_retry)
+
+
+def n_runs(run: Path) -> int:
+    """Gives how many trials were run in a folder."""
+    log = run / trialworks.LOG
+    return len(log.read_text().splitlines()) if log.exists() else 0
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +90,7 @@ def test_a_run_that_was_killed_goes_on_without_repeating_what_is_done(tmp_path: 
         command, check=False, env={"PYTHONPATH": here}, capture_output=True, timeout=60
     )
     assert done.returncode == -signal.SIGKILL, done.stderr
-    assert not is_done(tmp_path, make_trial(4))
+    assert find_result(tmp_path, make_trial(4)) is None
 
     trialworks.run_some(tmp_path, 0)
 
@@ -110,7 +132,7 @@ def test_a_full_disk_ends_the_run_and_is_nobodys_result(tmp_path: Path) -> None:
     jobs = [Job(trial=GOOD, work=trialworks.fill_the_disk, wall_s=LONG_S)]
     with pytest.raises(ConfigError, match="the disk is full"):
         run_jobs(tmp_path, jobs, n_jobs=1, on_done=trialworks.ignore)
-    assert not is_done(tmp_path, GOOD)
+    assert find_result(tmp_path, GOOD) is None
 
 
 def test_an_interrupt_is_for_the_run_and_not_for_its_trials(tmp_path: Path) -> None:
@@ -123,3 +145,53 @@ def test_an_interrupt_is_for_the_run_and_not_for_its_trials(tmp_path: Path) -> N
 def test_a_trials_folder_is_named_so_that_any_system_can_hold_it(tmp_path: Path) -> None:
     folder = trial_folder(tmp_path, make_trial(7)).relative_to(tmp_path)
     assert folder.as_posix() == "trials/count/none/nobody/plain/007"
+
+
+@pytest.mark.parametrize("text", ["", '{"trial": {"task": "smal'])
+def test_a_result_that_was_cut_off_is_run_again(tmp_path: Path, text: str) -> None:
+    write_result(tmp_path, make_result(GOOD))
+    (trial_folder(tmp_path, GOOD) / "result.json").write_text(text)
+    run_again(tmp_path, GOOD)
+    assert read_result(tmp_path, GOOD).score.is_success
+    assert n_runs(tmp_path) == 1
+
+
+def test_a_whole_result_that_is_not_understood_is_never_thrown_away(tmp_path: Path) -> None:
+    write_result(tmp_path, make_result(GOOD))
+    path = trial_folder(tmp_path, GOOD) / "result.json"
+    path.write_text('{"trial": "of the future"}')
+    with pytest.raises(ConfigError, match=r"001/result\.json is no result: trial"):
+        run_again(tmp_path, GOOD)
+    assert "of the future" in path.read_text()
+
+
+def test_a_result_of_another_trial_is_not_taken_for_this_one(tmp_path: Path) -> None:
+    write_result(tmp_path, make_result(replace(GOOD, seed=7)))
+    with pytest.raises(ConfigError, match="holds another trial, with the seed 7"):
+        run_again(tmp_path, GOOD)
+
+
+@pytest.mark.parametrize("state", [TrialState.CRASHED, TrialState.HUNG])
+def test_what_broke_is_run_again_only_where_that_is_asked_for(
+    tmp_path: Path, state: TrialState
+) -> None:
+    write_result(tmp_path, make_result(GOOD, state=state))
+    run_again(tmp_path, GOOD)
+    assert read_result(tmp_path, GOOD).state is state
+    run_again(tmp_path, GOOD, has_retry=True)
+    assert read_result(tmp_path, GOOD).state is TrialState.FINISHED
+    assert n_runs(tmp_path) == 1
+
+
+def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "letter.txt").touch()
+    options = RunOptions(worlds=("flat_1",), folder=tmp_path)
+    with pytest.raises(ConfigError, match=r"holds other things, such as letter\.txt"):
+        run_evaluation(options, on_plan=lambda _: None, on_done=trialworks.ignore)
+
+
+def test_a_place_that_cannot_be_written_to_is_told_without_a_trace(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="No space left"), writing_to(tmp_path):
+        raise OSError(errno.ENOSPC, "No space left on device")
+    with pytest.raises(ConnectionResetError), writing_to(tmp_path):
+        raise ConnectionResetError

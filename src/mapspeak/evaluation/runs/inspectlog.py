@@ -1,0 +1,196 @@
+"""The run as a log of inspect-ai, for `inspect view` and whatever reads such logs.
+
+The format is that of inspect-ai's log files (version 2): a zip of JSON with a header, summaries and
+a file for each sample. A sample is a task in a world by one agent; its epochs are the trials.
+"""
+
+import base64
+import hashlib
+import json
+import zipfile
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from mapspeak.evaluation.trials import Trial, TrialResult, Turn, read_turns, trial_folder
+
+__all__ = ["write_log"]
+
+LOG = "inspect.eval"
+SCORER = "truth"
+RIGHT, WRONG = "C", "I"
+"""How inspect-ai writes a score of right and of wrong."""
+
+
+def write_log(
+    run: Path, results: Sequence[TrialResult], versions: Mapping[str, str], *, is_whole: bool
+) -> Path:
+    """Write the log of a run into its folder.
+
+    Args:
+        run: The run's folder.
+        results: What came of the trials.
+        versions: Of everything that took part, by name.
+        is_whole: All that was asked for has a result.
+    """
+    path, new = run / LOG, run / f".{LOG}"
+    with zipfile.ZipFile(new, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as log:
+        summaries = []
+        for result in results:
+            sample = _sample(run, result)
+            name = f"samples/{sample['id']}_epoch_{sample['epoch']}.json"
+            log.writestr(name, json.dumps(sample))
+            summaries.append(_summary(sample))
+        log.writestr("summaries.json", json.dumps(summaries))
+        header = _header(results, versions, is_whole=is_whole)
+        log.writestr("header.json", json.dumps(header))
+    new.replace(path)
+    return path
+
+
+def _header(
+    results: Sequence[TrialResult], versions: Mapping[str, str], *, is_whole: bool
+) -> dict[str, Any]:
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    ids = list(dict.fromkeys(_sample_id(result.trial) for result in results))
+    tasks = ", ".join(dict.fromkeys(result.trial.task for result in results))
+    n_right = sum(result.score.is_success for result in results)
+    accuracy = n_right / len(results) if results else 0.0
+    metric = {"name": "accuracy", "value": accuracy, "params": {}}
+    return {
+        "version": 2,
+        "status": "success" if is_whole else "cancelled",
+        "eval": {
+            "eval_id": _id_of(f"eval {now}"),
+            "run_id": _id_of(f"run {now}"),
+            "task_id": _id_of(tasks),
+            "created": now,
+            "task": tasks or "none",
+            "dataset": {"name": "mapspeak", "samples": len(ids), "sample_ids": ids},
+            "model": ", ".join(dict.fromkeys(result.trial.answerer for result in results)),
+            "config": {"epochs": max((result.trial.number for result in results), default=1)},
+            "packages": dict(versions),
+        },
+        "plan": {"name": "plan", "steps": [], "config": {}},
+        "results": {
+            "total_samples": len(results),
+            "completed_samples": sum(not result.state.is_broken for result in results),
+            "scores": [
+                {
+                    "name": SCORER,
+                    "scorer": SCORER,
+                    "params": {},
+                    "metrics": {"accuracy": metric},
+                }
+            ],
+        },
+        "stats": {"started_at": now, "completed_at": now},
+    }
+
+
+def _sample(run: Path, result: TrialResult) -> dict[str, Any]:
+    trial, score = result.trial, result.score
+    figures = {
+        name: getattr(result, name)
+        for name in ("driven_m", "shortest_m", "robot_s", "wall_s", "cpu_s", "n_calls")
+    }
+    tokens = (result.n_input_tokens, result.n_output_tokens)
+    usage = {
+        "input_tokens": tokens[0] or 0,
+        "output_tokens": tokens[1] or 0,
+        "total_tokens": (tokens[0] or 0) + (tokens[1] or 0),
+    }
+    sample: dict[str, Any] = {
+        "id": _sample_id(trial),
+        "epoch": trial.number,
+        "uuid": _id_of(trial.id),
+        "input": result.prompt,
+        "target": "",
+        "messages": list(_messages(run, trial)),
+        "output": {"model": trial.answerer, "choices": [], "completion": result.answer},
+        "scores": {
+            SCORER: {
+                "value": RIGHT if score.is_success else WRONG,
+                "answer": result.answer,
+                "explanation": score.reason,
+                "metadata": {**score.figures, "failure": score.failure, "state": result.state},
+            }
+        },
+        "metadata": {"seed": trial.seed, "world": trial.world, **figures},
+        "store": {},
+        "events": [],
+        "model_usage": {} if None in tokens else {trial.answerer: usage},
+        "total_time": result.wall_s,
+        "attachments": {},
+    }
+    if result.error is not None:
+        said = result.error
+        sample["error"] = {"message": said, "traceback": said, "traceback_ansi": said}
+    return sample
+
+
+def _summary(sample: Mapping[str, Any]) -> dict[str, Any]:
+    names = ("id", "epoch", "uuid", "input", "target", "metadata", "scores", "model_usage")
+    return {
+        **{name: sample[name] for name in names},
+        "total_time": sample["total_time"],
+        "message_count": len(sample["messages"]),
+        "completed": True,
+        **({"error": sample["error"]["message"]} if "error" in sample else {}),
+    }
+
+
+def _messages(run: Path, trial: Trial) -> Iterator[dict[str, Any]]:
+    """Yield the conversation; a call and its answer have the same id."""
+    pictures = trial_folder(run, trial) / "pictures"
+    for number, turn in enumerate(read_turns(run, trial)):
+        message_id = _id_of(f"{trial.id} {number}")
+        if turn.role in ("system", "user"):
+            yield {"id": message_id, "role": turn.role, "content": turn.text}
+        elif turn.role == "tool":
+            yield {
+                "id": message_id,
+                "role": "tool",
+                "content": [{"type": "text", "text": turn.text}, *_images(turn, pictures)],
+                "tool_call_id": f"call-{number - 1}",
+                "function": "" if turn.call is None else turn.call.tool,
+                **({"error": {"type": "unknown", "message": turn.text}} if turn.is_error else {}),
+            }
+        else:
+            calls = [] if turn.call is None else [_call(turn, number)]
+            yield {
+                "id": message_id,
+                "role": "assistant",
+                "content": turn.text,
+                **({"tool_calls": calls} if calls else {}),
+            }
+
+
+def _call(turn: Turn, number: int) -> dict[str, Any]:
+    if turn.call is None:
+        raise AssertionError("only calls are written as calls")
+    return {
+        "id": f"call-{number}",
+        "type": "function",
+        "function": turn.call.tool,
+        "arguments": turn.call.arguments,
+    }
+
+
+def _images(turn: Turn, pictures: Path) -> Iterator[dict[str, Any]]:
+    for name in turn.pictures:
+        path = pictures / name
+        if path.is_file():
+            media_type = "image/jpeg" if path.suffix == ".jpg" else "image/png"
+            data = base64.b64encode(path.read_bytes()).decode()
+            yield {"type": "image", "image": f"data:{media_type};base64,{data}"}
+
+
+def _sample_id(trial: Trial) -> str:
+    """Return what is the same for all trials of a kind; it names a file, so without slashes."""
+    return trial.id.rpartition("/")[0].replace("/", " ")
+
+
+def _id_of(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:22]

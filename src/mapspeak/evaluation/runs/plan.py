@@ -1,0 +1,188 @@
+"""What an evaluation is to run: its options, its trials, and what has to go before them."""
+
+import platform
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mapspeak import __version__
+from mapspeak.errors import ConfigError
+from mapspeak.evaluation.agents.others import can_think, find_versions, read_thinking
+from mapspeak.evaluation.scores import Site
+from mapspeak.evaluation.tasks import EXPLORE, Task, choose_tasks, find_task
+from mapspeak.evaluation.trials import Trial
+from mapspeak.server import Representation
+from mapspeak.simulator import World, load_world, world_names
+
+__all__ = ["RunOptions", "RunPlan", "plan_run", "prepare_world"]
+
+ALL_WORLDS = "all"
+PLAIN = str(Representation.PICTURE_TABLE)
+SCRIPTED = "scripted"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunOptions:
+    """What an evaluation was asked for.
+
+    Attributes:
+        agents: Who answers.
+        tasks: Names of tasks or of their groups.
+        worlds: Names, paths, or "all" for those that are shipped.
+        n_trials: Of each task in each world; a world is explored once.
+        seed: The first trial's; each further one has the next.
+        folder: Where everything goes.
+        representations: How the server shows the map.
+        thinking: How much models may think; None where nothing was said. Scripts are asked once.
+        n_jobs: Trials at a time.
+        hang_s: Wall time after which a trial's process is killed.
+        has_retry: Trials that crashed or hung before are run again.
+
+    Raises:
+        ConfigError: There is no such representation or way to think, or nothing was chosen.
+    """
+
+    agents: tuple[str, ...] = (SCRIPTED,)
+    tasks: tuple[str, ...] = ("paper",)
+    worlds: tuple[str, ...] = (ALL_WORLDS,)
+    n_trials: int = 30
+    seed: int = 0
+    folder: Path
+    representations: tuple[str, ...] = (PLAIN,)
+    thinking: tuple[str | None, ...] = (None,)
+    n_jobs: int = 2
+    hang_s: float = 1200.0
+    has_retry: bool = False
+
+    def __post_init__(self) -> None:
+        chosen = {
+            "--agent": self.agents,
+            "--task": self.tasks,
+            "--worlds": self.worlds,
+            "--representation": self.representations,
+        }
+        for flag, names in chosen.items():
+            if not names:
+                raise ConfigError(f"{flag} names nothing.", hint="Leave it away for the default.")
+        for amount in self.thinking:
+            read_thinking(amount)
+        if any(self.thinking) and not any(map(can_think, self.agents)):
+            raise ConfigError(
+                f"--thinking is for models and client programs, not for {', '.join(self.agents)}.",
+                hint="Leave it away, or name a model with --agent.",
+            )
+        for name in self.representations:
+            if name not in set(Representation):
+                raise ConfigError(
+                    f"There is no representation {name[:40]!r}.",
+                    hint=f"There are: {', '.join(Representation)}.",
+                )
+
+    def load_worlds(self) -> dict[str, World]:
+        """Return the worlds by the names they were asked for.
+
+        Raises:
+            ConfigError: There is no such world.
+        """
+        names = (
+            each
+            for name in self.worlds
+            for each in (world_names() if name == ALL_WORLDS else [name])
+        )
+        return {name: load_world(name) for name in dict.fromkeys(names)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunPlan:
+    """The trials of an evaluation.
+
+    Attributes:
+        trials: Those that were asked for, in their order.
+        preparations: Scripted explorations that others start from and that were not asked for.
+        versions: Of mapspeak, Python, numpy, and of what stands behind the agents, by name.
+    """
+
+    trials: tuple[Trial, ...]
+    preparations: tuple[Trial, ...] = ()
+    versions: dict[str, str]
+
+
+def plan_run(options: RunOptions, worlds: Mapping[str, World]) -> RunPlan:
+    """Plan all trials of an evaluation, world by world, and what has to go before them.
+
+    Raises:
+        ConfigError: There is no such task, no world offers it, or two trials would lie in one
+            folder.
+    """
+    tasks = choose_tasks(options.tasks)
+    trials = tuple(
+        trial
+        for name, world in worlds.items()
+        for site in (Site(world),)
+        for task in tasks
+        if task.is_offered(site)
+        for trial in _trials_of(options, task, name)
+    )
+    if not trials:
+        asked = ", ".join(task.name for task in tasks)
+        raise ConfigError(f"No world has what {asked} asks about.", hint="Choose other worlds.")
+    needed = {
+        trial.world: prepare_world(options, trial.world)
+        for trial in trials
+        if find_task(trial.task).needs_map
+    }
+    preparations = tuple(each for each in needed.values() if each not in trials)
+    _check_ids((*preparations, *trials))
+    versions = {
+        "mapspeak": __version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        **find_versions(options.agents),
+    }
+    return RunPlan(trials=trials, preparations=preparations, versions=versions)
+
+
+def _trials_of(options: RunOptions, task: Task, world: str) -> Iterator[Trial]:
+    n_trials = 1 if task.name == EXPLORE else options.n_trials
+    for number in range(1, n_trials + 1):
+        for agent in dict.fromkeys(options.agents):
+            amounts = options.thinking if can_think(agent) else (None,)
+            for representation in dict.fromkeys(options.representations):
+                for thinking in dict.fromkeys(amounts):
+                    yield Trial(
+                        task=task.name,
+                        world=world,
+                        seed=options.seed + number - 1,
+                        agent=agent,
+                        representation=representation,
+                        thinking=thinking,
+                        number=number,
+                    )
+
+
+def prepare_world(options: RunOptions, world: str) -> Trial:
+    """Return the exploration whose map and memory all trials of a world start from."""
+    return Trial(
+        task=EXPLORE,
+        world=world,
+        seed=options.seed,
+        agent=SCRIPTED,
+        representation=PLAIN,
+        number=1,
+    )
+
+
+def _check_ids(trials: Iterable[Trial]) -> None:
+    """Check that no two trials would write over each other."""
+    known: dict[str, Trial] = {}
+    for trial in trials:
+        other = known.setdefault(trial.id, trial)
+        if other != trial:
+            pairs = ((other.world, trial.world), (other.agent, trial.agent))
+            named = next((pair for pair in pairs if pair[0] != pair[1]), (other.id, trial.id))
+            raise ConfigError(
+                f"{named[0]} and {named[1]} would lie in the same folder, {trial.id}.",
+                hint="Run one of them in a folder of its own, with --out, or give it another name.",
+            )

@@ -1,0 +1,394 @@
+"""The runner: a process for each trial, some at a time, and going on after a stop.
+
+A trial that crashes, hangs or runs out of memory is written down as broken, and the others go on. A
+trial that has a result is not run again.
+"""
+
+import errno
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from multiprocessing.connection import wait
+from multiprocessing.context import BaseContext
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+
+from filelock import FileLock, Timeout
+from pydantic import ValidationError
+
+from mapspeak.errors import ConfigError, MapspeakError
+from mapspeak.evaluation.runs.attempt import attempt
+from mapspeak.evaluation.runs.plan import RunOptions, RunPlan, plan_run, prepare_world
+from mapspeak.evaluation.tasks import EXPLORE, find_task
+from mapspeak.evaluation.trials import (
+    Failure,
+    Score,
+    Trial,
+    TrialResult,
+    TrialState,
+    find_result,
+    read_result,
+    trial_folder,
+    write_result,
+)
+from mapspeak.simulator import World
+
+__all__ = ["Job", "make_jobs", "run_evaluation", "run_jobs", "writing_to"]
+
+ERRORS = "errors.txt"
+LOCK = ".run.lock"
+PRELOAD = ("mapspeak.evaluation.runs", "mapspeak.evaluation.runs.preload", "mapspeak.cli")
+"""What every trial needs; imported once, before processes are forked."""
+LAST_WORDS = 2000
+"""Characters of a crash that its result keeps."""
+FULL_DISK = 74
+"""Exit status of a trial that could not write; it gets no result."""
+NO_ROOM = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS})
+CANNOT_WRITE = NO_ROOM | {errno.EACCES, errno.EPERM, errno.ENOTDIR, errno.ENAMETOOLONG}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """A trial to be run.
+
+    Attributes:
+        trial: Which one.
+        work: Carries it out and writes its result; called in a process of its own.
+        after: A trial that has to be finished before; None for none.
+        wall_s: A process that takes longer is killed.
+    """
+
+    trial: Trial
+    work: Callable[[], object]
+    after: Trial | None = None
+    wall_s: float
+
+
+def make_jobs(options: RunOptions, plan: RunPlan, worlds: Mapping[str, World]) -> Iterator[Job]:
+    """Yield what is to be done: first all that others wait for, the largest world first.
+
+    Exploring takes longest, and longest in the largest world: begun last, it would keep one
+    process busy while the others have nothing left to do.
+    """
+    trials = (*plan.preparations, *plan.trials)
+    exploring = [trial for trial in trials if trial.task == EXPLORE]
+    exploring.sort(key=lambda trial: -_floor_m2(worlds[trial.world]))
+    for trial in (*exploring, *(trial for trial in trials if trial.task != EXPLORE)):
+        needs_map = find_task(trial.task).needs_map
+        before = prepare_world(options, trial.world) if needs_map else None
+        work = partial(attempt, options.folder, trial, worlds[trial.world], before)
+        yield Job(trial=trial, work=work, after=before, wall_s=options.hang_s)
+
+
+def _floor_m2(world: World) -> float:
+    """Return about how large a world is: the box around its walls."""
+    ends = [end for wall in world.walls for end in (wall.start, wall.end)]
+    xs, ys = [end.x for end in ends], [end.y for end in ends]
+    return (max(xs) - min(xs)) * (max(ys) - min(ys)) if ends else 0.0
+
+
+# --- running it ----------------------------------------------------------------------------------
+
+
+def run_evaluation(
+    options: RunOptions,
+    *,
+    on_plan: Callable[[RunPlan], None],
+    on_done: Callable[[TrialResult], None],
+) -> RunPlan:
+    """Run every trial that has no result yet, and return the plan.
+
+    Args:
+        options: What is asked for.
+        on_plan: Told of all trials before the first one.
+        on_done: Told of every result, also of those that were there already.
+
+    Raises:
+        ConfigError: Something asked for does not exist, the folder holds something else or cannot
+            be written to, or another run is at work in it.
+    """
+    worlds = options.load_worlds()
+    plan = plan_run(options, worlds)
+    folder = options.folder
+    with writing_to(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        there = {path.name for path in folder.iterdir()} - {LOCK}
+        if there and "trials" not in there:
+            raise ConfigError(
+                f"{folder} holds other things, such as {min(there)}, and no evaluation.",
+                hint="Choose a new or an empty folder with --out.",
+            )
+        with _alone_in(folder):
+            on_plan(plan)
+            jobs = make_jobs(options, plan, worlds)
+            run_jobs(
+                folder,
+                jobs,
+                n_jobs=options.n_jobs,
+                on_done=on_done,
+                has_retry=options.has_retry,
+            )
+    return plan
+
+
+@contextmanager
+def writing_to(folder: Path) -> Generator[None]:
+    """Turn the errors of a folder that cannot be written to into ours.
+
+    Raises:
+        ConfigError: The disk is full, or the place is not ours to write to.
+    """
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in CANNOT_WRITE:
+            raise
+        raise ConfigError(
+            f"{folder} cannot be written to: {error.strerror or error}.",
+            hint="Make room or choose another --out; started again, finished trials are kept.",
+        ) from error
+
+
+@contextmanager
+def _alone_in(folder: Path) -> Generator[None]:
+    """Keep other runs out of a folder; the lock of a killed run is free."""
+    lock = FileLock(folder / LOCK)
+    try:
+        lock.acquire(timeout=0)
+    except Timeout as error:
+        raise ConfigError(
+            f"Another run is at work in {folder}.", hint="Wait for it, or choose another --out."
+        ) from error
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+@dataclass(slots=True)
+class _Running:
+    job: Job
+    process: BaseProcess
+    ends_s: float
+
+
+@dataclass(slots=True)
+class _Progress:
+    """What is done, under way, and still to do."""
+
+    run: Path
+    on_done: Callable[[TrialResult], None]
+    done: dict[Trial, TrialResult] = field(default_factory=dict)
+    waiting: list[Job] = field(default_factory=list)
+    running: list[_Running] = field(default_factory=list)
+
+    def settle(self, result: TrialResult) -> None:
+        self.done[result.trial] = result
+        self.on_done(result)
+
+    def take_next(self) -> Job | None:
+        """Return the first job whose predecessor is done; None while all others have to wait."""
+        for job in self.waiting:
+            if job.after is None or job.after in self.done:
+                self.waiting.remove(job)
+                return job
+        if self.waiting and not self.running:
+            raise AssertionError("a job waits for one that is not there")
+        return None
+
+
+def run_jobs(
+    run: Path,
+    jobs: Iterable[Job],
+    *,
+    n_jobs: int,
+    on_done: Callable[[TrialResult], None],
+    has_retry: bool = False,
+) -> None:
+    """Run all jobs that have no result yet, in their order where nothing has to wait.
+
+    Args:
+        run: The run's folder.
+        jobs: What to do. A job's predecessor must be among them, or be done.
+        n_jobs: Processes at a time.
+        on_done: Told of each result, also of those that were there already.
+        has_retry: Trials that crashed or hung are run again.
+
+    Raises:
+        ConfigError: The disk is full, or a result in the folder is of another trial or not
+            understood; what is done is kept.
+    """
+    progress = _Progress(run, on_done)
+    earlier = [(job, _find_earlier(run, job.trial)) for job in jobs]
+    for job, result in earlier:
+        if result is None or (has_retry and result.state.is_broken):
+            progress.waiting.append(job)
+        else:
+            progress.settle(result)
+    processes = _processes()
+    try:
+        while progress.waiting or progress.running:
+            _start_more(progress, processes, n_jobs)
+            for result in _await_some(run, progress.running):
+                progress.settle(result)
+    finally:
+        # All are told before one is waited for: a second Ctrl-C may end the waiting.
+        for each in progress.running:
+            each.process.kill()
+        for each in progress.running:
+            each.process.join()
+
+
+def _start_more(progress: _Progress, processes: BaseContext, n_jobs: int) -> None:
+    while len(progress.running) < n_jobs and (job := progress.take_next()) is not None:
+        before = None if job.after is None else progress.done[job.after]
+        if before is not None and before.state.is_broken:
+            said = f"{before.trial.id} came to no result."
+            progress.settle(_write_broken(progress.run, job, TrialState.CRASHED, said))
+        else:
+            progress.running.append(_start(progress.run, job, processes))
+
+
+def _find_earlier(run: Path, trial: Trial) -> TrialResult | None:
+    """Return the result that an earlier run left; None for none, or for one that was cut off."""
+    path = find_result(run, trial)
+    if path is None:
+        return None
+    try:
+        result = read_result(path)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        if first["type"] == "json_invalid":
+            return None
+        raise ConfigError(
+            f"{path} is no result: {'.'.join(map(str, first['loc']))}: {first['msg']}.",
+            hint="Use the mapspeak that wrote it, or delete it to run that trial again.",
+        ) from error
+    if result.trial != trial:
+        found = result.trial
+        raise ConfigError(
+            f"{path.parent} holds another trial, with the seed {found.seed}, "
+            f"of {found.agent} in {found.world}.",
+            hint="Go on with the options of that evaluation, or choose another folder with --out.",
+        )
+    return result
+
+
+def _processes() -> BaseContext:
+    """Return the way to start processes: forked from one that has imported all, if can be."""
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(list(PRELOAD))
+    return context
+
+
+def _start(run: Path, job: Job, processes: BaseContext) -> _Running:
+    folder = trial_folder(run, job.trial)
+    folder.mkdir(parents=True, exist_ok=True)
+    if (path := find_result(run, job.trial)) is not None:
+        path.unlink()
+    process = processes.Process(  # type: ignore[attr-defined]  # contexts have it
+        target=_work_apart, args=(job.work, folder / ERRORS), daemon=False
+    )
+    process.start()
+    return _Running(job, process, time.monotonic() + job.wall_s)
+
+
+def _await_some(run: Path, running: list[_Running]) -> Iterator[TrialResult]:
+    """Wait until a process has ended or has to be ended, and yield what became of it."""
+    if not running:
+        return
+    next_s = min(each.ends_s for each in running)
+    left_s = max(next_s - time.monotonic(), 0.0)
+    wait([each.process.sentinel for each in running], timeout=left_s)
+    for each in list(running):
+        if not each.process.is_alive():
+            each.process.join()
+            running.remove(each)
+            yield _settle(run, each)
+        elif time.monotonic() >= each.ends_s:
+            each.process.kill()
+            each.process.join()
+            running.remove(each)
+            said = f"It was killed after {each.job.wall_s:.0f} s of wall time."
+            yield _write_broken(run, each.job, TrialState.HUNG, said)
+
+
+def _settle(run: Path, ended: _Running) -> TrialResult:
+    if (path := find_result(run, ended.job.trial)) is not None:
+        return read_result(path)
+    code = ended.process.exitcode
+    if code == FULL_DISK:
+        raise ConfigError(
+            f"{run} cannot be written to: the disk is full.",
+            hint="Make room and start again; finished trials are kept.",
+        )
+    errors = trial_folder(run, ended.job.trial) / ERRORS
+    said = errors.read_text("utf-8", "replace")[-LAST_WORDS:] if errors.exists() else ""
+    how = f"killed by signal {-code}" if code is not None and code < 0 else f"exit code {code}"
+    return _write_broken(run, ended.job, TrialState.CRASHED, f"{said.strip()} ({how})".strip())
+
+
+def _write_broken(run: Path, job: Job, state: TrialState, error: str) -> TrialResult:
+    score = Score(is_success=False, failure=Failure.BROKEN, reason="The trial came to no result.")
+    result = TrialResult(trial=job.trial, prompt="", state=state, score=score, error=error)
+    write_result(run, result)
+    return result
+
+
+# --- in the trial's own process ----------------------------------------------------------------
+
+
+def _work_apart(work: Callable[[], object], errors: Path) -> None:
+    """Do the work; what it says goes to a file, and it ends when the run does."""
+    _end_with_parent()
+    # Ctrl-C in a terminal reaches all processes; what becomes of a trial is the run's to say.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with errors.open("w", encoding="utf-8") as said:
+        os.dup2(said.fileno(), 1)
+        os.dup2(said.fileno(), 2)
+    try:
+        work()
+    except BaseException as error:  # noqa: BLE001 - the process's last words, for the result
+        leaves = list(_leaves(error))
+        if any(isinstance(leaf, OSError) and leaf.errno in NO_ROOM for leaf in leaves):
+            os._exit(FULL_DISK)
+        # What we raise on purpose says what to do; anything else is a bug, and needs its trace.
+        is_ours = all(isinstance(leaf, MapspeakError) for leaf in leaves)
+        sys.stderr.write("\n".join(map(str, leaves)) if is_ours else traceback.format_exc())
+        sys.stderr.flush()
+        os._exit(1)
+    sys.stderr.flush()
+    # Nothing here is worth an orderly end: threads may wait for what never comes.
+    os._exit(0)
+
+
+def _leaves(error: BaseException) -> Iterator[BaseException]:
+    """Yield all errors of a group of groups."""
+    if isinstance(error, BaseExceptionGroup):
+        for each in error.exceptions:
+            yield from _leaves(each)
+    else:
+        yield error
+
+
+def _end_with_parent() -> None:
+    """End this process when the run's process is gone: nobody would read its result."""
+    parent = multiprocessing.parent_process()
+    if parent is None:
+        return
+
+    def watch() -> None:
+        wait([parent.sentinel])
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

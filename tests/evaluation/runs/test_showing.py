@@ -1,0 +1,64 @@
+"""The bars, drawn on a terminal of 78 columns."""
+
+import io
+
+from rich.console import Console
+
+from mapspeak.evaluation.runs import RunPlan, say_result, show_run, show_trials
+from mapspeak.evaluation.trials import Failure, ToolCall, TrialState, Turn
+from reportmaking import make_result, make_trial
+
+COLUMNS = 78
+LONG = "a place with a name that is much longer than what is left of any line of a terminal"
+
+
+def draw(*parts: object, is_coloured: bool = False) -> str:
+    """Draws what rich draws on a narrow terminal."""
+    file = io.StringIO()
+    console = Console(
+        file=file,
+        width=COLUMNS,
+        force_terminal=is_coloured,
+        color_system="standard" if is_coloured else None,
+    )
+    console.print(*parts)
+    return file.getvalue().rstrip("\n")
+
+
+def test_the_bar_of_a_trial_is_one_line_whatever_is_called() -> None:
+    with show_trials(is_quiet=True) as bar:
+        lines = []
+        for task in ("explore", "smallest-room"):
+            bar.begin(task)
+            for text in ("R1", LONG):
+                call = ToolCall(tool="navigate_to", arguments={"place": text})
+                bar.note(Turn(role="agent", call=call))
+                bar.note(Turn(role="tool", call=call, text=text))
+                lines.append(draw(*bar.progress.get_renderables()))
+    assert all("\n" not in line and len(line) <= COLUMNS for line in lines)
+    assert {line.index("calls") for line in lines} == {lines[0].index("calls")}
+    assert ["1 calls" in lines[0], "2 calls" in lines[1], "1 calls" in lines[2]] == [True] * 3
+    assert "navigate_to R1" in lines[0]
+
+
+def test_the_bar_of_a_run_is_one_line_and_keeps_its_numbers() -> None:
+    trials = tuple(make_trial(number, world=LONG) for number in range(1, 13))
+    with show_run(is_quiet=True) as bar:
+        bar.begin(RunPlan(trials=trials, versions={}))
+        for trial in trials:
+            bar.note(make_result(trial))
+            line = draw(*bar.progress.get_renderables())
+            assert "\n" not in line
+            assert f"{bar.n_done}/12" in line
+            assert f"{bar.n_done} done" in line
+
+
+def test_a_result_is_said_in_its_colour() -> None:
+    failed = make_result(make_trial(), failure=Failure.WRONG_SIZE)
+    broken = make_result(make_trial(), failure=Failure.BROKEN, state=TrialState.CRASHED)
+    lines = [draw(say_result(each), is_coloured=True) for each in (failed, broken)]
+    lines.insert(0, draw(say_result(make_result(make_trial())), is_coloured=True))
+    assert ["\x1b[1;32mdone" in lines[0], "\x1b[1;31mFAILED" in lines[1]] == [True] * 2
+    assert "\x1b[1;31mBROKEN" in lines[2]
+    plain = "done    Go to the smallest room: It stands in the toilet."
+    assert draw(say_result(make_result(make_trial()))) == plain
