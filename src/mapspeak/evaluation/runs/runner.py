@@ -149,7 +149,7 @@ def writing_to(folder: Path) -> Generator[None]:
     try:
         yield
     except OSError as error:
-        if error.errno not in CANNOT_WRITE:
+        if folder.is_dir() and error.errno not in CANNOT_WRITE:
             raise
         raise ConfigError(
             f"{folder} cannot be written to: {error.strerror or error}.",
