@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.simulator.worlds.world import Door, TrueRoom, Wall, World, WorldObject
+from mapspeak.simulator.worlds.world import TrueRoom, World, WorldDoor, WorldObject, WorldWall
 from mapspeak.spatial.rooms import RoomClass
 
 ROOM_LENGTH_M = 8.0
@@ -15,12 +15,12 @@ START = Pose(1.0, ROOM_WIDTH_M / 2, 0.0)
 """In the middle of the near end, looking at the far one."""
 
 
-def make_wall(start: tuple[float, float], end: tuple[float, float]) -> Wall:
-    return Wall(start=Point(*start), end=Point(*end), thickness_m=0.1, height_m=2.8)
+def make_wall(start: tuple[float, float], end: tuple[float, float]) -> WorldWall:
+    return WorldWall(start=Point(*start), end=Point(*end), thickness_m=0.1, height_m=2.8)
 
 
 def make_room(
-    *things: tuple[str, Pose], walls: Sequence[Wall] = (), doors: Sequence[Door] = ()
+    *things: tuple[str, Pose], walls: Sequence[WorldWall] = (), doors: Sequence[WorldDoor] = ()
 ) -> World:
     """Gives a room of 8 x 6 m with things of the given kinds; its inner faces are at 0 and 8, 6."""
     corners = (

@@ -4,11 +4,18 @@ from mapspeak.simulator.camera.camera import SimulatedDetection
 from mapspeak.simulator.robot.controller import KEEP_OFF_M
 from mapspeak.simulator.robot.lidar import BEAM_ANGLES_RAD, MAX_RANGE_M, LidarScan
 from mapspeak.simulator.robot.navigator import DriveState, DriveStatus
-from mapspeak.simulator.robot.physics import MAX_SPEED_MPS, MAX_TURN_RADPS, Velocity
+from mapspeak.simulator.robot.physics import MAX_SPEED_MPS, MAX_TURN_RADPS, BodyVelocity
 from mapspeak.simulator.simulation import TICK_S, CameraShot, Simulation
 from mapspeak.simulator.statelog import StateLog, StateRecord, read_state_log
 from mapspeak.simulator.truth import MeasuredRoom, TrueFloor, Truth, is_in_sight, slice_at_eye_level
-from mapspeak.simulator.worlds.world import BODY_RADIUS_M, Door, TrueRoom, Wall, World, WorldObject
+from mapspeak.simulator.worlds.world import (
+    BODY_RADIUS_M,
+    TrueRoom,
+    World,
+    WorldDoor,
+    WorldObject,
+    WorldWall,
+)
 from mapspeak.simulator.worlds.worldfiles import load_world, world_names
 
 __all__ = [
@@ -19,8 +26,8 @@ __all__ = [
     "MAX_SPEED_MPS",
     "MAX_TURN_RADPS",
     "TICK_S",
+    "BodyVelocity",
     "CameraShot",
-    "Door",
     "DriveState",
     "DriveStatus",
     "LidarScan",
@@ -32,10 +39,10 @@ __all__ = [
     "TrueFloor",
     "TrueRoom",
     "Truth",
-    "Velocity",
-    "Wall",
     "World",
+    "WorldDoor",
     "WorldObject",
+    "WorldWall",
     "is_in_sight",
     "load_world",
     "read_state_log",

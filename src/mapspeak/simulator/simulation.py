@@ -15,14 +15,14 @@ from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose
 from mapspeak.simulator.camera.camera import (
     HORIZONTAL_FOV_RAD,
-    Camera,
+    PinholeCamera,
     SimulatedDetection,
     SimulatedDetector,
 )
 from mapspeak.simulator.robot.controller import Obstacles
 from mapspeak.simulator.robot.lidar import Lidar, LidarScan
 from mapspeak.simulator.robot.navigator import DriveState, DriveStatus, Navigator, Senses
-from mapspeak.simulator.robot.physics import STANDING, Odometry, RobotBody, Velocity
+from mapspeak.simulator.robot.physics import STANDING, BodyVelocity, Odometry, RobotBody
 from mapspeak.simulator.robot.slam import Localiser, Mapper
 from mapspeak.simulator.truth import Truth
 from mapspeak.simulator.worlds.slices import slice_world
@@ -130,7 +130,7 @@ class Simulation:
         return self._odometry.odom_from_base
 
     @property
-    def velocity(self) -> Velocity:
+    def velocity(self) -> BodyVelocity:
         """How fast the wheels turn it."""
         return self._body.velocity
 
@@ -201,7 +201,7 @@ class Simulation:
         self._teleoperated_until_s = -math.inf
         self._navigator.give_up(DriveState.CANCELLED, "The robot was stopped.")
 
-    def set_velocity(self, velocity: Velocity) -> None:
+    def set_velocity(self, velocity: BodyVelocity) -> None:
         """Drive by hand for half a second at most; a drive under way ends.
 
         Nothing but the bumper protects the robot meanwhile, as on a real one.
@@ -213,10 +213,10 @@ class Simulation:
     # --- inside ---
 
     @cached_property
-    def _camera(self) -> Camera:
-        return Camera(self._world)
+    def _camera(self) -> PinholeCamera:
+        return PinholeCamera(self._world)
 
-    def _command(self) -> Velocity:
+    def _command(self) -> BodyVelocity:
         if self.time_s < self._teleoperated_until_s:
             return self._teleoperation
         if not self._navigator.is_driving:

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.geometry import Point, Pose
 from mapspeak.simulator.robot.gridmap import CELL_SIZE_M
 from mapspeak.simulator.robot.lidar import (
     BEAM_ANGLES_RAD,
@@ -177,11 +177,6 @@ class Truth:
     def slam_error_m(self) -> float:
         """How far the robot's own pose is off."""
         return self.pose.point.distance_to(self._mapper.map_from_base.point)
-
-    @property
-    def slam_error_rad(self) -> float:
-        """How far the robot's own heading is off."""
-        return abs(wrap_angle(self.pose.yaw_rad - self._mapper.map_from_base.yaw_rad))
 
     @property
     def n_collisions(self) -> int:

@@ -3,7 +3,7 @@ import pytest
 
 from mapspeak.evaluation.scores import Site
 from mapspeak.geometry import Point, Pose
-from mapspeak.simulator import TrueRoom, Wall, World
+from mapspeak.simulator import TrueRoom, World, WorldWall
 from mapspeak.spatial.rooms import RoomClass
 
 BEHIND = Point(6.0, 0.0)
@@ -15,7 +15,7 @@ def two_rooms(*, gap_m: float) -> Site:
     corners = [Point(-2.0, -2.0), Point(8.0, -2.0), Point(8.0, 2.0), Point(-2.0, 2.0)]
     sides = list(zip(corners, (*corners[1:], corners[0]), strict=True))
     sides += [(Point(4.0, y), Point(4.0, y / 4 * gap_m)) for y in (2.0, -2.0)]
-    walls = tuple(Wall(start=a, end=b, thickness_m=0.1, height_m=2.5) for a, b in sides)
+    walls = tuple(WorldWall(start=a, end=b, thickness_m=0.1, height_m=2.5) for a, b in sides)
     outline = (Point(4.0, -2.0), Point(8.0, -2.0), Point(8.0, 2.0), Point(4.0, 2.0))
     behind = TrueRoom(name="behind", room_class=RoomClass.ROOM, outline=outline)
     return Site(

@@ -5,22 +5,22 @@ import pytest
 
 from mapspeak.geometry import Pose
 from mapspeak.simulator.camera.building import Panel
-from mapspeak.simulator.camera.camera import Camera
-from mapspeak.simulator.worlds.world import Door, Wall
+from mapspeak.simulator.camera.camera import PinholeCamera
+from mapspeak.simulator.worlds.world import WorldDoor, WorldWall
 from staging import ROOM_WIDTH_M, START, make_room, make_wall
 
-DOOR = Door(name="door", pose=Pose(4, 3, math.pi / 2), width_m=1.0)
+DOOR = WorldDoor(name="door", pose=Pose(4, 3, math.pi / 2), width_m=1.0)
 
 
-def cut_wall() -> list[Wall]:
+def cut_wall() -> list[WorldWall]:
     """A wall across the room with a gap of 1 m in its middle."""
     return [make_wall((4, 0), (4, 2.5)), make_wall((4, 3.5), (4, ROOM_WIDTH_M))]
 
 
-def column_of_ranges(*doors: Door) -> np.ndarray:
+def column_of_ranges(*doors: WorldDoor) -> np.ndarray:
     """Ranges down the middle column of a picture that looks at the gap from 3 m."""
     world = make_room(walls=cut_wall(), doors=doors)
-    view = Camera(world).observe(START, width_px=161, height_px=121)
+    view = PinholeCamera(world).observe(START, width_px=161, height_px=121)
     return np.asarray(view.range_m[:, 80])
 
 
@@ -35,10 +35,12 @@ def test_one_looks_through_a_door_and_not_over_it() -> None:
 
 
 def test_a_wide_opening_gets_no_lintel() -> None:
-    wide = Door(name="gate", pose=Pose(4, 3, math.pi / 2), width_m=5.0)
+    wide = WorldDoor(name="gate", pose=Pose(4, 3, math.pi / 2), width_m=5.0)
     walls = [make_wall((4, 0), (4, 0.5)), make_wall((4, 5.5), (4, ROOM_WIDTH_M))]
     with_gate, without = (
-        Camera(make_room(walls=walls, doors=doors)).observe(START, width_px=161, height_px=121)
+        PinholeCamera(make_room(walls=walls, doors=doors)).observe(
+            START, width_px=161, height_px=121
+        )
         for doors in ([wide], [])
     )
     assert (with_gate.range_m[:, 80] == without.range_m[:, 80]).all()

@@ -6,10 +6,10 @@ import pytest
 from mapspeak.geometry import Pose
 from mapspeak.simulator.camera.camera import (
     MAX_DETECTION_RANGE_M,
-    Camera,
+    PinholeCamera,
+    SegmentedView,
     SimulatedDetection,
     SimulatedDetector,
-    View,
 )
 from mapspeak.simulator.worlds.world import World, WorldObject
 from staging import END_WALL, ROOM_WIDTH_M, START, make_room, make_wall
@@ -17,20 +17,20 @@ from staging import END_WALL, ROOM_WIDTH_M, START, make_room, make_wall
 N_LOOKS = 200
 
 
-def observe(world: World, pose: Pose = START) -> View:
-    return Camera(world).observe(pose, width_px=320, height_px=240)
+def observe(world: World, pose: Pose = START) -> SegmentedView:
+    return PinholeCamera(world).observe(pose, width_px=320, height_px=240)
 
 
-def detect_often(view: View, *, seed: int = 1) -> list[tuple[SimulatedDetection, ...]]:
+def detect_often(view: SegmentedView, *, seed: int = 1) -> list[tuple[SimulatedDetection, ...]]:
     detector = SimulatedDetector(random=np.random.default_rng(seed))
     return [detector.detect(view) for _ in range(N_LOOKS)]
 
 
-def paint_view(*, n_pixels: int, range_m: float) -> View:
+def paint_view(*, n_pixels: int, range_m: float) -> SegmentedView:
     """A view of 100 x 100 pixels with one forklift that shows on the first of them."""
     ids = np.full(10_000, -1)
     ids[:n_pixels] = 0
-    return View(
+    return SegmentedView(
         objects=(WorldObject(name="truck", kind="forklift", pose=Pose(0, 0)),),
         object_ids=ids.reshape(100, 100),
         range_m=np.full((100, 100), range_m, dtype=np.float32),

@@ -5,10 +5,10 @@ import pytest
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.simulator.robot.controller import Obstacles
-from mapspeak.simulator.robot.physics import Velocity
+from mapspeak.simulator.robot.physics import BodyVelocity
 from mapspeak.simulator.worlds.world import BODY_RADIUS_M
 
-AHEAD = Velocity(0.8, 0.0)
+AHEAD = BodyVelocity(0.8, 0.0)
 
 
 def points(*places: tuple[float, float]) -> np.ndarray[tuple[int, int]]:
@@ -33,12 +33,12 @@ def test_before_a_wall_the_robot_slows_down_and_then_stands() -> None:
 def test_turning_on_the_spot_and_leaving_are_always_allowed() -> None:
     too_near = wall_ahead(BODY_RADIUS_M + 0.005)
 
-    assert too_near.limit(Velocity(0.0, 1.0)) == Velocity(0.0, 1.0)
-    assert too_near.limit(Velocity(-0.15, 0.0)) == Velocity(-0.15, 0.0)
+    assert too_near.limit(BodyVelocity(0.0, 1.0)) == BodyVelocity(0.0, 1.0)
+    assert too_near.limit(BodyVelocity(-0.15, 0.0)) == BodyVelocity(-0.15, 0.0)
 
 
 def test_a_blocked_arc_leaves_its_turn() -> None:
-    assert wall_ahead(BODY_RADIUS_M).limit(Velocity(0.8, 0.5)) == Velocity(0.0, 0.5)
+    assert wall_ahead(BODY_RADIUS_M).limit(BodyVelocity(0.8, 0.5)) == BodyVelocity(0.0, 0.5)
 
 
 def test_a_way_is_free_when_the_body_fits_all_along_it() -> None:

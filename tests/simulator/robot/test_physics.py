@@ -10,10 +10,10 @@ from mapspeak.simulator.robot.physics import (
     MAX_ACCELERATION_MPS2,
     MAX_SPEED_MPS,
     MAX_TURN_RADPS,
+    BodyVelocity,
     DifferentialDrive,
     Odometry,
     RobotBody,
-    Velocity,
     move_along_arc,
 )
 from mapspeak.simulator.worlds.slices import Slice
@@ -25,14 +25,14 @@ speeds = st.floats(-MAX_SPEED_MPS, MAX_SPEED_MPS)
 turns = st.floats(-MAX_TURN_RADPS, MAX_TURN_RADPS)
 
 
-def drive(body: RobotBody, command: Velocity, n_ticks: int) -> None:
+def drive(body: RobotBody, command: BodyVelocity, n_ticks: int) -> None:
     for _ in range(n_ticks):
         body.move(command, TICK_S)
 
 
 @given(speeds, turns, st.floats(0.01, 1.0))
 def test_an_arc_in_two_halves_is_the_whole_arc(speed: float, turn: float, duration: float) -> None:
-    velocity, start = Velocity(speed, turn), Pose(1.0, -2.0, 0.7)
+    velocity, start = BodyVelocity(speed, turn), Pose(1.0, -2.0, 0.7)
 
     whole = move_along_arc(start, velocity, duration)
     halves = move_along_arc(move_along_arc(start, velocity, duration / 2), velocity, duration / 2)
@@ -42,7 +42,7 @@ def test_an_arc_in_two_halves_is_the_whole_arc(speed: float, turn: float, durati
 
 
 def test_a_quarter_circle_ends_where_geometry_says() -> None:
-    end = move_along_arc(Pose(0.0, 0.0), Velocity(math.pi / 2, math.pi / 2), 1.0)
+    end = move_along_arc(Pose(0.0, 0.0), BodyVelocity(math.pi / 2, math.pi / 2), 1.0)
 
     assert (end.x, end.y, end.yaw_rad) == pytest.approx((1.0, 1.0, math.pi / 2))
 
@@ -50,18 +50,18 @@ def test_a_quarter_circle_ends_where_geometry_says() -> None:
 def test_the_drive_gains_speed_no_faster_than_it_can_and_keeps_to_its_limits() -> None:
     drive = DifferentialDrive()
 
-    first = drive.follow(Velocity(5.0, -9.0), TICK_S)
+    first = drive.follow(BodyVelocity(5.0, -9.0), TICK_S)
     for _ in range(100):
-        drive.follow(Velocity(5.0, -9.0), TICK_S)
+        drive.follow(BodyVelocity(5.0, -9.0), TICK_S)
 
     assert first.speed_mps == pytest.approx(MAX_ACCELERATION_MPS2 * TICK_S)
-    assert drive.velocity == Velocity(MAX_SPEED_MPS, -MAX_TURN_RADPS)
+    assert drive.velocity == BodyVelocity(MAX_SPEED_MPS, -MAX_TURN_RADPS)
 
 
 def test_a_wall_stops_the_body_and_the_bump_is_counted_once() -> None:
     body = RobotBody(WALL_AT_2_M, Pose(0.0, 0.0))
 
-    drive(body, Velocity(1.0, 0.0), 100)
+    drive(body, BodyVelocity(1.0, 0.0), 100)
 
     assert body.n_collisions == 1
     assert body.world_from_base.x < 2.0 - BODY_RADIUS_M
@@ -71,10 +71,10 @@ def test_a_wall_stops_the_body_and_the_bump_is_counted_once() -> None:
 def test_a_body_that_has_bumped_can_turn_back_off_and_bump_again() -> None:
     body = RobotBody(WALL_AT_2_M, Pose(0.0, 0.0))
 
-    drive(body, Velocity(1.0, 0.0), 100)
-    drive(body, Velocity(-0.5, 0.0), 40)
+    drive(body, BodyVelocity(1.0, 0.0), 100)
+    drive(body, BodyVelocity(-0.5, 0.0), 40)
     assert body.world_from_base.x < 1.2
-    drive(body, Velocity(1.0, 0.0), 100)
+    drive(body, BodyVelocity(1.0, 0.0), 100)
 
     assert body.n_collisions == 2
 
@@ -82,7 +82,7 @@ def test_a_body_that_has_bumped_can_turn_back_off_and_bump_again() -> None:
 def drive_odometry(seed: int, n_ticks: int) -> tuple[Pose, Pose]:
     """Drives a wide circle; gives where odometry and where truth end."""
     odometry = Odometry(random=np.random.default_rng(seed))
-    true, step = Pose(0.0, 0.0), move_along_arc(Pose(0.0, 0.0), Velocity(0.8, 0.2), TICK_S)
+    true, step = Pose(0.0, 0.0), move_along_arc(Pose(0.0, 0.0), BodyVelocity(0.8, 0.2), TICK_S)
     for _ in range(n_ticks):
         true = true @ step
         odometry.record(step)

@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.simulator import Wall, World, WorldObject, load_world
+from mapspeak.simulator import World, WorldObject, WorldWall, load_world
 from mapspeak.simulator.worlds.slices import Slice, fill_outlines, slice_world
 
 UNIT_SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 
-def world_with(*objects: WorldObject, walls: tuple[Wall, ...] = ()) -> World:
+def world_with(*objects: WorldObject, walls: tuple[WorldWall, ...] = ()) -> World:
     return World(
         name="test", title="test", walls=walls, objects=objects, rooms=(), start=Pose(0, 0)
     )
 
 
 def test_a_wall_is_a_rectangle_around_its_centre_line() -> None:
-    wall = Wall(start=Point(1, 2), end=Point(1, 5), thickness_m=0.2, height_m=2.0)
+    wall = WorldWall(start=Point(1, 2), end=Point(1, 5), thickness_m=0.2, height_m=2.0)
 
     (outline,) = slice_world(world_with(walls=(wall,)), low_m=0.1, high_m=1.0).outlines
 
@@ -26,7 +26,7 @@ def test_a_wall_is_a_rectangle_around_its_centre_line() -> None:
 
 
 def test_a_low_wall_does_not_reach_into_a_high_slice() -> None:
-    wall = Wall(start=Point(1, 2), end=Point(1, 5), thickness_m=0.2, height_m=0.5)
+    wall = WorldWall(start=Point(1, 2), end=Point(1, 5), thickness_m=0.2, height_m=0.5)
 
     assert not slice_world(world_with(walls=(wall,)), low_m=0.6, high_m=1.0).outlines
 

@@ -5,7 +5,7 @@ import pytest
 
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Point
-from mapspeak.simulator import Wall, load_world, world_names
+from mapspeak.simulator import WorldWall, load_world, world_names
 from mapspeak.spatial.rooms import RoomClass
 
 WORKSHOP = """\
@@ -33,7 +33,7 @@ def write(folder: Path, text: str) -> Path:
     return path
 
 
-def pieces_at_x(walls: tuple[Wall, ...], x: float) -> list[tuple[float, float]]:
+def pieces_at_x(walls: tuple[WorldWall, ...], x: float) -> list[tuple[float, float]]:
     """Gives from where to where the walls at some x stand, in y."""
     return [
         (round(wall.start.y, 6), round(wall.end.y, 6))

@@ -16,7 +16,7 @@ _CHUNK = 4096
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Atlas:
+class TextureAtlas:
     """Drawn surfaces, each at several sizes.
 
     Attributes:
@@ -53,7 +53,7 @@ class Atlas:
         return look_up(self.picture, at)
 
 
-def build_atlas(pictures: Sequence[NDArray[np.uint8]], repeats: Sequence[bool]) -> Atlas:
+def build_atlas(pictures: Sequence[NDArray[np.uint8]], repeats: Sequence[bool]) -> TextureAtlas:
     """Pack pictures with their mip levels, each with a border so that neighbours do not bleed."""
     levels = [
         np.pad(level, ((1, 1), (1, 1), (0, 0)), mode="wrap" if tiled else "edge")
@@ -67,7 +67,7 @@ def build_atlas(pictures: Sequence[NDArray[np.uint8]], repeats: Sequence[bool]) 
         whole[y : y + level.shape[0], x : x + level.shape[1]] = level
     places = np.concatenate([corners + 1, sizes - 2], axis=1).astype(np.float32)
     by_surface = places.reshape(len(pictures), N_LEVELS, 4)
-    return Atlas(whole, by_surface, by_surface[:, 0, 2:].copy(), np.array(repeats))
+    return TextureAtlas(whole, by_surface, by_surface[:, 0, 2:].copy(), np.array(repeats))
 
 
 def pack(sizes: NDArray[np.intp], width: int) -> tuple[NDArray[np.intp], int]:

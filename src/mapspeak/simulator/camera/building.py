@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.simulator.worlds.models import Surface
-from mapspeak.simulator.worlds.world import Door, Wall, World
+from mapspeak.simulator.worlds.world import World, WorldDoor, WorldWall
 
 FloatArray = NDArray[np.float64]
 Colour = tuple[int, int, int]
@@ -105,9 +105,9 @@ def _floor_and_ceiling(world: World, ceiling_m: float) -> Iterator[Panel]:
     )
 
 
-def _fill_corners(walls: Sequence[Wall]) -> Iterator[Wall]:
+def _fill_corners(walls: Sequence[WorldWall]) -> Iterator[WorldWall]:
     """Return walls that reach over their ends where others meet them, so that corners are full."""
-    meeting: dict[tuple[int, int], list[Wall]] = defaultdict(list)
+    meeting: dict[tuple[int, int], list[WorldWall]] = defaultdict(list)
     for wall in walls:
         for end in (wall.start, wall.end):
             meeting[_place_in_cm(end)].append(wall)
@@ -132,11 +132,11 @@ def _place_in_cm(point: Point) -> tuple[int, int]:
     return round(point.x * 100), round(point.y * 100)
 
 
-def _is_across(wall: Wall, bearing_rad: float) -> bool:
+def _is_across(wall: WorldWall, bearing_rad: float) -> bool:
     return abs(math.sin(wall.start.bearing_to(wall.end) - bearing_rad)) > 0.1
 
 
-def _wall(wall: Wall, ceiling_m: float) -> Iterator[Panel]:
+def _wall(wall: WorldWall, ceiling_m: float) -> Iterator[Panel]:
     pose = Pose(wall.start.x, wall.start.y, wall.start.bearing_to(wall.end))
     length, half = wall.start.distance_to(wall.end), wall.thickness_m / 2
     height = wall.height_m
@@ -151,7 +151,7 @@ def _wall(wall: Wall, ceiling_m: float) -> Iterator[Panel]:
         yield _level(pose, (Point(0, -half), Point(length, half)), height, PAINT)
 
 
-def _door(door: Door, world: World) -> Iterator[Panel]:
+def _door(door: WorldDoor, world: World) -> Iterator[Panel]:
     """Return the piece of wall above a door, and a frame around it on both sides."""
     wall = _find_wall_beside(door, world)
     if wall is None or door.width_m > _WIDEST_DOOR_M:
@@ -182,7 +182,7 @@ def _casing(pose: Pose, half_width: float, half: float, head: float) -> Iterator
     yield _upright(pose, *ends, (head, head + _CASING_M), FRAME)
 
 
-def _find_wall_beside(door: Door, world: World) -> Wall | None:
+def _find_wall_beside(door: WorldDoor, world: World) -> WorldWall | None:
     """Return the wall that ends where the door begins."""
     jambs = [door.pose.transform(Point(side * door.width_m / 2, 0.0)) for side in (-1, 1)]
     for wall in world.walls:

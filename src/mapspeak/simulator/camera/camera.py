@@ -25,10 +25,10 @@ __all__ = [
     "HORIZONTAL_FOV_RAD",
     "MAX_DETECTION_RANGE_M",
     "SMALLEST_AREA_RATIO",
-    "Camera",
+    "PinholeCamera",
+    "SegmentedView",
     "SimulatedDetection",
     "SimulatedDetector",
-    "View",
 ]
 
 Picture = NDArray[np.uint8]
@@ -38,7 +38,7 @@ CAMERA_HEIGHT_M = 1.1
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class View:
+class SegmentedView:
     """Which object each pixel shows, and how far it is. Never leaves the simulator.
 
     Attributes:
@@ -54,59 +54,44 @@ class View:
     bearing_rad: NDArray[np.float64]
 
 
-class Camera:
+class PinholeCamera:
     """A level pinhole camera. Building one prepares its world; pictures are quick then."""
 
     def __init__(self, world: World) -> None:
         self._scene = build_scene(world)
 
     def render(
-        self,
-        world_from_camera: Pose,
-        *,
-        width_px: int = 640,
-        height_px: int = 480,
-        horizontal_fov_rad: float = HORIZONTAL_FOV_RAD,
-        camera_height_m: float = CAMERA_HEIGHT_M,
+        self, world_from_camera: Pose, *, width_px: int = 640, height_px: int = 480
     ) -> Picture:
         """Take a picture: red, green and blue, 0 to 255, shape (height, width, 3)."""
-        viewpoint = Viewpoint(
-            pose=world_from_camera,
-            height_m=camera_height_m,
-            horizontal_fov_rad=horizontal_fov_rad,
-            width_px=width_px,
-            height_px=height_px,
-        )
-        return draw_picture(self._scene, viewpoint)
+        return draw_picture(self._scene, _look_from(world_from_camera, width_px, height_px))
 
     def observe(
-        self,
-        world_from_camera: Pose,
-        *,
-        width_px: int = 640,
-        height_px: int = 480,
-        horizontal_fov_rad: float = HORIZONTAL_FOV_RAD,
-        camera_height_m: float = CAMERA_HEIGHT_M,
-    ) -> View:
+        self, world_from_camera: Pose, *, width_px: int = 640, height_px: int = 480
+    ) -> SegmentedView:
         """Return which object each pixel shows, and no picture."""
-        viewpoint = Viewpoint(
-            pose=world_from_camera,
-            height_m=camera_height_m,
-            horizontal_fov_rad=horizontal_fov_rad,
-            width_px=width_px,
-            height_px=height_px,
-        )
+        viewpoint = _look_from(world_from_camera, width_px, height_px)
         visibility = look(self._scene, viewpoint)
         owners = np.append(self._scene.triangles.owners[visibility.triangles], BUILDING)
         columns = (np.arange(width_px) + 0.5 - width_px / 2) / viewpoint.focal_px
         with np.errstate(divide="ignore"):
             depth_m = np.float32(1.0) / visibility.inverse_depth
-        return View(
+        return SegmentedView(
             objects=self._scene.objects,
             object_ids=owners[visibility.rows],
             range_m=depth_m * np.hypot(1.0, columns).astype(np.float32),
             bearing_rad=-np.arctan(columns),
         )
+
+
+def _look_from(world_from_camera: Pose, width_px: int, height_px: int) -> Viewpoint:
+    return Viewpoint(
+        pose=world_from_camera,
+        height_m=CAMERA_HEIGHT_M,
+        horizontal_fov_rad=HORIZONTAL_FOV_RAD,
+        width_px=width_px,
+        height_px=height_px,
+    )
 
 
 MAX_DETECTION_RANGE_M = 12.0
@@ -162,7 +147,7 @@ class SimulatedDetector:
     def __init__(self, *, random: np.random.Generator) -> None:
         self._random = random
 
-    def detect(self, view: View) -> tuple[SimulatedDetection, ...]:
+    def detect(self, view: SegmentedView) -> tuple[SimulatedDetection, ...]:
         """Return what the simulated detector reports of a view, from left to right."""
         sightings = sorted(_find_sightings(view), key=lambda sighting: -sighting.bearing_rad)
         return tuple(self._report(sighting) for sighting in sightings if self._notices(sighting))
@@ -181,7 +166,7 @@ class SimulatedDetector:
         )
 
 
-def _find_sightings(view: View) -> Iterator[_Sighting]:
+def _find_sightings(view: SegmentedView) -> Iterator[_Sighting]:
     """Return what can be seen of each object that is near enough and large enough."""
     n_pixels = view.object_ids.size
     for owner in np.unique(view.object_ids[view.object_ids >= 0]):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.simulator.camera.atlas import Atlas, build_atlas
+from mapspeak.simulator.camera.atlas import TextureAtlas, build_atlas
 from mapspeak.simulator.camera.building import TILE_M, Panel, build_panels
 from mapspeak.simulator.camera.lighting import Light, LightMap, find_light, map_light
 from mapspeak.simulator.camera.textures import GLOWING, TILED, draw
@@ -158,7 +158,7 @@ class Scene:
     groups: IntArray
     group_centres: FloatArray
     group_radii_m: FloatArray
-    atlas: Atlas
+    atlas: TextureAtlas
     light_map: LightMap
 
 

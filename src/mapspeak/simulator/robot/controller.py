@@ -13,7 +13,7 @@ from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.simulator.robot.physics import (
     MAX_ACCELERATION_MPS2,
     STANDING,
-    Velocity,
+    BodyVelocity,
     move_along_arc,
 )
 from mapspeak.simulator.robot.scanmatch import place_points
@@ -83,7 +83,7 @@ class Obstacles:
                 return point
         return target
 
-    def limit(self, wanted: Velocity) -> Velocity:
+    def limit(self, wanted: BodyVelocity) -> BodyVelocity:
         """Return the fastest motion on the wanted arc that can still stop before touching anything.
 
         The arc stays the same, the speed is a share of what is wanted. Where none will do, only
@@ -92,12 +92,12 @@ class Obstacles:
         if wanted.speed_mps == 0 or not len(self._points):
             return wanted
         for share in _SHARES:
-            slower = Velocity(share * wanted.speed_mps, share * wanted.turn_radps)
+            slower = BodyVelocity(share * wanted.speed_mps, share * wanted.turn_radps)
             if self._is_arc_free(slower):
                 return slower
-        return Velocity(0.0, wanted.turn_radps)
+        return BodyVelocity(0.0, wanted.turn_radps)
 
-    def _is_arc_free(self, velocity: Velocity) -> bool:
+    def _is_arc_free(self, velocity: BodyVelocity) -> bool:
         stopping_s = _REACTION_S + abs(velocity.speed_mps) / (2 * MAX_ACCELERATION_MPS2)
         allowed = self._nearest_allowed()
         step_s = stopping_s / _N_SAMPLES
@@ -175,7 +175,7 @@ class PathFollower:
         turn_left = wrap_angle(self._goal.yaw_rad - pose.yaw_rad)
         return self._is_at_end and abs(turn_left) <= _ARRIVED_RAD
 
-    def steer(self, pose: Pose, speed_mps: float, obstacles: Obstacles) -> Velocity:
+    def steer(self, pose: Pose, speed_mps: float, obstacles: Obstacles) -> BodyVelocity:
         """Return the velocity that follows the path from here."""
         self._advance(pose)
         distance = pose.point.distance_to(self._goal.point)
@@ -221,7 +221,7 @@ class PathFollower:
         self._is_turning = abs(bearing_rad) > limit
         return self._is_turning
 
-    def _pursue(self, target: Point, obstacles: Obstacles) -> Velocity:
+    def _pursue(self, target: Point, obstacles: Obstacles) -> BodyVelocity:
         squared = target.x**2 + target.y**2
         curvature = 2 * target.y / squared if squared > 0 else 0.0
         room = max(min(obstacles.room_m / _ROOMY_M, 1.0), 0.3)
@@ -230,13 +230,13 @@ class PathFollower:
         if abs(curvature) * speed > _TURN_RADPS:
             speed = _TURN_RADPS / abs(curvature)
         speed = max(speed, _CREEP_MPS)
-        return Velocity(speed, curvature * speed)
+        return BodyVelocity(speed, curvature * speed)
 
 
-def _turn_by(angle_rad: float) -> Velocity:
+def _turn_by(angle_rad: float) -> BodyVelocity:
     """Turn on the spot, slowing down early enough to stop at the angle."""
     speed = min(math.sqrt(2 * _COMFORT_RADPS2 * abs(angle_rad)), _TURN_RADPS)
-    return Velocity(0.0, math.copysign(speed, angle_rad))
+    return BodyVelocity(0.0, math.copysign(speed, angle_rad))
 
 
 def _sample(path: Path) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:

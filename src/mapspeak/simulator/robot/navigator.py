@@ -11,7 +11,7 @@ import numpy as np
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.simulator.robot.controller import Obstacles, PathFollower
-from mapspeak.simulator.robot.physics import STANDING, Velocity
+from mapspeak.simulator.robot.physics import STANDING, BodyVelocity
 from mapspeak.simulator.worlds.world import BODY_RADIUS_M
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import Path, clearance_m, distances_from, find_path
@@ -87,7 +87,7 @@ class Senses:
 class _Recovery:
     """A motion that is done for a while to get free."""
 
-    velocity: Velocity
+    velocity: BodyVelocity
     ends_s: float
 
 
@@ -135,14 +135,14 @@ class Navigator:
         if self.is_driving:
             self._end(state, reason)
 
-    def steer(self, senses: Senses) -> Velocity:
+    def steer(self, senses: Senses) -> BodyVelocity:
         """Return the velocity to drive with now."""
         if self._goal is None:
             return STANDING
         wanted = self._recover(senses) or self._follow(senses, self._goal)
         return senses.obstacles.limit(wanted)
 
-    def _follow(self, senses: Senses, goal: Pose) -> Velocity:
+    def _follow(self, senses: Senses, goal: Pose) -> BodyVelocity:
         if not self._has_good_path(senses) and not self._plan(senses, goal):
             return STANDING
         follower = self._follower
@@ -220,14 +220,14 @@ class Navigator:
             self._end(DriveState.BLOCKED, f"{reason} {n_recoveries} attempts to get free failed.")
             return
         if n_recoveries % 2 == 0:
-            motion, duration_s = Velocity(_BACK_OFF_MPS, 0.0), _BACK_OFF_S
+            motion, duration_s = BodyVelocity(_BACK_OFF_MPS, 0.0), _BACK_OFF_S
         else:
-            motion, duration_s = Velocity(0.0, _LOOK_AROUND_RADPS), _LOOK_AROUND_S
+            motion, duration_s = BodyVelocity(0.0, _LOOK_AROUND_RADPS), _LOOK_AROUND_S
         self._recovery = _Recovery(motion, now_s + duration_s)
         self._milestone = None
         self._status = replace(self._status, n_recoveries=n_recoveries + 1)
 
-    def _recover(self, senses: Senses) -> Velocity | None:
+    def _recover(self, senses: Senses) -> BodyVelocity | None:
         """Return the motion of a recovery under way."""
         if self._recovery is not None and senses.now_s >= self._recovery.ends_s:
             self._recovery = None

@@ -15,10 +15,10 @@ __all__ = [
     "MAX_TURN_ACCELERATION_RADPS2",
     "MAX_TURN_RADPS",
     "STANDING",
+    "BodyVelocity",
     "DifferentialDrive",
     "Odometry",
     "RobotBody",
-    "Velocity",
     "move_along_arc",
 ]
 
@@ -29,18 +29,18 @@ MAX_TURN_ACCELERATION_RADPS2 = 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class Velocity:
+class BodyVelocity:
     """How fast a differential drive moves: ahead, and turning left."""
 
     speed_mps: float = 0.0
     turn_radps: float = 0.0
 
 
-STANDING = Velocity()
+STANDING = BodyVelocity()
 _LEAST = float(np.finfo(np.float64).eps)
 
 
-def move_along_arc(pose: Pose, velocity: Velocity, duration_s: float) -> Pose:
+def move_along_arc(pose: Pose, velocity: BodyVelocity, duration_s: float) -> Pose:
     """Return the pose after driving with a constant velocity: a piece of a circle."""
     turned = velocity.turn_radps * duration_s
     driven = velocity.speed_mps * duration_s
@@ -60,15 +60,15 @@ class DifferentialDrive:
         self._velocity = STANDING
 
     @property
-    def velocity(self) -> Velocity:
+    def velocity(self) -> BodyVelocity:
         """How the robot moves now."""
         return self._velocity
 
-    def follow(self, command: Velocity, duration_s: float) -> Velocity:
+    def follow(self, command: BodyVelocity, duration_s: float) -> BodyVelocity:
         """Change the velocity towards the command, within the limits, and return it."""
         speed = _clamp(command.speed_mps, MAX_SPEED_MPS)
         turn = _clamp(command.turn_radps, MAX_TURN_RADPS)
-        self._velocity = Velocity(
+        self._velocity = BodyVelocity(
             _approach(self._velocity.speed_mps, speed, MAX_ACCELERATION_MPS2 * duration_s),
             _approach(self._velocity.turn_radps, turn, MAX_TURN_ACCELERATION_RADPS2 * duration_s),
         )
@@ -111,7 +111,7 @@ class Odometry:
         driven = math.copysign(
             math.hypot(before_from_after.x, before_from_after.y), before_from_after.x
         )
-        felt = Velocity(self._felt_distance(driven), self._felt_turn(before_from_after, driven))
+        felt = BodyVelocity(self._felt_distance(driven), self._felt_turn(before_from_after, driven))
         self._odom_from_base = move_along_arc(self._odom_from_base, felt, 1.0)
 
     def _felt_distance(self, driven_m: float) -> float:
@@ -170,11 +170,11 @@ class RobotBody:
         self._is_touching = False
 
     @property
-    def velocity(self) -> Velocity:
+    def velocity(self) -> BodyVelocity:
         """How it moves now."""
         return self._drive.velocity
 
-    def move(self, command: Velocity, duration_s: float) -> Pose:
+    def move(self, command: BodyVelocity, duration_s: float) -> Pose:
         """Move for a moment and return the step it took, in its frame before the step."""
         before = self.world_from_base
         velocity = self._drive.follow(command, duration_s)

@@ -26,56 +26,85 @@ from mapspeak.simulator.robot.scanmatch import (
 )
 from mapspeak.spatial import OccupancyGrid
 
-__all__ = ["Localiser", "Mapper", "Pacing"]
+__all__ = ["Localiser", "Mapper", "PoseTracker"]
 
 _PERIOD_S = 1.0
 _LEAST_MOTION = 0.01
 """Metres or radians: a robot that stands still learns nothing from one more scan."""
+_LOWEST_SCORE_RATIO = 0.35
+"""Below this a scan does not fit the map; it neither moves the robot nor marks the map."""
+
+_MAPPING_STEP = (0.15, 0.1)
+"""How far the robot drives, in metres, or turns, in radians, between two scans of the map."""
+_FEWEST_RETURNS = 40
+"""A scan with fewer returns places nothing; odometry goes on alone."""
+
+_LOCALISING_STEP = (0.25, 0.2)
+"""Likewise between two corrections: AMCL's own defaults in Nav2."""
+_FIRST_GUESS_M = 0.1
+_FIRST_GUESS_RAD = 0.05
+"""The spread of the pose that the robot is told at first."""
+_NEW_M = 0.25
+"""What is seen this far from everything on the map is new; less may be an error of the pose."""
+_OBSTACLE_RANGE_M = 5.0
+"""Farther returns mark nothing: there the error of the heading counts for too much."""
+_FEWEST_HITS = 3
+"""A cell is new once so many scans have hit it."""
+_OCCUPIED = 100
 
 
-class Pacing:
-    """Remembers at which scan the robot last learned something.
+class PoseTracker:
+    """A pose in the map that follows odometry, and that some of the scans correct.
 
     Args:
-        distance_m: After so much way the next scan is worth a look.
-        turn_rad: Or after so much turning.
+        map_from_odom: Where odometry starts in the map.
+        step: After so many metres, or so much turning in radians, the next scan is worth a look.
     """
 
-    def __init__(self, *, distance_m: float, turn_rad: float) -> None:
-        self._distance_m = distance_m
-        self._turn_rad = turn_rad
+    def __init__(self, map_from_odom: Pose, *, step: tuple[float, float]) -> None:
+        self._map_from_odom = map_from_odom
+        self._odom_from_base = Pose(0.0, 0.0, 0.0)
+        self._step_m, self._step_rad = step
         self._odom_at_last: Pose | None = None
         self._last_s = -math.inf
 
-    def is_due(self, odom_from_base: Pose, now_s: float) -> bool:
+    @property
+    def map_from_base(self) -> Pose:
+        """Where the robot believes it is."""
+        return self._map_from_odom @ self._odom_from_base
+
+    def follow_odometry(self, odom_from_base: Pose) -> None:
+        """Move the pose as the wheels report."""
+        self._odom_from_base = odom_from_base
+
+    def _is_due(self, now_s: float) -> bool:
         """True when a scan is to be used; then it counts as the last one."""
-        if not self._has_moved_enough(odom_from_base, now_s):
+        if not self._has_moved_enough(now_s):
             return False
-        self._odom_at_last = odom_from_base
+        self._odom_at_last = self._odom_from_base
         self._last_s = now_s
         return True
 
-    def _has_moved_enough(self, odom_from_base: Pose, now_s: float) -> bool:
+    def _has_moved_enough(self, now_s: float) -> bool:
         if self._odom_at_last is None:
             return True
-        moved = self._odom_at_last.inverse() @ odom_from_base
+        moved = self._odom_at_last.inverse() @ self._odom_from_base
         distance, turn = math.hypot(moved.x, moved.y), abs(moved.yaw_rad)
-        if distance >= self._distance_m or turn >= self._turn_rad:
+        if distance >= self._step_m or turn >= self._step_rad:
             return True
         has_moved = distance >= _LEAST_MOTION or turn >= _LEAST_MOTION
         return has_moved and now_s - self._last_s >= _PERIOD_S
 
+    def _correct(self, field: SurfaceField, scan: LidarScan) -> bool:
+        """Correct the pose by a scan; False when the scan does not fit the map."""
+        match = match_scan(field, scan.points_in_base, self.map_from_base)
+        if match.score_ratio is not None and match.score_ratio < _LOWEST_SCORE_RATIO:
+            return False
+        self._map_from_odom = match.map_from_base @ self._odom_from_base.inverse()
+        return True
 
-_UPDATE_DISTANCE_M = 0.15
-_UPDATE_TURN_RAD = 0.1
 
-_FEWEST_RETURNS = 40
-"""A scan with fewer returns places nothing; odometry goes on alone."""
-_LOWEST_SCORE_RATIO = 0.35
-"""Below this a scan does not fit the map; it neither moves the robot nor marks the map."""
-
-
-class Mapper:
+class Mapper(PoseTracker):
     """Scan-to-map SLAM.
 
     Attributes:
@@ -83,76 +112,35 @@ class Mapper:
     """
 
     def __init__(self) -> None:
-        self.n_updates = 0
+        super().__init__(Pose(0.0, 0.0, 0.0), step=_MAPPING_STEP)
         self._map = LogOddsMap()
-        self._map_from_odom = Pose(0.0, 0.0, 0.0)
-        self._odom_from_base = Pose(0.0, 0.0, 0.0)
-        self._pacing = Pacing(distance_m=_UPDATE_DISTANCE_M, turn_rad=_UPDATE_TURN_RAD)
+        self.n_updates = 0
         self._published: OccupancyGrid | None = None
-        self._n_published = -1
-
-    @property
-    def map_from_base(self) -> Pose:
-        """Where the robot believes it is."""
-        return self._map_from_odom @ self._odom_from_base
 
     @property
     def planning_map(self) -> OccupancyGrid | None:
         """None: the robot plans on the map it publishes."""
         return None
 
-    def follow_odometry(self, odom_from_base: Pose) -> None:
-        """Move the pose as the wheels report."""
-        self._odom_from_base = odom_from_base
-
     def add_scan(self, scan: LidarScan) -> None:
         """Match a scan to the map and add it, if the robot has moved enough to learn from it."""
-        if not self._pacing.is_due(self._odom_from_base, scan.stamp_s):
+        if not self._is_due(scan.stamp_s) or scan.n_returns < _FEWEST_RETURNS:
             return
-        if scan.n_returns >= _FEWEST_RETURNS and self._place(scan):
+        if self.n_updates == 0 or self._correct(SurfaceField(self._map), scan):
             ends = place_points(self.map_from_base, scan.ends_in_base)
             self._map.insert(ends, scan.is_return)
             self.n_updates += 1
+            self._published = None
 
     def publish(self, *, stamp_s: float) -> OccupancyGrid:
         """Return the map; the same one until a scan has changed it."""
-        if self._published is None or self._n_published != self.n_updates:
+        if self._published is None:
             self._published = self._map.publish(stamp_s=stamp_s)
-            self._n_published = self.n_updates
         return self._published
 
-    def _place(self, scan: LidarScan) -> bool:
-        """Correct the pose by the map made so far; False when the scan does not fit in."""
-        if self.n_updates == 0:
-            return True
-        match = match_scan(SurfaceField(self._map), scan.points_in_base, self.map_from_base)
-        if match.score_ratio is not None and match.score_ratio < _LOWEST_SCORE_RATIO:
-            return False
-        self._map_from_odom = match.map_from_base @ self._odom_from_base.inverse()
-        return True
 
-
-FIRST_GUESS_M = 0.1
-FIRST_GUESS_RAD = 0.05
-"""The spread of the pose that the robot is told at first."""
-
-UPDATE_M, UPDATE_RAD = 0.25, 0.2
-"""How far the robot moves between two corrections: AMCL's own defaults in Nav2."""
-
-"""Below this a scan does not fit the map and does not move the robot."""
-_NEW_M = 0.25
-"""What is seen this far from everything on the map is new; less may be an error of the pose."""
-_OBSTACLE_RANGE_M = 5.0
-"""Farther returns mark nothing: there the error of the heading counts for too much."""
-_FEWEST_HITS = 3
-"""A cell is new once so many scans have hit it."""
-
-
-class Localiser:
+class Localiser(PoseTracker):
     """The robot's place in a map that is known and stays as it is.
-
-    Attributes:
-        n_updates: How many scans have been matched.
 
     Args:
         known: The map; its frame is the map frame.
@@ -161,41 +149,23 @@ class Localiser:
     """
 
     def __init__(self, known: OccupancyGrid, pose: Pose, *, random: np.random.Generator) -> None:
-        self.n_updates = 0
+        dx, dy = random.normal(0.0, _FIRST_GUESS_M, 2).tolist()
+        told = Pose(pose.x + dx, pose.y + dy, pose.yaw_rad + random.normal(0.0, _FIRST_GUESS_RAD))
+        super().__init__(told, step=_LOCALISING_STEP)
         self._known = known
         self._field = FinishedField(LogOddsMap.of(known))
-        dx, dy = random.normal(0.0, FIRST_GUESS_M, 2).tolist()
-        told = Pose(pose.x + dx, pose.y + dy, pose.yaw_rad + random.normal(0.0, FIRST_GUESS_RAD))
-        self._map_from_odom = told
-        self._odom_from_base = Pose(0.0, 0.0, 0.0)
-        self._pacing = Pacing(distance_m=UPDATE_M, turn_rad=UPDATE_RAD)
         self._layer = _ObstacleLayer(known)
-
-    @property
-    def map_from_base(self) -> Pose:
-        """Where the robot believes it is."""
-        return self._map_from_odom @ self._odom_from_base
 
     @property
     def planning_map(self) -> OccupancyGrid:
         """The known map and the obstacles seen besides; the same one until there are more."""
         return self._layer.grid
 
-    def follow_odometry(self, odom_from_base: Pose) -> None:
-        """Move the pose as the wheels report."""
-        self._odom_from_base = odom_from_base
-
     def add_scan(self, scan: LidarScan) -> None:
         """Correct the pose by a scan, if the robot has moved enough to learn from it."""
-        if not self._pacing.is_due(self._odom_from_base, scan.stamp_s):
-            return
-        match = match_scan(self._field, scan.points_in_base, self.map_from_base)
-        if match.score_ratio is not None and match.score_ratio < _LOWEST_SCORE_RATIO:
-            return
-        self._map_from_odom = match.map_from_base @ self._odom_from_base.inverse()
-        self.n_updates += 1
-        near = scan.points_in_base[np.hypot(*scan.points_in_base.T) <= _OBSTACLE_RANGE_M]
-        self._layer.mark(place_points(self.map_from_base, near))
+        if self._is_due(scan.stamp_s) and self._correct(self._field, scan):
+            near = scan.points_in_base[np.hypot(*scan.points_in_base.T) <= _OBSTACLE_RANGE_M]
+            self._layer.mark(place_points(self.map_from_base, near))
 
     def publish(self, *, stamp_s: float) -> OccupancyGrid:
         """Return the known map, which is as old as it is."""
@@ -233,6 +203,3 @@ class _ObstacleLayer:
                 origin=self.grid.origin,
                 stamp_s=self.grid.stamp_s,
             )
-
-
-_OCCUPIED = 100

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mapspeak.errors import MapError
 from mapspeak.geometry import Point, Pose
-from mapspeak.simulator.worlds.world import BODY_RADIUS_M, Wall, World
+from mapspeak.simulator.worlds.world import BODY_RADIUS_M, World, WorldWall
 from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.paths import clearance_m
 
@@ -86,12 +86,12 @@ def _find_solid(grid: OccupancyGrid) -> Mask:
     return np.asarray(grid.occupied | is_rim | (edge & grid.free))
 
 
-def _raise_walls(grid: OccupancyGrid) -> Iterator[Wall]:
+def _raise_walls(grid: OccupancyGrid) -> Iterator[WorldWall]:
     """Return a wall for each rectangle of solid cells."""
     size_m = grid.resolution_m
     for rows, cols in _cover(_find_surface(grid)):
         middle = (rows.start + rows.stop) / 2 * size_m
-        yield Wall(
+        yield WorldWall(
             start=grid.origin.transform(Point(cols.start * size_m, middle)),
             end=grid.origin.transform(Point(cols.stop * size_m, middle)),
             thickness_m=(rows.stop - rows.start) * size_m,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.simulator.worlds.models import Mesh, build_parts, find_kind
-from mapspeak.simulator.worlds.world import Wall, World, WorldObject
+from mapspeak.simulator.worlds.world import World, WorldObject, WorldWall
 
 __all__ = ["Slice", "fill_outlines", "footprint", "slice_world"]
 
@@ -171,7 +171,7 @@ def _sides_of(outlines: Sequence[FloatArray]) -> FloatArray:
     return np.hstack([corners, corners[following]])
 
 
-def _outline_wall(wall: Wall) -> FloatArray:
+def _outline_wall(wall: WorldWall) -> FloatArray:
     half = wall.thickness_m / 2
     length = wall.start.distance_to(wall.end)
     world_from_wall = Pose(wall.start.x, wall.start.y, wall.start.bearing_to(wall.end))

@@ -5,7 +5,15 @@ from dataclasses import dataclass
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial.rooms import RoomClass
 
-__all__ = ["BODY_BAND_M", "BODY_RADIUS_M", "Door", "TrueRoom", "Wall", "World", "WorldObject"]
+__all__ = [
+    "BODY_BAND_M",
+    "BODY_RADIUS_M",
+    "TrueRoom",
+    "World",
+    "WorldDoor",
+    "WorldObject",
+    "WorldWall",
+]
 
 BODY_RADIUS_M = 0.28
 """Of the robot: a world must have room for it."""
@@ -14,7 +22,7 @@ BODY_BAND_M = (0.02, 1.2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Wall:
+class WorldWall:
     """A straight piece of wall, already cut where doors are.
 
     Attributes:
@@ -31,7 +39,7 @@ class Wall:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Door:
+class WorldDoor:
     """A gap that was cut into a wall.
 
     Attributes:
@@ -102,8 +110,8 @@ class World:
 
     name: str
     title: str
-    walls: tuple[Wall, ...]
+    walls: tuple[WorldWall, ...]
     objects: tuple[WorldObject, ...]
     rooms: tuple[TrueRoom, ...]
     start: Pose
-    doors: tuple[Door, ...] = ()
+    doors: tuple[WorldDoor, ...] = ()

@@ -25,11 +25,11 @@ from mapspeak.simulator.worlds.slices import slice_world
 from mapspeak.simulator.worlds.world import (
     BODY_BAND_M,
     BODY_RADIUS_M,
-    Door,
     TrueRoom,
-    Wall,
     World,
+    WorldDoor,
     WorldObject,
+    WorldWall,
 )
 from mapspeak.spatial.mapfiles import load_map
 from mapspeak.spatial.rooms import RoomClass
@@ -303,7 +303,7 @@ def _check_start(world: World) -> None:
         )
 
 
-def _raise_walls(written: _WorldFile) -> Iterator[Wall]:
+def _raise_walls(written: _WorldFile) -> Iterator[WorldWall]:
     """Turn each line into straight walls, each longer by half its thickness: corners close."""
     for index, wall in enumerate(written.walls):
         thickness = wall.thickness_m or written.wall_thickness_m
@@ -312,7 +312,7 @@ def _raise_walls(written: _WorldFile) -> Iterator[Wall]:
             length = start.distance_to(end)
             if length == 0:
                 raise _FaultError(("walls", index, "line"), f"the point {first} comes twice")
-            yield Wall(
+            yield WorldWall(
                 start=_along(start, end, -thickness / 2),
                 end=_along(start, end, length + thickness / 2),
                 thickness_m=thickness,
@@ -320,7 +320,7 @@ def _raise_walls(written: _WorldFile) -> Iterator[Wall]:
             )
 
 
-def _place_doors(doors: Sequence[_WrittenDoor], walls: Sequence[Wall]) -> Iterator[Door]:
+def _place_doors(doors: Sequence[_WrittenDoor], walls: Sequence[WorldWall]) -> Iterator[WorldDoor]:
     for index, door in enumerate(doors):
         middle = Point(*door.at)
         nearest = min(walls, key=lambda wall: _distance_beside(wall, middle))
@@ -329,14 +329,14 @@ def _place_doors(doors: Sequence[_WrittenDoor], walls: Sequence[Wall]) -> Iterat
             raise _FaultError(
                 ("doors", index, "at"), f"no wall is here; the nearest one is {beside:.2f} m away"
             )
-        yield Door(
+        yield WorldDoor(
             name=door.name or f"door {index + 1}",
             pose=Pose(middle.x, middle.y, wrap_angle(nearest.start.bearing_to(nearest.end))),
             width_m=door.width_m,
         )
 
 
-def _distance_beside(wall: Wall, point: Point) -> float:
+def _distance_beside(wall: WorldWall, point: Point) -> float:
     """Return the distance from a point to a wall's centre line."""
     length = wall.start.distance_to(wall.end)
     turn = wall.start.bearing_to(point) - wall.start.bearing_to(wall.end)
@@ -349,7 +349,7 @@ def _along(start: Point, end: Point, distance_m: float) -> Point:
     return Point(start.x + distance_m * math.cos(yaw), start.y + distance_m * math.sin(yaw))
 
 
-def _cut_wall(wall: Wall, doors: Sequence[Door]) -> Iterator[Wall]:
+def _cut_wall(wall: WorldWall, doors: Sequence[WorldDoor]) -> Iterator[WorldWall]:
     """Return the pieces of a wall that its doors leave standing."""
     length = wall.start.distance_to(wall.end)
     position = 0.0
@@ -361,12 +361,12 @@ def _cut_wall(wall: Wall, doors: Sequence[Door]) -> Iterator[Wall]:
         yield _shorten(wall, position, length)
 
 
-def _shorten(wall: Wall, low_m: float, high_m: float) -> Wall:
+def _shorten(wall: WorldWall, low_m: float, high_m: float) -> WorldWall:
     start, end = (_along(wall.start, wall.end, along_m) for along_m in (low_m, high_m))
     return replace(wall, start=start, end=end)
 
 
-def _gaps(wall: Wall, doors: Sequence[Door]) -> Iterator[tuple[float, float]]:
+def _gaps(wall: WorldWall, doors: Sequence[WorldDoor]) -> Iterator[tuple[float, float]]:
     """Return from where to where each door cuts a wall: one it stands in line with."""
     length = wall.start.distance_to(wall.end)
     wall_from_world = Pose(wall.start.x, wall.start.y, wall.start.bearing_to(wall.end)).inverse()

@@ -7,7 +7,7 @@ import numpy as np
 
 from mapspeak.evaluation.scores import Passage, Site
 from mapspeak.geometry import Pose
-from mapspeak.simulator import Door, MeasuredRoom, WorldObject
+from mapspeak.simulator import MeasuredRoom, WorldDoor, WorldObject
 from mapspeak.spatial.grid import Mask
 
 __all__ = ["away_from", "close_door", "find_doors_into_rooms", "find_spacious_rooms"]
@@ -21,7 +21,7 @@ ROOM_LEFT_RATIO = 0.5
 """A thing in the way leaves the robot at least so much of the room."""
 
 
-def find_doors_into_rooms(site: Site) -> list[tuple[Door, MeasuredRoom]]:
+def find_doors_into_rooms(site: Site) -> list[tuple[WorldDoor, MeasuredRoom]]:
     """Gives doors with a space that they lead into and that is not the only one on that side."""
     found = []
     map_from_world = site.world.start.inverse()
@@ -38,7 +38,7 @@ def _smaller_side(site: Site, passage: Passage) -> list[MeasuredRoom]:
     return sorted(rooms, key=lambda room: room.outline_area_m2)[:1] if len(rooms) > 1 else []
 
 
-def close_door(door: Door) -> tuple[WorldObject, ...]:
+def close_door(door: WorldDoor) -> tuple[WorldObject, ...]:
     """Gives crates side by side across a door."""
     n_crates = max(math.ceil((door.width_m - 0.1) / CRATE_M), 1)
     pitch_m = door.width_m / n_crates
