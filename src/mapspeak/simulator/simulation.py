@@ -188,7 +188,7 @@ class Simulation:
         return self._ended[goal_id]
 
     def cancel_goal(self, goal_id: int) -> None:
-        """End a drive if it still goes on; the robot comes to a stand.
+        """End a drive that still goes on; the robot stops.
 
         Raises:
             GoalError: No drive has that id.
@@ -197,7 +197,7 @@ class Simulation:
             self._navigator.give_up(DriveState.CANCELLED, "It was cancelled.")
 
     def stop(self) -> None:
-        """End every drive and brings the robot to a stand."""
+        """End every drive and stop the robot."""
         self._teleoperated_until_s = -math.inf
         self._navigator.give_up(DriveState.CANCELLED, "The robot was stopped.")
 
@@ -206,7 +206,7 @@ class Simulation:
 
         Nothing but the bumper protects the robot meanwhile, as on a real one.
         """
-        self._navigator.give_up(DriveState.CANCELLED, "Somebody drives by hand.")
+        self._navigator.give_up(DriveState.CANCELLED, "The robot is driven by hand.")
         self._teleoperation = velocity
         self._teleoperated_until_s = self.time_s + _TELEOPERATION_TIMEOUT_S
 

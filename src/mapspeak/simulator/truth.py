@@ -28,6 +28,7 @@ from mapspeak.simulator.worlds.models import find_kind
 from mapspeak.simulator.worlds.slices import FloatArray, Slice, fill_outlines, slice_world
 from mapspeak.simulator.worlds.world import BODY_BAND_M, BODY_RADIUS_M, TrueRoom, World, WorldObject
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
+from mapspeak.spatial.paths import clearance_m
 
 __all__ = ["MeasuredRoom", "TrueFloor", "Truth", "is_in_sight", "slice_at_eye_level"]
 
@@ -95,7 +96,7 @@ class TrueFloor:
     @cached_property
     def standable(self) -> Mask:
         """True at the cells of `solid` where the robot can come to stand from its start."""
-        is_clear = self._clearance_m >= BODY_RADIUS_M
+        is_clear = clearance_m(self.solid) >= BODY_RADIUS_M
         _, labels = cv2.connectedComponents(is_clear.astype(np.uint8), connectivity=4)
         start = self.solid.cell_at(Point(0.0, 0.0))
         label = labels[start.row, start.col]
@@ -108,7 +109,7 @@ class TrueFloor:
         As on every map made by a LiDAR, a cell that a surface touches is solid.
         """
         is_seen = np.zeros(self.solid.cells.shape, dtype=np.uint8)
-        for point in self._lookouts():
+        for point in self._viewpoints():
             world_from_base = self._world.start @ Pose(point.x, point.y)
             ranges = np.minimum(measure_ranges(self._solids.edges, world_from_base), MAX_RANGE_M)
             star = (BEAM_DIRECTIONS * ranges[:, None] + (point.x, point.y)) / CELL_SIZE_M
@@ -119,13 +120,7 @@ class TrueFloor:
         cells = np.where(is_solid, _SOLID, np.where(is_seen > 0, _FREE, UNKNOWN))
         return _grid(cells, self.solid.origin.point)
 
-    @cached_property
-    def _clearance_m(self) -> FloatArray:
-        is_free = (self.solid.cells == _FREE).astype(np.uint8)
-        distance = cv2.distanceTransform(is_free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-        return np.asarray(distance, dtype=np.float64) * CELL_SIZE_M
-
-    def _lookouts(self) -> list[Point]:
+    def _viewpoints(self) -> list[Point]:
         """Return places where the robot can stand, spread over a square lattice."""
         rows, cols = np.nonzero(self.standable)
         every = round(_LOOK_EVERY_M / CELL_SIZE_M)

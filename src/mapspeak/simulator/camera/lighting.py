@@ -20,7 +20,7 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.simulator.camera.atlas import look_up, pack
 from mapspeak.simulator.camera.building import TILE_M, Panel, find_bounds, find_ceiling
 from mapspeak.simulator.robot.lidar import N_BEAMS, measure_ranges
-from mapspeak.simulator.worlds.models import build_parts, find_kind
+from mapspeak.simulator.worlds.models import base_height_m, build_parts, find_kind
 from mapspeak.simulator.worlds.slices import fill_outlines, slice_world
 from mapspeak.simulator.worlds.world import World, WorldObject
 
@@ -120,14 +120,14 @@ def _find_hanging(panel: Panel, things: Sequence[WorldObject]) -> list[WorldObje
 
 def _project_on(thing: WorldObject, panel: Panel) -> list[FloatArray]:
     """Return each part's corners on a panel, in metres right of and below its upper left corner."""
-    usual_m = find_kind(thing.kind).base_height_m
-    base_m = usual_m if thing.base_height_m is None else thing.base_height_m
     width_m, height_m = panel.size_m
     offset = np.array([thing.pose.x, thing.pose.y, 0.0]) - panel.corner
     middle = float(offset @ panel.right) / width_m
     top = float(panel.corner[2]) + height_m
     return [
-        np.column_stack([middle + points[:, 1], top - base_m - points[:, 2] + _WALL_DROP_M])
+        np.column_stack(
+            [middle + points[:, 1], top - base_height_m(thing) - points[:, 2] + _WALL_DROP_M]
+        )
         for points in (part.corners.reshape(-1, 3) for part in build_parts(thing.kind))
     ]
 

@@ -11,7 +11,7 @@ from mapspeak.simulator.camera.atlas import TextureAtlas, build_atlas
 from mapspeak.simulator.camera.building import TILE_M, Panel, build_panels
 from mapspeak.simulator.camera.lighting import Light, LightMap, find_light, map_light
 from mapspeak.simulator.camera.textures import GLOWING, TILED, draw
-from mapspeak.simulator.worlds.models import Surface, build_parts, find_kind
+from mapspeak.simulator.worlds.models import Surface, base_height_m, build_parts
 from mapspeak.simulator.worlds.world import World, WorldObject
 
 __all__ = [
@@ -128,9 +128,8 @@ def shine_on(triangles: Triangles, light: Light) -> Triangles:
 
 
 def _to_world(corners: FloatArray, thing: WorldObject) -> FloatArray:
-    usual_m = find_kind(thing.kind).base_height_m
-    base_m = usual_m if thing.base_height_m is None else thing.base_height_m
-    return np.asarray(_turn(corners, thing) + np.array([thing.pose.x, thing.pose.y, base_m]))
+    place = (thing.pose.x, thing.pose.y, base_height_m(thing))
+    return np.asarray(_turn(corners, thing) + np.array(place))
 
 
 def _turn(vectors: FloatArray, thing: WorldObject) -> FloatArray:

@@ -159,8 +159,8 @@ def _compute_floor() -> FloatArray:
     """Compute four metres of sealed concrete with its joints."""
     n = 1024
     clouds = 3.5 * _ripples(n, n, rows=0.006, columns=0.006)
-    specks = 2.2 * _ripples(n, n, rows=0.4, columns=0.4)
-    grey = 158.0 + clouds + specks
+    grains = 2.2 * _ripples(n, n, rows=0.4, columns=0.4)
+    grey = 158.0 + clouds + grains
     floor = np.stack([grey, grey * 0.995, grey * 0.97], axis=2)
     for edge in (slice(0, 3), slice(n - 2, n)):
         floor[edge, :] *= 0.72
@@ -172,8 +172,8 @@ def _compute_wall() -> FloatArray:
     """Compute two metres of painted plaster."""
     n = 256
     clouds = 0.8 * _ripples(n, n, rows=0.02, columns=0.02)
-    specks = 1.2 * _ripples(n, n, rows=0.4, columns=0.4)
-    plaster = 240.0 + (clouds + specks)[:, :, None] + np.array([0.0, 0.0, -5.0])
+    grains = 1.2 * _ripples(n, n, rows=0.4, columns=0.4)
+    plaster = 240.0 + (clouds + grains)[:, :, None] + np.array([0.0, 0.0, -5.0])
     return np.asarray(plaster)
 
 

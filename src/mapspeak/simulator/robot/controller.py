@@ -112,7 +112,7 @@ class Obstacles:
         here = self._nearest_m
         if here >= BODY_RADIUS_M + KEEP_OFF_M:
             return BODY_RADIUS_M + KEEP_OFF_M
-        # Who stands too near already may pass and leave, but not touch.
+        # A robot that is too near already may pass and leave, but not touch.
         return min(BODY_RADIUS_M + _SQUEEZE_M, here - 1e-3)
 
     def _distance_from(self, place: Point) -> float:

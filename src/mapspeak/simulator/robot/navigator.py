@@ -131,7 +131,7 @@ class Navigator:
         self._status = DriveStatus(state=DriveState.DRIVING)
 
     def give_up(self, state: DriveState, reason: str) -> None:
-        """End the drive because somebody wants something else, if there is one."""
+        """End the drive, if there is one, because something else was commanded."""
         if self.is_driving:
             self._end(state, reason)
 
@@ -246,7 +246,7 @@ class Navigator:
 
 
 def _fault_of(grid: OccupancyGrid, goal: Point) -> str | None:
-    """Return why the robot cannot stand at a goal, whatever the way; None when it can."""
+    """Return why the robot cannot stand at a goal, whatever the path; None when it can."""
     cell = grid.cell_at(goal)
     if grid.is_unknown(cell):
         return "The goal lies where the map knows nothing."
@@ -268,10 +268,8 @@ def _is_free_along(
         return True
     rows, cols = rows.clip(0, grid.n_rows - 1), cols.clip(0, grid.n_cols - 1)
     # What lies farther from the path than the radius takes no room from it.
-    reach = math.ceil(radius_m / grid.resolution_m) + 1
-    top, left = max(int(rows.min()) - reach, 0), max(int(cols.min()) - reach, 0)
-    near = grid.crop(
-        slice(top, int(rows.max()) + reach + 1), slice(left, int(cols.max()) + reach + 1)
-    )
+    margin = math.ceil(radius_m / grid.resolution_m) + 1
+    around = grid.window(rows, cols, margin=margin)
+    near = grid.crop(*around)
     is_open = near.free & (clearance_m(near) >= radius_m)
-    return bool(is_open[rows - top, cols - left].all())
+    return bool(is_open[rows - around[0].start, cols - around[1].start].all())

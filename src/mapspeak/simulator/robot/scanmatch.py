@@ -194,7 +194,7 @@ _SMALL_STEP = 2e-4
 _LARGEST_STEP = 0.1
 _FIT_SPREAD_M = 0.03
 """How far points scatter about their surface; those further off count for less and less."""
-_SHARE_OF_NEWS = 0.1
+_INDEPENDENT_RATIO = 0.1
 """Neighbouring points lie on the same cells and share their errors: ten count as one."""
 _ODOMETRY_SPREAD = (0.05, 0.05, 0.03)
 """How far odometry may be off between two updates: m, m, rad."""
@@ -284,7 +284,7 @@ def _linearise(
     turning = normals[:, 1] * arms[:, 0] - normals[:, 0] * arms[:, 1]
     jacobian = np.column_stack([normals, turning])
     # Cauchy's weights: what lies far off its surface has perhaps another one.
-    weighted = _SHARE_OF_NEWS * jacobian / (_FIT_SPREAD_M**2 + offsets**2)[:, None]
+    weighted = _INDEPENDENT_RATIO * jacobian / (_FIT_SPREAD_M**2 + offsets**2)[:, None]
     return weighted.T @ jacobian, -weighted.T @ offsets
 
 

@@ -188,10 +188,10 @@ class _ObstacleLayer:
         rows, cols = self.grid.cells_at(points_in_map)
         is_inside = self.grid.contains_cells(rows, cols)
         rows, cols = rows[is_inside], cols[is_inside]
-        is_news = self._is_open[rows, cols]
-        if not is_news.any():
+        is_new = self._is_open[rows, cols]
+        if not is_new.any():
             return
-        cells = np.unique(np.stack([rows[is_news], cols[is_news]], axis=1), axis=0)
+        cells = np.unique(np.stack([rows[is_new], cols[is_new]], axis=1), axis=0)
         self._n_hits[cells[:, 0], cells[:, 1]] += 1
         found = cells[self._n_hits[cells[:, 0], cells[:, 1]] >= _FEWEST_HITS]
         if (self.grid.cells[found[:, 0], found[:, 1]] < _OCCUPIED).any():

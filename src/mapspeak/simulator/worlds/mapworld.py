@@ -1,7 +1,7 @@
 """A world out of a map: walls from its occupied cells, no objects.
 
 So any building that has once been mapped can be driven in. What the map does not know is closed
-off by a wall, since nobody can say what would be seen there.
+off by a wall: what would be seen there is not known.
 """
 
 from collections.abc import Iterable, Iterator

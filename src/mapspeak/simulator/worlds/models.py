@@ -20,12 +20,14 @@ import orjson
 from numpy.typing import NDArray
 
 from mapspeak.errors import ConfigError
+from mapspeak.simulator.worlds.world import WorldObject
 
 __all__ = [
     "Mesh",
     "ObjectCategory",
     "ObjectKind",
     "Surface",
+    "base_height_m",
     "build_parts",
     "find_kind",
     "kind_names",
@@ -142,6 +144,12 @@ def find_kind(name: str) -> ObjectKind:
         base_height_m=model.get("base_height_m", 0.0),
         is_wall_hung=model.get("is_wall_hung", False),
     )
+
+
+def base_height_m(thing: WorldObject) -> float:
+    """Return how high above the floor the base of an object is."""
+    usual_m = find_kind(thing.kind).base_height_m
+    return usual_m if thing.base_height_m is None else thing.base_height_m
 
 
 @cache

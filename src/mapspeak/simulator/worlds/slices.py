@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.simulator.worlds.models import Mesh, build_parts, find_kind
+from mapspeak.simulator.worlds.models import Mesh, base_height_m, build_parts, find_kind
 from mapspeak.simulator.worlds.world import World, WorldObject, WorldWall
 
 __all__ = ["Slice", "fill_outlines", "footprint", "slice_world"]
@@ -182,8 +182,7 @@ def _outline_wall(wall: WorldWall) -> FloatArray:
 
 
 def _outline_object(thing: WorldObject, low_m: float, high_m: float) -> Iterator[FloatArray]:
-    usual_m = find_kind(thing.kind).base_height_m
-    lifted_m = 0.0 if thing.base_height_m is None else thing.base_height_m - usual_m
+    lifted_m = base_height_m(thing) - find_kind(thing.kind).base_height_m
     for corners in footprint(thing.kind, low_m - lifted_m, high_m - lifted_m):
         yield _place(corners, thing.pose)
 
