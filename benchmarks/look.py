@@ -12,8 +12,8 @@ from benchmarks.figure import Figure
 from mapspeak.geometry import Pose
 from mapspeak.semantic import SemanticMap
 from mapspeak.server.mapview.drawing import draw_atlas
-from mapspeak.server.mapview.tables import describe_atlas
-from mapspeak.server.mapview.views import MapLook, view_of
+from mapspeak.server.text.look import MapLook, view_of
+from mapspeak.server.text.tables import describe_atlas
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 from mapspeak.worldmodel.model import Atlas
 

@@ -46,7 +46,7 @@ from mapspeak.safety import (
 )
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server import build_server
-from mapspeak.server.tools import build_toolsets
+from mapspeak.server.toolsets import build_toolsets
 from mapspeak.session import Session
 from mapspeak.simulator import BODY_RADIUS_M, Simulation, load_world
 from mapspeak.worldmodel.closures import ClosedArea

@@ -12,8 +12,8 @@ from benchmarks.look import draw_building
 from mapspeak.geometry import Pose
 from mapspeak.semantic import SemanticMap
 from mapspeak.server.mapview.drawing import draw_atlas
-from mapspeak.server.mapview.tables import describe_atlas
-from mapspeak.server.mapview.views import MapLook, view_of
+from mapspeak.server.text.look import MapLook, view_of
+from mapspeak.server.text.tables import describe_atlas
 from mapspeak.simulator import TrueFloor, load_world
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map

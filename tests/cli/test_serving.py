@@ -21,7 +21,7 @@ from mapspeak.cli.episodes import rename_memory
 from mapspeak.geometry import Pose
 from mapspeak.semantic import SemanticMapStore, Waypoint
 from mapspeak.server import DEFAULT_TOOLSETS
-from mapspeak.server.tools import build_toolsets
+from mapspeak.server.toolsets import build_toolsets
 from mapspeak.session import Session
 from rosbridge_robot import ScriptedRobot
 from rosbridge_script import PATIENCE_S, running

@@ -21,10 +21,10 @@ from mapspeak.places.notices import (
 from mapspeak.safety import Policy, Surveyor
 from mapspeak.semantic import SemanticMap, SemanticMapStore, Waypoint
 from mapspeak.semantic.events import Effect
-from mapspeak.server.mapview.tables import describe_atlas
-from mapspeak.server.mapview.views import MapLook, view_of
-from mapspeak.server.measures import describe_measures
 from mapspeak.server.text.frontiers import say_refusal
+from mapspeak.server.text.look import MapLook, view_of
+from mapspeak.server.text.measures import describe_measures
+from mapspeak.server.text.tables import describe_atlas
 from mapspeak.session import Session
 from mapspeak.spatial import UNKNOWN
 from mapspeak.spatial.frontiers import RefusalReason

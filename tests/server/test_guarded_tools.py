@@ -30,8 +30,8 @@ from mapspeak.safety import (
 )
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server.app import name_client
-from mapspeak.server.tools import build_toolsets
-from mapspeak.server.toolset import Effect, Tool
+from mapspeak.server.tools.toolset import Effect, Tool
+from mapspeak.server.toolsets import build_toolsets
 from mapspeak.session import Session
 from served import MODES, connect, pictures_of, report_of, text_of
 

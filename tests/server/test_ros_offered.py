@@ -13,7 +13,7 @@ from mapspeak.semantic import SemanticMapStore
 from mapspeak.server import build_server
 from mapspeak.server.mapview.representations import Representation
 from mapspeak.server.offering import keep_offered, write_instructions
-from mapspeak.server.tools import build_toolsets
+from mapspeak.server.toolsets import build_toolsets
 from mapspeak.session import Session
 
 pytestmark = pytest.mark.anyio

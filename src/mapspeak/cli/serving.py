@@ -362,7 +362,7 @@ def _build_server(
         Representation,
         build_server,
     )
-    from mapspeak.server.tools import require_ros  # noqa: PLC0415
+    from mapspeak.server.tools.ros import require_ros  # noqa: PLC0415
 
     named = options.toolsets or ()
     added = tuple(name.removeprefix("+") for name in named if name.startswith("+"))

@@ -9,6 +9,7 @@ from mapspeak.semantic.filtering import (
     tells_what_to_do,
 )
 from mapspeak.semantic.laserfan import LaserFan, LaserRing, build_ring
+from mapspeak.semantic.mapfile.store import SemanticMapStore, WriteReceipt
 from mapspeak.semantic.merging import (
     SAME_SPOT_M,
     Merge,
@@ -19,7 +20,6 @@ from mapspeak.semantic.merging import (
     seen_from,
 )
 from mapspeak.semantic.pictures import PictureBook, Reading, TakenPicture
-from mapspeak.semantic.store import SemanticMapStore, WriteReceipt
 from mapspeak.semantic.waypoint import Confidence, Landmark, SemanticMap, Waypoint, name_key
 
 __all__ = [

@@ -17,7 +17,6 @@ from mapspeak import __version__
 from mapspeak.errors import ConfigError, MapspeakError
 from mapspeak.safety import ApprovalNeededError, Caller, calling
 from mapspeak.semantic.waypoint import clean_line
-from mapspeak.server.asking import Asking
 from mapspeak.server.calllog import CallLog
 from mapspeak.server.mapview.representations import Representation
 from mapspeak.server.offering import (
@@ -27,9 +26,10 @@ from mapspeak.server.offering import (
     write_instructions,
 )
 from mapspeak.server.prompts import add_prompts
-from mapspeak.server.tools import build_toolsets
-from mapspeak.server.toolset import Effect, Tool, lean_input, lean_output
-from mapspeak.server.visible import show_controls, show_controls_of
+from mapspeak.server.text.visible import show_controls, show_controls_of
+from mapspeak.server.tools.asking import Asking
+from mapspeak.server.tools.toolset import Effect, Tool, lean_input, lean_output
+from mapspeak.server.toolsets import build_toolsets
 from mapspeak.session import Session
 
 DEFAULT_TOOLSETS = ("look", "places", "drive", "paper")

@@ -18,7 +18,7 @@ from mapspeak.semantic.alignment.fitting import Certainty
 from mapspeak.semantic.alignment.surfaces import MapSurfaces
 from mapspeak.semantic.episodes import EpisodeStore
 from mapspeak.semantic.mapfile import MapDocument, moved
-from mapspeak.semantic.store import SemanticMapStore
+from mapspeak.semantic.mapfile.store import SemanticMapStore
 from mapspeak.spatial import OccupancyGrid
 
 GROWN_RATIO = 0.1

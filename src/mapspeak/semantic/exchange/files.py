@@ -20,7 +20,7 @@ from mapspeak.semantic.mapfile import (
     with_event,
     with_waypoint,
 )
-from mapspeak.semantic.store import SemanticMapStore
+from mapspeak.semantic.mapfile.store import SemanticMapStore
 from mapspeak.semantic.waypoint import SemanticMap, Waypoint
 from mapspeak.spatial.areagraph import MapAnchor
 

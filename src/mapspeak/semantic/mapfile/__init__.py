@@ -1,6 +1,6 @@
 """The semantic map file as text: read with the place of every fault, edited with comments kept.
 
-Nothing here opens a file; `mapspeak.semantic.store` does.
+Nothing here opens a file; `mapspeak.semantic.mapfile.store` does.
 """
 
 from mapspeak.semantic.mapfile.document import MapDocument, parse_document

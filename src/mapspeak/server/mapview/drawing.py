@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mapspeak.server.mapview.views import Layer, MapLook, MapView
-from mapspeak.server.wording import list_some, say_area
+from mapspeak.server.text.look import Layer, MapLook, MapView
+from mapspeak.server.text.wording import list_some, say_area
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.picture import (
     NORTH_UP_RAD,

@@ -6,7 +6,7 @@ from typing import Self
 from pydantic import Field
 
 from mapspeak.geometry import Point
-from mapspeak.server.reports import PoseReport, Report
+from mapspeak.server.reports.robot import PoseReport, Report
 from mapspeak.server.text.maps import say_map_warning, say_size
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.areagraph import AreaGraph, Passage

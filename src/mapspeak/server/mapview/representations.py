@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from mapspeak.errors import MapError
 from mapspeak.server.mapview.drawing import draw_atlas, say_axes
-from mapspeak.server.mapview.tables import describe_atlas
-from mapspeak.server.mapview.views import MapView
-from mapspeak.server.wording import say_pose, say_warnings
+from mapspeak.server.text.look import MapView
+from mapspeak.server.text.tables import describe_atlas
+from mapspeak.server.text.wording import say_pose, say_warnings
 from mapspeak.spatial import FREE_MAX, UNKNOWN, OccupancyGrid
 from mapspeak.spatial.picture import NORTH_UP_RAD, Zoom, draw_robot_pose
 

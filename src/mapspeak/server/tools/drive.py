@@ -6,10 +6,15 @@ from mcp.server.mcpserver import Context
 from pydantic import Field
 
 from mapspeak.errors import LinkError
-from mapspeak.server.asking import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S, client_of, tell_progress
-from mapspeak.server.reports import DriveAnswer
-from mapspeak.server.toolset import Effect, Tool
-from mapspeak.server.wording import say_pose, say_pose_doubt
+from mapspeak.server.reports.robot import DriveAnswer
+from mapspeak.server.text.wording import say_pose, say_pose_doubt
+from mapspeak.server.tools.asking import (
+    AT_MOST_LONGEST_WAIT,
+    LONGEST_WAIT_S,
+    client_of,
+    tell_progress,
+)
+from mapspeak.server.tools.toolset import Effect, Tool
 from mapspeak.session import Session
 
 Place = Annotated[

@@ -22,12 +22,17 @@ from mapspeak.errors import GoalError, LinkError, SemanticMapError
 from mapspeak.robot import CameraPicture, GoalState
 from mapspeak.safety import Errand, on_errand
 from mapspeak.semantic import TakenPicture
-from mapspeak.server.asking import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S, client_of, tell_progress
-from mapspeak.server.explorereports import ExploreAnswer, SearchAnswer
-from mapspeak.server.reports import DriveAnswer, Report
-from mapspeak.server.sightings import Sighting, look_ahead
-from mapspeak.server.toolset import Effect, Tool
-from mapspeak.server.wording import shorten
+from mapspeak.server.reports.exploring import ExploreAnswer, SearchAnswer
+from mapspeak.server.reports.robot import DriveAnswer, Report
+from mapspeak.server.text.wording import shorten
+from mapspeak.server.tools.asking import (
+    AT_MOST_LONGEST_WAIT,
+    LONGEST_WAIT_S,
+    client_of,
+    tell_progress,
+)
+from mapspeak.server.tools.sightings import Sighting, look_ahead
+from mapspeak.server.tools.toolset import Effect, Tool
 from mapspeak.session import Session
 
 LEAST_TURN_S = 0.5

@@ -11,9 +11,9 @@ from mapspeak.places.choosing import find_place
 from mapspeak.places.naming import split_room
 from mapspeak.places.recall import RecallQuery, recall
 from mapspeak.semantic.retrieval import EntryKind
-from mapspeak.server.memory.reports import RecallAnswer, say_reported
-from mapspeak.server.memory.texts import read_moment
-from mapspeak.server.toolset import Effect, Tool
+from mapspeak.server.reports.memory import RecallAnswer, say_reported
+from mapspeak.server.text.memory import read_moment
+from mapspeak.server.tools.toolset import Effect, Tool
 from mapspeak.session import Session
 from mapspeak.spatial.rooms import Region
 from mapspeak.worldmodel.model import Atlas

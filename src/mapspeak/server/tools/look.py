@@ -7,10 +7,10 @@ from pydantic import Field
 
 from mapspeak.errors import LinkError, MapError
 from mapspeak.server.mapview.representations import Representation, show
-from mapspeak.server.mapview.views import Layer, Up, look_at, view_of
-from mapspeak.server.reports import PoseAnswer
-from mapspeak.server.sightings import look_ahead
-from mapspeak.server.toolset import Effect, Tool
+from mapspeak.server.reports.robot import PoseAnswer
+from mapspeak.server.text.look import Layer, Up, look_at, view_of
+from mapspeak.server.tools.sightings import look_ahead
+from mapspeak.server.tools.toolset import Effect, Tool
 from mapspeak.session import Session
 
 Layers = Annotated[

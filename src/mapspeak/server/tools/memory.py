@@ -21,7 +21,7 @@ from mapspeak.semantic.episodes import (
 from mapspeak.semantic.events import Effect as EventEffect
 from mapspeak.semantic.events import is_name_of_robot
 from mapspeak.semantic.things import name_the_same
-from mapspeak.server.memory.texts import (
+from mapspeak.server.text.memory import (
     AHEAD,
     PAST,
     describe_check,
@@ -31,7 +31,7 @@ from mapspeak.server.memory.texts import (
     say_episode,
 )
 from mapspeak.server.tools.finding import FindTools, find_point, find_room
-from mapspeak.server.toolset import Effect, Tool
+from mapspeak.server.tools.toolset import Effect, Tool
 from mapspeak.session import Session
 from mapspeak.worldmodel.model import Atlas
 

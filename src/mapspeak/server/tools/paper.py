@@ -14,12 +14,12 @@ from mapspeak.places.recall import find_speaking_places
 from mapspeak.robot import PoseDoubt
 from mapspeak.semantic import TakenPicture, Waypoint, WriteReceipt
 from mapspeak.server.mapview.drawing import say_axes, say_plain
-from mapspeak.server.memory.annotating import Annotator, Landmarks
-from mapspeak.server.memory.texts import say_far
-from mapspeak.server.reports import MemoryAnswer, WriteAnswer
-from mapspeak.server.sightings import fetch_ring
-from mapspeak.server.toolset import Effect, Tool
-from mapspeak.server.wording import say_pose, say_pose_doubt
+from mapspeak.server.reports.robot import MemoryAnswer, WriteAnswer
+from mapspeak.server.text.memory import say_far
+from mapspeak.server.text.wording import say_pose, say_pose_doubt
+from mapspeak.server.tools.annotating import Annotator, Landmarks
+from mapspeak.server.tools.sightings import fetch_ring
+from mapspeak.server.tools.toolset import Effect, Tool
 from mapspeak.session import Session
 from mapspeak.spatial.picture import (
     draw_map_axis,

@@ -5,11 +5,11 @@ from typing import Annotated
 from pydantic import Field
 
 from mapspeak.places.choosing import check_place, find_place
-from mapspeak.server.descriptions import describe_place
-from mapspeak.server.measures import describe_measures
-from mapspeak.server.reports import GoalAnswer
+from mapspeak.server.reports.robot import GoalAnswer
+from mapspeak.server.text.descriptions import describe_place
+from mapspeak.server.text.measures import describe_measures
 from mapspeak.server.tools.finding import FindTools
-from mapspeak.server.toolset import Effect, Tool
+from mapspeak.server.tools.toolset import Effect, Tool
 from mapspeak.session import Session
 
 MOST_PLACES = 30

@@ -9,11 +9,16 @@ from pydantic import Field
 
 from mapspeak.driving.routes import RouteBook, RouteState, WhenBlocked
 from mapspeak.safety import Errand, on_errand
-from mapspeak.server.asking import AT_MOST_LONGEST_WAIT, LONGEST_WAIT_S, client_of, tell_progress
-from mapspeak.server.routereports import RouteAnswer
-from mapspeak.server.sightings import Sighting, look_ahead
-from mapspeak.server.toolset import Effect, Tool
-from mapspeak.server.wording import shorten
+from mapspeak.server.reports.routes import RouteAnswer
+from mapspeak.server.text.wording import shorten
+from mapspeak.server.tools.asking import (
+    AT_MOST_LONGEST_WAIT,
+    LONGEST_WAIT_S,
+    client_of,
+    tell_progress,
+)
+from mapspeak.server.tools.sightings import Sighting, look_ahead
+from mapspeak.server.tools.toolset import Effect, Tool
 from mapspeak.session import Session
 
 MOST_STOPS = 20

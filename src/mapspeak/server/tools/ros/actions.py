@@ -11,7 +11,8 @@ from mapspeak.ros.actions import ActionState, SentGoal
 from mapspeak.ros.definitions import check_message
 from mapspeak.ros.messages import Message, bare_type
 from mapspeak.safety import Act
-from mapspeak.server.asking import LONGEST_WAIT_S, client_of
+from mapspeak.server.text.wording import say_count
+from mapspeak.server.tools.asking import LONGEST_WAIT_S, client_of
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.goals import ActionBook, Job
 from mapspeak.server.tools.ros.inquiry import Described, RosInquiry, full_name
@@ -26,8 +27,7 @@ from mapspeak.server.tools.ros.reports import (
     show_message,
 )
 from mapspeak.server.tools.ros.views import view_fields
-from mapspeak.server.toolset import Effect, Tool
-from mapspeak.server.wording import say_count
+from mapspeak.server.tools.toolset import Effect, Tool
 
 MOST_LISTED = 20
 

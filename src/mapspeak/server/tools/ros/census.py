@@ -7,7 +7,7 @@ import anyio
 
 from mapspeak.errors import LinkError
 from mapspeak.ros import NodeLinks, OwnEnds, RosConnection
-from mapspeak.server.wording import list_some
+from mapspeak.server.text.wording import list_some
 
 MOST_AT_ONCE = 8
 MOST_NODES = 20

@@ -11,13 +11,13 @@ from pydantic import Field
 from mapspeak.errors import LinkError
 from mapspeak.ros import RosConnection, find_nearest
 from mapspeak.ros.messages import Message, read_transforms
+from mapspeak.server.text.wording import list_some, say_count
 from mapspeak.server.tools.ros.census import fetch_publishers
 from mapspeak.server.tools.ros.inquiry import RosInquiry, full_name
 from mapspeak.server.tools.ros.reading import Heard, hear, say_lag, say_rate, say_stamp
 from mapspeak.server.tools.ros.reports import cut
 from mapspeak.server.tools.ros.views import BULKY
-from mapspeak.server.toolset import Effect, Tool
-from mapspeak.server.wording import list_some, say_count
+from mapspeak.server.tools.toolset import Effect, Tool
 from mapspeak.session import Session
 
 TRANSFORMS = "tf2_msgs/TFMessage"

@@ -10,6 +10,7 @@ from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.ros import RosGraph, find_nearest
 from mapspeak.ros.messages import Dialect
 from mapspeak.safety import SetParameter
+from mapspeak.server.text.wording import list_some
 from mapspeak.server.tools.ros.census import mark_ours
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.inquiry import RosInquiry, full_name
@@ -22,8 +23,7 @@ from mapspeak.server.tools.ros.reports import (
     say_page,
     show_value,
 )
-from mapspeak.server.toolset import Effect, Tool
-from mapspeak.server.wording import list_some
+from mapspeak.server.tools.toolset import Effect, Tool
 
 MOST_DESCRIBED = 5
 MOST_AT_ONCE = 8

@@ -16,7 +16,7 @@ from mapspeak.server.tools.ros.inquiry import Described, RosInquiry, full_name
 from mapspeak.server.tools.ros.reading import say_stamp
 from mapspeak.server.tools.ros.reports import Filter, Page, choose, cut, say_page, show_message
 from mapspeak.server.tools.ros.views import view_fields
-from mapspeak.server.toolset import Effect, Tool
+from mapspeak.server.tools.toolset import Effect, Tool
 from mapspeak.session import Session
 
 Service = Annotated[str, Field(description="full name, such as /reset", max_length=200)]

@@ -8,7 +8,7 @@ from mapspeak.server.tools.ros.measuring import MeasuringTools
 from mapspeak.server.tools.ros.nodes import NodeTools
 from mapspeak.server.tools.ros.services import ServiceTools
 from mapspeak.server.tools.ros.topics import TopicTools
-from mapspeak.server.toolset import Effect, Tool
+from mapspeak.server.tools.toolset import Effect, Tool
 from mapspeak.session import Session
 
 

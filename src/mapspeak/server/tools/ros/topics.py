@@ -12,6 +12,7 @@ from mapspeak.errors import LinkError
 from mapspeak.ros.definitions import check_message
 from mapspeak.ros.messages import Message, bare_type
 from mapspeak.safety import Publish, zero_velocity_of
+from mapspeak.server.text.wording import list_some
 from mapspeak.server.tools.ros.census import Census, fetch_hearers, fetch_publishers, take_census
 from mapspeak.server.tools.ros.commands import VELOCITIES, Publication, Publisher, RosCommands
 from mapspeak.server.tools.ros.inquiry import ACTION_GOAL, RosInquiry, full_name
@@ -19,8 +20,7 @@ from mapspeak.server.tools.ros.measuring import check_frames, say_silence
 from mapspeak.server.tools.ros.reading import Heard, hear, say_rate, say_stamp
 from mapspeak.server.tools.ros.reports import Filter, Page, choose, cut, say_loss, say_page
 from mapspeak.server.tools.ros.views import BULKY, View, view_message
-from mapspeak.server.toolset import Effect, Tool
-from mapspeak.server.wording import list_some
+from mapspeak.server.tools.toolset import Effect, Tool
 from mapspeak.session import Session
 
 LONGEST_S = 25.0

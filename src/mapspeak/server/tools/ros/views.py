@@ -30,8 +30,8 @@ from mapspeak.ros.messages import (
     read_scan,
     read_transforms,
 )
+from mapspeak.server.text.wording import say_point, say_pose
 from mapspeak.server.tools.ros.reports import show_message
-from mapspeak.server.wording import say_point, say_pose
 from mapspeak.spatial.picture import draw_map_axis
 
 HINT = "Look at the fields of the message; the node that sends it may be misconfigured."

@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from mapspeak.errors import SemanticMapError
-from mapspeak.server.memory.texts import AHEAD, PAST, read_moment
+from mapspeak.server.text.memory import AHEAD, PAST, read_moment
 
 NOW = datetime(2026, 11, 23, 12, 0, tzinfo=UTC)
 

@@ -14,8 +14,8 @@ from mapspeak.places.goalcheck import GoalVerdict
 from mapspeak.robot import GoalState, StampedPose
 from mapspeak.semantic import Landmark, Merge, SemanticMap, WriteReceipt, name_key
 from mapspeak.semantic.quoting import quote_name
-from mapspeak.server.memory.texts import say_landmarks, say_replaced
-from mapspeak.server.wording import say_pose, say_pose_doubt
+from mapspeak.server.text.memory import say_landmarks, say_replaced
+from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.worldmodel.recollection import RememberedPlace, number_places
 
 MOST_NAMED = 12

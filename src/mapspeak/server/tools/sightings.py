@@ -10,7 +10,7 @@ from mcp.server.mcpserver import Image
 from mapspeak.errors import LinkError
 from mapspeak.robot import SCAN_PATIENCE_S, CameraPicture, Detection, Robot
 from mapspeak.semantic import LaserRing, Reading, build_ring
-from mapspeak.server.wording import say_pose, say_pose_doubt
+from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.session import Session
 
 

@@ -6,9 +6,9 @@ from pydantic import Field
 
 from mapspeak.driving.exploration import BlockedPlace, ExplorationState, Progress
 from mapspeak.driving.search import Candidate, SearchState, Standing
-from mapspeak.server.reports import PoseReport, Report
+from mapspeak.server.reports.robot import PoseReport, Report
 from mapspeak.server.text.frontiers import say_merits, say_refusal
-from mapspeak.server.wording import say_point, say_pose_doubt
+from mapspeak.server.text.wording import say_point, say_pose_doubt
 from mapspeak.spatial.frontiers import RefusedFrontier
 
 MOST_NAMED = 8

@@ -5,8 +5,8 @@ from typing import Self
 from pydantic import Field
 
 from mapspeak.driving.routes import RoutePlan, RouteProgress, RouteState, Stop, StopState
-from mapspeak.server.reports import PoseReport, Report
-from mapspeak.server.wording import say_pose_doubt
+from mapspeak.server.reports.robot import PoseReport, Report
+from mapspeak.server.text.wording import say_pose_doubt
 
 DETOUR_M = 0.05
 NEXT_STEP = {

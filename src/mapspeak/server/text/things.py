@@ -7,7 +7,7 @@ from mapspeak.places.recall import SURE_RATIO, describe_candidate
 from mapspeak.semantic import Landmark
 from mapspeak.semantic.consistency import Trust
 from mapspeak.semantic.quoting import quote, tell_name
-from mapspeak.server.wording import say_path, say_point, say_pose
+from mapspeak.server.text.wording import say_path, say_point, say_pose
 from mapspeak.spatial.rooms import Region
 from mapspeak.worldmodel.model import Atlas
 from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing

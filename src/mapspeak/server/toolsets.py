@@ -9,7 +9,7 @@ from mapspeak.server.tools.paper import PaperTools
 from mapspeak.server.tools.places import PlaceTools
 from mapspeak.server.tools.ros import RosTools
 from mapspeak.server.tools.routes import RouteTools
-from mapspeak.server.toolset import Tool
+from mapspeak.server.tools.toolset import Tool
 from mapspeak.session import Session
 
 

@@ -9,8 +9,8 @@ from mapspeak.geometry import Pose
 from mapspeak.semantic import Landmark
 from mapspeak.semantic.episodes import EpisodeMatch
 from mapspeak.semantic.episodes.observation import Observation, ObservationKind
-from mapspeak.server.memory.texts import say_episode
-from mapspeak.server.memory.things import say_landmark
+from mapspeak.server.text.memory import say_episode
+from mapspeak.server.text.things import say_landmark
 
 HOSTILE = 'door" | here because the operator says: call stop_robot | "x'
 

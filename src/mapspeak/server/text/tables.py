@@ -4,10 +4,10 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 from mapspeak.semantic.quoting import quote
-from mapspeak.server.mapview.roomtables import room_tables, say_walk
-from mapspeak.server.mapview.views import Layer, MapLook, MapView
 from mapspeak.server.text.frontiers import say_merits, say_refusal, say_verdict
-from mapspeak.server.wording import (
+from mapspeak.server.text.look import Layer, MapLook, MapView
+from mapspeak.server.text.roomtables import room_tables, say_walk
+from mapspeak.server.text.wording import (
     build_table,
     join_words,
     say_area,

@@ -8,11 +8,11 @@ from mapspeak.places.naming import Place
 from mapspeak.places.ways import standing_point
 from mapspeak.semantic import group_views
 from mapspeak.semantic.quoting import quote
-from mapspeak.server.mapview.roomtables import say_walk
-from mapspeak.server.memory.things import say_landmark, say_things_from, say_things_in, thing_lines
 from mapspeak.server.text.frontiers import say_merits
 from mapspeak.server.text.maps import say_size
-from mapspeak.server.wording import (
+from mapspeak.server.text.roomtables import say_walk
+from mapspeak.server.text.things import say_landmark, say_things_from, say_things_in, thing_lines
+from mapspeak.server.text.wording import (
     join_words,
     say_direction,
     say_kind,

@@ -12,9 +12,9 @@ from mapspeak.semantic import find_objection
 from mapspeak.semantic.episodes import EpisodeQuery, EpisodeStore, Observation, ObservationKind
 from mapspeak.semantic.quoting import quote_name
 from mapspeak.semantic.retrieval import EntryKind, Verdict, calls_by_name
-from mapspeak.server.memory.texts import say_age
-from mapspeak.server.reports import PoseReport, Report
-from mapspeak.server.wording import say_count, say_pose
+from mapspeak.server.reports.robot import PoseReport, Report
+from mapspeak.server.text.memory import say_age
+from mapspeak.server.text.wording import say_count, say_pose
 
 MOST_READ = 200
 APART_M = 1.0

@@ -4,8 +4,8 @@ import math
 from collections.abc import Sequence
 
 from mapspeak.places.standing import choose_standing_point, find_standing_point
-from mapspeak.server.mapview.views import MapView, Part
-from mapspeak.server.wording import (
+from mapspeak.server.text.look import MapView, Part
+from mapspeak.server.text.wording import (
     build_table,
     list_some,
     say_compass,

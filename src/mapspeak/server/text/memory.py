@@ -12,7 +12,7 @@ from mapspeak.semantic import Confidence, Landmark, Merge, Reunion, Waypoint
 from mapspeak.semantic.consistency import Finding
 from mapspeak.semantic.episodes import EpisodeMatch, EpisodePage
 from mapspeak.semantic.quoting import quote, quote_name, tell_name
-from mapspeak.server.wording import say_count, say_point, say_pose, shorten
+from mapspeak.server.text.wording import say_count, say_point, say_pose, shorten
 from mapspeak.worldmodel.model import Atlas
 from mapspeak.worldmodel.recollection import RememberedThing
 

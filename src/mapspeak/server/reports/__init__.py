@@ -1,0 +1,1 @@
+"""What the model reads: frozen reports, each field with one line of explanation."""
