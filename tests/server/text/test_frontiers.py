@@ -107,3 +107,15 @@ def test_the_verdict_says_what_is_left(verdict: FrontierVerdict, words: str) -> 
         n_named=1,
     )
     assert say_verdict(report) == words
+
+
+def test_the_most_frequent_refusal_is_told_first() -> None:
+    reasons = [RefusalReason.TOO_NARROW, RefusalReason.NO_WAY, RefusalReason.NO_WAY]
+    report = FrontierReport(
+        frontiers=(),
+        refused=tuple(refused(reason) for reason in reasons),
+        n_unlisted=0,
+        verdict=FrontierVerdict.ALL_REFUSED,
+        n_named=0,
+    )
+    assert say_verdict(report).endswith("refused are 2 behind walls, 1 too narrow for the robot.")

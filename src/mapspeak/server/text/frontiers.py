@@ -22,11 +22,12 @@ MERITS = {
     FrontierMerit.NEAREST: "nearest",
 }
 REFUSED = {
+    RefusalReason.LOOKED_ALREADY: "looked at already",
+    RefusalReason.NOTHING_TO_SEE: "with next to nothing to see",
     RefusalReason.NO_WAY: "behind walls",
     RefusalReason.TOO_NARROW: "too narrow for the robot",
-    RefusalReason.NOTHING_TO_SEE: "with next to nothing to see",
-    RefusalReason.LOOKED_ALREADY: "looked at already",
 }
+"""Of reasons that are equally frequent, the first is told first."""
 
 
 def say_merits(frontier: Frontier) -> str:
@@ -86,4 +87,7 @@ def say_verdict(report: FrontierReport) -> str:
 
 def _count_refused(report: FrontierReport) -> str:
     by_reason = Counter(border.reason for border in report.refused)
-    return ", ".join(f"{n} {REFUSED[reason]}" for reason, n in by_reason.most_common())
+    most_first = sorted(REFUSED, key=lambda reason: -by_reason[reason])
+    return ", ".join(
+        f"{by_reason[reason]} {REFUSED[reason]}" for reason in most_first if by_reason[reason]
+    )
