@@ -56,5 +56,5 @@ def test_the_best_known_of_a_name_is_found_only_where_no_other_of_the_name_is_wi
     assert second.position is not None
     assert first.position.distance_to(second.position) == pytest.approx(away_m, abs=0.2)
     answer = recall(atlas, RecallQuery(words="hydrant"))
-    assert answer.n_meant == 2
+    assert answer.answer.n_meant == 2
     assert answer.verdict is verdict

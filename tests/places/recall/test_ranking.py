@@ -49,7 +49,7 @@ def test_of_several_things_of_one_name_the_nearest_by_path_comes_first(
     cells: list[tuple[int, int]],
 ) -> None:
     told = ask(cells, n=20)
-    ways_m = [math.inf if each.path_m is None else each.path_m for each in told]
+    ways_m = [math.inf if each.check.path_m is None else each.check.path_m for each in told]
     others_m = ways_m if told[0].trust.ratio < 0.98 else ways_m[1:]
     assert others_m == sorted(others_m)
 

@@ -1,6 +1,12 @@
 """Recalling: what is remembered of a request, where it is, how sure, and where to stand for it."""
 
-from mapspeak.places.recall.answer import SURE_RATIO, Recall, RecallCandidate, RecallQuery
+from mapspeak.places.recall.answer import (
+    SURE_RATIO,
+    Recall,
+    RecallCandidate,
+    RecallDoubt,
+    RecallQuery,
+)
 from mapspeak.places.recall.asking import describe_candidate, find_speaking_places, recall
 from mapspeak.places.recall.nearby import Nearby, find_nearby
 
@@ -9,6 +15,7 @@ __all__ = [
     "Nearby",
     "Recall",
     "RecallCandidate",
+    "RecallDoubt",
     "RecallQuery",
     "describe_candidate",
     "find_nearby",

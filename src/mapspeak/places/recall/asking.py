@@ -11,14 +11,12 @@ from itertools import islice
 from mapspeak.geometry import Point
 from mapspeak.places.choosing import stand_at
 from mapspeak.places.goalcheck import judge_goal
-from mapspeak.places.naming import Place, say_spot, split_room
+from mapspeak.places.naming import Place, split_room
 from mapspeak.places.recall.answer import (
     Recall,
     RecallCandidate,
     RecallQuery,
     find_doubt,
-    say_advice,
-    say_evidence,
 )
 from mapspeak.semantic import Landmark
 from mapspeak.semantic.retrieval import Answer, Basis, Candidate, EntryKind, Verdict
@@ -88,23 +86,27 @@ def _is_between(moment: datetime, query: RecallQuery) -> bool:
 
 
 def describe_candidate(
-    atlas: Atlas, remembered: Remembered, *, score_ratio: float = 1.0, evidence: str = ""
+    atlas: Atlas,
+    remembered: Remembered,
+    *,
+    match: Candidate | None = None,
+    near: Point | None = None,
 ) -> RecallCandidate:
-    """Gives what is known of a place or thing, and the pose in which a robot would stand for it.
+    """Return what is known of a place or thing, and the pose in which a robot would stand for it.
 
     Args:
         atlas: The map with the memory.
         remembered: The place or thing.
-        score_ratio: How alike it and a request are.
-        evidence: Why it is meant, in words.
+        match: How it matches a request; None where nothing was asked.
+        near: The point that the request is near to.
     """
     if isinstance(remembered, RememberedPlace):
-        return _describe_place(atlas, remembered, score_ratio, evidence)
-    return _describe_thing(atlas, remembered, score_ratio, evidence)
+        return _describe_place(atlas, remembered, match, near)
+    return _describe_thing(atlas, remembered, match, near)
 
 
 def _describe_place(
-    atlas: Atlas, remembered: RememberedPlace, score_ratio: float, evidence: str
+    atlas: Atlas, remembered: RememberedPlace, match: Candidate | None, near: Point | None
 ) -> RecallCandidate:
     waypoint = remembered.waypoint
     pose = stand_at(atlas, Place(remembered.id, remembered))
@@ -113,8 +115,9 @@ def _describe_place(
         id=remembered.id,
         kind=EntryKind.PLACE,
         name=waypoint.name,
-        score_ratio=score_ratio,
-        evidence=evidence,
+        score_ratio=1.0 if match is None else match.score_ratio,
+        match=match,
+        away_m=None if near is None else point_of(remembered).distance_to(near),
         seen_from=(remembered.id,),
         pictures=() if waypoint.picture is None else (waypoint.picture,),
         position=waypoint.pose.point,
@@ -123,15 +126,14 @@ def _describe_place(
         pose=pose,
         is_faced=False,
         faced_ratio=0.0,
-        problem="" if check.is_ok else check.sentence,
-        path_m=check.path_m,
+        check=check,
         last_seen=last_seen(atlas, remembered),
         trust=atlas.judge.judge_place(remembered),
     )
 
 
 def _describe_thing(
-    atlas: Atlas, remembered: RememberedThing, score_ratio: float, evidence: str
+    atlas: Atlas, remembered: RememberedThing, match: Candidate | None, near: Point | None
 ) -> RecallCandidate:
     thing = remembered.thing
     pose = stand_at(atlas, Place(remembered.id, remembered))
@@ -142,8 +144,9 @@ def _describe_thing(
         id=remembered.id,
         kind=EntryKind.THING,
         name=thing.label,
-        score_ratio=score_ratio,
-        evidence=evidence,
+        score_ratio=1.0 if match is None else match.score_ratio,
+        match=match,
+        away_m=None if near is None else point_of(remembered).distance_to(near),
         seen_from=tuple(dict.fromkeys(place.id for place, _ in views)),
         pictures=tuple(dict.fromkeys(filter(None, pictures))),
         position=thing.position,
@@ -152,8 +155,7 @@ def _describe_thing(
         pose=pose,
         is_faced=atlas.find_approach(remembered) is not None,
         faced_ratio=atlas.measure_faced(remembered),
-        problem="" if check.is_ok else check.sentence,
-        path_m=check.path_m,
+        check=check,
         last_seen=last_seen(atlas, remembered),
         trust=atlas.judge.judge_thing(remembered),
     )
@@ -198,7 +200,7 @@ MOST_TIED = 30
 
 
 def recall(atlas: Atlas, query: RecallQuery) -> Recall:
-    """Gives what is remembered of a request; the same for the same memory, map and pose."""
+    """Return what is remembered of a request; the same for the same memory, map and pose."""
     query = _with_room(atlas, query)
     passing = {each.id: each for each in find_passing(atlas, query)}
     among = frozenset(passing)
@@ -212,28 +214,21 @@ def recall(atlas: Atlas, query: RecallQuery) -> Recall:
         describe_candidate(
             atlas,
             passing[each.entry.id],
-            score_ratio=each.score_ratio,
-            evidence="; ".join(_say_why(query, each, passing[each.entry.id])),
+            match=each,
+            near=query.near,
         )
         for each in islice(ranked, query.n)
     )
-    doubt = ""
+    doubt = None
     if answer.verdict is Verdict.FOUND:
         doubt = find_doubt(candidates[0], room_id=query.room_id)
     return Recall(
-        verdict=Verdict.LIKELY if doubt else answer.verdict,
-        advice=say_advice(
-            answer,
-            candidates,
-            n_searched=len(among),
-            is_empty=not (atlas.recollection.places or atlas.things),
-            doubt=doubt,
-        ),
+        query=query,
+        answer=answer,
         candidates=candidates,
-        n_meant=answer.n_meant,
         n_searched=len(among),
-        understood=answer.understood,
-        limits=answer.limits,
+        is_empty=not (atlas.recollection.places or atlas.things),
+        doubt=doubt,
     )
 
 
@@ -246,12 +241,6 @@ def _find_best(
         return None
     best = find_best_known(atlas, [passing[each.entry.id] for each in meant], room_id=room_id)
     return None if best is None else best.id
-
-
-def _say_why(query: RecallQuery, found: Candidate, remembered: Remembered) -> Iterator[str]:
-    yield say_evidence(found)
-    if query.near is not None:
-        yield f"{point_of(remembered).distance_to(query.near):.1f} m from {say_spot(query.near)}"
 
 
 def _with_room(atlas: Atlas, query: RecallQuery) -> RecallQuery:

@@ -14,6 +14,7 @@ from mapspeak.semantic.quoting import quote_name
 from mapspeak.semantic.retrieval import EntryKind, Verdict, calls_by_name
 from mapspeak.server.reports.robot import PoseReport, Report
 from mapspeak.server.text.memory import say_age
+from mapspeak.server.text.recall import say_advice, say_evidence
 from mapspeak.server.text.wording import say_count, say_pose
 
 MOST_READ = 200
@@ -115,24 +116,24 @@ class CandidateReport(Report):
     trust_why: list[str] = Field(description="who saw it, then what speaks against it")
 
     @classmethod
-    def of(cls, candidate: RecallCandidate, *, now: datetime | None) -> Self:
-        """Makes the report of a candidate; ages are counted from `now`."""
-        at, off_m, path_m = candidate.position, candidate.uncertainty_m, candidate.path_m
+    def of(cls, candidate: RecallCandidate, *, near: Point | None, now: datetime | None) -> Self:
+        """Make the report of a candidate near to a point; ages are counted from `now`."""
+        at, off_m, check = candidate.position, candidate.uncertainty_m, candidate.check
         return cls(
             id=candidate.id,
             name=candidate.name,
             kind=candidate.kind,
             score=round(candidate.score_ratio, 2),
-            why=candidate.evidence,
+            why=say_evidence(candidate, near=near),
             seen_from=list(candidate.seen_from),
             pictures=list(candidate.pictures),
             position=None if at is None else [round(at.x, 2) + 0.0, round(at.y, 2) + 0.0],
             uncertainty_m=None if off_m is None else round(off_m, 2),
             room=" or ".join(candidate.room_ids) or None,
-            path_m=None if path_m is None else round(path_m, 2),
+            path_m=None if check.path_m is None else round(check.path_m, 2),
             stand_at=PoseReport.of(candidate.pose),
             facing_it=candidate.is_faced,
-            problem=candidate.problem,
+            problem="" if check.is_ok else check.sentence,
             last_seen=_say_moment(candidate.last_seen, now),
             trust=round(candidate.trust.ratio, 2),
             trust_why=list(candidate.trust.reasons[:MOST_DOUBTS]),
@@ -151,15 +152,18 @@ class RecallAnswer(Report):
     warnings: list[str]
 
     @classmethod
-    def of(cls, answer: Recall, *, now: datetime | None, warnings: tuple[str, ...] = ()) -> Self:
-        """Makes the report of an answer."""
+    def of(cls, recalled: Recall, *, now: datetime | None, warnings: tuple[str, ...] = ()) -> Self:
+        """Make the report of an answer."""
+        answer, near = recalled.answer, recalled.query.near
         limits = () if answer.limits is None else (answer.limits,)
         return cls(
-            verdict=answer.verdict,
-            advice=answer.advice,
-            candidates=[CandidateReport.of(each, now=now) for each in answer.candidates],
+            verdict=recalled.verdict,
+            advice=say_advice(recalled),
+            candidates=[
+                CandidateReport.of(each, near=near, now=now) for each in recalled.candidates
+            ],
             n_fitting=answer.n_meant,
-            n_searched=answer.n_searched,
+            n_searched=recalled.n_searched,
             understood=answer.understood,
             warnings=[*filter(None, warnings), *limits],
         )

@@ -16,6 +16,7 @@ from mapspeak.semantic import TakenPicture, Waypoint, WriteReceipt
 from mapspeak.server.mapview.drawing import say_axes, say_plain
 from mapspeak.server.reports.robot import MemoryAnswer, WriteAnswer
 from mapspeak.server.text.memory import say_far
+from mapspeak.server.text.recall import say_advice
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.server.tools.annotating import Annotator, Landmarks
 from mapspeak.server.tools.sightings import fetch_ring
@@ -185,7 +186,7 @@ class PaperTools:
             )
         atlas = await self._session.fetch_atlas()
         shown, answer = await self._session.compute(lambda: find_speaking_places(atlas, query))
-        return MemoryAnswer.of_places(atlas.memory, shown, advice=[answer.advice])
+        return MemoryAnswer.of_places(atlas.memory, shown, advice=[say_advice(answer)])
 
     async def _find_robot(self) -> tuple[Pose, PoseDoubt | None]:
         here = await self._session.robot.fetch_pose()

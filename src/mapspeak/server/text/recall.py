@@ -1,0 +1,128 @@
+"""What is remembered of a request, in words: how far to trust it, and what to do next."""
+
+from collections.abc import Iterator, Sequence
+
+from mapspeak.geometry import Point
+from mapspeak.places.naming import say_spot
+from mapspeak.places.recall import Recall, RecallCandidate, RecallDoubt
+from mapspeak.semantic.quoting import quote
+from mapspeak.semantic.retrieval import Answer, Basis, Candidate, MatchEvidence, Verdict
+from mapspeak.semantic.waypoint import name_key
+
+LONGEST_QUOTE = 120
+DOUBTS = {
+    RecallDoubt.DOUBTFUL_RECORD: "its record is doubtful",
+    RecallDoubt.NOT_NOTED: "where it is was not noted",
+    RecallDoubt.CONTRADICTED: "what was noted of it does not go together",
+    RecallDoubt.FEW_VIEWS: "no two good views of it agree so far",
+    RecallDoubt.IMPRECISE: "its place is known to within {off_m:.1f} m only",
+    RecallDoubt.OTHER_ROOM: "it may be in {rooms}",
+    RecallDoubt.OUT_OF_SIGHT: "no place is known from which it would be in sight near by",
+    RecallDoubt.HARDLY_IN_SIGHT: (
+        "much of where it may be would not be in sight from any place near by"
+    ),
+}
+
+
+def say_evidence(candidate: RecallCandidate, *, near: Point | None = None) -> str:
+    """Say why a candidate is one, and how far it is from the point the request is near to."""
+    said = [] if candidate.match is None else [_say_match(candidate.match)]
+    if candidate.away_m is not None and near is not None:
+        said.append(f"{candidate.away_m:.1f} m from {say_spot(near)}")
+    return "; ".join(said)
+
+
+def _say_match(found: Candidate) -> str:
+    """Say what a request matches: a name, a meaning, or which words stand where."""
+    match found.basis:
+        case Basis.NAME:
+            return f"called {quote(found.text, most=LONGEST_QUOTE)}"
+        case Basis.MEANING:
+            return (
+                f"its {found.field} {quote(found.text, most=LONGEST_QUOTE)} is like it in meaning"
+            )
+        case Basis.WORDS:
+            return "; ".join(_say_words(found.evidence)) or f"its {found.field}"
+
+
+def _say_words(evidence: Sequence[MatchEvidence]) -> Iterator[str]:
+    """Yield each text once that says words of the request, with these words."""
+    words_of: dict[str, list[str]] = {}
+    for each in evidence:
+        is_same = each.query_word.casefold() == each.found_word.casefold()
+        said = each.found_word if is_same else f"{each.found_word} for {each.query_word}"
+        words_of.setdefault(f"its {each.field} {quote(each.text, most=LONGEST_QUOTE)}", []).append(
+            said
+        )
+    for text, words in words_of.items():
+        yield f"{text} says {', '.join(words)}"
+
+
+def say_advice(recalled: Recall) -> str:
+    """Say the verdict with what to do next."""
+    answer, candidates = recalled.answer, recalled.candidates
+    if not recalled.n_searched:
+        if recalled.is_empty:
+            return "Not remembered: nothing is remembered yet. Look for it with search_for."
+        return "Not remembered: nothing passes these filters. Leave filters out, or search_for it."
+    match answer.verdict:
+        case Verdict.NOT_REMEMBERED:
+            missing = answer.missing
+            kind = f" (it sounds like {quote(missing)}, and none is)" if missing else ""
+            first = _name(candidates[0]) if candidates else ""
+            nearest = f"; the nearest is {first}, which is probably not meant" if first else ""
+            return (
+                f"Not remembered{kind}{nearest}. Say it in other words, or look for it with "
+                "search_for."
+            )
+        case Verdict.AMBIGUOUS:
+            return _say_ambiguous(answer, candidates)
+        case Verdict.FOUND | Verdict.LIKELY:
+            return _say_found(candidates[0], recalled.doubt) + _say_others(answer.n_meant - 1)
+
+
+def _say_found(first: RecallCandidate, doubt: RecallDoubt | None) -> str:
+    said = f"Found: {_name(first)}."
+    if doubt is not None:
+        said = f"Likely {_name(first)}, not sure: {_say_doubt(first, doubt)}."
+    if not first.check.is_ok:
+        return f"{said} But the robot cannot go there: {first.check.sentence}"
+    if doubt and first.position is None:
+        return f"{said} navigate_to {first.id} goes where it was seen."
+    look = "; look before you rely on it" if doubt else ""
+    return f"{said} navigate_to takes {first.id}{look}."
+
+
+def _say_doubt(first: RecallCandidate, doubt: RecallDoubt) -> str:
+    rooms = " or ".join(first.room_ids) or "no room"
+    return DOUBTS[doubt].format(off_m=first.uncertainty_m, rooms=rooms)
+
+
+def _say_others(n_others: int) -> str:
+    """Return a sentence for things of the name that fewer views speak for; nothing for none."""
+    if not n_others:
+        return ""
+    are = "others are" if n_others > 1 else "other is"
+    return f" {n_others} {are} called so, of which fewer views agree."
+
+
+def _say_ambiguous(answer: Answer, candidates: Sequence[RecallCandidate]) -> str:
+    first = candidates[0]
+    if answer.candidates[0].basis is Basis.NAME:
+        nearest = f"; {first.id} is the nearest by path" if first.check.path_m is not None else ""
+        return (
+            f"Ambiguous: {answer.n_meant} are called so{nearest}. Choose by room, or ask which is "
+            "meant, then navigate_to its id."
+        )
+    kind = f" (it is more like {quote(answer.missing)})" if answer.missing else ""
+    n_same = sum(name_key(each.entry.name) == name_key(first.name) for each in answer.candidates)
+    of_several = f", of {n_same} the nearest by path" if n_same > 1 else ""
+    return (
+        f"Ambiguous: nothing is called so{kind}. The likeliest is {_name(first)}{of_several}; what "
+        "is meant may also not be remembered. See why each is listed, and navigate_to an id only "
+        "if it fits; else say it in other words, or search_for it."
+    )
+
+
+def _name(candidate: RecallCandidate) -> str:
+    return f"{candidate.id} {quote(candidate.name, most=LONGEST_QUOTE)}"

@@ -1,0 +1,62 @@
+from collections.abc import Iterator
+
+import pytest
+
+from embedding import ConceptEmbedder
+from fakes import two_rooms
+from mapspeak.geometry import Point
+from mapspeak.places.recall import Recall, RecallQuery, recall
+from mapspeak.semantic import Landmark, SemanticMap, Waypoint
+from mapspeak.server.text.recall import say_advice, say_evidence
+from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.recollection import Recollector
+from remembering import EXTINGUISHER, LADDER, ROBOT, atlas_of, look, looks_at
+
+LOOKS = looks_at("fire extinguisher", EXTINGUISHER)
+NEAR = look("near", 2.0, 1.0, ("fire extinguisher", LADDER), yaw_deg=180)
+THIRD = look("east c", 4.8, 1.5, ("fire extinguisher", EXTINGUISHER), range_m=2.6)
+UNPLACED = Waypoint(
+    name="hall", pose=ROBOT, functional_landmarks=(Landmark(label="fire extinguisher"),)
+)
+WASHBASINS = (
+    look("far", 2.0, 1.0, ("washbasin", LADDER), yaw_deg=180, range_m=2.0),
+    look("near", 4.8, 1.5, ("washbasin", EXTINGUISHER), range_m=2.6),
+)
+
+
+def ask(*places: Waypoint, words: str = "fire extinguisher") -> Recall:
+    return recall(atlas_of(*places), RecallQuery(words=words))
+
+
+def list_answers() -> Iterator[tuple[Recall, str]]:
+    yield ask(*LOOKS), 'Found: T1 "fire extinguisher". navigate_to takes T1.'
+    yield ask(LOOKS[0]), "no two good views of it agree so far. navigate_to takes T1; look before"
+    yield ask(UNPLACED), "not sure: where it is was not noted. navigate_to T1 goes where it was"
+    yield ask(*LOOKS, words="a helicopter"), "or look for it with search_for."
+    yield ask(), "Not remembered: nothing is remembered yet. Look for it with search_for."
+    yield ask(*LOOKS, NEAR), "Ambiguous: 2 are called so; T2 is the nearest by path. Choose by room"
+    yield ask(*LOOKS, THIRD, NEAR), " 1 other is called so, of which fewer views agree."
+    yield ask(*WASHBASINS, words="where can I wash my hands"), "of 2 the nearest by path; what is"
+    yield ask(*LOOKS, words="a piano"), 'Not remembered (it sounds like "piano", and none is)'
+
+
+@pytest.mark.parametrize(("recalled", "said"), list(list_answers()))
+def test_advice_says_the_verdict_and_what_to_do_next(recalled: Recall, said: str) -> None:
+    assert said in say_advice(recalled)
+
+
+def test_evidence_is_a_name_with_the_metres_to_where_it_was_asked_for() -> None:
+    near = Point(4.0, 1.0)
+    first = recall(atlas_of(*LOOKS), RecallQuery(words="fire extinguisher", near=near)).candidates[
+        0
+    ]
+    away_m = first.position.distance_to(near) if first.position else 0.0
+    said = f'called "fire extinguisher"; {away_m:.1f} m from (4.00, 1.00)'
+    assert say_evidence(first, near=near) == said
+
+
+def test_evidence_is_a_likeness_in_meaning() -> None:
+    memory, recollector = SemanticMap(waypoints=LOOKS), Recollector(ConceptEmbedder)
+    atlas = Atlas(two_rooms(), ROBOT, memory, radius_m=0.2, recollector=recollector)
+    first = recall(atlas, RecallQuery(words="burning flames")).candidates[0]
+    assert "is like it in meaning" in say_evidence(first)
