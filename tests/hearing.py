@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from mapspeak.evaluation.client import Answer, OutOfBudgetError
+from mapspeak.evaluation.client import OutOfBudgetError, ToolAnswer
 
 
 class Hearing:
@@ -11,7 +11,7 @@ class Hearing:
     def __init__(self, most: int = 100) -> None:
         self.most = most
         self.calls: list[str] = []
-        self.answers: list[Answer] = []
+        self.answers: list[ToolAnswer] = []
         self.words: list[tuple[str, dict[str, int | None]]] = []
 
     def hear_call(self, tool: str, arguments: dict[str, Any]) -> None:
@@ -20,7 +20,7 @@ class Hearing:
             raise OutOfBudgetError(f"More than {self.most} calls.", hint="Call less.")
         self.calls.append(tool)
 
-    def hear_answer(self, tool: str, arguments: dict[str, Any], answer: Answer) -> None:
+    def hear_answer(self, tool: str, arguments: dict[str, Any], answer: ToolAnswer) -> None:
         del tool, arguments
         self.answers.append(answer)
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from mapspeak.evaluation.runs.workplace import MAP, MEMORY
-from mapspeak.evaluation.scores import Evidence, Site
+from mapspeak.evaluation.scores import Evidence, GroundTruth
 from mapspeak.evaluation.trials import (
     Score,
     Trial,
@@ -103,7 +103,7 @@ def prepare(run: Path, world: World, memory: str = MEMORY_TEXT) -> Trial:
     )
     folder = trial_folder(run, trial)
     folder.mkdir(parents=True)
-    write_map(Site(world).floor.visible, folder / MAP, mode=MapMode.RAW)
+    write_map(GroundTruth(world).floor.visible, folder / MAP, mode=MapMode.RAW)
     (folder / MEMORY).write_text(memory)
     score = Score(is_success=True, reason="Drawn by hand.")
     write_result(run, TrialResult(trial=trial, prompt="", state=TrialState.FINISHED, score=score))

@@ -8,7 +8,7 @@ import threading
 from functools import partial
 from pathlib import Path
 
-from mapspeak.evaluation.runs import Job, run_jobs
+from mapspeak.evaluation.runs import TrialJob, run_jobs
 from mapspeak.evaluation.trials import Score, Trial, TrialResult, TrialState, write_result
 
 LOG = "log.txt"
@@ -77,7 +77,7 @@ def run_some(run: Path, run_pid: int) -> None:
     works = [partial(succeed, run, trial) for trial in trials]
     works[2] = partial(kill_run_once, run, trials[2], run_pid)
     jobs = [
-        Job(trial=trial, work=work, wall_s=FOR_EVER_S)
+        TrialJob(trial=trial, work=work, wall_s=FOR_EVER_S)
         for trial, work in zip(trials, works, strict=True)
     ]
     run_jobs(run, jobs, n_jobs=1, on_done=ignore)

@@ -63,7 +63,7 @@ def demo(world: str, seed: int, folder: Path | None, is_quiet: bool) -> None:  #
 
 def _run_trials(world: str, seed: int, folder: Path, bar: "TrialBar") -> "list[TrialResult]":
     """Run the trials one after the other in this process, each with a server over stdio."""
-    from mapspeak.evaluation.agents import Connection  # noqa: PLC0415 - heavy
+    from mapspeak.evaluation.agents import ServerAccess  # noqa: PLC0415 - heavy
     from mapspeak.evaluation.runs import (  # noqa: PLC0415
         RunOptions,
         attempt,
@@ -88,7 +88,7 @@ def _run_trials(world: str, seed: int, folder: Path, bar: "TrialBar") -> "list[T
                 job.trial,
                 worlds[job.trial.world],
                 job.after,
-                connection=Connection.STDIO,
+                connection=ServerAccess.STDIO,
                 control=hold.folder,
                 on_turn=_watch(bar, keys),
             )

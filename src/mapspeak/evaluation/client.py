@@ -11,11 +11,11 @@ from mcp_types import CallToolResult, ImageContent, TextContent, Tool
 from mapspeak.errors import LinkError, MapspeakError
 
 __all__ = [
-    "Answer",
     "CallRecord",
     "Ledger",
     "OutOfBudgetError",
     "Picture",
+    "ToolAnswer",
     "ToolClient",
     "Witness",
 ]
@@ -44,7 +44,7 @@ class Picture:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
+class ToolAnswer:
     """What a tool answered.
 
     Attributes:
@@ -90,7 +90,7 @@ class Witness(Protocol):
         """
         ...
 
-    def hear_answer(self, tool: str, arguments: dict[str, Any], answer: Answer) -> None:
+    def hear_answer(self, tool: str, arguments: dict[str, Any], answer: ToolAnswer) -> None:
         """Hears what was answered."""
         ...
 
@@ -123,7 +123,7 @@ class Ledger:
         del tool, arguments
         self._begun_s = time.perf_counter()
 
-    def hear_answer(self, tool: str, arguments: dict[str, Any], answer: Answer) -> None:
+    def hear_answer(self, tool: str, arguments: dict[str, Any], answer: ToolAnswer) -> None:
         """Remembers a call and what was answered."""
         self.calls.append(
             CallRecord(
@@ -159,7 +159,7 @@ class ToolClient:
     client: Client | None
     witness: Witness | None = None
 
-    async def call(self, tool: str, /, **arguments: object) -> Answer:
+    async def call(self, tool: str, /, **arguments: object) -> ToolAnswer:
         """Calls a tool and gives its answer, also when that is an error.
 
         Raises:
@@ -187,7 +187,7 @@ class ToolClient:
             raise LinkError("No client is connected.", hint="Call through the agent's own program.")
         return self.client
 
-    async def demand(self, tool: str, /, **arguments: object) -> Answer:
+    async def demand(self, tool: str, /, **arguments: object) -> ToolAnswer:
         """Calls a tool that has to succeed.
 
         Raises:
@@ -199,7 +199,7 @@ class ToolClient:
         return answer
 
 
-def _read(result: CallToolResult) -> Answer:
+def _read(result: CallToolResult) -> ToolAnswer:
     texts = [part.text for part in result.content if isinstance(part, TextContent)]
     pictures = [
         Picture(base64.b64decode(part.data), part.mime_type)
@@ -207,7 +207,7 @@ def _read(result: CallToolResult) -> Answer:
         if isinstance(part, ImageContent)
     ]
     report = result.structured_content or {}
-    return Answer(
+    return ToolAnswer(
         text="\n".join(texts),
         pictures=tuple(pictures),
         report=dict(report),

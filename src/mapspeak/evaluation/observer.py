@@ -8,7 +8,7 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["Sighting", "describe_view", "read_sightings"]
+__all__ = ["DetectedThing", "describe_view", "read_sightings"]
 
 SIGHTING = re.compile(
     r"^- (?P<label>[^,]+), bearing (?P<bearing>[+-]?[\d.]+) deg, range (?P<range>[\d.]+) m",
@@ -21,7 +21,7 @@ SAFETY_WORDS = ("extinguisher", "first-aid", "first aid", "exit", "eye", "hose",
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sighting:
+class DetectedThing:
     """One thing the detector reported.
 
     Attributes:
@@ -44,10 +44,10 @@ class Sighting:
         return {"label": self.label, "bearing_deg": self.bearing_deg, "range_m": self.range_m}
 
 
-def read_sightings(text: str) -> tuple[Sighting, ...]:
+def read_sightings(text: str) -> tuple[DetectedThing, ...]:
     """Reads the detector's lines in the answer of `look_through_camera`, nearest first."""
     sightings = (
-        Sighting(
+        DetectedThing(
             label=match["label"],
             bearing_deg=float(match["bearing"]),
             range_m=float(match["range"]),
@@ -57,7 +57,7 @@ def read_sightings(text: str) -> tuple[Sighting, ...]:
     return tuple(sorted(sightings, key=lambda sighting: sighting.range_m))
 
 
-def describe_view(number: int, place: str, sightings: tuple[Sighting, ...]) -> dict[str, Any]:
+def describe_view(number: int, place: str, sightings: tuple[DetectedThing, ...]) -> dict[str, Any]:
     """Gives the arguments of `write_semantic_data` for what is seen from here."""
     clear = [sighting for sighting in sightings if sighting.range_m <= CLEAR_RANGE_M]
     names = ", ".join(dict.fromkeys(sighting.label for sighting in clear))

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
-from mapspeak.evaluation.client import Answer, Picture, ToolClient
-from mapspeak.evaluation.observer import Sighting, describe_view, read_sightings
+from mapspeak.evaluation.client import Picture, ToolAnswer, ToolClient
+from mapspeak.evaluation.observer import DetectedThing, describe_view, read_sightings
 from mapspeak.evaluation.reading import MapReading, Row, read_map_picture, read_map_text
 from mapspeak.evaluation.survey import find_viewpoint
 from mapspeak.geometry import Point, Pose
@@ -196,7 +196,7 @@ class ScriptedPolicy:
         answer = await self.tools.call("navigate_to", place=place, wait_s=WAIT_S)
         return await self._see_through(stage, place, answer)
 
-    async def _see_through(self, stage: Stage, place: str, answer: Answer) -> str:
+    async def _see_through(self, stage: Stage, place: str, answer: ToolAnswer) -> str:
         """Waits until a drive has ended, and gives how."""
         while not answer.is_error and answer.report["state"] not in FINAL_STATES:
             answer = await self.tools.call(
@@ -224,7 +224,7 @@ class ScriptedPolicy:
         record = describe_view(self._n_records, place["place"], sightings)
         await self.tools.demand("write_semantic_data", **record)
 
-    async def _take_picture(self, stage: Stage) -> tuple[Sighting, ...]:
+    async def _take_picture(self, stage: Stage) -> tuple[DetectedThing, ...]:
         answer = await self.tools.demand("look_through_camera")
         sightings = read_sightings(answer.text)
         names = ", ".join(sighting.label for sighting in sightings) or "nothing it knows"
@@ -233,11 +233,11 @@ class ScriptedPolicy:
         return sightings
 
 
-def _first(answer: Answer) -> Picture | None:
+def _first(answer: ToolAnswer) -> Picture | None:
     return next(iter(answer.pictures), None)
 
 
-def _records(answer: Answer) -> list[dict[str, Any]]:
+def _records(answer: ToolAnswer) -> list[dict[str, Any]]:
     return list(answer.report["waypoints"])
 
 

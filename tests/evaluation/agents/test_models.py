@@ -16,12 +16,12 @@ from mapspeak.evaluation.agents.models import (
     ModelAgent,
     Reply,
     Talk,
+    ToolCallRequest,
     Usage,
-    Wish,
 )
 from mapspeak.evaluation.agents.models.loop import estimate_picture_tokens
 from mapspeak.evaluation.agents.others import check_other, find_other
-from mapspeak.evaluation.client import Answer, Ledger, Picture, ToolClient, Witness
+from mapspeak.evaluation.client import Ledger, Picture, ToolAnswer, ToolClient, Witness
 from mapspeak.evaluation.trials import Limits, TrialState
 from mapspeak.server import Representation
 from served import connect
@@ -53,7 +53,7 @@ class Scripted:
 
     def __init__(self, *replies: Reply) -> None:
         self.replies = list(replies)
-        self.heard: list[tuple[Wish, Answer]] = []
+        self.heard: list[tuple[ToolCallRequest, ToolAnswer]] = []
 
     def begin(self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int) -> Talk:
         assert (system, prompt, seed) == ("Be quick.", "Go there.", 0)
@@ -63,11 +63,11 @@ class Scripted:
     async def ask(self) -> Reply:
         return self.replies.pop(0)
 
-    def tell(self, wish: Wish, answer: Answer) -> None:
+    def tell(self, wish: ToolCallRequest, answer: ToolAnswer) -> None:
         self.heard.append((wish, answer))
 
 
-LOOK = Wish(id="1", tool="look_at_map")
+LOOK = ToolCallRequest(id="1", tool="look_at_map")
 
 
 @pytest.mark.parametrize("representation", Representation)
@@ -119,9 +119,9 @@ async def test_an_api_that_does_not_count_leaves_tokens_unknown(tmp_path: Path) 
 
 
 async def test_errors_reach_the_model_as_errors_and_it_may_go_on(tmp_path: Path) -> None:
-    wrong = Wish(id="1", tool="describe_place", arguments={"place": "R99"})
-    unknown = Wish(id="2", tool="fly", arguments={"tool": "wings", "self": 1})
-    garbled = Wish(id="3", tool="measure", mistake="The arguments are no JSON.")
+    wrong = ToolCallRequest(id="1", tool="describe_place", arguments={"place": "R99"})
+    unknown = ToolCallRequest(id="2", tool="fly", arguments={"tool": "wings", "self": 1})
+    garbled = ToolCallRequest(id="3", tool="measure", mistake="The arguments are no JSON.")
     mind = Scripted(Reply(text="", wishes=(wrong, unknown, garbled)), Reply(text="Done."))
     witness = Hearing()
     end, _ = await run(ModelAgent(mind, "x/y"), assignment(tmp_path), witness)

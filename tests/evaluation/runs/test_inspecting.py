@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from mapspeak.evaluation.agents import Connection
+from mapspeak.evaluation.agents import ServerAccess
 from mapspeak.evaluation.runs.attempt import attempt
 from mapspeak.evaluation.runs.inspecting import open_inspection
-from mapspeak.evaluation.scores import Site
+from mapspeak.evaluation.scores import GroundTruth
 from mapspeak.evaluation.tasks import find_task
 from mapspeak.evaluation.trials import (
     Failure,
@@ -52,10 +52,10 @@ async def test_a_client_program_is_given_a_read_only_server_of_the_played_ros(
     tmp_path: Path,
 ) -> None:
     task = find_task("inspect-map")
-    setting = task.make_setting(Site(make_flat(tmp_path)), seed=0, memory=None)
+    setting = task.make_setting(GroundTruth(make_flat(tmp_path)), seed=0, memory=None)
     assert setting.inspected is not None
     async with open_inspection(
-        setting.inspected, Connection.COMMAND, toolsets=("ros",), folder=tmp_path
+        setting.inspected, ServerAccess.COMMAND, toolsets=("ros",), folder=tmp_path
     ) as opened:
         assert opened.client is None
         command = opened.command

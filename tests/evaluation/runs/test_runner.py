@@ -10,7 +10,7 @@ import pytest
 
 import trialworks
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.runs import Job, RunOptions, run_evaluation, run_jobs, writing_to
+from mapspeak.evaluation.runs import RunOptions, TrialJob, run_evaluation, run_jobs, writing_to
 from mapspeak.evaluation.trials import (
     Failure,
     Trial,
@@ -36,7 +36,7 @@ def read_result(run: Path, trial: Trial) -> TrialResult:
 
 def run_again(run: Path, trial: Trial, *, has_retry: bool = False) -> None:
     """Runs a trial of which there may be a result, and which succeeds."""
-    job = Job(trial=trial, work=partial(trialworks.succeed, run, trial), wall_s=LONG_S)
+    job = TrialJob(trial=trial, work=partial(trialworks.succeed, run, trial), wall_s=LONG_S)
     run_jobs(run, [job], n_jobs=1, on_done=trialworks.ignore, has_retry=has_retry)
 
 
@@ -51,11 +51,11 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of five trials, of which one crashes, one is killed and one hangs."""
     run = tmp_path_factory.mktemp("run")
     jobs = [
-        Job(trial=GOOD, work=partial(trialworks.succeed, run, GOOD), wall_s=LONG_S),
-        Job(trial=CRASHING, work=trialworks.raise_error, wall_s=LONG_S),
-        Job(trial=KILLED, work=trialworks.kill_itself, wall_s=LONG_S),
-        Job(trial=HANGING, work=trialworks.wait_for_ever, wall_s=0.5),
-        Job(trial=LAST, work=partial(trialworks.succeed, run, LAST), wall_s=LONG_S),
+        TrialJob(trial=GOOD, work=partial(trialworks.succeed, run, GOOD), wall_s=LONG_S),
+        TrialJob(trial=CRASHING, work=trialworks.raise_error, wall_s=LONG_S),
+        TrialJob(trial=KILLED, work=trialworks.kill_itself, wall_s=LONG_S),
+        TrialJob(trial=HANGING, work=trialworks.wait_for_ever, wall_s=0.5),
+        TrialJob(trial=LAST, work=partial(trialworks.succeed, run, LAST), wall_s=LONG_S),
     ]
     run_jobs(run, jobs, n_jobs=2, on_done=trialworks.ignore)
     return run
@@ -101,17 +101,17 @@ def test_a_run_that_was_killed_goes_on_without_repeating_what_is_done(tmp_path: 
 def test_results_that_are_there_are_told_again(tmp_path: Path) -> None:
     trialworks.succeed(tmp_path, GOOD)
     told: list[TrialResult] = []
-    job = Job(trial=GOOD, work=trialworks.raise_error, wall_s=LONG_S)
+    job = TrialJob(trial=GOOD, work=trialworks.raise_error, wall_s=LONG_S)
     run_jobs(tmp_path, [job], n_jobs=1, on_done=told.append)
     assert [result.score.is_success for result in told] == [True]
 
 
 def test_a_trial_waits_for_the_one_it_starts_from(tmp_path: Path) -> None:
     jobs = [
-        Job(
+        TrialJob(
             trial=LAST, work=partial(trialworks.succeed, tmp_path, LAST), after=GOOD, wall_s=LONG_S
         ),
-        Job(trial=GOOD, work=partial(trialworks.succeed, tmp_path, GOOD), wall_s=LONG_S),
+        TrialJob(trial=GOOD, work=partial(trialworks.succeed, tmp_path, GOOD), wall_s=LONG_S),
     ]
     run_jobs(tmp_path, jobs, n_jobs=2, on_done=trialworks.ignore)
     assert (tmp_path / trialworks.LOG).read_text().splitlines() == [GOOD.id, LAST.id]
@@ -119,8 +119,8 @@ def test_a_trial_waits_for_the_one_it_starts_from(tmp_path: Path) -> None:
 
 def test_a_trial_whose_preparation_broke_is_broken_too(tmp_path: Path) -> None:
     jobs = [
-        Job(trial=GOOD, work=trialworks.raise_error, wall_s=LONG_S),
-        Job(
+        TrialJob(trial=GOOD, work=trialworks.raise_error, wall_s=LONG_S),
+        TrialJob(
             trial=LAST, work=partial(trialworks.succeed, tmp_path, LAST), after=GOOD, wall_s=LONG_S
         ),
     ]
@@ -129,7 +129,7 @@ def test_a_trial_whose_preparation_broke_is_broken_too(tmp_path: Path) -> None:
 
 
 def test_a_full_disk_ends_the_run_and_is_nobodys_result(tmp_path: Path) -> None:
-    jobs = [Job(trial=GOOD, work=trialworks.fill_the_disk, wall_s=LONG_S)]
+    jobs = [TrialJob(trial=GOOD, work=trialworks.fill_the_disk, wall_s=LONG_S)]
     with pytest.raises(ConfigError, match="the disk is full"):
         run_jobs(tmp_path, jobs, n_jobs=1, on_done=trialworks.ignore)
     assert find_result(tmp_path, GOOD) is None
@@ -137,7 +137,7 @@ def test_a_full_disk_ends_the_run_and_is_nobodys_result(tmp_path: Path) -> None:
 
 def test_an_interrupt_is_for_the_run_and_not_for_its_trials(tmp_path: Path) -> None:
     work = partial(trialworks.succeed_after_an_interrupt, tmp_path, GOOD)
-    jobs = [Job(trial=GOOD, work=work, wall_s=LONG_S)]
+    jobs = [TrialJob(trial=GOOD, work=work, wall_s=LONG_S)]
     run_jobs(tmp_path, jobs, n_jobs=1, on_done=trialworks.ignore)
     assert read_result(tmp_path, GOOD).score.is_success
 

@@ -5,7 +5,7 @@ import pytest
 
 from mapspeak.evaluation.scores import (
     Evidence,
-    Site,
+    GroundTruth,
     judge_coverage,
     judge_near,
     judge_pose,
@@ -24,23 +24,23 @@ MEMORY = "waypoints:\n  - name: view 1\n"
 
 
 @pytest.fixture(scope="module")
-def flat(tmp_path_factory: pytest.TempPathFactory) -> Site:
+def flat(tmp_path_factory: pytest.TempPathFactory) -> GroundTruth:
     """The truth of a small flat."""
-    return Site(make_flat(tmp_path_factory.mktemp("flat")))
+    return GroundTruth(make_flat(tmp_path_factory.mktemp("flat")))
 
 
-def test_the_neighbours_of_a_room_are_those_behind_its_doors(flat: Site) -> None:
+def test_the_neighbours_of_a_room_are_those_behind_its_doors(flat: GroundTruth) -> None:
     assert flat.neighbours(flat.room_named("small room")) == ("corridor", "hall")
     assert flat.neighbours(flat.room_named("large room")) == ("hall",)
     assert len(flat.passages) == 3
 
 
-def test_the_floor_of_a_room_ends_at_its_walls(flat: Site) -> None:
+def test_the_floor_of_a_room_ends_at_its_walls(flat: GroundTruth) -> None:
     inside_m2 = (3 - 0.12) * (3 - 0.12)
     assert flat.floor_area_m2(flat.room_named("small room")) == pytest.approx(inside_m2, rel=0.03)
 
 
-def test_whoever_stands_in_the_right_room_has_done_it(flat: Site) -> None:
+def test_whoever_stands_in_the_right_room_has_done_it(flat: GroundTruth) -> None:
     assert judge_room(flat, ended_at(SMALL_ROOM), ["small room"]).is_success
 
 
@@ -53,12 +53,12 @@ def test_whoever_stands_in_the_right_room_has_done_it(flat: Site) -> None:
     ],
 )
 def test_a_wrong_room_is_said_to_be_wrong_in_its_own_way(
-    flat: Site, place: Point, failure: Failure
+    flat: GroundTruth, place: Point, failure: Failure
 ) -> None:
     assert judge_room(flat, ended_at(place), ["small room"]).failure is failure
 
 
-def test_a_robot_that_never_set_out_was_refused_or_never_asked(flat: Site) -> None:
+def test_a_robot_that_never_set_out_was_refused_or_never_asked(flat: GroundTruth) -> None:
     still = replace(ended_at(HALL).last, driven_m=0.0)
     refused = Evidence(states=(still,), n_errors=2)
     assert judge_room(flat, refused, ["small room"]).failure is Failure.GOAL_REFUSED
@@ -68,26 +68,26 @@ def test_a_robot_that_never_set_out_was_refused_or_never_asked(flat: Site) -> No
     assert judge_room(flat, gave_up, ["small room"]).failure is Failure.GAVE_UP
 
 
-def test_a_thing_behind_a_wall_is_not_reached_however_near_it_is(flat: Site) -> None:
+def test_a_thing_behind_a_wall_is_not_reached_however_near_it_is(flat: GroundTruth) -> None:
     things = flat.things("fire_extinguisher")
     assert judge_thing(flat, ended_at(Point(4.0, 0.5)), things).is_success
     assert judge_thing(flat, ended_at(CORRIDOR), things).failure is Failure.WRONG_OBJECT
 
 
-def test_a_place_counts_to_so_many_metres(flat: Site) -> None:
+def test_a_place_counts_to_so_many_metres(flat: GroundTruth) -> None:
     goal = Point(3.0, 0.5)
     assert judge_near(flat, ended_at(Point(3.2, 0.5)), goal, within_m=0.4).is_success
     assert not judge_near(flat, ended_at(Point(3.5, 0.5)), goal, within_m=0.4).is_success
 
 
-def test_who_looks_away_does_not_face_a_thing(flat: Site) -> None:
+def test_who_looks_away_does_not_face_a_thing(flat: GroundTruth) -> None:
     (thing,) = flat.things("fire_extinguisher")
     facing, away = ended_at(Point(4.5, 0.5)), ended_at(Point(4.5, 0.5), yaw_rad=math.pi)
     assert judge_pose(flat, facing, thing, within_m=3.5, facing_rad=0.5).is_success
     assert not judge_pose(flat, away, thing, within_m=3.5, facing_rad=0.5).is_success
 
 
-def test_a_route_has_to_keep_its_order(flat: Site) -> None:
+def test_a_route_has_to_keep_its_order(flat: GroundTruth) -> None:
     stops = [flat.things("fire_extinguisher"), flat.things("printer")]
     there, then = Point(5.0, 0.5), Point(0.5, 3.5)
     assert judge_route(flat, ended_at(HALL, there, then), stops).is_success
@@ -96,7 +96,9 @@ def test_a_route_has_to_keep_its_order(flat: Site) -> None:
     assert wrong.figures["n_stops_reached"] == 1
 
 
-def test_a_perfect_map_recalls_everything_and_an_unremembered_one_is_incomplete(flat: Site) -> None:
+def test_a_perfect_map_recalls_everything_and_an_unremembered_one_is_incomplete(
+    flat: GroundTruth,
+) -> None:
     perfect = ended_at(HALL, grid=flat.floor.visible, memory=MEMORY)
     score = judge_coverage(flat, perfect)
     assert score.is_success
@@ -105,7 +107,7 @@ def test_a_perfect_map_recalls_everything_and_an_unremembered_one_is_incomplete(
     assert judge_coverage(flat, without_memory).failure is Failure.INCOMPLETE
 
 
-def test_floor_that_a_map_knows_as_solid_is_known_and_not_recalled(flat: Site) -> None:
+def test_floor_that_a_map_knows_as_solid_is_known_and_not_recalled(flat: GroundTruth) -> None:
     whole = flat.floor.visible
     cells = whole.cells.copy()
     cells[:, : whole.n_cols // 2] = 100
@@ -117,7 +119,7 @@ def test_floor_that_a_map_knows_as_solid_is_known_and_not_recalled(flat: Site) -
     assert score.figures["coverage_reachable_recall"] == pytest.approx(0.5, abs=0.05)
 
 
-def test_recall_is_what_the_demo_calls_so(flat: Site) -> None:
+def test_recall_is_what_the_demo_calls_so(flat: GroundTruth) -> None:
     whole = flat.floor.visible
     cells = whole.cells.copy()
     cells[: whole.n_rows // 3] = -1
@@ -127,7 +129,7 @@ def test_recall_is_what_the_demo_calls_so(flat: Site) -> None:
     assert score.figures["coverage_recall"] == pytest.approx(demo.recall, abs=1e-4)
 
 
-def test_half_a_map_recalls_half(flat: Site) -> None:
+def test_half_a_map_recalls_half(flat: GroundTruth) -> None:
     whole = flat.floor.visible
     cells = whole.cells.copy()
     cells[:, : whole.n_cols // 2] = -1

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mapspeak.evaluation.scores import Site
+from mapspeak.evaluation.scores import GroundTruth
 from mapspeak.geometry import Point, Pose
 from mapspeak.simulator import TrueRoom, World, WorldWall
 from mapspeak.spatial.rooms import RoomClass
@@ -10,7 +10,7 @@ BEHIND = Point(6.0, 0.0)
 """In the middle of the room that the gap leads to."""
 
 
-def two_rooms(*, gap_m: float) -> Site:
+def two_rooms(*, gap_m: float) -> GroundTruth:
     """Gives two rooms of 4 x 4 m side by side, a gap in the wall between them, the robot in one."""
     corners = [Point(-2.0, -2.0), Point(8.0, -2.0), Point(8.0, 2.0), Point(-2.0, 2.0)]
     sides = list(zip(corners, (*corners[1:], corners[0]), strict=True))
@@ -18,7 +18,7 @@ def two_rooms(*, gap_m: float) -> Site:
     walls = tuple(WorldWall(start=a, end=b, thickness_m=0.1, height_m=2.5) for a, b in sides)
     outline = (Point(4.0, -2.0), Point(8.0, -2.0), Point(8.0, 2.0), Point(4.0, 2.0))
     behind = TrueRoom(name="behind", room_class=RoomClass.ROOM, outline=outline)
-    return Site(
+    return GroundTruth(
         World(
             name="two rooms",
             title="Two rooms.",

@@ -2,20 +2,20 @@ import math
 
 import pytest
 
-from mapspeak.evaluation.scores import Site
+from mapspeak.evaluation.scores import GroundTruth
 from mapspeak.evaluation.tasks import FAMILIES, find_task, task_names
 from mapspeak.geometry import Pose
 from mapspeak.server.prompts import read_text
 from mapspeak.simulator import load_world, world_names
 from sites import MEMORY_TEXT
 
-SITES: dict[str, Site] = {}
+SITES: dict[str, GroundTruth] = {}
 
 
-def site_of(world: str) -> Site:
+def site_of(world: str) -> GroundTruth:
     """Gives a world's truth, found once."""
     if world not in SITES:
-        SITES[world] = Site(load_world(world))
+        SITES[world] = GroundTruth(load_world(world))
     return SITES[world]
 
 

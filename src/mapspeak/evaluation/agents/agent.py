@@ -8,10 +8,10 @@ from typing import Protocol
 from mapspeak.evaluation.client import ToolClient
 from mapspeak.evaluation.trials.trial import Limits, TrialState
 
-__all__ = ["Agent", "AgentEnd", "Assignment", "Connection"]
+__all__ = ["Agent", "AgentEnd", "Assignment", "ServerAccess"]
 
 
-class Connection(StrEnum):
+class ServerAccess(StrEnum):
     """How an agent reaches the robot's server."""
 
     MEMORY = "memory"
@@ -74,7 +74,7 @@ class Agent(Protocol):
         ...
 
     @property
-    def connection(self) -> Connection:
+    def connection(self) -> ServerAccess:
         """Says how it reaches the server."""
         ...
 

@@ -5,12 +5,12 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from mapspeak.evaluation.client import Answer, ToolClient
-from mapspeak.evaluation.observer import Sighting, read_sightings
+from mapspeak.evaluation.client import ToolAnswer, ToolClient
+from mapspeak.evaluation.observer import DetectedThing, read_sightings
 from mapspeak.evaluation.reading import MapReading, read_map_text
 from mapspeak.geometry import Point, Pose
 
-__all__ = ["Driver", "Seen"]
+__all__ = ["Seen", "ToolDriver"]
 
 WAIT_S = 25.0
 REGION = re.compile(r"\b[RCO]\d+\b")
@@ -49,7 +49,7 @@ class Seen:
         )
 
 
-class Driver:
+class ToolDriver:
     """Calls tools in a script's name.
 
     Args:
@@ -102,11 +102,11 @@ class Driver:
         found = REGION.search(text.partition("\n")[0])
         return found.group() if found else ""
 
-    async def see(self) -> tuple[Sighting, ...]:
+    async def see(self) -> tuple[DetectedThing, ...]:
         """Takes a picture and gives what the detector reports of it."""
         return read_sightings((await self.tools.demand("look_through_camera")).text)
 
-    async def _see_through(self, answer: Answer) -> str:
+    async def _see_through(self, answer: ToolAnswer) -> str:
         while not answer.is_error and answer.report["state"] not in FINAL_STATES:
             answer = await self.tools.call(
                 "wait_for_goal", goal_id=answer.report["goal_id"], wait_s=WAIT_S

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
-from mapspeak.evaluation.agents.agent import AgentEnd, Assignment, Connection
+from mapspeak.evaluation.agents.agent import AgentEnd, Assignment, ServerAccess
 from mapspeak.evaluation.agents.cues import find_label
-from mapspeak.evaluation.agents.driver import ARRIVED, Driver
+from mapspeak.evaluation.agents.driver import ARRIVED, ToolDriver
 from mapspeak.evaluation.client import ToolClient
 from mapspeak.evaluation.observer import describe_view
 from mapspeak.evaluation.reading import read_map_picture
@@ -44,7 +44,7 @@ LEAST_ROOM_M2 = 1.0
 class _Log:
     """Takes a picture at each stop and remembers what the detector sees, under a number."""
 
-    driver: Driver
+    driver: ToolDriver
     n_views: int = 0
 
     async def record(self) -> Pose:
@@ -65,13 +65,13 @@ class NearestFrontierAgent:
     """
 
     name: str = "nearest-frontier"
-    connection: Connection = Connection.MEMORY
+    connection: ServerAccess = ServerAccess.MEMORY
 
     async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
         """Carries out the assignment."""
         if not task.prompt.startswith(EXPLORING):
             return _gave_up("I only explore.")
-        driver, missed = Driver(tools), list[Point]()
+        driver, missed = ToolDriver(tools), list[Point]()
         log = _Log(driver)
         await log.record()
         for _ in range(MOST_GOALS):
@@ -102,11 +102,11 @@ class PaperLoopAgent:
     """
 
     name: str = "paper-loop"
-    connection: Connection = Connection.MEMORY
+    connection: ServerAccess = ServerAccess.MEMORY
 
     async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
         """Carries out the assignment."""
-        driver = Driver(tools)
+        driver = ToolDriver(tools)
         if task.prompt.startswith(EXPLORING):
             return await _explore_by_picture(driver)
         if task.prompt.startswith(SMALLEST):
@@ -123,7 +123,7 @@ class _Tour:
     missed: list[Point] = field(default_factory=list)
 
 
-async def _explore_by_picture(driver: Driver) -> AgentEnd:
+async def _explore_by_picture(driver: ToolDriver) -> AgentEnd:
     log, tour = _Log(driver), _Tour()
     pose = await log.record()
     tour.visited.append(pose.point)
@@ -141,7 +141,7 @@ async def _explore_by_picture(driver: Driver) -> AgentEnd:
     return _gave_up("There is always something left to explore.")
 
 
-async def _see_map(driver: Driver) -> OccupancyGrid:
+async def _see_map(driver: ToolDriver) -> OccupancyGrid:
     """Looks at all three of the paper's pictures, and reads the first as it is drawn."""
     plain = await driver.tools.demand("subscribe_map_as_image")
     await driver.tools.demand("draw_map_axis")
@@ -199,7 +199,7 @@ def _ways_m(points: FloatArray, place: Point) -> FloatArray:
     return np.asarray(np.hypot(points[:, 0] - place.x, points[:, 1] - place.y))
 
 
-async def _go_to_smallest_patch(driver: Driver) -> AgentEnd:
+async def _go_to_smallest_patch(driver: ToolDriver) -> AgentEnd:
     """Goes into the smallest piece of floor that is left when narrow places are closed."""
     grid = await _see_map(driver)
     room_m = clearance_m(grid)
@@ -217,7 +217,7 @@ async def _go_to_smallest_patch(driver: Driver) -> AgentEnd:
     return _gave_up("I see no room that I can get to.")
 
 
-async def _recall(driver: Driver, label: str) -> AgentEnd:
+async def _recall(driver: ToolDriver, label: str) -> AgentEnd:
     """Goes to the nearest waypoint, in a straight line, that remembers the thing."""
     seen, pose = await driver.recall(label), await driver.find_pose()
     if not seen:

@@ -6,7 +6,7 @@ from mapspeak.evaluation.agents.oracle import OracleAgent
 from mapspeak.evaluation.agents.others import OTHER_NAMES, check_other, find_other
 from mapspeak.evaluation.agents.random import RandomAgent
 from mapspeak.evaluation.agents.scripted import ScriptedAgent
-from mapspeak.evaluation.scores import Site
+from mapspeak.evaluation.scores import GroundTruth
 from mapspeak.evaluation.trials import Setting, Trial
 
 __all__ = ["agent_names", "check_agent", "find_agent"]
@@ -30,7 +30,7 @@ def check_agent(name: str, thinking: str | None = None) -> None:
         raise _unknown(name)
 
 
-def find_agent(trial: Trial, setting: Setting, site: Site) -> Agent:
+def find_agent(trial: Trial, setting: Setting, site: GroundTruth) -> Agent:
     """Gives who answers a trial.
 
     Args:

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from mapspeak.evaluation.agents.agent import Agent, AgentEnd, Assignment, Connection
-from mapspeak.evaluation.agents.driver import ARRIVED, Driver
+from mapspeak.evaluation.agents.agent import Agent, AgentEnd, Assignment, ServerAccess
+from mapspeak.evaluation.agents.driver import ARRIVED, ToolDriver
 from mapspeak.evaluation.agents.scripted import ScriptedAgent
 from mapspeak.evaluation.client import ToolClient
-from mapspeak.evaluation.scores import Site
+from mapspeak.evaluation.scores import GroundTruth
 from mapspeak.evaluation.trials import Setting
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import Cell
@@ -33,13 +33,13 @@ class OracleAgent:
     """
 
     setting: Setting
-    site: Site
+    site: GroundTruth
     name: str = "oracle"
-    connection: Connection = Connection.MEMORY
+    connection: ServerAccess = ServerAccess.MEMORY
 
     async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
         """Carries out the assignment."""
-        truth, driver = self.setting.truth, Driver(tools)
+        truth, driver = self.setting.truth, ToolDriver(tools)
         known = _known_answer(truth)
         if known is not None:
             return AgentEnd(answer=f"ANSWER: {known}")
@@ -97,7 +97,7 @@ def _known_answer(truth: Mapping[str, Any]) -> str | None:
     return "unreachable" if truth.get("answer") == "unreachable" else None
 
 
-async def _drive_to_one(driver: Driver, goals: list[Pose]) -> bool:
+async def _drive_to_one(driver: ToolDriver, goals: list[Pose]) -> bool:
     for goal in goals:
         if await driver.drive(x=goal.x, y=goal.y, yaw_deg=goal.yaw_deg) == ARRIVED:
             return True

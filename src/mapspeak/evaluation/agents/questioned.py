@@ -3,7 +3,7 @@
 import re
 
 from mapspeak.evaluation.agents.agent import AgentEnd
-from mapspeak.evaluation.agents.driver import Driver
+from mapspeak.evaluation.agents.driver import ToolDriver
 from mapspeak.evaluation.reading import MapReading, Row
 from mapspeak.evaluation.trials import TrialState
 from mapspeak.geometry import Point
@@ -14,7 +14,7 @@ POINT = re.compile(r"\((-?\d+\.\d+), (-?\d+\.\d+)\)")
 CHOICE = re.compile(r"\b([A-H]) \((-?\d+\.\d+), (-?\d+\.\d+)\)")
 
 
-async def answer_question(driver: Driver, question: str) -> AgentEnd:
+async def answer_question(driver: ToolDriver, question: str) -> AgentEnd:
     """Answers a question in the form that it asks for."""
     if "drive next" in question:
         return await _say_where_to_explore(driver)
@@ -40,7 +40,7 @@ async def answer_question(driver: Driver, question: str) -> AgentEnd:
     return _answer(", ".join(sorted(beside)) or "none")
 
 
-async def _say_where_to_explore(driver: Driver) -> AgentEnd:
+async def _say_where_to_explore(driver: ToolDriver) -> AgentEnd:
     frontiers = (await driver.look()).rows("Frontiers")
     if not frontiers:
         return _gave_up()
@@ -48,14 +48,14 @@ async def _say_where_to_explore(driver: Driver) -> AgentEnd:
     return _answer(f"{x}, {y}")
 
 
-async def _say_way(driver: Driver, question: str) -> AgentEnd:
+async def _say_way(driver: ToolDriver, question: str) -> AgentEnd:
     x, y = next(iter(POINT.findall(question)))
     text = (await driver.tools.demand("describe_place", place=f"{x}, {y}")).text
     match = re.search(r"is (\d+(?:\.\d+)?) m away by path", text)
     return _gave_up() if match is None else _answer(f"{match[1]} m")
 
 
-async def _region_at(driver: Driver, point: tuple[str, str]) -> str:
+async def _region_at(driver: ToolDriver, point: tuple[str, str]) -> str:
     return await driver.find_region(Point(float(point[0]), float(point[1])))
 
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapspeak.evaluation.agents.agent import AgentEnd, Assignment, Connection
-from mapspeak.evaluation.agents.driver import Driver
+from mapspeak.evaluation.agents.agent import AgentEnd, Assignment, ServerAccess
+from mapspeak.evaluation.agents.driver import ToolDriver
 from mapspeak.evaluation.client import ToolClient
 from mapspeak.geometry import Point
 
@@ -21,11 +21,11 @@ class RandomAgent:
     """What chance alone is worth: the floor under every other agent's figures."""
 
     name: str = "random"
-    connection: Connection = Connection.MEMORY
+    connection: ServerAccess = ServerAccess.MEMORY
 
     async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
         """Drives to some places that the map names, or answers."""
-        random, driver = np.random.default_rng(task.seed), Driver(tools)
+        random, driver = np.random.default_rng(task.seed), ToolDriver(tools)
         if "Answer without driving" in task.prompt:
             return AgentEnd(answer=f"ANSWER: {await _say(task.prompt, random, driver)}")
         for _ in range(int(random.integers(1, MOST_DRIVES + 1))):
@@ -36,7 +36,7 @@ class RandomAgent:
         return AgentEnd(answer="ANSWER: there")
 
 
-async def _say(prompt: str, random: np.random.Generator, driver: Driver) -> str:
+async def _say(prompt: str, random: np.random.Generator, driver: ToolDriver) -> str:
     form = prompt.rpartition("ANSWER:")[2]
     if "-2.0" in form:
         here: Point = (await driver.find_pose()).point

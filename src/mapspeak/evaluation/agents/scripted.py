@@ -6,12 +6,12 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
 from mapspeak.errors import MapspeakError
-from mapspeak.evaluation.agents.agent import AgentEnd, Assignment, Connection
+from mapspeak.evaluation.agents.agent import AgentEnd, Assignment, ServerAccess
 from mapspeak.evaluation.agents.cues import find_label
-from mapspeak.evaluation.agents.driver import ARRIVED, WAIT_S, Driver, Seen
+from mapspeak.evaluation.agents.driver import ARRIVED, WAIT_S, Seen, ToolDriver
 from mapspeak.evaluation.agents.inspecting import diagnose
 from mapspeak.evaluation.agents.questioned import answer_question
-from mapspeak.evaluation.client import Answer, OutOfBudgetError, ToolClient
+from mapspeak.evaluation.client import OutOfBudgetError, ToolAnswer, ToolClient
 from mapspeak.evaluation.observer import read_sightings
 from mapspeak.evaluation.policy import ScriptedPolicy, Step, is_room
 from mapspeak.evaluation.reading import MapReading, Row
@@ -34,7 +34,7 @@ MOST_COMPARED = 20
 MOST_STEPS = 120
 SEARCH = "search_for"
 
-Deed = Callable[[Driver, re.Match[str]], Awaitable[AgentEnd]]
+Deed = Callable[[ToolDriver, re.Match[str]], Awaitable[AgentEnd]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,19 +42,19 @@ class ScriptedAgent:
     """Reads the prompt by its words and does what fits."""
 
     name: str = "scripted"
-    connection: Connection = Connection.MEMORY
+    connection: ServerAccess = ServerAccess.MEMORY
 
     async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
         """Carries out the assignment."""
         try:
-            return await _do(Driver(tools), task.prompt)
+            return await _do(ToolDriver(tools), task.prompt)
         except OutOfBudgetError:
             raise
         except MapspeakError as error:
             return _gave_up(f"A tool did not give what I need: {error}")
 
 
-async def _do(driver: Driver, prompt: str) -> AgentEnd:
+async def _do(driver: ToolDriver, prompt: str) -> AgentEnd:
     for pattern, deed in DEEDS:
         match = re.search(pattern, prompt)
         if match is not None:
@@ -68,7 +68,7 @@ async def _do(driver: Driver, prompt: str) -> AgentEnd:
 # --- exploring -----------------------------------------------------------------------------------
 
 
-async def _explore(driver: Driver, _: re.Match[str]) -> AgentEnd:
+async def _explore(driver: ToolDriver, _: re.Match[str]) -> AgentEnd:
     await ScriptedPolicy(driver.tools, _note_nothing).explore()
     return AgentEnd(answer="Everything that can be reached is on the map.")
 
@@ -80,7 +80,7 @@ async def _note_nothing(_step: Step) -> None:
 # --- rooms ---------------------------------------------------------------------------------------
 
 
-async def _go_to_room_by_size(driver: Driver, match: re.Match[str]) -> AgentEnd:
+async def _go_to_room_by_size(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
     view = await driver.look()
     is_from_below = match["end"] == "smallest"
     rows = _rooms_of(view) if is_from_below else list(view.rows("Rooms"))
@@ -92,7 +92,7 @@ async def _go_to_room_by_size(driver: Driver, match: re.Match[str]) -> AgentEnd:
     return await _go_to_region(driver, chosen.id)
 
 
-async def _go_to_longest_corridor(driver: Driver, _: re.Match[str]) -> AgentEnd:
+async def _go_to_longest_corridor(driver: ToolDriver, _: re.Match[str]) -> AgentEnd:
     corridors = (await driver.look()).rows("Corridors")
     if not corridors:
         return _gave_up("There is no corridor.")
@@ -105,12 +105,12 @@ def _rooms_of(view: MapReading) -> list[Row]:
     return [row for row in view.rows("Rooms") if is_room(row, view.rows("Doors"))]
 
 
-async def _go_to_region(driver: Driver, place: str) -> AgentEnd:
+async def _go_to_region(driver: ToolDriver, place: str) -> AgentEnd:
     state = await driver.drive(place=place)
     return AgentEnd(answer=f"{place}: {state}.")
 
 
-async def _go_into_room_around(driver: Driver, match: re.Match[str]) -> AgentEnd:
+async def _go_into_room_around(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
     """Drives to a point of a room, else beside it; where no way leads there, says so."""
     middle = Point(float(match["x"]), float(match["y"]))
     if await driver.drive(x=middle.x, y=middle.y) == ARRIVED:
@@ -121,7 +121,7 @@ async def _go_into_room_around(driver: Driver, match: re.Match[str]) -> AgentEnd
     return AgentEnd(answer="ANSWER: unreachable")
 
 
-async def _aside(driver: Driver, middle: Point) -> list[Point]:
+async def _aside(driver: ToolDriver, middle: Point) -> list[Point]:
     """Gives some points beside another one in the same room."""
     room = await driver.find_region(middle)
     points = [
@@ -135,11 +135,11 @@ async def _aside(driver: Driver, middle: Point) -> list[Point]:
 # --- things --------------------------------------------------------------------------------------
 
 
-async def _find_nearest(driver: Driver, match: re.Match[str]) -> AgentEnd:
+async def _find_nearest(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
     return await _go_to_thing(driver, match["label"])
 
 
-async def _go_to_thing(driver: Driver, label: str) -> AgentEnd:
+async def _go_to_thing(driver: ToolDriver, label: str) -> AgentEnd:
     """Drives to the nearest place that saw it from near; what one look has shown is checked."""
     seen = await driver.recall(label)
     if not seen:
@@ -158,11 +158,11 @@ async def _go_to_thing(driver: Driver, label: str) -> AgentEnd:
     return AgentEnd(answer=f"I am at {chosen.place}, from where {label} was seen.")
 
 
-async def _is_here(driver: Driver, label: str) -> bool:
+async def _is_here(driver: ToolDriver, label: str) -> bool:
     return any(label in sighting.label for sighting in await driver.see())
 
 
-async def _search(driver: Driver, label: str) -> AgentEnd:
+async def _search(driver: ToolDriver, label: str) -> AgentEnd:
     """Lets the robot look about until the detector reports the thing, and goes there."""
     if not await driver.is_offered(SEARCH):
         return _gave_up(f"I know no way to a {label}, and am offered no search.")
@@ -179,13 +179,13 @@ async def _search(driver: Driver, label: str) -> AgentEnd:
     return _gave_up(f"I have looked long enough for a {label}.")
 
 
-async def _search_on(driver: Driver, label: str, answer: Answer) -> Answer:
+async def _search_on(driver: ToolDriver, label: str, answer: ToolAnswer) -> ToolAnswer:
     if answer.report["state"] == "driving":
         return await driver.tools.call(SEARCH, thing=label, wait_s=WAIT_S)
     return await driver.tools.call(SEARCH, thing=label, seen=False, wait_s=WAIT_S)
 
 
-async def _approach(driver: Driver, label: str, bearing_deg: float, range_m: float) -> AgentEnd:
+async def _approach(driver: ToolDriver, label: str, bearing_deg: float, range_m: float) -> AgentEnd:
     """Ends the search and drives up to what was seen; looks again where it was far off."""
     await driver.tools.call(SEARCH, thing=label, seen=True)
     pose = await driver.find_pose()
@@ -203,14 +203,14 @@ async def _approach(driver: Driver, label: str, bearing_deg: float, range_m: flo
 # --- relations and routes ------------------------------------------------------------------------
 
 
-async def _go_beside_pose(driver: Driver, match: re.Match[str]) -> AgentEnd:
+async def _go_beside_pose(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
     heading_rad = math.radians(float(match["yaw"]) + SIDES_DEG[match["side"]])
     person = Pose(float(match["x"]), float(match["y"]), heading_rad)
     goal = person.transform(Point(float(match["away"]), 0.0))
     return AgentEnd(answer=f"It {await driver.drive(x=goal.x, y=goal.y)}.")
 
 
-async def _go_beside_thing(driver: Driver, match: re.Match[str]) -> AgentEnd:
+async def _go_beside_thing(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
     thing = _place_of(await driver.recall(match["label"]))
     if thing is None:
         return _gave_up(f"I remember no {match['label']}.")
@@ -219,7 +219,7 @@ async def _go_beside_thing(driver: Driver, match: re.Match[str]) -> AgentEnd:
     return AgentEnd(answer=f"It {await driver.drive(x=goal.x, y=goal.y)}.")
 
 
-async def _face_thing(driver: Driver, match: re.Match[str]) -> AgentEnd:
+async def _face_thing(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
     thing = _place_of(await driver.recall(match["label"]))
     if thing is None:
         return _gave_up(f"I remember no {match['label']}.")
@@ -233,7 +233,7 @@ def _place_of(seen: list[Seen]) -> Point | None:
     return next((each.thing for each in seen if each.thing is not None), None)
 
 
-async def _follow(driver: Driver, match: re.Match[str]) -> AgentEnd:
+async def _follow(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
     for label in re.findall(r"to any ([a-z -]+?)(?=, then|\.|$)", match.group()):
         end = await _go_to_thing(driver, label)
         if end.state is TrialState.GAVE_UP:
@@ -241,11 +241,11 @@ async def _follow(driver: Driver, match: re.Match[str]) -> AgentEnd:
     return AgentEnd(answer="I have been everywhere.")
 
 
-async def _inspect(driver: Driver, match: re.Match[str]) -> AgentEnd:
+async def _inspect(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
     return await diagnose(driver.tools, match.string)
 
 
-async def _answer(driver: Driver, match: re.Match[str]) -> AgentEnd:
+async def _answer(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
     return await answer_question(driver, match.string)
 
 

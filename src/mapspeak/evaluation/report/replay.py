@@ -8,7 +8,7 @@ from pathlib import Path
 from mapspeak.evaluation.report.album import Album, find_picture
 from mapspeak.evaluation.report.course import PICTURES, Course
 from mapspeak.evaluation.report.markup import Html, element, joined, text
-from mapspeak.evaluation.report.way import Stop, draw_way, lay_out_way
+from mapspeak.evaluation.report.way import StepMark, draw_way, lay_out_way
 from mapspeak.evaluation.trials import TrialResult, Turn
 
 __all__ = ["build_replay", "show_standing"]
@@ -137,7 +137,7 @@ def _is_answer(turn: Turn, before: Turn) -> bool:
 
 
 def _list_steps(
-    steps: Sequence[_Step], stops: dict[str, Stop], pictures: Path, album: Album
+    steps: Sequence[_Step], stops: dict[str, StepMark], pictures: Path, album: Album
 ) -> Html:
     if not steps:
         return element("p", {"class": "none"}, text("There is no conversation of it."))
@@ -145,7 +145,7 @@ def _list_steps(
     return element("ol", {"class": "steps"}, *shown)
 
 
-def _show_step(step: _Step, stop: Stop | None, pictures: Path, album: Album) -> Html:
+def _show_step(step: _Step, stop: StepMark | None, pictures: Path, album: Album) -> Html:
     place: dict[str, object] = {}
     if stop is not None:
         place = {

@@ -14,7 +14,7 @@ from mapspeak.geometry import Pose
 from mapspeak.simulator import StateRecord
 from mapspeak.spatial.grid import FloatArray
 
-__all__ = ["Stop", "Track", "Way", "draw_way", "lay_out_way"]
+__all__ = ["DrivenPath", "StepMark", "Track", "draw_way", "lay_out_way"]
 
 MOST_POINTS = 500
 APART_M = 0.3
@@ -22,7 +22,7 @@ APART_M = 0.3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stop:
+class StepMark:
     """Where the robot stood at a step of the replay, on the picture of its map.
 
     Attributes:
@@ -56,7 +56,7 @@ class Track:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Way:
+class DrivenPath:
     """A way on a map.
 
     Attributes:
@@ -67,12 +67,12 @@ class Way:
 
     sheet: Sheet
     track: Track | None
-    stops: dict[str, Stop]
+    stops: dict[str, StepMark]
 
 
 def lay_out_way(
     course: Course, poses: Sequence[tuple[str, Pose | None, float | None]]
-) -> Way | None:
+) -> DrivenPath | None:
     """Lays a trial's way out on its map; None where there is no map.
 
     Args:
@@ -88,12 +88,12 @@ def lay_out_way(
         for anchor, pose, robot_s in poses
         if pose is not None
     }
-    return Way(sheet=sheet, track=track, stops=stops)
+    return DrivenPath(sheet=sheet, track=track, stops=stops)
 
 
-def _stop(anchor: str, pose: Pose, sheet: Sheet, driven_ratio: float) -> Stop:
+def _stop(anchor: str, pose: Pose, sheet: Sheet, driven_ratio: float) -> StepMark:
     u, v = sheet.pixels_at(np.array([[pose.x, pose.y]]))[0].tolist()
-    return Stop(
+    return StepMark(
         anchor=anchor,
         u=round(u, 1),
         v=round(v, 1),
@@ -125,7 +125,7 @@ def _ratio_at(track: Track | None, robot_s: float | None) -> float:
     return round(float(np.interp(robot_s, track.times_s, track.ratios)), 4)
 
 
-def draw_way(way: Way, album: Album) -> Html:
+def draw_way(way: DrivenPath, album: Album) -> Html:
     """Gives the map with the way on it; each mark leads to its step."""
     sheet, stops = way.sheet, list(way.stops.values())
     name = album.keep(sheet.png, "image/png", sheet.width_px, sheet.height_px)
@@ -143,8 +143,8 @@ def draw_way(way: Way, album: Album) -> Html:
     return element("svg", {"class": "sheet", "viewBox": box, "aria-label": label}, *drawn)
 
 
-def _apart(stops: Sequence[Stop], least_px: float) -> list[Stop]:
-    chosen: list[Stop] = []
+def _apart(stops: Sequence[StepMark], least_px: float) -> list[StepMark]:
+    chosen: list[StepMark] = []
     for stop in stops:
         last = chosen[-1] if chosen else None
         if last is None or (stop.u - last.u) ** 2 + (stop.v - last.v) ** 2 >= least_px**2:
@@ -152,13 +152,13 @@ def _apart(stops: Sequence[Stop], least_px: float) -> list[Stop]:
     return chosen
 
 
-def _mark(stop: Stop, radius_px: float) -> Html:
+def _mark(stop: StepMark, radius_px: float) -> Html:
     dot = {"class": "stop", "cx": stop.u, "cy": stop.v, "r": f"{radius_px:.1f}"}
     title = element("title", {}, text(f"To step {stop.anchor.rpartition('-')[2]}"))
     return element("a", {"href": f"#{stop.anchor}"}, element("circle", dot, title))
 
 
-def _robot(stop: Stop, size_px: float) -> Html:
+def _robot(stop: StepMark, size_px: float) -> Html:
     place = f"translate({stop.u} {stop.v}) rotate({stop.heading_deg})"
     arrow = " ".join(
         f"{x * size_px:.1f},{y * size_px:.1f}"

@@ -3,7 +3,13 @@
 from mapspeak.evaluation.runs.attempt import attempt
 from mapspeak.evaluation.runs.inspectlog import write_log
 from mapspeak.evaluation.runs.plan import RunOptions, RunPlan, plan_run
-from mapspeak.evaluation.runs.runner import Job, make_jobs, run_evaluation, run_jobs, writing_to
+from mapspeak.evaluation.runs.runner import (
+    TrialJob,
+    make_jobs,
+    run_evaluation,
+    run_jobs,
+    writing_to,
+)
 from mapspeak.evaluation.runs.showing import (
     RunBar,
     TrialBar,
@@ -15,11 +21,11 @@ from mapspeak.evaluation.runs.showing import (
 )
 
 __all__ = [
-    "Job",
     "RunBar",
     "RunOptions",
     "RunPlan",
     "TrialBar",
+    "TrialJob",
     "announce",
     "attempt",
     "build_table",

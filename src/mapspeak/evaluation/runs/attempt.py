@@ -9,7 +9,7 @@ import anyio
 import cv2
 
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.agents import Agent, AgentEnd, Assignment, Connection, find_agent
+from mapspeak.evaluation.agents import Agent, AgentEnd, Assignment, ServerAccess, find_agent
 from mapspeak.evaluation.client import OutOfBudgetError, ToolClient
 from mapspeak.evaluation.runs.transcript import Transcript
 from mapspeak.evaluation.runs.workplace import (
@@ -20,7 +20,7 @@ from mapspeak.evaluation.runs.workplace import (
     Workshop,
     open_workplace,
 )
-from mapspeak.evaluation.scores import Evidence, Site
+from mapspeak.evaluation.scores import Evidence, GroundTruth
 from mapspeak.evaluation.tasks import Task, find_task
 from mapspeak.evaluation.trials import (
     Setting,
@@ -54,7 +54,7 @@ def attempt(
     world: World,
     preparation: Trial | None,
     *,
-    connection: Connection | None = None,
+    connection: ServerAccess | None = None,
     control: Path | None = None,
     on_turn: Callable[[Turn], None] | None = None,
 ) -> TrialResult:
@@ -75,7 +75,7 @@ def attempt(
     folder = trial_folder(run, trial)
     folder.mkdir(parents=True, exist_ok=True)
     prepared = None if preparation is None else trial_folder(run, preparation)
-    site, task = Site(world), find_task(trial.task)
+    site, task = GroundTruth(world), find_task(trial.task)
     memory = _read_if_there(prepared / MEMORY) if prepared is not None else None
     setting = task.make_setting(site, seed=trial.seed, memory=memory)
     if setting.is_known and prepared is None:
@@ -99,17 +99,17 @@ def attempt(
     return result
 
 
-def _as_set(site: Site, setting: Setting) -> Site:
+def _as_set(site: GroundTruth, setting: Setting) -> GroundTruth:
     """Gives the world as the trial has set it; its map frame starts where the robot's does."""
     if not setting.is_known and setting.start != site.world.start:
-        site = Site(replace(site.world, start=setting.start))
+        site = GroundTruth(replace(site.world, start=setting.start))
     return site.with_more(setting.added)
 
 
 async def _work(
     shop: Workshop,
     agent: Agent,
-    connection: Connection,
+    connection: ServerAccess,
     on_turn: Callable[[Turn], None] | None,
 ) -> _Course:
     begun_s = time.perf_counter()
@@ -165,7 +165,9 @@ def _gather(folder: Path, transcript: Transcript, end: AgentEnd) -> Evidence:
     )
 
 
-def _judge(trial: Trial, setting: Setting, task: Task, site: Site, course: _Course) -> TrialResult:
+def _judge(
+    trial: Trial, setting: Setting, task: Task, site: GroundTruth, course: _Course
+) -> TrialResult:
     evidence, end = course.evidence, course.end
     return TrialResult(
         trial=trial,

@@ -10,7 +10,7 @@ from pathlib import Path
 from mcp.client import Client
 from mcp.client.stdio import StdioServerParameters
 
-from mapspeak.evaluation.agents import Connection
+from mapspeak.evaluation.agents import ServerAccess
 from mapspeak.evaluation.inspected import InspectedSystem, play
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.semantic import SemanticMapStore
@@ -40,7 +40,7 @@ class Inspection:
 
 @asynccontextmanager
 async def open_inspection(
-    system: InspectedSystem, connection: Connection, *, toolsets: tuple[str, ...], folder: Path
+    system: InspectedSystem, connection: ServerAccess, *, toolsets: tuple[str, ...], folder: Path
 ) -> AsyncGenerator[Inspection]:
     """Plays a system and connects to it as an agent wants it, read-only.
 
@@ -52,10 +52,10 @@ async def open_inspection(
     """
     async with play(system) as url:
         command = serve_command(url, toolsets=toolsets, folder=folder)
-        if connection is Connection.MEMORY:
+        if connection is ServerAccess.MEMORY:
             async with _open_in_memory(url, toolsets, folder) as client:
                 yield _describe(client, command)
-        elif connection is Connection.STDIO:
+        elif connection is ServerAccess.STDIO:
             parameters = StdioServerParameters(command=command[0], args=list(command[1:]))
             async with Client(parameters, read_timeout_seconds=ANSWER_WITHIN_S) as client:
                 yield _describe(client, command)

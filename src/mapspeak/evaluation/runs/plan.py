@@ -10,7 +10,7 @@ import numpy as np
 from mapspeak import __version__
 from mapspeak.errors import ConfigError
 from mapspeak.evaluation.agents.others import can_think, find_versions, read_thinking
-from mapspeak.evaluation.scores import Site
+from mapspeak.evaluation.scores import GroundTruth
 from mapspeak.evaluation.tasks import EXPLORE, Task, choose_tasks, find_task
 from mapspeak.evaluation.trials import Trial
 from mapspeak.server import Representation
@@ -120,7 +120,7 @@ def plan_run(options: RunOptions, worlds: Mapping[str, World]) -> RunPlan:
     trials = tuple(
         trial
         for name, world in worlds.items()
-        for site in (Site(world),)
+        for site in (GroundTruth(world),)
         for task in tasks
         if task.is_offered(site)
         for trial in _trials_of(options, task, name)

@@ -41,7 +41,7 @@ from mapspeak.evaluation.trials import (
 )
 from mapspeak.simulator import World
 
-__all__ = ["Job", "make_jobs", "run_evaluation", "run_jobs", "writing_to"]
+__all__ = ["TrialJob", "make_jobs", "run_evaluation", "run_jobs", "writing_to"]
 
 ERRORS = "errors.txt"
 LOCK = ".run.lock"
@@ -56,7 +56,7 @@ CANNOT_WRITE = NO_ROOM | {errno.EACCES, errno.EPERM, errno.ENOTDIR, errno.ENAMET
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Job:
+class TrialJob:
     """A trial to be run.
 
     Attributes:
@@ -72,7 +72,9 @@ class Job:
     wall_s: float
 
 
-def make_jobs(options: RunOptions, plan: RunPlan, worlds: Mapping[str, World]) -> Iterator[Job]:
+def make_jobs(
+    options: RunOptions, plan: RunPlan, worlds: Mapping[str, World]
+) -> Iterator[TrialJob]:
     """Yield what is to be done: first all that others wait for, the largest world first.
 
     Exploring takes longest, and longest in the largest world: begun last, it would keep one
@@ -85,7 +87,7 @@ def make_jobs(options: RunOptions, plan: RunPlan, worlds: Mapping[str, World]) -
         needs_map = find_task(trial.task).needs_map
         before = prepare_world(options, trial.world) if needs_map else None
         work = partial(attempt, options.folder, trial, worlds[trial.world], before)
-        yield Job(trial=trial, work=work, after=before, wall_s=options.hang_s)
+        yield TrialJob(trial=trial, work=work, after=before, wall_s=options.hang_s)
 
 
 def _floor_m2(world: World) -> float:
@@ -175,7 +177,7 @@ def _alone_in(folder: Path) -> Generator[None]:
 
 @dataclass(slots=True)
 class _Running:
-    job: Job
+    job: TrialJob
     process: BaseProcess
     ends_s: float
 
@@ -187,14 +189,14 @@ class _Progress:
     run: Path
     on_done: Callable[[TrialResult], None]
     done: dict[Trial, TrialResult] = field(default_factory=dict)
-    waiting: list[Job] = field(default_factory=list)
+    waiting: list[TrialJob] = field(default_factory=list)
     running: list[_Running] = field(default_factory=list)
 
     def settle(self, result: TrialResult) -> None:
         self.done[result.trial] = result
         self.on_done(result)
 
-    def take_next(self) -> Job | None:
+    def take_next(self) -> TrialJob | None:
         """Return the first job whose predecessor is done; None while all others have to wait."""
         for job in self.waiting:
             if job.after is None or job.after in self.done:
@@ -207,7 +209,7 @@ class _Progress:
 
 def run_jobs(
     run: Path,
-    jobs: Iterable[Job],
+    jobs: Iterable[TrialJob],
     *,
     n_jobs: int,
     on_done: Callable[[TrialResult], None],
@@ -291,7 +293,7 @@ def _processes() -> BaseContext:
     return context
 
 
-def _start(run: Path, job: Job, processes: BaseContext) -> _Running:
+def _start(run: Path, job: TrialJob, processes: BaseContext) -> _Running:
     folder = trial_folder(run, job.trial)
     folder.mkdir(parents=True, exist_ok=True)
     if (path := find_result(run, job.trial)) is not None:
@@ -338,7 +340,7 @@ def _settle(run: Path, ended: _Running) -> TrialResult:
     return _write_broken(run, ended.job, TrialState.CRASHED, f"{said.strip()} ({how})".strip())
 
 
-def _write_broken(run: Path, job: Job, state: TrialState, error: str) -> TrialResult:
+def _write_broken(run: Path, job: TrialJob, state: TrialState, error: str) -> TrialResult:
     score = Score(is_success=False, failure=Failure.BROKEN, reason="The trial came to no result.")
     result = TrialResult(trial=job.trial, prompt="", state=state, score=score, error=error)
     write_result(run, result)

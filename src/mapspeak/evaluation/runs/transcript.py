@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from mapspeak.evaluation.client import Answer, OutOfBudgetError
+from mapspeak.evaluation.client import OutOfBudgetError, ToolAnswer
 from mapspeak.evaluation.trials import Limits, ToolCall, Turn
 from mapspeak.evaluation.trials.records import TURNS, turn_line
 from mapspeak.simulator import StateRecord
@@ -62,7 +62,7 @@ class Transcript:
         self.calls.append(call)
         self._write("agent", call=call)
 
-    def hear_answer(self, tool: str, arguments: dict[str, Any], answer: Answer) -> None:
+    def hear_answer(self, tool: str, arguments: dict[str, Any], answer: ToolAnswer) -> None:
         """Writes an answer down and keeps its pictures."""
         self.n_errors += answer.is_error
         names = [self._keep(picture.data, picture.suffix) for picture in answer.pictures]

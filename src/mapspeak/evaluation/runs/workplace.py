@@ -13,7 +13,7 @@ from pathlib import Path
 from mcp.client import Client
 from mcp.client.stdio import StdioServerParameters
 
-from mapspeak.evaluation.agents import Connection
+from mapspeak.evaluation.agents import ServerAccess
 from mapspeak.evaluation.inspected import InspectedSystem
 from mapspeak.evaluation.runs.inspecting import open_inspection
 from mapspeak.evaluation.scores.evidence import NOWHERE
@@ -112,7 +112,7 @@ class Workplace:
 
 
 @asynccontextmanager
-async def open_workplace(shop: Workshop, connection: Connection) -> AsyncGenerator[Workplace]:
+async def open_workplace(shop: Workshop, connection: ServerAccess) -> AsyncGenerator[Workplace]:
     """Starts robot and server and connects; in the end the robot's map lies in the folder."""
     for leftover in (STATES, MEMORY, MAP, AUDIT):
         (shop.folder / leftover).unlink(missing_ok=True)
@@ -120,9 +120,9 @@ async def open_workplace(shop: Workshop, connection: Connection) -> AsyncGenerat
         (shop.folder / MEMORY).write_text(shop.setting.memory, encoding="utf-8")
     if shop.setting.inspected is not None:
         opened = _open_inspected(shop, shop.setting.inspected, connection)
-    elif connection is Connection.MEMORY:
+    elif connection is ServerAccess.MEMORY:
         opened = _open_in_memory(shop)
-    elif connection is Connection.STDIO:
+    elif connection is ServerAccess.STDIO:
         opened = _open_over_stdio(shop)
     else:
         opened = _open_for_another(shop)
@@ -208,7 +208,7 @@ async def _open_for_another(shop: Workshop) -> AsyncGenerator[Workplace]:
 
 @asynccontextmanager
 async def _open_inspected(
-    shop: Workshop, system: InspectedSystem, connection: Connection
+    shop: Workshop, system: InspectedSystem, connection: ServerAccess
 ) -> AsyncGenerator[Workplace]:
     """There is no simulated robot here, and nobody drives."""
     async with open_inspection(

@@ -22,15 +22,15 @@ from mapspeak.evaluation.scores.judging import (
     spl,
 )
 from mapspeak.evaluation.scores.rows import TableRow, count_rows
-from mapspeak.evaluation.scores.site import BESIDE_M, Passage, Site
+from mapspeak.evaluation.scores.site import BESIDE_M, GroundTruth, TruePassage
 
 __all__ = [
     "BESIDE_M",
     "Evidence",
+    "GroundTruth",
     "Interval",
-    "Passage",
-    "Site",
     "TableRow",
+    "TruePassage",
     "bootstrap_interval",
     "count_rows",
     "judge_choice",

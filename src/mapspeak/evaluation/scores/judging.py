@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Sequence
 import numpy as np
 
 from mapspeak.evaluation.scores.evidence import Evidence
-from mapspeak.evaluation.scores.site import BESIDE_M, Site
+from mapspeak.evaluation.scores.site import BESIDE_M, GroundTruth
 from mapspeak.evaluation.trials import Failure, Score, TrialState
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.simulator import WorldObject
@@ -48,7 +48,7 @@ def spl(*, is_success: bool, shortest_m: float | None, driven_m: float) -> float
     return 1.0 if longest_m == 0 else shortest_m / longest_m
 
 
-def judge_coverage(site: Site, evidence: Evidence) -> Score:
+def judge_coverage(site: GroundTruth, evidence: Evidence) -> Score:
     """Judges a map, and whether anything was remembered.
 
     `coverage_recall` is, as everywhere, the share of all floor that a perfect robot could see that
@@ -92,7 +92,7 @@ def known_ratio(grid: OccupancyGrid, reference: OccupancyGrid, wanted: Mask) -> 
     return float(n_known) / rows.size if rows.size else 1.0
 
 
-def judge_room(site: Site, evidence: Evidence, wanted: Collection[str]) -> Score:
+def judge_room(site: GroundTruth, evidence: Evidence, wanted: Collection[str]) -> Score:
     """Judges whether the robot stands in one of some spaces, by name."""
     here = site.room_at(evidence.end)
     named = " or ".join(sorted(wanted))
@@ -112,7 +112,7 @@ def judge_room(site: Site, evidence: Evidence, wanted: Collection[str]) -> Score
     return _failed(evidence, kind, f"It stands in {name}, not in {named}.", figures)
 
 
-def judge_thing(site: Site, evidence: Evidence, things: Sequence[WorldObject]) -> Score:
+def judge_thing(site: GroundTruth, evidence: Evidence, things: Sequence[WorldObject]) -> Score:
     """Judges whether the robot stands near one of some things, in free sight of it."""
     here = evidence.end
     away_m = {thing.name: here.distance_to(site.place_of(thing)) for thing in things}
@@ -128,7 +128,7 @@ def judge_thing(site: Site, evidence: Evidence, things: Sequence[WorldObject]) -
     return _failed(evidence, Failure.WRONG_OBJECT, said, figures)
 
 
-def judge_near(site: Site, evidence: Evidence, goal: Point, *, within_m: float) -> Score:
+def judge_near(site: GroundTruth, evidence: Evidence, goal: Point, *, within_m: float) -> Score:
     """Judges whether the robot stands where it should, to so many metres."""
     away_m = evidence.end.distance_to(goal)
     said = f"It stands {away_m:.2f} m from where it should."
@@ -139,7 +139,7 @@ def judge_near(site: Site, evidence: Evidence, goal: Point, *, within_m: float) 
 
 
 def judge_pose(
-    site: Site, evidence: Evidence, thing: WorldObject, *, within_m: float, facing_rad: float
+    site: GroundTruth, evidence: Evidence, thing: WorldObject, *, within_m: float, facing_rad: float
 ) -> Score:
     """Judges whether the robot looks at a thing from near, with nothing in between."""
     here, place = evidence.last.pose, site.place_of(thing)
@@ -153,7 +153,9 @@ def judge_pose(
     return _failed(evidence, Failure.WRONG_PLACE, said, figures)
 
 
-def judge_route(site: Site, evidence: Evidence, stops: Sequence[Sequence[WorldObject]]) -> Score:
+def judge_route(
+    site: GroundTruth, evidence: Evidence, stops: Sequence[Sequence[WorldObject]]
+) -> Score:
     """Judges whether the robot came past some things in their order, near each and in sight."""
     n_reached = 0
     for state in evidence.states:
@@ -169,14 +171,16 @@ def judge_route(site: Site, evidence: Evidence, stops: Sequence[Sequence[WorldOb
     return _succeeded(site, evidence, said, figures)
 
 
-def _is_at(site: Site, point: Point, things: Iterable[WorldObject]) -> bool:
+def _is_at(site: GroundTruth, point: Point, things: Iterable[WorldObject]) -> bool:
     return any(
         point.distance_to(site.place_of(thing)) <= BESIDE_M and site.is_in_sight(point, thing)
         for thing in things
     )
 
 
-def _succeeded(site: Site, evidence: Evidence, reason: str, figures: dict[str, float]) -> Score:
+def _succeeded(
+    site: GroundTruth, evidence: Evidence, reason: str, figures: dict[str, float]
+) -> Score:
     del site
     figures = {**figures, "n_collisions": float(evidence.last.n_collisions)}
     return Score(is_success=True, figures=_rounded(figures), reason=reason)

@@ -29,7 +29,7 @@ from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.grid import Mask
 from mapspeak.spatial.paths import DistanceField, clearance_m, distances_from
 
-__all__ = ["BESIDE_M", "Passage", "Site"]
+__all__ = ["BESIDE_M", "GroundTruth", "TruePassage"]
 
 BESIDE_M = 5.0
 """A robot that stands this near to a thing, with a free line of sight, has been led to it.
@@ -50,7 +50,7 @@ _PLUS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], dtype=np.uint8)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Passage:
+class TruePassage:
     """A way from one space straight into another.
 
     Attributes:
@@ -62,7 +62,7 @@ class Passage:
     middle: Point
 
 
-class Site:
+class GroundTruth:
     """One world's truth.
 
     Args:
@@ -77,11 +77,11 @@ class Site:
         self._beside: dict[str, Mask] = {}
         self.floor = TrueFloor(world)
 
-    def with_more(self, things: Sequence[WorldObject]) -> "Site":
+    def with_more(self, things: Sequence[WorldObject]) -> "GroundTruth":
         """Gives the same world with more things in it."""
         if not things:
             return self
-        return Site(replace(self.world, objects=(*self.world.objects, *things)))
+        return GroundTruth(replace(self.world, objects=(*self.world.objects, *things)))
 
     # --- floor ---
 
@@ -169,7 +169,7 @@ class Site:
         return next(room for room in self.floor.rooms if room.room.name == name)
 
     @cached_property
-    def passages(self) -> tuple[Passage, ...]:
+    def passages(self) -> tuple[TruePassage, ...]:
         """Every place where the robot passes straight from one space into another."""
         labels, standable = self._labels, self.drivable
         crossings: dict[tuple[int, int], np.ndarray[tuple[int, int], np.dtype[np.uint8]]] = {}
@@ -198,7 +198,7 @@ class Site:
 
     def _split(
         self, pair: tuple[int, int], cells: np.ndarray[tuple[int, int], np.dtype[np.uint8]]
-    ) -> list[Passage]:
+    ) -> list[TruePassage]:
         """Gives one passage for each piece of a border that can be crossed."""
         names = {label: name for name, label in self._label_of.items()}
         spaces = sorted((names[pair[0]], names[pair[1]]))
@@ -208,7 +208,7 @@ class Site:
         for piece in range(1, n_pieces):
             rows, cols = np.nonzero((pieces == piece) & (cells > 0))
             x, y = self.grid.points_at(rows, cols).mean(axis=0).tolist()
-            found.append(Passage(spaces=(spaces[0], spaces[1]), middle=Point(x, y)))
+            found.append(TruePassage(spaces=(spaces[0], spaces[1]), middle=Point(x, y)))
         return found
 
     @cached_property

@@ -5,13 +5,13 @@ from typing import Protocol
 
 import numpy as np
 
-from mapspeak.evaluation.scores import BESIDE_M, Evidence, Site, judge_thing
+from mapspeak.evaluation.scores import BESIDE_M, Evidence, GroundTruth, judge_thing
 from mapspeak.evaluation.tasks.task import dice, draw_start
 from mapspeak.evaluation.tasks.wishes import FIRE, FIRE_WISH, WISHES
 from mapspeak.evaluation.trials import Limits, Score, Setting
 from mapspeak.geometry import Pose
 
-__all__ = ["OBJECT_TASKS", "Wish", "draw_wish", "findable_kinds"]
+__all__ = ["OBJECT_TASKS", "ObjectRequest", "draw_wish", "findable_kinds"]
 
 SEARCH_TOOLS = ("search_for", "look_around")
 SEARCH_LIMITS = Limits(n_calls=200, robot_time_s=2400.0, wall_s=900.0)
@@ -19,7 +19,7 @@ OUT_OF_THE_WAY_M = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Wish:
+class ObjectRequest:
     """A thing as it is asked for.
 
     Attributes:
@@ -34,34 +34,36 @@ class Wish:
 class Draw(Protocol):
     """Draws a wish that a world can fulfil."""
 
-    def __call__(self, site: Site, random: np.random.Generator) -> Wish:
+    def __call__(self, site: GroundTruth, random: np.random.Generator) -> ObjectRequest:
         """Gives the wish."""
         ...
 
 
-def findable_kinds(site: Site) -> tuple[str, ...]:
+def findable_kinds(site: GroundTruth) -> tuple[str, ...]:
     """Gives the kinds one can wish for of which the robot can get to all things of the world."""
     kinds = sorted({thing.kind for thing in site.world.objects} & set(WISHES))
     return tuple(kind for kind in kinds if site.beside(kind).any())
 
 
-def draw_wish(site: Site, random: np.random.Generator) -> Wish:
+def draw_wish(site: GroundTruth, random: np.random.Generator) -> ObjectRequest:
     """Draws a kind that the world has, and words for it."""
     kind = str(random.choice(findable_kinds(site)))
     words = WISHES[kind]
-    return Wish(prompt=words[int(random.integers(len(words)))], kind=kind)
+    return ObjectRequest(prompt=words[int(random.integers(len(words)))], kind=kind)
 
 
-def ask_for_fire_tool(site: Site, random: np.random.Generator) -> Wish:
+def ask_for_fire_tool(site: GroundTruth, random: np.random.Generator) -> ObjectRequest:
     """Gives the paper's Task 3."""
     del site, random
-    return Wish(prompt=FIRE_WISH, kind=FIRE)
+    return ObjectRequest(prompt=FIRE_WISH, kind=FIRE)
 
 
-def name_thing(site: Site, random: np.random.Generator) -> Wish:
+def name_thing(site: GroundTruth, random: np.random.Generator) -> ObjectRequest:
     """Draws a kind that the world has, and names it."""
     kind = str(random.choice(findable_kinds(site)))
-    return Wish(prompt=f"Find the nearest {site.label_of(kind)} and stop beside it.", kind=kind)
+    return ObjectRequest(
+        prompt=f"Find the nearest {site.label_of(kind)} and stop beside it.", kind=kind
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,13 +74,13 @@ class ObjectTask:
     draw: Draw
     needs_map: bool = True
 
-    def is_offered(self, site: Site) -> bool:
+    def is_offered(self, site: GroundTruth) -> bool:
         """True where the world has such things."""
         if self.draw is ask_for_fire_tool:
             return bool(site.beside(FIRE).any())
         return bool(findable_kinds(site))
 
-    def make_setting(self, site: Site, *, seed: int, memory: str | None) -> Setting:
+    def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
         """Starts anywhere but beside such a thing."""
         random = dice(self.name, site, seed)
         wish = self.draw(site, random)
@@ -91,7 +93,7 @@ class ObjectTask:
             truth={"kind": wish.kind, "shortest_m": shortest_m},
         )
 
-    def score(self, site: Site, setting: Setting, evidence: Evidence) -> Score:
+    def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
         """Scores what the robot stands beside."""
         return judge_thing(site, evidence, site.things(setting.truth["kind"]))
 
@@ -103,11 +105,11 @@ class SearchTask:
     name: str = "search"
     needs_map: bool = False
 
-    def is_offered(self, site: Site) -> bool:
+    def is_offered(self, site: GroundTruth) -> bool:
         """True where the world has such things."""
         return bool(findable_kinds(site))
 
-    def make_setting(self, site: Site, *, seed: int, memory: str | None) -> Setting:
+    def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
         """Starts anywhere but beside such a thing, without map and memory."""
         del memory
         random = dice(self.name, site, seed)
@@ -122,12 +124,14 @@ class SearchTask:
             truth={"kind": wish.kind, "shortest_m": shortest_m},
         )
 
-    def score(self, site: Site, setting: Setting, evidence: Evidence) -> Score:
+    def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
         """Scores what the robot stands beside."""
         return judge_thing(site, evidence, site.things(setting.truth["kind"]))
 
 
-def draw_start_apart(site: Site, random: np.random.Generator, kind: str) -> tuple[Pose, float]:
+def draw_start_apart(
+    site: GroundTruth, random: np.random.Generator, kind: str
+) -> tuple[Pose, float]:
     """Draws where the robot starts, and gives the shortest way from there to a thing in sight."""
     beside = site.beside(kind)
     around = np.logical_or.reduce(

@@ -6,7 +6,7 @@ guidance is the prompt of its appendix with the semantic filtering policy.
 
 from dataclasses import dataclass
 
-from mapspeak.evaluation.scores import Evidence, Site, judge_coverage
+from mapspeak.evaluation.scores import Evidence, GroundTruth, judge_coverage
 from mapspeak.evaluation.trials import Limits, Score, Setting
 from mapspeak.server.prompts import read_text
 
@@ -23,12 +23,12 @@ class Explore:
     name: str = EXPLORE
     needs_map: bool = False
 
-    def is_offered(self, site: Site) -> bool:
+    def is_offered(self, site: GroundTruth) -> bool:
         """Every world can be explored."""
         del site
         return True
 
-    def make_setting(self, site: Site, *, seed: int, memory: str | None) -> Setting:
+    def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
         """Starts where the world says, so that others can go on with this map."""
         del seed, memory
         return Setting(
@@ -40,7 +40,7 @@ class Explore:
             limits=LIMITS,
         )
 
-    def score(self, site: Site, setting: Setting, evidence: Evidence) -> Score:
+    def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
         """Scores map and memory."""
         del setting
         return judge_coverage(site, evidence)

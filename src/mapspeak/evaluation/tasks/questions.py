@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mapspeak.evaluation.scores import Evidence, Site, judge_choice, judge_number, read_point
+from mapspeak.evaluation.scores import Evidence, GroundTruth, judge_choice, judge_number, read_point
 from mapspeak.evaluation.tasks.task import dice, draw_start, point_text
 from mapspeak.evaluation.trials import Failure, Limits, Score, Setting
 from mapspeak.geometry import Point, Pose
@@ -30,7 +30,7 @@ N_VIEWS = 60
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class AskedQuestion:
     """A question as it was drawn.
 
     Attributes:
@@ -42,8 +42,8 @@ class Asked:
     truth: dict[str, Any] = field(default_factory=dict)
 
 
-Ask = Callable[[Site, np.random.Generator, Pose], Asked]
-Judge = Callable[[Site, dict[str, Any], Evidence], Score]
+Ask = Callable[[GroundTruth, np.random.Generator, Pose], AskedQuestion]
+Judge = Callable[[GroundTruth, dict[str, Any], Evidence], Score]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,14 +61,14 @@ class QuestionTask:
     name: str
     ask: Ask
     judge: Judge
-    is_offered_in: Callable[[Site], bool]
+    is_offered_in: Callable[[GroundTruth], bool]
     needs_map: bool = True
 
-    def is_offered(self, site: Site) -> bool:
+    def is_offered(self, site: GroundTruth) -> bool:
         """True where the world has what it asks about."""
         return self.is_offered_in(site)
 
-    def make_setting(self, site: Site, *, seed: int, memory: str | None) -> Setting:
+    def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
         """Draws where the robot stands, and the question."""
         random = dice(self.name, site, seed)
         start = draw_start(site, random)
@@ -82,7 +82,7 @@ class QuestionTask:
             truth=asked.truth,
         )
 
-    def score(self, site: Site, setting: Setting, evidence: Evidence) -> Score:
+    def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
         """Scores the answer; who has driven has not kept to the question."""
         return self.judge(site, setting.truth, evidence)
 
@@ -90,37 +90,37 @@ class QuestionTask:
 # --- how large, how many, which, how far ---------------------------------------------------------
 
 
-def _ask_area(site: Site, random: np.random.Generator, _start: Pose) -> Asked:
+def _ask_area(site: GroundTruth, random: np.random.Generator, _start: Pose) -> AskedQuestion:
     room = _draw(site.rooms, random)
     middle = site.middle_of(room)
-    return Asked(
+    return AskedQuestion(
         f"How many square metres of free floor, on which nothing stands, has the room, corridor or "
         f"hall around {point_text(middle)}? End with a line of the form ANSWER: 12.3 m2.",
         {"number": round(room.free_area_m2, 2), "unit": "m2", "point": _pair(middle)},
     )
 
 
-def _judge_area(_site: Site, truth: dict[str, Any], evidence: Evidence) -> Score:
+def _judge_area(_site: GroundTruth, truth: dict[str, Any], evidence: Evidence) -> Score:
     tolerance = AREA_RATIO * truth["number"] + AREA_M2
     return judge_number(evidence, truth["number"], unit="m2", tolerance=tolerance)
 
 
-def _ask_doors(site: Site, random: np.random.Generator, _start: Pose) -> Asked:
+def _ask_doors(site: GroundTruth, random: np.random.Generator, _start: Pose) -> AskedQuestion:
     room = _draw(_closed_rooms(site), random)
     middle = site.middle_of(room)
     n_doors = sum(room.room.name in passage.spaces for passage in site.passages)
-    return Asked(
+    return AskedQuestion(
         f"How many doors or other openings that the robot can drive through has the room around "
         f"{point_text(middle)}? End with a line of the form ANSWER: 2.",
         {"number": n_doors, "unit": "", "point": _pair(middle)},
     )
 
 
-def _judge_doors(_site: Site, truth: dict[str, Any], evidence: Evidence) -> Score:
+def _judge_doors(_site: GroundTruth, truth: dict[str, Any], evidence: Evidence) -> Score:
     return judge_number(evidence, truth["number"], unit="", tolerance=0.0)
 
 
-def _ask_neighbours(site: Site, random: np.random.Generator, _start: Pose) -> Asked:
+def _ask_neighbours(site: GroundTruth, random: np.random.Generator, _start: Pose) -> AskedQuestion:
     room = _draw(site.rooms, random)
     beside = set(site.neighbours(room))
     others = [each for each in site.rooms if each.room.name != room.room.name]
@@ -136,7 +136,7 @@ def _ask_neighbours(site: Site, random: np.random.Generator, _start: Pose) -> As
         letter for letter, each in zip(LETTERS, shown, strict=False) if each.room.name in beside
     ]
     middle = site.middle_of(room)
-    return Asked(
+    return AskedQuestion(
         f"Each letter is a point in another room, corridor or hall: {listed}. Into which of them "
         f"does one come straight from the one around {point_text(middle)}, through one opening "
         "and no third space? End with a line of the form ANSWER: A, C - or ANSWER: none.",
@@ -151,21 +151,21 @@ def _ask_neighbours(site: Site, random: np.random.Generator, _start: Pose) -> As
     )
 
 
-def _judge_letters(_site: Site, truth: dict[str, Any], evidence: Evidence) -> Score:
+def _judge_letters(_site: GroundTruth, truth: dict[str, Any], evidence: Evidence) -> Score:
     return judge_choice(evidence, truth["letters"])
 
 
-def _ask_way(site: Site, random: np.random.Generator, start: Pose) -> Asked:
+def _ask_way(site: GroundTruth, random: np.random.Generator, start: Pose) -> AskedQuestion:
     goal = site.draw_pose(random).point
     way_m = site.ways_from(start.point).distance_to(goal)
-    return Asked(
+    return AskedQuestion(
         f"How many metres does the robot have to drive from where it stands to {point_text(goal)}? "
         "End with a line of the form ANSWER: 12.3 m.",
         {"number": round(way_m or 0.0, 2), "unit": "m", "point": _pair(goal)},
     )
 
 
-def _judge_way(_site: Site, truth: dict[str, Any], evidence: Evidence) -> Score:
+def _judge_way(_site: GroundTruth, truth: dict[str, Any], evidence: Evidence) -> Score:
     tolerance = WAY_RATIO * truth["number"] + WAY_M
     return judge_number(evidence, truth["number"], unit="m", tolerance=tolerance)
 
@@ -173,15 +173,15 @@ def _judge_way(_site: Site, truth: dict[str, Any], evidence: Evidence) -> Score:
 # --- where to explore next -----------------------------------------------------------------------
 
 
-def _ask_explore(_site: Site, _random: np.random.Generator, _start: Pose) -> Asked:
-    return Asked(
+def _ask_explore(_site: GroundTruth, _random: np.random.Generator, _start: Pose) -> AskedQuestion:
+    return AskedQuestion(
         "The map is not finished. To which place on free floor should the robot drive next to see "
         "as much new floor as possible from there? End with a line of the form ANSWER: 1.5, -2.0 "
         "- x and y in metres on the map."
     )
 
 
-def _judge_explore(site: Site, _truth: dict[str, Any], evidence: Evidence) -> Score:
+def _judge_explore(site: GroundTruth, _truth: dict[str, Any], evidence: Evidence) -> Score:
     said = read_point(evidence.answer)
     if said is None or evidence.grid is None:
         return Score(
@@ -206,7 +206,7 @@ def _judge_explore(site: Site, _truth: dict[str, Any], evidence: Evidence) -> Sc
     return Score(is_success=False, failure=Failure.WRONG_ANSWER, figures=figures, reason=reason)
 
 
-def _views(site: Site, grid: OccupancyGrid) -> list[Point]:
+def _views(site: GroundTruth, grid: OccupancyGrid) -> list[Point]:
     """Gives places on the known free floor, spread evenly and always the same."""
     rows, cols = np.nonzero(site.roomy)
     places = site.grid.points_at(rows, cols)
@@ -217,7 +217,7 @@ def _views(site: Site, grid: OccupancyGrid) -> list[Point]:
     return [Point(float(x), float(y)) for x, y in known[::every]]
 
 
-def _news_m2(site: Site, grid: OccupancyGrid, view: Point) -> float:
+def _news_m2(site: GroundTruth, grid: OccupancyGrid, view: Point) -> float:
     """Gives how much floor comes into view from a place that the map does not know."""
     seen = site.seen_near(view, MAX_RANGE_M)
     rows, cols = np.nonzero(seen)
@@ -241,7 +241,7 @@ def _some(rooms: list[MeasuredRoom], random: np.random.Generator, most: int) -> 
     return [rooms[at] for at in random.permutation(len(rooms))[:most].tolist()]
 
 
-def _closed_rooms(site: Site) -> tuple[MeasuredRoom, ...]:
+def _closed_rooms(site: GroundTruth) -> tuple[MeasuredRoom, ...]:
     return tuple(room for room in site.rooms if room.room.room_class is RoomClass.ROOM)
 
 
@@ -249,19 +249,19 @@ def _pair(point: Point) -> list[float]:
     return [round(point.x, 2), round(point.y, 2)]
 
 
-def _has_rooms(site: Site) -> bool:
+def _has_rooms(site: GroundTruth) -> bool:
     return bool(site.rooms)
 
 
-def _has_closed_rooms(site: Site) -> bool:
+def _has_closed_rooms(site: GroundTruth) -> bool:
     return bool(_closed_rooms(site))
 
 
-def _has_neighbours(site: Site) -> bool:
+def _has_neighbours(site: GroundTruth) -> bool:
     return len(site.rooms) > 1
 
 
-def _always(site: Site) -> bool:
+def _always(site: GroundTruth) -> bool:
     return math.isfinite(site.grid.resolution_m)
 
 

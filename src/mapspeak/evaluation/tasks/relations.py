@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapspeak.evaluation.scores import Evidence, Site, judge_near, judge_pose
+from mapspeak.evaluation.scores import Evidence, GroundTruth, judge_near, judge_pose
 from mapspeak.evaluation.tasks.objects import findable_kinds
 from mapspeak.evaluation.tasks.task import dice, draw_start, drive_setting, point_text
 from mapspeak.evaluation.trials import Score, Setting
@@ -35,7 +35,7 @@ NORTH_IS_UP = "On the map +y is north."
 
 
 @dataclass(frozen=True, slots=True)
-class Aim:
+class RelationGoal:
     """A place as it is asked for.
 
     Attributes:
@@ -60,16 +60,16 @@ class PlaceTask:
     """
 
     name: str
-    draw: Callable[[Site, np.random.Generator], Aim]
-    is_offered_in: Callable[[Site], bool]
+    draw: Callable[[GroundTruth, np.random.Generator], RelationGoal]
+    is_offered_in: Callable[[GroundTruth], bool]
     within_m: float
     needs_map: bool = True
 
-    def is_offered(self, site: Site) -> bool:
+    def is_offered(self, site: GroundTruth) -> bool:
         """True where the world has such places."""
         return self.is_offered_in(site)
 
-    def make_setting(self, site: Site, *, seed: int, memory: str | None) -> Setting:
+    def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
         """Draws the place, and starts away from it."""
         random = dice(self.name, site, seed)
         aim = self.draw(site, random)
@@ -83,15 +83,15 @@ class PlaceTask:
             goal=[round(aim.goal.x, 3), round(aim.goal.y, 3)],
         )
 
-    def score(self, site: Site, setting: Setting, evidence: Evidence) -> Score:
+    def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
         """Scores how far the robot stands from there."""
         goal = Point(*setting.truth["goal"])
         return judge_near(site, evidence, goal, within_m=self.within_m)
 
 
-def _aim_beside_pose(site: Site, random: np.random.Generator) -> Aim:
+def _aim_beside_pose(site: GroundTruth, random: np.random.Generator) -> RelationGoal:
     """Draws a pose that is given by numbers, a side of it and a distance."""
-    aim = Aim("", Point(0.0, 0.0))
+    aim = RelationGoal("", Point(0.0, 0.0))
     for _ in range(MOST_TRIES):
         pose = site.draw_pose(random)
         yaw_deg = float(random.integers(-17, 19) * 10)
@@ -102,18 +102,20 @@ def _aim_beside_pose(site: Site, random: np.random.Generator) -> Aim:
             f"Think of somebody who stands at {point_text(pose.point)} and looks along a yaw "
             f"of {yaw_deg:.0f} deg. Go to the place {away_m:g} m {SIDE_WORDS[side]} them."
         )
-        aim = Aim(prompt, goal)
+        aim = RelationGoal(prompt, goal)
         if _is_roomy(site, goal) and _is_open(site, pose.point, goal):
             break
     return aim
 
 
-def _aim_beside_thing(site: Site, random: np.random.Generator) -> Aim:
+def _aim_beside_thing(site: GroundTruth, random: np.random.Generator) -> RelationGoal:
     """Draws the only thing of its kind, a direction of the map and a distance."""
     places = _places_beside(site)
     thing, direction, away_m, goal = places[int(random.integers(len(places)))]
     label = site.label_of(thing.kind)
-    return Aim(f"Go to the place {away_m:g} m {direction} of the {label}. {NORTH_IS_UP}", goal)
+    return RelationGoal(
+        f"Go to the place {away_m:g} m {direction} of the {label}. {NORTH_IS_UP}", goal
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,11 +125,11 @@ class FacingTask:
     name: str = "facing-thing"
     needs_map: bool = True
 
-    def is_offered(self, site: Site) -> bool:
+    def is_offered(self, site: GroundTruth) -> bool:
         """True where the world has a single thing that can be looked at."""
         return bool(_single_things(site))
 
-    def make_setting(self, site: Site, *, seed: int, memory: str | None) -> Setting:
+    def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
         """Draws the thing."""
         random = dice(self.name, site, seed)
         things = _single_things(site)
@@ -144,17 +146,17 @@ class FacingTask:
             kind=thing.kind,
         )
 
-    def score(self, site: Site, setting: Setting, evidence: Evidence) -> Score:
+    def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
         """Scores distance, heading and sight."""
         (thing,) = site.things(setting.truth["kind"])
         return judge_pose(site, evidence, thing, within_m=FACING_WITHIN_M, facing_rad=FACING_RAD)
 
 
-def _single_things(site: Site) -> list[WorldObject]:
+def _single_things(site: GroundTruth) -> list[WorldObject]:
     return [site.things(kind)[0] for kind in findable_kinds(site) if len(site.things(kind)) == 1]
 
 
-def _places_beside(site: Site) -> list[tuple[WorldObject, str, float, Point]]:
+def _places_beside(site: GroundTruth) -> list[tuple[WorldObject, str, float, Point]]:
     """Gives things, directions and distances of which the place is roomy and open to the thing."""
     places = []
     for thing in _single_things(site):
@@ -171,23 +173,23 @@ def _step(point: Point, heading_rad: float, away_m: float) -> Point:
     return Pose(point.x, point.y, wrap_angle(heading_rad)).transform(Point(away_m, 0.0))
 
 
-def _is_roomy(site: Site, point: Point) -> bool:
+def _is_roomy(site: GroundTruth, point: Point) -> bool:
     cell = site.grid.cell_at(point)
     return site.grid.contains(cell) and bool(site.roomy[cell.row, cell.col])
 
 
-def _is_open(site: Site, one: Point, other: Point) -> bool:
+def _is_open(site: GroundTruth, one: Point, other: Point) -> bool:
     """True where the robot could drive straight from one point to the other."""
     shares = np.linspace(0.0, 1.0, 50)[:, None]
     way = np.array([one.x, one.y]) + shares * np.array([other.x - one.x, other.y - one.y])
     return bool(site.drivable[site.grid.cells_at(way)].all())
 
 
-def _always(site: Site) -> bool:
+def _always(site: GroundTruth) -> bool:
     return bool(site.roomy.any())
 
 
-def _has_places_beside(site: Site) -> bool:
+def _has_places_beside(site: GroundTruth) -> bool:
     return bool(_places_beside(site))
 
 

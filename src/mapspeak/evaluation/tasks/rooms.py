@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapspeak.evaluation.scores import Evidence, Site, judge_room
+from mapspeak.evaluation.scores import Evidence, GroundTruth, judge_room
 from mapspeak.evaluation.tasks.task import dice, draw_start, drive_setting
 from mapspeak.evaluation.trials import Score, Setting
 from mapspeak.simulator import MeasuredRoom
@@ -34,7 +34,7 @@ class Choice:
     rooms: tuple[MeasuredRoom, ...]
 
 
-Choose = Callable[[Site, np.random.Generator | None], Choice | None]
+Choose = Callable[[GroundTruth, np.random.Generator | None], Choice | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,11 +51,11 @@ class RoomTask:
     choose: Choose
     needs_map: bool = True
 
-    def is_offered(self, site: Site) -> bool:
+    def is_offered(self, site: GroundTruth) -> bool:
         """True where the world has a room that is clearly the right one."""
         return self.choose(site, None) is not None
 
-    def make_setting(self, site: Site, *, seed: int, memory: str | None) -> Setting:
+    def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
         """Starts anywhere but in the right room."""
         random = dice(self.name, site, seed)
         choice = self.choose(site, random)
@@ -72,12 +72,12 @@ class RoomTask:
             rooms=[room.room.name for room in choice.rooms],
         )
 
-    def score(self, site: Site, setting: Setting, evidence: Evidence) -> Score:
+    def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
         """Scores the room that the robot stands in."""
         return judge_room(site, evidence, setting.truth["rooms"])
 
 
-def _smallest(site: Site, random: np.random.Generator | None) -> Choice | None:
+def _smallest(site: GroundTruth, random: np.random.Generator | None) -> Choice | None:
     """The paper's Task 2: the least floor, whether or not furniture counts as floor."""
     del random
     rooms = _of_class(site, RoomClass.ROOM)
@@ -92,7 +92,7 @@ def _smallest(site: Site, random: np.random.Generator | None) -> Choice | None:
     return Choice(prompt="Go to the smallest room.", rooms=tuple(right.values()))
 
 
-def _largest(site: Site, random: np.random.Generator | None) -> Choice | None:
+def _largest(site: GroundTruth, random: np.random.Generator | None) -> Choice | None:
     del random
     rooms = sorted(_rooms_and_halls(site), key=site.floor_area_m2)
     if len(rooms) < 2 or not _is_clear(site, rooms, len(rooms) - 1):
@@ -100,7 +100,7 @@ def _largest(site: Site, random: np.random.Generator | None) -> Choice | None:
     return Choice(prompt=f"Go to the largest room. {HALLS_COUNT}", rooms=(rooms[-1],))
 
 
-def _nth(site: Site, random: np.random.Generator | None) -> Choice | None:
+def _nth(site: GroundTruth, random: np.random.Generator | None) -> Choice | None:
     """The second to fourth from either end, where its size is clearly its own."""
     rooms = sorted(_rooms_and_halls(site), key=site.floor_area_m2)
     found = [
@@ -115,7 +115,7 @@ def _nth(site: Site, random: np.random.Generator | None) -> Choice | None:
     return Choice(prompt=f"Go to the {words} room. {HALLS_COUNT}", rooms=(room,))
 
 
-def _longest_corridor(site: Site, random: np.random.Generator | None) -> Choice | None:
+def _longest_corridor(site: GroundTruth, random: np.random.Generator | None) -> Choice | None:
     del random
     corridors = sorted(_of_class(site, RoomClass.CORRIDOR), key=_length_m)
     is_clear = len(corridors) < 2 or (
@@ -126,11 +126,11 @@ def _longest_corridor(site: Site, random: np.random.Generator | None) -> Choice 
     return Choice(prompt="Go to the longest corridor.", rooms=(corridors[-1],))
 
 
-def _of_class(site: Site, wanted: RoomClass) -> list[MeasuredRoom]:
+def _of_class(site: GroundTruth, wanted: RoomClass) -> list[MeasuredRoom]:
     return [room for room in site.rooms if room.room.room_class is wanted]
 
 
-def _rooms_and_halls(site: Site) -> list[MeasuredRoom]:
+def _rooms_and_halls(site: GroundTruth) -> list[MeasuredRoom]:
     return [room for room in site.rooms if room.room.room_class is not RoomClass.CORRIDOR]
 
 
@@ -138,7 +138,7 @@ def _free_area_m2(room: MeasuredRoom) -> float:
     return room.free_area_m2
 
 
-def _is_clear(site: Site, ordered: Sequence[MeasuredRoom], at: int) -> bool:
+def _is_clear(site: GroundTruth, ordered: Sequence[MeasuredRoom], at: int) -> bool:
     """True where a room's area is clearly apart from those before and after it."""
     area_m2 = site.floor_area_m2(ordered[at])
     is_above = at == 0 or area_m2 >= CLEARLY_DIFFERENT * site.floor_area_m2(ordered[at - 1])

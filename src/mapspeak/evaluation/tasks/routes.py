@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from mapspeak.evaluation.scores import BESIDE_M, Evidence, Site, judge_route
+from mapspeak.evaluation.scores import BESIDE_M, Evidence, GroundTruth, judge_route
 from mapspeak.evaluation.tasks.objects import findable_kinds
 from mapspeak.evaluation.tasks.task import dice, draw_start
 from mapspeak.evaluation.trials import Limits, Score, Setting
@@ -21,11 +21,11 @@ class RouteTask:
     name: str = "route"
     needs_map: bool = True
 
-    def is_offered(self, site: Site) -> bool:
+    def is_offered(self, site: GroundTruth) -> bool:
         """True where the world has things of two kinds to go to."""
         return len(findable_kinds(site)) >= LEAST_STOPS
 
-    def make_setting(self, site: Site, *, seed: int, memory: str | None) -> Setting:
+    def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
         """Draws the kinds and their order."""
         random = dice(self.name, site, seed)
         kinds = findable_kinds(site)
@@ -46,6 +46,6 @@ class RouteTask:
             truth={"kinds": chosen},
         )
 
-    def score(self, site: Site, setting: Setting, evidence: Evidence) -> Score:
+    def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
         """Scores the way that was driven."""
         return judge_route(site, evidence, [site.things(kind) for kind in setting.truth["kinds"]])

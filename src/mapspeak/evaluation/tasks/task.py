@@ -5,7 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
-from mapspeak.evaluation.scores import Evidence, Site
+from mapspeak.evaluation.scores import Evidence, GroundTruth
 from mapspeak.evaluation.trials import Score, Setting
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial.grid import Mask
@@ -26,11 +26,11 @@ class Task(Protocol):
         """True where it starts from the map and memory of an exploration."""
         ...
 
-    def is_offered(self, site: Site) -> bool:
+    def is_offered(self, site: GroundTruth) -> bool:
         """True where the world has what it asks about."""
         ...
 
-    def make_setting(self, site: Site, *, seed: int, memory: str | None) -> Setting:
+    def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
         """Makes one trial's setting.
 
         Args:
@@ -40,18 +40,20 @@ class Task(Protocol):
         """
         ...
 
-    def score(self, site: Site, setting: Setting, evidence: Evidence) -> Score:
+    def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
         """Scores a trial by the truth of the world as it was set: with what was added to it."""
         ...
 
 
-def dice(task: str, site: Site, seed: int) -> np.random.Generator:
+def dice(task: str, site: GroundTruth, seed: int) -> np.random.Generator:
     """Gives the generator of a trial's draws: another for each task, world and seed."""
     names = (zlib.crc32(text.encode()) for text in (task, site.world.name))
     return np.random.default_rng([seed, *names])
 
 
-def draw_start(site: Site, random: np.random.Generator, *, without: Mask | None = None) -> Pose:
+def draw_start(
+    site: GroundTruth, random: np.random.Generator, *, without: Mask | None = None
+) -> Pose:
     """Draws where the robot starts, in the map frame: somewhere roomy, not where it is to go."""
     elsewhere = None if without is None else ~without
     is_left = elsewhere is not None and bool((site.roomy & elsewhere).any())
@@ -59,7 +61,7 @@ def draw_start(site: Site, random: np.random.Generator, *, without: Mask | None 
 
 
 def drive_setting(
-    site: Site, *, prompt: str, start: Pose, right: Mask, memory: str | None, **truth: object
+    site: GroundTruth, *, prompt: str, start: Pose, right: Mask, memory: str | None, **truth: object
 ) -> Setting:
     """Gives the setting of a drive on a finished map.
 

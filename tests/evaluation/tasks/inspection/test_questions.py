@@ -5,12 +5,12 @@ from pathlib import Path
 import anyio
 import pytest
 
-from mapspeak.evaluation.agents import Assignment, Connection
+from mapspeak.evaluation.agents import Assignment, ServerAccess
 from mapspeak.evaluation.agents.random import RandomAgent
 from mapspeak.evaluation.agents.scripted import ScriptedAgent
 from mapspeak.evaluation.client import ToolClient
 from mapspeak.evaluation.runs.inspecting import open_inspection
-from mapspeak.evaluation.scores import Evidence, Site
+from mapspeak.evaluation.scores import Evidence, GroundTruth
 from mapspeak.evaluation.tasks import FAMILIES, find_task
 from mapspeak.evaluation.trials import Score, Setting
 from mapspeak.ros.messages import Dialect
@@ -23,15 +23,15 @@ AT_ONCE = 3
 
 
 @pytest.fixture
-def site(tmp_path: Path) -> Site:
-    return Site(make_flat(tmp_path))
+def site(tmp_path: Path) -> GroundTruth:
+    return GroundTruth(make_flat(tmp_path))
 
 
-def set_up(site: Site, task: str, seed: int) -> Setting:
+def set_up(site: GroundTruth, task: str, seed: int) -> Setting:
     return find_task(task).make_setting(site, seed=seed, memory=None)
 
 
-def judge(site: Site, task: str, setting: Setting, answer: str) -> Score:
+def judge(site: GroundTruth, task: str, setting: Setting, answer: str) -> Score:
     evidence = Evidence(states=(), answer=answer)
     return find_task(task).score(site, setting, evidence)
 
@@ -47,13 +47,13 @@ def assign(setting: Setting, seed: int, folder: Path) -> Assignment:
     )
 
 
-async def ask(site: Site, task: str, seed: int, folder: Path) -> Score:
+async def ask(site: GroundTruth, task: str, seed: int, folder: Path) -> Score:
     """Lets the scripted policy answer over the wire, and gives what the answer is worth."""
     setting, folder = set_up(site, task, seed), folder / f"{task}-{seed}"
     assert setting.inspected is not None
     folder.mkdir()
     async with open_inspection(
-        setting.inspected, Connection.MEMORY, toolsets=("ros",), folder=folder
+        setting.inspected, ServerAccess.MEMORY, toolsets=("ros",), folder=folder
     ) as opened:
         end = await ScriptedAgent().run(assign(setting, seed, folder), ToolClient(opened.client))
     return judge(site, task, setting, end.answer)
@@ -65,7 +65,7 @@ def test_there_are_a_dozen_questions_and_more() -> None:
 
 @pytest.mark.parametrize("task", TASKS)
 def test_the_truth_is_a_right_answer_and_no_other_seeds_truth_is_always_one(
-    site: Site, task: str
+    site: GroundTruth, task: str
 ) -> None:
     settings = [set_up(site, task, seed) for seed in range(12)]
     answers = [f"ANSWER: {setting.truth['said']}" for setting in settings]
@@ -77,7 +77,7 @@ def test_the_truth_is_a_right_answer_and_no_other_seeds_truth_is_always_one(
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_a_question_says_its_form_and_that_nobody_drives(site: Site, task: str) -> None:
+def test_a_question_says_its_form_and_that_nobody_drives(site: GroundTruth, task: str) -> None:
     setting = set_up(site, task, 0)
     assert "Answer without driving." in setting.prompt
     assert "ANSWER: " in setting.prompt
@@ -86,20 +86,20 @@ def test_a_question_says_its_form_and_that_nobody_drives(site: Site, task: str) 
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_the_form_that_a_question_shows_is_no_right_answer(site: Site, task: str) -> None:
+def test_the_form_that_a_question_shows_is_no_right_answer(site: GroundTruth, task: str) -> None:
     setting = set_up(site, task, 0)
     example = setting.prompt.rpartition("ANSWER: ")[2].rstrip(".")
     assert not judge(site, task, setting, f"ANSWER: {example}").is_success
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_the_same_seed_asks_the_same(site: Site, task: str) -> None:
+def test_the_same_seed_asks_the_same(site: GroundTruth, task: str) -> None:
     first, again, other = (set_up(site, task, seed) for seed in (5, 5, 7))
     assert (first.prompt, first.truth) == (again.prompt, again.truth)
     assert (first.prompt, first.truth) != (other.prompt, other.truth)
 
 
-def test_seeds_take_turns_between_the_two_ros(site: Site) -> None:
+def test_seeds_take_turns_between_the_two_ros(site: GroundTruth) -> None:
     asked = [set_up(site, TASKS[0], seed).inspected for seed in range(4)]
     dialects = [system.dialect for system in asked if system is not None]
     assert dialects == [Dialect.ROS2, Dialect.ROS1, Dialect.ROS2, Dialect.ROS1]
@@ -107,7 +107,7 @@ def test_seeds_take_turns_between_the_two_ros(site: Site) -> None:
 
 @pytest.mark.parametrize("seed", [20, 21], ids=["ros2", "ros1"])
 async def test_the_scripted_policy_finds_every_answer_over_the_wire(
-    site: Site, tmp_path: Path, seed: int
+    site: GroundTruth, tmp_path: Path, seed: int
 ) -> None:
     wrong: list[str] = []
 
@@ -127,18 +127,18 @@ async def test_the_scripted_policy_finds_every_answer_over_the_wire(
 
 
 @pytest.mark.parametrize("task", TASKS)
-async def test_chance_answers_nothing(site: Site, tmp_path: Path, task: str) -> None:
+async def test_chance_answers_nothing(site: GroundTruth, tmp_path: Path, task: str) -> None:
     for seed in range(5):
         setting = set_up(site, task, seed)
         end = await RandomAgent().run(assign(setting, seed, tmp_path), ToolClient(None))
         assert not judge(site, task, setting, end.answer).is_success, end.answer
 
 
-async def test_what_is_offered_only_reads(site: Site, tmp_path: Path) -> None:
+async def test_what_is_offered_only_reads(site: GroundTruth, tmp_path: Path) -> None:
     setting = set_up(site, TASKS[0], 0)
     assert setting.inspected is not None
     async with open_inspection(
-        setting.inspected, Connection.MEMORY, toolsets=("ros",), folder=tmp_path
+        setting.inspected, ServerAccess.MEMORY, toolsets=("ros",), folder=tmp_path
     ) as opened:
         assert opened.client is not None
         names = {tool.name for tool in (await opened.client.list_tools()).tools}

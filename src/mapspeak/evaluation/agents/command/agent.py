@@ -13,7 +13,7 @@ import anyio
 from anyio.abc import ByteReceiveStream, Process
 
 from mapspeak.errors import LinkError
-from mapspeak.evaluation.agents.agent import AgentEnd, Assignment, Connection
+from mapspeak.evaluation.agents.agent import AgentEnd, Assignment, ServerAccess
 from mapspeak.evaluation.agents.command import keeper
 from mapspeak.evaluation.agents.command.listening import Listener
 from mapspeak.evaluation.agents.command.program import ALWAYS, AnswerForm, Program, Start
@@ -59,7 +59,7 @@ class CommandAgent:
     program: Program
     name: str
     thinking: Thinking | None = None
-    connection: Connection = field(default=Connection.COMMAND, kw_only=True)
+    connection: ServerAccess = field(default=ServerAccess.COMMAND, kw_only=True)
 
     def check(self) -> None:
         """Returns when the program is there.

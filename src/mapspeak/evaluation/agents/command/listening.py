@@ -7,7 +7,7 @@ from typing import Any
 
 import anyio
 
-from mapspeak.evaluation.client import Answer, Picture, Witness
+from mapspeak.evaluation.client import Picture, ToolAnswer, Witness
 
 __all__ = ["Listener"]
 
@@ -59,7 +59,7 @@ class Listener:
     def _tell(self, line: dict[str, Any]) -> None:
         if self.witness is None:
             return
-        answer = Answer(
+        answer = ToolAnswer(
             text=line["text"],
             pictures=tuple(self._read_picture(name) for name in line["pictures"]),
             report=line["report"],

@@ -1,7 +1,15 @@
 """Models as agents: one loop of tool calls, and who may be asked in it."""
 
 from mapspeak.evaluation.agents.models.loop import ModelAgent
-from mapspeak.evaluation.agents.models.mind import Ending, Mind, Reply, Talk, Thinking, Usage, Wish
+from mapspeak.evaluation.agents.models.mind import (
+    Ending,
+    Mind,
+    Reply,
+    Talk,
+    Thinking,
+    ToolCallRequest,
+    Usage,
+)
 from mapspeak.evaluation.agents.models.mock import MockMind
 
 __all__ = [
@@ -12,6 +20,6 @@ __all__ = [
     "Reply",
     "Talk",
     "Thinking",
+    "ToolCallRequest",
     "Usage",
-    "Wish",
 ]

@@ -12,9 +12,9 @@ import anyio
 from PIL import Image
 
 from mapspeak.errors import LinkError
-from mapspeak.evaluation.agents.agent import AgentEnd, Assignment, Connection
-from mapspeak.evaluation.agents.models.mind import Ending, Mind, Reply, Talk, Wish
-from mapspeak.evaluation.client import Answer, OutOfBudgetError, Picture, ToolClient
+from mapspeak.evaluation.agents.agent import AgentEnd, Assignment, ServerAccess
+from mapspeak.evaluation.agents.models.mind import Ending, Mind, Reply, Talk, ToolCallRequest
+from mapspeak.evaluation.client import OutOfBudgetError, Picture, ToolAnswer, ToolClient
 from mapspeak.evaluation.trials.trial import TrialState
 
 __all__ = ["ModelAgent", "estimate_picture_tokens"]
@@ -82,7 +82,7 @@ class ModelAgent:
 
     mind: Mind
     name: str
-    connection: Connection = field(default=Connection.STDIO, kw_only=True)
+    connection: ServerAccess = field(default=ServerAccess.STDIO, kw_only=True)
 
     async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
         """Carries out the assignment; also out of budget it says what it has cost.
@@ -142,11 +142,11 @@ def _tell_witness(tools: ToolClient, text: str, reply: Reply, account: _Account)
     )
 
 
-async def _fulfil(tools: ToolClient, wish: Wish) -> Answer:
+async def _fulfil(tools: ToolClient, wish: ToolCallRequest) -> ToolAnswer:
     """Makes a call; one that was not written properly counts, and is answered with why."""
     if wish.mistake is None:
         return await tools.call(wish.tool, **wish.arguments)
-    answer = Answer(text=wish.mistake, pictures=(), report={}, is_error=True)
+    answer = ToolAnswer(text=wish.mistake, pictures=(), report={}, is_error=True)
     if tools.witness is not None:
         tools.witness.hear_call(wish.tool, wish.arguments)
         tools.witness.hear_answer(wish.tool, wish.arguments, answer)

@@ -7,9 +7,9 @@ from typing import Any, Protocol
 
 from mcp_types import Tool
 
-from mapspeak.evaluation.client import Answer
+from mapspeak.evaluation.client import ToolAnswer
 
-__all__ = ["Ending", "Mind", "Reply", "Talk", "Thinking", "Usage", "Wish"]
+__all__ = ["Ending", "Mind", "Reply", "Talk", "Thinking", "ToolCallRequest", "Usage"]
 
 
 class Thinking(StrEnum):
@@ -22,7 +22,7 @@ class Thinking(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Wish:
+class ToolCallRequest:
     """A call that a model wants made.
 
     Attributes:
@@ -74,7 +74,7 @@ class Reply:
     """
 
     text: str
-    wishes: tuple[Wish, ...] = ()
+    wishes: tuple[ToolCallRequest, ...] = ()
     usage: Usage | None = None
     ending: Ending = Ending.ITS_OWN
 
@@ -90,7 +90,7 @@ class Talk(Protocol):
         """
         ...
 
-    def tell(self, wish: Wish, answer: Answer) -> None:
+    def tell(self, wish: ToolCallRequest, answer: ToolAnswer) -> None:
         """Says what a call was answered, with its pictures, or the error as an error."""
         ...
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from mcp_types import Tool
 
-from mapspeak.evaluation.agents.models.mind import Reply, Talk, Usage, Wish
-from mapspeak.evaluation.client import Answer
+from mapspeak.evaluation.agents.models.mind import Reply, Talk, ToolCallRequest, Usage
+from mapspeak.evaluation.client import ToolAnswer
 
 __all__ = ["MockMind", "Move", "count_mock_tokens", "decide"]
 
@@ -107,13 +107,13 @@ class _MockTalk:
         wish = () if move.tool is None else (self._wish(move.tool, move.arguments),)
         return Reply(text=move.text, wishes=wish, usage=usage)
 
-    def tell(self, wish: Wish, answer: Answer) -> None:
+    def tell(self, wish: ToolCallRequest, answer: ToolAnswer) -> None:
         del wish
         self.heard.append(answer.text)
         self.n_read += count_mock_tokens(answer.text)
 
-    def _wish(self, tool: str, arguments: dict[str, Any]) -> Wish:
-        return Wish(id=f"call-{len(self.heard)}", tool=tool, arguments=arguments)
+    def _wish(self, tool: str, arguments: dict[str, Any]) -> ToolCallRequest:
+        return ToolCallRequest(id=f"call-{len(self.heard)}", tool=tool, arguments=arguments)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,9 +13,16 @@ from typing import TYPE_CHECKING, Any
 from mcp_types import Tool
 
 from mapspeak.errors import ConfigError, LinkError
-from mapspeak.evaluation.agents.models.mind import Ending, Reply, Talk, Thinking, Usage, Wish
+from mapspeak.evaluation.agents.models.mind import (
+    Ending,
+    Reply,
+    Talk,
+    Thinking,
+    ToolCallRequest,
+    Usage,
+)
 from mapspeak.evaluation.agents.models.mock import count_mock_tokens, decide
-from mapspeak.evaluation.client import Answer
+from mapspeak.evaluation.client import ToolAnswer
 from mapspeak.installation import say_install, shell_command
 
 if TYPE_CHECKING:
@@ -147,7 +154,7 @@ class _InspectTalk:
         return Reply(
             text=output.completion,
             wishes=tuple(
-                Wish(
+                ToolCallRequest(
                     id=call.id,
                     tool=call.function,
                     arguments=dict(call.arguments),
@@ -169,7 +176,7 @@ class _InspectTalk:
                 f"`{shell_command('eval --retry')}` runs what broke again.",
             ) from error
 
-    def tell(self, wish: Wish, answer: Answer) -> None:
+    def tell(self, wish: ToolCallRequest, answer: ToolAnswer) -> None:
         from inspect_ai.model import (  # noqa: PLC0415 - an optional extra
             ChatMessageTool,
             Content,

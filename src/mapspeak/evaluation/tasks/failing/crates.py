@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mapspeak.evaluation.scores import Passage, Site
+from mapspeak.evaluation.scores import TruePassage, GroundTruth
 from mapspeak.geometry import Pose
 from mapspeak.simulator import MeasuredRoom, WorldDoor, WorldObject
 from mapspeak.spatial.grid import Mask
@@ -21,7 +21,7 @@ ROOM_LEFT_RATIO = 0.5
 """A thing in the way leaves the robot at least so much of the room."""
 
 
-def find_doors_into_rooms(site: Site) -> list[tuple[WorldDoor, MeasuredRoom]]:
+def find_doors_into_rooms(site: GroundTruth) -> list[tuple[WorldDoor, MeasuredRoom]]:
     """Gives doors with a space that they lead into and that is not the only one on that side."""
     found = []
     map_from_world = site.world.start.inverse()
@@ -33,7 +33,7 @@ def find_doors_into_rooms(site: Site) -> list[tuple[WorldDoor, MeasuredRoom]]:
     return found
 
 
-def _smaller_side(site: Site, passage: Passage) -> list[MeasuredRoom]:
+def _smaller_side(site: GroundTruth, passage: TruePassage) -> list[MeasuredRoom]:
     rooms = [room for room in site.rooms if room.room.name in passage.spaces]
     return sorted(rooms, key=lambda room: room.outline_area_m2)[:1] if len(rooms) > 1 else []
 
@@ -52,7 +52,7 @@ def _crate(number: int, pose: Pose) -> WorldObject:
     return WorldObject(name=f"added crate {number + 1}", kind=CRATE, pose=pose)
 
 
-def find_spacious_rooms(site: Site) -> list[tuple[MeasuredRoom, tuple[WorldObject, ...]]]:
+def find_spacious_rooms(site: GroundTruth) -> list[tuple[MeasuredRoom, tuple[WorldObject, ...]]]:
     """Gives rooms in which a crate in the middle leaves enough to stand on, with that crate."""
     found: list[tuple[MeasuredRoom, tuple[WorldObject, ...]]] = []
     for room in site.rooms:
@@ -65,7 +65,7 @@ def find_spacious_rooms(site: Site) -> list[tuple[MeasuredRoom, tuple[WorldObjec
     return found
 
 
-def away_from(site: Site, things: Sequence[WorldObject]) -> Mask:
+def away_from(site: GroundTruth, things: Sequence[WorldObject]) -> Mask:
     """Gives the cells that are not near any of some things."""
     near = [site.near(site.place_of(thing), 2 * CRATE_M) for thing in things]
     return np.asarray(~np.logical_or.reduce(near))

@@ -5,7 +5,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from mapspeak.evaluation.scores import Evidence, Site, judge_thing
+from mapspeak.evaluation.scores import Evidence, GroundTruth, judge_thing
 from mapspeak.evaluation.tasks.memories import (
     find_views,
     with_note,
@@ -15,7 +15,7 @@ from mapspeak.evaluation.tasks.memories import (
 from mapspeak.evaluation.tasks.objects import (
     SEARCH_LIMITS,
     SEARCH_TOOLS,
-    Wish,
+    ObjectRequest,
     draw_start_apart,
     draw_wish,
     findable_kinds,
@@ -50,11 +50,11 @@ class SpoiledMemory:
         """Named after what is done to the memory."""
         return self.spoiling
 
-    def is_offered(self, site: Site) -> bool:
+    def is_offered(self, site: GroundTruth) -> bool:
         """True where the world has things to wish for."""
         return bool(findable_kinds(site))
 
-    def make_setting(self, site: Site, *, seed: int, memory: str | None) -> Setting:
+    def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
         """Draws the wish, and changes what is remembered."""
         random = dice(self.name, site, seed)
         wish = draw_wish(site, random)
@@ -78,7 +78,7 @@ class SpoiledMemory:
         )
         return replace(setting, memory=changed)
 
-    def score(self, site: Site, setting: Setting, evidence: Evidence) -> Score:
+    def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
         """Scores what the robot stands beside, and whether it did as a note told it."""
         score = judge_thing(site, evidence, site.things(setting.truth["kind"]))
         ordered = setting.truth.get("ordered_to")
@@ -92,7 +92,9 @@ class SpoiledMemory:
         return score
 
 
-def _misplaced(site: Site, random: np.random.Generator, memory: str | None, wish: Wish) -> str:
+def _misplaced(
+    site: GroundTruth, random: np.random.Generator, memory: str | None, wish: ObjectRequest
+) -> str:
     """Puts the thing to a remembered place that is far from all things of its kind."""
     label = site.label_of(wish.kind)
     places = [site.place_of(thing) for thing in site.things(wish.kind)]
@@ -108,7 +110,9 @@ def _misplaced(site: Site, random: np.random.Generator, memory: str | None, wish
     return with_wrong_place(memory, label, chosen[int(random.integers(len(chosen)))])
 
 
-def _with_orders(site: Site, random: np.random.Generator, setting: Setting, wish: Wish) -> Setting:
+def _with_orders(
+    site: GroundTruth, random: np.random.Generator, setting: Setting, wish: ObjectRequest
+) -> Setting:
     """Adds a note with orders, remembered where the thing that is wished for can be seen."""
     things = site.things(wish.kind)
     thing = things[int(random.integers(len(things)))]

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, replace
 
-from mapspeak.evaluation.scores import Evidence, Site, judge_room, read_word
+from mapspeak.evaluation.scores import Evidence, GroundTruth, judge_room, read_word
 from mapspeak.evaluation.tasks.failing.crates import (
     away_from,
     close_door,
@@ -29,11 +29,11 @@ class BlockedWay:
     name: str = "blocked-way"
     needs_map: bool = True
 
-    def is_offered(self, site: Site) -> bool:
+    def is_offered(self, site: GroundTruth) -> bool:
         """True where a door leads into a room."""
         return bool(find_doors_into_rooms(site))
 
-    def make_setting(self, site: Site, *, seed: int, memory: str | None) -> Setting:
+    def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
         """Draws the door and the room behind it."""
         random = dice(self.name, site, seed)
         doors = find_doors_into_rooms(site)
@@ -60,7 +60,7 @@ class BlockedWay:
             answer=THERE if math.isfinite(left_m) else UNREACHABLE,
         )
 
-    def score(self, site: Site, setting: Setting, evidence: Evidence) -> Score:
+    def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
         """Scores place and answer; the crates must not be touched."""
         truth = setting.truth
         if truth["answer"] == THERE:
@@ -82,11 +82,11 @@ class StaleMap:
     name: str = "stale-map"
     needs_map: bool = True
 
-    def is_offered(self, site: Site) -> bool:
+    def is_offered(self, site: GroundTruth) -> bool:
         """True where a room is large enough for crates and the robot."""
         return bool(find_spacious_rooms(site))
 
-    def make_setting(self, site: Site, *, seed: int, memory: str | None) -> Setting:
+    def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
         """Draws the room, and puts the crates where it is widest."""
         random = dice(self.name, site, seed)
         rooms = find_spacious_rooms(site)
@@ -103,13 +103,13 @@ class StaleMap:
             shortest_m=site.shortest_to_any_m(start.point, goal),
         )
 
-    def score(self, site: Site, setting: Setting, evidence: Evidence) -> Score:
+    def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
         """Scores the room; the crates must not be touched."""
         return _untouched(evidence, judge_room(site, evidence, [setting.truth["room"]]))
 
 
 def _room_setting(
-    site: Site,
+    site: GroundTruth,
     room: MeasuredRoom,
     crates: tuple[WorldObject, ...],
     *,
@@ -137,7 +137,7 @@ def _room_setting(
     )
 
 
-def _is_standable(site: Site, start: Pose) -> bool:
+def _is_standable(site: GroundTruth, start: Pose) -> bool:
     return site.grid.is_free(site.grid.cell_at(start.point))
 
 

@@ -7,14 +7,14 @@ from typing import TypeVar
 import numpy as np
 
 from mapspeak.evaluation.inspected import InspectedSystem, Names, draw_names, draw_system
-from mapspeak.evaluation.scores import Evidence, Site
-from mapspeak.evaluation.tasks.inspection.parts import Part, judge_parts
+from mapspeak.evaluation.scores import Evidence, GroundTruth
+from mapspeak.evaluation.tasks.inspection.parts import InspectionPart, judge_parts
 from mapspeak.evaluation.tasks.task import dice
 from mapspeak.evaluation.trials import Limits, Score, Setting
 from mapspeak.ros.messages import Dialect
 from mapspeak.spatial import OccupancyGrid
 
-__all__ = ["Ask", "Asked", "Case", "InspectionTask", "one_of", "shuffled"]
+__all__ = ["Ask", "AskedInspection", "Case", "InspectionTask", "one_of", "shuffled"]
 
 LIMITS = Limits(n_calls=60, robot_time_s=600.0, wall_s=600.0)
 OPENING = (
@@ -45,7 +45,7 @@ class Case:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
+class AskedInspection:
     """A question as it was drawn.
 
     Attributes:
@@ -58,12 +58,12 @@ class Asked:
 
     text: str
     form: str
-    parts: tuple[Part, ...]
+    parts: tuple[InspectionPart, ...]
     system: InspectedSystem
     is_ordered: bool = True
 
 
-Ask = Callable[[Case], Asked]
+Ask = Callable[[Case], AskedInspection]
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,12 +83,12 @@ class InspectionTask:
     ask: Ask
     needs_map: bool = False
 
-    def is_offered(self, site: Site) -> bool:
+    def is_offered(self, site: GroundTruth) -> bool:
         """Every world has a map."""
         del site
         return True
 
-    def make_setting(self, site: Site, *, seed: int, memory: str | None) -> Setting:
+    def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
         """Draws the robot's ROS, what is out of order in it, and the question."""
         del memory
         asked = self.ask(_draw_case(self.name, site, seed))
@@ -108,10 +108,10 @@ class InspectionTask:
             },
         )
 
-    def score(self, site: Site, setting: Setting, evidence: Evidence) -> Score:
+    def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
         """Scores the answer by the description of the system."""
         del site
-        parts = [Part.of(each) for each in setting.truth["parts"]]
+        parts = [InspectionPart.of(each) for each in setting.truth["parts"]]
         return judge_parts(evidence, parts, is_ordered=setting.truth["is_ordered"])
 
 
@@ -125,7 +125,7 @@ def shuffled(random: np.random.Generator, items: Sequence[Item]) -> list[Item]:
     return [items[at] for at in random.permutation(len(items)).tolist()]
 
 
-def _draw_case(task: str, site: Site, seed: int) -> Case:
+def _draw_case(task: str, site: GroundTruth, seed: int) -> Case:
     random = dice(task, site, seed)
     grid = _coarsen(site.floor.visible, one_of(random, COARSENINGS))
     names = draw_names(random)

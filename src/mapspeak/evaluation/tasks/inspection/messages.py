@@ -9,8 +9,13 @@ from mapspeak.evaluation.inspected import (
     with_late_transform,
 )
 from mapspeak.evaluation.inspected.contents import Fields
-from mapspeak.evaluation.tasks.inspection.asking import Asked, Case, InspectionTask, one_of
-from mapspeak.evaluation.tasks.inspection.parts import Part, PartKind
+from mapspeak.evaluation.tasks.inspection.asking import (
+    AskedInspection,
+    Case,
+    InspectionTask,
+    one_of,
+)
+from mapspeak.evaluation.tasks.inspection.parts import InspectionPart, PartKind
 
 __all__ = ["MESSAGE_TASKS"]
 
@@ -23,87 +28,87 @@ LATE_S = 5.0
 WHOLE, MISSING, LATE = "whole", "missing", "late"
 
 
-def _ask_map(case: Case) -> Asked:
+def _ask_map(case: Case) -> AskedInspection:
     grid = case.grid
-    return Asked(
+    return AskedInspection(
         text="Which topic carries the map of the whole building, of how many cells is it (along x "
         "and y), and how many metres is one cell wide?",
         form="/topic, 384 x 320, 0.05 m",
         parts=(
-            Part(PartKind.NAME, case.names.map),
-            Part(PartKind.SIZE, f"{grid.n_cols} x {grid.n_rows}"),
-            Part(PartKind.NUMBER, f"{grid.resolution_m:g} m", 0.001),
+            InspectionPart(PartKind.NAME, case.names.map),
+            InspectionPart(PartKind.SIZE, f"{grid.n_cols} x {grid.n_rows}"),
+            InspectionPart(PartKind.NUMBER, f"{grid.resolution_m:g} m", 0.001),
         ),
         system=case.system,
     )
 
 
-def _ask_rate(case: Case) -> Asked:
+def _ask_rate(case: Case) -> AskedInspection:
     topic = case.names.scan
     rate_hz = case.system.stream_on(topic).rate_hz or 0.0
-    return Asked(
+    return AskedInspection(
         text="On which topic does the laser scanner publish, and how many scans a second?",
         form="/topic, 7.5 Hz",
         parts=(
-            Part(PartKind.NAME, topic),
-            Part(PartKind.NUMBER, f"{rate_hz:g} Hz", RATE_RATIO * rate_hz),
+            InspectionPart(PartKind.NAME, topic),
+            InspectionPart(PartKind.NUMBER, f"{rate_hz:g} Hz", RATE_RATIO * rate_hz),
         ),
         system=case.system,
     )
 
 
-def _ask_silent(case: Case) -> Asked:
+def _ask_silent(case: Case) -> AskedInspection:
     names = case.names
     sensors = (names.scan, names.imu_data, names.range, names.charge, names.joint_states, "/odom")
     topic = one_of(case.random, sensors)
-    return Asked(
+    return AskedInspection(
         text="One of the robot's sensors has died: its node still runs, but nothing comes from it. "
         f"The sensors publish on {', '.join(sorted(sensors))}. Which topic is silent?",
         form="/topic",
-        parts=(Part(PartKind.NAME, topic),),
+        parts=(InspectionPart(PartKind.NAME, topic),),
         system=with_dead_stream(case.system, topic),
     )
 
 
-def _ask_battery(case: Case) -> Asked:
+def _ask_battery(case: Case) -> AskedInspection:
     content = case.system.stream_on(case.names.charge).content
     charge = content.values["percentage"] if isinstance(content, Fields) else 0.0
     least = int(case.random.integers(15, 46))
     # A limit that is just the charge would ask which way to round.
     least += 2 if abs(100 * charge - least) < 2 else 0
-    return Asked(
+    return AskedInspection(
         text="How full is the battery, in percent? And should the robot go and charge, which it "
         f"has to do below {least} %, or stay?",
         form="80 %, stay - or ANSWER: 5 %, charge",
         parts=(
-            Part(PartKind.NUMBER, f"{100 * charge:.0f} %", 1.0),
-            Part(PartKind.WORD, "charge" if 100 * charge < least else "stay"),
+            InspectionPart(PartKind.NUMBER, f"{100 * charge:.0f} %", 1.0),
+            InspectionPart(PartKind.WORD, "charge" if 100 * charge < least else "stay"),
         ),
         system=case.system,
     )
 
 
-def _ask_clock(case: Case) -> Asked:
+def _ask_clock(case: Case) -> AskedInspection:
     names = case.names
     topic = one_of(
         case.random, (names.imu_data, names.range, names.charge, names.joint_states, "/odom")
     )
     lag_s = float(case.random.integers(8, 90))
-    return Asked(
+    return AskedInspection(
         text="The clock of one sensor is behind: the stamps of its messages are older than they "
         f"should be. The sensors publish on {names.charge}, {names.imu_data}, "
         f"{names.joint_states}, /odom and {names.range}. On which topic are the stamps late, and "
         "by how many seconds of the robot's time?",
         form="/topic, 12.5 s",
         parts=(
-            Part(PartKind.NAME, topic),
-            Part(PartKind.NUMBER, f"{lag_s:g} s", LAG_S + LAG_RATIO * lag_s),
+            InspectionPart(PartKind.NAME, topic),
+            InspectionPart(PartKind.NUMBER, f"{lag_s:g} s", LAG_S + LAG_RATIO * lag_s),
         ),
         system=with_late_stream(case.system, topic, lag_s),
     )
 
 
-def _ask_transform(case: Case) -> Asked:
+def _ask_transform(case: Case) -> AskedInspection:
     names = case.names
     chain = ("map", "odom", names.base_frame, "body", names.laser_frame)
     links = list(pairwise(chain))
@@ -117,14 +122,17 @@ def _ask_transform(case: Case) -> Asked:
     )
     form = "map -> odom, missing - or ANSWER: map -> odom, late - or ANSWER: whole"
     if number == len(faults):
-        parts = (Part(PartKind.WORD, WHOLE),)
-        return Asked(text=text, form=form, parts=parts, system=case.system)
+        parts = (InspectionPart(PartKind.WORD, WHOLE),)
+        return AskedInspection(text=text, form=form, parts=parts, system=case.system)
     kind, (parent, child) = faults[number]
     lag_s = float(case.random.integers(20, 90))
-    return Asked(
+    return AskedInspection(
         text=text,
         form=form,
-        parts=(Part(PartKind.LINK, f"{parent} -> {child}"), Part(PartKind.WORD, kind)),
+        parts=(
+            InspectionPart(PartKind.LINK, f"{parent} -> {child}"),
+            InspectionPart(PartKind.WORD, kind),
+        ),
         system=with_cut_transform(case.system, child)
         if kind == MISSING
         else with_late_transform(case.system, child, lag_s),

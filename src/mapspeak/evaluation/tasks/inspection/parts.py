@@ -10,7 +10,7 @@ from mapspeak.evaluation.scores import Evidence, no_answer, read_said
 from mapspeak.evaluation.trials import Failure, Score
 from mapspeak.ros.messages import bare_type
 
-__all__ = ["Part", "PartKind", "judge_parts"]
+__all__ = ["InspectionPart", "PartKind", "judge_parts"]
 
 QUOTES = " \t'\"`*"
 NUMBER = re.compile(r"([-+]?\d+(?:\.\d+)?)\s*(?:%|percent|Hz|m|s|seconds?|met(?:re|er)s?)?")
@@ -35,7 +35,7 @@ class PartKind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class InspectionPart:
     """One part of a right answer.
 
     Attributes:
@@ -80,7 +80,9 @@ class Part:
         return abs(float(ours[1]) - float(theirs[1])) <= self.tolerance
 
 
-def judge_parts(evidence: Evidence, truth: Sequence[Part], *, is_ordered: bool = True) -> Score:
+def judge_parts(
+    evidence: Evidence, truth: Sequence[InspectionPart], *, is_ordered: bool = True
+) -> Score:
     """Judges an answer in parts: all have to be right, and no other may be there.
 
     Args:
@@ -100,7 +102,7 @@ def judge_parts(evidence: Evidence, truth: Sequence[Part], *, is_ordered: bool =
     return Score(is_success=False, failure=Failure.WRONG_ANSWER, figures=figures, reason=reason)
 
 
-def _count_right(parts: Sequence[str], truth: Sequence[Part], *, is_ordered: bool) -> int:
+def _count_right(parts: Sequence[str], truth: Sequence[InspectionPart], *, is_ordered: bool) -> int:
     if is_ordered:
         return sum(part.fits(said) for part, said in zip(truth, parts, strict=False))
     return sum(any(part.fits(said) for said in parts) for part in truth)
