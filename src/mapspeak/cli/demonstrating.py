@@ -63,7 +63,6 @@ def demo(world: str, seed: int, folder: Path | None, is_quiet: bool) -> None:  #
 
 def _run_trials(world: str, seed: int, folder: Path, bar: "TrialBar") -> "list[TrialResult]":
     """Run the trials one after the other in this process, each with a server over stdio."""
-    from mapspeak.evaluation.agents import ServerAccess  # noqa: PLC0415 - heavy
     from mapspeak.evaluation.runs import (  # noqa: PLC0415
         RunOptions,
         attempt,
@@ -71,7 +70,7 @@ def _run_trials(world: str, seed: int, folder: Path, bar: "TrialBar") -> "list[T
         plan_run,
         writing_to,
     )
-    from mapspeak.evaluation.trials import trial_folder  # noqa: PLC0415
+    from mapspeak.evaluation.trials import ServerAccess, trial_folder  # noqa: PLC0415
     from mapspeak.safety import Hold  # noqa: PLC0415
 
     options = RunOptions(worlds=(world,), n_trials=1, seed=seed, folder=folder)

@@ -83,7 +83,7 @@ class Witness(Protocol):
     """Whoever hears every call, and may refuse one."""
 
     def hear_call(self, tool: str, arguments: dict[str, Any]) -> None:
-        """Hears of a call before it is made.
+        """Hear of a call before it is made.
 
         Raises:
             OutOfBudgetError: It must not be made.
@@ -91,7 +91,7 @@ class Witness(Protocol):
         ...
 
     def hear_answer(self, tool: str, arguments: dict[str, Any], answer: ToolAnswer) -> None:
-        """Hears what was answered."""
+        """Hear what was answered."""
         ...
 
     def hear_words(
@@ -103,7 +103,7 @@ class Witness(Protocol):
         n_output_tokens: int | None = None,
         n_picture_tokens: int | None = None,
     ) -> None:
-        """Hears what was said besides calls: role is "system", "user" or "agent"."""
+        """Hear what was said besides calls: role is "system", "user" or "agent"."""
         ...
 
 
@@ -119,12 +119,12 @@ class Ledger:
     _begun_s: float = 0.0
 
     def hear_call(self, tool: str, arguments: dict[str, Any]) -> None:
-        """Notes when a call begins."""
+        """Note when a call begins."""
         del tool, arguments
         self._begun_s = time.perf_counter()
 
     def hear_answer(self, tool: str, arguments: dict[str, Any], answer: ToolAnswer) -> None:
-        """Remembers a call and what was answered."""
+        """Remember a call and what was answered."""
         self.calls.append(
             CallRecord(
                 tool=tool,
@@ -144,7 +144,7 @@ class Ledger:
         n_output_tokens: int | None = None,
         n_picture_tokens: int | None = None,
     ) -> None:
-        """Forgets what was said besides calls."""
+        """Forget what was said besides calls."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +160,7 @@ class ToolClient:
     witness: Witness | None = None
 
     async def call(self, tool: str, /, **arguments: object) -> ToolAnswer:
-        """Calls a tool and gives its answer, also when that is an error.
+        """Call a tool and return its answer, also when that is an error.
 
         Raises:
             LinkError: There is no client.
@@ -175,7 +175,7 @@ class ToolClient:
         return answer
 
     async def list_tools(self) -> list[Tool]:
-        """Gives the tools as the server describes them to any model.
+        """Return the tools as the server describes them to any model.
 
         Raises:
             LinkError: There is no client.
@@ -188,7 +188,7 @@ class ToolClient:
         return self.client
 
     async def demand(self, tool: str, /, **arguments: object) -> ToolAnswer:
-        """Calls a tool that has to succeed.
+        """Call a tool that has to succeed.
 
         Raises:
             LinkError: It did not; its text says why.

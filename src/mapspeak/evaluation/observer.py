@@ -40,12 +40,12 @@ class DetectedThing:
         return any(word in self.label for word in SAFETY_WORDS)
 
     def as_landmark(self) -> dict[str, Any]:
-        """Gives it as `write_semantic_data` takes it."""
+        """Return it as `write_semantic_data` takes it."""
         return {"label": self.label, "bearing_deg": self.bearing_deg, "range_m": self.range_m}
 
 
 def read_sightings(text: str) -> tuple[DetectedThing, ...]:
-    """Reads the detector's lines in the answer of `look_through_camera`, nearest first."""
+    """Read the detector's lines in the answer of `look_through_camera`, nearest first."""
     sightings = (
         DetectedThing(
             label=match["label"],
@@ -58,7 +58,7 @@ def read_sightings(text: str) -> tuple[DetectedThing, ...]:
 
 
 def describe_view(number: int, place: str, sightings: tuple[DetectedThing, ...]) -> dict[str, Any]:
-    """Gives the arguments of `write_semantic_data` for what is seen from here."""
+    """Return the arguments of `write_semantic_data` for what is seen from here."""
     clear = [sighting for sighting in sightings if sighting.range_m <= CLEAR_RANGE_M]
     names = ", ".join(dict.fromkeys(sighting.label for sighting in clear))
     seen = f"The simulated detector reports: {names}." if names else "Nothing it knows is near."

@@ -91,7 +91,7 @@ class ScriptedPolicy:
     _grid: OccupancyGrid = field(init=False)
 
     async def run(self) -> PolicyResult:
-        """Carries out the three tasks in the paper's order."""
+        """Carry out the three tasks in the paper's order."""
         is_explored = await self.explore()
         smallest_room = await self.go_to_smallest_room()
         fire_waypoint = await self.go_to_fire_tool()
@@ -115,7 +115,7 @@ class ScriptedPolicy:
         return not view.rows("Frontiers")
 
     async def _follow_frontiers(self, view: MapReading) -> MapReading:
-        """Lets the robot explore, one frontier at a time, until none is left that it can reach."""
+        """Let the robot explore, one frontier at a time, until none is left that it can reach."""
         while self._n_goals < MOST_GOALS and (n_goals := await self._explore_one()):
             self._n_goals += n_goals
             view = await self._look(Stage.EXPLORE)
@@ -123,7 +123,7 @@ class ScriptedPolicy:
         return view
 
     async def _explore_one(self) -> int:
-        """Gives how many frontiers the robot set out to, none where nothing is left."""
+        """Return how many frontiers the robot set out to, none where nothing is left."""
         state = "driving"
         while state == "driving":
             report = (await self.tools.demand("explore", n_goals=1, wait_s=WAIT_S)).report
@@ -132,7 +132,7 @@ class ScriptedPolicy:
         return int(report["n_goals"])
 
     async def _survey(self, pose: Pose) -> None:
-        """Looks around wherever floor has not been looked at from near."""
+        """Look around wherever floor has not been looked at from near."""
         for _ in range(MOST_VIEWPOINTS):
             point = find_viewpoint(self._grid, pose.point, self._looked_at, radius_m=MARGIN_M)
             if point is None:
@@ -197,7 +197,7 @@ class ScriptedPolicy:
         return await self._see_through(stage, place, answer)
 
     async def _see_through(self, stage: Stage, place: str, answer: ToolAnswer) -> str:
-        """Waits until a drive has ended, and gives how."""
+        """Wait until a drive has ended, and return how."""
         while not answer.is_error and answer.report["state"] not in FINAL_STATES:
             answer = await self.tools.call(
                 "wait_for_goal", goal_id=answer.report["goal_id"], wait_s=WAIT_S
@@ -207,7 +207,7 @@ class ScriptedPolicy:
         return state
 
     async def _record_surroundings(self, pose: Pose) -> None:
-        """Records what is ahead and, where it has not looked around near by, to all sides."""
+        """Record what is ahead and, where it has not looked around near by, to all sides."""
         await self._record()
         if any(pose.point.distance_to(place) < LOOK_AROUND_EVERY_M for place in self._looked_at):
             return
@@ -259,7 +259,7 @@ def _point_of(record: dict[str, Any]) -> Point:
 
 
 def _range_of_fire_tool(record: dict[str, Any]) -> float | None:
-    """Gives how far from a waypoint its fire extinguisher is; None where it names none."""
+    """Return how far from a waypoint its fire extinguisher is; None where it names none."""
     landmarks = record["safety_landmarks"] + record["functional_landmarks"]
     ranges = [each["range_m"] for each in landmarks if re.search("extinguish", each["label"])]
     return min((math.inf if each is None else each for each in ranges), default=None)

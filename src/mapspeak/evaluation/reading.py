@@ -36,7 +36,7 @@ class Row:
     cells: dict[str, str]
 
     def number(self, column: str) -> float:
-        """Gives a column as a number; infinite where the table says there is none."""
+        """Return a column as a number; infinite where the table says there is none."""
         match = re.match(r"-?[\d.]+", self.cells[column])
         return float(match.group()) if match else math.inf
 
@@ -54,12 +54,12 @@ class MapReading:
     tables: dict[str, tuple[Row, ...]]
 
     def rows(self, table: str) -> tuple[Row, ...]:
-        """Gives the rows of a table; none where it is not there."""
+        """Return the rows of a table; none where it is not there."""
         return self.tables.get(table, ())
 
 
 def read_map_text(text: str) -> MapReading:
-    """Reads what `look_at_map` answered.
+    """Read what `look_at_map` answered.
 
     Raises:
         MapError: The text names no pose.
@@ -89,7 +89,7 @@ def _split(line: str) -> list[str]:
 
 
 def read_map_picture(text: str, picture: bytes) -> OccupancyGrid:
-    """Reads the grid back from `subscribe_map_as_image`, by the grey levels of the paper's eq. 1.
+    """Read the grid back from `subscribe_map_as_image`, by the grey levels of the paper's eq. 1.
 
     Raises:
         MapError: The text does not say where whole cells lie in the picture.

@@ -26,7 +26,7 @@ N_RAYS = 180
 def find_viewpoint(
     grid: OccupancyGrid, robot: Point, looked_from: Sequence[Point], *, radius_m: float
 ) -> Point | None:
-    """Finds the middle of the nearest piece of floor that is still to be looked at, or None."""
+    """Find the middle of the nearest piece of floor that is still to be looked at, or None."""
     distances = distances_from(grid, robot, radius_m=radius_m)
     rows, cols = np.nonzero(grid.free)
     ways_m = np.full(grid.cells.shape, np.inf)
@@ -44,7 +44,7 @@ def find_viewpoint(
 
 
 def _near_in_sight(grid: OccupancyGrid, place: Point) -> Mask:
-    """Gives the cells that can be seen from a place and are near it."""
+    """Return the cells that can be seen from a place and are near it."""
     angles = np.linspace(-math.pi, math.pi, N_RAYS, endpoint=False)
     reach = np.arange(0.0, SIGHT_M, grid.resolution_m)
     xs = place.x + np.cos(angles)[:, None] * reach
@@ -76,7 +76,7 @@ def _find_nearest_piece(grid: OccupancyGrid, is_left: Mask, ways_m: FloatArray) 
 
 
 def _depth(piece: Mask) -> FloatArray:
-    """Gives how many cells each cell lies inside its piece."""
+    """Return how many cells each cell lies inside its piece."""
     padded = np.pad(piece.astype(np.uint8), 1)
     depth = cv2.distanceTransform(padded, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     return np.asarray(depth[1:-1, 1:-1], dtype=np.float64)

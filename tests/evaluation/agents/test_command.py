@@ -8,13 +8,12 @@ import pytest
 import clientprogram
 from hearing import Hearing
 from mapspeak.errors import ConfigError, LinkError
-from mapspeak.evaluation.agents import Assignment
 from mapspeak.evaluation.agents.command import AnswerForm, CommandAgent, Program, find_program
 from mapspeak.evaluation.agents.command.program import Start
+from mapspeak.evaluation.agents.finding import find_versions
 from mapspeak.evaluation.agents.models import Thinking
-from mapspeak.evaluation.agents.others import find_versions
 from mapspeak.evaluation.client import ToolClient
-from mapspeak.evaluation.trials import Limits, TrialState
+from mapspeak.evaluation.trials import Assignment, Limits, TrialState
 
 pytestmark = pytest.mark.anyio
 

@@ -4,10 +4,9 @@ import pytest
 
 from drawing import grid_from_text
 from fakes import FakeRobot
-from mapspeak.evaluation.agents import Agent, AgentEnd, Assignment
 from mapspeak.evaluation.agents.exploring import NearestFrontierAgent, PaperLoopAgent
 from mapspeak.evaluation.client import Ledger, ToolClient
-from mapspeak.evaluation.trials import Limits, TrialState
+from mapspeak.evaluation.trials import Agent, AgentEnd, Assignment, Limits, TrialState
 from mapspeak.geometry import Pose
 from served import connect
 

@@ -9,7 +9,7 @@ from PIL import Image
 from fakes import FakeRobot, two_rooms
 from hearing import Hearing
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.agents import AgentEnd, Assignment
+from mapspeak.evaluation.agents.finding import check_other, find_other
 from mapspeak.evaluation.agents.models import (
     Ending,
     MockMind,
@@ -20,9 +20,8 @@ from mapspeak.evaluation.agents.models import (
     Usage,
 )
 from mapspeak.evaluation.agents.models.loop import estimate_picture_tokens
-from mapspeak.evaluation.agents.others import check_other, find_other
 from mapspeak.evaluation.client import Ledger, Picture, ToolAnswer, ToolClient, Witness
-from mapspeak.evaluation.trials import Limits, TrialState
+from mapspeak.evaluation.trials import AgentEnd, Assignment, Limits, TrialState
 from mapspeak.server import Representation
 from served import connect
 

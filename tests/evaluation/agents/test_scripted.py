@@ -4,10 +4,9 @@ import pytest
 
 from drawing import grid_from_text
 from fakes import FakeRobot
-from mapspeak.evaluation.agents import AgentEnd, Assignment
 from mapspeak.evaluation.agents.scripted import ScriptedAgent
 from mapspeak.evaluation.client import Ledger, ToolClient
-from mapspeak.evaluation.trials import Limits, TrialState
+from mapspeak.evaluation.trials import AgentEnd, Assignment, Limits, TrialState
 from mapspeak.geometry import Pose
 from served import connect
 

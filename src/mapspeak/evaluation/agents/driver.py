@@ -10,7 +10,7 @@ from mapspeak.evaluation.observer import DetectedThing, read_sightings
 from mapspeak.evaluation.reading import MapReading, read_map_text
 from mapspeak.geometry import Point, Pose
 
-__all__ = ["Seen", "ToolDriver"]
+__all__ = ["Seen", "ToolDriver", "find_label"]
 
 WAIT_S = 25.0
 REGION = re.compile(r"\b[RCO]\d+\b")
@@ -64,17 +64,17 @@ class ToolDriver:
         return any(each.name == tool for each in await self.tools.list_tools())
 
     async def look(self) -> MapReading:
-        """Reads the map's tables."""
+        """Read the map's tables."""
         return read_map_text((await self.tools.demand("look_at_map")).text)
 
     async def find_pose(self) -> Pose:
-        """Gives where the robot is."""
+        """Return where the robot is."""
         robot = (await self.tools.demand("get_robot_pose")).report
         pose = robot.get("pose", robot)
         return Pose(pose["x"], pose["y"], math.radians(pose["yaw_deg"]))
 
     async def recall(self, label: str) -> list[Seen]:
-        """Gives everything remembered that bears a label, the nearest sightings first."""
+        """Return everything remembered that bears a label, the nearest sightings first."""
         memory = (await self.tools.demand("get_semantic_data")).report
         found = [
             _seen(record, landmark)
@@ -85,25 +85,25 @@ class ToolDriver:
         return sorted(found, key=lambda seen: seen.range_m)
 
     async def drive(self, **goal: object) -> str:
-        """Drives to a `place`, or to `x`, `y` and perhaps `yaw_deg`; gives how it ended."""
+        """Drive to a `place`, or to `x`, `y` and perhaps `yaw_deg`; gives how it ended."""
         answer = await self.tools.call("navigate_to", **goal, wait_s=WAIT_S)
         return await self._see_through(answer)
 
     async def find_nearest(self, places: list[str]) -> str | None:
-        """Gives which of some places is the nearest by path; None where no way leads to any."""
+        """Return which of some places is the nearest by path; None where no way leads to any."""
         text = (await self.tools.demand("measure", places=places, start="robot")).text
         rows = re.findall(r"^(\w+) \| [^|]+ \| \d", text, re.MULTILINE)
         return rows[0] if rows else None
 
     async def find_region(self, point: Point) -> str:
-        """Gives the id of the room, corridor or hall at a point; empty where there is none."""
+        """Return the id of the room, corridor or hall at a point; empty where there is none."""
         place = f"{point.x:.2f}, {point.y:.2f}"
         text = (await self.tools.demand("describe_place", place=place)).text
         found = REGION.search(text.partition("\n")[0])
         return found.group() if found else ""
 
     async def see(self) -> tuple[DetectedThing, ...]:
-        """Takes a picture and gives what the detector reports of it."""
+        """Take a picture and return what the detector reports of it."""
         return read_sightings((await self.tools.demand("look_through_camera")).text)
 
     async def _see_through(self, answer: ToolAnswer) -> str:
@@ -123,3 +123,30 @@ def _seen(record: dict[str, Any], landmark: dict[str, Any]) -> Seen:
         bearing_rad=None if bearing_deg is None else math.radians(bearing_deg),
         range_m=math.inf if landmark["range_m"] is None else landmark["range_m"],
     )
+
+
+CUES = (
+    ("hand-held device|water comes from the wall", "fire hose reel"),
+    ("[Ff]ire|burning|puts it out|flames|smoulder", "fire extinguisher"),
+    ("bandage|plaster|bleeding", "first-aid box"),
+    ("leave the building|way outside", "exit sign"),
+    ("[Aa]cid|rinsed", "eye wash station"),
+    ("climb", "ladder"),
+    ("battery|plugged in", "charging dock"),
+    ("heavy load", "forklift"),
+    ("write a letter", "desk"),
+    ("files are kept", "filing cabinet"),
+    ("lie down", "sofa"),
+    ("sketch", "whiteboard"),
+    ("on paper", "printer"),
+    ("kept cold", "fridge"),
+    ("hot drink", "coffee machine"),
+    ("wash", "sink"),
+    ("privacy", "toilet"),
+    ("apple", "trash bin"),
+)
+
+
+def find_label(wish: str) -> str | None:
+    """Return the thing that is meant; None where no word is known."""
+    return next((label for words, label in CUES if re.search(words, wish)), None)

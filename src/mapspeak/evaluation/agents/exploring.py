@@ -6,12 +6,11 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
-from mapspeak.evaluation.agents.agent import AgentEnd, Assignment, ServerAccess
-from mapspeak.evaluation.agents.cues import find_label
-from mapspeak.evaluation.agents.driver import ARRIVED, ToolDriver
+from mapspeak.evaluation.agents.driver import ARRIVED, ToolDriver, find_label
 from mapspeak.evaluation.client import ToolClient
 from mapspeak.evaluation.observer import describe_view
 from mapspeak.evaluation.reading import read_map_picture
+from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess
 from mapspeak.evaluation.trials.trial import TrialState
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import OccupancyGrid
@@ -48,7 +47,7 @@ class _Log:
     n_views: int = 0
 
     async def record(self) -> Pose:
-        """Records what is ahead, and gives where that was."""
+        """Record what is ahead, and return where that was."""
         sightings = await self.driver.see()
         pose = await self.driver.find_pose()
         self.n_views += 1
@@ -68,7 +67,7 @@ class NearestFrontierAgent:
     connection: ServerAccess = ServerAccess.MEMORY
 
     async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
-        """Carries out the assignment."""
+        """Carry out the assignment."""
         if not task.prompt.startswith(EXPLORING):
             return _gave_up("I only explore.")
         driver, missed = ToolDriver(tools), list[Point]()
@@ -105,7 +104,7 @@ class PaperLoopAgent:
     connection: ServerAccess = ServerAccess.MEMORY
 
     async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
-        """Carries out the assignment."""
+        """Carry out the assignment."""
         driver = ToolDriver(tools)
         if task.prompt.startswith(EXPLORING):
             return await _explore_by_picture(driver)
@@ -142,7 +141,7 @@ async def _explore_by_picture(driver: ToolDriver) -> AgentEnd:
 
 
 async def _see_map(driver: ToolDriver) -> OccupancyGrid:
-    """Looks at all three of the paper's pictures, and reads the first as it is drawn."""
+    """Look at all three of the paper's pictures, and reads the first as it is drawn."""
     plain = await driver.tools.demand("subscribe_map_as_image")
     await driver.tools.demand("draw_map_axis")
     await driver.tools.demand("draw_robot_pose")
@@ -150,7 +149,7 @@ async def _see_map(driver: ToolDriver) -> OccupancyGrid:
 
 
 def _choose_waypoint(grid: OccupancyGrid, robot: Point, tour: _Tour) -> Pose | None:
-    """Finds the place that sees most of the border with the unknown, by the prompt's rules.
+    """Find the place that sees most of the border with the unknown, by the prompt's rules.
 
     A place at least 5 m away comes first; where there is none, one that is nearer.
     """
@@ -176,7 +175,7 @@ def _choose_waypoint(grid: OccupancyGrid, robot: Point, tour: _Tour) -> Pose | N
 
 
 def _edge_of_unknown(grid: OccupancyGrid) -> Mask:
-    """Gives free cells beside unknown ones."""
+    """Return free cells beside unknown ones."""
     beside = cv2.dilate(grid.unknown.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     return np.asarray(grid.free & beside)
 
@@ -200,7 +199,7 @@ def _ways_m(points: FloatArray, place: Point) -> FloatArray:
 
 
 async def _go_to_smallest_patch(driver: ToolDriver) -> AgentEnd:
-    """Goes into the smallest piece of floor that is left when narrow places are closed."""
+    """Go into the smallest piece of floor that is left when narrow places are closed."""
     grid = await _see_map(driver)
     room_m = clearance_m(grid)
     n_patches, labels, statistics, _ = cv2.connectedComponentsWithStats(
@@ -218,7 +217,7 @@ async def _go_to_smallest_patch(driver: ToolDriver) -> AgentEnd:
 
 
 async def _recall(driver: ToolDriver, label: str) -> AgentEnd:
-    """Goes to the nearest waypoint, in a straight line, that remembers the thing."""
+    """Go to the nearest waypoint, in a straight line, that remembers the thing."""
     seen, pose = await driver.recall(label), await driver.find_pose()
     if not seen:
         return _gave_up(f"I remember no {label}.")

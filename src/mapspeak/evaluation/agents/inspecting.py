@@ -4,10 +4,9 @@ import re
 from collections.abc import Awaitable, Callable
 from itertools import pairwise
 
-from mapspeak.evaluation.agents.agent import AgentEnd
 from mapspeak.evaluation.agents.rosreading import RosReader
 from mapspeak.evaluation.client import ToolClient
-from mapspeak.evaluation.trials import TrialState
+from mapspeak.evaluation.trials import AgentEnd, TrialState
 
 __all__ = ["diagnose"]
 
@@ -31,7 +30,7 @@ Diagnosis = Callable[[RosReader, str], Awaitable[str | None]]
 
 
 async def diagnose(tools: ToolClient, question: str) -> AgentEnd:
-    """Answers a question about the robot's ROS in the form that it asks for."""
+    """Answer a question about the robot's ROS in the form that it asks for."""
     reader = RosReader(tools)
     for pattern, find_out in DIAGNOSES:
         if re.search(pattern, question):

@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from mapspeak.evaluation.agents.agent import Agent, AgentEnd, Assignment, ServerAccess
 from mapspeak.evaluation.agents.driver import ARRIVED, ToolDriver
 from mapspeak.evaluation.agents.scripted import ScriptedAgent
 from mapspeak.evaluation.client import ToolClient
 from mapspeak.evaluation.scores import GroundTruth
-from mapspeak.evaluation.trials import Setting
+from mapspeak.evaluation.trials import Agent, AgentEnd, Assignment, ServerAccess, Setting
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import Cell
 from mapspeak.spatial.grid import Mask
@@ -38,7 +37,7 @@ class OracleAgent:
     connection: ServerAccess = ServerAccess.MEMORY
 
     async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
-        """Carries out the assignment."""
+        """Carry out the assignment."""
         truth, driver = self.setting.truth, ToolDriver(tools)
         known = _known_answer(truth)
         if known is not None:
@@ -52,7 +51,7 @@ class OracleAgent:
         return AgentEnd(answer="ANSWER: there")
 
     def _stops(self) -> list[list[Pose]]:
-        """Gives poses for each stop that are right, the roomiest first."""
+        """Return poses for each stop that are right, the roomiest first."""
         truth, site = self.setting.truth, self.site
         if "goal" in truth:
             goal = Point(*truth["goal"])
@@ -87,7 +86,7 @@ class OracleAgent:
 
 
 def _known_answer(truth: Mapping[str, Any]) -> str | None:
-    """Gives the right answer of a question that needs no drive; None for all else."""
+    """Return the right answer of a question that needs no drive; None for all else."""
     if "said" in truth:
         return str(truth["said"])
     if "number" in truth:

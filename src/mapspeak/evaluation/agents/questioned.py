@@ -2,10 +2,9 @@
 
 import re
 
-from mapspeak.evaluation.agents.agent import AgentEnd
 from mapspeak.evaluation.agents.driver import ToolDriver
 from mapspeak.evaluation.reading import MapReading, Row
-from mapspeak.evaluation.trials import TrialState
+from mapspeak.evaluation.trials import AgentEnd, TrialState
 from mapspeak.geometry import Point
 
 __all__ = ["answer_question"]
@@ -15,7 +14,7 @@ CHOICE = re.compile(r"\b([A-H]) \((-?\d+\.\d+), (-?\d+\.\d+)\)")
 
 
 async def answer_question(driver: ToolDriver, question: str) -> AgentEnd:
-    """Answers a question in the form that it asks for."""
+    """Answer a question in the form that it asks for."""
     if "drive next" in question:
         return await _say_where_to_explore(driver)
     if "have to drive" in question:
@@ -65,7 +64,7 @@ def _row_of(view: MapReading, region: str) -> Row | None:
 
 
 def _ways_out(view: MapReading, row: Row) -> dict[str, str]:
-    """Gives the doors that the robot can drive through, and where each leads."""
+    """Return the doors that the robot can drive through, and where each leads."""
     closed = {door.id for door in view.rows("Doors") if door.cells["path m"].startswith("no way")}
     found = dict(re.findall(r"(D\d+)>(\w+)", row.cells["doors"]))
     return {door: there for door, there in found.items() if door not in closed}

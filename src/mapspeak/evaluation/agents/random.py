@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapspeak.evaluation.agents.agent import AgentEnd, Assignment, ServerAccess
 from mapspeak.evaluation.agents.driver import ToolDriver
 from mapspeak.evaluation.client import ToolClient
+from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess
 from mapspeak.geometry import Point
 
 __all__ = ["RandomAgent"]
@@ -24,7 +24,7 @@ class RandomAgent:
     connection: ServerAccess = ServerAccess.MEMORY
 
     async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
-        """Drives to some places that the map names, or answers."""
+        """Drive to some places that the map names, or answers."""
         random, driver = np.random.default_rng(task.seed), ToolDriver(tools)
         if "Answer without driving" in task.prompt:
             return AgentEnd(answer=f"ANSWER: {await _say(task.prompt, random, driver)}")

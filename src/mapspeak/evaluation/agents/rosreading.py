@@ -41,7 +41,7 @@ class RosReader:
         self._tools = tools
 
     async def list_topics(self, type_ending: str = "") -> list[str]:
-        """Gives the topics, or those whose type ends so."""
+        """Return the topics, or those whose type ends so."""
         text = (await self._tools.demand("ros_topics")).text
         lines = [line.split() for line in text.splitlines()[1:]]
         return [
@@ -49,15 +49,15 @@ class RosReader:
         ]
 
     async def list_nodes(self) -> list[str]:
-        """Gives the nodes."""
+        """Return the nodes."""
         return (await self._tools.demand("ros_nodes")).text.splitlines()[1:]
 
     async def list_services(self, part: str) -> list[str]:
-        """Gives the services with a word in their names."""
+        """Return the services with a word in their names."""
         return (await self._tools.demand("ros_services", filter=part)).text.splitlines()[1:]
 
     async def fetch_topic(self, topic: str) -> TopicReading:
-        """Gives who publishes a topic, who hears it, and of what fields."""
+        """Return who publishes a topic, who hears it, and of what fields."""
         text = (await self._tools.demand("ros_topic", topic=topic)).text
         return TopicReading(
             name=topic,
@@ -67,29 +67,29 @@ class RosReader:
         )
 
     async def fetch_heard(self, node: str) -> list[str]:
-        """Gives the topics that a node hears."""
+        """Return the topics that a node hears."""
         text = (await self._tools.demand("ros_node", node=node)).text
         match = re.search(r"^hears: (.*)$", text, re.MULTILINE)
         return match[1].split(", ") if match else []
 
     async def fetch_parameters(self, node: str) -> dict[str, str]:
-        """Gives a node's parameters that are numbers, as they are written."""
+        """Return a node's parameters that are numbers, as they are written."""
         text = (await self._tools.demand("ros_parameters", node=node)).text
         return dict(PARAMETER.findall(text))
 
     async def fetch_service_type(self, service: str) -> str:
-        """Gives the type of a service."""
+        """Return the type of a service."""
         text = (await self._tools.demand("ros_service", service=service)).text
         return text.splitlines()[0].split()[1]
 
     async def fetch_time_s(self) -> float:
-        """Gives the robot's time; 0 where it does not say."""
+        """Return the robot's time; 0 where it does not say."""
         text = (await self._tools.demand("ros_overview")).text
         match = re.search(r"robot time (\d+(?:\.\d+)?) s", text)
         return float(match[1]) if match else 0.0
 
     async def read(self, topic: str, **how: object) -> str | None:
-        """Gives what ros_read says of a topic; None where nothing came."""
+        """Return what ros_read says of a topic; None where nothing came."""
         answer = await self._tools.call("ros_read", topic=topic, **how)
         return None if answer.is_error else answer.text
 

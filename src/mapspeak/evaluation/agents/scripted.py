@@ -6,16 +6,14 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
 from mapspeak.errors import MapspeakError
-from mapspeak.evaluation.agents.agent import AgentEnd, Assignment, ServerAccess
-from mapspeak.evaluation.agents.cues import find_label
-from mapspeak.evaluation.agents.driver import ARRIVED, WAIT_S, Seen, ToolDriver
+from mapspeak.evaluation.agents.driver import ARRIVED, WAIT_S, Seen, ToolDriver, find_label
 from mapspeak.evaluation.agents.inspecting import diagnose
 from mapspeak.evaluation.agents.questioned import answer_question
 from mapspeak.evaluation.client import OutOfBudgetError, ToolAnswer, ToolClient
 from mapspeak.evaluation.observer import read_sightings
 from mapspeak.evaluation.policy import ScriptedPolicy, Step, is_room
 from mapspeak.evaluation.reading import MapReading, Row
-from mapspeak.evaluation.trials import TrialState
+from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess, TrialState
 from mapspeak.geometry import Point, Pose, wrap_angle
 
 __all__ = ["ScriptedAgent"]
@@ -45,7 +43,7 @@ class ScriptedAgent:
     connection: ServerAccess = ServerAccess.MEMORY
 
     async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
-        """Carries out the assignment."""
+        """Carry out the assignment."""
         try:
             return await _do(ToolDriver(tools), task.prompt)
         except OutOfBudgetError:
@@ -101,7 +99,7 @@ async def _go_to_longest_corridor(driver: ToolDriver, _: re.Match[str]) -> Agent
 
 
 def _rooms_of(view: MapReading) -> list[Row]:
-    """Gives the rooms that are rooms and no nooks."""
+    """Return the rooms that are rooms and no nooks."""
     return [row for row in view.rows("Rooms") if is_room(row, view.rows("Doors"))]
 
 
@@ -111,7 +109,7 @@ async def _go_to_region(driver: ToolDriver, place: str) -> AgentEnd:
 
 
 async def _go_into_room_around(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
-    """Drives to a point of a room, else beside it; where no way leads there, says so."""
+    """Drive to a point of a room, else beside it; where no way leads there, says so."""
     middle = Point(float(match["x"]), float(match["y"]))
     if await driver.drive(x=middle.x, y=middle.y) == ARRIVED:
         return AgentEnd(answer="ANSWER: there")
@@ -122,7 +120,7 @@ async def _go_into_room_around(driver: ToolDriver, match: re.Match[str]) -> Agen
 
 
 async def _aside(driver: ToolDriver, middle: Point) -> list[Point]:
-    """Gives some points beside another one in the same room."""
+    """Return some points beside another one in the same room."""
     room = await driver.find_region(middle)
     points = [
         Pose(middle.x, middle.y, math.radians(heading_deg)).transform(Point(away_m, 0.0))
@@ -140,7 +138,7 @@ async def _find_nearest(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
 
 
 async def _go_to_thing(driver: ToolDriver, label: str) -> AgentEnd:
-    """Drives to the nearest place that saw it from near; what one look has shown is checked."""
+    """Drive to the nearest place that saw it from near; what one look has shown is checked."""
     seen = await driver.recall(label)
     if not seen:
         return await _search(driver, label)
@@ -163,7 +161,7 @@ async def _is_here(driver: ToolDriver, label: str) -> bool:
 
 
 async def _search(driver: ToolDriver, label: str) -> AgentEnd:
-    """Lets the robot look about until the detector reports the thing, and goes there."""
+    """Let the robot look about until the detector reports the thing, and goes there."""
     if not await driver.is_offered(SEARCH):
         return _gave_up(f"I know no way to a {label}, and am offered no search.")
     answer = await driver.tools.call(SEARCH, thing=label, wait_s=WAIT_S)
@@ -186,7 +184,7 @@ async def _search_on(driver: ToolDriver, label: str, answer: ToolAnswer) -> Tool
 
 
 async def _approach(driver: ToolDriver, label: str, bearing_deg: float, range_m: float) -> AgentEnd:
-    """Ends the search and drives up to what was seen; looks again where it was far off."""
+    """End the search and drives up to what was seen; looks again where it was far off."""
     await driver.tools.call(SEARCH, thing=label, seen=True)
     pose = await driver.find_pose()
     heading_rad = pose.yaw_rad + math.radians(bearing_deg)
@@ -229,7 +227,7 @@ async def _face_thing(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
 
 
 def _place_of(seen: list[Seen]) -> Point | None:
-    """Gives where a thing is, by the sighting from the least distance that has a bearing."""
+    """Return where a thing is, by the sighting from the least distance that has a bearing."""
     return next((each.thing for each in seen if each.thing is not None), None)
 
 

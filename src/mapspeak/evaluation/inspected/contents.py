@@ -22,7 +22,7 @@ class Content(Protocol):
     """What a message says."""
 
     def write(self, stamp_s: float, dialect: Dialect) -> Message:
-        """Gives the message; fields that are left out hold their defaults.
+        """Return the message; fields that are left out hold their defaults.
 
         Args:
             stamp_s: Its time, in seconds of the robot's clock.
@@ -44,7 +44,7 @@ class Fields:
     frame_id: str | None = None
 
     def write(self, stamp_s: float, dialect: Dialect) -> Message:
-        """Gives the fields, with a header where there is one."""
+        """Return the fields, with a header where there is one."""
         if self.frame_id is None:
             return dict(self.values)
         return {"header": write_header(self.frame_id, stamp_s, dialect=dialect), **self.values}
@@ -76,7 +76,7 @@ class Transforms:
     all: tuple[Transform, ...]
 
     def write(self, stamp_s: float, dialect: Dialect) -> Message:
-        """Gives them, all with the same stamp."""
+        """Return them, all with the same stamp."""
         told = [
             FrameTransform(
                 parent_from_child=each.pose, parent=each.parent, child=each.child, stamp_s=stamp_s
@@ -97,7 +97,7 @@ class Cells:
     grid: OccupancyGrid
 
     def write(self, stamp_s: float, dialect: Dialect) -> Message:
-        """Gives the grid as it is."""
+        """Return the grid as it is."""
         del stamp_s
         return write_grid(self.grid, dialect=dialect)
 
@@ -117,7 +117,7 @@ class Beams:
     range_m: float
 
     def write(self, stamp_s: float, dialect: Dialect) -> Message:
-        """Gives the scan."""
+        """Return the scan."""
         return {
             "header": write_header(self.frame_id, stamp_s, dialect=dialect),
             "angle_min": -3.14,

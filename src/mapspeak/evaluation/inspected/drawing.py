@@ -112,14 +112,14 @@ CHOICES: Mapping[str, Sequence[str]] = {
 
 
 def draw_names(random: np.random.Generator) -> Names:
-    """Draws what everything is called."""
+    """Draw what everything is called."""
     return Names(**{each.name: _one(random, CHOICES[each.name]) for each in fields(Names)})
 
 
 def draw_system(
     random: np.random.Generator, names: Names, grid: OccupancyGrid, *, dialect: Dialect
 ) -> InspectedSystem:
-    """Draws a system in which everything is as it should be.
+    """Draw a system in which everything is as it should be.
 
     Args:
         random: Of the figures.
@@ -161,7 +161,7 @@ def _sensors(random: np.random.Generator, names: Names) -> tuple[Stream, ...]:
 
 
 def _figures(random: np.random.Generator, names: Names) -> dict[str, dict[str, Any]]:
-    """Draws what the sensors say besides their stamps."""
+    """Draw what the sensors say besides their stamps."""
     charge = round(float(random.uniform(0.06, 0.96)), 2)
     upright = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
     place = {"x": 1.5, "y": 0.7, "z": 0.0}
@@ -253,7 +253,7 @@ def _hearings(names: Names) -> tuple[Hearing, ...]:
 
 
 def _services(random: np.random.Generator, names: Names) -> tuple[OfferedService, ...]:
-    """Draws the names and the types: what a service does says neither."""
+    """Draw the names and the types: what a service does says neither."""
     simple = ("std_srvs/Trigger", "std_srvs/Empty")
     offered = (
         (names.motors, ("reset_odometry", "zero_odometry", "odometry/reset"), simple),
@@ -283,7 +283,7 @@ def _navigation(random: np.random.Generator) -> dict[str, Any]:
 
 
 def _draw_type(random: np.random.Generator) -> str:
-    """Draws the text of a message type: five fields, of which two are of one kind."""
+    """Draw the text of a message type: five fields, of which two are of one kind."""
     fields_drawn = [MEASURED[at] for at in random.permutation(len(MEASURED))[:5].tolist()]
     kinds = [PLAIN_KINDS[at] for at in random.permutation(len(PLAIN_KINDS))[:4].tolist()]
     return "\n".join(

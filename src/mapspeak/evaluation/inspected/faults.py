@@ -20,33 +20,33 @@ __all__ = [
 
 
 def with_dead_stream(system: InspectedSystem, topic: str) -> InspectedSystem:
-    """Lets a topic fall silent; its node still says that it publishes it."""
+    """Let a topic fall silent; its node still says that it publishes it."""
     return _with_streams(
         system, lambda each: replace(each, rate_hz=0.0) if each.topic == topic else each
     )
 
 
 def with_late_stream(system: InspectedSystem, topic: str, lag_s: float) -> InspectedSystem:
-    """Sets back the clock by which a topic's messages are stamped, by some seconds."""
+    """Set back the clock by which a topic's messages are stamped, by some seconds."""
     return _with_streams(
         system, lambda each: replace(each, lag_s=lag_s) if each.topic == topic else each
     )
 
 
 def with_late_transform(system: InspectedSystem, child: str, lag_s: float) -> InspectedSystem:
-    """Sets back the stamps of the transform to a frame, by some seconds."""
+    """Set back the stamps of the transform to a frame, by some seconds."""
     return _with_streams(
         system, lambda each: replace(each, lag_s=lag_s) if _tells_of(each, child) else each
     )
 
 
 def with_cut_transform(system: InspectedSystem, child: str) -> InspectedSystem:
-    """Ends the transform to a frame, and leaves those that are told together with it."""
+    """End the transform to a frame, and leaves those that are told together with it."""
     return _with_streams(system, lambda each: _cut(each, child) if _tells_of(each, child) else each)
 
 
 def with_second_publisher(system: InspectedSystem, topic: str, node: str) -> InspectedSystem:
-    """Lets one more node publish what a topic carries."""
+    """Let one more node publish what a topic carries."""
     second = replace(system.stream_on(topic), node=node)
     return replace(system, streams=(*system.streams, second))
 
@@ -54,7 +54,7 @@ def with_second_publisher(system: InspectedSystem, topic: str, node: str) -> Ins
 def with_lost_hearer(
     system: InspectedSystem, node: str, topic: str, instead: str
 ) -> InspectedSystem:
-    """Lets a node listen to another topic instead of the right one, which nobody publishes."""
+    """Let a node listen to another topic instead of the right one, which nobody publishes."""
     hearings = tuple(
         replace(each, topic=instead) if (each.node, each.topic) == (node, topic) else each
         for each in system.hearings
@@ -63,18 +63,18 @@ def with_lost_hearer(
 
 
 def with_parameter(system: InspectedSystem, node: str, name: str, value: float) -> InspectedSystem:
-    """Sets a node's parameter to another value."""
+    """Set a node's parameter to another value."""
     changed = {**system.parameters[node], name: value}
     return replace(system, parameters={**system.parameters, node: changed})
 
 
 def without_hearers(system: InspectedSystem, topic: str) -> InspectedSystem:
-    """Takes away all who hear a topic."""
+    """Take away all who hear a topic."""
     return replace(system, hearings=tuple(each for each in system.hearings if each.topic != topic))
 
 
 def without_node(system: InspectedSystem, node: str) -> InspectedSystem:
-    """Takes away a node with all that it does."""
+    """Take away a node with all that it does."""
     return replace(
         system,
         streams=tuple(each for each in system.streams if each.node != node),

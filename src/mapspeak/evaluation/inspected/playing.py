@@ -28,7 +28,7 @@ LOG = "rosgraph_msgs/Log"
 
 @asynccontextmanager
 async def play(system: InspectedSystem) -> AsyncGenerator[str]:
-    """Plays a system, in real time, while the context lasts; gives the address of its rosbridge."""
+    """Play a system, in real time, while the context lasts; gives the address of its rosbridge."""
     begun_s = anyio.current_time()
 
     def clock() -> float:
@@ -63,7 +63,7 @@ def _build(system: InspectedSystem, clock: Callable[[], float]) -> RosSystem:
 
 
 def _use_own_clock(system: InspectedSystem, parameters: Parameters) -> None:
-    """Says of all nodes that they do not run by /clock, which is not there."""
+    """Say of all nodes that they do not run by /clock, which is not there."""
     if system.dialect is Dialect.ROS1:
         parameters.put("/use_sim_time", value=False)
     else:

@@ -96,19 +96,19 @@ class InspectedSystem:
         return tuple(sorted(self._types()))
 
     def publishers_of(self, topic: str) -> tuple[str, ...]:
-        """Gives the nodes that publish a topic, by name."""
+        """Return the nodes that publish a topic, by name."""
         return tuple(sorted({each.node for each in self.streams if each.topic == topic}))
 
     def hearers_of(self, topic: str) -> tuple[str, ...]:
-        """Gives the nodes that hear a topic, by name."""
+        """Return the nodes that hear a topic, by name."""
         return tuple(sorted({each.node for each in self.hearings if each.topic == topic}))
 
     def stream_on(self, topic: str) -> Stream:
-        """Gives the stream on a topic that has one."""
+        """Return the stream on a topic that has one."""
         return next(each for each in self.streams if each.topic == topic)
 
     def type_of(self, topic: str) -> str:
-        """Gives the type of a topic that is there."""
+        """Return the type of a topic that is there."""
         return self._types()[topic]
 
     def _types(self) -> dict[str, str]:

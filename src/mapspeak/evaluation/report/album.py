@@ -18,14 +18,14 @@ FORMATS = {"PNG": "image/png", "JPEG": "image/jpeg"}
 
 
 def find_picture(pictures: Path, name: str) -> Path | None:
-    """Gives the file of a picture; None where it is missing, or the name leads elsewhere."""
+    """Return the file of a picture; None where it is missing, or the name leads elsewhere."""
     path = pictures / name
     is_inside = path.name == name and path.resolve().parent == pictures.resolve()
     return path if is_inside and path.is_file() else None
 
 
 def count_picture_bytes(folders: Iterable[Path]) -> int:
-    """Gives the size of all pictures in some folders, each counted once."""
+    """Return the size of all pictures in some folders, each counted once."""
     sizes = {
         hashlib.sha256(data).digest(): len(data)
         for folder in folders
@@ -50,7 +50,7 @@ class Album:
     _kept: dict[str, Html] = field(default_factory=dict)
 
     def show(self, path: Path, caption: str) -> Html:
-        """Gives a picture of the folder as markup."""
+        """Return a picture of the folder as markup."""
         data = path.read_bytes()
         found = _measure(data)
         if found is None:
@@ -66,7 +66,7 @@ class Album:
         return element("img", {"class": "seen", "src": where, **size, "alt": caption})
 
     def keep(self, data: bytes, media_type: str, width: int, height: int) -> str:
-        """Takes a picture in, if it is not there yet, and gives the id that it is used by."""
+        """Take a picture in, if it is not there yet, and return the id that it is used by."""
         name = f"p-{hashlib.sha256(data).hexdigest()[:16]}"
         if name not in self._kept:
             inside = f"data:{media_type};base64,{base64.b64encode(data).decode()}"
@@ -75,14 +75,14 @@ class Album:
         return name
 
     def definitions(self) -> Html:
-        """Gives everything that was taken in; it is shown nowhere, only used."""
+        """Return everything that was taken in; it is shown nowhere, only used."""
         kept = joined(self._kept.values())
         unseen = {"class": "album", "width": 0, "height": 0, "aria-hidden": "true"}
         return element("svg", unseen, element("defs", {}, kept))
 
 
 def _measure(data: bytes) -> tuple[str, int, int] | None:
-    """Gives media type, width and height in pixels; None for what is neither PNG nor JPEG."""
+    """Return media type, width and height in pixels; None for what is neither PNG nor JPEG."""
     try:
         with Image.open(io.BytesIO(data), formats=tuple(FORMATS)) as picture:
             return FORMATS[str(picture.format)], picture.width, picture.height

@@ -19,17 +19,17 @@ INVISIBLE = re.compile(
 
 
 def text(value: object) -> Html:
-    """Gives text as markup; what nobody could see in it is spelled out."""
+    """Return text as markup; what nobody could see in it is spelled out."""
     return Html(escape(INVISIBLE.sub(lambda found: f"<U+{ord(found[0]):04X}>", str(value))))
 
 
 def joined(parts: Iterable[Html]) -> Html:
-    """Gives pieces of markup one after the other."""
+    """Return pieces of markup one after the other."""
     return Html("".join(parts))
 
 
 def element(name: str, attributes: Mapping[str, object], *children: Html) -> Html:
-    """Gives an element.
+    """Return an element.
 
     Args:
         name: Of the tag.
@@ -49,7 +49,7 @@ def _attribute(key: str, value: object) -> str:
 
 
 def table(heading: Sequence[str], rows: Iterable[Sequence[Html]], *, kind: str = "") -> Html:
-    """Gives a table that scrolls sideways where the screen is narrow; cells come as <td>."""
+    """Return a table that scrolls sideways where the screen is narrow; cells come as <td>."""
     head = joined(element("th", {"scope": "col"}, text(cell)) for cell in heading)
     body = joined(element("tr", {}, *row) for row in rows)
     whole = element(

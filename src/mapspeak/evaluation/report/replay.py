@@ -118,7 +118,7 @@ def _tokens(read: int | None, written: int | None, pictures: int | None) -> list
 
 
 def _group(trial_id: str, turns: Sequence[Turn]) -> Iterator[_Step]:
-    """Joins each call with its answer."""
+    """Join each call with its answer."""
     groups: list[list[Turn]] = []
     for turn in turns:
         before = groups[-1][-1] if groups else None

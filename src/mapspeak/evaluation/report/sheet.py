@@ -44,17 +44,17 @@ class Sheet:
         return 1.0 / (self.grid.resolution_m * self.cells_per_px)
 
     def pixels_at(self, points: FloatArray) -> FloatArray:
-        """Gives (u, v) of shape (n, 2), as real numbers, for points in metres of shape (n, 2)."""
+        """Return (u, v) of shape (n, 2), as real numbers, for points in metres of shape (n, 2)."""
         cells = self.grid.fractional_cells_at(points) / self.cells_per_px
         return np.stack([cells[:, 1], self.height_px - cells[:, 0]], axis=1)
 
     def heading_deg(self, pose: Pose) -> float:
-        """Gives a heading as SVG turns things: clockwise from the picture's right."""
+        """Return a heading as SVG turns things: clockwise from the picture's right."""
         return -math.degrees(pose.yaw_rad - self.grid.origin.yaw_rad)
 
 
 def draw_sheet(grid: OccupancyGrid) -> Sheet | None:
-    """Draws what is known of a map; None where nothing is."""
+    """Draw what is known of a map; None where nothing is."""
     rows, cols = np.nonzero(~grid.unknown)
     if not rows.size:
         return None

@@ -73,7 +73,7 @@ class DrivenPath:
 def lay_out_way(
     course: Course, poses: Sequence[tuple[str, Pose | None, float | None]]
 ) -> DrivenPath | None:
-    """Lays a trial's way out on its map; None where there is no map.
+    """Lay a trial's way out on its map; None where there is no map.
 
     Args:
         course: How the trial went.
@@ -103,7 +103,7 @@ def _stop(anchor: str, pose: Pose, sheet: Sheet, driven_ratio: float) -> StepMar
 
 
 def _lay_track(sheet: Sheet, states: Sequence[StateRecord]) -> Track | None:
-    """Gives the line of a way, without the moments at which the robot only turned."""
+    """Return the line of a way, without the moments at which the robot only turned."""
     moved = [now for before, now in pairwise(states) if now.driven_m > before.driven_m]
     if not moved:
         return None
@@ -119,14 +119,14 @@ def _lay_track(sheet: Sheet, states: Sequence[StateRecord]) -> Track | None:
 
 
 def _ratio_at(track: Track | None, robot_s: float | None) -> float:
-    """Gives the share of the line that lies behind the robot."""
+    """Return the share of the line that lies behind the robot."""
     if track is None or robot_s is None:
         return 0.0
     return round(float(np.interp(robot_s, track.times_s, track.ratios)), 4)
 
 
 def draw_way(way: DrivenPath, album: Album) -> Html:
-    """Gives the map with the way on it; each mark leads to its step."""
+    """Return the map with the way on it; each mark leads to its step."""
     sheet, stops = way.sheet, list(way.stops.values())
     name = album.keep(sheet.png, "image/png", sheet.width_px, sheet.height_px)
     size_px = 0.012 * (sheet.width_px + sheet.height_px)

@@ -9,7 +9,7 @@ import anyio
 import cv2
 
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.agents import Agent, AgentEnd, Assignment, ServerAccess, find_agent
+from mapspeak.evaluation.agents import find_agent
 from mapspeak.evaluation.client import OutOfBudgetError, ToolClient
 from mapspeak.evaluation.runs.transcript import Transcript
 from mapspeak.evaluation.runs.workplace import (
@@ -23,6 +23,10 @@ from mapspeak.evaluation.runs.workplace import (
 from mapspeak.evaluation.scores import Evidence, GroundTruth
 from mapspeak.evaluation.tasks import Task, find_task
 from mapspeak.evaluation.trials import (
+    Agent,
+    AgentEnd,
+    Assignment,
+    ServerAccess,
     Setting,
     Trial,
     TrialResult,
@@ -100,7 +104,7 @@ def attempt(
 
 
 def _as_set(site: GroundTruth, setting: Setting) -> GroundTruth:
-    """Gives the world as the trial has set it; its map frame starts where the robot's does."""
+    """Return the world as the trial has set it; its map frame starts where the robot's does."""
     if not setting.is_known and setting.start != site.world.start:
         site = GroundTruth(replace(site.world, start=setting.start))
     return site.with_more(setting.added)

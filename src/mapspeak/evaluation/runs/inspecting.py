@@ -10,8 +10,8 @@ from pathlib import Path
 from mcp.client import Client
 from mcp.client.stdio import StdioServerParameters
 
-from mapspeak.evaluation.agents import ServerAccess
 from mapspeak.evaluation.inspected import InspectedSystem, play
+from mapspeak.evaluation.trials import ServerAccess
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server import build_server
@@ -42,7 +42,7 @@ class Inspection:
 async def open_inspection(
     system: InspectedSystem, connection: ServerAccess, *, toolsets: tuple[str, ...], folder: Path
 ) -> AsyncGenerator[Inspection]:
-    """Plays a system and connects to it as an agent wants it, read-only.
+    """Play a system and connects to it as an agent wants it, read-only.
 
     Args:
         system: What is played, for as long as the context lasts.
@@ -69,7 +69,7 @@ def _describe(client: Client | None, command: tuple[str, ...]) -> Inspection:
 
 
 def serve_command(url: str, *, toolsets: tuple[str, ...], folder: Path) -> tuple[str, ...]:
-    """Gives the command line of a read-only server for the ROS behind a rosbridge."""
+    """Return the command line of a read-only server for the ROS behind a rosbridge."""
     return (
         *(sys.executable, "-m", "mapspeak", "serve", "--robot", url, "--read-only"),
         *("--toolsets", ",".join(toolsets)),

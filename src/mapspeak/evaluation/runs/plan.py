@@ -9,7 +9,7 @@ import numpy as np
 
 from mapspeak import __version__
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.agents.others import can_think, find_versions, read_thinking
+from mapspeak.evaluation.agents.finding import can_think, find_versions, read_thinking
 from mapspeak.evaluation.scores import GroundTruth
 from mapspeak.evaluation.tasks import EXPLORE, Task, choose_tasks, find_task
 from mapspeak.evaluation.trials import Trial

@@ -21,7 +21,7 @@ from rich.progress import (
 )
 from rich.table import Column, Table
 
-from mapspeak.evaluation.agents.others import can_think
+from mapspeak.evaluation.agents.finding import can_think
 from mapspeak.evaluation.runs.plan import RunOptions, RunPlan
 from mapspeak.evaluation.scores import TableRow
 from mapspeak.evaluation.tasks import EXPLORE

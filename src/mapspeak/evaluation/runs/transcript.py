@@ -51,7 +51,7 @@ class Transcript:
         self._turns = (folder / TURNS).open("wb")
 
     def hear_call(self, tool: str, arguments: dict[str, Any]) -> None:
-        """Writes a call down.
+        """Write a call down.
 
         Raises:
             OutOfBudgetError: It would be one too many, or comes too late.
@@ -63,7 +63,7 @@ class Transcript:
         self._write("agent", call=call)
 
     def hear_answer(self, tool: str, arguments: dict[str, Any], answer: ToolAnswer) -> None:
-        """Writes an answer down and keeps its pictures."""
+        """Write an answer down and keeps its pictures."""
         self.n_errors += answer.is_error
         names = [self._keep(picture.data, picture.suffix) for picture in answer.pictures]
         self._write(
@@ -84,7 +84,7 @@ class Transcript:
         n_output_tokens: int | None = None,
         n_picture_tokens: int | None = None,
     ) -> None:
-        """Writes down what was said besides calls.
+        """Write down what was said besides calls.
 
         Raises:
             OutOfBudgetError: The model has read and written more than it may.
@@ -104,7 +104,7 @@ class Transcript:
             )
 
     def close(self) -> None:
-        """Ends the file."""
+        """End the file."""
         self._turns.close()
 
     def _check_limits(self) -> None:

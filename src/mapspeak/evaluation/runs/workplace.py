@@ -13,11 +13,10 @@ from pathlib import Path
 from mcp.client import Client
 from mcp.client.stdio import StdioServerParameters
 
-from mapspeak.evaluation.agents import ServerAccess
 from mapspeak.evaluation.inspected import InspectedSystem
 from mapspeak.evaluation.runs.inspecting import open_inspection
 from mapspeak.evaluation.scores.evidence import NOWHERE
-from mapspeak.evaluation.trials import Setting, Trial
+from mapspeak.evaluation.trials import ServerAccess, Setting, Trial
 from mapspeak.links.simulated import SimulatedRobot, SoloRobot
 from mapspeak.safety import Approvals, AuditLog, Guard, Hold, Policy, WaitingRoom
 from mapspeak.semantic import SemanticMapStore
@@ -69,7 +68,7 @@ class Workshop:
         return DEFAULT_TOOLSETS if chosen is None else chosen
 
     def command(self) -> tuple[str, ...]:
-        """Gives the command line of a server for this trial; writes the world it names."""
+        """Return the command line of a server for this trial; writes the world it names."""
         setting, world = self.setting, self.trial.world
         if setting.added:
             changed = self.folder / "world" / f"{self.world.name}.yaml"
@@ -113,7 +112,7 @@ class Workplace:
 
 @asynccontextmanager
 async def open_workplace(shop: Workshop, connection: ServerAccess) -> AsyncGenerator[Workplace]:
-    """Starts robot and server and connects; in the end the robot's map lies in the folder."""
+    """Start robot and server and connects; in the end the robot's map lies in the folder."""
     for leftover in (STATES, MEMORY, MAP, AUDIT):
         (shop.folder / leftover).unlink(missing_ok=True)
     if shop.setting.memory is not None:
@@ -159,7 +158,7 @@ async def _open_in_memory(shop: Workshop) -> AsyncGenerator[Workplace]:
 
 
 def _build_guard(shop: Workshop, robot: SimulatedRobot) -> Guard:
-    """Gives the guard that a served robot has when nobody wrote a policy.
+    """Return the guard that a served robot has when nobody wrote a policy.
 
     Its clock is the robot's, so that a trial is the same whenever it is run. Nothing watches
     between calls: nobody can hold a trial's robot, no area is closed, and no time passes then.
@@ -197,7 +196,7 @@ async def _open_over_stdio(shop: Workshop) -> AsyncGenerator[Workplace]:
 
 @asynccontextmanager
 async def _open_for_another(shop: Workshop) -> AsyncGenerator[Workplace]:
-    """Leaves it to the agent to start the server."""
+    """Leave it to the agent to start the server."""
     yield Workplace(
         client=None,
         instructions="",
@@ -223,7 +222,7 @@ async def _open_inspected(
 
 
 def _last_state(log: Path) -> StateRecord:
-    """Gives the last whole line of a log that another process writes."""
+    """Return the last whole line of a log that another process writes."""
     if not log.exists():
         return NOWHERE
     with log.open("rb") as file:

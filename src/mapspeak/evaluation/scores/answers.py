@@ -24,14 +24,14 @@ UNITS = {"m2": r"(?:m2|m²|m\^2|sq\.? ?m|square met(?:re|er)s)", "m": r"(?:m|met
 
 
 def read_number(text: str, unit: str = "") -> float | None:
-    """Reads a number with its unit, "m", "m2" or none; None where the form is not kept."""
+    """Read a number with its unit, "m", "m2" or none; None where the form is not kept."""
     said = read_said(text)
     match = re.fullmatch(rf"(?P<number>{NUMBER})\s*{UNITS[unit]}", said or "", re.IGNORECASE)
     return float(match["number"]) if match else None
 
 
 def read_letters(text: str) -> frozenset[str] | None:
-    """Reads letters such as "A, C", or "none"; None where the form is not kept."""
+    """Read letters such as "A, C", or "none"; None where the form is not kept."""
     said = read_said(text)
     if said is None:
         return None
@@ -43,20 +43,20 @@ def read_letters(text: str) -> frozenset[str] | None:
 
 
 def read_point(text: str) -> Point | None:
-    """Reads two coordinates, "1.5, -2"; None where the form is not kept."""
+    """Read two coordinates, "1.5, -2"; None where the form is not kept."""
     said = read_said(text) or ""
     match = re.fullmatch(rf"\(?({NUMBER})\s*(?:m)?\s*,\s*({NUMBER})\s*(?:m)?", said.rstrip(")"))
     return Point(float(match[1]), float(match[2])) if match else None
 
 
 def read_word(text: str, words: Collection[str]) -> str | None:
-    """Reads one of some words, whatever its case; None where the form is not kept."""
+    """Read one of some words, whatever its case; None where the form is not kept."""
     said = (read_said(text) or "").casefold()
     return next((word for word in words if word.casefold() == said), None)
 
 
 def judge_number(evidence: Evidence, truth: float, *, unit: str, tolerance: float) -> Score:
-    """Judges a number by how far it is off, in its own unit."""
+    """Judge a number by how far it is off, in its own unit."""
     said = read_number(evidence.answer, unit)
     if said is None:
         return no_answer(evidence)
@@ -68,7 +68,7 @@ def judge_number(evidence: Evidence, truth: float, *, unit: str, tolerance: floa
 
 
 def judge_choice(evidence: Evidence, truth: Collection[str]) -> Score:
-    """Judges a choice of letters: all right ones and no other."""
+    """Judge a choice of letters: all right ones and no other."""
     said = read_letters(evidence.answer)
     if said is None:
         return no_answer(evidence)
@@ -85,7 +85,7 @@ def _listed(letters: Collection[str]) -> str:
 
 
 def no_answer(evidence: Evidence) -> Score:
-    """Gives the score of a trial that ended without an answer in the form asked for."""
+    """Return the score of a trial that ended without an answer in the form asked for."""
     gave_up = evidence.state is TrialState.GAVE_UP
     return Score(
         is_success=False,
@@ -95,6 +95,6 @@ def no_answer(evidence: Evidence) -> Score:
 
 
 def read_said(text: str) -> str | None:
-    """Reads what the last line of the form says; None where there is none."""
+    """Read what the last line of the form says; None where there is none."""
     lines = [match["said"].strip() for match in LINE.finditer(text)]
     return lines[-1] if lines else None

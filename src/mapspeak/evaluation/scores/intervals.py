@@ -29,7 +29,7 @@ class Interval:
 
 
 def wilson_interval(n_successes: int, n_trials: int) -> Interval | None:
-    """Gives the share of successes with Wilson's score interval (1927); None without trials."""
+    """Return the share of successes with Wilson's score interval (1927); None without trials."""
     if n_trials == 0:
         return None
     z = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2)
@@ -40,7 +40,7 @@ def wilson_interval(n_successes: int, n_trials: int) -> Interval | None:
 
 
 def bootstrap_interval(values: Sequence[float], *, seed: int = 0) -> Interval | None:
-    """Gives the mean with its bootstrap interval (Efron, 1979); None without values."""
+    """Return the mean with its bootstrap interval (Efron, 1979); None without values."""
     if not values:
         return None
     sample = np.asarray(values, dtype=np.float64)

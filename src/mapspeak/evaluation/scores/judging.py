@@ -33,7 +33,7 @@ RECORD = re.compile(r"^\s*- name:", re.MULTILINE)
 
 
 def spl(*, is_success: bool, shortest_m: float | None, driven_m: float) -> float | None:
-    """Gives success weighted by path length (Anderson et al., 2018); None without a shortest way.
+    """Return success weighted by path length (Anderson et al., 2018); None without a shortest way.
 
     Args:
         is_success: The task was done.
@@ -49,7 +49,7 @@ def spl(*, is_success: bool, shortest_m: float | None, driven_m: float) -> float
 
 
 def judge_coverage(site: GroundTruth, evidence: Evidence) -> Score:
-    """Judges a map, and whether anything was remembered.
+    """Judge a map, and whether anything was remembered.
 
     `coverage_recall` is, as everywhere, the share of all floor that a perfect robot could see that
     the map shows as free: it lacks the cells along walls that SLAM draws one cell too thick, and
@@ -84,7 +84,7 @@ def judge_coverage(site: GroundTruth, evidence: Evidence) -> Score:
 
 
 def known_ratio(grid: OccupancyGrid, reference: OccupancyGrid, wanted: Mask) -> float:
-    """Gives the share of some cells of a reference that a map knows; 1 where there are none."""
+    """Return the share of some cells of a reference that a map knows; 1 where there are none."""
     rows, cols = np.nonzero(wanted)
     there_rows, there_cols = grid.cells_at(reference.points_at(rows, cols))
     is_inside = grid.contains_cells(there_rows, there_cols)
@@ -93,7 +93,7 @@ def known_ratio(grid: OccupancyGrid, reference: OccupancyGrid, wanted: Mask) -> 
 
 
 def judge_room(site: GroundTruth, evidence: Evidence, wanted: Collection[str]) -> Score:
-    """Judges whether the robot stands in one of some spaces, by name."""
+    """Judge whether the robot stands in one of some spaces, by name."""
     here = site.room_at(evidence.end)
     named = " or ".join(sorted(wanted))
     if here is None:
@@ -113,7 +113,7 @@ def judge_room(site: GroundTruth, evidence: Evidence, wanted: Collection[str]) -
 
 
 def judge_thing(site: GroundTruth, evidence: Evidence, things: Sequence[WorldObject]) -> Score:
-    """Judges whether the robot stands near one of some things, in free sight of it."""
+    """Judge whether the robot stands near one of some things, in free sight of it."""
     here = evidence.end
     away_m = {thing.name: here.distance_to(site.place_of(thing)) for thing in things}
     in_sight = [thing for thing in things if site.is_in_sight(here, thing)]
@@ -129,7 +129,7 @@ def judge_thing(site: GroundTruth, evidence: Evidence, things: Sequence[WorldObj
 
 
 def judge_near(site: GroundTruth, evidence: Evidence, goal: Point, *, within_m: float) -> Score:
-    """Judges whether the robot stands where it should, to so many metres."""
+    """Judge whether the robot stands where it should, to so many metres."""
     away_m = evidence.end.distance_to(goal)
     said = f"It stands {away_m:.2f} m from where it should."
     figures = {"distance_to_goal_m": away_m}
@@ -141,7 +141,7 @@ def judge_near(site: GroundTruth, evidence: Evidence, goal: Point, *, within_m: 
 def judge_pose(
     site: GroundTruth, evidence: Evidence, thing: WorldObject, *, within_m: float, facing_rad: float
 ) -> Score:
-    """Judges whether the robot looks at a thing from near, with nothing in between."""
+    """Judge whether the robot looks at a thing from near, with nothing in between."""
     here, place = evidence.last.pose, site.place_of(thing)
     away_m = here.point.distance_to(place)
     off_rad = abs(wrap_angle(here.point.bearing_to(place) - here.yaw_rad))
@@ -156,7 +156,7 @@ def judge_pose(
 def judge_route(
     site: GroundTruth, evidence: Evidence, stops: Sequence[Sequence[WorldObject]]
 ) -> Score:
-    """Judges whether the robot came past some things in their order, near each and in sight."""
+    """Judge whether the robot came past some things in their order, near each and in sight."""
     n_reached = 0
     for state in evidence.states:
         if n_reached < len(stops) and _is_at(site, state.pose.point, stops[n_reached]):
@@ -187,7 +187,7 @@ def _succeeded(
 
 
 def _failed(evidence: Evidence, failure: Failure, reason: str, figures: dict[str, float]) -> Score:
-    """Gives the score of a failure; one that never set out has another reason than its place."""
+    """Return the score of a failure; one that never set out has another reason than its place."""
     figures = {**figures, "n_collisions": float(evidence.last.n_collisions)}
     if evidence.state is TrialState.GAVE_UP:
         failure = Failure.GAVE_UP

@@ -41,7 +41,7 @@ class TableRow:
 
 
 def count_rows(results: Iterable[TrialResult], *, by_world: bool = False) -> tuple[TableRow, ...]:
-    """Counts results: a row for each task, agent and representation, and each world if asked."""
+    """Count results: a row for each task, agent and representation, and each world if asked."""
     groups: dict[tuple[str, str | None, str, str], list[TrialResult]] = {}
     for result in results:
         trial = result.trial
@@ -84,7 +84,7 @@ def _count(
 
 
 def _figures_of(result: TrialResult) -> dict[str, float]:
-    """Gives every number of a result that a mean says something about."""
+    """Return every number of a result that a mean says something about."""
     optional = {
         "n_input_tokens": result.n_input_tokens,
         "n_output_tokens": result.n_output_tokens,

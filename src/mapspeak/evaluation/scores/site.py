@@ -78,7 +78,7 @@ class GroundTruth:
         self.floor = TrueFloor(world)
 
     def with_more(self, things: Sequence[WorldObject]) -> "GroundTruth":
-        """Gives the same world with more things in it."""
+        """Return the same world with more things in it."""
         if not things:
             return self
         return GroundTruth(replace(self.world, objects=(*self.world.objects, *things)))
@@ -123,18 +123,18 @@ class GroundTruth:
         return np.asarray(self.drivable & (clearance_m(self.grid) >= START_ROOM_M))
 
     def ways_from(self, point: Point) -> DistanceField:
-        """Gives the shortest ways from a point to everywhere."""
+        """Return the shortest ways from a point to everywhere."""
         return distances_from(self.grid, point, radius_m=PLAN_RADIUS_M)
 
     def shortest_to_any_m(self, start: Point, goal: Mask) -> float:
-        """Gives the shortest way to the nearest of some cells; infinite where there is none."""
+        """Return the shortest way to the nearest of some cells; infinite where there is none."""
         rows, cols = np.nonzero(goal & self.drivable)
         if not rows.size:
             return math.inf
         return float(self.ways_from(start).distances_at(rows, cols).min())
 
     def draw_pose(self, random: np.random.Generator, where: Mask | None = None) -> Pose:
-        """Draws a pose where the robot has room, in the map frame; within some cells if given.
+        """Draw a pose where the robot has room, in the map frame; within some cells if given.
 
         Raises:
             ValueError: None of the cells has room for the robot.
@@ -145,7 +145,7 @@ class GroundTruth:
         return Pose(x, y, float(random.uniform(-math.pi, math.pi)))
 
     def in_world(self, pose: Pose) -> Pose:
-        """Gives a pose of the map frame as the world file counts."""
+        """Return a pose of the map frame as the world file counts."""
         return self.world.start @ pose
 
     # --- rooms ---
@@ -156,16 +156,16 @@ class GroundTruth:
         return tuple(room for room in self.floor.rooms if (self.cells_of(room) & self.roomy).any())
 
     def cells_of(self, room: MeasuredRoom) -> Mask:
-        """Gives the cells inside a room's outline."""
+        """Return the cells inside a room's outline."""
         return np.asarray(self._labels == self._label_of[room.room.name])
 
     def room_at(self, point: Point) -> MeasuredRoom | None:
-        """Gives the space that a point lies in; None outside all of them."""
+        """Return the space that a point lies in; None outside all of them."""
         there = self.world.start.transform(point)
         return next((room for room in self.floor.rooms if room.room.contains(there)), None)
 
     def room_named(self, name: str) -> MeasuredRoom:
-        """Gives a space by its name."""
+        """Return a space by its name."""
         return next(room for room in self.floor.rooms if room.room.name == name)
 
     @cached_property
@@ -189,7 +189,7 @@ class GroundTruth:
         )
 
     def neighbours(self, room: MeasuredRoom) -> tuple[str, ...]:
-        """Gives the names of the spaces that one passes into straight from a room."""
+        """Return the names of the spaces that one passes into straight from a room."""
         name = room.room.name
         others = (
             set(passage.spaces) - {name} for passage in self.passages if name in passage.spaces
@@ -199,7 +199,7 @@ class GroundTruth:
     def _split(
         self, pair: tuple[int, int], cells: np.ndarray[tuple[int, int], np.dtype[np.uint8]]
     ) -> list[TruePassage]:
-        """Gives one passage for each piece of a border that can be crossed."""
+        """Return one passage for each piece of a border that can be crossed."""
         names = {label: name for name, label in self._label_of.items()}
         spaces = sorted((names[pair[0]], names[pair[1]]))
         wide = cv2.dilate(cells, np.ones((5, 5), dtype=np.uint8))
@@ -231,11 +231,11 @@ class GroundTruth:
     # --- things ---
 
     def things(self, kind: str) -> tuple[WorldObject, ...]:
-        """Gives all things of a kind."""
+        """Return all things of a kind."""
         return tuple(thing for thing in self.world.objects if thing.kind == kind)
 
     def place_of(self, thing: WorldObject) -> Point:
-        """Gives where a thing stands, in the map frame."""
+        """Return where a thing stands, in the map frame."""
         return self.world.start.inverse().transform(thing.pose.point)
 
     def is_in_sight(self, place: Point, thing: WorldObject) -> bool:
@@ -248,14 +248,14 @@ class GroundTruth:
         return slice_at_eye_level(self.world)
 
     def near(self, point: Point, radius_m: float) -> Mask:
-        """Gives the cells whose middles lie within a distance of a point."""
+        """Return the cells whose middles lie within a distance of a point."""
         grid = self.grid
         xs = grid.origin.x + (np.arange(grid.n_cols) + 0.5) * grid.resolution_m - point.x
         ys = grid.origin.y + (np.arange(grid.n_rows) + 0.5) * grid.resolution_m - point.y
         return np.asarray(xs[None, :] ** 2 + ys[:, None] ** 2 <= radius_m**2)
 
     def beside(self, kind: str) -> Mask:
-        """Gives places near things of a kind from which one of them is in sight; found once."""
+        """Return places near things of a kind from which one of them is in sight; found once."""
         if kind not in self._beside:
             near = [self.seen_around(thing, BESIDE_M) for thing in self.things(kind)]
             nowhere = np.zeros(self.grid.cells.shape, dtype=bool)
@@ -263,7 +263,7 @@ class GroundTruth:
         return self._beside[kind]
 
     def seen_around(self, thing: WorldObject, radius_m: float) -> Mask:
-        """Gives places near a thing from which it is in sight: in front of it if it hangs."""
+        """Return places near a thing from which it is in sight: in front of it if it hangs."""
         seen = self.seen_near(self.place_of(thing), radius_m)
         if not find_kind(thing.kind).is_wall_hung:
             return seen
@@ -274,7 +274,7 @@ class GroundTruth:
         return seen
 
     def seen_near(self, point: Point, radius_m: float) -> Mask:
-        """Gives places near a point from which it can be seen, one every fifth of a metre."""
+        """Return places near a point from which it can be seen, one every fifth of a metre."""
         grid, found = self.grid, np.zeros(self.grid.cells.shape, dtype=bool)
         every = max(round(self.LOOK_EVERY_M / grid.resolution_m), 1)
         coarse = np.zeros_like(found)
@@ -301,7 +301,7 @@ class GroundTruth:
         return TrueFloor(replace(self.world, objects=())).solid
 
     def floor_area_m2(self, room: MeasuredRoom) -> float:
-        """Gives the floor between a room's walls, with what stands on it."""
+        """Return the floor between a room's walls, with what stands on it."""
         return self._floor_areas_m2[room.room.name]
 
     @cached_property
@@ -319,19 +319,19 @@ class GroundTruth:
         }
 
     def middle_of(self, room: MeasuredRoom) -> Point:
-        """Gives where in a room the robot has most room."""
+        """Return where in a room the robot has most room."""
         depth = np.where(self.cells_of(room) & self.roomy, clearance_m(self.grid), -1.0)
         row, col = np.unravel_index(int(depth.argmax()), depth.shape)
         return self.grid.point_at(Cell(int(row), int(col)))
 
     @staticmethod
     def label_of(kind: str) -> str:
-        """Gives a kind as people call it."""
+        """Return a kind as people call it."""
         return find_kind(kind).label
 
 
 def _grow(pieces: NDArray[np.uint8], within: Mask) -> NDArray[np.uint8]:
-    """Lets pieces of floor grow over the floor around them, side by side, until all is taken."""
+    """Let pieces of floor grow over the floor around them, side by side, until all is taken."""
     while True:
         wider = np.asarray(cv2.dilate(pieces, _PLUS), dtype=np.uint8)
         grown = np.where((pieces == _NOWHERE) & within, wider, pieces)

@@ -4,33 +4,36 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.tasks.failing import FAILURE_TASKS
-from mapspeak.evaluation.tasks.inspection import INSPECTION_TASKS
+from mapspeak.evaluation.tasks.blocked import BlockedWay, StaleMap
+from mapspeak.evaluation.tasks.inspections import GRAPH_TASKS, MESSAGE_TASKS
 from mapspeak.evaluation.tasks.objects import OBJECT_TASKS
 from mapspeak.evaluation.tasks.paper import EXPLORE, Explore
 from mapspeak.evaluation.tasks.questions import QUESTION_TASKS
-from mapspeak.evaluation.tasks.relations import RELATION_TASKS
+from mapspeak.evaluation.tasks.relations import RELATION_TASKS, RouteTask
 from mapspeak.evaluation.tasks.rooms import ROOM_TASKS
-from mapspeak.evaluation.tasks.routes import RouteTask
+from mapspeak.evaluation.tasks.spoiled import SpoiledMemory, Spoiling
 from mapspeak.evaluation.tasks.task import Task
 
 __all__ = ["FAMILIES", "choose_tasks", "find_task", "task_names"]
 
-_TASKS: Mapping[str, Task] = MappingProxyType(
-    {
-        task.name: task
-        for task in (
-            Explore(),
-            *ROOM_TASKS,
-            *OBJECT_TASKS,
-            *RELATION_TASKS,
-            RouteTask(),
-            *QUESTION_TASKS,
-            *FAILURE_TASKS,
-            *INSPECTION_TASKS,
-        )
-    }
+FAILURE_TASKS: tuple[Task, ...] = (
+    BlockedWay(),
+    StaleMap(),
+    *(SpoiledMemory(spoiling) for spoiling in Spoiling),
 )
+INSPECTION_TASKS: tuple[Task, ...] = (*GRAPH_TASKS, *MESSAGE_TASKS)
+
+_ALL: tuple[Task, ...] = (
+    Explore(),
+    *ROOM_TASKS,
+    *OBJECT_TASKS,
+    *RELATION_TASKS,
+    RouteTask(),
+    *QUESTION_TASKS,
+    *FAILURE_TASKS,
+    *INSPECTION_TASKS,
+)
+_TASKS: Mapping[str, Task] = MappingProxyType({task.name: task for task in _ALL})
 
 FAMILIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
@@ -50,12 +53,12 @@ FAMILIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
 
 
 def task_names() -> tuple[str, ...]:
-    """Gives the names of all tasks."""
+    """Return the names of all tasks."""
     return tuple(_TASKS)
 
 
 def find_task(name: str) -> Task:
-    """Gives a task by its name.
+    """Return a task by its name.
 
     Raises:
         ConfigError: There is none of that name.
@@ -67,7 +70,7 @@ def find_task(name: str) -> Task:
 
 
 def choose_tasks(names: Iterable[str]) -> tuple[Task, ...]:
-    """Gives tasks by their own names and those of their groups, each once.
+    """Return tasks by their own names and those of their groups, each once.
 
     Raises:
         ConfigError: There is none of a name.

@@ -29,7 +29,7 @@ class Explore:
         return True
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
-        """Starts where the world says, so that others can go on with this map."""
+        """Start where the world says, so that others can go on with this map."""
         del seed, memory
         return Setting(
             prompt="Update the map while moving.",
@@ -41,6 +41,6 @@ class Explore:
         )
 
     def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
-        """Scores map and memory."""
+        """Score map and memory."""
         del setting
         return judge_coverage(site, evidence)

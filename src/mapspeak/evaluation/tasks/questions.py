@@ -69,7 +69,7 @@ class QuestionTask:
         return self.is_offered_in(site)
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
-        """Draws where the robot stands, and the question."""
+        """Draw where the robot stands, and the question."""
         random = dice(self.name, site, seed)
         start = draw_start(site, random)
         asked = self.ask(site, random, start)
@@ -83,7 +83,7 @@ class QuestionTask:
         )
 
     def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
-        """Scores the answer; who has driven has not kept to the question."""
+        """Score the answer; who has driven has not kept to the question."""
         return self.judge(site, setting.truth, evidence)
 
 
@@ -207,7 +207,7 @@ def _judge_explore(site: GroundTruth, _truth: dict[str, Any], evidence: Evidence
 
 
 def _views(site: GroundTruth, grid: OccupancyGrid) -> list[Point]:
-    """Gives places on the known free floor, spread evenly and always the same."""
+    """Return places on the known free floor, spread evenly and always the same."""
     rows, cols = np.nonzero(site.roomy)
     places = site.grid.points_at(rows, cols)
     at_rows, at_cols = grid.cells_at(places)
@@ -218,7 +218,7 @@ def _views(site: GroundTruth, grid: OccupancyGrid) -> list[Point]:
 
 
 def _news_m2(site: GroundTruth, grid: OccupancyGrid, view: Point) -> float:
-    """Gives how much floor comes into view from a place that the map does not know."""
+    """Return how much floor comes into view from a place that the map does not know."""
     seen = site.seen_near(view, MAX_RANGE_M)
     rows, cols = np.nonzero(seen)
     if not rows.size:

@@ -1,4 +1,4 @@
-"""Places by relation: beside a pose, in a direction of a thing, in front of it and facing it."""
+"""Places by relation to a pose or a thing, and routes past several things."""
 
 import math
 from collections.abc import Callable
@@ -6,14 +6,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapspeak.evaluation.scores import Evidence, GroundTruth, judge_near, judge_pose
+from mapspeak.evaluation.scores import (
+    BESIDE_M,
+    Evidence,
+    GroundTruth,
+    judge_near,
+    judge_pose,
+    judge_route,
+)
 from mapspeak.evaluation.tasks.objects import findable_kinds
 from mapspeak.evaluation.tasks.task import dice, draw_start, drive_setting, point_text
-from mapspeak.evaluation.trials import Score, Setting
+from mapspeak.evaluation.trials import Limits, Score, Setting
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.simulator import WorldObject
 
-__all__ = ["RELATION_TASKS"]
+__all__ = ["RELATION_TASKS", "RouteTask"]
 
 SIDES = {"left": 90.0, "right": -90.0, "front": 0.0, "back": 180.0}
 SIDE_WORDS = {
@@ -70,7 +77,7 @@ class PlaceTask:
         return self.is_offered_in(site)
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
-        """Draws the place, and starts away from it."""
+        """Draw the place, and starts away from it."""
         random = dice(self.name, site, seed)
         aim = self.draw(site, random)
         start = draw_start(site, random, without=site.near(aim.goal, 3 * THING_TOLERANCE_M))
@@ -84,13 +91,13 @@ class PlaceTask:
         )
 
     def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
-        """Scores how far the robot stands from there."""
+        """Score how far the robot stands from there."""
         goal = Point(*setting.truth["goal"])
         return judge_near(site, evidence, goal, within_m=self.within_m)
 
 
 def _aim_beside_pose(site: GroundTruth, random: np.random.Generator) -> RelationGoal:
-    """Draws a pose that is given by numbers, a side of it and a distance."""
+    """Draw a pose that is given by numbers, a side of it and a distance."""
     aim = RelationGoal("", Point(0.0, 0.0))
     for _ in range(MOST_TRIES):
         pose = site.draw_pose(random)
@@ -109,7 +116,7 @@ def _aim_beside_pose(site: GroundTruth, random: np.random.Generator) -> Relation
 
 
 def _aim_beside_thing(site: GroundTruth, random: np.random.Generator) -> RelationGoal:
-    """Draws the only thing of its kind, a direction of the map and a distance."""
+    """Draw the only thing of its kind, a direction of the map and a distance."""
     places = _places_beside(site)
     thing, direction, away_m, goal = places[int(random.integers(len(places)))]
     label = site.label_of(thing.kind)
@@ -130,7 +137,7 @@ class FacingTask:
         return bool(_single_things(site))
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
-        """Draws the thing."""
+        """Draw the thing."""
         random = dice(self.name, site, seed)
         things = _single_things(site)
         thing = things[int(random.integers(len(things)))]
@@ -147,7 +154,7 @@ class FacingTask:
         )
 
     def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
-        """Scores distance, heading and sight."""
+        """Score distance, heading and sight."""
         (thing,) = site.things(setting.truth["kind"])
         return judge_pose(site, evidence, thing, within_m=FACING_WITHIN_M, facing_rad=FACING_RAD)
 
@@ -157,7 +164,7 @@ def _single_things(site: GroundTruth) -> list[WorldObject]:
 
 
 def _places_beside(site: GroundTruth) -> list[tuple[WorldObject, str, float, Point]]:
-    """Gives things, directions and distances of which the place is roomy and open to the thing."""
+    """Return things, directions and distances of which the place is roomy and open to the thing."""
     places = []
     for thing in _single_things(site):
         at = site.place_of(thing)
@@ -208,3 +215,45 @@ RELATION_TASKS = (
     ),
     FacingTask(),
 )
+
+
+MOST_STOPS = 4
+LEAST_STOPS = 2
+LIMITS = Limits(n_calls=80, robot_time_s=1800.0, wall_s=900.0)
+
+
+@dataclass(frozen=True, slots=True)
+class RouteTask:
+    """The robot goes to several things in the order that is given; any thing of a kind will do."""
+
+    name: str = "route"
+    needs_map: bool = True
+
+    def is_offered(self, site: GroundTruth) -> bool:
+        """True where the world has things of two kinds to go to."""
+        return len(findable_kinds(site)) >= LEAST_STOPS
+
+    def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
+        """Draw the kinds and their order."""
+        random = dice(self.name, site, seed)
+        kinds = findable_kinds(site)
+        most = min(MOST_STOPS, len(kinds))
+        n_stops = int(random.integers(LEAST_STOPS, most + 1))
+        chosen = [str(kind) for kind in random.choice(kinds, size=n_stops, replace=False)]
+        start = draw_start(site, random, without=site.beside(chosen[0]))
+        first, *others = (f"any {site.label_of(kind)}" for kind in chosen)
+        steps = ", then ".join((f"first to {first}", *(f"to {other}" for other in others)))
+        return Setting(
+            prompt=f"Go {steps}. Keep to this order and stop at each, at most {BESIDE_M:g} m from "
+            "it with a free view of it. Stay at the last one.",
+            start=site.in_world(start),
+            is_known=True,
+            memory=memory,
+            tools=("follow_route",),
+            limits=LIMITS,
+            truth={"kinds": chosen},
+        )
+
+    def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
+        """Score the way that was driven."""
+        return judge_route(site, evidence, [site.things(kind) for kind in setting.truth["kinds"]])

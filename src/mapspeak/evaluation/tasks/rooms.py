@@ -56,7 +56,7 @@ class RoomTask:
         return self.choose(site, None) is not None
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
-        """Starts anywhere but in the right room."""
+        """Start anywhere but in the right room."""
         random = dice(self.name, site, seed)
         choice = self.choose(site, random)
         if choice is None:
@@ -73,7 +73,7 @@ class RoomTask:
         )
 
     def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
-        """Scores the room that the robot stands in."""
+        """Score the room that the robot stands in."""
         return judge_room(site, evidence, setting.truth["rooms"])
 
 
@@ -149,7 +149,7 @@ def _is_clear(site: GroundTruth, ordered: Sequence[MeasuredRoom], at: int) -> bo
 
 
 def _length_m(room: MeasuredRoom) -> float:
-    """Gives the longest distance between two corners of an outline."""
+    """Return the longest distance between two corners of an outline."""
     corners = room.room.outline
     return max((one.distance_to(other) for one in corners for other in corners), default=math.nan)
 

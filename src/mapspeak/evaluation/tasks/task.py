@@ -18,7 +18,7 @@ class Task(Protocol):
 
     @property
     def name(self) -> str:
-        """Gives its name, such as "smallest-room"."""
+        """Return its name, such as "smallest-room"."""
         ...
 
     @property
@@ -31,7 +31,7 @@ class Task(Protocol):
         ...
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
-        """Makes one trial's setting.
+        """Make one trial's setting.
 
         Args:
             site: A world in which it is offered.
@@ -41,12 +41,12 @@ class Task(Protocol):
         ...
 
     def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
-        """Scores a trial by the truth of the world as it was set: with what was added to it."""
+        """Score a trial by the truth of the world as it was set: with what was added to it."""
         ...
 
 
 def dice(task: str, site: GroundTruth, seed: int) -> np.random.Generator:
-    """Gives the generator of a trial's draws: another for each task, world and seed."""
+    """Return the generator of a trial's draws: another for each task, world and seed."""
     names = (zlib.crc32(text.encode()) for text in (task, site.world.name))
     return np.random.default_rng([seed, *names])
 
@@ -54,7 +54,7 @@ def dice(task: str, site: GroundTruth, seed: int) -> np.random.Generator:
 def draw_start(
     site: GroundTruth, random: np.random.Generator, *, without: Mask | None = None
 ) -> Pose:
-    """Draws where the robot starts, in the map frame: somewhere roomy, not where it is to go."""
+    """Draw where the robot starts, in the map frame: somewhere roomy, not where it is to go."""
     elsewhere = None if without is None else ~without
     is_left = elsewhere is not None and bool((site.roomy & elsewhere).any())
     return site.draw_pose(random, elsewhere if is_left else None)
@@ -63,7 +63,7 @@ def draw_start(
 def drive_setting(
     site: GroundTruth, *, prompt: str, start: Pose, right: Mask, memory: str | None, **truth: object
 ) -> Setting:
-    """Gives the setting of a drive on a finished map.
+    """Return the setting of a drive on a finished map.
 
     Args:
         site: The world.
@@ -84,5 +84,5 @@ def drive_setting(
 
 
 def point_text(point: Point) -> str:
-    """Gives a point as prompts and answers write it."""
+    """Return a point as prompts and answers write it."""
     return f"({point.x:.2f}, {point.y:.2f})"

@@ -1,5 +1,6 @@
 """Trials: what is attempted, what came of it, and how both lie on the disk."""
 
+from mapspeak.evaluation.trials.agent import Agent, AgentEnd, Assignment, ServerAccess
 from mapspeak.evaluation.trials.records import (
     find_result,
     read_result,
@@ -22,9 +23,13 @@ from mapspeak.evaluation.trials.trial import (
 )
 
 __all__ = [
+    "Agent",
+    "AgentEnd",
+    "Assignment",
     "Failure",
     "Limits",
     "Score",
+    "ServerAccess",
     "Setting",
     "ToolCall",
     "Trial",

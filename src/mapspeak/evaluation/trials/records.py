@@ -37,7 +37,7 @@ _TURN: TypeAdapter[Turn] = TypeAdapter(Turn)
 
 
 def trial_folder(run: Path, trial: Trial) -> Path:
-    """Gives where a trial lies in a run's folder."""
+    """Return where a trial lies in a run's folder."""
     return run / TRIALS / trial.id
 
 
@@ -48,7 +48,7 @@ def find_result(run: Path, trial: Trial) -> Path | None:
 
 
 def write_result(run: Path, result: TrialResult) -> None:
-    """Writes result.json so that it is there whole or not at all."""
+    """Write result.json so that it is there whole or not at all."""
     folder = trial_folder(run, result.trial)
     folder.mkdir(parents=True, exist_ok=True)
     _write_at_once(folder / RESULT, _RESULT.dump_json(result, indent=2) + b"\n")
@@ -73,12 +73,12 @@ def read_results(run: Path) -> tuple[TrialResult, ...]:
 
 
 def turn_line(turn: Turn) -> bytes:
-    """Gives a turn as one line of turns.jsonl."""
+    """Return a turn as one line of turns.jsonl."""
     return _TURN.dump_json(turn, exclude_defaults=True) + b"\n"
 
 
 def read_turns(run: Path, trial: Trial) -> tuple[Turn, ...]:
-    """Reads every whole line of a trial's conversation; none where there is no such file."""
+    """Read every whole line of a trial's conversation; none where there is no such file."""
     path = trial_folder(run, trial) / TURNS
     if not path.exists():
         return ()
@@ -87,7 +87,7 @@ def read_turns(run: Path, trial: Trial) -> tuple[Turn, ...]:
 
 
 def say_fault(error: Exception) -> str:
-    """Says in a few words why a file cannot be read."""
+    """Say in a few words why a file cannot be read."""
     if isinstance(error, ValidationError):
         first = error.errors(include_url=False, include_input=False)[0]
         where = ".".join(str(part) for part in first["loc"])
@@ -99,7 +99,7 @@ def say_fault(error: Exception) -> str:
 
 
 def _write_at_once(path: Path, data: bytes) -> None:
-    """Puts a file in its place whole, so that no reader and no crash ever sees half of it."""
+    """Put a file in its place whole, so that no reader and no crash ever sees half of it."""
     new = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         with new.open("wb") as file:

@@ -50,12 +50,12 @@ class Trial:
 
     @property
     def answerer(self) -> str:
-        """Gives who answers, with how much it may think where that was said."""
+        """Return who answers, with how much it may think where that was said."""
         return self.agent if self.thinking is None else f"{self.agent}+{self.thinking}"
 
     @property
     def id(self) -> str:
-        """Gives where it lies below the run's trials: the same in every run."""
+        """Return where it lies below the run's trials: the same in every run."""
         parts = (self.task, self.world, self.answerer, self.representation)
         return "/".join((*map(_as_file_name, parts), f"{self.number:03d}"))
 

@@ -13,12 +13,12 @@ import anyio
 from anyio.abc import ByteReceiveStream, Process
 
 from mapspeak.errors import LinkError
-from mapspeak.evaluation.agents.agent import AgentEnd, Assignment, ServerAccess
 from mapspeak.evaluation.agents.command import keeper
 from mapspeak.evaluation.agents.command.listening import Listener
 from mapspeak.evaluation.agents.command.program import ALWAYS, AnswerForm, Program, Start
 from mapspeak.evaluation.agents.models import Thinking
 from mapspeak.evaluation.client import OutOfBudgetError, ToolClient
+from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess
 from mapspeak.evaluation.trials.trial import TrialState
 
 __all__ = ["CommandAgent"]
@@ -62,7 +62,7 @@ class CommandAgent:
     connection: ServerAccess = field(default=ServerAccess.COMMAND, kw_only=True)
 
     def check(self) -> None:
-        """Returns when the program is there.
+        """Return when the program is there.
 
         Raises:
             ConfigError: It is not.
@@ -70,7 +70,7 @@ class CommandAgent:
         self.program.check(self.thinking)
 
     async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
-        """Carries out the assignment.
+        """Carry out the assignment.
 
         Raises:
             LinkError: The program failed by itself.
@@ -148,7 +148,7 @@ async def _run(
     course: _Course,
     wall_s: float,
 ) -> None:
-    """Runs a program to its end, or until its time or its budget is up; leaves nothing running."""
+    """Run a program to its end, or until its time or its budget is up; leaves nothing running."""
     process = await anyio.open_process(
         [sys.executable, str(keeper.__file__), *command],
         cwd=start.folder,
@@ -197,7 +197,7 @@ def _hear_rest(listener: Listener, course: _Course) -> None:
 
 
 async def _take_rest(process: Process, course: _Course) -> None:
-    """Takes what was written last; nobody is left who could write more."""
+    """Take what was written last; nobody is left who could write more."""
     with anyio.move_on_after(1.0):
         await _collect(process.stdout, course.said)
         await _collect(process.stderr, course.complained)
@@ -205,7 +205,7 @@ async def _take_rest(process: Process, course: _Course) -> None:
 
 
 def _find_servers(folder: Path) -> tuple[int, ...]:
-    """Gives the processes of the servers that serve a trial's robot.
+    """Return the processes of the servers that serve a trial's robot.
 
     A client program often starts its server as a group of its own.
     """
@@ -217,7 +217,7 @@ def _find_servers(folder: Path) -> tuple[int, ...]:
 
 
 async def _await_end(servers: Collection[int]) -> None:
-    """Returns when servers have ended, or when it has waited long enough.
+    """Return when servers have ended, or when it has waited long enough.
 
     One that has lost its client ends by itself, once it has written what it has to write. It is not
     killed: its number was only read from a file.
@@ -237,7 +237,7 @@ def _is_running(process: int) -> bool:
 
 
 async def _end_group(process: Process) -> None:
-    """Ends a program, and then whatever is left of it, by its own group."""
+    """End a program, and then whatever is left of it, by its own group."""
     if process.returncode is None:
         process.terminate()
     with anyio.move_on_after(GRACE_S):
@@ -249,7 +249,7 @@ async def _end_group(process: Process) -> None:
 
 
 def _signal_group(group: int, number: int) -> bool:
-    """Sends a signal to a group; false when nobody is left in it."""
+    """Send a signal to a group; false when nobody is left in it."""
     try:
         os.killpg(group, number)
     except (ProcessLookupError, PermissionError):
@@ -263,7 +263,7 @@ def _choose_variables(program: Program) -> dict[str, str]:
 
 
 def _secrets(variables: Mapping[str, str]) -> dict[str, str]:
-    """Gives the values that must not be written down, and what is written instead."""
+    """Return the values that must not be written down, and what is written instead."""
     return {
         value: f"[{name}]"
         for name, value in variables.items()
@@ -279,7 +279,7 @@ def _plain(data: bytes | bytearray, hidden: Mapping[str, str]) -> str:
 
 
 def _read_json(text: str) -> object:
-    """Gives the JSON object in a text; programs may write lines of their own before it."""
+    """Return the JSON object in a text; programs may write lines of their own before it."""
     try:
         return json.loads(text[text.index("{") :])
     except ValueError:

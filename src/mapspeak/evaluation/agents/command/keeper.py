@@ -15,7 +15,7 @@ __all__: list[str] = []
 
 
 def main() -> int:
-    """Runs the program that its arguments name, and gives its exit status."""
+    """Run the program that its arguments name, and return its exit status."""
     program = subprocess.Popen(sys.argv[1:], stdin=subprocess.DEVNULL)  # noqa: S603 - the user's own
     signal.signal(signal.SIGTERM, lambda *_: program.terminate())
     threading.Thread(target=_end_with_input, daemon=True).start()

@@ -30,7 +30,7 @@ class Listener:
     _n_read: int = field(default=0, init=False)
 
     async def listen(self) -> None:
-        """Listens until it is cancelled.
+        """Listen until it is cancelled.
 
         Raises:
             OutOfBudgetError: The witness has heard more than may be.
@@ -41,7 +41,7 @@ class Listener:
             await anyio.sleep(EVERY_S)
 
     def hear_new(self) -> None:
-        """Tells of every whole line that was not there before.
+        """Tell of every whole line that was not there before.
 
         Raises:
             OutOfBudgetError: The witness has heard more than may be.

@@ -75,7 +75,7 @@ class Program(BaseModel):
     version: tuple[str, ...] = ("--version",)
 
     def find_version(self) -> str | None:
-        """Gives the first line that it says of its version; None where it says none in time."""
+        """Return the first line that it says of its version; None where it says none in time."""
         path = shutil.which(self.command[0]) if self.command and self.version else None
         if path is None:
             return None
@@ -96,7 +96,7 @@ class Program(BaseModel):
         return lines[0][:LONGEST_VERSION] if lines else None
 
     def check(self, thinking: Thinking | None) -> None:
-        """Returns when the program is there and can be told how much to think.
+        """Return when the program is there and can be told how much to think.
 
         Raises:
             ConfigError: It is not, or it cannot.
@@ -114,7 +114,7 @@ class Program(BaseModel):
             )
 
     def find_numbers(self, said: object, keys: Iterable[str]) -> int | None:
-        """Gives the sum of the numbers under some keys; None where there is none."""
+        """Return the sum of the numbers under some keys; None where there is none."""
         found = [
             each
             for key in keys
@@ -124,7 +124,7 @@ class Program(BaseModel):
         return int(sum(found)) if found else None
 
     def find_answer(self, said: object) -> str:
-        """Gives the text under the answer's key; empty where there is none."""
+        """Return the text under the answer's key; empty where there is none."""
         return next((str(each) for each in _find(said, self.answer_key.split("."))), "")
 
 
@@ -150,7 +150,7 @@ class Start:
         return self.folder / "answer.txt"
 
     def command(self, program: Program) -> list[str]:
-        """Gives the program's command line."""
+        """Return the program's command line."""
         values = {
             "{prompt}": self.prompt,
             "{config}": str(self.folder / program.config),
@@ -164,7 +164,7 @@ class Start:
         return [_fill(part, values) for part in (*program.command, *more)]
 
     def write_config(self, program: Program) -> None:
-        """Writes the program's settings, which name the server."""
+        """Write the program's settings, which name the server."""
         command, *arguments = self.server
         entry = {"command": command, "args": arguments, **program.server}
         path = self.folder / program.config
@@ -173,7 +173,7 @@ class Start:
 
 
 def find_program(name: str) -> Program:
-    """Gives a program by its name, or from a file (.yaml) that describes it.
+    """Return a program by its name, or from a file (.yaml) that describes it.
 
     Raises:
         ConfigError: There is none, or the file has a mistake.
@@ -192,7 +192,7 @@ def find_program(name: str) -> Program:
 
 
 def _fill(text: str, values: Mapping[str, str]) -> str:
-    """Fills in what is to be filled in; the value of one is not searched for another."""
+    """Fill in what is to be filled in; the value of one is not searched for another."""
     name = next((name for name in values if name in text), None)
     if name is None:
         return text

@@ -12,9 +12,9 @@ import anyio
 from PIL import Image
 
 from mapspeak.errors import LinkError
-from mapspeak.evaluation.agents.agent import AgentEnd, Assignment, ServerAccess
 from mapspeak.evaluation.agents.models.mind import Ending, Mind, Reply, Talk, ToolCallRequest
 from mapspeak.evaluation.client import OutOfBudgetError, Picture, ToolAnswer, ToolClient
+from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess
 from mapspeak.evaluation.trials.trial import TrialState
 
 __all__ = ["ModelAgent", "estimate_picture_tokens"]
@@ -28,7 +28,7 @@ WRAP_UP_S = 1.0
 
 
 def estimate_picture_tokens(picture: Picture) -> int:
-    """Estimates what a picture costs: its pixels by 750, whatever the model.
+    """Estimate what a picture costs: its pixels by 750, whatever the model.
 
     No API that we know through `inspect-ai` says what of a request was pictures; this is the same
     estimate for all of them, and never more than one.
@@ -85,7 +85,7 @@ class ModelAgent:
     connection: ServerAccess = field(default=ServerAccess.STDIO, kw_only=True)
 
     async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
-        """Carries out the assignment; also out of budget it says what it has cost.
+        """Carry out the assignment; also out of budget it says what it has cost.
 
         Raises:
             LinkError: There is nothing to call, or the model cannot be asked or never answered.
@@ -143,7 +143,7 @@ def _tell_witness(tools: ToolClient, text: str, reply: Reply, account: _Account)
 
 
 async def _fulfil(tools: ToolClient, wish: ToolCallRequest) -> ToolAnswer:
-    """Makes a call; one that was not written properly counts, and is answered with why."""
+    """Make a call; one that was not written properly counts, and is answered with why."""
     if wish.mistake is None:
         return await tools.call(wish.tool, **wish.arguments)
     answer = ToolAnswer(text=wish.mistake, pictures=(), report={}, is_error=True)

@@ -83,7 +83,7 @@ class Talk(Protocol):
     """One conversation, which keeps all that was said in it."""
 
     async def ask(self) -> Reply:
-        """Gives the model's answer to all that was said so far.
+        """Return the model's answer to all that was said so far.
 
         Raises:
             LinkError: The model cannot be reached, or does not take what it was asked.
@@ -91,7 +91,7 @@ class Talk(Protocol):
         ...
 
     def tell(self, wish: ToolCallRequest, answer: ToolAnswer) -> None:
-        """Says what a call was answered, with its pictures, or the error as an error."""
+        """Say what a call was answered, with its pictures, or the error as an error."""
         ...
 
 
@@ -99,7 +99,7 @@ class Mind(Protocol):
     """A model that can be talked to."""
 
     def begin(self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int) -> Talk:
-        """Begins a conversation.
+        """Begin a conversation.
 
         Args:
             system: What it is told before.

@@ -41,7 +41,7 @@ class Move:
 
 
 def decide(seed: int, *, prompt: str, heard: Sequence[str], tools: Collection[str]) -> Move:
-    """Gives the next move: it looks, errs once, drives a little, and answers.
+    """Return the next move: it looks, errs once, drives a little, and answers.
 
     Args:
         seed: Of its draws.
@@ -68,12 +68,12 @@ def decide(seed: int, *, prompt: str, heard: Sequence[str], tools: Collection[st
 
 
 def count_mock_tokens(text: str) -> int:
-    """Gives what stands for tokens where there is no model: characters by four."""
+    """Return what stands for tokens where there is no model: characters by four."""
     return len(text) // CHARACTERS_PER_TOKEN
 
 
 def _drive(random: np.random.Generator, heard: Sequence[str]) -> Move:
-    """Drives to an id that it has read, else to a point near the pose that it has read."""
+    """Drive to an id that it has read, else to a point near the pose that it has read."""
     first = heard[0] if heard else ""
     ids = sorted(set(IDS.findall(first)))
     if ids:
@@ -121,7 +121,7 @@ class MockMind:
     """Answers by the script; its "tokens" are characters by four, and its pictures are not read."""
 
     def begin(self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int) -> Talk:
-        """Begins a conversation."""
+        """Begin a conversation."""
         return _MockTalk(
             seed=seed,
             prompt=prompt,

@@ -44,7 +44,7 @@ MOST_SAID = 300
 
 
 def open_mind(name: str, thinking: Thinking | None) -> "InspectMind":
-    """Gives a model by the library's name for it, such as "anthropic/claude-opus-4-1".
+    """Return a model by the library's name for it, such as "anthropic/claude-opus-4-1".
 
     Args:
         name: Provider and model.
@@ -69,7 +69,7 @@ def _say_install(name: str) -> str:
 
 
 def find_client(name: str) -> str:
-    """Gives the package that the library speaks through to a model's provider."""
+    """Return the package that the library speaks through to a model's provider."""
     return CLIENTS.get(name.partition("/")[0], CLIENT)
 
 
@@ -86,7 +86,7 @@ class InspectMind:
     thinking: Thinking | None
 
     def begin(self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int) -> Talk:
-        """Begins a conversation.
+        """Begin a conversation.
 
         Raises:
             ConfigError: The model cannot be asked: a package, a key or an address is missing.
@@ -112,7 +112,7 @@ class InspectMind:
         )
 
     def check(self) -> None:
-        """Returns when the model can be asked, without asking it.
+        """Return when the model can be asked, without asking it.
 
         Raises:
             ConfigError: A package, a key or an address is missing.
@@ -135,7 +135,7 @@ class InspectMind:
 
 
 def _plain(error: Exception) -> str:
-    """Gives a message as a sentence, without the library's markup and line ends."""
+    """Return a message as a sentence, without the library's markup and line ends."""
     said = " ".join(re.sub(r"\[/?[a-z ]*\]", "", str(error)).split())
     return f"{said.removeprefix('ERROR: ').rstrip('.')}."
 
@@ -204,7 +204,7 @@ _ENDINGS = {
 
 
 def _say_cause(error: BaseException) -> str:
-    """Gives what the provider said, which the library may have wrapped in its own errors."""
+    """Return what the provider said, which the library may have wrapped in its own errors."""
     while error.__cause__ is not None:
         error = error.__cause__
     said = " ".join(str(error).split())[:MOST_SAID].rstrip(".")
@@ -225,7 +225,7 @@ def _as_info(tool: Tool) -> "ToolInfo":
 
 
 def _read_usage(usage: "ModelUsage | None") -> Usage | None:
-    """Gives all that was read: the library counts cached tokens apart."""
+    """Return all that was read: the library counts cached tokens apart."""
     if usage is None:
         return None
     cached = (usage.input_tokens_cache_read or 0) + (usage.input_tokens_cache_write or 0)

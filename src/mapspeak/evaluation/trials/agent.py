@@ -70,16 +70,16 @@ class Agent(Protocol):
 
     @property
     def name(self) -> str:
-        """Gives its name, as in `Trial.agent`."""
+        """Return its name, as in `Trial.agent`."""
         ...
 
     @property
     def connection(self) -> ServerAccess:
-        """Says how it reaches the server."""
+        """Say how it reaches the server."""
         ...
 
     async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
-        """Carries out the assignment.
+        """Carry out the assignment.
 
         Raises:
             OutOfBudgetError: A call would have gone beyond the limits; let it pass through.

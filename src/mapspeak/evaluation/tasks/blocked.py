@@ -1,21 +1,26 @@
-"""Ways that are not what the map shows."""
+"""Failures on purpose: a way that is blocked, and a map that is out of date."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from mapspeak.evaluation.scores import Evidence, GroundTruth, judge_room, read_word
-from mapspeak.evaluation.tasks.failing.crates import (
-    away_from,
-    close_door,
-    find_doors_into_rooms,
-    find_spacious_rooms,
-)
+import numpy as np
+
+from mapspeak.evaluation.scores import Evidence, GroundTruth, TruePassage, judge_room, read_word
 from mapspeak.evaluation.tasks.task import dice, draw_start, point_text
 from mapspeak.evaluation.trials import Failure, Limits, Score, Setting
 from mapspeak.geometry import Pose
-from mapspeak.simulator import MeasuredRoom, WorldObject
+from mapspeak.simulator import MeasuredRoom, WorldDoor, WorldObject
+from mapspeak.spatial.grid import Mask
 
-__all__ = ["BlockedWay", "StaleMap"]
+__all__ = [
+    "BlockedWay",
+    "StaleMap",
+    "away_from",
+    "close_door",
+    "find_doors_into_rooms",
+    "find_spacious_rooms",
+]
 
 THERE, UNREACHABLE = "there", "unreachable"
 LEAST_DETOUR = 1.2
@@ -34,7 +39,7 @@ class BlockedWay:
         return bool(find_doors_into_rooms(site))
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
-        """Draws the door and the room behind it."""
+        """Draw the door and the room behind it."""
         random = dice(self.name, site, seed)
         doors = find_doors_into_rooms(site)
         order = random.permutation(len(doors)).tolist()
@@ -61,7 +66,7 @@ class BlockedWay:
         )
 
     def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
-        """Scores place and answer; the crates must not be touched."""
+        """Score place and answer; the crates must not be touched."""
         truth = setting.truth
         if truth["answer"] == THERE:
             return _untouched(evidence, judge_room(site, evidence, [truth["room"]]))
@@ -87,7 +92,7 @@ class StaleMap:
         return bool(find_spacious_rooms(site))
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
-        """Draws the room, and puts the crates where it is widest."""
+        """Draw the room, and puts the crates where it is widest."""
         random = dice(self.name, site, seed)
         rooms = find_spacious_rooms(site)
         room, crates = rooms[int(random.integers(len(rooms)))]
@@ -104,7 +109,7 @@ class StaleMap:
         )
 
     def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
-        """Scores the room; the crates must not be touched."""
+        """Score the room; the crates must not be touched."""
         return _untouched(evidence, judge_room(site, evidence, [setting.truth["room"]]))
 
 
@@ -119,7 +124,7 @@ def _room_setting(
     shortest_m: float,
     **truth: str,
 ) -> Setting:
-    """Gives the setting of a drive into a room, with crates that the map does not show."""
+    """Return the setting of a drive into a room, with crates that the map does not show."""
     middle = site.middle_of(room)
     return Setting(
         prompt=prompt,
@@ -150,3 +155,62 @@ def _untouched(evidence: Evidence, score: Score) -> Score:
         failure=Failure.COLLIDED,
         reason=f"It bumped into something {evidence.last.n_collisions} times.",
     )
+
+
+CRATE = "crate"
+CRATE_M = 0.8
+"""How wide one is."""
+DOOR_REACH_M = 1.0
+"""How far from a door the middle of its passage may lie."""
+ROOM_LEFT_RATIO = 0.5
+"""A thing in the way leaves the robot at least so much of the room."""
+
+
+def find_doors_into_rooms(site: GroundTruth) -> list[tuple[WorldDoor, MeasuredRoom]]:
+    """Return doors with a space that they lead into and that is not the only one on that side."""
+    found = []
+    map_from_world = site.world.start.inverse()
+    for door in site.world.doors:
+        middle = map_from_world.transform(door.pose.point)
+        passage = min(site.passages, key=lambda each: each.middle.distance_to(middle), default=None)
+        if passage is not None and passage.middle.distance_to(middle) <= DOOR_REACH_M:
+            found += [(door, room) for room in _smaller_side(site, passage)]
+    return found
+
+
+def _smaller_side(site: GroundTruth, passage: TruePassage) -> list[MeasuredRoom]:
+    rooms = [room for room in site.rooms if room.room.name in passage.spaces]
+    return sorted(rooms, key=lambda room: room.outline_area_m2)[:1] if len(rooms) > 1 else []
+
+
+def close_door(door: WorldDoor) -> tuple[WorldObject, ...]:
+    """Return crates side by side across a door."""
+    n_crates = max(math.ceil((door.width_m - 0.1) / CRATE_M), 1)
+    pitch_m = door.width_m / n_crates
+    return tuple(
+        _crate(number, door.pose @ Pose((number + 0.5) * pitch_m - door.width_m / 2, 0.0))
+        for number in range(n_crates)
+    )
+
+
+def _crate(number: int, pose: Pose) -> WorldObject:
+    return WorldObject(name=f"added crate {number + 1}", kind=CRATE, pose=pose)
+
+
+def find_spacious_rooms(site: GroundTruth) -> list[tuple[MeasuredRoom, tuple[WorldObject, ...]]]:
+    """Return rooms in which a crate in the middle leaves enough to stand on, with that crate."""
+    found: list[tuple[MeasuredRoom, tuple[WorldObject, ...]]] = []
+    for room in site.rooms:
+        middle = site.middle_of(room)
+        crates = (_crate(0, site.in_world(Pose(middle.x, middle.y))),)
+        before = site.cells_of(room) & site.floor.standable
+        after = before & site.with_more(crates).floor.standable
+        if after.sum() >= ROOM_LEFT_RATIO * before.sum() and len(site.rooms) > 1:
+            found.append((room, crates))
+    return found
+
+
+def away_from(site: GroundTruth, things: Sequence[WorldObject]) -> Mask:
+    """Return the cells that are not near any of some things."""
+    near = [site.near(site.place_of(thing), 2 * CRATE_M) for thing in things]
+    return np.asarray(~np.logical_or.reduce(near))

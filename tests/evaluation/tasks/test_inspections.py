@@ -5,14 +5,13 @@ from pathlib import Path
 import anyio
 import pytest
 
-from mapspeak.evaluation.agents import Assignment, ServerAccess
 from mapspeak.evaluation.agents.random import RandomAgent
 from mapspeak.evaluation.agents.scripted import ScriptedAgent
 from mapspeak.evaluation.client import ToolClient
 from mapspeak.evaluation.runs.inspecting import open_inspection
 from mapspeak.evaluation.scores import Evidence, GroundTruth
 from mapspeak.evaluation.tasks import FAMILIES, find_task
-from mapspeak.evaluation.trials import Score, Setting
+from mapspeak.evaluation.trials import Assignment, Score, ServerAccess, Setting
 from mapspeak.ros.messages import Dialect
 from sites import make_flat
 

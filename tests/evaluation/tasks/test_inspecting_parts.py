@@ -1,7 +1,7 @@
 import pytest
 
 from mapspeak.evaluation.scores import Evidence
-from mapspeak.evaluation.tasks.inspection.parts import InspectionPart, PartKind, judge_parts
+from mapspeak.evaluation.tasks.inspecting import InspectionPart, PartKind, judge_parts
 from mapspeak.evaluation.trials import Failure, TrialState
 
 MAP = (
