@@ -4,6 +4,8 @@
 arguments of the function of that name below; everything is in the object's own frame: x to the
 front, y to the left, z up from its base, metres. A part is convex, or stands for its convex hull
 where the laser and collisions are concerned.
+Some numbers go to their last digit: the
+worlds that ship were drawn with them, and are drawn again by a test.
 """
 
 from collections.abc import Callable, Mapping, Sequence
