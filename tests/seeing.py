@@ -10,7 +10,7 @@ from PIL import Image
 from mapspeak.geometry import Point
 from mapspeak.spatial.picture import MapPicture
 from mapspeak.spatial.picture.ink import text_patch
-from mapspeak.spatial.picture.palette import (
+from mapspeak.spatial.picture.marks import (
     FREE,
     GREYS,
     N_RAMP_LEVELS,

@@ -21,7 +21,7 @@ from mapspeak.spatial.picture import (
 )
 from mapspeak.spatial.picture.axes import lines_in_view
 from mapspeak.spatial.picture.ink import LABEL_SIZE_PX, NUMBER_SIZE_PX
-from mapspeak.spatial.picture.palette import (
+from mapspeak.spatial.picture.marks import (
     FILLS,
     PALETTE,
     FillPart,

@@ -21,7 +21,7 @@ from mapspeak.spatial.picture import (
     draw_map,
 )
 from mapspeak.spatial.picture.ink import NUMBER_SIZE_PX
-from mapspeak.spatial.picture.palette import FILLS, PALETTE, FillPart
+from mapspeak.spatial.picture.marks import FILLS, PALETTE, FillPart
 from seeing import find_text, full_colour, is_colour, pixels_of
 
 FLOOR = OccupancyGrid(

@@ -19,7 +19,7 @@ from mapspeak.spatial.picture import (
     draw_map,
 )
 from mapspeak.spatial.picture.ink import LABEL_SIZE_PX
-from mapspeak.spatial.picture.palette import FILLS, PALETTE, FillPart
+from mapspeak.spatial.picture.marks import FILLS, PALETTE, FillPart
 from mapspeak.spatial.picture.regions import colour_regions
 from seeing import (
     WALL_RGB,

@@ -15,7 +15,7 @@ from mapspeak.spatial.picture import (
     draw_map,
 )
 from mapspeak.spatial.picture.ink import LABEL_SIZE_PX, NUMBER_SIZE_PX
-from mapspeak.spatial.picture.palette import PALETTE
+from mapspeak.spatial.picture.marks import PALETTE
 from mapspeak.spatial.picture.regions import ZONE_NUMBER
 from seeing import WALL_RGB, colours_at, find_text, is_colour, pixels_of
 

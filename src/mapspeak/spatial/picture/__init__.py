@@ -2,6 +2,7 @@
 
 from mapspeak.spatial.picture.drawing import MapLayers, MapPicture, draw_map
 from mapspeak.spatial.picture.marks import (
+    Colour,
     LegendEntry,
     LegendSample,
     Line,
@@ -12,7 +13,6 @@ from mapspeak.spatial.picture.marks import (
     Shape,
     Zone,
 )
-from mapspeak.spatial.picture.palette import Colour
 from mapspeak.spatial.picture.paper import (
     draw_map_axis,
     draw_map_plain,

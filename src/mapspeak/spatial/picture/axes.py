@@ -15,7 +15,7 @@ from mapspeak.spatial.picture.ink import (
     stamp,
     text_patch,
 )
-from mapspeak.spatial.picture.palette import (
+from mapspeak.spatial.picture.marks import (
     FRAME,
     GRID_OVER,
     IS_BUSY,

@@ -27,14 +27,19 @@ from mapspeak.spatial.picture.legend import (
     grounds_in,
     n_rows_of,
 )
-from mapspeak.spatial.picture.marks import LegendEntry, Line, Mark, PictureRegion, RegionLayer, Zone
-from mapspeak.spatial.picture.palette import (
+from mapspeak.spatial.picture.marks import (
     FREE,
     PALETTE,
     PAPER,
     UNKNOWN_GROUND,
     WALL,
     Canvas,
+    LegendEntry,
+    Line,
+    Mark,
+    PictureRegion,
+    RegionLayer,
+    Zone,
 )
 from mapspeak.spatial.picture.placing import place_labels
 from mapspeak.spatial.picture.regions import (

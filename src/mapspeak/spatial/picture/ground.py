@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.spatial.grid import FREE_MAX, UNKNOWN, IntArray, OccupancyGrid
-from mapspeak.spatial.picture.palette import (
+from mapspeak.spatial.picture.marks import (
     FREE,
     GREYS,
     UNKNOWN_GROUND,

@@ -17,8 +17,16 @@ from PIL import Image, ImageDraw, ImageFont
 
 from mapspeak.errors import MapspeakError
 from mapspeak.spatial.grid import FloatArray
-from mapspeak.spatial.picture.marks import Line, LineStyle, Shape
-from mapspeak.spatial.picture.palette import N_RAMP_LEVELS, PAPER, RAMPS, Canvas, Colour
+from mapspeak.spatial.picture.marks import (
+    N_RAMP_LEVELS,
+    PAPER,
+    RAMPS,
+    Canvas,
+    Colour,
+    Line,
+    LineStyle,
+    Shape,
+)
 from mapspeak.spatial.picture.view import Box, PictureView
 
 LABEL_SIZE_PX = 16

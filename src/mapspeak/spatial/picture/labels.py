@@ -10,8 +10,7 @@ import numpy as np
 
 from mapspeak.spatial.grid import FloatArray, IntArray
 from mapspeak.spatial.picture.ink import SYMBOL_REACH_PX, draw_polygon, draw_stroke, stamp
-from mapspeak.spatial.picture.marks import Mark, PictureRegion
-from mapspeak.spatial.picture.palette import Canvas, Colour
+from mapspeak.spatial.picture.marks import Canvas, Colour, Mark, PictureRegion
 from mapspeak.spatial.picture.view import Box
 
 HALO_PX = 3

@@ -23,16 +23,6 @@ from mapspeak.spatial.picture.ink import (
     text_patch,
 )
 from mapspeak.spatial.picture.marks import (
-    LegendEntry,
-    LegendSample,
-    Line,
-    LineStyle,
-    Mark,
-    PictureRegion,
-    Shape,
-    Zone,
-)
-from mapspeak.spatial.picture.palette import (
     FILLS,
     FRAME,
     FREE,
@@ -41,6 +31,14 @@ from mapspeak.spatial.picture.palette import (
     Canvas,
     Colour,
     FillPart,
+    LegendEntry,
+    LegendSample,
+    Line,
+    LineStyle,
+    Mark,
+    PictureRegion,
+    Shape,
+    Zone,
 )
 from mapspeak.spatial.picture.regions import AUTOMATIC_COLOURS, ZONE_NUMBER
 from mapspeak.spatial.picture.view import PictureView, is_north_up, round_length_m

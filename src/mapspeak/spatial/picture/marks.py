@@ -1,4 +1,7 @@
-"""What can be drawn on a map: marks, lines, areas and a legend, whatever they stand for."""
+"""What can be drawn on a map, whatever it stands for, and the one palette it is drawn in.
+
+Pale fills and marks follow the Okabe-Ito set, which people with any colour vision can tell apart.
+"""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -8,7 +11,142 @@ from numpy.typing import NDArray
 
 from mapspeak.errors import MapError
 from mapspeak.geometry import Point
-from mapspeak.spatial.picture.palette import Colour
+
+Canvas = NDArray[np.uint8]
+"""Palette numbers, shape (rows, cols); row 0 is the top."""
+
+Rgb = tuple[int, int, int]
+
+
+class Colour(StrEnum):
+    """A colour by name; always joined by a shape, a text or a hatching."""
+
+    INK = "ink"
+    ORANGE = "orange"
+    SKY = "sky"
+    GREEN = "green"
+    YELLOW = "yellow"
+    BLUE = "blue"
+    VERMILION = "vermilion"
+    PURPLE = "purple"
+
+
+_RGB: dict[Colour, Rgb] = {
+    Colour.INK: (20, 20, 20),
+    Colour.ORANGE: (230, 159, 0),
+    Colour.SKY: (86, 180, 233),
+    Colour.GREEN: (0, 158, 115),
+    Colour.YELLOW: (240, 228, 66),
+    Colour.BLUE: (0, 114, 178),
+    Colour.VERMILION: (213, 94, 0),
+    Colour.PURPLE: (204, 121, 167),
+}
+
+
+class FillPart(StrEnum):
+    """What a pixel of a filled area belongs to."""
+
+    PLAIN = "plain"
+    HATCH = "hatch"
+    OUTLINE = "outline"
+
+
+WHITE: Rgb = (255, 255, 255)
+UNKNOWN_GROUND, FREE, WALL, PAPER, FRAME = range(5)
+_GRID_FREE, _GRID_UNKNOWN, _GRID_PAPER_UNKNOWN = range(5, 8)
+_ZERO_FREE, _ZERO_UNKNOWN, _ZERO_PAPER_UNKNOWN = range(8, 11)
+N_RAMP_LEVELS = 8
+_FILL_START, _RAMP_START, _GREY_START = 16, 64, 144
+
+FILLS: dict[tuple[Colour, FillPart], int] = {
+    (colour, part): _FILL_START + 5 * index + offset
+    for index, colour in enumerate(_RGB)
+    for offset, part in enumerate(FillPart)
+}
+"""Palette numbers of filled areas; two more per colour are the grid lines over them."""
+
+RAMPS: dict[Colour, NDArray[np.uint8]] = {
+    colour: np.arange(N_RAMP_LEVELS, dtype=np.uint8) + (_RAMP_START + N_RAMP_LEVELS * index)
+    for index, colour in enumerate(_RGB)
+}
+"""Palette numbers from nearly white to the full colour, for smooth edges on a white halo."""
+
+GREYS: NDArray[np.uint8] = np.arange(102, dtype=np.uint8) + _GREY_START
+"""Palette numbers of the paper's grey levels: occupancy -1 first, then 0 to 100."""
+
+
+def _mix(colour: Rgb, other: Rgb, share: float) -> Rgb:
+    """Return a mixture with that share of the first colour."""
+    red, green, blue = (
+        round(share * a + (1 - share) * b) for a, b in zip(colour, other, strict=True)
+    )
+    return red, green, blue
+
+
+def _build_palette() -> NDArray[np.uint8]:
+    table = np.full((256, 3), 255, dtype=np.uint8)
+    table[UNKNOWN_GROUND] = (212, 212, 212)
+    table[WALL] = (24, 24, 24)
+    table[FRAME] = (120, 120, 120)
+    table[_GRID_FREE], table[_ZERO_FREE] = (206, 216, 228), (140, 164, 196)
+    table[_GRID_UNKNOWN], table[_ZERO_UNKNOWN] = (188, 194, 202), (140, 156, 178)
+    table[_GRID_PAPER_UNKNOWN], table[_ZERO_PAPER_UNKNOWN] = (150, 154, 160), (176, 190, 212)
+    for colour, rgb in _RGB.items():
+        plain = _mix(rgb, WHITE, 0.28)
+        table[FILLS[colour, FillPart.PLAIN]] = plain
+        table[FILLS[colour, FillPart.HATCH]] = _mix(rgb, WHITE, 0.62)
+        table[FILLS[colour, FillPart.OUTLINE]] = _mix(rgb, (60, 60, 60), 0.75)
+        table[_grid_over_fill(colour)] = _mix(plain, (90, 110, 140), 0.80)
+        table[_grid_over_fill(colour) + 1] = _mix(plain, (60, 90, 140), 0.55)
+        for level, number in enumerate(RAMPS[colour], start=1):
+            table[number] = _mix(rgb, WHITE, level / N_RAMP_LEVELS)
+    occupancy = np.arange(101)
+    table[GREYS[0]] = 127
+    table[GREYS[1:]] = ((255 * (100 - occupancy) + 50) // 100)[:, np.newaxis]
+    return table
+
+
+def _grid_over_fill(colour: Colour) -> int:
+    return FILLS[colour, FillPart.PLAIN] + len(FillPart)
+
+
+def _build_grid_over(
+    *, on_free: int, on_unknown: int, on_paper_unknown: int, fill_offset: int
+) -> NDArray[np.uint8]:
+    """Return what a grid line turns each palette number into; walls stay what they are."""
+    over = np.arange(256, dtype=np.uint8)
+    over[FREE], over[UNKNOWN_GROUND], over[GREYS[0]] = on_free, on_unknown, on_paper_unknown
+    over[GREYS[1:51]] = on_free
+    for colour in _RGB:
+        for part in (FillPart.PLAIN, FillPart.HATCH):
+            over[FILLS[colour, part]] = _grid_over_fill(colour) + fill_offset
+    return over
+
+
+def _build_is_busy() -> NDArray[np.uint8]:
+    """Return 1 for what a label should not cover: walls and everything drawn over the map."""
+    busy = np.zeros(256, dtype=np.uint8)
+    busy[WALL] = 1
+    busy[_RAMP_START : _RAMP_START + N_RAMP_LEVELS * len(_RGB)] = 1
+    busy[GREYS[51:]] = 1
+    return busy
+
+
+PALETTE = _build_palette()
+GRID_OVER = _build_grid_over(
+    on_free=_GRID_FREE,
+    on_unknown=_GRID_UNKNOWN,
+    on_paper_unknown=_GRID_PAPER_UNKNOWN,
+    fill_offset=0,
+)
+ZERO_LINE_OVER = _build_grid_over(
+    on_free=_ZERO_FREE,
+    on_unknown=_ZERO_UNKNOWN,
+    on_paper_unknown=_ZERO_PAPER_UNKNOWN,
+    fill_offset=1,
+)
+IS_BUSY = _build_is_busy()
+
 
 _MAX_LABEL = np.iinfo(np.uint16).max
 

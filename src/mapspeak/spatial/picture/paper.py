@@ -20,7 +20,7 @@ from mapspeak.spatial.picture.drawing import (
     plan_sheet,
 )
 from mapspeak.spatial.picture.legend import GroundEntry, Legend
-from mapspeak.spatial.picture.palette import GREYS, PALETTE, PAPER
+from mapspeak.spatial.picture.marks import GREYS, PALETTE, PAPER
 from mapspeak.spatial.picture.view import NORTH_UP_RAD, paper_spacing_m
 
 _GROUNDS = (

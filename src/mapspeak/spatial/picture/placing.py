@@ -24,7 +24,7 @@ from mapspeak.spatial.picture.labels import (
     Rings,
     leader_of,
 )
-from mapspeak.spatial.picture.palette import IS_BUSY, Canvas
+from mapspeak.spatial.picture.marks import IS_BUSY, Canvas
 from mapspeak.spatial.picture.view import Box
 
 _COST_OF_CROSSING = 12.0

@@ -8,8 +8,18 @@ from numpy.typing import NDArray
 
 from mapspeak.errors import MapError
 from mapspeak.spatial.grid import IntArray, Mask, OccupancyGrid
-from mapspeak.spatial.picture.marks import PictureRegion, RegionLayer, Zone
-from mapspeak.spatial.picture.palette import FILLS, FREE, RAMPS, WALL, Canvas, Colour, FillPart
+from mapspeak.spatial.picture.marks import (
+    FILLS,
+    FREE,
+    RAMPS,
+    WALL,
+    Canvas,
+    Colour,
+    FillPart,
+    PictureRegion,
+    RegionLayer,
+    Zone,
+)
 from mapspeak.spatial.picture.view import PictureView
 
 AUTOMATIC_COLOURS = (
