@@ -11,7 +11,7 @@ from mapspeak.evaluation.agents.inspecting import diagnose
 from mapspeak.evaluation.agents.questioned import answer_question
 from mapspeak.evaluation.client import OutOfBudgetError, ToolAnswer, ToolClient
 from mapspeak.evaluation.observer import read_sightings
-from mapspeak.evaluation.policy import ScriptedPolicy, Step, is_room
+from mapspeak.evaluation.policy import ExplorationPolicy, is_room
 from mapspeak.evaluation.reading import MapReading, Row
 from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess, TrialState
 from mapspeak.geometry import Point, Pose, wrap_angle
@@ -67,12 +67,8 @@ async def _do(driver: ToolDriver, prompt: str) -> AgentEnd:
 
 
 async def _explore(driver: ToolDriver, _: re.Match[str]) -> AgentEnd:
-    await ScriptedPolicy(driver.tools, _note_nothing).explore()
+    await ExplorationPolicy(driver.tools).explore()
     return AgentEnd(answer="Everything that can be reached is on the map.")
-
-
-async def _note_nothing(_step: Step) -> None:
-    """The trial's witness writes everything down."""
 
 
 # --- rooms ---------------------------------------------------------------------------------------
