@@ -3,9 +3,8 @@
 `models.json` lists every kind of object with its parts. A part is written as a shape with the
 arguments of the function of that name below; everything is in the object's own frame: x to the
 front, y to the left, z up from its base, metres. A part is convex, or stands for its convex hull
-where the laser and collisions are concerned.
-Some numbers go to their last digit: the
-worlds that ship were drawn with them, and are drawn again by a test.
+where the laser and collisions are concerned. Some numbers go to their last digit, because the
+shipped worlds were drawn with them; a test draws them again.
 """
 
 from collections.abc import Callable, Mapping, Sequence
