@@ -1,4 +1,4 @@
-"""The errors mapspeak raises on purpose, and how causes are told.
+"""The errors mapspeak raises on purpose, the steps they lead to, and how causes are told.
 
 MapspeakError           everything below; carries what is wrong and what to do next
 |- ConfigError          a flag, a world file or a setting that cannot be used
@@ -8,6 +8,21 @@ MapspeakError           everything below; carries what is wrong and what to do n
 |- PolicyError          what the policy, a hold or a person does not allow
 `- SemanticMapError     the semantic map file or a record in it is wrong
 """
+
+from enum import StrEnum
+
+
+class NextStep(StrEnum):
+    """What the reader can do after an error; the server says with which tool."""
+
+    CHOOSE_ON_MAP = "choose_on_map"
+    DRIVE_THERE = "drive_there"
+    SEE_PLACES = "see_places"
+    MEASURE = "measure"
+    READ_MORE = "read_more"
+    LOOK_AROUND = "look_around"
+    LOOK_FROM = "look_from"
+    CHECK_NEAR = "check_near"
 
 
 def say_cause(error: Exception) -> str:
@@ -20,13 +35,19 @@ class MapspeakError(Exception):
 
     Attributes:
         message: What is wrong, with the number and its unit.
-        hint: What the reader can do next; names a tool where a model will read it.
+        hint: What the reader can do next, in plain words that name no tool.
+        step: The same as a code, where a tool does it.
+        about: The id of the place that the step is about; else empty.
     """
 
-    def __init__(self, message: str, *, hint: str) -> None:
+    def __init__(
+        self, message: str, *, hint: str, step: NextStep | None = None, about: str = ""
+    ) -> None:
         super().__init__(message)
         self.message = message
         self.hint = hint
+        self.step = step
+        self.about = about
 
     def __str__(self) -> str:
         return f"{self.message} {self.hint}"

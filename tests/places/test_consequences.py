@@ -13,7 +13,7 @@ from mapspeak.driving.exploration.progress import find_unreachable, judge_end
 from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Pose
 from mapspeak.places.choosing import check_place, find_place
-from mapspeak.places.goalcheck import GoalVerdict
+from mapspeak.places.goalcheck import GoalVerdict, say_check
 from mapspeak.places.notices import (
     close_floor_of,
     say_consequences,
@@ -61,8 +61,8 @@ def test_a_goal_behind_a_closure_names_what_closes_the_way() -> None:
     check = check_place(atlas, find_place(atlas, f"{EAST.x}, {EAST.y}")).check
 
     assert check.verdict is GoalVerdict.UNREACHABLE
-    assert "area 'C1', closed by event E2 until 14:00" in check.sentence
-    assert "as wide as the robot" not in check.sentence
+    assert "area 'C1', closed by event E2 until 14:00" in say_check(check)
+    assert "as wide as the robot" not in say_check(check)
 
 
 def test_a_record_behind_a_closure_is_no_less_trusted() -> None:

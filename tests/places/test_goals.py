@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose
-from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, check_goal
+from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, check_goal, say_check
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import distances_from
 
@@ -38,7 +38,9 @@ def test_a_goal_in_the_open_is_fine_and_says_how_far_it_is() -> None:
     assert found.nearest is None
     assert found.path_m == pytest.approx(3.7, abs=0.2)
     assert found.clearance_m == pytest.approx(1.0)
-    assert found.sentence == "(4.75, 2.75) is 3.7 m away by path, 1.00 m from the nearest obstacle."
+    assert (
+        say_check(found) == "(4.75, 2.75) is 3.7 m away by path, 1.00 m from the nearest obstacle."
+    )
 
 
 @pytest.mark.parametrize(
@@ -57,7 +59,7 @@ def test_a_goal_in_the_open_is_fine_and_says_how_far_it_is() -> None:
 def test_a_bad_goal_is_refused_with_the_reason(goal: Pose, verdict: GoalVerdict, says: str) -> None:
     found = check(goal)
     assert found.verdict is verdict
-    assert says in found.sentence
+    assert says in say_check(found)
     assert found.path_m is None
 
 
@@ -68,7 +70,7 @@ def test_a_goal_nearer_to_a_wall_than_the_robots_radius_is_too_tight() -> None:
     distances = distances_from(grid, Point(2.0, 2.0), radius_m=0.3)
     found = check_goal(grid, distances, Pose(0.125, 1.025, 0.5))
     assert found.verdict is GoalVerdict.TOO_TIGHT
-    assert "0.10 m from the nearest obstacle; the robot needs 0.30 m" in found.sentence
+    assert "0.10 m from the nearest obstacle; the robot needs 0.30 m" in say_check(found)
     assert found.nearest is not None
     assert (found.nearest.x, found.nearest.y) == pytest.approx((0.325, 1.025))
     assert found.nearest.yaw_rad == 0.5
@@ -198,4 +200,4 @@ def test_a_number_with_hundreds_of_digits_is_not_repeated() -> None:
     for far in (1e300, -1e308, 1e7):
         check = check_goal(grid, distances, Pose(far, 0.0))
         assert check.verdict is GoalVerdict.NOT_FINITE
-        assert len(check.sentence) < 100
+        assert len(say_check(check)) < 100

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from guarding import MONDAY_NOON
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Point, Pose
 from mapspeak.installation import shell_command
-from mapspeak.places.goalcheck import GoalCheck, GoalVerdict
+from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, say_check
 from mapspeak.safety import (
     Act,
     Allowed,
@@ -29,13 +29,23 @@ from mapspeak.safety import (
     Situation,
     decide,
 )
+from mapspeak.worldmodel.closures import ClosedArea
 
 NOW = Situation()
+STAIRS = ClosedArea(name="stairs", outline=(Point(1, 1), Point(2, 1), Point(2, 2)))
 
 
 def drive(verdict: GoalVerdict = GoalVerdict.OK, *, path_m: float | None = 3.0) -> Drive:
-    check = GoalCheck(verdict=verdict, sentence="so it is.", clearance_m=1.0, path_m=path_m)
-    return Drive(goal=Pose(1.0, 2.0), check=check)
+    goal = Pose(1.0, 2.0)
+    check = GoalCheck(
+        verdict=verdict,
+        goal=goal,
+        radius_m=0.2,
+        clearance_m=1.0,
+        path_m=path_m,
+        areas=(STAIRS,) if verdict is GoalVerdict.CLOSED else (),
+    )
+    return Drive(goal=goal, check=check)
 
 
 def twist(linear: float, angular: float = 0.0) -> dict[str, Any]:
@@ -104,9 +114,10 @@ def test_a_persons_word_does_not_lift_other_rules() -> None:
     "verdict", [verdict for verdict in GoalVerdict if verdict is not GoalVerdict.OK]
 )
 def test_a_goal_that_is_no_goal_is_refused(verdict: GoalVerdict) -> None:
-    decision = decide(drive(verdict, path_m=None), policy=Policy(), situation=NOW)
+    command = drive(verdict, path_m=None)
+    decision = decide(command, policy=Policy(), situation=NOW)
     assert isinstance(decision, Refused)
-    assert decision.reason == "so it is."
+    assert decision.reason == say_check(command.check)
 
 
 def test_the_time_of_a_hold_is_told_to_the_second() -> None:

@@ -3,9 +3,9 @@
 import math
 from dataclasses import dataclass, replace
 
-from mapspeak.errors import GoalError
+from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.places.goalcheck import GoalCheck, check_goal, say_refusal
+from mapspeak.places.goalcheck import GoalCheck, check_goal, say_check, say_refusal
 from mapspeak.places.naming import (
     Place,
     Spot,
@@ -75,7 +75,7 @@ class CheckedGoal:
     @property
     def sentence(self) -> str:
         """Why there, and what is to be said of it."""
-        return "; ".join(filter(None, (self.reason, self.check.sentence)))
+        return "; ".join(filter(None, (self.reason, say_check(self.check))))
 
 
 def choose_goal(
@@ -91,8 +91,8 @@ def choose_goal(
     goal = check_place(atlas, meant, yaw_deg=yaw_deg)
     if not goal.check.is_ok:
         has_heading = yaw_deg is not None or _has_heading(meant)
-        hint = _what_instead(goal.check, has_heading=has_heading)
-        raise GoalError(say_refusal(goal.name, goal.check), hint=hint)
+        hint, step = _what_instead(goal.check, has_heading=has_heading)
+        raise GoalError(say_refusal(goal.name, goal.check), hint=hint, step=step)
     return goal
 
 
@@ -156,12 +156,10 @@ def stand_at(atlas: Atlas, place: Place) -> Pose:
             return straight_on if yaw_rad is None else Pose(point.x, point.y, yaw_rad)
 
 
-def _what_instead(check: GoalCheck, *, has_heading: bool) -> str:
+def _what_instead(check: GoalCheck, *, has_heading: bool) -> tuple[str, NextStep]:
     if check.nearest is None:
-        return "No place near it works either; call look_at_map and choose another one."
+        return "No place near it works either.", NextStep.CHOOSE_ON_MAP
     near = check.nearest
     heading = f", yaw_deg={near.yaw_deg:.0f}" if has_heading else ""
-    return (
-        f"The nearest pose that works is x={near.x:.2f}, y={near.y:.2f}{heading}; "
-        "call navigate_to with it, or call look_at_map."
-    )
+    hint = f"The nearest pose that works is x={near.x:.2f}, y={near.y:.2f}{heading}."
+    return hint, NextStep.DRIVE_THERE

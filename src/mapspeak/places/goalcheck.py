@@ -11,7 +11,7 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, Mask
 from mapspeak.spatial.paths import DistanceField, distances_from
-from mapspeak.worldmodel.closures import MARGIN_M, ClosedFloor
+from mapspeak.worldmodel.closures import MARGIN_M, ClosedArea, ClosedFloor
 
 Opened = Callable[[Point], DistanceField]
 
@@ -35,19 +35,29 @@ class GoalCheck:
 
     Attributes:
         verdict: The reason code.
-        sentence: The same in words with numbers.
+        goal: Where to stand.
+        radius_m: The robot's, around its centre.
         clearance_m: From the goal to the nearest obstacle; 0 in one, off the map and where nobody
             knows.
         path_m: By path from the robot; None where no way leads there.
         nearest: The nearest pose that would work, by ways from the goal that pass through no wall;
             None for a good goal, and where there is none.
+        bounds: The corners of the map with the least and the greatest x and y; None where the goal
+            is no place on any map.
+        areas: The closed areas in the way: the one that the goal is in or too near to, the one
+            that the robot stands in, or those on the shortest way.
+        is_robot_inside: The robot itself stands in the closed area.
     """
 
     verdict: GoalVerdict
-    sentence: str
+    goal: Pose
+    radius_m: float
     clearance_m: float
     path_m: float | None = None
     nearest: Pose | None = None
+    bounds: tuple[Point, Point] | None = None
+    areas: tuple[ClosedArea, ...] = ()
+    is_robot_inside: bool = False
 
     @property
     def is_ok(self) -> bool:
@@ -83,25 +93,34 @@ def check_goal(
     return replace(check, nearest=_find_nearest(grid, distances, goal))
 
 
-def say_refusal(name: str, check: GoalCheck) -> str:
-    """Return why a place is no goal, with its name where the sentence does not say it."""
-    return check.sentence if name in check.sentence else f"{name}: {check.sentence}"
-
-
 def judge_goal(
     grid: OccupancyGrid, distances: DistanceField, goal: Pose, *, opened: Opened | None = None
 ) -> GoalCheck:
-    """Judges a goal as `check_goal`, without looking for another where it does not work."""
+    """Judge a goal as `check_goal`, without looking for another where it does not work."""
+    radius_m = distances.radius_m
     if not goal.is_finite() or max(abs(goal.x), abs(goal.y)) > FARTHEST_M:
-        sentence = f"({goal.x:g}, {goal.y:g}) is no place: a goal is two numbers of metres."
-        return GoalCheck(verdict=GoalVerdict.NOT_FINITE, sentence=sentence, clearance_m=0.0)
+        return GoalCheck(
+            verdict=GoalVerdict.NOT_FINITE, goal=goal, radius_m=radius_m, clearance_m=0.0
+        )
     clear_m = _clearance_at(grid, goal.point)
     path_m = distances.distance_to(goal.point)
-    closed = _say_closed(distances, goal, is_reachable=path_m is not None)
-    verdict, sentence = closed or _judge(grid, distances, goal, clear_m, path_m)
-    if verdict is GoalVerdict.UNREACHABLE:
-        sentence = _say_cut_off(grid, distances, goal, opened) or sentence
-    return GoalCheck(verdict=verdict, sentence=sentence, clearance_m=clear_m, path_m=path_m)
+    verdict = _judge(grid, distances, goal, clear_m, path_m)
+    areas: tuple[ClosedArea, ...] = ()
+    closing, is_robot_inside = _find_closing(distances, goal, is_reachable=path_m is not None)
+    if closing is not None:
+        verdict, areas = GoalVerdict.CLOSED, (closing,)
+    elif verdict is GoalVerdict.UNREACHABLE:
+        areas = _find_cutting_off(grid, distances, goal, opened)
+    return GoalCheck(
+        verdict=verdict,
+        goal=goal,
+        radius_m=radius_m,
+        clearance_m=clear_m,
+        path_m=path_m,
+        bounds=grid.bounds(),
+        areas=areas,
+        is_robot_inside=is_robot_inside,
+    )
 
 
 def _judge(
@@ -110,66 +129,52 @@ def _judge(
     goal: Pose,
     clear_m: float,
     path_m: float | None,
-) -> tuple[GoalVerdict, str]:
-    cell, radius_m = grid.cell_at(goal.point), distances.radius_m
+) -> GoalVerdict:
+    cell = grid.cell_at(goal.point)
     if not grid.contains(cell):
-        return GoalVerdict.OFF_MAP, f"{_say(goal)} lies off the map, {_bounds(grid)}."
+        return GoalVerdict.OFF_MAP
     if grid.is_unknown(cell):
-        return GoalVerdict.UNKNOWN, f"nobody has seen yet what is at {_say(goal)}."
+        return GoalVerdict.UNKNOWN
     if not grid.is_free(cell):
-        return GoalVerdict.OCCUPIED, f"{_say(goal)} lies in a wall or an obstacle."
+        return GoalVerdict.OCCUPIED
     if path_m is not None:
-        sentence = f"{_say(goal)} is {path_m:.1f} m away by path, {_say_clearance(clear_m)}."
-        return GoalVerdict.OK, sentence
-    if clear_m < radius_m:
-        sentence = (
-            f"{_say(goal)} is {_say_clearance(clear_m)}; the robot needs {radius_m:.2f} m "
-            "around its centre."
-        )
-        return GoalVerdict.TOO_TIGHT, sentence
-    sentence = f"no known way as wide as the robot, {2 * radius_m:.2f} m, leads to {_say(goal)}."
-    return GoalVerdict.UNREACHABLE, sentence
+        return GoalVerdict.OK
+    return GoalVerdict.TOO_TIGHT if clear_m < distances.radius_m else GoalVerdict.UNREACHABLE
 
 
-def _say_cut_off(
+def _find_cutting_off(
     grid: OccupancyGrid, distances: DistanceField, goal: Pose, opened: Opened | None
-) -> str:
-    """Says which closed areas cut a goal off; nothing where walls do."""
+) -> tuple[ClosedArea, ...]:
+    """Find the closed areas that cut a goal off; none where walls do."""
     floor, radius_m = distances.lattice.grid, distances.radius_m
     if not isinstance(floor, ClosedFloor):
-        return ""
+        return ()
     start = distances.start
     field = opened(start) if opened else distances_from(grid, start, radius_m=radius_m)
     way = field.way_to(goal.point)
     reach_m = radius_m + MARGIN_M + 2 * floor.resolution_m
-    areas = [] if way is None else floor.find_areas_along(way, within_m=reach_m)
-    if not areas:
-        return ""
-    titles = " and the ".join(area.title for area in areas)
-    return f"every known way to {_say(goal)} is closed; the shortest leads over the {titles}."
+    return () if way is None else tuple(floor.find_areas_along(way, within_m=reach_m))
 
 
-def _say_closed(
+def _find_closing(
     distances: DistanceField, goal: Pose, *, is_reachable: bool
-) -> tuple[GoalVerdict, str] | None:
-    """Gives the verdict on a goal at which the robot would be over a closed area."""
+) -> tuple[ClosedArea | None, bool]:
+    """Find the closed area that the robot would be over at a goal, or that it stands in itself.
+
+    Returns:
+        The area, None where there is none, and whether it is the robot that stands in it.
+    """
     floor = distances.lattice.grid
     if not isinstance(floor, ClosedFloor):
-        return None
+        return None, False
     # Borders of areas and of cells differ: what is reachable decides between the two.
     cell_m = floor.resolution_m
     reach_m = distances.radius_m if is_reachable else distances.radius_m + MARGIN_M + 2 * cell_m
     area = floor.find_area(goal.point, within_m=reach_m)
-    if area is not None:
-        off_m = area.distance_to(goal.point)
-        where = f"{off_m:.2f} m from" if off_m else "in"
-        return GoalVerdict.CLOSED, f"{_say(goal)} lies {where} the {area.title}."
-    around = None if is_reachable else floor.find_area(distances.start, within_m=0.0)
-    if around is None:
-        return None
-    ended = f", or end_event ends {around.event_id} where it is over" if around.event_id else ""
-    sentence = f"the robot itself stands in the {around.title}; a person has to lead it out{ended}."
-    return GoalVerdict.CLOSED, sentence
+    if area is not None or is_reachable:
+        return area, False
+    around = floor.find_area(distances.start, within_m=0.0)
+    return around, around is not None
 
 
 def _find_nearest(grid: OccupancyGrid, distances: DistanceField, goal: Pose) -> Pose | None:
@@ -260,16 +265,65 @@ def _window(grid: OccupancyGrid, centre: Point, reach_m: float) -> OccupancyGrid
     return grid.crop(*grid.window(cell.row, cell.col, margin=n))
 
 
-def _say(goal: Pose) -> str:
-    return f"({goal.x:.2f}, {goal.y:.2f})"
+def say_refusal(name: str, check: GoalCheck) -> str:
+    """Return why a place is no goal, with its name where the sentence does not say it."""
+    sentence = say_check(check)
+    return sentence if name in sentence else f"{name}: {sentence}"
 
 
-def _say_clearance(clear_m: float) -> str:
-    if math.isinf(clear_m):
+def say_check(check: GoalCheck) -> str:
+    """Return what a check says of a goal, with numbers: the message where it is refused."""
+    at = f"({check.goal.x:.2f}, {check.goal.y:.2f})"
+    match check.verdict:
+        case GoalVerdict.NOT_FINITE:
+            at = f"({check.goal.x:g}, {check.goal.y:g})"
+            said = f"{at} is no place: a goal is two numbers of metres."
+        case GoalVerdict.OFF_MAP:
+            said = f"{at} lies off the map{_say_bounds(check)}."
+        case GoalVerdict.UNKNOWN:
+            said = f"nobody has seen yet what is at {at}."
+        case GoalVerdict.OCCUPIED:
+            said = f"{at} lies in a wall or an obstacle."
+        case GoalVerdict.OK:
+            said = f"{at} is {check.path_m:.1f} m away by path, {_say_clearance(check)}."
+        case GoalVerdict.TOO_TIGHT:
+            said = (
+                f"{at} is {_say_clearance(check)}; the robot needs {check.radius_m:.2f} m "
+                "around its centre."
+            )
+        case GoalVerdict.CLOSED:
+            said = _say_closed(check, at)
+        case GoalVerdict.UNREACHABLE:
+            said = _say_unreachable(check, at)
+    return said
+
+
+def _say_bounds(check: GoalCheck) -> str:
+    if check.bounds is None:
+        return ""
+    low, high = check.bounds
+    return f", which spans x {low.x:.1f} to {high.x:.1f}, y {low.y:.1f} to {high.y:.1f}"
+
+
+def _say_clearance(check: GoalCheck) -> str:
+    if math.isinf(check.clearance_m):
         return f"more than {SEARCH_M:.0f} m from any obstacle"
-    return f"{clear_m:.2f} m from the nearest obstacle"
+    return f"{check.clearance_m:.2f} m from the nearest obstacle"
 
 
-def _bounds(grid: OccupancyGrid) -> str:
-    low, high = grid.bounds()
-    return f"which spans x {low.x:.1f} to {high.x:.1f}, y {low.y:.1f} to {high.y:.1f}"
+def _say_closed(check: GoalCheck, at: str) -> str:
+    area = check.areas[0]
+    if check.is_robot_inside:
+        event_id = area.event_id
+        ended = f", or event {event_id} has to be ended where it is over" if event_id else ""
+        return f"the robot itself stands in the {area.title}; a person has to lead it out{ended}."
+    off_m = area.distance_to(check.goal.point)
+    where = f"{off_m:.2f} m from" if off_m else "in"
+    return f"{at} lies {where} the {area.title}."
+
+
+def _say_unreachable(check: GoalCheck, at: str) -> str:
+    if check.areas:
+        titles = " and the ".join(area.title for area in check.areas)
+        return f"every known way to {at} is closed; the shortest leads over the {titles}."
+    return f"no known way as wide as the robot, {2 * check.radius_m:.2f} m, leads to {at}."

@@ -5,7 +5,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from mapspeak.errors import GoalError
+from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.places.standing import stand_before
@@ -100,7 +100,8 @@ def find_named(atlas: Atlas, words: str) -> Place | None:
 def no_such_place(atlas: Atlas, words: str) -> GoalError:
     """Gives the error for words that name no place: what became of it, and what there is."""
     wanted = words.strip()
-    return GoalError(_what_became_of(atlas, wanted), hint=_known_places(atlas, wanted))
+    hint, step = _known_places(atlas, wanted)
+    return GoalError(_what_became_of(atlas, wanted), hint=hint, step=step)
 
 
 def is_taken_name(name: str) -> bool:
@@ -173,11 +174,11 @@ def _what_became_of(atlas: Atlas, place: str) -> str:
     return f"There is no place called {place[:80]!r}."
 
 
-def _known_places(atlas: Atlas, wanted: str) -> str:
+def _known_places(atlas: Atlas, wanted: str) -> tuple[str, NextStep]:
     if atlas.places and not ID.fullmatch(wanted):
         answer = atlas.recollection.find(wanted, limit=MOST_GUESSES)
         if answer.verdict is not Verdict.NOT_REMEMBERED:
-            return _say_guesses(answer)
+            return _say_guesses(answer), NextStep.READ_MORE
     groups = {
         "rooms and corridors": [region.id for region in atlas.rooms.regions],
         "doors": [door.id for door in atlas.rooms.doors],
@@ -185,7 +186,7 @@ def _known_places(atlas: Atlas, wanted: str) -> str:
         "remembered": [place.id for place in atlas.places],
     }
     known = [f"{name} {_some_of(ids)}" for name, ids in groups.items() if ids]
-    return f"Known are {'; '.join(known) or 'no places yet'}. Call look_at_map to see them."
+    return f"Known are {'; '.join(known) or 'no places yet'}.", NextStep.SEE_PLACES
 
 
 def _say_guesses(answer: Answer) -> str:
@@ -195,7 +196,7 @@ def _say_guesses(answer: Answer) -> str:
     told = ", ".join(f"{each.entry.id} {quote_name(each.entry.name)}" for each in answer.candidates)
     return (
         f"Nothing remembered is called so; nearest in {by}: {told}. If {first.entry.id} is meant, "
-        f"use {first.entry.id}; find_place says more."
+        f"use {first.entry.id}."
     )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from mapspeak.hold import say_hold
 from mapspeak.installation import shell_command
-from mapspeak.places.goalcheck import GoalCheck, GoalVerdict
+from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, say_check
 from mapspeak.ros.messages import bare_type
 from mapspeak.safety.commands import (
     Act,
@@ -172,7 +172,7 @@ def judge_check(check: GoalCheck, policy: Policy) -> Refused | None:
     """Return what is against a goal by what the map says of it; None when nothing is."""
     always = (GoalVerdict.NOT_FINITE, GoalVerdict.CLOSED)
     if not check.is_ok and (policy.needs_known_way or check.verdict in always):
-        return Refused(rule="goals", reason=check.sentence, hint=_what_instead(check))
+        return Refused(rule="goals", reason=say_check(check), hint=_what_instead(check))
     if check.path_m is not None and check.path_m > policy.farthest_m:
         return Refused(
             rule="goals.farthest_m",

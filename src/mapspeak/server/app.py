@@ -26,6 +26,7 @@ from mapspeak.server.offering import (
     write_instructions,
 )
 from mapspeak.server.prompts import add_prompts
+from mapspeak.server.text.errors import say_error
 from mapspeak.server.text.visible import show_controls, show_controls_of
 from mapspeak.server.tools.asking import Asking
 from mapspeak.server.tools.toolset import Effect, Tool, lean_input, lean_output
@@ -322,7 +323,7 @@ def _disagreed() -> ToolError:
 def _explain(name: str, cause: BaseException | None) -> str | None:
     match cause:
         case MapspeakError():
-            return str(cause)
+            return say_error(cause)
         case ValidationError():
             faults = [_fault(error["loc"], error["msg"]) for error in cause.errors()]
             return f"{name} was called with wrong arguments: {'; '.join(dict.fromkeys(faults))}."

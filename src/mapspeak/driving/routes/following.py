@@ -16,7 +16,7 @@ from mapspeak.driving.exploration import Site
 from mapspeak.driving.routes.planning import Candidate, RoutePlan, plan_route
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose
-from mapspeak.places.goalcheck import GoalCheck, check_goal
+from mapspeak.places.goalcheck import GoalCheck, check_goal, say_check
 from mapspeak.places.standing import arrival_pose
 from mapspeak.robot import GoalState, PoseDoubt
 from mapspeak.worldmodel.model import Atlas
@@ -189,7 +189,7 @@ class RouteBook:
             atlas = await self._site.fetch_atlas()
             pose, check = await self._site.compute(lambda: _check(atlas, goal))
             if not check.is_ok:
-                return check.sentence
+                return say_check(check)
             drive = await drives.start(pose, place=goal.title, ticket=ticket, client=client)
         self._goal_id = drive.goal_id
         return ""

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from mapspeak.errors import GoalError
+from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point, Pose
 from mapspeak.places.choosing import CheckedGoal, check_place, find_place
 from mapspeak.places.goalcheck import say_refusal
@@ -49,7 +49,8 @@ def find_candidates(atlas: Atlas, words: str) -> tuple[Candidate, ...]:
     if not good:
         raise GoalError(
             say_refusal(goals[0].name, goals[0].check),
-            hint="Leave this stop out, or call check_goal to find a pose near it that works.",
+            hint="Leave this stop out.",
+            step=NextStep.CHECK_NEAR,
         )
     unique = {(goal.pose.x, goal.pose.y): _candidate_of(goal) for goal in reversed(good)}
     return tuple(reversed(unique.values()))[:MOST_CANDIDATES]
@@ -150,7 +151,12 @@ def _find(atlas: Atlas, number: int, stop: str) -> tuple[Candidate, ...]:
     try:
         return find_candidates(atlas, stop)
     except GoalError as error:
-        raise GoalError(f"Stop {number + 1}: {error.message}", hint=error.hint) from error
+        raise GoalError(
+            f"Stop {number + 1}: {error.message}",
+            hint=error.hint,
+            step=error.step,
+            about=error.about,
+        ) from error
 
 
 def plan_among(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mapspeak.errors import GoalError
+from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point
 from mapspeak.places.standing import COMFORT_M
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
@@ -118,7 +118,7 @@ def is_in_sight(atlas: Atlas, points: FloatArray, thing: Point) -> Mask:
 
 MOST_EXTENT = 256
 TOLERANCE_M = 0.1
-FALLBACK = "Call look_at_map, or measure, and name another place."
+FALLBACK = "Name another place."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -136,10 +136,13 @@ class Stand:
     yaw_rad: float | None = None
 
 
-def refuse(what: str, works: Sequence[str] = (), *, else_hint: str = FALLBACK) -> GoalError:
-    """Gives the error for what nothing fits, with what would."""
-    hint = f"What would work: {join_or(works)}." if works else else_hint
-    return GoalError(what, hint=hint)
+def refuse(what: str, works: Sequence[str] = (), *, else_hint: str = "") -> GoalError:
+    """Return the error for what nothing fits, with what would."""
+    if works:
+        return GoalError(what, hint=f"What would work: {join_or(works)}.")
+    if else_hint:
+        return GoalError(what, hint=else_hint)
+    return GoalError(what, hint=FALLBACK, step=NextStep.MEASURE)
 
 
 def join_or(words: Sequence[str]) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point
 from mapspeak.places.naming import Place
 from mapspeak.places.relations.directions import front_of_region
@@ -73,11 +74,15 @@ def stand_next_to(atlas: Atlas, thing: Referent) -> Stand:
         if point is not None:
             away_m = _at(footing, from_edge_m, point)
             return _facing(thing, point, f"next to {thing.name}, {away_m:.1f} m from it")
-    aside = "" if thing.door is None else " beside its opening"
-    raise refuse(
-        f"The robot can stand nowhere within {NEARLY_M:.1f} m of {thing.name}{aside}.",
-        [] if thing.door is None else [f"in front of {thing.name}", f"behind {thing.name}"],
-        else_hint=f"Call describe_place with {thing.name}, then choose another place.",
+    nowhere = f"The robot can stand nowhere within {NEARLY_M:.1f} m of {thing.name}"
+    if thing.door is not None:
+        works = [f"in front of {thing.name}", f"behind {thing.name}"]
+        raise refuse(f"{nowhere} beside its opening.", works)
+    raise GoalError(
+        f"{nowhere}.",
+        hint="Choose another place.",
+        step=NextStep.LOOK_AROUND,
+        about=thing.name,
     )
 
 

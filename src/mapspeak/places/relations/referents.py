@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
-from mapspeak.errors import GoalError
+from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.places.naming import (
@@ -316,7 +316,9 @@ def _find_thing(atlas: Atlas, wanted: str) -> Referent | None:
         ids = [place.id for place in places]
         raise GoalError(
             f"{wanted[:80]!r} was seen from {', '.join(ids)}, but not in which direction.",
-            hint=f"Call navigate_to with {ids[0]} and look from there.",
+            hint=f"Drive to {ids[0]} and look from there.",
+            step=NextStep.LOOK_FROM,
+            about=ids[0],
         )
     if len(located) > 1:
         raise _several_things(atlas, wanted, located)

@@ -7,6 +7,7 @@ from pydantic import Field
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
+from mapspeak.places.goalcheck import say_check
 from mapspeak.places.recall import Recall, RecallCandidate, RecallQuery
 from mapspeak.semantic import find_objection
 from mapspeak.semantic.episodes import EpisodeQuery, EpisodeStore, Observation, ObservationKind
@@ -133,7 +134,7 @@ class CandidateReport(Report):
             path_m=None if check.path_m is None else round(check.path_m, 2),
             stand_at=PoseReport.of(candidate.pose),
             facing_it=candidate.is_faced,
-            problem="" if check.is_ok else check.sentence,
+            problem="" if check.is_ok else say_check(check),
             last_seen=_say_moment(candidate.last_seen, now),
             trust=round(candidate.trust.ratio, 2),
             trust_why=list(candidate.trust.reasons[:MOST_DOUBTS]),

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 
 from mapspeak.places.choosing import CheckedGoal, check_place
+from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import Place
 from mapspeak.places.ways import standing_point
 from mapspeak.semantic import group_views
@@ -52,10 +53,10 @@ def describe_place(atlas: Atlas, place: Place) -> str:
 def _way_lines(atlas: Atlas, place: Place, goal: CheckedGoal) -> Iterator[str]:
     yield f"From the robot: {say_direction(atlas, standing_point(atlas, place))}."
     if goal.check.is_ok:
-        yield f"To go there: navigate_to takes {place.name}; {goal.check.sentence}"
+        yield f"To go there: navigate_to takes {place.name}; {say_check(goal.check)}"
         yield f"The robot would stand at {say_pose(goal.pose)}."
         return
-    yield f"The robot cannot go there: {goal.check.sentence}"
+    yield f"The robot cannot go there: {say_check(goal.check)}"
     if goal.check.nearest is not None:
         yield f"The nearest pose that works: {say_pose(goal.check.nearest)}."
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from mapspeak.errors import GoalError
 from mapspeak.places.choosing import check_place, find_place
-from mapspeak.places.goalcheck import GoalVerdict
+from mapspeak.places.goalcheck import GoalVerdict, say_check
 from mapspeak.places.naming import Place, Spot
 from mapspeak.places.ways import Way, find_way, measure_path, standing_point
 from mapspeak.server.text.roomtables import say_sizes
@@ -63,7 +63,7 @@ def _way_table(atlas: Atlas, start: Place, ends: Sequence[Place]) -> str:
         n_all=len(nearest_first),
     )
     is_there = begin.check.is_ok or start.point == atlas.robot.point
-    said = [] if is_there else [f"No way begins there: {begin.check.sentence}"]
+    said = [] if is_there else [f"No way begins there: {say_check(begin.check)}"]
     if is_there and atlas.map.areas:
         said = list(_say_closed(atlas, nearest_first[:MOST_WAYS], lengths_m))
     return "\n".join([table, *said])
@@ -74,7 +74,7 @@ def _say_closed(
 ) -> Iterator[str]:
     """Says why there is no way to some places, where it may be that something is closed."""
     without_way = [end for end in ends if lengths_m[end.name] is None]
-    sentences = (check_place(atlas, end).check.sentence for end in without_way[:MOST_REASONS])
+    sentences = (say_check(check_place(atlas, end).check) for end in without_way[:MOST_REASONS])
     yield from dict.fromkeys(sentences)
 
 

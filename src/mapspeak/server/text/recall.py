@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from mapspeak.geometry import Point
+from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import say_spot
 from mapspeak.places.recall import Recall, RecallCandidate, RecallDoubt
 from mapspeak.semantic.quoting import quote
@@ -86,7 +87,7 @@ def _say_found(first: RecallCandidate, doubt: RecallDoubt | None) -> str:
     if doubt is not None:
         said = f"Likely {_name(first)}, not sure: {_say_doubt(first, doubt)}."
     if not first.check.is_ok:
-        return f"{said} But the robot cannot go there: {first.check.sentence}"
+        return f"{said} But the robot cannot go there: {say_check(first.check)}"
     if doubt and first.position is None:
         return f"{said} navigate_to {first.id} goes where it was seen."
     look = "; look before you rely on it" if doubt else ""
