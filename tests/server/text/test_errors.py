@@ -3,7 +3,7 @@ import pytest
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.server.text.errors import say_error
 
-NEAR = "The nearest pose that works is x=1.00, y=2.00."
+NEAR = "The nearest pose that works is x=1.00, y=2.00"
 
 
 @pytest.mark.parametrize(
@@ -12,9 +12,8 @@ NEAR = "The nearest pose that works is x=1.00, y=2.00."
         (None, "Give x, y.", "Give x, y."),
         (
             NextStep.DRIVE_THERE,
-            NEAR,
-            "The nearest pose that works is x=1.00, y=2.00; call navigate_to with it, or call "
-            "look_at_map.",
+            f"{NEAR}.",
+            f"{NEAR}; call navigate_to with it, or call look_at_map.",
         ),
         (
             NextStep.CHOOSE_ON_MAP,
