@@ -231,7 +231,7 @@ def test_what_speaks_against_a_thing_lowers_its_trust() -> None:
     behind = look("a", 2.0, 1.0, ("sink", Point(2.0, 2.6)), yaw_deg=90, range_m=9.0)
     first = recall(atlas_of(behind), RecallQuery(words="sink")).candidates[0]
     assert first.trust.ratio < 0.8
-    assert len(first.trust.reasons) > 1
+    assert first.trust.findings
 
 
 def test_a_likeness_in_meaning_is_told_and_never_driven_to() -> None:

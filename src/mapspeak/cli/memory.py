@@ -240,6 +240,7 @@ def _findings(places: "SemanticMap", map_file: Path) -> list[dict[str, object]]:
         check_memory,
     )
     from mapspeak.semantic.things import find_things  # noqa: PLC0415
+    from mapspeak.server.text.findings import say_finding  # noqa: PLC0415
     from mapspeak.spatial.mapfiles import load_map  # noqa: PLC0415
     from mapspeak.spatial.rooms import find_rooms  # noqa: PLC0415
 
@@ -247,7 +248,7 @@ def _findings(places: "SemanticMap", map_file: Path) -> list[dict[str, object]]:
     found = find_things(places, grid)
     findings = check_memory(places, found, rooms=find_rooms(grid))
     return [
-        {"kind": str(each.kind), "sentence": each.sentence, "waypoints": list(each.waypoints)}
+        {"kind": str(each.kind), "sentence": say_finding(each), "waypoints": list(each.waypoints)}
         for each in findings
     ]
 

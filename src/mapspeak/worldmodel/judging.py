@@ -38,10 +38,10 @@ class Judge:
 
     def judge_place(self, place: RememberedPlace) -> Trust:
         """Gives the trust that a record deserves: it is sure until something speaks against it."""
-        ratio, reasons = 1.0, []
+        ratio, against = 1.0, []
         for number in self._of_waypoint.get(place.waypoint.name, ()):
             finding = self.findings[number]
             if finding.label is None and finding.weight < 1.0:
                 ratio *= finding.weight
-                reasons.append(finding.sentence)
-        return Trust(ratio, tuple(reasons))
+                against.append(finding)
+        return Trust(ratio, tuple(against))

@@ -11,7 +11,6 @@ import numpy as np
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.semantic.consistency.findings import Finding, FindingKind
 from mapspeak.semantic.consistency.sightlines import FARTHEST_M, check_pose, check_rays
-from mapspeak.semantic.quoting import quote_name
 from mapspeak.semantic.things import Thing, Things, name_the_same
 from mapspeak.semantic.waypoint import SemanticMap, Waypoint
 from mapspeak.spatial.grid import FloatArray
@@ -37,10 +36,8 @@ def check_duplicates(waypoints: Sequence[Waypoint]) -> Iterator[Finding]:
             if turn_rad <= TWIN_RAD and named and named == _labels(other):
                 yield Finding(
                     kind=FindingKind.DUPLICATE,
-                    sentence=f"{quote_name(other.name)} and {quote_name(waypoint.name)} stand "
-                    f"{other.pose.point.distance_to(waypoint.pose.point):.2f} m apart and name "
-                    "the same things.",
                     waypoints=(other.name, waypoint.name),
+                    far_m=other.pose.point.distance_to(waypoint.pose.point),
                 )
 
 
@@ -53,10 +50,10 @@ def check_company(places: SemanticMap, found: Things) -> Iterator[Finding]:
         for view in thing.conflicting:
             yield Finding(
                 kind=FindingKind.POINTS_PAST,
-                sentence=f"{quote_name(view.waypoint)} {view.why}, the {_say(thing)}.",
                 waypoints=(view.waypoint,),
                 label=view.landmark.label,
                 things=(thing,),
+                view=view,
             )
     for waypoint in places.waypoints:
         yield from _not_seen(found, waypoint, placed, at)
@@ -71,8 +68,6 @@ def _two_labels(placed: Sequence[Thing], at: FloatArray) -> Iterator[Finding]:
             if not is_seen_beside and not name_the_same(thing.label, other.label):
                 yield Finding(
                     kind=FindingKind.TWO_LABELS,
-                    sentence=f"In one place stand a {_say(other)} by {_count(other)} and a "
-                    f"{_say(thing)} by {_count(thing)}.",
                     waypoints=(*other.waypoints, *thing.waypoints),
                     things=(other, thing),
                 )
@@ -100,25 +95,14 @@ def _not_seen(
         ):
             yield Finding(
                 kind=FindingKind.NOT_SEEN,
-                sentence=f"{quote_name(waypoint.name)} looked to where the {_say(thing)} should "
-                f"be, {pose.point.distance_to(thing.position):.1f} m away, and does not name it.",
                 waypoints=(waypoint.name,),
                 things=(thing,),
+                far_m=pose.point.distance_to(thing.position),
             )
 
 
 def _labels(waypoint: Waypoint) -> list[str]:
     return sorted(each.label.casefold() for each in waypoint.landmarks)
-
-
-def _say(thing: Thing) -> str:
-    assert thing.position is not None, "these have a place"  # noqa: S101 - our belief
-    return f"{quote_name(thing.label)} at ({thing.position.x:.2f}, {thing.position.y:.2f})"
-
-
-def _count(thing: Thing) -> str:
-    n = len(thing.supporting)
-    return "one view" if n == 1 else f"{n} views"
 
 
 BORDER_M = 1.0
@@ -224,9 +208,8 @@ def check_rooms(
         told, here = misfiled[waypoint.name]
         yield Finding(
             kind=FindingKind.WRONG_ROOM,
-            sentence=f"{quote_name(waypoint.name)} is filed under {told.id}, but stands in "
-            f"{here.id}.",
             waypoints=(waypoint.name,),
+            ids=(told.id, here.id),
         )
         return
     start = rooms.find_region_at(waypoint.pose.point) or rooms.find_region(waypoint.room_id)
@@ -235,11 +218,10 @@ def check_rooms(
         if start is not None and not _sees_through(rooms, waypoint, thing, (start, *way)):
             yield Finding(
                 kind=FindingKind.WRONG_ROOM,
-                sentence=f"{quote_name(thing.label)} of {quote_name(waypoint.name)} lies in "
-                f"{way[-1].id}, which no door on the line from {start.id} opens to.",
                 waypoints=(waypoint.name,),
                 label=thing.label,
                 things=(thing,),
+                ids=(way[-1].id, start.id),
             )
 
 

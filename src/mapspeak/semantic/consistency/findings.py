@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
-from mapspeak.semantic.quoting import quote_name
-from mapspeak.semantic.things import Thing
+from mapspeak.geometry import Point
+from mapspeak.semantic.things import Thing, View
 
 
 class FindingKind(StrEnum):
@@ -51,17 +51,30 @@ class Finding:
 
     Attributes:
         kind: What is odd.
-        sentence: The same in words with numbers.
         waypoints: The names of the places concerned.
         label: Of the one landmark concerned; None where it is the whole place.
         things: The things concerned, whatever their views.
+        view: Of the one thing concerned, the view that points past it.
+        ids: Of the maps: the record's and the robot's. Of the rooms: the one that a record names
+            or a thing lies in, and the one that it is seen from.
+        at: Where the place stands.
+        radius_m: Of the robot that cannot get there.
+        far_m: From one place to the other, or to the thing.
+        told_m: How far away the landmark was told to be.
+        open_m: How far the line to the landmark leads over free floor.
     """
 
     kind: FindingKind
-    sentence: str
     waypoints: tuple[str, ...]
     label: str | None = None
     things: tuple[Thing, ...] = ()
+    view: View | None = None
+    ids: tuple[str, str] | None = None
+    at: Point | None = None
+    radius_m: float | None = None
+    far_m: float | None = None
+    told_m: float | None = None
+    open_m: float | None = None
 
     @property
     def weight(self) -> float:
@@ -91,26 +104,28 @@ class Trust:
 
     Attributes:
         ratio: From 0 to 1.
-        reasons: In words: who speaks for it, then what speaks against it.
+        findings: What speaks against it.
+        thing: The thing, whose views speak for it; None of a place.
     """
 
     ratio: float
-    reasons: tuple[str, ...]
+    findings: tuple[Finding, ...]
+    thing: Thing | None = None
 
 
 def judge_trust(thing: Thing, findings: Iterable[Finding]) -> Trust:
-    """Gives the trust that a thing deserves by its views and all findings of its memory.
+    """Return the trust that a thing deserves by its views and all findings of its memory.
 
     A finding about one of several places that have seen it counts by its share of them.
     """
     odds = thing.confidence_ratio / (1 - thing.confidence_ratio)
-    reasons = [_say_views(thing)]
+    against = []
     for finding in findings:
         share = _share(thing, finding)
         if share and finding.weight < 1.0:
             odds *= finding.weight_for(thing) ** share
-            reasons.append(finding.sentence)
-    return Trust(odds / (1 + odds), tuple(reasons))
+            against.append(finding)
+    return Trust(odds / (1 + odds), tuple(against), thing)
 
 
 def _share(thing: Thing, finding: Finding) -> float:
@@ -123,10 +138,3 @@ def _share(thing: Thing, finding: Finding) -> float:
         if view.waypoint in finding.waypoints
     ]
     return sum(views) / len(thing.supporting)
-
-
-def _say_views(thing: Thing) -> str:
-    names = ", ".join(map(quote_name, thing.waypoints))
-    n_views = len(thing.supporting)
-    views = "" if n_views == len(thing.waypoints) else f" in {n_views} views"
-    return f"Seen from {len(thing.waypoints)}{views}: {names}."

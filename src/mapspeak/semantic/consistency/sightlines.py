@@ -5,7 +5,6 @@ from collections.abc import Iterator
 
 from mapspeak.geometry import Point
 from mapspeak.semantic.consistency.findings import Finding, FindingKind
-from mapspeak.semantic.quoting import quote_name
 from mapspeak.semantic.things import Things
 from mapspeak.semantic.things.sight import BODY_M, OWN_M
 from mapspeak.semantic.waypoint import Landmark, Waypoint
@@ -19,20 +18,16 @@ def check_pose(
     grid: OccupancyGrid, waypoint: Waypoint, distances: DistanceField | None, map_id: str | None
 ) -> Iterator[Finding]:
     """Gives what is odd about where a waypoint is."""
-    if None not in (map_id, waypoint.map_id) and waypoint.map_id != map_id:
-        of, on = quote_name(waypoint.map_id or ""), quote_name(map_id or "")
-        sentence = f"belongs to the map {of}, but the robot is on {on}"
-        yield _finding(FindingKind.OTHER_MAP, waypoint, sentence)
-    point = waypoint.pose.point
+    of, point = (waypoint.name,), waypoint.pose.point
+    if waypoint.map_id is not None and map_id is not None and waypoint.map_id != map_id:
+        ids = (waypoint.map_id, map_id)
+        yield Finding(kind=FindingKind.OTHER_MAP, waypoints=of, ids=ids)
     ground = _ground_at(grid, point)
     if ground is not None:
-        yield _finding(*_say_ground(ground, waypoint, point))
+        yield Finding(kind=ground, waypoints=of, at=point)
     elif distances is not None and not distances.is_reachable(point):
-        sentence = (
-            f"stands at {_say(point)}, where a robot of {distances.radius_m:.2f} m radius cannot "
-            "get to now"
-        )
-        yield _finding(FindingKind.UNREACHABLE, waypoint, sentence)
+        radius_m = distances.radius_m
+        yield Finding(kind=FindingKind.UNREACHABLE, waypoints=of, at=point, radius_m=radius_m)
 
 
 def _ground_at(grid: OccupancyGrid, point: Point) -> FindingKind | None:
@@ -46,27 +41,6 @@ def _ground_at(grid: OccupancyGrid, point: Point) -> FindingKind | None:
     if occupancy > FREE_MAX:
         return FindingKind.IN_OBSTACLE
     return FindingKind.IN_UNKNOWN if occupancy == UNKNOWN else None
-
-
-def _say_ground(
-    kind: FindingKind, waypoint: Waypoint, point: Point
-) -> tuple[FindingKind, Waypoint, str]:
-    said = {
-        FindingKind.OFF_MAP: f"stands at {_say(point)}, off the map",
-        FindingKind.IN_OBSTACLE: f"stands at {_say(point)}, where the map has an obstacle now",
-        FindingKind.IN_UNKNOWN: f"stands at {_say(point)}, where nobody has seen the floor",
-    }
-    return kind, waypoint, said[kind]
-
-
-def _finding(kind: FindingKind, waypoint: Waypoint, what: str) -> Finding:
-    sentence = f"{quote_name(waypoint.name)} {what}."
-    return Finding(kind=kind, sentence=sentence, waypoints=(waypoint.name,))
-
-
-def _say(point: Point) -> str:
-    is_near = max(abs(point.x), abs(point.y)) < FARTHEST_M
-    return f"({point.x:.2f}, {point.y:.2f})" if is_near else f"({point.x:g}, {point.y:g})"
 
 
 N_SIGMAS = 2.0
@@ -91,16 +65,14 @@ def _check(
         return  # It stands in an obstacle, which is another finding.
     if _ends_in_unknown(found, waypoint, way, open_m):
         if landmark.range_m is None or landmark.range_m > open_m:
-            sentence = f"the line to it leaves the seen floor after {open_m:.1f} m"
-            yield _landmark_finding(FindingKind.THROUGH_UNKNOWN, waypoint, landmark, sentence)
+            yield _landmark_finding(FindingKind.THROUGH_UNKNOWN, waypoint, landmark, open_m)
         return
     if landmark.range_m is None:
         return
     noise = found.sight.noise
     spread_m = noise.range_m + noise.range_ratio * landmark.range_m
     if landmark.range_m > _widest_m(found, waypoint, way) + BODY_M + N_SIGMAS * spread_m:
-        sentence = f"it is told as {landmark.range_m:.1f} m away, behind a wall at {open_m:.1f} m"
-        yield _landmark_finding(FindingKind.BEHIND_WALL, waypoint, landmark, sentence)
+        yield _landmark_finding(FindingKind.BEHIND_WALL, waypoint, landmark, open_m)
 
 
 def _widest_m(found: Things, waypoint: Waypoint, way: float) -> float:
@@ -127,11 +99,12 @@ def _ends_in_unknown(found: Things, waypoint: Waypoint, way: float, open_m: floa
 
 
 def _landmark_finding(
-    kind: FindingKind, waypoint: Waypoint, landmark: Landmark, what: str
+    kind: FindingKind, waypoint: Waypoint, landmark: Landmark, open_m: float
 ) -> Finding:
     return Finding(
         kind=kind,
-        sentence=f"{quote_name(landmark.label)} of {quote_name(waypoint.name)}: {what}.",
         waypoints=(waypoint.name,),
         label=landmark.label,
+        told_m=landmark.range_m,
+        open_m=open_m,
     )

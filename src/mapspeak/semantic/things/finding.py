@@ -285,8 +285,8 @@ def describe_group(
         purposes=tuple(_by_votes(filter(None, (each.landmark.purpose for each in ordered)))),
         position=position,
         uncertainty_m=placement.uncertainty_m if placement else None,
-        supporting=tuple(_view(each, _say_support(each, position)) for each in ordered),
-        conflicting=tuple(_view(each, _say_conflict(each, position)) for each in conflicting),
+        supporting=tuple(_view(each, position) for each in ordered),
+        conflicting=tuple(_view(each, position) for each in conflicting),
         confidence_ratio=_confidence(group, agreements),
         n_agreeing=_count_agreeing(group, agreements),
         whereabouts=placement.whereabouts if placement else None,
@@ -299,34 +299,20 @@ def _by_votes(words: Iterable[str]) -> list[str]:
     return sorted(counts, key=lambda word: (-counts[word], -len(word), word))
 
 
-def _view(sighting: Sighting, why: str) -> View:
+def _view(sighting: Sighting, position: Point | None) -> View:
+    pose, bearing_rad = sighting.waypoint.pose, sighting.landmark.bearing_rad
+    far_m = off_rad = None
+    if position is not None and bearing_rad is not None:
+        far_m = pose.point.distance_to(position)
+        ahead_rad = pose.yaw_rad + bearing_rad
+        off_rad = abs(math.remainder(pose.point.bearing_to(position) - ahead_rad, math.tau))
     return View(
         waypoint=sighting.waypoint.name,
         landmark=sighting.landmark,
-        place=sighting.waypoint.pose.point,
-        why=why,
+        place=pose.point,
+        far_m=far_m,
+        off_rad=off_rad,
     )
-
-
-def _say_support(sighting: Sighting, position: Point | None) -> str:
-    landmark = sighting.landmark
-    if position is None or landmark.bearing_rad is None:
-        return "names it, without a direction"
-    far_m = sighting.waypoint.pose.point.distance_to(position)
-    told = "" if landmark.range_m is None else f", told as {landmark.range_m:.1f} m"
-    return f"saw it {far_m:.1f} m away{told}, {_off_deg(sighting, position):.0f} deg off"
-
-
-def _say_conflict(sighting: Sighting, position: Point | None) -> str:
-    assert position is not None, "only a place can be contradicted"  # noqa: S101 - our belief
-    return f"has it in plain sight, but points {_off_deg(sighting, position):.0f} deg past it"
-
-
-def _off_deg(sighting: Sighting, position: Point) -> float:
-    pose = sighting.waypoint.pose
-    ahead = pose.yaw_rad + (sighting.landmark.bearing_rad or 0.0)
-    off_rad = math.remainder(pose.point.bearing_to(position) - ahead, math.tau)
-    return abs(math.degrees(off_rad))
 
 
 def _confidence(group: Sequence[Sighting], agreements: Sequence[float]) -> float:

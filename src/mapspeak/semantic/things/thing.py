@@ -117,13 +117,16 @@ class View:
         waypoint: The name of the place it was seen from.
         landmark: What was seen.
         place: Where it was seen from: that waypoint's place, or the view's own.
-        why: Why it speaks for the thing or against it, in words with numbers.
+        far_m: From there to the thing; None where the view says no direction or the thing has no
+            position.
+        off_rad: How far the view points past the thing, without a sign; None as before.
     """
 
     waypoint: str
     landmark: Landmark
     place: Point
-    why: str
+    far_m: float | None = None
+    off_rad: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,6 +14,7 @@ from mapspeak.semantic.episodes import EpisodeQuery, EpisodeStore, Observation, 
 from mapspeak.semantic.quoting import quote_name
 from mapspeak.semantic.retrieval import EntryKind, Verdict, calls_by_name
 from mapspeak.server.reports.robot import PoseReport, Report
+from mapspeak.server.text.findings import say_trust
 from mapspeak.server.text.memory import say_age
 from mapspeak.server.text.recall import say_advice, say_evidence
 from mapspeak.server.text.wording import say_count, say_pose
@@ -137,7 +138,7 @@ class CandidateReport(Report):
             problem="" if check.is_ok else say_check(check),
             last_seen=_say_moment(candidate.last_seen, now),
             trust=round(candidate.trust.ratio, 2),
-            trust_why=list(candidate.trust.reasons[:MOST_DOUBTS]),
+            trust_why=say_trust(candidate.trust)[:MOST_DOUBTS],
         )
 
 

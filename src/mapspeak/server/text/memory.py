@@ -12,6 +12,7 @@ from mapspeak.semantic import Confidence, Landmark, Merge, Reunion, Waypoint
 from mapspeak.semantic.consistency import Finding
 from mapspeak.semantic.episodes import EpisodeMatch, EpisodePage
 from mapspeak.semantic.quoting import quote, quote_name, tell_name
+from mapspeak.server.text.findings import say_finding, say_trust
 from mapspeak.server.text.wording import say_count, say_point, say_pose, shorten
 from mapspeak.worldmodel.model import Atlas
 from mapspeak.worldmodel.recollection import RememberedThing
@@ -104,7 +105,7 @@ def describe_check(atlas: Atlas, *, first: int) -> str:
     judge = atlas.judge
     trusts = [(judge.judge_thing(each), each) for each in atlas.things]
     doubted = sorted(
-        ((trust, each) for trust, each in trusts if len(trust.reasons) > 1),
+        ((trust, each) for trust, each in trusts if trust.findings),
         key=lambda pair: (pair[0].ratio, int(pair[1].id[1:])),
     )
     findings = sorted(judge.findings, key=lambda finding: finding.weight)
@@ -121,7 +122,7 @@ def describe_check(atlas: Atlas, *, first: int) -> str:
             "Things with something against them, least trusted first",
             [
                 f"{each.id} {quote(each.thing.label)}, trust {trust.ratio:.2f}: "
-                f"{' '.join(trust.reasons[:4])}"
+                f"{' '.join(say_trust(trust)[:4])}"
                 for trust, each in doubted[first : first + MOST_LISTED]
             ],
             n_all=len(doubted),
@@ -147,7 +148,7 @@ def _rows(heading: str, rows: list[str], *, n_all: int, first: int) -> Iterator[
 
 
 def _say_finding(finding: Finding) -> str:
-    return f"{finding.kind.replace('_', ' ')}: {finding.sentence}"
+    return f"{finding.kind.replace('_', ' ')}: {say_finding(finding)}"
 
 
 def describe_episodes(page: EpisodePage, *, now: datetime | None) -> str:

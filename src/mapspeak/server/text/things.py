@@ -7,6 +7,7 @@ from mapspeak.places.recall import SURE_RATIO, describe_candidate
 from mapspeak.semantic import Landmark
 from mapspeak.semantic.consistency import Trust
 from mapspeak.semantic.quoting import quote, tell_name
+from mapspeak.server.text.findings import say_conflict, say_finding, say_support
 from mapspeak.server.text.wording import say_path, say_point, say_pose
 from mapspeak.spatial.rooms import Region
 from mapspeak.worldmodel.model import Atlas
@@ -87,18 +88,23 @@ def _list(atlas: Atlas, heading: str, things: Sequence[RememberedThing]) -> Iter
 def _say_thing(atlas: Atlas, remembered: RememberedThing) -> str:
     thing, trust = remembered.thing, atlas.judge.judge_thing(remembered)
     where = "place not noted" if thing.position is None else f"at {say_point(thing.position)}"
-    doubt = "" if trust.ratio >= LOW_RATIO else f" ({' '.join(trust.reasons[1:3])})"
+    doubt = (
+        "" if trust.ratio >= LOW_RATIO else f" ({' '.join(map(say_finding, trust.findings[:2]))})"
+    )
     return f"{remembered.id} {quote(thing.label)} {where}, trust {trust.ratio:.2f}{doubt}"
 
 
 def _view_lines(atlas: Atlas, remembered: RememberedThing) -> Iterator[str]:
     thing = remembered.thing
-    for what, views in (("Seen from", thing.supporting), ("Against it", thing.conflicting)):
+    for what, views, say_why in (
+        ("Seen from", thing.supporting, say_support),
+        ("Against it", thing.conflicting, say_conflict),
+    ):
         for view in views[:MOST_VIEWS]:
             place = atlas.recollection.find_place(view.waypoint)
             place_id = "" if place is None else f"{place.id} "
             away = say_path(view.place.distance_to(remembered.point))
-            yield f"{what} {place_id}{quote(view.waypoint)}, {away} m off: {view.why}."
+            yield f"{what} {place_id}{quote(view.waypoint)}, {away} m off: {say_why(view)}."
             if view.landmark.note is not None:
                 yield f"Noted there: {quote(view.landmark.note)}"
 
@@ -106,8 +112,8 @@ def _view_lines(atlas: Atlas, remembered: RememberedThing) -> Iterator[str]:
 def _trust_lines(trust: Trust) -> Iterator[str]:
     word = "sure" if trust.ratio >= SURE_RATIO else "likely" if trust.ratio >= LOW_RATIO else "low"
     yield f"Trust {trust.ratio:.2f}, {word}."
-    for reason in trust.reasons[1:MOST_VIEWS]:
-        yield f"It speaks against it: {reason}"
+    for finding in trust.findings[: MOST_VIEWS - 1]:
+        yield f"It speaks against it: {say_finding(finding)}"
 
 
 def _quote_all(texts: Sequence[str]) -> str:
