@@ -1,8 +1,13 @@
 """Exploring: frontier after frontier, until nothing is left or what is left cannot be reached."""
 
-from mapspeak.driving.exploration.blocked import BlockedPlace, BlockedPlaces, has_room_at
-from mapspeak.driving.exploration.explorer import Bounds, Explorer, Pick, take_first
-from mapspeak.driving.exploration.progress import ExplorationState, Progress
+from mapspeak.driving.exploration.blocked import BlockedPlace, BlockedPlaces, TripEnd, has_room_at
+from mapspeak.driving.exploration.explorer import Explorer, Pick, take_first
+from mapspeak.driving.exploration.progress import (
+    BoundKind,
+    Bounds,
+    ExplorationState,
+    Progress,
+)
 from mapspeak.driving.exploration.trips import (
     OnTrip,
     Site,
@@ -17,6 +22,7 @@ from mapspeak.driving.exploration.trips import (
 __all__ = [
     "BlockedPlace",
     "BlockedPlaces",
+    "BoundKind",
     "Bounds",
     "ExplorationState",
     "Explorer",
@@ -26,6 +32,7 @@ __all__ = [
     "Site",
     "Target",
     "Trip",
+    "TripEnd",
     "TripState",
     "Trips",
     "has_room_at",

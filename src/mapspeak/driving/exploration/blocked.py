@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.geometry import Point, Pose
+from mapspeak.robot import GoalState
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 from mapspeak.spatial.paths import clearance_m
 
@@ -48,6 +49,21 @@ class _Patch:
         return float((_kinds_at(grid, self.points) != self.kinds).mean())
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TripEnd:
+    """Why a trip ended before its target.
+
+    Attributes:
+        goal_id: Its drive; None where the robot was not sent at all.
+        goal_state: How the drive ended; None likewise.
+        message: What the robot or the refusal says of it; may be empty.
+    """
+
+    goal_id: str | None = None
+    goal_state: GoalState | None = None
+    message: str = ""
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class BlockedPlace:
     """A place that could not be reached.
@@ -55,13 +71,13 @@ class BlockedPlace:
     Attributes:
         id: What it was called when the robot was sent there.
         pose: Where the robot was to stand.
-        reason: Why it did not get there, in words.
+        end: Why it did not get there.
         n_tries: How often it was sent there.
     """
 
     id: str
     pose: Pose
-    reason: str
+    end: TripEnd
     n_tries: int = 1
     _patches: tuple[_Patch, ...] = field(default=(), repr=False)
 
@@ -80,7 +96,7 @@ class BlockedPlaces:
         return iter(self._places)
 
     def remember(
-        self, place_id: str, pose: Pose, *, stuck: Point, reason: str, grid: OccupancyGrid
+        self, place_id: str, pose: Pose, *, stuck: Point, end: TripEnd, grid: OccupancyGrid
     ) -> None:
         """Notes that a place could not be reached.
 
@@ -88,7 +104,7 @@ class BlockedPlaces:
             place_id: Of the place.
             pose: Where the robot was to stand.
             stuck: Where it gave up.
-            reason: Why, in words.
+            end: Why.
             grid: The map of that moment.
         """
         earlier = self._find(pose.point)
@@ -96,7 +112,7 @@ class BlockedPlaces:
         patches = (_patch_around(grid, pose.point), _patch_around(grid, stuck))
         n_tries = 1 if earlier is None else earlier.n_tries + 1
         self._places.append(
-            BlockedPlace(id=place_id, pose=pose, reason=reason, n_tries=n_tries, _patches=patches)
+            BlockedPlace(id=place_id, pose=pose, end=end, n_tries=n_tries, _patches=patches)
         )
         del self._places[:-MOST_KEPT]
 

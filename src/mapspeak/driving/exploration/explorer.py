@@ -2,14 +2,16 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import anyio
 
 from mapspeak.driving.exploration.blocked import BlockedPlace, has_room_at
 from mapspeak.driving.exploration.progress import (
+    BoundKind,
+    Bounds,
     ExplorationState,
     Progress,
+    find_not_worth,
     find_unreachable,
     judge_end,
     known_area_m2,
@@ -42,24 +44,6 @@ Pick = Callable[[Sequence[Frontier], Atlas], Frontier]
 def take_first(frontiers: Sequence[Frontier], _atlas: Atlas) -> Frontier:
     """Takes the best one."""
     return frontiers[0]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Bounds:
-    """Where an exploration ends, whatever is left.
-
-    Attributes:
-        n_goals: So many frontiers to drive to.
-        duration_s: So much robot time in calls.
-        known_ratio: So much of the floor that is to be expected.
-        stops_at_goals: It pauses wherever the robot arrives, and where it sees from afar what it
-            was sent to see, so that somebody can look around.
-    """
-
-    n_goals: int | None = None
-    duration_s: float | None = None
-    known_ratio: float | None = None
-    stops_at_goals: bool = False
 
 
 class Explorer:
@@ -121,15 +105,15 @@ class Explorer:
         while True:
             with self._site.drives.preparing() as ticket:
                 atlas = await self._site.fetch_atlas()
-                if (told := self._bound_reached(atlas)) is not None:
+                if (bound := self._bound_reached(atlas)) is not None:
                     await self._trips.give_up()
-                    return await self._end(atlas, ExplorationState.BOUND_REACHED, told)
-                if (seen := self._find_seen_from_here(atlas)) is not None:
+                    return await self._end(atlas, ExplorationState.BOUND_REACHED, bound=bound)
+                if (seen_id := self._find_seen_from_here(atlas)) is not None:
                     await self._trips.give_up(is_seen=True)
-                    return await self._end(atlas, ExplorationState.AT_GOAL, seen)
+                    return await self._end(atlas, ExplorationState.AT_GOAL, seen_id=seen_id)
                 state = await self._choose(atlas, ticket, client)
             if state is None:
-                return await self._end(atlas, *judge_end(atlas, self._blocked(atlas)))
+                return await self._end(atlas, judge_end(atlas, self._blocked(atlas)))
             left_s = wait_s - (self._site.robot.now_s - begun_s)
             if state is TripState.UNDER_WAY and left_s > SLACK_S:
                 state = await self._trips.follow(
@@ -139,21 +123,18 @@ class Explorer:
             self._elapsed_s = before_s + spent_s
             ended = self._after(state, is_late=spent_s >= wait_s - SLACK_S)
             if ended is not None:
-                return await self._end(await self._site.fetch_atlas(), *ended)
+                return await self._end(await self._site.fetch_atlas(), ended)
 
-    def _after(self, state: TripState, *, is_late: bool) -> tuple[ExplorationState, str] | None:
+    def _after(self, state: TripState, *, is_late: bool) -> ExplorationState | None:
         """Gives how the call ends after a step of a trip; None where it goes on."""
         if state is TripState.INTERRUPTED:
-            return (
-                ExplorationState.INTERRUPTED,
-                self._trips.why_ended or "Something ended the drive.",
-            )
+            return ExplorationState.INTERRUPTED
         if state is TripState.ARRIVED and self._bounds.stops_at_goals:
-            return ExplorationState.AT_GOAL, "The robot stands at a frontier."
-        return (ExplorationState.DRIVING, "There is more to explore.") if is_late else None
+            return ExplorationState.AT_GOAL
+        return ExplorationState.DRIVING if is_late else None
 
     def _find_seen_from_here(self, atlas: Atlas) -> str | None:
-        """Says so where a pause is due because the target has been seen from afar."""
+        """Return the id of a target seen from afar, where a pause is due for it."""
         trip = self._trips.current
         if not self._bounds.stops_at_goals or trip is None:
             return None
@@ -162,7 +143,7 @@ class Explorer:
         )
         if is_near or not self._must_turn(atlas, trip.target):
             return None
-        return f"What {trip.target.id} promised has been seen from here."
+        return trip.target.id
 
     async def _choose(self, atlas: Atlas, ticket: int, client: str) -> TripState | None:
         """Sets out to the next target where there is no trip, or its end has been seen from afar.
@@ -189,13 +170,12 @@ class Explorer:
         ]
         if frontiers:
             frontier = self._pick(frontiers, atlas)
-            return Target(id=frontier.id, pose=frontier.pose, reason="", frontier=frontier)
+            return Target(id=frontier.id, pose=frontier.pose, frontier=frontier)
         retry = self._trips.blocked.worth_another_try(atlas.grid)
         nearest = min(retry, key=lambda each: _path_m(atlas, each), default=None)
         if nearest is None or not math.isfinite(_path_m(atlas, nearest)):
             return None
-        reason = f"another try; before: {nearest.reason}"
-        return Target(id=nearest.id, pose=nearest.pose, reason=reason)
+        return Target(id=nearest.id, pose=nearest.pose, earlier=nearest)
 
     def _blocked(self, atlas: Atlas) -> tuple[BlockedPlace, ...]:
         """Gives the blocked places at which something unknown is left."""
@@ -224,29 +204,39 @@ class Explorer:
         is_last = self._bounds.n_goals is not None and self._trips.n_begun >= self._bounds.n_goals
         return not is_last and remaining_ratio(atlas.grid, frontier) < SEEN_RATIO
 
-    def _bound_reached(self, atlas: Atlas) -> str | None:
-        """Gives which bound ends the exploration, in words; None where it goes on."""
+    def _bound_reached(self, atlas: Atlas) -> BoundKind | None:
+        """Return which bound ends the exploration; None where it goes on."""
         bounds = self._bounds
         if bounds.duration_s is not None and self._elapsed_s >= bounds.duration_s - SLACK_S:
-            return f"{bounds.duration_s:.0f} s have passed."
+            return BoundKind.DURATION
         if self._trips.current is not None:
             return None
         if bounds.n_goals is not None and self._trips.n_begun >= bounds.n_goals:
-            return _say_tried(self._trips)
+            return BoundKind.GOALS
         if bounds.known_ratio is not None and known_ratio(atlas) >= bounds.known_ratio:
-            return f"{100 * bounds.known_ratio:.0f} % of the floor to be expected are known."
+            return BoundKind.KNOWN
         return None
 
-    async def _end(self, atlas: Atlas, state: ExplorationState, sentence: str) -> Progress:
+    async def _end(
+        self,
+        atlas: Atlas,
+        state: ExplorationState,
+        *,
+        bound: BoundKind | None = None,
+        seen_id: str | None = None,
+    ) -> Progress:
         self._state = state
         if state is ExplorationState.AT_GOAL:
             self._paused_at = atlas.robot.point
-        return await self._site.compute(lambda: self._report(atlas, sentence))
+        return await self._site.compute(lambda: self._report(atlas, bound, seen_id))
 
-    def _report(self, atlas: Atlas, sentence: str) -> Progress:
+    def _report(self, atlas: Atlas, bound: BoundKind | None, seen_id: str | None) -> Progress:
         return Progress(
             state=self._state,
-            sentence=sentence,
+            bounds=self._bounds,
+            bound=bound,
+            seen_id=seen_id,
+            trip_end=self._trips.end,
             n_goals=self._trips.n_begun,
             n_arrived=self._trips.n_arrived,
             n_seen=self._trips.n_seen,
@@ -261,16 +251,9 @@ class Explorer:
             pose_doubt=atlas.pose_doubt,
             unreachable=find_unreachable(atlas),
             blocked=self._blocked(atlas),
+            not_worth=find_not_worth(atlas),
+            closed=tuple(atlas.map.areas),
         )
-
-
-def _say_tried(trips: Trips) -> str:
-    """Return what became of the goals."""
-    goals = "goal was" if trips.n_begun == 1 else "goals were"
-    return (
-        f"{trips.n_begun} {goals} tried: {trips.n_arrived} reached, {trips.n_seen} seen from "
-        f"afar, {trips.n_blocked} blocked."
-    )
 
 
 def _path_m(atlas: Atlas, place: BlockedPlace) -> float:

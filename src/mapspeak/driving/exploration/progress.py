@@ -1,26 +1,24 @@
 """How an exploration stands, as a value."""
 
-from collections import Counter
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 
-from mapspeak.driving.exploration.blocked import BlockedPlace
+from mapspeak.driving.exploration.blocked import BlockedPlace, TripEnd
 from mapspeak.driving.exploration.trips import Trip
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import PoseDoubt
 from mapspeak.spatial.frontiers import (
     Frontier,
-    FrontierReport,
     FrontierVerdict,
     RefusalReason,
     RefusedFrontier,
 )
 from mapspeak.spatial.paths import DistanceField
+from mapspeak.worldmodel.closures import ClosedArea
 from mapspeak.worldmodel.model import Atlas
 
-MOST_NAMED = 3
 NEAR_M = 0.5
 """A border is looked at from the floor that is so much more than the robot's radius around it."""
 OUT_OF_REACH = frozenset({RefusalReason.NO_WAY, RefusalReason.TOO_NARROW, RefusalReason.CLOSED_OFF})
@@ -43,13 +41,42 @@ class ExplorationState(StrEnum):
         return self not in (ExplorationState.DRIVING, ExplorationState.AT_GOAL)
 
 
+class BoundKind(StrEnum):
+    """What an exploration is bounded by."""
+
+    DURATION = "duration"
+    GOALS = "goals"
+    KNOWN = "known"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bounds:
+    """Where an exploration ends, whatever is left.
+
+    Attributes:
+        n_goals: So many frontiers to drive to.
+        duration_s: So much robot time in calls.
+        known_ratio: So much of the floor that is to be expected.
+        stops_at_goals: It pauses wherever the robot arrives, and where it sees from afar what it
+            was sent to see, so that somebody can look around.
+    """
+
+    n_goals: int | None = None
+    duration_s: float | None = None
+    known_ratio: float | None = None
+    stops_at_goals: bool = False
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Progress:
     """How an exploration stands.
 
     Attributes:
         state: See `ExplorationState`.
-        sentence: The same in words with numbers.
+        bounds: Where it was to end.
+        bound: The one that was reached, if one was.
+        seen_id: The frontier seen from here, where it pauses for that.
+        trip_end: What interrupted it; None where that is not known.
         n_goals: Frontiers the robot was sent to since the exploration began.
         n_arrived: How many of them it has come to.
         n_seen: How many it left on the way, since what they were for had been seen from afar.
@@ -64,10 +91,15 @@ class Progress:
         pose_doubt: Why it may be elsewhere.
         unreachable: Borders with the unknown that the robot cannot get to.
         blocked: Places that it was sent to in vain.
+        not_worth: Borders with the unknown that are not worth a drive.
+        closed: Areas that no way leads through now.
     """
 
     state: ExplorationState
-    sentence: str
+    bounds: Bounds
+    bound: BoundKind | None
+    seen_id: str | None
+    trip_end: TripEnd | None
     n_goals: int
     n_arrived: int
     n_seen: int
@@ -82,6 +114,8 @@ class Progress:
     pose_doubt: PoseDoubt | None
     unreachable: tuple[RefusedFrontier, ...]
     blocked: tuple[BlockedPlace, ...]
+    not_worth: tuple[RefusedFrontier, ...]
+    closed: tuple[ClosedArea, ...]
 
 
 def known_ratio(atlas: Atlas) -> float:
@@ -127,45 +161,16 @@ def _is_reached_near(distances: DistanceField, point: Point) -> bool:
     return bool(np.isfinite(distances.distances_at(rows[:, np.newaxis], cols)).any())
 
 
-def judge_end(atlas: Atlas, blocked: tuple[BlockedPlace, ...]) -> tuple[ExplorationState, str]:
-    """Says what it means that there is no frontier to go to: all seen, or the rest out of reach."""
-    report = atlas.frontiers
-    if report.verdict is FrontierVerdict.NOTHING_KNOWN:
-        return ExplorationState.NOTHING_KNOWN, "No free floor is known yet."
-    unreachable = find_unreachable(atlas)
-    if not unreachable and not blocked:
-        return ExplorationState.NOTHING_LEFT, f"Nothing is left to explore{_say_dull(report)}."
-    closing = " and ".join(f"the {area.title}" for area in atlas.map.areas[:MOST_NAMED])
-    parts = [f"{n} {words}" for n, words in _count(unreachable, blocked, closing) if n]
-    left_m = sum(each.length_m for each in unreachable)
-    sentence = (
-        f"What is left cannot be reached: {', '.join(parts)}; "
-        f"{left_m:.1f} m of border with the unknown."
-    )
-    return ExplorationState.REST_UNREACHABLE, sentence
+def find_not_worth(atlas: Atlas) -> tuple[RefusedFrontier, ...]:
+    """Return the borders with the unknown that are not worth a drive."""
+    refused = atlas.frontiers.refused
+    return tuple(each for each in refused if each.reason is RefusalReason.NOTHING_TO_SEE)
 
 
-def _say_dull(report: FrontierReport) -> str:
-    """Gives what is not worth a drive, in words."""
-    dull = [each for each in report.refused if _is_dull(each)]
-    if not dull:
-        return ": all was seen"
-    left_m = sum(each.length_m for each in dull)
-    places = "places" if len(dull) > 1 else "place"
-    return f" that is worth a drive; {left_m:.1f} m of border in {len(dull)} {places} stay"
-
-
-def _is_dull(border: RefusedFrontier) -> bool:
-    return border.reason is RefusalReason.NOTHING_TO_SEE
-
-
-def _count(
-    unreachable: tuple[RefusedFrontier, ...], blocked: tuple[BlockedPlace, ...], closing: str
-) -> tuple[tuple[int, str], ...]:
-    reasons = Counter(each.reason for each in unreachable)
-    return (
-        (reasons[RefusalReason.CLOSED_OFF], f"behind what is closed ({closing})"),
-        (reasons[RefusalReason.TOO_NARROW], "behind gaps too narrow for the robot"),
-        (reasons[RefusalReason.NO_WAY], "behind walls"),
-        (len(blocked), "where driving there failed"),
-    )
+def judge_end(atlas: Atlas, blocked: tuple[BlockedPlace, ...]) -> ExplorationState:
+    """Return what it means that no frontier is left: all seen, or the rest out of reach."""
+    if atlas.frontiers.verdict is FrontierVerdict.NOTHING_KNOWN:
+        return ExplorationState.NOTHING_KNOWN
+    if not find_unreachable(atlas) and not blocked:
+        return ExplorationState.NOTHING_LEFT
+    return ExplorationState.REST_UNREACHABLE

@@ -10,7 +10,7 @@ import anyio
 
 from mapspeak.driving.drive import DriveBook, OnProgress
 from mapspeak.driving.drivereport import DriveReport
-from mapspeak.driving.exploration.blocked import BlockedPlaces
+from mapspeak.driving.exploration.blocked import BlockedPlace, BlockedPlaces, TripEnd
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.robot import GoalState, Robot
@@ -83,14 +83,14 @@ class Target:
     Attributes:
         id: F3, W2, or the words for a place that has no id.
         pose: Where to stand.
-        reason: Why there, in words; empty for a frontier whose merits say it.
         frontier: The frontier to look over; None where it is none.
+        earlier: The try before, where the place was blocked then.
     """
 
     id: str
     pose: Pose
-    reason: str
     frontier: Frontier | None = None
+    earlier: BlockedPlace | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +125,7 @@ class Trips:
         n_arrived: How many of them ended where they led to.
         n_seen: How many were left on the way, since what they were for had been seen from afar.
         n_blocked: How many could not be driven to their end.
-        why_ended: Why the latest trip ended as it did; empty when it arrived.
+        end: Why the latest trip ended before its target; None when it did not.
     """
 
     def __init__(self, site: Site) -> None:
@@ -133,7 +133,7 @@ class Trips:
         self.current: Trip | None = None
         self.blocked = BlockedPlaces()
         self.n_begun = self.n_arrived = self.n_seen = self.n_blocked = 0
-        self.why_ended = ""
+        self.end: TripEnd | None = None
         self._driven_before_m = 0.0
 
     @property
@@ -203,34 +203,33 @@ class Trips:
         if not status.state.is_final:
             return TripState.UNDER_WAY
         self.current = None
-        self.why_ended = status.reason
         if status.state is GoalState.ARRIVED:
+            self.end = None
             self.n_arrived += 1
             self.blocked.forget(trip.target.pose.point)
             return TripState.ARRIVED
+        self.end = TripEnd(goal_id=trip.goal_id, goal_state=status.state, message=status.reason)
         if status.state in (GoalState.CANCELLED, GoalState.PREEMPTED):
-            self.why_ended = status.reason or f"{trip.goal_id} was {status.state}."
             return TripState.INTERRUPTED
         self.n_blocked += 1
-        self.why_ended = status.reason or f"The drive ended as {status.state}."
-        self._remember_blocked(trip.target, report.pose, grid)
+        self._remember_blocked(trip.target, self.end, report.pose, grid)
         return TripState.BLOCKED
 
     def _take_in_refusal(
         self, target: Target, why: str, *, ticket: int, grid: OccupancyGrid
     ) -> TripState:
         """Takes a refusal for one of the place, unless the robot belongs to somebody else now."""
-        self.why_ended = why
+        self.end = TripEnd(message=why)
         if self._is_not_ours(ticket):
             self.current = None
             return TripState.INTERRUPTED
-        self._remember_blocked(target, target.pose, grid)
+        self._remember_blocked(target, self.end, target.pose, grid)
         return TripState.BLOCKED
 
-    def _remember_blocked(self, target: Target, stuck: Pose, grid: OccupancyGrid) -> None:
-        self.blocked.remember(
-            target.id, target.pose, stuck=stuck.point, reason=self.why_ended, grid=grid
-        )
+    def _remember_blocked(
+        self, target: Target, end: TripEnd, stuck: Pose, grid: OccupancyGrid
+    ) -> None:
+        self.blocked.remember(target.id, target.pose, stuck=stuck.point, end=end, grid=grid)
 
     def _is_not_ours(self, ticket: int) -> bool:
         """True when the robot was stopped meanwhile, or is on a drive that somebody else wants."""

@@ -78,18 +78,6 @@ class Candidate:
     frontier: Frontier | None = None
     name: str = ""
 
-    @property
-    def reason(self) -> str:
-        """Why there, in words with numbers."""
-        if self.kind is CandidateKind.REMEMBERED:
-            what = "thing that is remembered" if self.id.startswith("T") else "remembered place"
-            return f"a {what} speaks of it, {self.path_m:.1f} m away"
-        if self.kind is CandidateKind.PICTURED:
-            return f"the detector reported it in this picture, {self.path_m:.1f} m away"
-        what = "unknown or unseen floor" if self.frontier else "floor not looked at yet"
-        liking = "" if self.score == 0.5 else f", score {self.score:.2f}"
-        return f"{self.area_m2:.1f} m2 of {what}, {self.path_m:.1f} m away{liking}"
-
 
 def find_candidates(
     atlas: Atlas,

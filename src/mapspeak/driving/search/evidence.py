@@ -82,20 +82,6 @@ class Earlier:
     reporting: tuple[TakenPicture, ...] = ()
     n_unread: int = 0
 
-    @property
-    def sentence(self) -> str:
-        """The same in words; empty where there were no pictures."""
-        told = []
-        if self.looks:
-            told.append(f"{len(self.looks)} earlier pictures count as looked at, and had none")
-        if self.reporting:
-            ids = ", ".join(each.id for each in self.reporting)
-            told.append(f"the detector reported it in {ids}")
-        if self.n_unread:
-            told.append(f"{self.n_unread} earlier pictures do not count: nobody looked for it then")
-        said = "; ".join(told)
-        return f"{said[:1].upper()}{said[1:]}." if said else ""
-
 
 def read_earlier(
     pictures: Iterable[TakenPicture], thing: str, *, judged: Sequence[Look] = ()

@@ -30,7 +30,13 @@ from mapspeak.driving.search.evidence import (
     speaks_of,
 )
 from mapspeak.driving.search.seenfloor import REACH_M, SeenFloor
-from mapspeak.driving.search.standing import SearchState, Standing, find_seen_regions
+from mapspeak.driving.search.standing import (
+    Budget,
+    BudgetKind,
+    SearchState,
+    Standing,
+    find_seen_regions,
+)
 from mapspeak.errors import PolicyError
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.robot import CameraPicture, Detection
@@ -53,23 +59,9 @@ UNKNOWN_RANGE_M = 3.0
 DISMISSED_M = 1.5
 """What the detector reports this near to something that was none is none either."""
 SLACK_S = 0.01
-ANEW = "Nothing new is left: what only earlier pictures showed is looked at anew."
 
 Choose = Callable[[Sequence[Candidate]], Candidate | None]
 """Chooses one of several places to look from, which come best first; None for none of them."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Budget:
-    """What a search may cost.
-
-    Attributes:
-        n_looks: Pictures.
-        driven_m: Metres.
-    """
-
-    n_looks: int | None = None
-    driven_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,7 +104,10 @@ class Searcher:
         self._thing = thing
         self._earlier = earlier
         self._seen = SeenFloor(earlier=earlier.looks)
-        self._news = earlier.sentence
+        self._is_begun_now = True
+        self._looks_anew = False
+        self._label: str | None = None
+        self._budget = Budget()
         self._shown: Look | None = None
         self._opinions = Opinions()
         self._visited: set[str] = set()
@@ -187,26 +182,25 @@ class Searcher:
     async def _advance(
         self, judgement: Judgement, budget: Budget, wait_s: float, on_trip: OnTrip, client: str
     ) -> Standing:
+        self._budget, self._label = budget, None
         if judgement.is_seen:
             await self._trips.give_up()
-            return await self._end(SearchState.FOUND, f"{self._thing} was found.")
+            return await self._end(SearchState.FOUND)
         deadline_s = self._site.robot.now_s + wait_s
         ended = None
         while ended is None:
-            ended = await self._step(budget, deadline_s, on_trip, client)
+            ended = await self._step(deadline_s, on_trip, client)
             if ended is None and self._site.robot.now_s >= deadline_s - SLACK_S:
-                ended = SearchState.DRIVING, "The robot is on its way."
-        return await self._end(*ended)
+                ended = SearchState.DRIVING
+        return await self._end(ended)
 
-    async def _step(
-        self, budget: Budget, deadline_s: float, on_trip: OnTrip, client: str
-    ) -> tuple[SearchState, str] | None:
+    async def _step(self, deadline_s: float, on_trip: OnTrip, client: str) -> SearchState | None:
         """Drives on for a moment; gives how the call ends, None where it goes on."""
         with self._site.drives.preparing() as ticket:
             atlas = await self._site.fetch_atlas()
-            if (told := self._what_is_spent(budget)) is not None:
+            if self._find_spent() is not None:
                 await self._trips.give_up()
-                return SearchState.BUDGET_SPENT, told
+                return SearchState.BUDGET_SPENT
             state = await self._set_out(atlas, ticket, client)
         left_s = deadline_s - self._site.robot.now_s
         if state is TripState.UNDER_WAY and left_s > SLACK_S:
@@ -215,22 +209,22 @@ class Searcher:
             )
         match state:
             case None:
-                return SearchState.NOT_FOUND, "There is nowhere left to look."
+                return SearchState.NOT_FOUND
             case TripState.INTERRUPTED:
-                return SearchState.INTERRUPTED, self._trips.why_ended
+                return SearchState.INTERRUPTED
             case TripState.ARRIVED:
                 return self._arrive()
-        label = await self._find_report()
-        if label is None:
+        self._label = await self._find_report()
+        if self._label is None:
             return None
         await self._trips.give_up()
-        return SearchState.REPORTED, f"The robot's detector reports {label}."
+        return SearchState.REPORTED
 
-    def _arrive(self) -> tuple[SearchState, str]:
+    def _arrive(self) -> SearchState:
         here = self._here
         if here is not None and here.name:
             self._visited.add(here.name)
-        return SearchState.LOOK, "The robot looks at a new place."
+        return SearchState.LOOK
 
     async def _set_out(self, atlas: Atlas, ticket: int, client: str) -> TripState | None:
         """Sets out to the next place where there is no trip, or it has become pointless."""
@@ -246,7 +240,7 @@ class Searcher:
         if not candidates and self._seen.n_earlier:
             self._seen.forget_earlier()
             candidates = await self._site.compute(lambda: self._find_candidates(atlas))
-            self._news = f"{self._news} {ANEW}".lstrip() if candidates else self._news
+            self._looks_anew |= bool(candidates)
         was_asked, self._has_new_opinion = self._has_new_opinion, False
         best = self._choose(candidates) if candidates else None
         if best is None:
@@ -261,7 +255,7 @@ class Searcher:
         if _stands_at(atlas, best):
             await self._trips.give_up()
             return TripState.ARRIVED
-        target = Target(id=best.id, pose=best.pose, reason=best.reason, frontier=best.frontier)
+        target = Target(id=best.id, pose=best.pose, frontier=best.frontier)
         return await self._trips.set_out(target, ticket=ticket, client=client, grid=atlas.grid)
 
     def _find_candidates(self, atlas: Atlas) -> list[Candidate]:
@@ -324,26 +318,34 @@ class Searcher:
                 self._has_new_opinion |= self._opinions.add_company(place, score)
         return found
 
-    def _what_is_spent(self, budget: Budget) -> str | None:
+    def _find_spent(self) -> BudgetKind | None:
+        budget = self._budget
         if budget.n_looks is not None and self._n_looks >= budget.n_looks:
-            return f"{budget.n_looks} pictures were looked at."
+            return BudgetKind.LOOKS
         if budget.driven_m is not None and self._trips.driven_m >= budget.driven_m:
-            return f"{budget.driven_m:.0f} m were driven."
+            return BudgetKind.METRES
         return None
 
-    async def _end(self, state: SearchState, sentence: str) -> Standing:
+    async def _end(self, state: SearchState) -> Standing:
         self._state = state
         atlas = await self._site.fetch_atlas()
-        return await self._site.compute(lambda: self._report(atlas, sentence))
+        return await self._site.compute(lambda: self._report(atlas))
 
-    def _report(self, atlas: Atlas, sentence: str) -> Standing:
+    def _report(self, atlas: Atlas) -> Standing:
         trip = self._trips.current
         seen = self._seen.mask_on(atlas.grid)
-        news, self._news = self._news, ""
+        earlier = self._earlier if self._is_begun_now else None
+        looks_anew = self._looks_anew
+        self._is_begun_now = self._looks_anew = False
         n_free = max(int(np.count_nonzero(atlas.grid.free)), 1)
         return Standing(
             state=self._state,
-            sentence=" ".join(filter(None, (sentence or "The drive was ended.", news))),
+            budget=self._budget,
+            spent=self._find_spent(),
+            label=self._label,
+            trip_end=self._trips.end,
+            earlier=earlier,
+            looks_anew=looks_anew,
             thing=self._thing,
             n_looks=self._n_looks,
             n_earlier=self._seen.n_earlier,

@@ -6,8 +6,9 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.driving.exploration import BlockedPlace
+from mapspeak.driving.exploration import BlockedPlace, TripEnd
 from mapspeak.driving.search.candidates import Candidate
+from mapspeak.driving.search.evidence import Earlier
 from mapspeak.geometry import Pose
 from mapspeak.robot import PoseDoubt
 from mapspeak.worldmodel.model import Atlas
@@ -35,6 +36,26 @@ class SearchState(StrEnum):
         return self in (SearchState.LOOK, SearchState.REPORTED)
 
 
+class BudgetKind(StrEnum):
+    """What a budget limits."""
+
+    LOOKS = "looks"
+    METRES = "metres"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Budget:
+    """What a search may cost.
+
+    Attributes:
+        n_looks: Pictures.
+        driven_m: Metres.
+    """
+
+    n_looks: int | None = None
+    driven_m: float | None = None
+
+
 @dataclass(frozen=True, slots=True)
 class SeenRegion:
     """A room or corridor, and how much of its floor the camera has looked at.
@@ -54,7 +75,12 @@ class Standing:
 
     Attributes:
         state: See `SearchState`.
-        sentence: The same in words with numbers.
+        budget: What it may cost.
+        spent: The part of the budget that is spent, if one is.
+        label: What the robot's detector reports here; None where it reports nothing.
+        trip_end: What interrupted it; None where that is not known.
+        earlier: The pictures it begins from, in its first answer only.
+        looks_anew: What only earlier pictures showed is looked at again, from this answer on.
         thing: What is looked for.
         n_looks: Pictures shown so far.
         n_earlier: Pictures from before that count as looked at.
@@ -70,7 +96,12 @@ class Standing:
     """
 
     state: SearchState
-    sentence: str
+    budget: Budget
+    spent: BudgetKind | None
+    label: str | None
+    trip_end: TripEnd | None
+    earlier: Earlier | None
+    looks_anew: bool
     thing: str
     n_looks: int
     n_earlier: int

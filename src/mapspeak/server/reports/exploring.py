@@ -4,12 +4,18 @@ from typing import Self
 
 from pydantic import Field
 
-from mapspeak.driving.exploration import BlockedPlace, ExplorationState, Progress
-from mapspeak.driving.search import Candidate, SearchState, Standing
+from mapspeak.driving.exploration import ExplorationState, Progress
+from mapspeak.driving.search import SearchState, Standing
 from mapspeak.server.reports.robot import PoseReport, Report
-from mapspeak.server.text.frontiers import say_merits, say_refusal
-from mapspeak.server.text.wording import say_point, say_pose_doubt
-from mapspeak.spatial.frontiers import RefusedFrontier
+from mapspeak.server.text.exploration import (
+    say_blocked,
+    say_progress,
+    say_target,
+    say_unreachable,
+)
+from mapspeak.server.text.frontiers import say_merits
+from mapspeak.server.text.search import say_candidate, say_standing
+from mapspeak.server.text.wording import say_pose_doubt
 
 MOST_NAMED = 8
 
@@ -55,7 +61,7 @@ class ExploreAnswer(Report):
         trip = progress.trip
         return cls(
             state=progress.state,
-            reason=progress.sentence,
+            reason=say_progress(progress),
             n_goals=progress.n_goals,
             n_arrived=progress.n_arrived,
             n_seen=progress.n_seen,
@@ -77,30 +83,18 @@ class ExploreAnswer(Report):
 
 def _say_next(progress: Progress) -> str:
     if progress.trip is not None:
-        target = progress.trip.target
-        why = target.reason or (say_merits(target.frontier) if target.frontier else "")
-        return f"{target.id}: {why}"
+        return say_target(progress.trip.target)
     best = next(iter(progress.frontiers), None)
     return "" if best is None else f"{best.id}: {say_merits(best)}"
 
 
 def _say_rest(progress: Progress) -> list[str]:
     told = [
-        *(_say_blocked(place) for place in progress.blocked),
-        *(_say_refused(border) for border in progress.unreachable),
+        *(say_blocked(place) for place in progress.blocked),
+        *(say_unreachable(border) for border in progress.unreachable),
     ]
     left_out = len(told) - MOST_NAMED
     return told if left_out <= 0 else [*told[:MOST_NAMED], f"and {left_out} more"]
-
-
-def _say_blocked(place: BlockedPlace) -> str:
-    times = f"{place.n_tries} times" if place.n_tries > 1 else "once"
-    return f"{place.id} at {say_point(place.pose.point)}, tried {times}: {place.reason}"
-
-
-def _say_refused(border: RefusedFrontier) -> str:
-    where = f"{border.length_m:.1f} m of border at {say_point(border.anchor)}"
-    return f"{where}: {say_refusal(border)}"
 
 
 SEARCH_STEP = {
@@ -138,24 +132,20 @@ class SearchAnswer(Report):
         """Makes the report of a search."""
         return cls(
             state=standing.state,
-            reason=standing.sentence,
+            reason=say_standing(standing),
             thing=standing.thing,
             n_looks=standing.n_looks,
             n_earlier=standing.n_earlier,
             driven_m=round(standing.driven_m, 1),
-            looks_at="" if standing.here is None else _say_candidate(standing.here),
+            looks_at="" if standing.here is None else say_candidate(standing.here),
             goal_id=standing.goal_id,
-            next=[_say_candidate(candidate) for candidate in standing.next],
+            next=[say_candidate(candidate) for candidate in standing.next],
             seen_percent=round(100 * standing.seen_ratio, 1),
             places_seen=[
                 f"{region.id} {100 * region.seen_ratio:.0f} %" for region in standing.regions
             ],
-            cannot_reach=[_say_blocked(place) for place in standing.blocked][:MOST_NAMED],
+            cannot_reach=[say_blocked(place) for place in standing.blocked][:MOST_NAMED],
             robot=PoseReport.of(standing.pose),
             pose_uncertain=say_pose_doubt(standing.pose_doubt),
             next_step=SEARCH_STEP[standing.state],
         )
-
-
-def _say_candidate(candidate: Candidate) -> str:
-    return f"{candidate.id}: {candidate.reason}"

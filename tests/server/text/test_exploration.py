@@ -1,0 +1,15 @@
+from mapspeak.driving.exploration import TripEnd
+from mapspeak.robot import GoalState
+from mapspeak.server.text.exploration import say_trip_end
+
+
+def test_the_end_of_a_trip_is_told_as_the_robot_tells_it() -> None:
+    end = TripEnd(goal_id="G1", goal_state=GoalState.BLOCKED, message="A crate stands in the way.")
+    assert say_trip_end(end) == "A crate stands in the way."
+
+
+def test_the_end_of_a_trip_is_told_by_its_state_where_the_robot_says_nothing() -> None:
+    failed = TripEnd(goal_id="G1", goal_state=GoalState.BLOCKED)
+    cancelled = TripEnd(goal_id="G1", goal_state=GoalState.CANCELLED)
+    assert say_trip_end(failed) == "The drive ended as blocked."
+    assert say_trip_end(cancelled) == "G1 was cancelled."
