@@ -24,7 +24,13 @@ from benchmarks.exploration import build_worlds, choose_start
 from benchmarks.figure import Figure
 from benchmarks.rooms import find_labelled_maps, list_labelled_maps
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.semantic.alignment import MapRelation, MapSurfaces, compare_maps, placed
+from mapspeak.semantic.alignment import (
+    MapRelation,
+    MapSurfaces,
+    compare_maps,
+    placed,
+    say_comparison,
+)
 from mapspeak.simulator import BODY_RADIUS_M, DriveState, Simulation, World, load_world
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import find_frontiers
@@ -300,7 +306,7 @@ def judge(case: Case) -> Result:
         off_m=off_m,
         off_deg=off_deg,
         spent_s=spent_s,
-        sentence=comparison.sentence,
+        sentence=say_comparison(comparison),
     )
 
 

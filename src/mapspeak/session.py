@@ -23,7 +23,7 @@ from mapspeak.robot import CameraPicture, Robot
 from mapspeak.ros import RosConnection, started_over
 from mapspeak.safety import Guard, GuardedConnection, GuardedRobot, Surveyor, WhenBusy
 from mapspeak.semantic import PictureBook, SemanticMap, SemanticMapStore
-from mapspeak.semantic.alignment import MapComparison, MapKeeper, MapRelation
+from mapspeak.semantic.alignment import MapComparison, MapKeeper, MapRelation, say_comparison
 from mapspeak.semantic.episodes import (
     EpisodePage,
     EpisodeQuery,
@@ -397,4 +397,4 @@ def _said_of(compare: Callable[[OccupancyGrid], MapComparison | None], grid: Occ
         MapRelation.OTHER: "Remembered poses mean nothing here: another memory belongs to it.",
     }
     unsure = "Remembered poses may be off: let the robot see more, then call realign_memory."
-    return f"{comparison.sentence} {next_step.get(comparison.relation, unsure)}"
+    return f"{say_comparison(comparison)} {next_step.get(comparison.relation, unsure)}"

@@ -5,6 +5,7 @@ from mapspeak.semantic.alignment.comparing import (
     MapRelation,
     SnapshotFolder,
     compare_maps,
+    say_comparison,
 )
 from mapspeak.semantic.alignment.fitting import Certainty, MapFit, find_fit
 from mapspeak.semantic.alignment.keeping import MapKeeper, RealignReceipt
@@ -23,4 +24,5 @@ __all__ = [
     "compare_maps",
     "find_fit",
     "placed",
+    "say_comparison",
 ]

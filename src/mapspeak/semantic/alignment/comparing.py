@@ -146,39 +146,43 @@ class MapComparison:
         relation: How they go together.
         as_it_lies: How well they agree when nothing is moved.
         fit: The best place for the old map, where one had to be looked for.
-        sentence: All this in words, with figures.
+        shortest_m: The walls of the map that shows less of them.
     """
 
     relation: MapRelation
     as_it_lies: Agreement
     fit: MapFit | None
-    sentence: str
+    shortest_m: float
 
 
 def compare_maps(old: OccupancyGrid, new: OccupancyGrid) -> MapComparison:
-    """Tells whether two maps show the same building, and in the same frame."""
+    """Compare two maps: whether they show the same building, and in the same frame."""
     before, after = MapSurfaces(old), MapSurfaces(new)
     as_it_lies = judge(before, after, NO_MOTION)
-    if _is_good(as_it_lies):
-        said = f"The map is the one that the records belong to: {_figures(as_it_lies)}."
-        return MapComparison(
-            relation=MapRelation.SAME, as_it_lies=as_it_lies, fit=None, sentence=said
-        )
+    fit, relation = None, MapRelation.SAME
     shortest_m = min(before.length_m, after.length_m)
-    if shortest_m < LEAST_SHARED_M:
-        said = (
+    if not _is_good(as_it_lies):
+        relation = MapRelation.UNKNOWN
+        if shortest_m >= LEAST_SHARED_M:
+            fit = find_fit(before, after)
+            relation = _relation_of(fit)
+    return MapComparison(relation=relation, as_it_lies=as_it_lies, fit=fit, shortest_m=shortest_m)
+
+
+def say_comparison(comparison: MapComparison) -> str:
+    """Return what a comparison gives, with figures: the message where records cannot be moved."""
+    relation, fit = comparison.relation, comparison.fit
+    figures = _figures(comparison.as_it_lies)
+    if fit is None and relation is MapRelation.SAME:
+        return f"The map is the one that the records belong to: {figures}."
+    if fit is None and relation is MapRelation.UNKNOWN:
+        return (
             f"Whether this is the map that the records belong to cannot be told yet: one of the "
-            f"two maps shows {shortest_m:.0f} m of walls, and {LEAST_SHARED_M:.0f} m are needed."
+            f"two maps shows {comparison.shortest_m:.0f} m of walls, and {LEAST_SHARED_M:.0f} m "
+            "are needed."
         )
-        return MapComparison(
-            relation=MapRelation.UNKNOWN, as_it_lies=as_it_lies, fit=None, sentence=said
-        )
-    fit = find_fit(before, after)
-    relation = _relation_of(fit)
-    said = f"{_OPENINGS[relation]} As they lie, {_figures(as_it_lies)}."
-    if fit is not None:
-        said += f" {fit.sentence}"
-    return MapComparison(relation=relation, as_it_lies=as_it_lies, fit=fit, sentence=said)
+    said = f"{_OPENINGS[relation]} As they lie, {figures}."
+    return said if fit is None else f"{said} {fit.sentence}"
 
 
 _OPENINGS = {

@@ -1,6 +1,5 @@
 """Records and the map they belong to, kept together: noticed when the map is another, and moved."""
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from mapspeak.semantic.alignment.comparing import (
     MapRelation,
     SnapshotFolder,
     compare_maps,
+    say_comparison,
 )
 from mapspeak.semantic.alignment.fitting import Certainty
 from mapspeak.semantic.alignment.surfaces import MapSurfaces
@@ -38,7 +38,6 @@ class RealignReceipt:
         n_events: Likewise.
         n_observations: Likewise.
         undo_path: The file as it was before.
-        sentence: All this in words.
     """
 
     comparison: MapComparison
@@ -48,7 +47,6 @@ class RealignReceipt:
     n_events: int
     n_observations: int
     undo_path: Path | None
-    sentence: str
 
 
 class MapKeeper:
@@ -73,7 +71,7 @@ class MapKeeper:
 
         Returns:
             How the kept map and this one go together; None where there is none to compare with.
-            When they are not the same, nothing is kept, and a reader should hear its sentence.
+            When they are not the same, nothing is kept, and a reader should hear of it.
 
         Raises:
             SemanticMapError: The kept map is damaged, or none can be written.
@@ -121,7 +119,7 @@ class MapKeeper:
         fit = comparison.fit
         if comparison.relation is not MapRelation.MOVED or fit is None:
             raise SemanticMapError(
-                f"The records stay where they are. {comparison.sentence}",
+                f"The records stay where they are. {say_comparison(comparison)}",
                 hint="Let the robot see more of the building and try again, or use another file "
                 "for this map.",
             )
@@ -164,13 +162,6 @@ class MapKeeper:
         _, after = self._store.rewrite(change)
         self._loaded = None
         n_observations = self.finish_move()
-        turn_deg = math.degrees(motion.yaw_rad)
-        said = (
-            f"{len(after.records)} waypoints, {len(after.events)} events and {n_observations} "
-            f"observations were moved: turned by {turn_deg:.1f} degrees about the old map's "
-            f"origin, which lies at ({motion.x:.2f}, {motion.y:.2f}) now. {comparison.sentence} "
-            f"The file as it was: {undo_path}."
-        )
         return RealignReceipt(
             comparison=comparison,
             motion=motion,
@@ -179,7 +170,6 @@ class MapKeeper:
             n_events=len(after.events),
             n_observations=n_observations,
             undo_path=undo_path,
-            sentence=said,
         )
 
     def _name(self) -> str:
@@ -214,7 +204,6 @@ def _nothing_moved(comparison: MapComparison) -> RealignReceipt:
         n_events=0,
         n_observations=0,
         undo_path=None,
-        sentence=f"Nothing had to be moved. {comparison.sentence}",
     )
 
 

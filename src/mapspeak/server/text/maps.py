@@ -1,9 +1,10 @@
-"""Maps in words: what a region is, and what is odd about a map's files."""
+"""Maps in words: what a region is, what is odd about a map's files, how one map lies on another."""
 
+import math
+
+from mapspeak.semantic.alignment import RealignReceipt, say_comparison
 from mapspeak.spatial.mapfiles import MapFileWarning, MapOddity
 from mapspeak.spatial.rooms import Region, RoomClass
-
-__all__ = ["say_map_warning", "say_size"]
 
 
 def say_size(region: Region) -> str:
@@ -37,3 +38,17 @@ def say_map_warning(warning: MapFileWarning) -> str:
                 "No cell of the map is free. Check negate and the thresholds: with negate: 0 "
                 "white is free."
             )
+
+
+def say_receipt(receipt: RealignReceipt) -> str:
+    """Say what was moved, how the maps go together and how sure that is."""
+    said, motion = say_comparison(receipt.comparison), receipt.motion
+    if motion is None or receipt.certainty is None:
+        return f"Nothing had to be moved. {said}"
+    turn_deg = math.degrees(motion.yaw_rad)
+    return (
+        f"{receipt.n_waypoints} waypoints, {receipt.n_events} events and "
+        f"{receipt.n_observations} observations were moved: turned by {turn_deg:.1f} degrees "
+        f"about the old map's origin, which lies at ({motion.x:.2f}, {motion.y:.2f}) now. {said} "
+        f"The file as it was: {receipt.undo_path}. Certainty: {receipt.certainty}."
+    )

@@ -21,6 +21,7 @@ from mapspeak.semantic.episodes import (
 from mapspeak.semantic.events import Effect as EventEffect
 from mapspeak.semantic.events import is_name_of_robot
 from mapspeak.semantic.things import name_the_same
+from mapspeak.server.text.maps import say_receipt
 from mapspeak.server.text.memory import (
     AHEAD,
     PAST,
@@ -267,10 +268,9 @@ class MemoryTools:
         session = self._session
         grid = await session.robot.fetch_map()
         receipt = await session.compute(lambda: session.keeper.realign(grid))
-        certainty = "" if receipt.certainty is None else f" Certainty: {receipt.certainty}."
         # Nobody knows which of them were taken on which map.
         has_forgotten = receipt.motion is not None and session.pictures.forget()
-        return f"{receipt.sentence}{certainty}{LOOK_ANEW if has_forgotten else ''}"
+        return f"{say_receipt(receipt)}{LOOK_ANEW if has_forgotten else ''}"
 
     def _keep_note(self, atlas: Atlas, text: str) -> str:
         """Keeps an event as an episode too; gives why it could not, else nothing."""
