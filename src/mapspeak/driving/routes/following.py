@@ -16,9 +16,9 @@ from mapspeak.driving.exploration import Site
 from mapspeak.driving.routes.planning import Candidate, RoutePlan, plan_route
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose
-from mapspeak.places.goalcheck import GoalCheck, check_goal, say_check
+from mapspeak.places.goalcheck import GoalCheck, check_goal
 from mapspeak.places.standing import arrival_pose
-from mapspeak.robot import GoalState, PoseDoubt
+from mapspeak.robot import GoalState, GoalStatus, PoseDoubt
 from mapspeak.worldmodel.model import Atlas
 
 SLACK_S = 0.01
@@ -59,14 +59,15 @@ class Stop:
         goal: What it is taken for.
         leg_m: The path to it from the stop before, as planned.
         state: How it stands.
-        reason: Why it was left out, or could not be reached yet.
+        obstacle: Why it was left out, or could not be reached yet: the check of its pose, or how
+            the drive there ended.
     """
 
     words: str
     goal: Candidate
     leg_m: float
     state: StopState = StopState.AHEAD
-    reason: str = ""
+    obstacle: GoalCheck | GoalStatus | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,7 +81,9 @@ class RouteProgress:
         pose: Where the robot is.
         pose_doubt: Why it may be elsewhere.
         left_m: Of the path to the stop under way; None where none is.
-        sentence: Why the call ended so.
+        number: The stop that the robot stands at, or that the call ended for; counted from 0.
+        is_pausing: The call ended while the robot stood at a stop as long as was asked for.
+        ended: How the drive ended that something interrupted.
     """
 
     state: RouteState
@@ -88,8 +91,10 @@ class RouteProgress:
     stops: tuple[Stop, ...]
     pose: Pose
     pose_doubt: PoseDoubt | None
-    sentence: str
     left_m: float | None = None
+    number: int | None = None
+    is_pausing: bool = False
+    ended: GoalStatus | None = None
 
 
 class RouteBook:
@@ -162,9 +167,9 @@ class RouteBook:
         await self._forget_ended()
         while (number := self._find_next()) is not None:
             if not await self._pause(deadline_s):
-                return await self._tell(RouteState.DRIVING, "The robot pauses at a stop.")
-            if self._goal_id is None and (fault := await self._set_out(number, client)):
-                ended = await self._leave_out(number, fault, when_blocked)
+                return await self._tell(RouteState.DRIVING, is_pausing=True)
+            if self._goal_id is None and (check := await self._set_out(number, client)):
+                ended = await self._leave_out(number, check, when_blocked)
             else:
                 ended = await self._drive(number, deadline_s, when_blocked, on_progress)
             if ended is not None:
@@ -182,17 +187,17 @@ class RouteBook:
         ahead = (n for n, stop in enumerate(self._stops) if stop.state is StopState.AHEAD)
         return next(ahead, None)
 
-    async def _set_out(self, number: int, client: str) -> str:
-        """Starts the drive to a stop; gives why it could not where it could not."""
+    async def _set_out(self, number: int, client: str) -> GoalCheck | None:
+        """Start the drive to a stop; return the check of its pose where it cannot be driven to."""
         goal, drives = self._stops[number].goal, self._site.drives
         with drives.preparing() as ticket:
             atlas = await self._site.fetch_atlas()
             pose, check = await self._site.compute(lambda: _check(atlas, goal))
             if not check.is_ok:
-                return say_check(check)
+                return check
             drive = await drives.start(pose, place=goal.title, ticket=ticket, client=client)
         self._goal_id = drive.goal_id
-        return ""
+        return None
 
     async def _drive(
         self, number: int, deadline_s: float, when_blocked: WhenBlocked, on_progress: OnProgress
@@ -200,29 +205,27 @@ class RouteBook:
         """Waits for the drive to a stop; gives the answer where the call ends with it."""
         drives, left_s = self._site.drives, deadline_s - self._site.robot.now_s
         report = await drives.wait(self._goal_id, wait_s=max(left_s, 0.0), on_progress=on_progress)
-        state, reason = report.status.state, report.status.reason
-        if not state.is_final:
-            return await self._tell(RouteState.DRIVING, "There are stops left.", report)
+        status = report.status
+        if not status.state.is_final:
+            return await self._tell(RouteState.DRIVING, report)
         self._goal_id = None
-        if state is GoalState.ARRIVED:
+        if status.state is GoalState.ARRIVED:
             self._mark(number, StopState.DONE)
             self._pause_until_s = self._site.robot.now_s + self._pause_s
-            sentence = f"The robot stands at stop {number + 1}, {self._stops[number].words}."
-            return await self._tell(RouteState.AT_STOP, sentence) if self._is_looking else None
-        if state in ENDED_ELSEWHERE:
-            sentence = reason or f"The drive to stop {number + 1} was {state}."
-            return await self._tell(RouteState.INTERRUPTED, sentence)
-        return await self._leave_out(number, reason or f"the drive was {state}", when_blocked)
+            is_looking = self._is_looking
+            return await self._tell(RouteState.AT_STOP, number=number) if is_looking else None
+        if status.state in ENDED_ELSEWHERE:
+            return await self._tell(RouteState.INTERRUPTED, number=number, ended=status)
+        return await self._leave_out(number, status, when_blocked)
 
     async def _leave_out(
-        self, number: int, reason: str, when_blocked: WhenBlocked
+        self, number: int, obstacle: GoalCheck | GoalStatus, when_blocked: WhenBlocked
     ) -> RouteProgress | None:
         if when_blocked is WhenBlocked.SKIP:
-            self._mark(number, StopState.SKIPPED, reason)
+            self._mark(number, StopState.SKIPPED, obstacle)
             return None
-        self._mark(number, StopState.AHEAD, reason)
-        sentence = f"Stop {number + 1}, {self._stops[number].words}: {reason}"
-        return await self._tell(RouteState.BLOCKED, sentence)
+        self._mark(number, StopState.AHEAD, obstacle)
+        return await self._tell(RouteState.BLOCKED, number=number)
 
     async def _pause(self, deadline_s: float) -> bool:
         """Stands at a stop as long as was asked for; False where the call ends before."""
@@ -239,13 +242,13 @@ class RouteBook:
 
     async def _finish(self, deadline_s: float) -> RouteProgress:
         if not await self._pause(deadline_s):
-            return await self._tell(RouteState.DRIVING, "The robot pauses at the last stop.")
-        skipped = sum(stop.state is StopState.SKIPPED for stop in self._stops)
-        left_out = f", {skipped} of them left out" if skipped else ""
-        return await self._tell(RouteState.DONE, f"No stop is left{left_out}.")
+            return await self._tell(RouteState.DRIVING, is_pausing=True)
+        return await self._tell(RouteState.DONE)
 
-    def _mark(self, number: int, state: StopState, reason: str = "") -> None:
-        self._stops[number] = replace(self._stops[number], state=state, reason=reason)
+    def _mark(
+        self, number: int, state: StopState, obstacle: GoalCheck | GoalStatus | None = None
+    ) -> None:
+        self._stops[number] = replace(self._stops[number], state=state, obstacle=obstacle)
 
     async def _give_up(self) -> None:
         """Ends the drive of an older route, so that none of it goes on."""
@@ -255,7 +258,13 @@ class RouteBook:
             self._goal_id = None
 
     async def _tell(
-        self, state: RouteState, sentence: str, report: DriveReport | None = None
+        self,
+        state: RouteState,
+        report: DriveReport | None = None,
+        *,
+        number: int | None = None,
+        is_pausing: bool = False,
+        ended: GoalStatus | None = None,
     ) -> RouteProgress:
         assert self._plan is not None  # noqa: S101 - only a route that was begun is told of
         if report is not None:
@@ -269,8 +278,10 @@ class RouteBook:
             stops=tuple(self._stops),
             pose=pose,
             pose_doubt=doubt,
-            sentence=sentence,
             left_m=None if report is None else report.status.distance_left_m,
+            number=number,
+            is_pausing=is_pausing,
+            ended=ended,
         )
 
 

@@ -6,6 +6,7 @@ from pydantic import Field
 
 from mapspeak.driving.routes import RoutePlan, RouteProgress, RouteState, Stop, StopState
 from mapspeak.server.reports.robot import PoseReport, Report
+from mapspeak.server.text.routes import say_obstacle, say_route
 from mapspeak.server.text.wording import say_pose_doubt
 
 DETOUR_M = 0.05
@@ -48,10 +49,10 @@ class RouteAnswer(Report):
         plan = progress.plan
         return cls(
             state=progress.state,
-            reason=progress.sentence,
+            reason=say_route(progress),
             done=[_say(stop) for stop in progress.stops if stop.state is StopState.DONE],
             skipped=[
-                f"{_say(stop)}: {stop.reason}"
+                f"{_say(stop)}: {say_obstacle(stop)}"
                 for stop in progress.stops
                 if stop.state is StopState.SKIPPED
             ],

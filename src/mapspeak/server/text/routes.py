@@ -1,0 +1,37 @@
+"""A route in words: why a call ended, and why a stop was left out."""
+
+from mapspeak.driving.routes import RouteProgress, RouteState, Stop, StopState
+from mapspeak.places.goalcheck import say_check
+from mapspeak.robot import GoalStatus
+
+
+def say_route(progress: RouteProgress) -> str:
+    """Say why a call of a route ended as it did."""
+    if progress.state is RouteState.DONE:
+        n_skipped = sum(stop.state is StopState.SKIPPED for stop in progress.stops)
+        left_out = f", {n_skipped} of them left out" if n_skipped else ""
+        return f"No stop is left{left_out}."
+    if progress.number is None:
+        return _say_driving(progress)
+    number, stop = progress.number + 1, progress.stops[progress.number]
+    if progress.state is RouteState.AT_STOP:
+        return f"The robot stands at stop {number}, {stop.words}."
+    if progress.ended is not None:
+        return progress.ended.reason or f"The drive to stop {number} was {progress.ended.state}."
+    return f"Stop {number}, {stop.words}: {say_obstacle(stop)}"
+
+
+def _say_driving(progress: RouteProgress) -> str:
+    if not progress.is_pausing:
+        return "There are stops left."
+    is_last = all(stop.state is not StopState.AHEAD for stop in progress.stops)
+    return f"The robot pauses at {'the last' if is_last else 'a'} stop."
+
+
+def say_obstacle(stop: Stop) -> str:
+    """Say why a stop was left out, or could not be reached yet."""
+    if stop.obstacle is None:
+        return ""
+    if isinstance(stop.obstacle, GoalStatus):
+        return stop.obstacle.reason or f"the drive was {stop.obstacle.state}"
+    return say_check(stop.obstacle)
