@@ -37,9 +37,9 @@ from mapspeak.safety import (
     AreaRule,
     AuditLine,
     AuditLog,
+    CommandKind,
     Guard,
     Hold,
-    Kind,
     Policy,
     WaitingRoom,
     read_audit,
@@ -272,7 +272,7 @@ async def connect(
 async def attack(n_calls: int, *, seed: int) -> Verdict:
     """Lets a hostile caller call whatever there is, and judges what came of it."""
     chooser = random.Random(seed)  # noqa: S311 - no secret
-    policy = Policy(areas=(PIT,), rates={Kind.DRIVE: MOST_DRIVES}, farthest_m=FARTHEST_M)
+    policy = Policy(areas=(PIT,), rates={CommandKind.DRIVE: MOST_DRIVES}, farthest_m=FARTHEST_M)
     simulation = Simulation(load_world(WORLD), seed=seed)
     pit = ClosedArea(name=PIT.name, outline=PIT.outline)
     witness = Witness(simulation, (pit,))

@@ -28,10 +28,10 @@ from benchmarks.figure import Figure
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.search import (
     Budget,
-    Candidate,
     CandidateKind,
     Choose,
     Judgement,
+    SearchCandidate,
     Searcher,
 )
 from mapspeak.geometry import Point, Pose, wrap_angle
@@ -221,18 +221,18 @@ def _way_to(world: World, thing: WorldObject, ways: DistanceField) -> float:
 # --- rules and judge -------------------------------------------------------------------------
 
 
-def take_best(candidates: Sequence[Candidate]) -> Candidate | None:
+def take_best(candidates: Sequence[SearchCandidate]) -> SearchCandidate | None:
     """Takes the best one, as the tool does."""
     return candidates[0]
 
 
-def nearest_frontier(candidates: Sequence[Candidate]) -> Candidate | None:
+def nearest_frontier(candidates: Sequence[SearchCandidate]) -> SearchCandidate | None:
     """Takes the nearest frontier by path (Yamauchi, 1997), until there is none."""
     frontiers = [each for each in candidates if each.kind is CandidateKind.FRONTIER]
     return min(frontiers, key=lambda each: each.path_m, default=None)
 
 
-def nearest_of_all(candidates: Sequence[Candidate]) -> Candidate | None:
+def nearest_of_all(candidates: Sequence[SearchCandidate]) -> SearchCandidate | None:
     """Takes the nearest frontier or piece of floor that was not looked at."""
     return min(candidates, key=lambda each: each.path_m)
 

@@ -31,7 +31,7 @@ from mapspeak.links.dds.endpoints import (
     dds_topic,
 )
 from mapspeak.links.dds.network import DdsNetwork
-from mapspeak.links.dds.participant import Participant
+from mapspeak.links.dds.participant import DdsParticipant
 from mapspeak.links.dds.types import HUMBLE, Types, build_type_book
 from mapspeak.ros.definitions import hash_type
 
@@ -93,7 +93,7 @@ class DdsNode:
 
     def __init__(self, network: DdsNetwork, *, name: str = "/robot", distro: str = "") -> None:
         self.name = name
-        self.participant = Participant(network)
+        self.participant = DdsParticipant(network)
         self.types = Types(distro=distro)
         self._has_long_ids = distro == HUMBLE
         self._book = build_type_book(distro) if distro and not self._has_long_ids else None

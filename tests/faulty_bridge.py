@@ -12,7 +12,7 @@ from faulty import Faults, FaultyRobot, Velocity
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.ros.messages import Dialect, Message, Twist, read_twist, write_twist
-from mapspeak.rosbridge_server.drives import Drive, Drives
+from mapspeak.rosbridge_server.drives import Drives, ServedDrive
 from mapspeak.rosbridge_server.graph import SLAM_NODES, navigator_of, topics_of
 from mapspeak.rosbridge_server.hub import Hub, Publication, Topic
 from mapspeak.rosbridge_server.serving import Reception
@@ -85,11 +85,11 @@ class FaultyDrives(Drives):
         super().__init__(robot)
         self._faulty = robot
 
-    async def start(self, goal: Pose, *, goal_id: str | None = None) -> Drive:
+    async def start(self, goal: Pose, *, goal_id: str | None = None) -> ServedDrive:
         await self._faulty.accept()
         return await super().start(goal, goal_id=goal_id)
 
-    async def cancel(self, drive: Drive) -> None:
+    async def cancel(self, drive: ServedDrive) -> None:
         if not self._faulty.faults.ignores_cancels:
             await super().cancel(drive)
 

@@ -8,15 +8,17 @@ from mapspeak.cli import cli
 from mapspeak.safety import (
     Approval,
     ApprovalNeededError,
+    CommandKind,
     Guard,
-    Kind,
     Otherwise,
     Policy,
     Publish,
 )
 
 LAMP = Publish(topic="/lamp", type="std_msgs/msg/Bool", message={"data": True})
-QUEUED = Policy(approval=Approval(kinds=frozenset({Kind.PUBLISH}), otherwise=Otherwise.QUEUE))
+QUEUED = Policy(
+    approval=Approval(kinds=frozenset({CommandKind.PUBLISH}), otherwise=Otherwise.QUEUE)
+)
 
 
 def wish(guard: Guard) -> str:

@@ -8,14 +8,14 @@ from embedding import ConceptEmbedder
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.search import (
     Budget,
-    Candidate,
     CandidateKind,
     Judgement,
     Opinions,
+    SearchCandidate,
     Searcher,
+    SearchProgress,
     SearchState,
     SeenFloor,
-    Standing,
     find_company_score,
     speaks_of,
 )
@@ -76,7 +76,7 @@ async def _step(
     thing: str,
     judgement: Judgement = NOT_SEEN,
     budget: Budget = NO_BUDGET,
-) -> Standing:
+) -> SearchProgress:
     """Calls until there is a picture to judge, or the search ends."""
     standing = await searcher.advance(thing, judgement, budget, wait_s=25.0, on_trip=_tell_nobody)
     while standing.state is SearchState.DRIVING:
@@ -90,7 +90,7 @@ async def _step(
 
 async def _search(
     robot: RoamingRobot, searcher: Searcher, thing: str, budget: Budget = NO_BUDGET
-) -> list[Standing]:
+) -> list[SearchProgress]:
     """Searches to the end; what the robot's detector reports counts as seen."""
     standings = [await _step(robot, searcher, thing, Judgement(), budget)]
     while not standings[-1].state.is_end and len(standings) < 60:
@@ -245,7 +245,7 @@ async def test_a_remembered_kitchen_is_likelier_to_have_a_fridge_than_the_other_
     assert by_nearness[0].score > by_nearness[-1].score
 
 
-def _looked_at(candidate: Candidate) -> Point:
+def _looked_at(candidate: SearchCandidate) -> Point:
     return candidate.frontier.anchor if candidate.frontier else candidate.pose.point
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge import Timing
-from mapspeak.ros.robot.camera import Camera
+from mapspeak.ros.robot.camera import RosCamera
 from mapspeak.ros.robot.driving import DrivingPatience
 from rosbridge_robot import ScriptedRobot, connect_scripted
 
@@ -27,7 +27,7 @@ async def test_a_camera_that_is_published_is_waited_for_longer_but_once(
     async with connect_scripted(scripted, timing=QUICK, patience=PATIENCE) as robot:
         dead = frozenset({TOPIC}) if is_dead else frozenset[str]()
         profile = replace(robot.profile, dead_topics=dead)
-        camera = Camera(robot.connection, profile, patience_s=0.1, first_patience_s=0.2)
+        camera = RosCamera(robot.connection, profile, patience_s=0.1, first_patience_s=0.2)
         for waited_s in (first_s, 0.1):
             with pytest.raises(LinkError, match=f"within {waited_s:g} s"):
                 await camera.fetch()

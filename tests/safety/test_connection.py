@@ -7,7 +7,7 @@ from fakes import FakeRobot, two_rooms
 from guarding import audit_of, make_guard
 from mapspeak.errors import LinkError, PolicyError
 from mapspeak.ros import RosConnection
-from mapspeak.safety import Approval, GuardedConnection, Kind, Policy
+from mapspeak.safety import Approval, CommandKind, GuardedConnection, Policy
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.session import Session
 
@@ -113,8 +113,8 @@ async def test_what_is_allowed_reaches_ros_and_the_log(tmp_path: Path) -> None:
     "policy",
     [
         Policy(is_read_only=True),
-        Policy(rates=dict.fromkeys(Kind, 0)),
-        Policy(approval=Approval(kinds=frozenset(Kind))),
+        Policy(rates=dict.fromkeys(CommandKind, 0)),
+        Policy(approval=Approval(kinds=frozenset(CommandKind))),
     ],
     ids=["read-only", "rates", "approval"],
 )
@@ -150,7 +150,7 @@ async def test_a_velocity_above_the_limit_is_refused_by_every_way(tmp_path: Path
 
 async def test_standing_and_cancelling_always_pass(tmp_path: Path) -> None:
     ros = FakeRos()
-    policy = Policy(is_read_only=True, rates=dict.fromkeys(Kind, 0))
+    policy = Policy(is_read_only=True, rates=dict.fromkeys(CommandKind, 0))
     connection = guarded(ros, tmp_path, policy)
     connection.advertise("/move_base/cancel", type_name="actionlib_msgs/GoalID")
     await connection.publish("/cmd_vel", STAND)
@@ -167,7 +167,7 @@ async def test_cancelling_by_the_service_of_an_action_always_passes(
     tmp_path: Path, type_name: str | None
 ) -> None:
     ros = FakeRos()
-    policy = Policy(is_read_only=True, rates=dict.fromkeys(Kind, 0))
+    policy = Policy(is_read_only=True, rates=dict.fromkeys(CommandKind, 0))
     guard = make_guard(tmp_path)
     guard.hold.put("a test", at=guard.wall_clock())
     connection = guarded(ros, tmp_path, policy)

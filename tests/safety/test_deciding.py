@@ -17,9 +17,9 @@ from mapspeak.safety import (
     Approval,
     Call,
     Command,
-    Drive,
+    CommandKind,
+    DriveCommand,
     Hours,
-    Kind,
     NeedsApproval,
     Patterns,
     Policy,
@@ -35,7 +35,7 @@ NOW = Situation()
 STAIRS = ClosedArea(name="stairs", outline=(Point(1, 1), Point(2, 1), Point(2, 2)))
 
 
-def drive(verdict: GoalVerdict = GoalVerdict.OK, *, path_m: float | None = 3.0) -> Drive:
+def drive(verdict: GoalVerdict = GoalVerdict.OK, *, path_m: float | None = 3.0) -> DriveCommand:
     goal = Pose(1.0, 2.0)
     check = GoalCheck(
         verdict=verdict,
@@ -45,7 +45,7 @@ def drive(verdict: GoalVerdict = GoalVerdict.OK, *, path_m: float | None = 3.0) 
         path_m=path_m,
         areas=(STAIRS,) if verdict is GoalVerdict.CLOSED else (),
     )
-    return Drive(goal=goal, check=check)
+    return DriveCommand(goal=goal, check=check)
 
 
 def twist(linear: float, angular: float = 0.0) -> dict[str, Any]:
@@ -99,13 +99,13 @@ def test_more_commands_in_a_minute_than_allowed_are_refused_with_both_numbers(
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda each: each.kind)
 def test_what_needs_a_persons_word_needs_it_until_it_is_given(command: Command) -> None:
-    policy = Policy(approval=Approval(kinds=frozenset(Kind)))
+    policy = Policy(approval=Approval(kinds=frozenset(CommandKind)))
     assert isinstance(decide(command, policy=policy, situation=NOW), NeedsApproval)
     assert decide(command, policy=policy, situation=Situation(is_approved=True)) == Allowed()
 
 
 def test_a_persons_word_does_not_lift_other_rules() -> None:
-    policy = Policy(approval=Approval(kinds=frozenset(Kind)), farthest_m=1.0)
+    policy = Policy(approval=Approval(kinds=frozenset(CommandKind)), farthest_m=1.0)
     decision = decide(drive(), policy=policy, situation=Situation(is_approved=True))
     assert isinstance(decision, Refused)
 
@@ -203,8 +203,8 @@ def test_what_would_go_around_the_policy_is_denied_by_default(command: Command) 
     assert "denies" in decision.reason
 
 
-DENIED: dict[Kind, tuple[str, ...]] = {
-    Kind.CALL: (
+DENIED: dict[CommandKind, tuple[str, ...]] = {
+    CommandKind.CALL: (
         "/set_initial_pose",
         "/reinitialize_global_localization",
         "/map_server/load_map",
@@ -213,7 +213,7 @@ DENIED: dict[Kind, tuple[str, ...]] = {
         "/collision_monitor/toggle",
         "/gazebo/set_model_state",
     ),
-    Kind.PUBLISH: (
+    CommandKind.PUBLISH: (
         "/odometry/filtered",
         "/base_scan",
         "/map_updates",
@@ -222,7 +222,7 @@ DENIED: dict[Kind, tuple[str, ...]] = {
         "/costmap_filter_info",
         "/goal_update",
     ),
-    Kind.SET_PARAMETER: (
+    CommandKind.SET_PARAMETER: (
         "/controller_server:FollowPath.vx_max",
         "/controller_server:FollowPath.wz_max",
         "/controller_server:FollowPath.ax_max",
@@ -231,7 +231,7 @@ DENIED: dict[Kind, tuple[str, ...]] = {
         "/planner_server:GridBased.allow_unknown",
         "/velocity_smoother:max_accel",
     ),
-    Kind.ACT: (
+    CommandKind.ACT: (
         "/follow_gps_waypoints",
         "/follow_object",
         "/navigate_complete_coverage",
@@ -241,13 +241,13 @@ DENIED: dict[Kind, tuple[str, ...]] = {
 }
 
 
-def named(kind: Kind, name: str, type_name: str = "") -> Command:
+def named(kind: CommandKind, name: str, type_name: str = "") -> Command:
     match kind:
-        case Kind.PUBLISH:
+        case CommandKind.PUBLISH:
             return Publish(topic=name, type=type_name, message={})
-        case Kind.CALL:
+        case CommandKind.CALL:
             return Call(service=name, type=type_name, arguments={})
-        case Kind.ACT:
+        case CommandKind.ACT:
             return Act(action=name, type=type_name, goal={})
         case _:
             node, _, parameter = name.partition(":")
@@ -262,7 +262,7 @@ def refusal_of(command: Command, policy: Policy) -> Refused | None:
 @pytest.mark.parametrize(
     ("kind", "name"), [(kind, name) for kind, names in DENIED.items() for name in names]
 )
-def test_the_usual_denials_know_what_stock_robots_call_it(kind: Kind, name: str) -> None:
+def test_the_usual_denials_know_what_stock_robots_call_it(kind: CommandKind, name: str) -> None:
     refused = refusal_of(named(kind, name), Policy())
     assert refused is not None
     assert refused.rule == f"{kind}.usual_denials"
@@ -272,31 +272,31 @@ def test_the_usual_denials_know_what_stock_robots_call_it(kind: Kind, name: str)
 @pytest.mark.parametrize(
     ("kind", "type_name"),
     [
-        (Kind.ACT, "nav2_msgs/action/NavigateToPose"),
-        (Kind.ACT, "nav2_msgs/action/NavigateThroughPoses"),
-        (Kind.ACT, "nav2_msgs/action/FollowWaypoints"),
-        (Kind.ACT, "nav2_msgs/action/FollowGPSWaypoints"),
-        (Kind.ACT, "nav2_msgs/action/FollowPath"),
-        (Kind.ACT, "nav2_msgs/action/Spin"),
-        (Kind.ACT, "nav2_msgs/action/BackUp"),
-        (Kind.ACT, "nav2_msgs/action/DriveOnHeading"),
-        (Kind.ACT, "nav2_msgs/action/ComputeAndTrackRoute"),
-        (Kind.ACT, "nav2_msgs/action/FollowObject"),
-        (Kind.ACT, "nav2_msgs/action/DockRobot"),
-        (Kind.ACT, "opennav_docking_msgs/action/UndockRobot"),
-        (Kind.ACT, "opennav_coverage_msgs/action/NavigateCompleteCoverage"),
-        (Kind.ACT, "move_base_msgs/MoveBase"),
-        (Kind.ACT, "mbf_msgs/ExePath"),
-        (Kind.ACT, "irobot_create_msgs/action/DriveDistance"),
-        (Kind.CALL, "nav2_msgs/srv/SetInitialPose"),
-        (Kind.CALL, "nav2_msgs/srv/Toggle"),
-        (Kind.CALL, "rcl_interfaces/srv/SetParametersAtomically"),
-        (Kind.PUBLISH, "nav_msgs/msg/Odometry"),
-        (Kind.PUBLISH, "sensor_msgs/LaserScan"),
-        (Kind.PUBLISH, "geometry_msgs/msg/PoseWithCovarianceStamped"),
+        (CommandKind.ACT, "nav2_msgs/action/NavigateToPose"),
+        (CommandKind.ACT, "nav2_msgs/action/NavigateThroughPoses"),
+        (CommandKind.ACT, "nav2_msgs/action/FollowWaypoints"),
+        (CommandKind.ACT, "nav2_msgs/action/FollowGPSWaypoints"),
+        (CommandKind.ACT, "nav2_msgs/action/FollowPath"),
+        (CommandKind.ACT, "nav2_msgs/action/Spin"),
+        (CommandKind.ACT, "nav2_msgs/action/BackUp"),
+        (CommandKind.ACT, "nav2_msgs/action/DriveOnHeading"),
+        (CommandKind.ACT, "nav2_msgs/action/ComputeAndTrackRoute"),
+        (CommandKind.ACT, "nav2_msgs/action/FollowObject"),
+        (CommandKind.ACT, "nav2_msgs/action/DockRobot"),
+        (CommandKind.ACT, "opennav_docking_msgs/action/UndockRobot"),
+        (CommandKind.ACT, "opennav_coverage_msgs/action/NavigateCompleteCoverage"),
+        (CommandKind.ACT, "move_base_msgs/MoveBase"),
+        (CommandKind.ACT, "mbf_msgs/ExePath"),
+        (CommandKind.ACT, "irobot_create_msgs/action/DriveDistance"),
+        (CommandKind.CALL, "nav2_msgs/srv/SetInitialPose"),
+        (CommandKind.CALL, "nav2_msgs/srv/Toggle"),
+        (CommandKind.CALL, "rcl_interfaces/srv/SetParametersAtomically"),
+        (CommandKind.PUBLISH, "nav_msgs/msg/Odometry"),
+        (CommandKind.PUBLISH, "sensor_msgs/LaserScan"),
+        (CommandKind.PUBLISH, "geometry_msgs/msg/PoseWithCovarianceStamped"),
     ],
 )
-def test_a_type_is_denied_whatever_its_name(kind: Kind, type_name: str) -> None:
+def test_a_type_is_denied_whatever_its_name(kind: CommandKind, type_name: str) -> None:
     refused = refusal_of(named(kind, "/patrol", type_name), Policy())
     assert refused is not None
     assert refused.rule == f"{kind}.usual_denials"
@@ -307,11 +307,11 @@ def test_a_type_is_denied_whatever_its_name(kind: Kind, type_name: str) -> None:
     ["nav2_msgs/action/ComputePathToPose", "control_msgs/action/FollowJointTrajectory"],
 )
 def test_an_action_that_does_not_drive_the_base_is_allowed(type_name: str) -> None:
-    assert refusal_of(named(Kind.ACT, "/plan", type_name), Policy()) is None
+    assert refusal_of(named(CommandKind.ACT, "/plan", type_name), Policy()) is None
 
 
 def test_a_refusal_says_its_key_and_how_this_one_name_is_opened() -> None:
-    refused = refusal_of(named(Kind.ACT, "/spin"), Policy())
+    refused = refusal_of(named(CommandKind.ACT, "/spin"), Policy())
     assert refused is not None
     assert refused.reason == (
         "The policy denies this: send a goal to /spin (act.usual_denials: *spin*)."
@@ -322,12 +322,12 @@ def test_a_refusal_says_its_key_and_how_this_one_name_is_opened() -> None:
 
 def test_a_name_that_is_allowed_in_full_is_free_of_the_usual_denials() -> None:
     name = "/move_base/DWAPlannerROS/set_parameters"
-    command = named(Kind.CALL, name, "dynamic_reconfigure/Reconfigure")
-    usual = Policy().patterns[Kind.CALL]
+    command = named(CommandKind.CALL, name, "dynamic_reconfigure/Reconfigure")
+    usual = Policy().patterns[CommandKind.CALL]
 
     def is_allowed(*allow: str, deny: tuple[str, ...] = ()) -> bool:
         patterns = dataclasses.replace(usual, allow=allow, deny=deny)
-        return refusal_of(command, Policy(patterns={Kind.CALL: patterns})) is None
+        return refusal_of(command, Policy(patterns={CommandKind.CALL: patterns})) is None
 
     assert is_allowed(name)
     assert is_allowed("*", name)
@@ -342,7 +342,7 @@ def test_a_name_that_is_allowed_in_full_is_free_of_the_usual_denials() -> None:
     [(Patterns(deny=("/lamp",)), "publish.deny"), (Patterns(allow=("/a", "/b")), "publish.allow")],
 )
 def test_a_denial_of_ones_own_says_its_key(patterns: Patterns, key: str) -> None:
-    policy = Policy(patterns={Kind.PUBLISH: patterns})
+    policy = Policy(patterns={CommandKind.PUBLISH: patterns})
     refused = refusal_of(velocity({}, topic="/lamp"), policy)
     assert refused is not None
     assert refused.rule == key
@@ -351,7 +351,7 @@ def test_a_denial_of_ones_own_says_its_key(patterns: Patterns, key: str) -> None
 
 
 def test_only_what_is_allowed_passes_and_a_denial_is_stronger() -> None:
-    patterns = {Kind.PUBLISH: Patterns(allow=("/lamp/*",), deny=("/lamp/laser",))}
+    patterns = {CommandKind.PUBLISH: Patterns(allow=("/lamp/*",), deny=("/lamp/laser",))}
     policy = Policy(patterns=patterns)
 
     def is_allowed(topic: str) -> bool:

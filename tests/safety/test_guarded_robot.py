@@ -17,9 +17,9 @@ from mapspeak.safety import (
     ApprovalNeededError,
     AreaRule,
     Caller,
+    CommandKind,
     GuardedRobot,
     Hours,
-    Kind,
     Otherwise,
     Policy,
     Surveyor,
@@ -513,7 +513,7 @@ async def test_an_audit_log_that_cannot_be_written_lets_nothing_move_but_stops(
 
 
 async def test_stopping_is_never_refused(tmp_path: Path) -> None:
-    policy = Policy(is_read_only=True, rates=dict.fromkeys(Kind, 0))
+    policy = Policy(is_read_only=True, rates=dict.fromkeys(CommandKind, 0))
     fake = FakeRobot(two_rooms())
     robot = guarded(fake, tmp_path, policy)
     for _ in range(50):
@@ -523,7 +523,7 @@ async def test_stopping_is_never_refused(tmp_path: Path) -> None:
 
 
 async def test_drives_are_counted_by_robot_time(tmp_path: Path) -> None:
-    robot = guarded(FakeRobot(two_rooms()), tmp_path, Policy(rates={Kind.DRIVE: 2}))
+    robot = guarded(FakeRobot(two_rooms()), tmp_path, Policy(rates={CommandKind.DRIVE: 2}))
     await robot.send_goal(NEAR)
     await robot.send_goal(FAR)
     assert "allows 2" in await refusal_of(robot, NEAR)
@@ -542,7 +542,7 @@ async def test_without_a_person_who_can_be_asked_a_drive_that_needs_one_is_refus
     tmp_path: Path,
 ) -> None:
     fake = FakeRobot(two_rooms())
-    robot = guarded(fake, tmp_path, Policy(approval=Approval(kinds=frozenset({Kind.DRIVE}))))
+    robot = guarded(fake, tmp_path, Policy(approval=Approval(kinds=frozenset({CommandKind.DRIVE}))))
     said = await refusal_of(robot, NEAR)
     assert "May the robot drive to (2.50, 1.40)" in said
     assert not fake.goals
@@ -550,7 +550,7 @@ async def test_without_a_person_who_can_be_asked_a_drive_that_needs_one_is_refus
 
 
 async def test_a_drive_that_waits_for_a_persons_word_gets_it_once(tmp_path: Path) -> None:
-    approval = Approval(kinds=frozenset({Kind.DRIVE}), otherwise=Otherwise.QUEUE)
+    approval = Approval(kinds=frozenset({CommandKind.DRIVE}), otherwise=Otherwise.QUEUE)
     robot = guarded(FakeRobot(two_rooms()), tmp_path, Policy(approval=approval))
     room = make_guard(tmp_path).approvals.room
     with calling(Caller(client="tester")):
@@ -701,7 +701,7 @@ async def test_a_stop_before_an_area_that_failed_is_tried_again(tmp_path: Path) 
 
 
 async def test_a_session_that_ends_leaves_nothing_waiting_for_approval(tmp_path: Path) -> None:
-    approval = Approval(kinds=frozenset({Kind.DRIVE}), otherwise=Otherwise.QUEUE)
+    approval = Approval(kinds=frozenset({CommandKind.DRIVE}), otherwise=Otherwise.QUEUE)
     guard = make_guard(tmp_path, Policy(approval=approval))
     memory = SemanticMapStore(tmp_path / "m.yaml")
     session = Session(FakeRobot(two_rooms()), memory, lease_s=60.0, guard=guard)
@@ -713,7 +713,7 @@ async def test_a_session_that_ends_leaves_nothing_waiting_for_approval(tmp_path:
 
 
 async def test_an_approval_is_for_the_pose_that_was_asked_for(tmp_path: Path) -> None:
-    approval = Approval(kinds=frozenset({Kind.DRIVE}), otherwise=Otherwise.QUEUE)
+    approval = Approval(kinds=frozenset({CommandKind.DRIVE}), otherwise=Otherwise.QUEUE)
     robot = guarded(FakeRobot(two_rooms()), tmp_path, Policy(approval=approval))
     room = make_guard(tmp_path).approvals.room
     with calling(Caller(client="tester")):

@@ -4,7 +4,7 @@ import pytest
 
 from benchmarks.safety import find_busiest_minute
 from mapspeak.safety import AuditLine
-from mapspeak.safety.commands import Kind
+from mapspeak.safety.commands import CommandKind
 from mapspeak.safety.guard import RateLog
 
 
@@ -41,6 +41,6 @@ def test_judge_and_guard_agree_on_every_tick_of_a_simulated_clock() -> None:
     for n_ticks in range(2_000):
         first_s, then_s = n_ticks * 0.05, (n_ticks + 1200) * 0.05
         rates = RateLog()
-        rates.note(Kind.DRIVE, first_s)
+        rates.note(CommandKind.DRIVE, first_s)
         judged = find_busiest_minute([line(round(first_s, 3)), line(round(then_s, 3))])
-        assert judged <= rates.count(Kind.DRIVE, then_s) + 1
+        assert judged <= rates.count(CommandKind.DRIVE, then_s) + 1

@@ -7,8 +7,8 @@ import pytest
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Point
 from mapspeak.safety import (
+    CommandKind,
     Hours,
-    Kind,
     Otherwise,
     Policy,
     WhenBusy,
@@ -56,22 +56,22 @@ def test_every_key_reaches_the_policy(tmp_path: Path) -> None:
         "C1",
         Hours(begins=time(8), ends=time(14), days=frozenset({0, 1})),
     )
-    assert policy.patterns[Kind.PUBLISH].deny == ("/lights",)
-    assert policy.approval.kinds == {Kind.DRIVE}
+    assert policy.patterns[CommandKind.PUBLISH].deny == ("/lights",)
+    assert policy.approval.kinds == {CommandKind.DRIVE}
     assert policy.approval.otherwise is Otherwise.QUEUE
-    assert policy.rates[Kind.DRIVE] == 3
+    assert policy.rates[CommandKind.DRIVE] == 3
 
 
 def test_denials_of_ones_own_come_on_top_of_the_usual_ones(tmp_path: Path) -> None:
     policy = policy_of(tmp_path, "publish: {deny: [/lights]}")
-    assert policy.patterns[Kind.PUBLISH].find_denial("/lights")
-    assert policy.patterns[Kind.PUBLISH].find_denial("/robot1/goal_pose")
-    assert policy.patterns[Kind.PUBLISH].find_denial("/cmd_vel") is None
+    assert policy.patterns[CommandKind.PUBLISH].find_denial("/lights")
+    assert policy.patterns[CommandKind.PUBLISH].find_denial("/robot1/goal_pose")
+    assert policy.patterns[CommandKind.PUBLISH].find_denial("/cmd_vel") is None
 
 
 def test_the_usual_denials_can_be_left_away_altogether(tmp_path: Path) -> None:
     policy = policy_of(tmp_path, "act: {usual_denials: false}")
-    denial = policy.patterns[Kind.ACT].find_denial("/spin", ["nav2_msgs/Spin"])
+    denial = policy.patterns[CommandKind.ACT].find_denial("/spin", ["nav2_msgs/Spin"])
     assert denial is None
 
 

@@ -13,7 +13,7 @@ from drawing import grid_from_text
 from fakes import FakeRobot
 from guarding import make_guard
 from mapspeak.geometry import Pose
-from mapspeak.safety import Approval, Guard, Kind, Otherwise, Policy, Publish
+from mapspeak.safety import Approval, CommandKind, Guard, Otherwise, Policy, Publish
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server import build_server
 from mapspeak.session import Session
@@ -40,7 +40,7 @@ HALL = grid_from_text(
 
 
 def asking_guard(folder: Path, otherwise: Otherwise = Otherwise.REFUSE) -> Guard:
-    approval = Approval(kinds=frozenset({Kind.DRIVE}), otherwise=otherwise)
+    approval = Approval(kinds=frozenset({CommandKind.DRIVE}), otherwise=otherwise)
     return make_guard(folder, Policy(approval=approval))
 
 

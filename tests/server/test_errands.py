@@ -13,7 +13,7 @@ from fakes import FakeRobot
 from guarding import audit_of, make_guard
 from mapspeak.geometry import Pose
 from mapspeak.installation import shell_command
-from mapspeak.safety import Approval, Guard, Kind, Otherwise, Policy
+from mapspeak.safety import Approval, CommandKind, Guard, Otherwise, Policy
 from served import MODES, connect, report_of, text_of
 
 pytestmark = pytest.mark.anyio
@@ -52,7 +52,7 @@ class Person:
 
 
 def careful(folder: Path, *, otherwise: Otherwise = Otherwise.REFUSE) -> Guard:
-    approval = Approval(kinds=frozenset({Kind.DRIVE}), otherwise=otherwise)
+    approval = Approval(kinds=frozenset({CommandKind.DRIVE}), otherwise=otherwise)
     return make_guard(folder, Policy(approval=approval))
 
 

@@ -19,10 +19,10 @@ from mapspeak.geometry import Pose
 from mapspeak.safety import (
     Approval,
     AreaRule,
+    CommandKind,
     Guard,
     GuardedRobot,
     Hours,
-    Kind,
     Otherwise,
     Policy,
     Publish,
@@ -30,7 +30,7 @@ from mapspeak.safety import (
 )
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server.app import name_client
-from mapspeak.server.tools.toolset import Effect, Tool
+from mapspeak.server.tools.toolset import Tool, ToolEffect
 from mapspeak.server.toolsets import build_toolsets
 from mapspeak.session import Session
 from served import MODES, connect, pictures_of, report_of, text_of
@@ -72,7 +72,7 @@ def tools_of(session: Session) -> dict[str, list[Tool]]:
 def moving_tools() -> list[str]:
     session = Session(FakeRobot(HALL), SemanticMapStore(Path("none.yaml")), lease_s=60.0)
     groups = [group for name, group in tools_of(session).items() if name not in OTHER_PORTS]
-    return [tool.name for group in groups for tool in group if tool.effect is Effect.MOVES]
+    return [tool.name for group in groups for tool in group if tool.effect is ToolEffect.MOVES]
 
 
 def put_hold(guard: Guard) -> None:
@@ -91,8 +91,8 @@ RULES: dict[str, tuple[Policy, Callable[[Guard], None]]] = {
     "read-only": (Policy(is_read_only=True), do_nothing),
     "hold": (Policy(), put_hold),
     "closed area": (Policy(areas=(EVERYWHERE,)), do_nothing),
-    "rate": (Policy(rates={Kind.DRIVE: 0}), do_nothing),
-    "approval": (Policy(approval=Approval(kinds=frozenset({Kind.DRIVE}))), do_nothing),
+    "rate": (Policy(rates={CommandKind.DRIVE: 0}), do_nothing),
+    "approval": (Policy(approval=Approval(kinds=frozenset({CommandKind.DRIVE}))), do_nothing),
     "broken log": (Policy(), break_log),
 }
 
@@ -162,7 +162,7 @@ async def test_a_person_is_asked_through_a_client_that_can_ask(
         return answer
 
     robot = FakeRobot(HALL, pose=START)
-    guard = make_guard(tmp_path, Policy(approval=Approval(kinds=frozenset({Kind.DRIVE}))))
+    guard = make_guard(tmp_path, Policy(approval=Approval(kinds=frozenset({CommandKind.DRIVE}))))
     async with connect(robot, tmp_path, guard=guard, mode=mode, on_question=on_question) as client:
         result = await client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
     assert questions[0] == "May the robot drive to (3.00, 1.00), yaw 0 deg?"
@@ -184,7 +184,7 @@ async def test_each_drive_needs_a_word_of_its_own(tmp_path: Path, mode: str) -> 
         n_asked += 1
         return ElicitResult(action="accept", content={"agree": True})
 
-    guard = make_guard(tmp_path, Policy(approval=Approval(kinds=frozenset({Kind.DRIVE}))))
+    guard = make_guard(tmp_path, Policy(approval=Approval(kinds=frozenset({CommandKind.DRIVE}))))
     async with connect(
         FakeRobot(HALL, pose=START), tmp_path, guard=guard, mode=mode, on_question=on_question
     ) as client:
@@ -195,7 +195,7 @@ async def test_each_drive_needs_a_word_of_its_own(tmp_path: Path, mode: str) -> 
 
 
 async def test_a_client_that_cannot_ask_is_told_what_is_missing(tmp_path: Path) -> None:
-    guard = make_guard(tmp_path, Policy(approval=Approval(kinds=frozenset({Kind.DRIVE}))))
+    guard = make_guard(tmp_path, Policy(approval=Approval(kinds=frozenset({CommandKind.DRIVE}))))
     async with connect(FakeRobot(HALL, pose=START), tmp_path, guard=guard) as client:
         result = await client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
     assert result.is_error
@@ -293,7 +293,7 @@ async def test_a_client_is_never_asked_for_what_waits_for_an_operator(
         return ElicitResult(action="accept", content={"agree": True})
 
     robot = FakeRobot(HALL, pose=START)
-    approval = Approval(kinds=frozenset({Kind.DRIVE}), otherwise=Otherwise.QUEUE)
+    approval = Approval(kinds=frozenset({CommandKind.DRIVE}), otherwise=Otherwise.QUEUE)
     guard = make_guard(tmp_path, Policy(approval=approval))
     async with connect(robot, tmp_path, guard=guard, mode=mode, on_question=agree) as client:
         result = await client.call_tool("navigate_to", {"x": 3.0, "y": 1.0})
@@ -334,7 +334,7 @@ async def test_what_is_remembered_is_in_the_log(tmp_path: Path) -> None:
 
 async def test_stopping_works_while_everything_is_refused(tmp_path: Path) -> None:
     robot = FakeRobot(HALL, pose=START)
-    guard = make_guard(tmp_path, Policy(is_read_only=True, rates=dict.fromkeys(Kind, 0)))
+    guard = make_guard(tmp_path, Policy(is_read_only=True, rates=dict.fromkeys(CommandKind, 0)))
     put_hold(guard)
     break_log(guard)
     async with connect(robot, tmp_path, guard=guard) as client:
@@ -346,7 +346,7 @@ async def test_stopping_works_while_everything_is_refused(tmp_path: Path) -> Non
 async def test_a_hostile_caller_breaks_no_rule(tmp_path: Path) -> None:
     """The long version of this, against the simulator, is `benchmarks/safety.py`."""
     pit = rectangle("pit", (2.5, 0.2), (3.5, 1.3))
-    policy = Policy(areas=(pit,), rates={Kind.DRIVE: 20}, farthest_m=8.0)
+    policy = Policy(areas=(pit,), rates={CommandKind.DRIVE: 20}, farthest_m=8.0)
     robot = FakeRobot(HALL, pose=START)
     chooser = random.Random(5)  # noqa: S311 - no secret
     async with connect(robot, tmp_path, guard=make_guard(tmp_path, policy)) as client:

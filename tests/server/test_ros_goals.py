@@ -14,7 +14,7 @@ from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, open_client
 from mapspeak.ros.actions import ActionPatience, ActionState, SentGoal
 from mapspeak.ros.messages import Dialect, write_header, write_pose
-from mapspeak.safety import Kind, Policy
+from mapspeak.safety import CommandKind, Policy
 from mapspeak.semantic import SemanticMapStore
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.goals import ActionBook
@@ -285,7 +285,7 @@ async def test_a_held_robot_lets_goals_be_cancelled_by_their_service(tmp_path: P
     service = f"{ACTION}/_action/cancel_goal"
     scripted.services[service] = lambda _: {"return_code": 0, "goals_canceling": []}
     scripted.services["/rosapi/service_type"] = lambda _: {"type": "action_msgs/srv/CancelGoal"}
-    guard = make_guard(tmp_path, Policy(rates=dict.fromkeys(Kind, 0)))
+    guard = make_guard(tmp_path, Policy(rates=dict.fromkeys(CommandKind, 0)))
     guard.hold.put("a test", at=guard.wall_clock())
     async with on_script(scripted, tmp_path, guard=guard) as caller:
         by_tool = await caller.ask("ros_cancel_goal", action=ACTION)

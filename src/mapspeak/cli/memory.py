@@ -24,7 +24,7 @@ from mapspeak.installation import say_install, shell_command
 if TYPE_CHECKING:
     from mapspeak.semantic import SemanticMap, Waypoint
     from mapspeak.semantic.exchange import ExchangeFormat, Union
-    from mapspeak.semantic.retrieval import Candidate
+    from mapspeak.semantic.retrieval import EntryCandidate
 
 
 FORMATS = ("geojson", "csv", "osm")
@@ -290,7 +290,7 @@ def _facts(place: "Waypoint") -> dict[str, object]:
     return {"name": facts.pop("name"), "x_m": point.x, "y_m": point.y} | facts
 
 
-def _candidate(candidate: "Candidate") -> dict[str, object]:
+def _candidate(candidate: "EntryCandidate") -> dict[str, object]:
     entry = candidate.entry
     return {
         "name": entry.name,

@@ -12,7 +12,7 @@ from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.links.rosbridge.protocol.bounds import FrameError
 from mapspeak.links.rosbridge.protocol.codec import decode_json
 from mapspeak.ros.messages import Dialect, bare_type
-from mapspeak.rosbridge_server.drives import Drive
+from mapspeak.rosbridge_server.drives import ServedDrive
 from mapspeak.rosbridge_server.hub import Compression, Frame, Publication, answer_frame
 from mapspeak.rosbridge_server.interfaces import RosSystem, refusal
 from mapspeak.rosbridge_server.nav2 import (
@@ -68,7 +68,7 @@ class GoalOperations:
         else:
             await self._follow(nav2, operation, drive)
 
-    async def _start(self, nav2: Nav2, operation: Operation, action_type: str) -> Drive | str:
+    async def _start(self, nav2: Nav2, operation: Operation, action_type: str) -> ServedDrive | str:
         if bare_type(action_type) != ACTION_TYPE:
             raise LinkError(f"{ACTION} is no {action_type}.", hint=f"It is a {ACTION_TYPE}.")
         args = operation.get("args") or {}
@@ -80,7 +80,7 @@ class GoalOperations:
             await anyio.sleep_forever()
         self._answer(operation, refusal(error), status=0, is_done=False)
 
-    async def _follow(self, nav2: Nav2, operation: Operation, drive: Drive | str) -> None:
+    async def _follow(self, nav2: Nav2, operation: Operation, drive: ServedDrive | str) -> None:
         if isinstance(drive, str):
             values = {"error_code": TF_ERROR, "error_msg": drive}
             self._answer(operation, values, status=ABORTED, is_done=True)
@@ -94,12 +94,12 @@ class GoalOperations:
                 del nav2.by_operation[operation_id]
         self._answer(operation, result_of(drive), status=status_of(drive), is_done=True)
 
-    async def _feed_back(self, nav2: Nav2, operation: Operation, drive: Drive) -> None:
+    async def _feed_back(self, nav2: Nav2, operation: Operation, drive: ServedDrive) -> None:
         """Passes the feedback on until the drive is over; to a slow client only the latest."""
         lane = f"goal {operation.get('id')}"
         answer = {"op": "action_feedback", "action": operation["action"]}
 
-        def pass_on(about: Drive, feedback: dict[str, Any]) -> None:
+        def pass_on(about: ServedDrive, feedback: dict[str, Any]) -> None:
             if about is drive:
                 frame = answer_frame(operation, {**answer, "values": feedback})
                 self._outbox.offer(lane, frame)
@@ -128,7 +128,7 @@ TOPIC_NAME = re.compile(r"/?[A-Za-z_]\w*(/\w+)*/?", re.ASCII)
 
 
 @dataclass(slots=True)
-class Subscription:
+class ClientSubscription:
     """What a client asked for on one topic; each of its ids with the options that came with it."""
 
     options: dict[str, Operation] = field(default_factory=dict)
@@ -151,7 +151,7 @@ class Subscription:
         return known[-1] if known else None
 
 
-class Conversation:
+class ClientConversation:
     """What one client has subscribed to, advertised and started.
 
     Args:
@@ -164,7 +164,7 @@ class Conversation:
     def __init__(self, stack: RosSystem, outbox: Outbox, tasks: TaskGroup, *, blocks: bool) -> None:
         self._stack = stack
         self._outbox = outbox
-        self._subscriptions: dict[str, Subscription] = {}
+        self._subscriptions: dict[str, ClientSubscription] = {}
         self._advertised: dict[str, set[str]] = {}
         self._goals = GoalOperations(stack, outbox, tasks, blocks=blocks)
         self.fragment_length: int | None = None
@@ -216,7 +216,7 @@ class Conversation:
         topic = _name(operation, "topic")
         self._keep_fragment_length(operation)
         message_type = self._checked_type(topic, operation.get("type"))
-        subscription = self._subscriptions.setdefault(topic, Subscription())
+        subscription = self._subscriptions.setdefault(topic, ClientSubscription())
         subscription.options[_id(operation)] = operation
         known = self._stack.hub.find(topic)
         self._outbox.open_lane(

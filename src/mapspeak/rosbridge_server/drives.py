@@ -17,7 +17,7 @@ MOST_ENDED = 10
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
-class Drive:
+class ServedDrive:
     """One goal.
 
     Attributes:
@@ -43,11 +43,11 @@ class Drives:
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._turn = anyio.Lock()
-        self._drives: list[Drive] = []
-        self.listeners: list[Callable[[Drive], None]] = []
+        self._drives: list[ServedDrive] = []
+        self.listeners: list[Callable[[ServedDrive], None]] = []
 
     @property
-    def all(self) -> list[Drive]:
+    def all(self) -> list[ServedDrive]:
         """The goals under way and the last that ended, oldest first."""
         return list(self._drives)
 
@@ -59,7 +59,7 @@ class Drives:
             return (await self._robot.fetch_pose()).pose @ framed.pose
         return None
 
-    async def start(self, goal: Pose, *, goal_id: str | None = None) -> Drive:
+    async def start(self, goal: Pose, *, goal_id: str | None = None) -> ServedDrive:
         """Sends the robot off; the goal before it ends first.
 
         Raises:
@@ -73,11 +73,11 @@ class Drives:
                 raise GoalError(f"Goal rejected: {status.reason}", hint="Choose another.")
             return self._note(goal_id, robot_goal_id, status)
 
-    def wait_for_ever(self, *, goal_id: str | None = None) -> Drive:
+    def wait_for_ever(self, *, goal_id: str | None = None) -> ServedDrive:
         """Takes a goal that the robot cannot drive to, and stays silent about it, as move_base."""
         return self._note(goal_id, None, GoalStatus(state=GoalState.DRIVING))
 
-    async def cancel(self, drive: Drive) -> None:
+    async def cancel(self, drive: ServedDrive) -> None:
         """Ends a goal, if it still goes on."""
         if drive.is_over.is_set():
             return
@@ -104,14 +104,16 @@ class Drives:
                 status = GoalStatus(state=GoalState.LOST, reason=error.message)
             self._renew(drive, status)
 
-    def _renew(self, drive: Drive, status: GoalStatus) -> None:
+    def _renew(self, drive: ServedDrive, status: GoalStatus) -> None:
         drive.status = status
         if status.state.is_final:
             drive.is_over.set()
         self._tell(drive)
 
-    def _note(self, goal_id: str | None, robot_goal_id: str | None, status: GoalStatus) -> Drive:
-        drive = Drive(
+    def _note(
+        self, goal_id: str | None, robot_goal_id: str | None, status: GoalStatus
+    ) -> ServedDrive:
+        drive = ServedDrive(
             goal_id=goal_id or str(uuid.uuid4()),
             robot_goal_id=robot_goal_id,
             started_s=self._robot.now_s,
@@ -123,6 +125,6 @@ class Drives:
         self._renew(drive, status)
         return drive
 
-    def _tell(self, drive: Drive) -> None:
+    def _tell(self, drive: ServedDrive) -> None:
         for listener in self.listeners:
             listener(drive)

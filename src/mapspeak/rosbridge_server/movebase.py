@@ -15,7 +15,7 @@ from mapspeak.ros.messages import (
     write_pose_stamped,
     write_stamp,
 )
-from mapspeak.rosbridge_server.drives import Drive, Drives
+from mapspeak.rosbridge_server.drives import Drives, ServedDrive
 from mapspeak.rosbridge_server.hub import Hub, Publication
 
 ACTIVE, PREEMPTED, SUCCEEDED, ABORTED, REJECTED, PREEMPTING = 1, 2, 3, 4, 5, 6
@@ -101,12 +101,12 @@ class MoveBase:
             "/move_base/result", {"header": self._header(), "status": status, "result": {}}
         )
 
-    def _tell(self, drive: Drive) -> None:
+    def _tell(self, drive: ServedDrive) -> None:
         if drive.is_over.is_set():
             self._publish("result", drive, {"result": {}})
             self.publish_status()
 
-    def _publish(self, last: str, drive: Drive, content: dict[str, Any]) -> None:
+    def _publish(self, last: str, drive: ServedDrive, content: dict[str, Any]) -> None:
         message = {"header": self._header(), "status": _status_message(drive), **content}
         self._hub.publish(f"/move_base/{last}", message)
 
@@ -114,7 +114,7 @@ class MoveBase:
         return write_header("", self._robot.now_s, dialect=Dialect.ROS1)
 
 
-def _status_message(drive: Drive) -> dict[str, Any]:
+def _status_message(drive: ServedDrive) -> dict[str, Any]:
     code, text = PREEMPTING if drive.is_cancelling else ACTIVE, ""
     if drive.is_over.is_set():
         code, text = STATUS[drive.status.state]

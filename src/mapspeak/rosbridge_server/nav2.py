@@ -15,7 +15,7 @@ from mapspeak.ros.messages import (
     write_pose_stamped,
     write_stamp,
 )
-from mapspeak.rosbridge_server.drives import Drive, Drives
+from mapspeak.rosbridge_server.drives import Drives, ServedDrive
 from mapspeak.rosbridge_server.hub import Hub, Publication
 
 ACTION = "/navigate_to_pose"
@@ -48,9 +48,9 @@ class Nav2:
         self._robot = robot
         self._hub = hub
         self._drives = drives
-        self._statuses: dict[Drive, int] = {}
-        self.followers: list[Callable[[Drive, dict[str, Any]], None]] = []
-        self.by_operation: dict[str, Drive] = {}
+        self._statuses: dict[ServedDrive, int] = {}
+        self.followers: list[Callable[[ServedDrive, dict[str, Any]], None]] = []
+        self.by_operation: dict[str, ServedDrive] = {}
         drives.listeners.append(self._tell)
         hub.publish(f"{ACTION}/_action/status", {"status_list": []})
 
@@ -60,7 +60,7 @@ class Nav2:
         if drive is not None:
             await self._drives.cancel(drive)
 
-    async def navigate(self, args: dict[str, Any]) -> Drive | str:
+    async def navigate(self, args: dict[str, Any]) -> ServedDrive | str:
         """Starts a drive for a goal of the action; gives a text where the goal is aborted at once.
 
         Raises:
@@ -78,7 +78,7 @@ class Nav2:
         except MapspeakError:
             return
 
-    def feedback_of(self, drive: Drive, pose: Pose) -> dict[str, Any]:
+    def feedback_of(self, drive: ServedDrive, pose: Pose) -> dict[str, Any]:
         """Gives what the action feeds back, with the robot's pose in the map."""
         now_s = self._robot.now_s
         left_m = min(drive.status.distance_left_m or 0.0, FARTHEST_M)
@@ -115,7 +115,7 @@ class Nav2:
         code = GOAL_TERMINATED if any(wanted) and not going else 0
         return {"return_code": code, "goals_canceling": [_goal_info(drive) for drive in going]}
 
-    def _tell(self, _drive: Drive) -> None:
+    def _tell(self, _drive: ServedDrive) -> None:
         """Publishes the status of all goals, when one has changed."""
         statuses = {drive: status_of(drive) for drive in self._drives.all}
         if statuses == self._statuses:
@@ -127,14 +127,14 @@ class Nav2:
         self._hub.publish(f"{ACTION}/_action/status", {"status_list": entries})
 
 
-def status_of(drive: Drive) -> int:
+def status_of(drive: ServedDrive) -> int:
     """Gives the number that action_msgs/GoalStatus has for how a drive stands."""
     if drive.is_over.is_set():
         return STATUS[drive.status.state]
     return CANCELING if drive.is_cancelling else EXECUTING
 
 
-def result_of(drive: Drive) -> dict[str, Any]:
+def result_of(drive: ServedDrive) -> dict[str, Any]:
     """Gives the action's result of a drive that has ended."""
     is_failed = drive.status.state in (GoalState.BLOCKED, GoalState.LOST)
     return {
@@ -143,12 +143,12 @@ def result_of(drive: Drive) -> dict[str, Any]:
     }
 
 
-def _goal_info(drive: Drive) -> dict[str, Any]:
+def _goal_info(drive: ServedDrive) -> dict[str, Any]:
     stamp = write_stamp(drive.started_s, dialect=Dialect.ROS2)
     return {"goal_id": _uuid_message(drive), "stamp": stamp}
 
 
-def _uuid_message(drive: Drive) -> dict[str, Any]:
+def _uuid_message(drive: ServedDrive) -> dict[str, Any]:
     return {"uuid": uuid.UUID(drive.goal_id).bytes}
 
 

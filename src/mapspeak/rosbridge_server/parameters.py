@@ -100,7 +100,7 @@ def add_parameter_services(
 ) -> None:
     """Offers for each node what every node of ROS 2 offers about its parameters."""
     for node in parameters.nodes:
-        of_node = NodeParameters(node, parameters)
+        of_node = ServedNodeParameters(node, parameters)
         answers = {
             "list_parameters": ("ListParameters", of_node.list_all),
             "get_parameters": ("GetParameters", of_node.get),
@@ -120,7 +120,7 @@ def add_parameter_services(
             )
 
 
-class NodeParameters:
+class ServedNodeParameters:
     """The answers of one node, named after its services."""
 
     def __init__(self, node: str, parameters: Parameters) -> None:

@@ -14,12 +14,12 @@ from anyio.streams.memory import MemoryObjectReceiveStream
 from mapspeak.errors import ConfigError
 from mapspeak.robot import Robot
 from mapspeak.ros.messages import Dialect
-from mapspeak.rosbridge_server.conversation import Conversation
+from mapspeak.rosbridge_server.conversation import ClientConversation
 from mapspeak.rosbridge_server.hub import Frame, fragments_of
 from mapspeak.rosbridge_server.interfaces import RosSystem
 from mapspeak.rosbridge_server.outbox import Outbox
 from mapspeak.rosbridge_server.stack import RosStack
-from mapspeak.rosbridge_server.websocket import WebSocket
+from mapspeak.rosbridge_server.websocket import ServerWebSocket
 
 LONGEST_FRAME = 10_000_000
 """rosbridge's `max_message_size`: on ROS 2 longer text is cut in pieces, longer CBOR is lost."""
@@ -114,7 +114,7 @@ class Reception:
 
     async def receive(self, stream: ByteStream) -> None:
         """Serves one client until it hangs up."""
-        socket = WebSocket(stream)
+        socket = ServerWebSocket(stream)
         try:
             if await socket.accept():
                 await self._talk(socket)
@@ -126,11 +126,11 @@ class Reception:
         finally:
             await socket.close()
 
-    async def _talk(self, socket: WebSocket) -> None:
+    async def _talk(self, socket: ServerWebSocket) -> None:
         to_do, done = anyio.create_memory_object_stream[str | bytes](MOST_OPERATIONS)
         async with to_do, done, anyio.create_task_group() as tasks:
             outbox = Outbox(tasks.cancel_scope.cancel)
-            conversation = Conversation(self._stack, outbox, tasks, blocks=self._blocks)
+            conversation = ClientConversation(self._stack, outbox, tasks, blocks=self._blocks)
             try:
                 tasks.start_soon(self._write, socket, outbox, conversation)
                 tasks.start_soon(_carry_out_all, conversation, done)
@@ -142,7 +142,9 @@ class Reception:
                 conversation.close()
                 tasks.cancel_scope.cancel()
 
-    async def _write(self, socket: WebSocket, outbox: Outbox, conversation: Conversation) -> None:
+    async def _write(
+        self, socket: ServerWebSocket, outbox: Outbox, conversation: ClientConversation
+    ) -> None:
         try:
             while True:
                 for item in await outbox.take():
@@ -152,7 +154,7 @@ class Reception:
         except (anyio.BrokenResourceError, anyio.ClosedResourceError):
             return
 
-    def _pieces(self, frame: Frame | None, conversation: Conversation) -> list[Frame]:
+    def _pieces(self, frame: Frame | None, conversation: ClientConversation) -> list[Frame]:
         """Cuts a long text up as rosbridge does; long CBOR is silently lost on ROS 2."""
         if frame is None:
             return []
@@ -167,7 +169,7 @@ class Reception:
 
 
 async def _carry_out_all(
-    conversation: Conversation, operations: MemoryObjectReceiveStream[str | bytes]
+    conversation: ClientConversation, operations: MemoryObjectReceiveStream[str | bytes]
 ) -> None:
     async for operation in operations:
         try:

@@ -17,7 +17,7 @@ HANDSHAKE_TIMEOUT_S = 10.0
 CLOSING_TIMEOUT_S = 1.0
 
 
-class WebSocket:
+class ServerWebSocket:
     """The server's end of one connection."""
 
     def __init__(self, stream: ByteStream) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from mapspeak.errors import ConfigError, PolicyError, say_cause
-from mapspeak.safety.commands import Command, Drive, say_command
+from mapspeak.safety.commands import Command, DriveCommand, say_command
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -212,7 +212,7 @@ def read_audit(path: Path) -> Iterator[AuditLine]:
 
 
 def _details(command: Command) -> dict[str, Any]:
-    if isinstance(command, Drive):
+    if isinstance(command, DriveCommand):
         goal = command.goal
         return {
             "x": _as_json(goal.x),

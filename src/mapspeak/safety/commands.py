@@ -17,7 +17,7 @@ MOST_SHOWN = 200
 Message = Mapping[str, Any]
 
 
-class Kind(StrEnum):
+class CommandKind(StrEnum):
     """The kinds of commands, as policy and audit name them."""
 
     DRIVE = "drive"
@@ -28,7 +28,7 @@ class Kind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Drive:
+class DriveCommand:
     """Drives somewhere by the robot's own navigation.
 
     Attributes:
@@ -38,7 +38,7 @@ class Drive:
 
     goal: Pose
     check: GoalCheck
-    kind = Kind.DRIVE
+    kind = CommandKind.DRIVE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +54,7 @@ class Publish:
     topic: str
     type: str
     message: Message
-    kind = Kind.PUBLISH
+    kind = CommandKind.PUBLISH
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +70,7 @@ class Call:
     service: str
     type: str
     arguments: Message
-    kind = Kind.CALL
+    kind = CommandKind.CALL
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,7 +88,7 @@ class Act:
     type: str
     goal: Message
     true_type: str = ""
-    kind = Kind.ACT
+    kind = CommandKind.ACT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,7 +104,7 @@ class SetParameter:
     node: str
     name: str
     value: Any
-    kind = Kind.SET_PARAMETER
+    kind = CommandKind.SET_PARAMETER
 
     @property
     def full_name(self) -> str:
@@ -112,13 +112,13 @@ class SetParameter:
         return f"{self.node}:{self.name}" if self.node else self.name
 
 
-Command = Drive | Publish | Call | Act | SetParameter
+Command = DriveCommand | Publish | Call | Act | SetParameter
 
 
 def say_command(command: Command) -> str:
     """Gives a command in words."""
     match command:
-        case Drive(goal=goal):
+        case DriveCommand(goal=goal):
             return f"drive to ({goal.x:.2f}, {goal.y:.2f}), yaw {goal.yaw_deg:.0f} deg"
         case Publish():
             return f"publish {command.type or 'anything'} on {command.topic}"
@@ -149,7 +149,7 @@ def _in_brackets(text: str) -> str:
 
 def is_same(one: Command, other: Command) -> bool:
     """True when what was approved of one holds for the other."""
-    if isinstance(one, Drive) and isinstance(other, Drive):
+    if isinstance(one, DriveCommand) and isinstance(other, DriveCommand):
         turned_rad = wrap_angle(one.goal.yaw_rad - other.goal.yaw_rad)
         is_near = one.goal.point.distance_to(other.goal.point) <= SAME_GOAL_M
         return is_near and abs(turned_rad) <= SAME_GOAL_RAD

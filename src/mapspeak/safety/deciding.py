@@ -14,7 +14,7 @@ from mapspeak.safety.commands import (
     Act,
     Call,
     Command,
-    Drive,
+    DriveCommand,
     Publish,
     SetParameter,
     say_command,
@@ -92,7 +92,7 @@ def decide(command: Command, *, policy: Policy, situation: Situation) -> Decisio
     refusals = (
         _against_everything(policy, situation),
         _against_name(command, policy),
-        judge_check(command.check, policy) if isinstance(command, Drive) else None,
+        judge_check(command.check, policy) if isinstance(command, DriveCommand) else None,
         _against_speed(command, policy),
         situation.objection,
         _against_rate(command, policy, situation),
@@ -128,7 +128,7 @@ def is_name_denied(command: Command, policy: Policy) -> bool:
 
 def _against_name(command: Command, policy: Policy) -> Refused | None:
     patterns = policy.patterns.get(command.kind)
-    if isinstance(command, Drive) or patterns is None:
+    if isinstance(command, DriveCommand) or patterns is None:
         return None
     name = _name_of(command)
     denial = patterns.find_denial(name, _types_of(command))

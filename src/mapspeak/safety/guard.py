@@ -11,7 +11,7 @@ from mapspeak.hold import Hold
 from mapspeak.installation import shell_command
 from mapspeak.safety.approvals import Approvals, Errand, Errands, current_errand
 from mapspeak.safety.audit import AuditLog, Caller, current_caller
-from mapspeak.safety.commands import Command, Drive, Kind
+from mapspeak.safety.commands import Command, CommandKind, DriveCommand
 from mapspeak.safety.deciding import Allowed, Decision, NeedsApproval, Refused, Situation, decide
 from mapspeak.safety.policy import Otherwise, Policy
 
@@ -23,13 +23,15 @@ class RateLog:
     """Counts commands in the last minute of robot time, whichever way its clock jumps."""
 
     def __init__(self) -> None:
-        self._times_s: dict[Kind, deque[float]] = defaultdict(lambda: deque(maxlen=MOST_KEPT))
+        self._times_s: dict[CommandKind, deque[float]] = defaultdict(
+            lambda: deque(maxlen=MOST_KEPT)
+        )
 
-    def note(self, kind: Kind, now_s: float) -> None:
+    def note(self, kind: CommandKind, now_s: float) -> None:
         """Counts a command."""
         self._times_s[kind].append(now_s)
 
-    def count(self, kind: Kind, now_s: float) -> int:
+    def count(self, kind: CommandKind, now_s: float) -> int:
         """Gives how many commands there were within a minute of now."""
         times_s = self._times_s[kind]
         while times_s and now_s - times_s[0] >= MINUTE_S:
@@ -237,7 +239,7 @@ def _say_decision(decision: Decision) -> tuple[str, str]:
 
 def _errand_of(command: Command) -> Errand | None:
     """Gives what a drive is a part of; None for one that is for itself, and for other commands."""
-    return current_errand() if isinstance(command, Drive) else None
+    return current_errand() if isinstance(command, DriveCommand) else None
 
 
 def _ask_for(errand: Errand) -> str:

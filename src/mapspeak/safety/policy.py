@@ -8,10 +8,10 @@ from datetime import datetime, time, timedelta
 from enum import StrEnum
 
 from mapspeak.geometry import Point
-from mapspeak.safety.commands import Kind
+from mapspeak.safety.commands import CommandKind
 
 USUAL_DENIALS = {
-    Kind.PUBLISH: (
+    CommandKind.PUBLISH: (
         *("*/tf", "*/tf_static", "*/clock", "*/map", "*/map_updates", "*/odom", "*/odometry*"),
         *("*/scan", "*_scan", "*/scan_*", "*/initialpose", "*/speed_limit"),
         *("*/keepout*", "*/*filter_mask", "*/*filter_info"),
@@ -19,7 +19,7 @@ USUAL_DENIALS = {
         *("*/goal_pose", "*/goal", "*/goal_update", "*/move_base_simple/*", "*/move_base/*"),
         "*/_action/*",
     ),
-    Kind.CALL: (
+    CommandKind.CALL: (
         *("*set_param*", "*delete_param*", "*shutdown*", "*change_state*", "*manage_nodes*"),
         *("*load_node", "*unload_node", "*kill*", "*/_action/*", "*set_logger_*"),
         # Where the robot is, and on which map.
@@ -31,13 +31,13 @@ USUAL_DENIALS = {
         # These end or hang the rosapi of ROS 2, and with it all questions to the robot.
         *("*/message_details", "*/service_re*_details", "*/get_param_names"),
     ),
-    Kind.ACT: (
+    CommandKind.ACT: (
         *("*navigate*", "*move_base*", "*exe_path*", "*recovery*", "*track_route*"),
         *("*follow_path*", "*follow_*waypoints*", "*follow_object*", "*wall_follow*"),
         *("*drive_on_heading*", "*drive_arc*", "*drive_distance*", "*rotate_angle*"),
         *("*backup*", "*spin*", "*dock*", "*assisted_teleop*"),
     ),
-    Kind.SET_PARAMETER: (
+    CommandKind.SET_PARAMETER: (
         *("*vel*", "*speed*", "*accel*", "*decel*", "*acc_lim*"),
         # As MPPI and the graceful controller name their limits.
         *("*[./:][va][xy]_*", "*[./:][wa]z_*", "*v_linear*", "*v_angular*"),
@@ -51,26 +51,26 @@ USUAL_DENIALS = {
 """By what things are called."""
 
 USUAL_TYPES = {
-    Kind.PUBLISH: (
+    CommandKind.PUBLISH: (
         *("tf2_msgs/TFMessage", "tf/tfMessage", "rosgraph_msgs/Clock", "nav_msgs/Odometry"),
         *("nav_msgs/OccupancyGrid", "map_msgs/*", "geometry_msgs/PoseWithCovarianceStamped"),
         *("sensor_msgs/LaserScan", "sensor_msgs/MultiEchoLaserScan", "sensor_msgs/PointCloud*"),
         *("sensor_msgs/Range", "nav2_msgs/SpeedLimit", "nav2_msgs/Costmap*"),
     ),
-    Kind.CALL: (
+    CommandKind.CALL: (
         *("nav2_msgs/SetInitialPose", "nav2_msgs/LoadMap", "nav_msgs/LoadMap", "nav_msgs/SetMap"),
         *("nav2_msgs/Toggle", "nav2_msgs/ManageLifecycleNodes", "lifecycle_msgs/ChangeState"),
         *("slam_toolbox/DeserializePoseGraph", "robot_localization/Set*"),
         *("rcl_interfaces/SetParameters*", "dynamic_reconfigure/Reconfigure"),
         *("composition_interfaces/LoadNode", "composition_interfaces/UnloadNode"),
     ),
-    Kind.ACT: (
+    CommandKind.ACT: (
         *("*/Navigate*", "*/MoveBase*", "*/ExePath", "*/Recovery", "*/ComputeAndTrackRoute"),
         *("*/FollowPath", "*/FollowWaypoints", "*/FollowGPSWaypoints", "*/FollowObject"),
         *("*/Spin", "*/BackUp", "*/DriveOnHeading", "*/AssistedTeleop", "*/Dock*", "*/Undock*"),
         *("*/DriveArc", "*/DriveDistance", "*/RotateAngle", "*/WallFollow"),
     ),
-    Kind.SET_PARAMETER: (),
+    CommandKind.SET_PARAMETER: (),
 }
 """By what the robot says they are, whatever they are called."""
 
@@ -213,28 +213,28 @@ class Approval:
         otherwise: What becomes of them where the client cannot ask.
     """
 
-    kinds: frozenset[Kind] = frozenset()
+    kinds: frozenset[CommandKind] = frozenset()
     otherwise: Otherwise = Otherwise.REFUSE
 
 
 USUAL_RATES = {
-    Kind.DRIVE: 60,
-    Kind.PUBLISH: 1200,
-    Kind.CALL: 120,
-    Kind.ACT: 60,
-    Kind.SET_PARAMETER: 30,
+    CommandKind.DRIVE: 60,
+    CommandKind.PUBLISH: 1200,
+    CommandKind.CALL: 120,
+    CommandKind.ACT: 60,
+    CommandKind.SET_PARAMETER: 30,
 }
 RATE_KEYS = {
-    Kind.DRIVE: "drives_per_minute",
-    Kind.PUBLISH: "publishes_per_minute",
-    Kind.CALL: "calls_per_minute",
-    Kind.ACT: "actions_per_minute",
-    Kind.SET_PARAMETER: "parameters_per_minute",
+    CommandKind.DRIVE: "drives_per_minute",
+    CommandKind.PUBLISH: "publishes_per_minute",
+    CommandKind.CALL: "calls_per_minute",
+    CommandKind.ACT: "actions_per_minute",
+    CommandKind.SET_PARAMETER: "parameters_per_minute",
 }
 """What policy.yaml calls them."""
 
 
-def _usual_patterns() -> dict[Kind, Patterns]:
+def _usual_patterns() -> dict[CommandKind, Patterns]:
     return {
         kind: Patterns(usual=usual, usual_types=USUAL_TYPES[kind])
         for kind, usual in USUAL_DENIALS.items()
@@ -267,9 +267,9 @@ class Policy:
     clearance_m: float = 0.0
     farthest_m: float = 500.0
     areas: tuple[AreaRule, ...] = ()
-    patterns: dict[Kind, Patterns] = field(default_factory=_usual_patterns)
+    patterns: dict[CommandKind, Patterns] = field(default_factory=_usual_patterns)
     approval: Approval = Approval()
-    rates: dict[Kind, int] = field(default_factory=lambda: dict(USUAL_RATES))
+    rates: dict[CommandKind, int] = field(default_factory=lambda: dict(USUAL_RATES))
 
 
 def _full(name: str) -> str:

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationInf
 
 from mapspeak.errors import MapError
 from mapspeak.geometry import Point, Pose
-from mapspeak.safety.commands import Kind
+from mapspeak.safety.commands import CommandKind
 from mapspeak.safety.policy import (
     DAYS,
     RATE_KEYS,
@@ -192,7 +192,7 @@ class _WrittenPatterns(_Written):
     deny: list[_Pattern] = []
     usual_denials: bool = True
 
-    def patterns(self, kind: Kind) -> Patterns:
+    def patterns(self, kind: CommandKind) -> Patterns:
         return Patterns(
             allow=tuple(self.allow),
             deny=tuple(self.deny),
@@ -211,24 +211,24 @@ class _WrittenApproval(_Written):
 
     def approval(self) -> Approval:
         asked = {
-            Kind.DRIVE: self.drives,
-            Kind.PUBLISH: self.publishes,
-            Kind.CALL: self.calls,
-            Kind.ACT: self.actions,
-            Kind.SET_PARAMETER: self.parameters,
+            CommandKind.DRIVE: self.drives,
+            CommandKind.PUBLISH: self.publishes,
+            CommandKind.CALL: self.calls,
+            CommandKind.ACT: self.actions,
+            CommandKind.SET_PARAMETER: self.parameters,
         }
         kinds = frozenset(kind for kind, is_asked in asked.items() if is_asked)
         return Approval(kinds=kinds, otherwise=Otherwise(self.otherwise))
 
 
 class _WrittenRates(_Written):
-    drives_per_minute: _PerMinute = USUAL_RATES[Kind.DRIVE]
-    publishes_per_minute: _PerMinute = USUAL_RATES[Kind.PUBLISH]
-    calls_per_minute: _PerMinute = USUAL_RATES[Kind.CALL]
-    actions_per_minute: _PerMinute = USUAL_RATES[Kind.ACT]
-    parameters_per_minute: _PerMinute = USUAL_RATES[Kind.SET_PARAMETER]
+    drives_per_minute: _PerMinute = USUAL_RATES[CommandKind.DRIVE]
+    publishes_per_minute: _PerMinute = USUAL_RATES[CommandKind.PUBLISH]
+    calls_per_minute: _PerMinute = USUAL_RATES[CommandKind.CALL]
+    actions_per_minute: _PerMinute = USUAL_RATES[CommandKind.ACT]
+    parameters_per_minute: _PerMinute = USUAL_RATES[CommandKind.SET_PARAMETER]
 
-    def rates(self) -> dict[Kind, int]:
+    def rates(self) -> dict[CommandKind, int]:
         return {kind: getattr(self, key) for kind, key in RATE_KEYS.items()}
 
 
@@ -261,10 +261,10 @@ class _PolicyFile(_Written):
                 *(area.rule(area.hours()) for area in self.closed),
             ),
             patterns={
-                Kind.PUBLISH: self.publish.patterns(Kind.PUBLISH),
-                Kind.CALL: self.call.patterns(Kind.CALL),
-                Kind.ACT: self.act.patterns(Kind.ACT),
-                Kind.SET_PARAMETER: self.set_parameter.patterns(Kind.SET_PARAMETER),
+                CommandKind.PUBLISH: self.publish.patterns(CommandKind.PUBLISH),
+                CommandKind.CALL: self.call.patterns(CommandKind.CALL),
+                CommandKind.ACT: self.act.patterns(CommandKind.ACT),
+                CommandKind.SET_PARAMETER: self.set_parameter.patterns(CommandKind.SET_PARAMETER),
             },
             approval=self.approval.approval(),
             rates=self.rates.rates(),

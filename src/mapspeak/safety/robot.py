@@ -20,7 +20,7 @@ from mapspeak.robot import (
     StampedPose,
 )
 from mapspeak.safety.audit import NOBODY, current_caller
-from mapspeak.safety.commands import Drive, say_command
+from mapspeak.safety.commands import DriveCommand, say_command
 from mapspeak.safety.detours import GuardedDrive
 from mapspeak.safety.guard import Guard, Permit
 from mapspeak.safety.holding import HoldKeeper, StandingCheck
@@ -135,7 +135,7 @@ class GuardedRobot:
         """
         n_stops = self._n_stops
         plan = await self.planner.plan(goal)
-        permit = self._guard.clear(Drive(goal=goal, check=plan.check), robot_s=self.now_s)
+        permit = self._guard.clear(DriveCommand(goal=goal, check=plan.check), robot_s=self.now_s)
         if n_stops != self._n_stops:
             raise self._overtaken(permit)
         try:

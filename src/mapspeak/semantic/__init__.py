@@ -19,7 +19,7 @@ from mapspeak.semantic.merging import (
     noted_at,
     seen_from,
 )
-from mapspeak.semantic.pictures import PictureBook, Reading, TakenPicture
+from mapspeak.semantic.pictures import PictureBook, PictureReading, TakenPicture
 from mapspeak.semantic.waypoint import Confidence, Landmark, SemanticMap, Waypoint, name_key
 
 __all__ = [
@@ -33,7 +33,7 @@ __all__ = [
     "Merge",
     "Objection",
     "PictureBook",
-    "Reading",
+    "PictureReading",
     "Reunion",
     "SemanticMap",
     "SemanticMapStore",

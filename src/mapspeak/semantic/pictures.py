@@ -17,7 +17,7 @@ BESIDE_RAD = math.radians(10.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reading:
+class PictureReading:
     """How far the robot's own sensors measured something in a picture to be.
 
     Attributes:
@@ -57,7 +57,7 @@ class TakenPicture:
     width_px: int
     horizontal_fov_rad: float | None
     recorded_at: datetime | None = None
-    readings: tuple[Reading, ...] = ()
+    readings: tuple[PictureReading, ...] = ()
     laser: LaserRing | None = None
     reported: tuple[str, ...] | None = None
 
@@ -122,7 +122,7 @@ class PictureBook:
         horizontal_fov_rad: float | None,
         name: str | None = None,
         recorded_at: datetime | None = None,
-        readings: tuple[Reading, ...] = (),
+        readings: tuple[PictureReading, ...] = (),
         laser: LaserRing | None = None,
         reported: tuple[str, ...] | None = None,
     ) -> TakenPicture:

@@ -29,7 +29,7 @@ from mapspeak.server.prompts import add_prompts
 from mapspeak.server.text.errors import say_error
 from mapspeak.server.text.visible import show_controls, show_controls_of
 from mapspeak.server.tools.asking import Asking
-from mapspeak.server.tools.toolset import Effect, Tool, lean_input, lean_output
+from mapspeak.server.tools.toolset import Tool, ToolEffect, lean_input, lean_output
 from mapspeak.server.toolsets import build_toolsets
 from mapspeak.session import Session
 
@@ -159,7 +159,7 @@ class MapspeakServer(MCPServer[Any]):
         self._arguments[tool.name] = tool.arguments
         self._numbers[tool.name] = tool.numbers
         self._former[tool.name] = tool.former
-        if tool.effect is Effect.REMEMBERS:
+        if tool.effect is ToolEffect.REMEMBERS:
             self._remembering.add(tool.name)
         self.add_tool(
             tool.function,
@@ -261,7 +261,7 @@ def build_server(
     chosen = choose_tools(known, toolsets=toolsets, tools=tools, is_read_only=is_read_only)
     names = {tool.name for group in known.values() for tool in group}
     offered = {tool.name for tool in chosen}
-    moves = any(tool.effect is Effect.MOVES for tool in chosen)
+    moves = any(tool.effect is ToolEffect.MOVES for tool in chosen)
     instructions = write_instructions(offered, known=names, moves=moves)
     server = MapspeakServer(
         session, instructions=instructions, call_log=call_log, missing=names - offered
@@ -292,9 +292,9 @@ def choose_tools(
         for toolset, group in known.items()
         for tool in group
         if (toolset in chosen_sets or tool.name in chosen_tools)
-        and (not is_read_only or tool.effect in (Effect.READS, Effect.STOPS))
+        and (not is_read_only or tool.effect in (ToolEffect.READS, ToolEffect.STOPS))
     ]
-    if any(tool.effect is Effect.MOVES for tool in chosen) and STOP not in {
+    if any(tool.effect is ToolEffect.MOVES for tool in chosen) and STOP not in {
         tool.name for tool in chosen
     }:
         # Whoever can start the robot can stop it.

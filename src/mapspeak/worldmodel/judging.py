@@ -3,7 +3,7 @@
 from collections import defaultdict
 from collections.abc import Iterable
 
-from mapspeak.semantic.consistency import Finding, Trust, judge_trust
+from mapspeak.semantic.consistency import MemoryFinding, Trust, judge_trust
 from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
 
 
@@ -17,7 +17,7 @@ class Judge:
         findings: The same, in their order.
     """
 
-    def __init__(self, findings: Iterable[Finding]) -> None:
+    def __init__(self, findings: Iterable[MemoryFinding]) -> None:
         self.findings = tuple(findings)
         # By identity: findings hold the very things, and comparing those as values is slow.
         self._of_thing: dict[int, list[int]] = defaultdict(list)

@@ -20,7 +20,7 @@ from mapspeak.ros.discovery import PoseSource, RobotOverrides, RosSettings
 from mapspeak.ros.messages import Dialect, write_header, write_pose
 from mapspeak.ros.robot import RosRobot
 from mapspeak.ros.robot.driving import DrivingPatience
-from mapspeak.ros.robot.maps import MapKeeper
+from mapspeak.ros.robot.maps import MapSubscriber
 from mapspeak.ros.robot.poses import PoseKeeper, RobotClock
 from rosbridge_robot import (
     ABORTED,
@@ -85,7 +85,7 @@ async def test_a_map_that_does_not_come_is_asked_for_again_and_at_last_as_json(
     scripted.latched["/map"] = scripted.map_message(grid_from_text(ROOM))
     scripted.n_silent["/map"] = n_silent
     async with connected(scripted) as robot:
-        maps = MapKeeper(robot.connection, robot.profile, waits_s=waits_after(n_silent))
+        maps = MapSubscriber(robot.connection, robot.profile, waits_s=waits_after(n_silent))
         assert (await maps.fetch()).n_cols == 4
     encodings = [each["compression"] for each in subscriptions(scripted, "/map")]
     assert encodings == ["cbor", "cbor", "none"][: n_silent + 1]
@@ -94,7 +94,7 @@ async def test_a_map_that_does_not_come_is_asked_for_again_and_at_last_as_json(
 async def test_a_map_that_never_comes_is_said_and_may_come_later() -> None:
     scripted = ScriptedRobot()
     async with connected(scripted) as robot:
-        maps = MapKeeper(robot.connection, robot.profile, waits_s=(0.01,))
+        maps = MapSubscriber(robot.connection, robot.profile, waits_s=(0.01,))
         with pytest.raises(LinkError, match="No map has come on /map yet"):
             await maps.fetch()
         await scripted.publish("/map", scripted.map_message(grid_from_text(ROOM)))
@@ -111,7 +111,7 @@ async def test_a_map_that_never_comes_is_said_and_may_come_later() -> None:
 async def test_asking_again_for_a_map_that_takes_long_does_not_begin_it_anew() -> None:
     scripted = ScriptedRobot()
     async with connected(scripted) as robot:
-        maps = MapKeeper(robot.connection, robot.profile, waits_s=(0.01, 0.01, 0.01))
+        maps = MapSubscriber(robot.connection, robot.profile, waits_s=(0.01, 0.01, 0.01))
         for _ in range(3):
             with pytest.raises(LinkError, match="ask again"):
                 await maps.fetch()

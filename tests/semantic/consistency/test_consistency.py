@@ -4,7 +4,7 @@ from dataclasses import replace
 from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose
 from mapspeak.semantic import Landmark, SemanticMap, Waypoint
-from mapspeak.semantic.consistency import Finding, FindingKind, check_memory, judge_trust
+from mapspeak.semantic.consistency import FindingKind, MemoryFinding, check_memory, judge_trust
 from mapspeak.semantic.things import Things, find_things
 from mapspeak.spatial.paths import distances_from
 from mapspeak.spatial.rooms import find_rooms
@@ -48,7 +48,7 @@ def mark(label: str, bearing_deg: float = 0.0, range_m: float | None = None) -> 
     return Landmark(label=label, bearing_rad=math.radians(bearing_deg), range_m=range_m)
 
 
-def check(*places: Waypoint, map_id: str | None = None) -> tuple[Things, tuple[Finding, ...]]:
+def check(*places: Waypoint, map_id: str | None = None) -> tuple[Things, tuple[MemoryFinding, ...]]:
     memory = SemanticMap(waypoints=places)
     found = find_things(memory, GRID)
     distances = distances_from(GRID, Point(1.0, 1.0), radius_m=0.2)
@@ -240,7 +240,7 @@ def test_a_thing_seen_through_two_doors_in_a_row_is_no_finding() -> None:
     assert last is not None
     assert first.id != last.id
 
-    def wrong_rooms(*places: Waypoint) -> list[Finding]:
+    def wrong_rooms(*places: Waypoint) -> list[MemoryFinding]:
         memory = SemanticMap(waypoints=places)
         findings = check_memory(memory, find_things(memory, grid), rooms=rooms)
         return [each for each in findings if each.kind is FindingKind.WRONG_ROOM]

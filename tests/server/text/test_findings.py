@@ -5,7 +5,7 @@ import pytest
 
 from mapspeak.geometry import Point
 from mapspeak.semantic import Landmark
-from mapspeak.semantic.consistency import Finding, FindingKind, Trust
+from mapspeak.semantic.consistency import FindingKind, MemoryFinding, Trust
 from mapspeak.semantic.things import Thing, View
 from mapspeak.semantic.things.thing import Category
 from mapspeak.server.text.findings import say_conflict, say_finding, say_support, say_trust
@@ -30,7 +30,7 @@ SINK = Thing(
     n_agreeing=1,
 )
 STOVE = replace(SINK, label="stove", supporting=(VIEW, replace(VIEW, waypoint="b")))
-FINDING = Finding(kind=FindingKind.OFF_MAP, waypoints=("a",), at=Point(9.0, 1.0))
+FINDING = MemoryFinding(kind=FindingKind.OFF_MAP, waypoints=("a",), at=Point(9.0, 1.0))
 
 
 @pytest.mark.parametrize(
@@ -86,9 +86,9 @@ FINDING = Finding(kind=FindingKind.OFF_MAP, waypoints=("a",), at=Point(9.0, 1.0)
             ),
         ),
     ],
-    ids=lambda each: each.kind if isinstance(each, Finding) else "",
+    ids=lambda each: each.kind if isinstance(each, MemoryFinding) else "",
 )
-def test_a_finding_is_a_sentence_with_its_numbers(finding: Finding, said: str) -> None:
+def test_a_finding_is_a_sentence_with_its_numbers(finding: MemoryFinding, said: str) -> None:
     assert say_finding(finding) == said
 
 

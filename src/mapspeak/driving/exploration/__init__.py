@@ -10,9 +10,9 @@ from mapspeak.driving.exploration.progress import (
 )
 from mapspeak.driving.exploration.trips import (
     OnTrip,
-    Site,
     Target,
     Trip,
+    TripContext,
     Trips,
     TripState,
     spread_headings,
@@ -29,9 +29,9 @@ __all__ = [
     "OnTrip",
     "Pick",
     "Progress",
-    "Site",
     "Target",
     "Trip",
+    "TripContext",
     "TripEnd",
     "TripState",
     "Trips",

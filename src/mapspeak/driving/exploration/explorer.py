@@ -17,7 +17,7 @@ from mapspeak.driving.exploration.progress import (
     known_area_m2,
     known_ratio,
 )
-from mapspeak.driving.exploration.trips import OnTrip, Site, Target, Trips, TripState
+from mapspeak.driving.exploration.trips import OnTrip, Target, TripContext, Trips, TripState
 from mapspeak.errors import PolicyError
 from mapspeak.geometry import Point
 from mapspeak.spatial.frontiers import Frontier, remaining_ratio
@@ -54,7 +54,7 @@ class Explorer:
         pick: Chooses among frontiers; the first of the ranking unless told otherwise.
     """
 
-    def __init__(self, site: Site, *, pick: Pick = take_first) -> None:
+    def __init__(self, site: TripContext, *, pick: Pick = take_first) -> None:
         self._site = site
         self._pick = pick
         self._trips = Trips(site)

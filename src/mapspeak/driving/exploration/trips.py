@@ -21,7 +21,7 @@ from mapspeak.worldmodel.model import Atlas
 T = TypeVar("T")
 
 
-class Site(Protocol):
+class TripContext(Protocol):
     """A robot, its drives, and the map as it is now; a session is one."""
 
     @property
@@ -44,7 +44,7 @@ class Site(Protocol):
 
 
 async def turn_to(
-    site: Site, yaw_rad: float, *, wait_s: float, on_progress: OnProgress, client: str = ""
+    site: TripContext, yaw_rad: float, *, wait_s: float, on_progress: OnProgress, client: str = ""
 ) -> DriveReport:
     """Turns the robot where it stands, and gives how that went.
 
@@ -128,7 +128,7 @@ class Trips:
         end: Why the latest trip ended before its target; None when it did not.
     """
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, site: TripContext) -> None:
         self._site = site
         self.current: Trip | None = None
         self.blocked = BlockedPlaces()

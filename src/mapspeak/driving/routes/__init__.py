@@ -4,19 +4,19 @@ from mapspeak.driving.routes.following import (
     RouteBook,
     RouteProgress,
     RouteState,
-    Stop,
+    RouteStop,
     StopState,
     WhenBlocked,
 )
-from mapspeak.driving.routes.planning import Candidate, RoutePlan, find_candidates, plan_route
+from mapspeak.driving.routes.planning import RoutePlan, StopCandidate, find_candidates, plan_route
 
 __all__ = [
-    "Candidate",
     "RouteBook",
     "RoutePlan",
     "RouteProgress",
     "RouteState",
-    "Stop",
+    "RouteStop",
+    "StopCandidate",
     "StopState",
     "WhenBlocked",
     "find_candidates",

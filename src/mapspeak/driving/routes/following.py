@@ -12,8 +12,8 @@ import anyio
 
 from mapspeak.driving.drive import OnProgress
 from mapspeak.driving.drivereport import DriveReport
-from mapspeak.driving.exploration import Site
-from mapspeak.driving.routes.planning import Candidate, RoutePlan, plan_route
+from mapspeak.driving.exploration import TripContext
+from mapspeak.driving.routes.planning import RoutePlan, StopCandidate, plan_route
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose
 from mapspeak.places.goalcheck import GoalCheck, check_goal
@@ -51,7 +51,7 @@ class WhenBlocked(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stop:
+class RouteStop:
     """One stop of a route.
 
     Attributes:
@@ -64,7 +64,7 @@ class Stop:
     """
 
     words: str
-    goal: Candidate
+    goal: StopCandidate
     leg_m: float
     state: StopState = StopState.AHEAD
     obstacle: GoalCheck | GoalStatus | None = None
@@ -88,7 +88,7 @@ class RouteProgress:
 
     state: RouteState
     plan: RoutePlan
-    stops: tuple[Stop, ...]
+    stops: tuple[RouteStop, ...]
     pose: Pose
     pose_doubt: PoseDoubt | None
     left_m: float | None = None
@@ -104,10 +104,10 @@ class RouteBook:
         site: The robot, its drives and its map.
     """
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, site: TripContext) -> None:
         self._site = site
         self._plan: RoutePlan | None = None
-        self._stops: list[Stop] = []
+        self._stops: list[RouteStop] = []
         self._goal_id: str | None = None
         self._pause_until_s: float | None = None
         self._pause_s = 0.0
@@ -131,7 +131,7 @@ class RouteBook:
             await self._give_up()
             self._plan = plan
             self._stops = [
-                Stop(words=words, goal=goal, leg_m=leg_m)
+                RouteStop(words=words, goal=goal, leg_m=leg_m)
                 for words, goal, leg_m in zip(plan.stops, plan.chosen, plan.legs_m, strict=True)
             ]
             self._pause_s, self._is_looking, self._pause_until_s = pause_s, is_looking, None
@@ -285,7 +285,7 @@ class RouteBook:
         )
 
 
-def _check(atlas: Atlas, goal: Candidate) -> tuple[Pose, GoalCheck]:
+def _check(atlas: Atlas, goal: StopCandidate) -> tuple[Pose, GoalCheck]:
     """Gives the pose for a stop as the robot comes to it from where it is, and judges it."""
     pose = arrival_pose(atlas, goal.pose.point) if goal.comes_straight_on else goal.pose
     return pose, check_goal(atlas.grid, atlas.distances, pose)

@@ -21,7 +21,7 @@ SAME_SAID_RATIO = 0.9
 
 
 @dataclass(frozen=True, slots=True)
-class Candidate:
+class StopCandidate:
     """One thing that a stop may mean, where the robot can stand.
 
     Attributes:
@@ -38,7 +38,7 @@ class Candidate:
     comes_straight_on: bool = False
 
 
-def find_candidates(atlas: Atlas, words: str) -> tuple[Candidate, ...]:
+def find_candidates(atlas: Atlas, words: str) -> tuple[StopCandidate, ...]:
     """Finds all that words may mean and the robot can get to.
 
     Raises:
@@ -56,8 +56,8 @@ def find_candidates(atlas: Atlas, words: str) -> tuple[Candidate, ...]:
     return tuple(reversed(unique.values()))[:MOST_CANDIDATES]
 
 
-def _candidate_of(goal: CheckedGoal) -> Candidate:
-    return Candidate(goal.name, goal.pose, goal.title, goal.comes_straight_on)
+def _candidate_of(goal: CheckedGoal) -> StopCandidate:
+    return StopCandidate(goal.name, goal.pose, goal.title, goal.comes_straight_on)
 
 
 def _find_places(atlas: Atlas, words: str) -> list[Place]:
@@ -119,7 +119,7 @@ class RoutePlan:
     """
 
     stops: tuple[str, ...]
-    chosen: tuple[Candidate, ...]
+    chosen: tuple[StopCandidate, ...]
     n_candidates: tuple[int, ...]
     legs_m: tuple[float, ...]
     greedy_m: float
@@ -147,7 +147,7 @@ def plan_route(atlas: Atlas, stops: Sequence[str]) -> RoutePlan:
     )
 
 
-def _find(atlas: Atlas, number: int, stop: str) -> tuple[Candidate, ...]:
+def _find(atlas: Atlas, number: int, stop: str) -> tuple[StopCandidate, ...]:
     try:
         return find_candidates(atlas, stop)
     except GoalError as error:
@@ -160,7 +160,7 @@ def _find(atlas: Atlas, number: int, stop: str) -> tuple[Candidate, ...]:
 
 
 def plan_among(
-    atlas: Atlas, stops: Sequence[str], choices: Sequence[tuple[Candidate, ...]]
+    atlas: Atlas, stops: Sequence[str], choices: Sequence[tuple[StopCandidate, ...]]
 ) -> RoutePlan:
     """Plans a route past stops whose candidates are known.
 
@@ -168,7 +168,7 @@ def plan_among(
         GoalError: No way leads from one stop to the next.
     """
     legs_m = _Legs(atlas)
-    best: list[tuple[float, tuple[Candidate, ...]]] = [(0.0, ())]
+    best: list[tuple[float, tuple[StopCandidate, ...]]] = [(0.0, ())]
     for number, candidates in enumerate(choices):
         best = [
             min(
@@ -193,9 +193,9 @@ def plan_among(
 
 
 def _choose_greedily(
-    legs_m: "_Legs", choices: Sequence[tuple[Candidate, ...]]
-) -> tuple[Candidate, ...]:
-    way: tuple[Candidate, ...] = ()
+    legs_m: "_Legs", choices: Sequence[tuple[StopCandidate, ...]]
+) -> tuple[StopCandidate, ...]:
+    way: tuple[StopCandidate, ...] = ()
     for candidates in choices:
         here = way
         way = (*way, min(candidates, key=lambda each: legs_m.between(here, each)))
@@ -209,16 +209,16 @@ class _Legs:
         self._atlas = atlas
         self._fields: dict[Point, DistanceField] = {}
 
-    def between(self, way: tuple[Candidate, ...], goal: Candidate) -> float:
+    def between(self, way: tuple[StopCandidate, ...], goal: StopCandidate) -> float:
         """Gives the metres from the end of a way, the robot where it is empty, to a candidate."""
         found_m = self._field(way).distance_to(goal.pose.point)
         return math.inf if found_m is None else found_m
 
-    def along(self, way: tuple[Candidate, ...]) -> tuple[float, ...]:
+    def along(self, way: tuple[StopCandidate, ...]) -> tuple[float, ...]:
         """Gives the metres of each leg."""
         return tuple(self.between(way[:n], each) for n, each in enumerate(way))
 
-    def _field(self, way: tuple[Candidate, ...]) -> DistanceField:
+    def _field(self, way: tuple[StopCandidate, ...]) -> DistanceField:
         if not way:
             return self._atlas.distances
         start = way[-1].pose.point

@@ -53,7 +53,7 @@ class CandidateKind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Candidate:
+class SearchCandidate:
     """A place to look for the thing from.
 
     Attributes:
@@ -87,7 +87,7 @@ def find_candidates(
     opinions: Opinions,
     visited: Collection[str],
     pictures: Sequence[TakenPicture] = (),
-) -> list[Candidate]:
+) -> list[SearchCandidate]:
     """Finds where to look next, best first; what is remembered comes before all else.
 
     After that come earlier pictures in which the robot's own detector reported such a thing.
@@ -150,14 +150,14 @@ def _key(place: Place) -> str:
     return remembered.waypoint.name if isinstance(remembered, RememberedPlace) else place.name
 
 
-def _remembered(atlas: Atlas, place: Place) -> Candidate | None:
+def _remembered(atlas: Atlas, place: Place) -> SearchCandidate | None:
     """Gives where to stand for it, or the nearest pose that works; None where none does."""
     goal = check_place(atlas, place)
     pose = goal.pose if goal.check.is_ok else goal.check.nearest
     path_m = None if pose is None else atlas.path_m(pose.point)
     if pose is None or path_m is None:
         return None
-    return Candidate(
+    return SearchCandidate(
         kind=CandidateKind.REMEMBERED,
         id=place.name,
         pose=pose,
@@ -169,12 +169,12 @@ def _remembered(atlas: Atlas, place: Place) -> Candidate | None:
     )
 
 
-def _pictured(atlas: Atlas, picture: TakenPicture) -> Candidate | None:
+def _pictured(atlas: Atlas, picture: TakenPicture) -> SearchCandidate | None:
     """Gives the pose that a picture was taken in; None where the robot cannot get there now."""
     path_m = atlas.path_m(picture.pose.point)
     if path_m is None:
         return None
-    return Candidate(
+    return SearchCandidate(
         kind=CandidateKind.PICTURED,
         id=picture.id,
         pose=picture.pose,
@@ -188,7 +188,7 @@ def _pictured(atlas: Atlas, picture: TakenPicture) -> Candidate | None:
 
 def _frontiers(
     atlas: Atlas, seen: Mask, half_rad: float, opinions: Opinions, near: list[Point]
-) -> Iterator[Candidate]:
+) -> Iterator[SearchCandidate]:
     frontiers = atlas.frontiers.frontiers
     if not frontiers:
         return
@@ -210,7 +210,7 @@ def _frontiers(
 
 def _unseen(
     atlas: Atlas, seen: Mask, half_rad: float, opinions: Opinions, near: list[Point]
-) -> Iterator[Candidate]:
+) -> Iterator[SearchCandidate]:
     """Gives the best heading at each of many places from which something unseen is in view."""
     places, ways_m = _places_to_stand(atlas)
     areas_m2 = _areas_by_heading(atlas, seen, places, half_rad)
@@ -240,7 +240,7 @@ def _rated(
     opinions: Opinions,
     near: list[Point],
     frontier: Frontier | None = None,
-) -> Candidate:
+) -> SearchCandidate:
     looks_at = frontier.anchor if frontier else pose.transform(Point(REACH_M / 2, 0.0))
     own_id = frontier.id if frontier else f"({pose.x:.1f}, {pose.y:.1f})"
     # Finding rooms takes long, and nobody needs them who thinks nothing of any.
@@ -250,7 +250,7 @@ def _rated(
         score = max(score, MAY_BE_NEAR)
     turn_rad = abs(wrap_angle(pose.yaw_rad - atlas.robot.yaw_rad)) if path_m < STOP_M else 0.0
     cost_m = path_m + STOP_M + TURN_M * turn_rad / math.pi
-    return Candidate(
+    return SearchCandidate(
         kind=kind,
         id=own_id,
         pose=pose,

@@ -9,15 +9,15 @@ import numpy as np
 
 from mapspeak.driving.exploration import (
     OnTrip,
-    Site,
     Target,
+    TripContext,
     Trips,
     TripState,
     has_room_at,
 )
 from mapspeak.driving.search.candidates import (
-    Candidate,
     CandidateKind,
+    SearchCandidate,
     find_candidates,
     unseen_area_m2,
 )
@@ -33,8 +33,8 @@ from mapspeak.driving.search.seenfloor import REACH_M, SeenFloor
 from mapspeak.driving.search.standing import (
     Budget,
     BudgetKind,
+    SearchProgress,
     SearchState,
-    Standing,
     find_seen_regions,
 )
 from mapspeak.errors import PolicyError
@@ -60,7 +60,7 @@ DISMISSED_M = 1.5
 """What the detector reports this near to something that was none is none either."""
 SLACK_S = 0.01
 
-Choose = Callable[[Sequence[Candidate]], Candidate | None]
+Choose = Callable[[Sequence[SearchCandidate]], SearchCandidate | None]
 """Chooses one of several places to look from, which come best first; None for none of them."""
 
 
@@ -79,7 +79,7 @@ class Judgement:
     scores: Mapping[str, float] = field(default_factory=dict)
 
 
-def take_best(candidates: Sequence[Candidate]) -> Candidate:
+def take_best(candidates: Sequence[SearchCandidate]) -> SearchCandidate:
     """Takes the first one."""
     return candidates[0]
 
@@ -92,7 +92,7 @@ class Searcher:
         choose: Chooses where to look next; the best unless told otherwise.
     """
 
-    def __init__(self, site: Site, *, choose: Choose = take_best) -> None:
+    def __init__(self, site: TripContext, *, choose: Choose = take_best) -> None:
         self._site = site
         self._choose = choose
         self._trips = Trips(site)
@@ -112,8 +112,8 @@ class Searcher:
         self._opinions = Opinions()
         self._visited: set[str] = set()
         self._looked: Point | None = None
-        self._here: Candidate | None = None
-        self._next: tuple[Candidate, ...] = ()
+        self._here: SearchCandidate | None = None
+        self._next: tuple[SearchCandidate, ...] = ()
         self._n_looks = 0
         self._state = SearchState.DRIVING
         self._has_new_opinion = False
@@ -138,7 +138,7 @@ class Searcher:
         on_trip: OnTrip,
         client: str = "",
         earlier: Sequence[TakenPicture] = (),
-    ) -> Standing:
+    ) -> SearchProgress:
         """Searches until there is something to look at, it ends, or so much robot time has passed.
 
         Whoever gives up waiting gives up the drive: the robot comes to a stand.
@@ -181,7 +181,7 @@ class Searcher:
 
     async def _advance(
         self, judgement: Judgement, budget: Budget, wait_s: float, on_trip: OnTrip, client: str
-    ) -> Standing:
+    ) -> SearchProgress:
         self._budget, self._label = budget, None
         if judgement.is_seen:
             await self._trips.give_up()
@@ -258,7 +258,7 @@ class Searcher:
         target = Target(id=best.id, pose=best.pose, frontier=best.frontier)
         return await self._trips.set_out(target, ticket=ticket, client=client, grid=atlas.grid)
 
-    def _find_candidates(self, atlas: Atlas) -> list[Candidate]:
+    def _find_candidates(self, atlas: Atlas) -> list[SearchCandidate]:
         self._recall_company(atlas)
         found = find_candidates(
             atlas,
@@ -285,7 +285,7 @@ class Searcher:
             if (score := find_company_score(words, self._thing)) is not None:
                 self._opinions.add_company(waypoint.pose.point, score)
 
-    async def _is_pointless(self, atlas: Atlas, here: Candidate) -> bool:
+    async def _is_pointless(self, atlas: Atlas, here: SearchCandidate) -> bool:
         """True when what a place had to show was seen on the way, or it cannot be stood in."""
         if not has_room_at(atlas.grid, here.pose.point, radius_m=atlas.radius_m):
             return True
@@ -326,19 +326,19 @@ class Searcher:
             return BudgetKind.METRES
         return None
 
-    async def _end(self, state: SearchState) -> Standing:
+    async def _end(self, state: SearchState) -> SearchProgress:
         self._state = state
         atlas = await self._site.fetch_atlas()
         return await self._site.compute(lambda: self._report(atlas))
 
-    def _report(self, atlas: Atlas) -> Standing:
+    def _report(self, atlas: Atlas) -> SearchProgress:
         trip = self._trips.current
         seen = self._seen.mask_on(atlas.grid)
         earlier = self._earlier if self._is_begun_now else None
         looks_anew = self._looks_anew
         self._is_begun_now = self._looks_anew = False
         n_free = max(int(np.count_nonzero(atlas.grid.free)), 1)
-        return Standing(
+        return SearchProgress(
             state=self._state,
             budget=self._budget,
             spent=self._find_spent(),
@@ -361,7 +361,9 @@ class Searcher:
         )
 
 
-def _pick_apart(best: Candidate, others: Sequence[Candidate]) -> tuple[Candidate, ...]:
+def _pick_apart(
+    best: SearchCandidate, others: Sequence[SearchCandidate]
+) -> tuple[SearchCandidate, ...]:
     """Gives the best of some places that are not much the same as one before."""
     picked = [best]
     for each in others:
@@ -371,7 +373,7 @@ def _pick_apart(best: Candidate, others: Sequence[Candidate]) -> tuple[Candidate
     return tuple(picked[1:])
 
 
-def _rate_now(here: Candidate | None, candidates: Sequence[Candidate]) -> float:
+def _rate_now(here: SearchCandidate | None, candidates: Sequence[SearchCandidate]) -> float:
     """Gives what speaks for the place under way, as things stand now."""
     if here is None or here.name:
         return math.inf
@@ -389,7 +391,7 @@ def _place_of(detection: Detection, pose: Pose) -> Point:
     return along.transform(Point(range_m, 0.0))
 
 
-def _stands_at(atlas: Atlas, candidate: Candidate) -> bool:
+def _stands_at(atlas: Atlas, candidate: SearchCandidate) -> bool:
     turn_rad = abs(wrap_angle(candidate.pose.yaw_rad - atlas.robot.yaw_rad))
     is_near = atlas.robot.point.distance_to(candidate.pose.point) <= HERE_M
     return is_near and turn_rad <= HERE_RAD

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.driving.exploration import BlockedPlace, TripEnd
-from mapspeak.driving.search.candidates import Candidate
+from mapspeak.driving.search.candidates import SearchCandidate
 from mapspeak.driving.search.evidence import Earlier
 from mapspeak.geometry import Pose
 from mapspeak.robot import PoseDoubt
@@ -70,7 +70,7 @@ class SeenRegion:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Standing:
+class SearchProgress:
     """How a search stands.
 
     Attributes:
@@ -106,9 +106,9 @@ class Standing:
     n_looks: int
     n_earlier: int
     driven_m: float
-    here: Candidate | None
+    here: SearchCandidate | None
     goal_id: str | None
-    next: tuple[Candidate, ...]
+    next: tuple[SearchCandidate, ...]
     regions: tuple[SeenRegion, ...]
     seen_ratio: float
     blocked: tuple[BlockedPlace, ...]

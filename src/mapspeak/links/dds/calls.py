@@ -16,10 +16,10 @@ from mapspeak.links.dds.endpoints import (
     reply_topic,
     request_topic,
 )
-from mapspeak.links.dds.goals import ActionClient
-from mapspeak.links.dds.participant import Participant
+from mapspeak.links.dds.goals import DdsActionClient
+from mapspeak.links.dds.participant import DdsParticipant
 from mapspeak.links.dds.services import ServiceClient
-from mapspeak.links.dds.topics import Topics
+from mapspeak.links.dds.topics import DdsTopics
 from mapspeak.links.dds.types import Types
 from mapspeak.ros import ActionGoal
 from mapspeak.ros.goal import PursuedGoal
@@ -46,10 +46,10 @@ class Calls:
 
     def __init__(
         self,
-        participant: Participant,
+        participant: DdsParticipant,
         discovery: Discovery,
         types: Types,
-        topics: Topics,
+        topics: DdsTopics,
         *,
         learn: Learn,
         start_soon: StartSoon,
@@ -61,7 +61,7 @@ class Calls:
         self._learn = learn
         self._start_soon = start_soon
         self._services: dict[str, ServiceClient] = {}
-        self._actions: dict[str, ActionClient] = {}
+        self._actions: dict[str, DdsActionClient] = {}
         self._news = anyio.Event()
 
     async def call(
@@ -147,14 +147,16 @@ class Calls:
             )
         return self._services[service]
 
-    async def _open_action(self, action: str) -> ActionClient:
+    async def _open_action(self, action: str) -> DdsActionClient:
         send, result, cancel = [
             await self._service(_part(action, name))
             for name in ("send_goal", "get_result", "cancel_goal")
         ]
         if action in self._actions:
             return self._actions[action]
-        client = ActionClient(send=send, result=result, cancel=cancel, start_soon=self._start_soon)
+        client = DdsActionClient(
+            send=send, result=result, cancel=cancel, start_soon=self._start_soon
+        )
         self._actions[action] = client
         self.note_change(send.name.reply_topic)
         await self._learn_feedback(action)

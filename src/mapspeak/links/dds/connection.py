@@ -11,10 +11,10 @@ from mapspeak.errors import LinkError
 from mapspeak.links.dds.calls import Calls
 from mapspeak.links.dds.discovery import Discovery, FramingOf, framing_by_vendor
 from mapspeak.links.dds.endpoints import DISCOVERY_TOPIC, DISCOVERY_TYPE, Quality, Sample
-from mapspeak.links.dds.graph import GraphQuestions
+from mapspeak.links.dds.graph import DdsGraph
 from mapspeak.links.dds.network import DdsNetwork, DdsTiming
-from mapspeak.links.dds.participant import Participant
-from mapspeak.links.dds.topics import Topics
+from mapspeak.links.dds.participant import DdsParticipant
+from mapspeak.links.dds.topics import DdsTopics
 from mapspeak.links.dds.types import Types
 from mapspeak.ros import ActionGoal, LinkKind, LinkName
 from mapspeak.ros.discovery import RobotOverrides
@@ -35,7 +35,7 @@ HINT = (
 )
 
 
-class DdsConnection(GraphQuestions, NativeConnection):
+class DdsConnection(DdsGraph, NativeConnection):
     """One ROS 2 system, as a member of its DDS domain sees it.
 
     Args:
@@ -56,7 +56,7 @@ class DdsConnection(GraphQuestions, NativeConnection):
     ) -> None:
         self.network = network
         self.timing = timing
-        self._participant = Participant(network)
+        self._participant = DdsParticipant(network)
         discovery = Discovery(
             self._participant.key, on_change=self._note_change, framing_of=framing_of
         )
@@ -64,7 +64,7 @@ class DdsConnection(GraphQuestions, NativeConnection):
         NativeConnection.__init__(self)
         self._tasks: TaskGroup | None = None
         self._found_s: float | None = None
-        self._topics = Topics(
+        self._topics = DdsTopics(
             self._participant,
             self.discovery,
             self.types,
@@ -97,7 +97,7 @@ class DdsConnection(GraphQuestions, NativeConnection):
         return None if self._found_s is None else anyio.current_time() - self._found_s
 
     @property
-    def topics(self) -> Topics:
+    def topics(self) -> DdsTopics:
         """What is read and written."""
         return self._topics
 

@@ -25,7 +25,7 @@ MOST_RESULTS_HELD = 20
 StartSoon = Callable[[Callable[[], Coroutine[Any, Any, None]]], None]
 
 
-class ActionClient:
+class DdsActionClient:
     """Pursues goals of one action.
 
     Args:

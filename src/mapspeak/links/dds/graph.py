@@ -20,7 +20,7 @@ ASKED_FOR_TIME = "/get_parameter_types"
 PATIENCE_S = 2.0
 
 
-class GraphQuestions(ABC):
+class DdsGraph(ABC):
     """Answers from what was discovered, by whatever way services are called."""
 
     def __init__(self, discovery: Discovery, types: Types) -> None:

@@ -45,7 +45,7 @@ CONFIGURATION_VARIABLE = "CYCLONEDDS_URI"
 FOR_EVER_NS = 2**63 - 1
 
 
-class Participant:
+class DdsParticipant:
     """Our member of a domain.
 
     Args:

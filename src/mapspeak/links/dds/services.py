@@ -17,7 +17,7 @@ from mapspeak.errors import LinkError
 from mapspeak.links.dds.cdr import HEADER_BYTES
 from mapspeak.links.dds.discovery import Framing
 from mapspeak.links.dds.endpoints import Outlet, Quality, Sample, ServiceName
-from mapspeak.links.dds.participant import Participant
+from mapspeak.links.dds.participant import DdsParticipant
 from mapspeak.ros import new_id
 
 QUALITY = Quality(is_reliable=True, is_latched=False, depth=100)
@@ -64,7 +64,7 @@ class ServiceClient:
 
     def __init__(
         self,
-        participant: Participant,
+        participant: DdsParticipant,
         name: ServiceName,
         *,
         framing: Framing,

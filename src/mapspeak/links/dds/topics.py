@@ -11,7 +11,7 @@ import anyio
 from mapspeak.errors import LinkError
 from mapspeak.links.dds.discovery import Discovery, Endpoint
 from mapspeak.links.dds.endpoints import Inlet, Outlet, Quality, Sample, dds_topic, full_type
-from mapspeak.links.dds.participant import Participant
+from mapspeak.links.dds.participant import DdsParticipant
 from mapspeak.links.dds.types import Types
 from mapspeak.ros import TYPE
 from mapspeak.ros.messages import Message, bare_type
@@ -59,7 +59,7 @@ class _Advertised:
     outlet: Outlet
 
 
-class Topics(NativeTopics[_Request]):
+class DdsTopics(NativeTopics[_Request]):
     """Reads and writes topics of ROS.
 
     A topic is read only once somebody writes it, because how it can be read depends on who does: a
@@ -76,7 +76,7 @@ class Topics(NativeTopics[_Request]):
 
     def __init__(
         self,
-        participant: Participant,
+        participant: DdsParticipant,
         discovery: Discovery,
         types: Types,
         *,

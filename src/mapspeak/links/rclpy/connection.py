@@ -10,10 +10,10 @@ from anyio.from_thread import BlockingPortal
 
 from mapspeak.errors import LinkError
 from mapspeak.links.rclpy.goals import Goals
-from mapspeak.links.rclpy.graph import GraphQuestions
-from mapspeak.links.rclpy.participant import Participant, errors_of_ros, wait_until
-from mapspeak.links.rclpy.services import Services
-from mapspeak.links.rclpy.topics import Topics
+from mapspeak.links.rclpy.graph import RclpyGraph
+from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wait_until
+from mapspeak.links.rclpy.services import RclpyServices
+from mapspeak.links.rclpy.topics import RclpyTopics
 from mapspeak.ros import ActionGoal, LinkKind, LinkName, NodeLinks, RosGraph
 from mapspeak.ros.goal import PursuedGoal
 from mapspeak.ros.messages import Message
@@ -38,7 +38,7 @@ HINT = (
 )
 
 
-class Ros2Connection(GraphQuestions, NativeConnection):
+class Ros2Connection(RclpyGraph, NativeConnection):
     """One ROS 2 system, as our node in it sees it.
 
     Args:
@@ -47,13 +47,13 @@ class Ros2Connection(GraphQuestions, NativeConnection):
         distro: Such as "jazzy"; empty where that is unknown.
     """
 
-    def __init__(self, participant: Participant, tasks: TaskGroup, *, distro: str) -> None:
+    def __init__(self, participant: RclpyParticipant, tasks: TaskGroup, *, distro: str) -> None:
         super().__init__(participant, distro=distro)
         NativeConnection.__init__(self)
         self._tasks = tasks
         self._found_s: float | None = None
-        self._topics = Topics(participant)
-        self._services = Services(participant)
+        self._topics = RclpyTopics(participant)
+        self._services = RclpyServices(participant)
         self._goals = Goals(participant, self._services, start_soon=self.start_soon)
 
     @property
@@ -72,7 +72,7 @@ class Ros2Connection(GraphQuestions, NativeConnection):
         return None if self._found_s is None else anyio.current_time() - self._found_s
 
     @property
-    def topics(self) -> Topics:
+    def topics(self) -> RclpyTopics:
         """What is read and written."""
         return self._topics
 
@@ -141,7 +141,7 @@ class Ros2Connection(GraphQuestions, NativeConnection):
         return self._found_s is not None
 
 
-class Surroundings(Protocol):
+class RclpyContext(Protocol):
     """What can be asked of a system that is still being found."""
 
     def nodes(self) -> tuple[str, ...]:
@@ -157,7 +157,7 @@ class Surroundings(Protocol):
         ...
 
 
-async def wait_until_quiet(system: Surroundings) -> None:
+async def wait_until_quiet(system: RclpyContext) -> None:
     """Returns when nothing new comes, and no node is a mere name: what it does comes later."""
     graph, before = await system.fetch_graph(), None
     while graph != before or not await _shows_all_nodes(system):
@@ -165,7 +165,7 @@ async def wait_until_quiet(system: Surroundings) -> None:
         graph, before = await system.fetch_graph(), graph
 
 
-async def _shows_all_nodes(system: Surroundings) -> bool:
+async def _shows_all_nodes(system: RclpyContext) -> bool:
     for node in system.nodes():
         try:
             links = await system.fetch_node(node)
@@ -209,8 +209,8 @@ async def open_connection(
 @asynccontextmanager
 async def _open_participant(
     domain_id: int | None, portal: BlockingPortal, variables: Mapping[str, str]
-) -> AsyncGenerator[Participant]:
-    participant = Participant(domain_id=domain_id, portal=portal, variables=variables)
+) -> AsyncGenerator[RclpyParticipant]:
+    participant = RclpyParticipant(domain_id=domain_id, portal=portal, variables=variables)
     await participant.start()
     try:
         yield participant

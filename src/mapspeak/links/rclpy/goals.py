@@ -13,8 +13,8 @@ import anyio
 
 from mapspeak.errors import LinkError
 from mapspeak.links.rclpy.messages import read_message, write_message
-from mapspeak.links.rclpy.participant import Participant, errors_of_ros
-from mapspeak.links.rclpy.services import SERVER_S, Client, Services
+from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros
+from mapspeak.links.rclpy.services import SERVER_S, Client, RclpyServices
 from mapspeak.links.rclpy.types import find_action, name_of
 from mapspeak.ros import ActionEnd, ActionGoal, new_id
 from mapspeak.ros.goal import PursuedGoal
@@ -69,7 +69,7 @@ class Goals:
     """
 
     def __init__(
-        self, participant: Participant, services: Services, *, start_soon: StartSoon
+        self, participant: RclpyParticipant, services: RclpyServices, *, start_soon: StartSoon
     ) -> None:
         self._participant = participant
         self._services = services

@@ -8,7 +8,7 @@ import numpy as np
 from rclpy.exceptions import NameValidationException
 
 from mapspeak.errors import LinkError
-from mapspeak.links.rclpy.participant import Participant
+from mapspeak.links.rclpy.participant import RclpyParticipant
 from mapspeak.links.rclpy.types import find_definitions
 from mapspeak.ros import NodeLinks, RosGraph
 from mapspeak.ros.messages import Dialect, bare_type
@@ -21,7 +21,7 @@ SEND_GOAL = "/_action/send_goal"
 NANOSECONDS = 1_000_000_000
 
 
-class GraphQuestions(ABC):
+class RclpyGraph(ABC):
     """Answers from what our node has discovered, and services of the nodes.
 
     Args:
@@ -29,7 +29,7 @@ class GraphQuestions(ABC):
         distro: Such as "jazzy"; empty where that is unknown.
     """
 
-    def __init__(self, participant: Participant, *, distro: str) -> None:
+    def __init__(self, participant: RclpyParticipant, *, distro: str) -> None:
         self._participant = participant
         self._distro = distro
         self._parameters = NodeParameters(self)

@@ -34,7 +34,7 @@ ERRORS = (RuntimeError, OverflowError, NameValidationException, NoTypeSupportImp
 """What rclpy raises; what ROS's own library says is a RuntimeError."""
 
 
-class Participant:
+class RclpyParticipant:
     """A node, in a context of its own, whose callbacks a thread of its own runs.
 
     Args:

@@ -7,7 +7,7 @@ import anyio
 
 from mapspeak.errors import LinkError
 from mapspeak.links.rclpy.messages import read_message, write_message
-from mapspeak.links.rclpy.participant import Participant, errors_of_ros, wait_until
+from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wait_until
 from mapspeak.links.rclpy.types import find_service
 from mapspeak.ros.messages import bare_type
 from mapspeak.ros.native import check_name, wrong_type
@@ -18,14 +18,14 @@ SERVER_S = 2.0
 Client = Any  # rclpy has no types
 
 
-class Services:
+class RclpyServices:
     """Calls services; a call that is not answered in time is forgotten.
 
     Args:
         participant: Ours.
     """
 
-    def __init__(self, participant: Participant) -> None:
+    def __init__(self, participant: RclpyParticipant) -> None:
         self._participant = participant
         self._clients: dict[str, Client] = {}
 

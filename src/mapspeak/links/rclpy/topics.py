@@ -12,7 +12,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from mapspeak.errors import LinkError
 from mapspeak.links.rclpy.messages import read_message, write_message
-from mapspeak.links.rclpy.participant import Participant, errors_of_ros, wait_until
+from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wait_until
 from mapspeak.links.rclpy.types import find_message
 from mapspeak.ros.messages import Message, bare_type
 from mapspeak.ros.native import NativeTopics, check_name, wrong_type
@@ -58,7 +58,7 @@ class _Advertised:
     made_s: float
 
 
-class Topics(NativeTopics[_Request]):
+class RclpyTopics(NativeTopics[_Request]):
     """Reads and writes topics of ROS.
 
     A topic is read only once somebody writes it, because how it can be read depends on who does: a
@@ -69,7 +69,7 @@ class Topics(NativeTopics[_Request]):
         participant: Ours.
     """
 
-    def __init__(self, participant: Participant) -> None:
+    def __init__(self, participant: RclpyParticipant) -> None:
         super().__init__()
         self._participant = participant
         self._advertised: dict[str, _Advertised] = {}

@@ -10,7 +10,7 @@ from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge.address import RobotAddress, Timing
-from mapspeak.links.rosbridge.connection import Connection
+from mapspeak.links.rosbridge.connection import SocketConnection
 from mapspeak.links.rosbridge.protocol import Event, ServiceAnswered, authenticate
 from mapspeak.links.rosbridge.websocket import open_websocket
 
@@ -44,7 +44,7 @@ class Channel:
         self._on_loss = on_loss
         self._timing = timing
         self._standing: dict[str, bytes] = {}
-        self._connection: Connection | None = None
+        self._connection: SocketConnection | None = None
         self._is_up = anyio.Event()
         self._fault: LinkError | None = None
         self._is_closing = False
@@ -152,7 +152,7 @@ class Channel:
             raise self._lost(f"was lost while {what} was asked")
         return _values_of(answer, what)
 
-    def replace(self, connection: Connection | None = None) -> None:
+    def replace(self, connection: SocketConnection | None = None) -> None:
         """Gives up a socket that does not answer for a fresh one; calls under way may finish."""
         stuck = connection or self._connection
         if stuck is not None and stuck is self._connection:
@@ -210,7 +210,7 @@ class Channel:
 
     async def _connect(self, tasks: TaskGroup) -> None:
         socket = await open_websocket(self._address, timeout_s=self._timing.connect_s)
-        connection = Connection(socket, on_event=self._on_event, timing=self._timing)
+        connection = SocketConnection(socket, on_event=self._on_event, timing=self._timing)
         if self._address.token is not None:
             connection.send(authenticate(self._address.token))
         for text in self._standing.values():
@@ -223,7 +223,7 @@ class Channel:
         self._up_since_s = anyio.current_time()
         self._is_up.set()
 
-    async def _wait_for_connection(self, timeout_s: float) -> Connection:
+    async def _wait_for_connection(self, timeout_s: float) -> SocketConnection:
         with anyio.move_on_after(self._patience_s(timeout_s)):
             while self._connection is None or not self.is_up or self._connection.is_over.is_set():
                 # A connection that has just ended is noticed by `_keep_up` before long.

@@ -21,7 +21,7 @@ from mapspeak.links.rosbridge.protocol import (
     Published,
     StatusNoted,
 )
-from mapspeak.links.rosbridge.requests import ServiceCaller, TopicRequest
+from mapspeak.links.rosbridge.requests import RosbridgeTopicRequest, ServiceCaller
 from mapspeak.links.rosbridge.rosapi import Rosapi
 from mapspeak.ros import ActionEnd, ActionGoal, LinkName, OwnEnds, Started, Subscription, new_id
 from mapspeak.ros.goal import PursuedGoal
@@ -61,7 +61,7 @@ class RosbridgeClient(Rosapi):
         self._control = self._channel()
         self._urgent = self._channel()
         self._caller = ServiceCaller(self._free_for_calls)
-        self._requests: dict[str, TopicRequest] = {}
+        self._requests: dict[str, RosbridgeTopicRequest] = {}
         self._announcements = Announcements(self._announce, self._take_back)
         self._goals: dict[str, tuple[PursuedGoal, Channel | None]] = {}
         self._tasks: TaskGroup | None = None
@@ -156,7 +156,7 @@ class RosbridgeClient(Rosapi):
         request = self._requests.get(topic)
         if request is None:
             subscription = TopicSubscription(topic, type_name=type_name)
-            request = TopicRequest(subscription, is_bulky, throttle_ms)
+            request = RosbridgeTopicRequest(subscription, is_bulky, throttle_ms)
             self._begin(request)
             self._requests[topic] = request
         request.subscription.n_users += 1
@@ -318,7 +318,7 @@ class RosbridgeClient(Rosapi):
         is_free = self._carries_goal(self._control) or not self._carries_goal(self._urgent)
         return self._urgent if is_free else self._control
 
-    def _begin(self, request: TopicRequest) -> None:
+    def _begin(self, request: RosbridgeTopicRequest) -> None:
         subscription = request.subscription
         request.operation_id = new_id()
         text = protocol.subscribe(
@@ -331,7 +331,7 @@ class RosbridgeClient(Rosapi):
         request.channel = self._free_for_topics()
         request.channel.keep_standing(request.operation_id, text)
 
-    def _end(self, request: TopicRequest) -> None:
+    def _end(self, request: RosbridgeTopicRequest) -> None:
         text = protocol.unsubscribe(request.subscription.topic, operation_id=request.operation_id)
         if request.channel is not None:
             request.channel.end_standing(request.operation_id, text)

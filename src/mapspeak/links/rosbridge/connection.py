@@ -41,7 +41,7 @@ class Pending:
         self.is_over.set()
 
 
-class Connection:
+class SocketConnection:
     """Serves one socket until it dies or is retired.
 
     Args:

@@ -85,7 +85,7 @@ Where CBOR is beyond the server's size limit it is dropped in silence, while JSO
 
 
 @dataclass(slots=True, eq=False)
-class TopicRequest:
+class RosbridgeTopicRequest:
     """How a topic was asked for.
 
     Attributes:

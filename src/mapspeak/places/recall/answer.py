@@ -8,7 +8,7 @@ from enum import StrEnum
 from mapspeak.geometry import Point, Pose
 from mapspeak.places.goalcheck import GoalCheck
 from mapspeak.semantic.consistency import Trust
-from mapspeak.semantic.retrieval import Answer, Candidate, EntryKind, Verdict
+from mapspeak.semantic.retrieval import Answer, EntryCandidate, EntryKind, Verdict
 
 NEAR_M = 5.0
 
@@ -67,7 +67,7 @@ class RecallCandidate:
     kind: EntryKind
     name: str
     score_ratio: float
-    match: Candidate | None
+    match: EntryCandidate | None
     away_m: float | None
     seen_from: tuple[str, ...]
     pictures: tuple[str, ...]

@@ -19,7 +19,7 @@ from mapspeak.places.recall.answer import (
     find_doubt,
 )
 from mapspeak.semantic import Landmark
-from mapspeak.semantic.retrieval import Answer, Basis, Candidate, EntryKind, Verdict
+from mapspeak.semantic.retrieval import Answer, Basis, EntryCandidate, EntryKind, Verdict
 from mapspeak.worldmodel.model import Atlas
 from mapspeak.worldmodel.recollection import Remembered, RememberedPlace, RememberedThing
 
@@ -89,7 +89,7 @@ def describe_candidate(
     atlas: Atlas,
     remembered: Remembered,
     *,
-    match: Candidate | None = None,
+    match: EntryCandidate | None = None,
     near: Point | None = None,
 ) -> RecallCandidate:
     """Return what is known of a place or thing, and the pose in which a robot would stand for it.
@@ -106,7 +106,7 @@ def describe_candidate(
 
 
 def _describe_place(
-    atlas: Atlas, remembered: RememberedPlace, match: Candidate | None, near: Point | None
+    atlas: Atlas, remembered: RememberedPlace, match: EntryCandidate | None, near: Point | None
 ) -> RecallCandidate:
     waypoint = remembered.waypoint
     pose = stand_at(atlas, Place(remembered.id, remembered))
@@ -133,7 +133,7 @@ def _describe_place(
 
 
 def _describe_thing(
-    atlas: Atlas, remembered: RememberedThing, match: Candidate | None, near: Point | None
+    atlas: Atlas, remembered: RememberedThing, match: EntryCandidate | None, near: Point | None
 ) -> RecallCandidate:
     thing = remembered.thing
     pose = stand_at(atlas, Place(remembered.id, remembered))
@@ -263,12 +263,12 @@ def find_speaking_places(atlas: Atlas, words: str) -> tuple[tuple[RememberedPlac
 
 def _rank(
     atlas: Atlas,
-    found: Sequence[Candidate],
+    found: Sequence[EntryCandidate],
     passing: Mapping[str, Remembered],
     *,
     best: str | None,
     is_tied: bool,
-) -> Iterator[Candidate]:
+) -> Iterator[EntryCandidate]:
     """Gives candidates by likeness, and of several that are as like the nearest by path first.
 
     The way is worked out of those alone that may come next: of the others it is known that they
@@ -309,6 +309,6 @@ def _find_way_m(atlas: Atlas, remembered: Remembered) -> float:
     return math.inf if way_m is None else way_m
 
 
-def _likeness(found: Candidate) -> float:
+def _likeness(found: EntryCandidate) -> float:
     """Gives how alike a candidate is, as far as that tells two of them apart."""
     return round(found.score_ratio, 3)

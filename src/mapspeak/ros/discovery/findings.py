@@ -2,7 +2,7 @@
 
 from mapspeak.robot import Finding, Health
 from mapspeak.ros import LinkKind, LinkName
-from mapspeak.ros.discovery.parts import CAMERA, LASER, MAP, NAVIGATION, VELOCITY, Part, Worth
+from mapspeak.ros.discovery.parts import CAMERA, LASER, MAP, NAVIGATION, VELOCITY, RobotPart, Worth
 from mapspeak.ros.discovery.profile import NavigationKind, PoseSource, RobotProfile
 
 START_MAP = "Start SLAM (slam_toolbox, cartographer, gmapping) or a map server on the robot."
@@ -50,7 +50,7 @@ def _say_link(link: LinkName) -> str:
 
 
 def _describe(
-    part: Part,
+    part: RobotPart,
     what: str,
     profile: RobotProfile,
     hint: str,

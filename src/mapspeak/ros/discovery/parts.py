@@ -22,7 +22,7 @@ class Worth(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Part:
+class RobotPart:
     """What belongs together in a profile.
 
     Attributes:
@@ -65,12 +65,12 @@ def _show_navigation(profile: RobotProfile) -> str | None:
     return end_of_goals(profile.navigation, profile.navigation_name)
 
 
-MAP = Part(
+MAP = RobotPart(
     key="map_topic",
     fields=("map_topic", "map_updates_topic", "other_map_topics"),
     topic=lambda profile: profile.map_topic,
 )
-POSE = Part(
+POSE = RobotPart(
     key="pose_topic",
     fields=(
         *("pose_source", "pose_topic", "pose_type", "map_frame", "base_frame", "tf_topics"),
@@ -79,26 +79,28 @@ POSE = Part(
     topic=_show_pose,
     is_second_best=lambda profile: profile.pose_source is not PoseSource.TF,
 )
-CAMERA = Part(
+CAMERA = RobotPart(
     key="camera_topic",
     fields=("camera_topic", "camera_type", "camera_info_topic"),
     topic=lambda profile: profile.camera_topic,
 )
-LASER = Part(key="scan_topic", fields=("scan_topic",), topic=lambda profile: profile.scan_topic)
-NAVIGATION = Part(
+LASER = RobotPart(
+    key="scan_topic", fields=("scan_topic",), topic=lambda profile: profile.scan_topic
+)
+NAVIGATION = RobotPart(
     key="navigation",
     fields=("navigation", "navigation_name", "planner_name"),
     topic=_show_navigation,
     is_heard=lambda profile: profile.navigation is NavigationKind.GOAL_TOPIC,
     is_second_best=lambda profile: profile.navigation is NavigationKind.GOAL_TOPIC,
 )
-VELOCITY = Part(
+VELOCITY = RobotPart(
     key="velocity_topic",
     fields=("velocity_topic", "velocity_type"),
     topic=lambda profile: profile.velocity_topic,
     is_heard=lambda _: True,
 )
-RADIUS = Part(
+RADIUS = RobotPart(
     key="radius_m",
     fields=("radius_m", "radius_source"),
     topic=lambda profile: profile.radius_source or None,
@@ -106,7 +108,7 @@ RADIUS = Part(
 PARTS = (MAP, POSE, CAMERA, LASER, NAVIGATION, VELOCITY, RADIUS)
 
 
-def find_missing(profile: RobotProfile) -> tuple[Part, ...]:
+def find_missing(profile: RobotProfile) -> tuple[RobotPart, ...]:
     """Return the parts of which better may be found."""
     return tuple(part for part in PARTS if part.worth(profile) is not Worth.FULL)
 
@@ -137,7 +139,7 @@ def improve(
     return replace(before, dead_topics=frozenset(dead), **values)  # type: ignore[arg-type]
 
 
-def _is_better(part: Part, before: RobotProfile, now: RobotProfile, is_settled: bool) -> bool:  # noqa: FBT001
+def _is_better(part: RobotPart, before: RobotProfile, now: RobotProfile, is_settled: bool) -> bool:  # noqa: FBT001
     if part.worth(now) != part.worth(before):
         return part.worth(now) > part.worth(before)
     return not is_settled or part.topic(now) == part.topic(before)

@@ -9,7 +9,7 @@ from mapspeak.errors import LinkError
 from mapspeak.ros import RosConnection
 from mapspeak.ros.discovery.finding import look_at_robot
 from mapspeak.ros.discovery.overrides import RobotOverrides
-from mapspeak.ros.discovery.parts import Part, find_missing, improve
+from mapspeak.ros.discovery.parts import RobotPart, find_missing, improve
 from mapspeak.ros.discovery.profile import RobotProfile
 from mapspeak.ros.transforms import FrameListener
 
@@ -69,7 +69,7 @@ class RobotWatch:
         return self._profile
 
     @property
-    def missing(self) -> tuple[Part, ...]:
+    def missing(self) -> tuple[RobotPart, ...]:
         """The parts of which better may be found; what robot.yaml says is good enough."""
         return tuple(part for part in find_missing(self.profile) if not self._is_said(part))
 
@@ -124,7 +124,7 @@ class RobotWatch:
                 pause_s = LATER_PAUSE_S if before != self._profile else longer_s
                 pause_s = min(pause_s, LONGEST_PAUSE_S)
 
-    async def find(self, part: Part) -> None:
+    async def find(self, part: RobotPart) -> None:
         """Return when a part is found; look once more for one that counts as missing.
 
         Raises:
@@ -134,7 +134,7 @@ class RobotWatch:
         if part in self.missing:
             await self.look()
 
-    async def wait_for(self, part: Part) -> None:
+    async def wait_for(self, part: RobotPart) -> None:
         """Return when a part is found, or counts as missing."""
         await self._wait_until(lambda: part not in self.missing)
 
@@ -174,7 +174,7 @@ class RobotWatch:
             if not is_found() and not self.is_settled:
                 await anyio.sleep(PAUSE_S)
 
-    def _is_said(self, part: Part) -> bool:
+    def _is_said(self, part: RobotPart) -> bool:
         is_dead = part.topic(self.profile) in self.profile.dead_topics
         return getattr(self._overrides, part.key) is not None and not is_dead
 

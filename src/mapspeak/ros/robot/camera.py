@@ -24,7 +24,7 @@ INFO_PATIENCE_S = 1.0
 CAMERA_HINT = "Check that the camera's driver runs, or name another camera_topic in robot.yaml."
 
 
-class Camera:
+class RosCamera:
     """Takes pictures.
 
     Args:

@@ -97,7 +97,7 @@ class DrivingPatience(ActionPatience):
     settling_s: float = 5.0
 
 
-class Driver(Protocol):
+class GoalDriver(Protocol):
     """One way of sending goals."""
 
     @property

@@ -30,7 +30,7 @@ IN_VAIN_S = 2.0
 """For a map that nobody publishes, and for one that was waited for in vain before."""
 
 
-class MapKeeper:
+class MapSubscriber:
     """Keeps the latest map, and makes a value of it when somebody wants it.
 
     Args:

@@ -32,20 +32,20 @@ from mapspeak.ros.discovery.parts import (
     POSE,
     RADIUS,
     VELOCITY,
-    Part,
+    RobotPart,
 )
-from mapspeak.ros.robot.camera import Camera
+from mapspeak.ros.robot.camera import RosCamera
 from mapspeak.ros.robot.driving import (
     MOVE_BASE,
     NAV2,
     ActionDriver,
-    Driver,
     DrivingPatience,
+    GoalDriver,
     GoalRecord,
 )
 from mapspeak.ros.robot.goaltopic import GoalTopicDriver
 from mapspeak.ros.robot.laser import Laser
-from mapspeak.ros.robot.maps import MapKeeper
+from mapspeak.ros.robot.maps import MapSubscriber
 from mapspeak.ros.robot.poses import PoseKeeper, RobotClock
 from mapspeak.ros.robot.stopping import Brake, stop_everything
 from mapspeak.ros.transforms import FrameListener
@@ -84,7 +84,7 @@ class RosRobot:
         self._goals: OrderedDict[str, GoalRecord] = OrderedDict()
         self._n_sending = 0
         profile = watch.profile
-        self._maps = MapKeeper(connection, profile)
+        self._maps = MapSubscriber(connection, profile)
         self._camera = self._build_camera()
         self._laser = self._build_laser()
         self._poses = PoseKeeper(connection, profile, frames)
@@ -235,12 +235,12 @@ class RosRobot:
         """Use what has been found since; what has stayed the same goes on being used."""
         now = self.profile
 
-        def is_new(part: Part) -> bool:
+        def is_new(part: RobotPart) -> bool:
             return part.values(before) != part.values(now)
 
         if is_new(MAP):
             self._maps.close()
-            self._maps = MapKeeper(self.connection, now)
+            self._maps = MapSubscriber(self.connection, now)
         if is_new(CAMERA):
             self._camera = self._build_camera()
         if is_new(LASER) or is_new(POSE):
@@ -256,8 +256,8 @@ class RosRobot:
         if now.clock_topic != before.clock_topic:
             self.connection.start_soon(partial(self._clock.start, now.clock_topic))
 
-    def _build_camera(self) -> Camera:
-        camera = Camera(self.connection, self.profile)
+    def _build_camera(self) -> RosCamera:
+        camera = RosCamera(self.connection, self.profile)
         self.connection.start_soon(camera.close_when_idle)
         return camera
 
@@ -273,7 +273,7 @@ class RosRobot:
         """Stops the base itself: whoever drove it has gone, and some keep to the last velocity."""
         self._brake.pull()
 
-    def _build_driver(self) -> Driver | None:
+    def _build_driver(self) -> GoalDriver | None:
         profile, name = self.profile, self.profile.navigation_name
         if name is None:
             return None
@@ -300,7 +300,7 @@ class RosRobot:
             case NavigationKind.NONE:
                 return None
 
-    def _wanted_driver(self) -> Driver:
+    def _wanted_driver(self) -> GoalDriver:
         if self._driver is None:
             raise LinkError(
                 "The robot offers no navigation.",

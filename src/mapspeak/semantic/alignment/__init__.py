@@ -9,11 +9,11 @@ from mapspeak.semantic.alignment.comparing import (
 )
 from mapspeak.semantic.alignment.fitting import Certainty, MapFit, find_fit
 from mapspeak.semantic.alignment.keeping import MapKeeper, RealignReceipt
-from mapspeak.semantic.alignment.surfaces import Agreement, MapSurfaces, placed
+from mapspeak.semantic.alignment.surfaces import MapAgreement, MapSurfaces, placed
 
 __all__ = [
-    "Agreement",
     "Certainty",
+    "MapAgreement",
     "MapComparison",
     "MapFit",
     "MapKeeper",

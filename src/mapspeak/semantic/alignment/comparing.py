@@ -22,7 +22,7 @@ from mapspeak.semantic.alignment.fitting import (
     MapFit,
     find_fit,
 )
-from mapspeak.semantic.alignment.surfaces import Agreement, MapSurfaces, judge
+from mapspeak.semantic.alignment.surfaces import MapAgreement, MapSurfaces, judge
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map, write_map
 
@@ -150,7 +150,7 @@ class MapComparison:
     """
 
     relation: MapRelation
-    as_it_lies: Agreement
+    as_it_lies: MapAgreement
     fit: MapFit | None
     shortest_m: float
 
@@ -207,7 +207,7 @@ def _relation_of(fit: MapFit | None) -> MapRelation:
     return MapRelation.UNKNOWN if is_possible else MapRelation.OTHER
 
 
-def _is_good(quality: Agreement) -> bool:
+def _is_good(quality: MapAgreement) -> bool:
     return (
         quality.agreement_ratio >= LEAST_STILL_AGREEMENT
         and quality.overlap_ratio >= LEAST_OVERLAP
@@ -215,7 +215,7 @@ def _is_good(quality: Agreement) -> bool:
     )
 
 
-def _figures(quality: Agreement) -> str:
+def _figures(quality: MapAgreement) -> str:
     return (
         f"{quality.agreement_ratio:.0%} of the walls that both maps show agree "
         f"({quality.shared_m:.0f} m, {quality.overlap_ratio:.0%} of the smaller map)"

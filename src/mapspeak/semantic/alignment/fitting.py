@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.semantic.alignment.surfaces import Agreement, MapSurfaces, judge, placed
+from mapspeak.semantic.alignment.surfaces import MapAgreement, MapSurfaces, judge, placed
 from mapspeak.spatial.grid import FloatArray
 
 Raster = NDArray[np.float32]
@@ -262,8 +262,8 @@ class MapFit:
     """
 
     new_from_old: Pose
-    quality: Agreement
-    rival: Agreement | None
+    quality: MapAgreement
+    rival: MapAgreement | None
     certainty: Certainty
     off_m: float
 
@@ -314,18 +314,18 @@ def find_fit(old: MapSurfaces, new: MapSurfaces) -> MapFit | None:
     )
 
 
-def _strongest(others: Iterable[Agreement], best: Agreement) -> Agreement | None:
+def _strongest(others: Iterable[MapAgreement], best: MapAgreement) -> MapAgreement | None:
     """Gives what competes most with the best place."""
     return max(others, key=lambda each: (_is_rival(each, best), each.evidence_m), default=None)
 
 
-def _is_rival(other: Agreement, best: Agreement) -> bool:
+def _is_rival(other: MapAgreement, best: MapAgreement) -> bool:
     evidence_ratio = other.evidence_m / best.evidence_m if best.evidence_m > 0 else math.inf
     agrees_as_well = other.agreement_ratio >= best.agreement_ratio - RIVAL_AGREEMENT
     return evidence_ratio >= (RIVAL_AGREEING_EVIDENCE if agrees_as_well else RIVAL_EVIDENCE)
 
 
-def _certainty_of(quality: Agreement, rival: Agreement | None) -> Certainty:
+def _certainty_of(quality: MapAgreement, rival: MapAgreement | None) -> Certainty:
     if not (
         quality.agreement_ratio >= LEAST_AGREEMENT
         and quality.overlap_ratio >= LEAST_OVERLAP
@@ -343,7 +343,7 @@ def _is_same_place(one: Pose, other: Pose, middle: Point) -> bool:
     return turned < SAME_RAD and one.transform(middle).distance_to(other.transform(middle)) < SAME_M
 
 
-def _say(quality: Agreement) -> str:
+def _say(quality: MapAgreement) -> str:
     return (
         f"{quality.agreement_ratio:.0%} of the walls agree, of {quality.shared_m:.0f} m that both "
         f"maps show ({quality.overlap_ratio:.0%} of the smaller map)"

@@ -154,7 +154,7 @@ MOST_POINTS = 8000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Agreement:
+class MapAgreement:
     """How well walls fit when one map is laid on another.
 
     Attributes:
@@ -173,7 +173,7 @@ class Agreement:
         return self.shared_m * (2 * self.agreement_ratio - 1)
 
 
-def judge(old: MapSurfaces, new: MapSurfaces, transform: Pose) -> Agreement:
+def judge(old: MapSurfaces, new: MapSurfaces, transform: Pose) -> MapAgreement:
     """Gives how well the old map, laid on the new one by a transform, agrees with it."""
     tolerance_m = max(TOLERANCE_M, 1.5 * max(old.grid.resolution_m, new.grid.resolution_m))
     forth = _count(old, new, transform, tolerance_m)
@@ -182,7 +182,7 @@ def judge(old: MapSurfaces, new: MapSurfaces, transform: Pose) -> Agreement:
     agreeing_m = (forth[1] + back[1]) / 2
     smaller = min((forth, old), (back, new), key=lambda each: each[1].length_m)
     length_m = smaller[1].length_m
-    return Agreement(
+    return MapAgreement(
         shared_m=shared_m,
         agreement_ratio=agreeing_m / shared_m if shared_m else 0.0,
         overlap_ratio=smaller[0][0] / length_m if length_m else 0.0,

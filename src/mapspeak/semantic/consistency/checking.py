@@ -9,7 +9,7 @@ from itertools import groupby, pairwise
 import numpy as np
 
 from mapspeak.geometry import Point, wrap_angle
-from mapspeak.semantic.consistency.findings import Finding, FindingKind
+from mapspeak.semantic.consistency.findings import FindingKind, MemoryFinding
 from mapspeak.semantic.consistency.sightlines import FARTHEST_M, check_pose, check_rays
 from mapspeak.semantic.things import Thing, Things, name_the_same
 from mapspeak.semantic.waypoint import SemanticMap, Waypoint
@@ -25,7 +25,7 @@ NEAR_M = 4.0
 CONE_MARGIN_RAD = math.radians(5)
 
 
-def check_duplicates(waypoints: Sequence[Waypoint]) -> Iterator[Finding]:
+def check_duplicates(waypoints: Sequence[Waypoint]) -> Iterator[MemoryFinding]:
     """Gives pairs of waypoints with nearly the same pose and landmarks."""
     at = np.array([(each.pose.x, each.pose.y) for each in waypoints]).reshape(-1, 2)
     for i, waypoint in enumerate(waypoints):
@@ -34,21 +34,21 @@ def check_duplicates(waypoints: Sequence[Waypoint]) -> Iterator[Finding]:
             turn_rad = abs(wrap_angle(waypoint.pose.yaw_rad - other.pose.yaw_rad))
             named = _labels(waypoint)
             if turn_rad <= TWIN_RAD and named and named == _labels(other):
-                yield Finding(
+                yield MemoryFinding(
                     kind=FindingKind.DUPLICATE,
                     waypoints=(other.name, waypoint.name),
                     far_m=other.pose.point.distance_to(waypoint.pose.point),
                 )
 
 
-def check_company(places: SemanticMap, found: Things) -> Iterator[Finding]:
+def check_company(places: SemanticMap, found: Things) -> Iterator[MemoryFinding]:
     """Gives things that some records speak against."""
     placed = [thing for thing in found.things if thing.position is not None]
     at = np.array([(t.position.x, t.position.y) for t in placed if t.position]).reshape(-1, 2)
     yield from _two_labels(placed, at)
     for thing in placed:
         for view in thing.conflicting:
-            yield Finding(
+            yield MemoryFinding(
                 kind=FindingKind.POINTS_PAST,
                 waypoints=(view.waypoint,),
                 label=view.landmark.label,
@@ -59,14 +59,14 @@ def check_company(places: SemanticMap, found: Things) -> Iterator[Finding]:
         yield from _not_seen(found, waypoint, placed, at)
 
 
-def _two_labels(placed: Sequence[Thing], at: FloatArray) -> Iterator[Finding]:
+def _two_labels(placed: Sequence[Thing], at: FloatArray) -> Iterator[MemoryFinding]:
     """Gives things of different names in one place that nobody has seen beside each other."""
     for i, thing in enumerate(placed):
         for j in np.flatnonzero(np.hypot(*(at[:i] - at[i]).T) <= ONE_PLACE_M).tolist():
             other = placed[j]
             is_seen_beside = set(thing.waypoints) & set(other.waypoints)
             if not is_seen_beside and not name_the_same(thing.label, other.label):
-                yield Finding(
+                yield MemoryFinding(
                     kind=FindingKind.TWO_LABELS,
                     waypoints=(*other.waypoints, *thing.waypoints),
                     things=(other, thing),
@@ -75,7 +75,7 @@ def _two_labels(placed: Sequence[Thing], at: FloatArray) -> Iterator[Finding]:
 
 def _not_seen(
     found: Things, waypoint: Waypoint, placed: Sequence[Thing], at: FloatArray
-) -> Iterator[Finding]:
+) -> Iterator[MemoryFinding]:
     """Gives things in plain sight between what a waypoint names, which it does not name."""
     seen = waypoint.standpoints[0].landmarks
     bearings = [each.bearing_rad for each in seen if each.bearing_rad is not None]
@@ -93,7 +93,7 @@ def _not_seen(
             and not is_named
             and found.is_in_plain_sight(waypoint, thing.position)
         ):
-            yield Finding(
+            yield MemoryFinding(
                 kind=FindingKind.NOT_SEEN,
                 waypoints=(waypoint.name,),
                 things=(thing,),
@@ -193,7 +193,7 @@ def check_rooms(
     found: Things,
     waypoint: Waypoint,
     misfiled: Mapping[str, tuple[Region, Region]],
-) -> Iterator[Finding]:
+) -> Iterator[MemoryFinding]:
     """Gives what is odd about the room that a record names; one without a room has nothing.
 
     Args:
@@ -206,7 +206,7 @@ def check_rooms(
         return
     if waypoint.name in misfiled:
         told, here = misfiled[waypoint.name]
-        yield Finding(
+        yield MemoryFinding(
             kind=FindingKind.WRONG_ROOM,
             waypoints=(waypoint.name,),
             ids=(told.id, here.id),
@@ -214,23 +214,26 @@ def check_rooms(
         return
     start = rooms.find_region_at(waypoint.pose.point) or rooms.find_region(waypoint.room_id)
     for thing in found.seen_from(waypoint) if start is not None else ():
-        way = _regions_on(rooms, waypoint, thing)
+        way = _regions_on(rooms, waypoint, thing, back_m=thing.uncertainty_m or 0.0)
         if start is not None and not _sees_through(rooms, waypoint, thing, (start, *way)):
-            yield Finding(
+            own = _regions_on(rooms, waypoint, thing, back_m=0.0)[-1]
+            yield MemoryFinding(
                 kind=FindingKind.WRONG_ROOM,
                 waypoints=(waypoint.name,),
                 label=thing.label,
                 things=(thing,),
-                ids=(way[-1].id, start.id),
+                ids=(own.id, start.id),
             )
 
 
-def _regions_on(rooms: RoomMap, waypoint: Waypoint, thing: Thing) -> tuple[Region, ...]:
-    """Return the rooms on the line from a place to the nearest point where a thing may be."""
+def _regions_on(
+    rooms: RoomMap, waypoint: Waypoint, thing: Thing, *, back_m: float
+) -> tuple[Region, ...]:
+    """Return the rooms on the line from a place to a thing, up to so far before the thing."""
     assert thing.position is not None, "only what has a place has a room"  # noqa: S101 - our belief
     start, end = waypoint.pose.point, thing.position
     far_m = start.distance_to(end)
-    near_ratio = max(1.0 - (thing.uncertainty_m or 0.0) / max(far_m, 1e-9), 0.0)
+    near_ratio = max(1.0 - back_m / max(far_m, 1e-9), 0.0)
     n_steps = max(math.ceil(near_ratio * far_m / _STEP_M), 1)
     shares = (near_ratio * step / n_steps for step in range(n_steps + 1))
     points = (
@@ -272,7 +275,7 @@ def check_memory(
     distances: DistanceField | None = None,
     rooms: RoomMap | None = None,
     map_id: str | None = None,
-) -> tuple[Finding, ...]:
+) -> tuple[MemoryFinding, ...]:
     """Gives all that is odd about a memory, in the order of its places; the same every time.
 
     Args:
@@ -282,7 +285,7 @@ def check_memory(
         rooms: Of that map; None leaves them out.
         map_id: The map that the robot is on; None takes the records for its.
     """
-    findings: list[Finding] = []
+    findings: list[MemoryFinding] = []
     misfiled = find_misfiled(rooms, places.waypoints) if rooms else {}
     for waypoint in places.waypoints:
         findings += check_pose(found.sight.grid, waypoint, distances, map_id or places.map_id)

@@ -46,7 +46,7 @@ either loses depends on how well the other is seen."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
+class MemoryFinding:
     """Something odd about what is remembered.
 
     Attributes:
@@ -109,11 +109,11 @@ class Trust:
     """
 
     ratio: float
-    findings: tuple[Finding, ...]
+    findings: tuple[MemoryFinding, ...]
     thing: Thing | None = None
 
 
-def judge_trust(thing: Thing, findings: Iterable[Finding]) -> Trust:
+def judge_trust(thing: Thing, findings: Iterable[MemoryFinding]) -> Trust:
     """Return the trust that a thing deserves by its views and all findings of its memory.
 
     A finding about one of several places that have seen it counts by its share of them.
@@ -128,7 +128,7 @@ def judge_trust(thing: Thing, findings: Iterable[Finding]) -> Trust:
     return Trust(odds / (1 + odds), tuple(against), thing)
 
 
-def _share(thing: Thing, finding: Finding) -> float:
+def _share(thing: Thing, finding: MemoryFinding) -> float:
     """Gives what share of a thing a finding concerns."""
     if finding.things:
         return float(thing in finding.things)

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 
 from mapspeak.geometry import Point
-from mapspeak.semantic.consistency.findings import Finding, FindingKind
+from mapspeak.semantic.consistency.findings import FindingKind, MemoryFinding
 from mapspeak.semantic.things import Things
 from mapspeak.semantic.things.sight import BODY_M, OWN_M
 from mapspeak.semantic.waypoint import Landmark, Waypoint
@@ -16,18 +16,18 @@ FARTHEST_M = 1e6
 
 def check_pose(
     grid: OccupancyGrid, waypoint: Waypoint, distances: DistanceField | None, map_id: str | None
-) -> Iterator[Finding]:
+) -> Iterator[MemoryFinding]:
     """Gives what is odd about where a waypoint is."""
     of, point = (waypoint.name,), waypoint.pose.point
     if waypoint.map_id is not None and map_id is not None and waypoint.map_id != map_id:
         ids = (waypoint.map_id, map_id)
-        yield Finding(kind=FindingKind.OTHER_MAP, waypoints=of, ids=ids)
+        yield MemoryFinding(kind=FindingKind.OTHER_MAP, waypoints=of, ids=ids)
     ground = _ground_at(grid, point)
     if ground is not None:
-        yield Finding(kind=ground, waypoints=of, at=point)
+        yield MemoryFinding(kind=ground, waypoints=of, at=point)
     elif distances is not None and not distances.is_reachable(point):
         radius_m = distances.radius_m
-        yield Finding(kind=FindingKind.UNREACHABLE, waypoints=of, at=point, radius_m=radius_m)
+        yield MemoryFinding(kind=FindingKind.UNREACHABLE, waypoints=of, at=point, radius_m=radius_m)
 
 
 def _ground_at(grid: OccupancyGrid, point: Point) -> FindingKind | None:
@@ -46,7 +46,7 @@ def _ground_at(grid: OccupancyGrid, point: Point) -> FindingKind | None:
 N_SIGMAS = 2.0
 
 
-def check_rays(found: Things, waypoint: Waypoint) -> Iterator[Finding]:
+def check_rays(found: Things, waypoint: Waypoint) -> Iterator[MemoryFinding]:
     """Gives landmarks of a waypoint that lie behind a wall or where nobody has seen."""
     for stand in waypoint.standpoints:
         for landmark in stand.landmarks:
@@ -56,7 +56,7 @@ def check_rays(found: Things, waypoint: Waypoint) -> Iterator[Finding]:
 
 def _check(
     found: Things, waypoint: Waypoint, landmark: Landmark, bearing_rad: float
-) -> Iterator[Finding]:
+) -> Iterator[MemoryFinding]:
     pose = waypoint.pose
     way = pose.yaw_rad + bearing_rad
     ahead = Point(pose.x + math.cos(way), pose.y + math.sin(way))
@@ -100,8 +100,8 @@ def _ends_in_unknown(found: Things, waypoint: Waypoint, way: float, open_m: floa
 
 def _landmark_finding(
     kind: FindingKind, waypoint: Waypoint, landmark: Landmark, open_m: float
-) -> Finding:
-    return Finding(
+) -> MemoryFinding:
+    return MemoryFinding(
         kind=kind,
         waypoints=(waypoint.name,),
         label=landmark.label,

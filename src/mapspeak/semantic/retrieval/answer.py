@@ -220,7 +220,7 @@ class Thresholds:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Candidate:
+class EntryCandidate:
     """Something that a request may mean.
 
     Attributes:
@@ -263,13 +263,13 @@ class Answer:
     query: str
     understood: str
     verdict: Verdict
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[EntryCandidate, ...]
     n_meant: int
     is_sure: bool
     limits: str | None = None
     missing: str | None = None
 
-    def find_speaking(self, *, least_said_ratio: float) -> tuple[Candidate, ...]:
+    def find_speaking(self, *, least_said_ratio: float) -> tuple[EntryCandidate, ...]:
         """Gives the candidates that are surely meant, or that say enough of the request."""
         n_sure = self.n_meant if self.is_sure else 0
         return tuple(

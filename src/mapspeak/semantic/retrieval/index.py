@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from mapspeak.semantic.retrieval.answer import (
     Answer,
     Basis,
-    Candidate,
     Entry,
+    EntryCandidate,
     MatchEvidence,
     MatchField,
     Thresholds,
@@ -30,7 +30,7 @@ from mapspeak.semantic.retrieval.kinds import KindIndex, Missing, calls_by_name,
 from mapspeak.semantic.retrieval.meaningindex import Likeness, MeaningIndex, TextVectors
 from mapspeak.semantic.retrieval.minilm import is_word
 from mapspeak.semantic.retrieval.wordindex import (
-    Asked,
+    AskedWords,
     LookAlikes,
     WordIndex,
     content_stems,
@@ -73,8 +73,8 @@ class _Asked:
     """
 
     request: str
-    words: tuple[Asked, ...]
-    common: tuple[Asked, ...]
+    words: tuple[AskedWords, ...]
+    common: tuple[AskedWords, ...]
     ratios: NDArray[np.float64]
     said_ratios: NDArray[np.float64]
     likeness: Likeness | None
@@ -142,7 +142,7 @@ class EntryIndex:
             limits=WORDS_ONLY if self._meanings is None else None,
         )
 
-    def _understand(self, query: str, words: tuple[Asked, ...]) -> str:
+    def _understand(self, query: str, words: tuple[AskedWords, ...]) -> str:
         """Gives the request with its words put right, or the name that it looks like."""
         put_right = _put_right(query, words)
         if content_stems(put_right) in self._of_stems or not any(
@@ -154,8 +154,8 @@ class EntryIndex:
         )
         return likest[0] if likest else put_right
 
-    def _compare(self, query: str, understood: str, words: tuple[Asked, ...]) -> _Asked:
-        common: tuple[Asked, ...] = ()
+    def _compare(self, query: str, understood: str, words: tuple[AskedWords, ...]) -> _Asked:
+        common: tuple[AskedWords, ...] = ()
         likeness, missing = None, None
         if self._vectors is None or self._meanings is None or not _is_in_latin_letters(understood):
             said_ratios = self._words.score_ratios(words)
@@ -229,7 +229,7 @@ class EntryIndex:
         is_other[self._of_key[name]] = False
         return float(ratios[first] - ratios[is_other].max()) if is_other.any() else 0.0
 
-    def _candidate(self, number: int, asked: _Asked, said: NDArray[np.float64]) -> Candidate:
+    def _candidate(self, number: int, asked: _Asked, said: NDArray[np.float64]) -> EntryCandidate:
         entry, basis = self._entries[number], asked.basis(number)
         evidence = self._explain(asked, number)
         field, text = entry.texts[0]
@@ -238,7 +238,7 @@ class EntryIndex:
         elif basis is Basis.WORDS:
             best = max(evidence, key=lambda each: each.weight)
             field, text = best.field, best.text
-        return Candidate(
+        return EntryCandidate(
             entry=entry,
             score_ratio=float(asked.ratios[number]),
             basis=basis,
@@ -278,7 +278,7 @@ def _numbers_by(keys: Iterable[Iterable[_Key]]) -> dict[_Key, list[int]]:
     return numbers
 
 
-def _put_right(query: str, words: Iterable[Asked]) -> str:
+def _put_right(query: str, words: Iterable[AskedWords]) -> str:
     """Gives the request with the words put right that only a misspelt word explains."""
     for word in words:
         if word.corrected != word.shown:

@@ -21,7 +21,7 @@ _GONE = frozenset({"absent", "former", "missing", "removed"})
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class ThingKind:
     """A kind of thing.
 
     Attributes:
@@ -34,13 +34,13 @@ class Kind:
 
 
 @cache
-def read_kinds() -> tuple[Kind, ...]:
+def read_kinds() -> tuple[ThingKind, ...]:
     """Reads the kinds in the order of the list, once: nothing ever changes them."""
     text = resources.files(__package__).joinpath("things.txt").read_text(encoding="utf-8")
     return tuple(_kinds_in(text))
 
 
-def find_kinds(label: str) -> tuple[Kind, ...]:
+def find_kinds(label: str) -> tuple[ThingKind, ...]:
     """Finds the kinds that a label names: "foam fire extinguisher" is a fire extinguisher.
 
     The longest name at the end of the label's head counts, whatever its form: a "sofa by the
@@ -55,12 +55,12 @@ def find_kinds(label: str) -> tuple[Kind, ...]:
     return next((found for tail in tails if (found := _kinds_by_stems().get(tail))), ())
 
 
-def find_kinds_called(name: str) -> tuple[Kind, ...]:
+def find_kinds_called(name: str) -> tuple[ThingKind, ...]:
     """Finds the kinds of which that is a name, with nothing added to it."""
     return _kinds_by_stems().get(content_stems(name), ())
 
 
-def find_names(kind: Kind, label: str) -> tuple[str, ...]:
+def find_names(kind: ThingKind, label: str) -> tuple[str, ...]:
     """Gives the names of a kind that a thing of that label may have.
 
     A "tennis table" is a table, and no "dining table": there are many tables, and the label says
@@ -94,7 +94,7 @@ def ends_with(stems: tuple[str, ...], ending: tuple[str, ...]) -> bool:
     return stems[len(stems) - len(ending) :] == ending if len(ending) <= len(stems) else False
 
 
-def find_named_kinds(text: str) -> frozenset[Kind]:
+def find_named_kinds(text: str) -> frozenset[ThingKind]:
     """Finds the kinds that a text names anywhere."""
     stems = content_stems(text)
     spans = (
@@ -117,11 +117,11 @@ def _tells_little(ending: tuple[str, ...]) -> bool:
     return len(found) > 1
 
 
-def _kinds_in(text: str) -> Iterator[Kind]:
+def _kinds_in(text: str) -> Iterator[ThingKind]:
     for line in text.splitlines():
         if line and not line.startswith("#"):
             names, uses = line.split(": ", 1)
-            yield Kind(tuple(names.split(", ")), tuple(uses.split("; ")))
+            yield ThingKind(tuple(names.split(", ")), tuple(uses.split("; ")))
 
 
 @cache
@@ -130,8 +130,8 @@ def _longest() -> int:
 
 
 @cache
-def _kinds_by_stems() -> MappingProxyType[tuple[str, ...], tuple[Kind, ...]]:
-    kinds: dict[tuple[str, ...], dict[Kind, None]] = defaultdict(dict)
+def _kinds_by_stems() -> MappingProxyType[tuple[str, ...], tuple[ThingKind, ...]]:
+    kinds: dict[tuple[str, ...], dict[ThingKind, None]] = defaultdict(dict)
     for kind in read_kinds():
         for name in kind.names:
             kinds[content_stems(name)][kind] = None

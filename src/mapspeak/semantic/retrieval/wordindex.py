@@ -165,7 +165,7 @@ Texts = Sequence[tuple[MatchField, str]]
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class AskedWords:
     """A word of the phrase.
 
     Attributes:
@@ -215,7 +215,7 @@ class WordIndex:
         }
         self._vocabulary = Vocabulary(self._postings, is_known=is_known)
 
-    def ask(self, phrase: str) -> tuple[Asked, ...]:
+    def ask(self, phrase: str) -> tuple[AskedWords, ...]:
         """Gives the words of a phrase that say what is meant, and what the records have of them."""
         found = []
         for shown, compared in content_words(phrase):
@@ -223,19 +223,19 @@ class WordIndex:
             n_with = sum(len(self._postings[spelling][0]) for spelling in spellings)
             weight = math.log1p(len(self._records) / max(n_with, 1))
             is_doubtful = self._vocabulary.is_doubtful(compared)
-            found.append(Asked(shown, spellings, weight, is_doubtful))
+            found.append(AskedWords(shown, spellings, weight, is_doubtful))
         return tuple(found)
 
-    def score_ratios(self, asked: Sequence[Asked]) -> NDArray[np.float64]:
+    def score_ratios(self, asked: Sequence[AskedWords]) -> NDArray[np.float64]:
         """Gives, for each record, how much of a phrase it says; rare words count more."""
         return self._score_ratios(asked, KIND_WEIGHTS)
 
-    def said_ratios(self, asked: Sequence[Asked]) -> NDArray[np.float64]:
+    def said_ratios(self, asked: Sequence[AskedWords]) -> NDArray[np.float64]:
         """Gives the same where a part of a longer word counts as nothing."""
         return self._score_ratios(asked, KIND_WEIGHTS | {MatchKind.PART: 0.0})
 
     def _score_ratios(
-        self, asked: Sequence[Asked], kind_weights: Mapping[MatchKind, float]
+        self, asked: Sequence[AskedWords], kind_weights: Mapping[MatchKind, float]
     ) -> NDArray[np.float64]:
         found = np.zeros(len(self._records))
         for word in asked:
@@ -246,12 +246,12 @@ class WordIndex:
             found += word.weight * best
         return found / max(sum(word.weight for word in asked), 1e-9)
 
-    def explain(self, asked: Sequence[Asked], number: int) -> tuple[MatchEvidence, ...]:
+    def explain(self, asked: Sequence[AskedWords], number: int) -> tuple[MatchEvidence, ...]:
         """Gives at most one finding in a record for each word of a phrase, in their order."""
         findings = (self._finding(word, number) for word in asked)
         return tuple(finding for finding in findings if finding)
 
-    def _finding(self, asked: Asked, number: int) -> MatchEvidence | None:
+    def _finding(self, asked: AskedWords, number: int) -> MatchEvidence | None:
         """Gives the weightiest place in a record that says a word."""
         findings = (
             MatchEvidence(

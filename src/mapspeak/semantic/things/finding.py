@@ -16,7 +16,7 @@ from mapspeak.semantic.things.joining import (
     group_names,
     join_sightings,
 )
-from mapspeak.semantic.things.likelihood import Sighting, Surroundings, read_waypoints
+from mapspeak.semantic.things.likelihood import Surroundings, WeighedView, read_waypoints
 from mapspeak.semantic.things.placing import Placement, place, trust_range
 from mapspeak.semantic.things.sight import BODY_M, N_RAYS, SightMap, build_sight_map
 from mapspeak.semantic.things.thing import NOISE, Category, NoiseModel, Thing, View, name_the_same
@@ -33,7 +33,7 @@ ELSEWHERE_RAD = math.radians(30)
 class Located:
     """Views of one thing, where it is, and how well each view goes with the others."""
 
-    group: tuple[Sighting, ...]
+    group: tuple[WeighedView, ...]
     placement: Placement | None
     agreements: tuple[float, ...]
 
@@ -52,7 +52,7 @@ class Things:
     things: tuple[Thing, ...]
     sight: SightMap
     surroundings: dict[Waypoint, Surroundings]
-    pools: dict[tuple[Sighting, ...], tuple[Thing, ...]]
+    pools: dict[tuple[WeighedView, ...], tuple[Thing, ...]]
 
     def is_in_plain_sight(self, waypoint: Waypoint, point: Point) -> bool:
         """True when who stands at a waypoint has nothing between itself and a point near by."""
@@ -123,7 +123,7 @@ def _is_of(sight: SightMap, grid: OccupancyGrid, noise: NoiseModel) -> bool:
 
 def _divide(
     surroundings: dict[Waypoint, Surroundings], same_name: SameName
-) -> list[tuple[Sighting, ...]]:
+) -> list[tuple[WeighedView, ...]]:
     """Gives all sightings in pools of related labels, in an order that the file does not set."""
     ordered = sorted(surroundings, key=_order)
     every = [each for waypoint in ordered for each in surroundings[waypoint].sightings]
@@ -132,7 +132,7 @@ def _divide(
         for i, group in enumerate(group_names([s.landmark.label for s in every], same_name))
         for label in group
     }
-    pools: dict[int, list[Sighting]] = {}
+    pools: dict[int, list[WeighedView]] = {}
     for each in every:
         pools.setdefault(pool_of[each.landmark.label], []).append(each)
     return [tuple(pools[i]) for i in sorted(pools)]
@@ -143,7 +143,9 @@ def _order(waypoint: Waypoint) -> tuple[str, str, float, float, float]:
     return name_key(waypoint.name), waypoint.name, pose.x, pose.y, pose.yaw_rad
 
 
-def _solve(sight: SightMap, pool: Sequence[Sighting], same_name: SameName) -> tuple[Located, ...]:
+def _solve(
+    sight: SightMap, pool: Sequence[WeighedView], same_name: SameName
+) -> tuple[Located, ...]:
     placed = [each for each in pool if each.likelihood is not None]
     posteriors = Posteriors(sight)
     groups = join_sightings(posteriors, placed, same_name) if placed else []
@@ -188,7 +190,7 @@ def _filled(group: Group, agreements: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def _add_to_nearest(
-    located: list[tuple[Group, Placement]], sighting: Sighting, same_name: SameName
+    located: list[tuple[Group, Placement]], sighting: WeighedView, same_name: SameName
 ) -> bool:
     """Adds a view without a direction to the nearest thing of its name; False where none is."""
     here = sighting.waypoint.pose.point
@@ -223,7 +225,7 @@ def _describe(found: Things, pool: Sequence[Located], same_name: SameName) -> tu
 
 def _against(
     found: Things, located: Located, alone: Sequence[Located], same_name: SameName
-) -> list[Sighting]:
+) -> list[WeighedView]:
     """Finds lone views of the name, from where the thing is in plain sight, that point past it."""
     if located.placement is None or len(located.group) < 2:
         return []
@@ -240,7 +242,7 @@ def _against(
     ]
 
 
-def _off_rad(sighting: Sighting, point: Point) -> float:
+def _off_rad(sighting: WeighedView, point: Point) -> float:
     pose, bearing_rad = sighting.waypoint.pose, sighting.landmark.bearing_rad or 0.0
     ahead = pose.yaw_rad + bearing_rad
     return abs(math.remainder(pose.point.bearing_to(point) - ahead, math.tau))
@@ -261,11 +263,11 @@ _SAME_PLACE_M = 0.3
 
 
 def describe_group(
-    group: Sequence[Sighting],
+    group: Sequence[WeighedView],
     placement: Placement | None,
     *,
     agreements: Sequence[float],
-    conflicting: Iterable[Sighting],
+    conflicting: Iterable[WeighedView],
 ) -> Thing:
     """Gives the thing that a group of views has seen.
 
@@ -299,7 +301,7 @@ def _by_votes(words: Iterable[str]) -> list[str]:
     return sorted(counts, key=lambda word: (-counts[word], -len(word), word))
 
 
-def _view(sighting: Sighting, position: Point | None) -> View:
+def _view(sighting: WeighedView, position: Point | None) -> View:
     pose, bearing_rad = sighting.waypoint.pose, sighting.landmark.bearing_rad
     far_m = off_rad = None
     if position is not None and bearing_rad is not None:
@@ -315,7 +317,7 @@ def _view(sighting: Sighting, position: Point | None) -> View:
     )
 
 
-def _confidence(group: Sequence[Sighting], agreements: Sequence[float]) -> float:
+def _confidence(group: Sequence[WeighedView], agreements: Sequence[float]) -> float:
     """Gives how likely it is that not all views are wrong: the odds of each, multiplied.
 
     The first view may be wrong in any way; a further one must be wrong and agree by chance.
@@ -327,7 +329,7 @@ def _confidence(group: Sequence[Sighting], agreements: Sequence[float]) -> float
     return odds / (1 + odds)
 
 
-def _count_agreeing(group: Sequence[Sighting], agreements: Sequence[float]) -> int:
+def _count_agreeing(group: Sequence[WeighedView], agreements: Sequence[float]) -> int:
     agreeing = [
         agreement >= LEAST_AGREEMENT for _, agreement in _from_different_places(group, agreements)
     ]
@@ -335,8 +337,8 @@ def _count_agreeing(group: Sequence[Sighting], agreements: Sequence[float]) -> i
 
 
 def _from_different_places(
-    group: Sequence[Sighting], agreements: Sequence[float]
-) -> Iterator[tuple[Sighting, float]]:
+    group: Sequence[WeighedView], agreements: Sequence[float]
+) -> Iterator[tuple[WeighedView, float]]:
     """Gives the first view from each place, with its agreement."""
     places = list[Point]()
     for each, agreement in zip(group, agreements, strict=True):

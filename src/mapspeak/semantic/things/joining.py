@@ -13,7 +13,7 @@ import numpy as np
 
 from mapspeak.semantic.merging import SAME_SPOT_M
 from mapspeak.semantic.things.laserchanges import find_log_priors
-from mapspeak.semantic.things.likelihood import Sighting, ViewLikelihood, are_apart
+from mapspeak.semantic.things.likelihood import ViewLikelihood, WeighedView, are_apart
 from mapspeak.semantic.things.placing import (
     Posterior,
     build_posterior,
@@ -26,7 +26,7 @@ from mapspeak.semantic.waypoint import Waypoint
 from mapspeak.spatial.grid import FloatArray, IntArray
 
 SameName = Callable[[str, str], bool]
-Group = list[Sighting]
+Group = list[WeighedView]
 
 LEAST_RATIO = 1.0
 """A view speaks of a place that it makes likelier than it was."""
@@ -72,7 +72,7 @@ def group_names(labels: Sequence[str], same_name: SameName) -> list[frozenset[st
 
 
 def join_sightings(
-    posteriors: "Posteriors", sightings: Sequence[Sighting], same_name: SameName
+    posteriors: "Posteriors", sightings: Sequence[WeighedView], same_name: SameName
 ) -> list[Group]:
     """Divides views of one name into groups: one for each thing.
 
@@ -93,7 +93,7 @@ class Posteriors:
 
     def __init__(self, sight: SightMap) -> None:
         self.sight = sight
-        self._known: dict[tuple[Sighting, ...], Posterior] = {}
+        self._known: dict[tuple[WeighedView, ...], Posterior] = {}
 
     def of(self, group: Group) -> Posterior:
         """Gives where the thing of a group of views may be."""
@@ -105,7 +105,7 @@ class Posteriors:
         return self._known[key]
 
 
-def _count(sightings: Sequence[Sighting]) -> _Ballot:
+def _count(sightings: Sequence[WeighedView]) -> _Ballot:
     likelihoods = [_likelihood(each) for each in sightings]
     cells = np.concatenate([each.cells for each in likelihoods])
     sizes = [len(each.cells) for each in likelihoods]
@@ -122,7 +122,7 @@ def _count(sightings: Sequence[Sighting]) -> _Ballot:
 
 
 def _take_peaks(
-    sight: SightMap, sightings: Sequence[Sighting], ballot: _Ballot, same_name: SameName
+    sight: SightMap, sightings: Sequence[WeighedView], ballot: _Ballot, same_name: SameName
 ) -> list[Group]:
     news = (_likelihood(each).news for each in sightings)
     count = _Count(ballot, find_log_priors(sight, ballot.places, news))
@@ -187,7 +187,7 @@ def _around(sight: SightMap, ballot: _Ballot, index: int) -> IntArray:
     return np.asarray(found[ballot.places[found] == cells], dtype=np.intp)
 
 
-def _choose(sightings: Sequence[Sighting], ratios: FloatArray, same_name: SameName) -> list[int]:
+def _choose(sightings: Sequence[WeighedView], ratios: FloatArray, same_name: SameName) -> list[int]:
     """Gives the views that speak of a place, the strongest first, one from each pose."""
     chosen: list[int] = []
     for i in np.argsort(-ratios, kind="stable").tolist():
@@ -198,7 +198,7 @@ def _choose(sightings: Sequence[Sighting], ratios: FloatArray, same_name: SameNa
     return chosen
 
 
-def _fits(sighting: Sighting, members: Iterator[Sighting], same_name: SameName) -> bool:
+def _fits(sighting: WeighedView, members: Iterator[WeighedView], same_name: SameName) -> bool:
     return all(
         not _are_of_one_look(sighting.waypoint, other.waypoint)
         and not are_apart(sighting.spot, other.spot)
@@ -217,7 +217,7 @@ def _are_of_one_look(one: Waypoint, other: Waypoint) -> bool:
 
 def _sweep(
     posteriors: Posteriors,
-    sightings: Sequence[Sighting],
+    sightings: Sequence[WeighedView],
     groups: list[Group],
     ballot: _Ballot,
     same_name: SameName,
@@ -290,6 +290,6 @@ def _evidence(sight: SightMap, group: Group) -> float:
     )
 
 
-def _likelihood(sighting: Sighting) -> ViewLikelihood:
+def _likelihood(sighting: WeighedView) -> ViewLikelihood:
     assert sighting.likelihood is not None, "joined views say where"  # noqa: S101 - our belief
     return sighting.likelihood

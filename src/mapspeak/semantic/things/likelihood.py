@@ -23,7 +23,7 @@ things makes one in a wrong place that nothing tells. Hence no wider; narrower s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Spot:
+class RangedSpot:
     """A point in the map frame, and its covariance in square metres.
 
     Attributes:
@@ -39,7 +39,7 @@ class Spot:
     yy: float
 
 
-def find_spot(pose: Pose, landmark: Landmark, noise: NoiseModel) -> Spot | None:
+def find_spot(pose: Pose, landmark: Landmark, noise: NoiseModel) -> RangedSpot | None:
     """Gives where a landmark says that its thing is; None without a direction or a range."""
     if landmark.bearing_rad is None or landmark.range_m is None:
         return None
@@ -49,7 +49,7 @@ def find_spot(pose: Pose, landmark: Landmark, noise: NoiseModel) -> Spot | None:
     along = (noise.range_m + noise.range_ratio * far_m) ** 2 + body
     across = (noise.bearing_rad * far_m) ** 2 + body
     cos, sin = math.cos(way), math.sin(way)
-    return Spot(
+    return RangedSpot(
         point=Point(pose.x + far_m * cos, pose.y + far_m * sin),
         xx=along * cos * cos + across * sin * sin,
         xy=(along - across) * cos * sin,
@@ -57,7 +57,7 @@ def find_spot(pose: Pose, landmark: Landmark, noise: NoiseModel) -> Spot | None:
     )
 
 
-def are_apart(one: Spot | None, other: Spot | None) -> bool:
+def are_apart(one: RangedSpot | None, other: RangedSpot | None) -> bool:
     """True for two spots so far apart that one thing is hardly in both."""
     if one is None or other is None:
         return False
@@ -194,7 +194,7 @@ def _weigh_range(sight: SightMap, ranges_m: FloatArray, told_m: float) -> FloatA
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Sighting:
+class WeighedView:
     """One landmark of one waypoint; compared by identity.
 
     Attributes:
@@ -211,7 +211,7 @@ class Sighting:
     category: Category
     wrong_ratio: float
     likelihood: ViewLikelihood | None
-    spot: Spot | None
+    spot: RangedSpot | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -226,7 +226,7 @@ class Surroundings:
 
     near_m: FloatArray
     far_m: FloatArray
-    sightings: tuple[Sighting, ...]
+    sightings: tuple[WeighedView, ...]
 
 
 def read_waypoints(
@@ -262,7 +262,7 @@ def _read(
         for landmark in landmarks:
             likelihood = weigh_view(sight, outlook, waypoint.pose, landmark)
             sightings.append(
-                Sighting(
+                WeighedView(
                     waypoint=waypoint,
                     landmark=landmark,
                     category=category,

@@ -5,7 +5,7 @@ from typing import Self
 from pydantic import Field
 
 from mapspeak.driving.exploration import ExplorationState, Progress
-from mapspeak.driving.search import SearchState, Standing
+from mapspeak.driving.search import SearchProgress, SearchState
 from mapspeak.server.reports.robot import PoseReport, Report
 from mapspeak.server.text.exploration import (
     say_blocked,
@@ -128,7 +128,7 @@ class SearchAnswer(Report):
     next_step: str
 
     @classmethod
-    def of(cls, standing: Standing) -> Self:
+    def of(cls, standing: SearchProgress) -> Self:
         """Makes the report of a search."""
         return cls(
             state=standing.state,

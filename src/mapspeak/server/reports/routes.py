@@ -4,7 +4,7 @@ from typing import Self
 
 from pydantic import Field
 
-from mapspeak.driving.routes import RoutePlan, RouteProgress, RouteState, Stop, StopState
+from mapspeak.driving.routes import RoutePlan, RouteProgress, RouteState, RouteStop, StopState
 from mapspeak.server.reports.robot import PoseReport, Report
 from mapspeak.server.text.routes import say_obstacle, say_route
 from mapspeak.server.text.wording import say_pose_doubt
@@ -72,12 +72,12 @@ def _is_better(plan: RoutePlan) -> bool:
     return plan.greedy_m > plan.total_m + DETOUR_M
 
 
-def _say(stop: Stop) -> str:
+def _say(stop: RouteStop) -> str:
     """Gives the words of a stop, with what they are taken for where that is something else."""
     name, words = stop.goal.name, " ".join(stop.words.split())
     is_point = name.startswith("(")
     return name if is_point or name.casefold() == words.casefold() else f"{words} ({name})"
 
 
-def _say_in_full(stop: Stop) -> str:
+def _say_in_full(stop: RouteStop) -> str:
     return stop.goal.title if stop.goal.title.startswith(stop.words) else _say(stop)

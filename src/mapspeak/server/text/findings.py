@@ -3,7 +3,7 @@
 import math
 
 from mapspeak.geometry import Point
-from mapspeak.semantic.consistency import Finding, FindingKind, Trust
+from mapspeak.semantic.consistency import FindingKind, MemoryFinding, Trust
 from mapspeak.semantic.quoting import quote_name
 from mapspeak.semantic.things import Thing, View
 
@@ -38,7 +38,7 @@ def say_conflict(view: View) -> str:
     return f"has it in plain sight, but points {off_deg:.0f} deg past it"
 
 
-def say_finding(finding: Finding) -> str:
+def say_finding(finding: MemoryFinding) -> str:
     """Say what is odd, with numbers."""
     if finding.kind is FindingKind.TWO_LABELS:
         one, other = (f"{_say_thing(each)} by {_count_views(each)}" for each in finding.things)
@@ -50,7 +50,7 @@ def say_finding(finding: Finding) -> str:
     return f"{said}."
 
 
-def _say_of_place(finding: Finding) -> str:
+def _say_of_place(finding: MemoryFinding) -> str:
     told, here = finding.ids or ("", "")
     at = "" if finding.at is None else _say_point(finding.at)
     thing = next(map(_say_thing, finding.things), "")
@@ -74,7 +74,7 @@ def _say_of_place(finding: Finding) -> str:
     return f"{quote_name(finding.waypoints[0])} {said[finding.kind]}"
 
 
-def _say_of_landmark(finding: Finding) -> str:
+def _say_of_landmark(finding: MemoryFinding) -> str:
     place = quote_name(finding.waypoints[0])
     if finding.view is not None:
         return f"{place} {say_conflict(finding.view)}, the {_say_thing(finding.things[0])}"

@@ -91,7 +91,7 @@ class MapLook:
 
 
 @dataclass(frozen=True, slots=True)
-class Part(Generic[Item]):
+class MapPart(Generic[Item]):
     """As many things of a kind as are shown, and how many there are.
 
     Attributes:
@@ -137,13 +137,13 @@ class MapView:
 
     atlas: Atlas
     look: MapLook
-    rooms: Part[Region]
-    corridors: Part[Region]
-    doors: Part[Door]
-    frontiers: Part[Frontier]
-    refused: Part[RefusedFrontier]
-    places: Part[RememberedPlace]
-    closed: Part[ClosedArea]
+    rooms: MapPart[Region]
+    corridors: MapPart[Region]
+    doors: MapPart[Door]
+    frontiers: MapPart[Frontier]
+    refused: MapPart[RefusedFrontier]
+    places: MapPart[RememberedPlace]
+    closed: MapPart[ClosedArea]
 
 
 def view_of(atlas: Atlas, look: MapLook) -> MapView:
@@ -161,21 +161,21 @@ def view_of(atlas: Atlas, look: MapLook) -> MapView:
     return MapView(
         atlas=atlas,
         look=look,
-        rooms=Part.ends(rooms, MOST_ROOMS),
-        corridors=Part.ends(corridors, MOST_CORRIDORS),
-        doors=Part.first(
+        rooms=MapPart.ends(rooms, MOST_ROOMS),
+        corridors=MapPart.ends(corridors, MOST_CORRIDORS),
+        doors=MapPart.first(
             sorted(doors, key=lambda door: path_or_far(atlas.find_crossing(door))), MOST_DOORS
         ),
-        frontiers=Part.first(
+        frontiers=MapPart.first(
             look.some_of(atlas.frontiers.frontiers, lambda each: each.pose.point), MOST_FRONTIERS
         ),
-        refused=Part.first(
+        refused=MapPart.first(
             look.some_of(find_refused(atlas), lambda border: border.anchor), MOST_REFUSED
         ),
-        places=Part.first(
+        places=MapPart.first(
             sorted(places, key=lambda place: path_or_far(place.waypoint.pose.point)), MOST_PLACES
         ),
-        closed=Part.first(
+        closed=MapPart.first(
             [area for area in atlas.map.areas if _shows_some(look, area)], MOST_CLOSED
         ),
     )

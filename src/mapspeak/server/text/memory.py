@@ -9,7 +9,7 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import wrap_angle
 from mapspeak.places.recall import Nearby
 from mapspeak.semantic import Confidence, Landmark, Merge, Reunion, Waypoint
-from mapspeak.semantic.consistency import Finding
+from mapspeak.semantic.consistency import MemoryFinding
 from mapspeak.semantic.episodes import EpisodeMatch, EpisodePage
 from mapspeak.semantic.quoting import quote, quote_name, tell_name
 from mapspeak.server.text.findings import say_finding, say_trust
@@ -147,7 +147,7 @@ def _rows(heading: str, rows: list[str], *, n_all: int, first: int) -> Iterator[
     yield from rows
 
 
-def _say_finding(finding: Finding) -> str:
+def _say_finding(finding: MemoryFinding) -> str:
     return f"{finding.kind.replace('_', ' ')}: {say_finding(finding)}"
 
 

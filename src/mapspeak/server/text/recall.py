@@ -7,7 +7,7 @@ from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import say_spot
 from mapspeak.places.recall import Recall, RecallCandidate, RecallDoubt
 from mapspeak.semantic.quoting import quote
-from mapspeak.semantic.retrieval import Answer, Basis, Candidate, MatchEvidence, Verdict
+from mapspeak.semantic.retrieval import Answer, Basis, EntryCandidate, MatchEvidence, Verdict
 from mapspeak.semantic.waypoint import name_key
 
 LONGEST_QUOTE = 120
@@ -33,7 +33,7 @@ def say_evidence(candidate: RecallCandidate, *, near: Point | None = None) -> st
     return "; ".join(said)
 
 
-def _say_match(found: Candidate) -> str:
+def _say_match(found: EntryCandidate) -> str:
     """Say what a request matches: a name, a meaning, or which words stand where."""
     match found.basis:
         case Basis.NAME:

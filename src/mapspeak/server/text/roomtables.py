@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from mapspeak.places.standing import choose_standing_point, find_standing_point
-from mapspeak.server.text.look import MapView, Part
+from mapspeak.server.text.look import MapPart, MapView
 from mapspeak.server.text.wording import (
     build_table,
     list_some,
@@ -91,7 +91,7 @@ def _say_stop(stop: PassedDoor) -> str:
     return f"{stop.region_id} ({stop.door_id}, {stop.along_m:.1f} m)"
 
 
-def _say_open_spaces(rooms: Part[Region]) -> str:
+def _say_open_spaces(rooms: MapPart[Region]) -> str:
     has_any = any(region.room_class is RoomClass.OPEN_SPACE for region in rooms.items)
     return " and open spaces (O)" if has_any else ""
 

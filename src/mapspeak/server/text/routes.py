@@ -1,6 +1,6 @@
 """A route in words: why a call ended, and why a stop was left out."""
 
-from mapspeak.driving.routes import RouteProgress, RouteState, Stop, StopState
+from mapspeak.driving.routes import RouteProgress, RouteState, RouteStop, StopState
 from mapspeak.places.goalcheck import say_check
 from mapspeak.robot import GoalStatus
 
@@ -18,7 +18,7 @@ def say_route(progress: RouteProgress) -> str:
         return f"The robot stands at stop {number}, {stop.words}."
     if progress.ended is not None:
         return progress.ended.reason or f"The drive to stop {number} was {progress.ended.state}."
-    return f"Stop {number}, {stop.words}: {say_obstacle(stop)}"
+    return f"RouteStop {number}, {stop.words}: {say_obstacle(stop)}"
 
 
 def _say_driving(progress: RouteProgress) -> str:
@@ -28,7 +28,7 @@ def _say_driving(progress: RouteProgress) -> str:
     return f"The robot pauses at {'the last' if is_last else 'a'} stop."
 
 
-def say_obstacle(stop: Stop) -> str:
+def say_obstacle(stop: RouteStop) -> str:
     """Say why a stop was left out, or could not be reached yet."""
     if stop.obstacle is None:
         return ""

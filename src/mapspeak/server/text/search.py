@@ -2,11 +2,11 @@
 
 from mapspeak.driving.search import (
     BudgetKind,
-    Candidate,
     CandidateKind,
     Earlier,
+    SearchCandidate,
+    SearchProgress,
     SearchState,
-    Standing,
 )
 from mapspeak.server.text.exploration import say_trip_end
 
@@ -18,7 +18,7 @@ STATES = {
 }
 
 
-def say_standing(standing: Standing) -> str:
+def say_standing(standing: SearchProgress) -> str:
     """Say why a call of a search ended as it did, and what is new since the call before."""
     earlier = "" if standing.earlier is None else _say_earlier(standing.earlier)
     anew = "Nothing new is left: what only earlier pictures showed is looked at anew."
@@ -26,7 +26,7 @@ def say_standing(standing: Standing) -> str:
     return " ".join(filter(None, told))
 
 
-def _say_state(standing: Standing) -> str:
+def _say_state(standing: SearchProgress) -> str:
     match standing.state:
         case SearchState.REPORTED:
             return f"The robot's detector reports {standing.label}."
@@ -39,7 +39,7 @@ def _say_state(standing: Standing) -> str:
     return STATES[standing.state]
 
 
-def _say_spent(standing: Standing) -> str:
+def _say_spent(standing: SearchProgress) -> str:
     if standing.spent is BudgetKind.LOOKS:
         return f"{standing.budget.n_looks} pictures were looked at."
     return f"{standing.budget.driven_m:.0f} m were driven."
@@ -59,12 +59,12 @@ def _say_earlier(earlier: Earlier) -> str:
     return f"{said[:1].upper()}{said[1:]}." if said else ""
 
 
-def say_candidate(candidate: Candidate) -> str:
+def say_candidate(candidate: SearchCandidate) -> str:
     """Say where the robot could look, and why there, with numbers."""
     return f"{candidate.id}: {_say_why(candidate)}"
 
 
-def _say_why(candidate: Candidate) -> str:
+def _say_why(candidate: SearchCandidate) -> str:
     away = f"{candidate.path_m:.1f} m away"
     if candidate.kind is CandidateKind.REMEMBERED:
         is_thing = candidate.id.startswith("T")

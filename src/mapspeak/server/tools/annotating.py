@@ -18,7 +18,7 @@ from mapspeak.semantic import (
     LaserFan,
     LaserRing,
     PictureBook,
-    Reading,
+    PictureReading,
     TakenPicture,
     Waypoint,
     find_objection,
@@ -285,7 +285,7 @@ def _range_of(
     return measured_m, reading.source
 
 
-def _find_reading(label: str, way_rad: float, picture: TakenPicture) -> Reading | None:
+def _find_reading(label: str, way_rad: float, picture: TakenPicture) -> PictureReading | None:
     """Gives what was measured of a thing of that name in a direction of the map frame."""
     found = [
         (off_rad, number)

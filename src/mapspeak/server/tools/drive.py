@@ -14,7 +14,7 @@ from mapspeak.server.tools.asking import (
     client_of,
     tell_progress,
 )
-from mapspeak.server.tools.toolset import Effect, Tool
+from mapspeak.server.tools.toolset import Tool, ToolEffect
 from mapspeak.session import Session
 
 Place = Annotated[
@@ -52,23 +52,26 @@ class DriveTools:
             Tool(
                 function=self.navigate_to,
                 title="Drive to a place",
-                effect=Effect.MOVES,
+                effect=ToolEffect.MOVES,
                 has_report=True,
                 is_entry=True,
             ),
             Tool(
                 function=self.wait_for_goal,
                 title="Wait for a drive",
-                effect=Effect.READS,
+                effect=ToolEffect.READS,
                 has_report=True,
             ),
             Tool(
                 function=self.cancel_goal,
                 title="Cancel a drive",
-                effect=Effect.STOPS,
+                effect=ToolEffect.STOPS,
             ),
             Tool(
-                function=self.stop_robot, title="Stop the robot", effect=Effect.STOPS, is_entry=True
+                function=self.stop_robot,
+                title="Stop the robot",
+                effect=ToolEffect.STOPS,
+                is_entry=True,
             ),
         ]
 

@@ -31,8 +31,8 @@ from mapspeak.server.tools.asking import (
     client_of,
     tell_progress,
 )
-from mapspeak.server.tools.sightings import Sighting, look_ahead
-from mapspeak.server.tools.toolset import Effect, Tool
+from mapspeak.server.tools.sightings import CameraSighting, look_ahead
+from mapspeak.server.tools.toolset import Tool, ToolEffect
 from mapspeak.session import Session
 
 LEAST_TURN_S = 0.5
@@ -116,17 +116,19 @@ class ExploreTools:
             Tool(
                 function=self.explore,
                 title="Explore the unknown",
-                effect=Effect.MOVES,
+                effect=ToolEffect.MOVES,
                 has_report=True,
             ),
             Tool(
                 function=self.search_for,
                 title="Find a thing",
-                effect=Effect.MOVES,
+                effect=ToolEffect.MOVES,
                 has_report=True,
             ),
-            Tool(function=self.turn, title="Turn in place", effect=Effect.MOVES, has_report=True),
-            Tool(function=self.look_around, title="Look all around", effect=Effect.MOVES),
+            Tool(
+                function=self.turn, title="Turn in place", effect=ToolEffect.MOVES, has_report=True
+            ),
+            Tool(function=self.look_around, title="Look all around", effect=ToolEffect.MOVES),
         ]
 
     async def explore(
@@ -267,7 +269,7 @@ class ExploreTools:
                 hint="Use explore, and look at the map.",
             )
 
-    async def _look_if_it_can(self) -> Sighting | None:
+    async def _look_if_it_can(self) -> CameraSighting | None:
         robot = self._session.robot
         return await look_ahead(self._session) if robot.description.has_camera else None
 
@@ -295,7 +297,7 @@ def _count_all_around(picture: CameraPicture) -> int:
     )
 
 
-def _answer(report: Report, sighting: Sighting | None) -> CallToolResult:
+def _answer(report: Report, sighting: CameraSighting | None) -> CallToolResult:
     """Gives a report as text and data, and what the camera sees with it."""
     content: list[TextContent | ImageContent] = [
         TextContent(type="text", text=report.model_dump_json())

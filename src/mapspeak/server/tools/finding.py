@@ -13,7 +13,7 @@ from mapspeak.places.recall import RecallQuery, recall
 from mapspeak.semantic.retrieval import EntryKind
 from mapspeak.server.reports.memory import RecallAnswer, say_reported
 from mapspeak.server.text.memory import read_moment
-from mapspeak.server.tools.toolset import Effect, Tool
+from mapspeak.server.tools.toolset import Tool, ToolEffect
 from mapspeak.session import Session
 from mapspeak.spatial.rooms import Region
 from mapspeak.worldmodel.model import Atlas
@@ -36,7 +36,7 @@ class FindTools:
     def tools(self) -> list[Tool]:
         """Gives the tool."""
         # Its report is not declared: a schema of answers would cost more than all its arguments.
-        return [Tool(function=self.find_place, title="Find in memory", effect=Effect.READS)]
+        return [Tool(function=self.find_place, title="Find in memory", effect=ToolEffect.READS)]
 
     async def find_place(
         self,

@@ -10,7 +10,7 @@ from mapspeak.server.mapview.representations import Representation, show
 from mapspeak.server.reports.robot import PoseAnswer
 from mapspeak.server.text.look import Layer, Up, look_at, view_of
 from mapspeak.server.tools.sightings import look_ahead
-from mapspeak.server.tools.toolset import Effect, Tool
+from mapspeak.server.tools.toolset import Tool, ToolEffect
 from mapspeak.session import Session
 
 Layers = Annotated[
@@ -47,19 +47,19 @@ class LookTools:
             Tool(
                 function=self.look_at_map,
                 title="Look at the map",
-                effect=Effect.READS,
+                effect=ToolEffect.READS,
                 is_entry=True,
             ),
             Tool(
                 function=self.look_through_camera,
                 title="Look through the camera",
-                effect=Effect.READS,
+                effect=ToolEffect.READS,
                 is_entry=True,
             ),
             Tool(
                 function=self.get_robot_pose,
                 title="Where the robot is",
-                effect=Effect.READS,
+                effect=ToolEffect.READS,
                 has_report=True,
             ),
         ]

@@ -32,7 +32,7 @@ from mapspeak.server.text.memory import (
     say_episode,
 )
 from mapspeak.server.tools.finding import FindTools, find_point, find_room
-from mapspeak.server.tools.toolset import Effect, Tool
+from mapspeak.server.tools.toolset import Tool, ToolEffect
 from mapspeak.session import Session
 from mapspeak.worldmodel.model import Atlas
 
@@ -94,14 +94,18 @@ class MemoryTools:
         """Gives the tools in their order."""
         return [
             *FindTools(self._session).tools(),
-            Tool(function=self.check_memory, title="What is odd in memory", effect=Effect.READS),
-            Tool(function=self.recall_episodes, title="Recall observations", effect=Effect.READS),
-            Tool(function=self.note_event, title="Note an event", effect=Effect.REMEMBERS),
-            Tool(function=self.end_event, title="End an event", effect=Effect.REMEMBERS),
+            Tool(
+                function=self.check_memory, title="What is odd in memory", effect=ToolEffect.READS
+            ),
+            Tool(
+                function=self.recall_episodes, title="Recall observations", effect=ToolEffect.READS
+            ),
+            Tool(function=self.note_event, title="Note an event", effect=ToolEffect.REMEMBERS),
+            Tool(function=self.end_event, title="End an event", effect=ToolEffect.REMEMBERS),
             Tool(
                 function=self.realign_memory,
                 title="Move memory with its map",
-                effect=Effect.REMEMBERS,
+                effect=ToolEffect.REMEMBERS,
             ),
         ]
 

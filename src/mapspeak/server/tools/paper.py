@@ -20,7 +20,7 @@ from mapspeak.server.text.recall import say_advice
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.server.tools.annotating import Annotator, Landmarks
 from mapspeak.server.tools.sightings import fetch_ring
-from mapspeak.server.tools.toolset import Effect, Tool
+from mapspeak.server.tools.toolset import Tool, ToolEffect
 from mapspeak.session import Session
 from mapspeak.spatial.picture import (
     draw_map_axis,
@@ -63,28 +63,28 @@ class PaperTools:
             Tool(
                 function=self.subscribe_map_as_image,
                 title="Map as a grey picture (paper)",
-                effect=Effect.READS,
+                effect=ToolEffect.READS,
             ),
             Tool(
                 function=self.draw_map_axis,
                 title="Map with axes and grid (paper)",
-                effect=Effect.READS,
+                effect=ToolEffect.READS,
             ),
             Tool(
                 function=self.draw_robot_pose,
                 title="Map with the robot's pose (paper)",
-                effect=Effect.READS,
+                effect=ToolEffect.READS,
             ),
             Tool(
                 function=self.write_semantic_data,
                 title="Remember this place",
-                effect=Effect.REMEMBERS,
+                effect=ToolEffect.REMEMBERS,
                 has_report=True,
             ),
             Tool(
                 function=self.get_semantic_data,
                 title="Recall remembered places",
-                effect=Effect.READS,
+                effect=ToolEffect.READS,
                 has_report=True,
             ),
         ]

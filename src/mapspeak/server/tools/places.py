@@ -9,7 +9,7 @@ from mapspeak.server.reports.robot import GoalAnswer
 from mapspeak.server.text.descriptions import describe_place
 from mapspeak.server.text.measures import describe_measures
 from mapspeak.server.tools.finding import FindTools
-from mapspeak.server.tools.toolset import Effect, Tool
+from mapspeak.server.tools.toolset import Tool, ToolEffect
 from mapspeak.session import Session
 
 MOST_PLACES = 30
@@ -38,12 +38,12 @@ class PlaceTools:
         """Gives the tools in their order."""
         return [
             *FindTools(self._session).tools(),
-            Tool(function=self.describe_place, title="One place in full", effect=Effect.READS),
-            Tool(function=self.measure, title="Measure ways and sizes", effect=Effect.READS),
+            Tool(function=self.describe_place, title="One place in full", effect=ToolEffect.READS),
+            Tool(function=self.measure, title="Measure ways and sizes", effect=ToolEffect.READS),
             Tool(
                 function=self.check_goal,
                 title="Check a goal",
-                effect=Effect.READS,
+                effect=ToolEffect.READS,
                 has_report=True,
             ),
         ]

@@ -17,8 +17,8 @@ from mapspeak.server.tools.asking import (
     client_of,
     tell_progress,
 )
-from mapspeak.server.tools.sightings import Sighting, look_ahead
-from mapspeak.server.tools.toolset import Effect, Tool
+from mapspeak.server.tools.sightings import CameraSighting, look_ahead
+from mapspeak.server.tools.toolset import Tool, ToolEffect
 from mapspeak.session import Session
 
 MOST_STOPS = 20
@@ -58,7 +58,7 @@ class RouteTools:
             Tool(
                 function=self.follow_route,
                 title="Follow a route",
-                effect=Effect.MOVES,
+                effect=ToolEffect.MOVES,
                 has_report=True,
             )
         ]
@@ -97,7 +97,7 @@ class RouteTools:
         )
 
 
-def _answer(report: RouteAnswer, sighting: Sighting | None) -> CallToolResult:
+def _answer(report: RouteAnswer, sighting: CameraSighting | None) -> CallToolResult:
     """Gives the report as text and data, and what the camera sees with it."""
     content: list[TextContent | ImageContent] = [
         TextContent(type="text", text=report.model_dump_json())

@@ -9,7 +9,7 @@ from mcp.server.mcpserver import Image
 
 from mapspeak.errors import LinkError
 from mapspeak.robot import SCAN_PATIENCE_S, CameraPicture, Detection, Robot
-from mapspeak.semantic import LaserRing, Reading, build_ring
+from mapspeak.semantic import LaserRing, PictureReading, build_ring
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.session import Session
 
@@ -35,7 +35,7 @@ async def fetch_ring(robot: Robot) -> LaserRing | None:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sighting:
+class CameraSighting:
     """A picture of the front camera, and what is to be said of it.
 
     Attributes:
@@ -54,7 +54,7 @@ class Sighting:
         return Image(data=self.picture.data, format=self.picture.media_type.partition("/")[2])
 
 
-async def look_ahead(session: Session) -> Sighting:
+async def look_ahead(session: Session) -> CameraSighting:
     """Takes a picture with the robot's front camera, names it, and keeps it as an episode.
 
     Raises:
@@ -87,14 +87,14 @@ async def look_ahead(session: Session) -> Sighting:
     lines += [say_pose_doubt(picture.pose_doubt)] if picture.pose_doubt else []
     lines += [] if detector is None else _say_detections(detector, detections)
     lines += [kept.fault] if kept.fault else []
-    return Sighting(text="\n".join(lines), picture=picture, detections=detections)
+    return CameraSighting(text="\n".join(lines), picture=picture, detections=detections)
 
 
-def _read(detector: str | None, detections: tuple[Detection, ...]) -> Iterator[Reading]:
+def _read(detector: str | None, detections: tuple[Detection, ...]) -> Iterator[PictureReading]:
     """Gives what was measured, for the records that may be made of the picture."""
     for seen in detections:
         if detector is not None and seen.range_m is not None:
-            yield Reading(
+            yield PictureReading(
                 label=seen.label,
                 bearing_rad=seen.bearing_rad,
                 range_m=seen.range_m,

@@ -10,7 +10,7 @@ from typing import Any, get_args, get_type_hints
 from mcp_types import ToolAnnotations
 
 
-class Effect(StrEnum):
+class ToolEffect(StrEnum):
     """What calling a tool changes."""
 
     READS = "reads"
@@ -34,7 +34,7 @@ class Tool:
 
     function: Callable[..., Awaitable[Any]]
     title: str
-    effect: Effect
+    effect: ToolEffect
     has_report: bool = False
     is_entry: bool = False
     former: Mapping[str, str] = field(default_factory=dict)
@@ -66,12 +66,12 @@ class Tool:
     @property
     def annotations(self) -> ToolAnnotations:
         """The hints of the MCP specification; of a tool that reads, the others mean nothing."""
-        if self.effect is Effect.READS:
+        if self.effect is ToolEffect.READS:
             return ToolAnnotations(read_only_hint=True)
         return ToolAnnotations(
             read_only_hint=False,
-            destructive_hint=self.effect is Effect.MOVES,
-            idempotent_hint=self.effect is not Effect.MOVES,
+            destructive_hint=self.effect is ToolEffect.MOVES,
+            idempotent_hint=self.effect is not ToolEffect.MOVES,
             open_world_hint=False,
         )
 

@@ -14,7 +14,7 @@ from mapspeak.safety import Act
 from mapspeak.server.text.wording import say_count
 from mapspeak.server.tools.asking import LONGEST_WAIT_S, client_of
 from mapspeak.server.tools.ros.commands import RosCommands
-from mapspeak.server.tools.ros.goals import ActionBook, Job
+from mapspeak.server.tools.ros.goals import ActionBook, TrackedGoal
 from mapspeak.server.tools.ros.inquiry import Described, RosInquiry, full_name
 from mapspeak.server.tools.ros.measuring import check_frames
 from mapspeak.server.tools.ros.reports import (
@@ -27,7 +27,7 @@ from mapspeak.server.tools.ros.reports import (
     show_message,
 )
 from mapspeak.server.tools.ros.views import view_fields
-from mapspeak.server.tools.toolset import Effect, Tool
+from mapspeak.server.tools.toolset import Tool, ToolEffect
 
 MOST_LISTED = 20
 
@@ -74,16 +74,20 @@ class ActionTools:
     def tools(self) -> list[Tool]:
         """Gives the tools in their order."""
         return [
-            Tool(function=self.ros_actions, title="List ROS actions", effect=Effect.READS),
-            Tool(function=self.ros_action, title="One ROS action", effect=Effect.READS),
+            Tool(function=self.ros_actions, title="List ROS actions", effect=ToolEffect.READS),
+            Tool(function=self.ros_action, title="One ROS action", effect=ToolEffect.READS),
             Tool(
                 function=self.ros_send_goal,
                 title="Send a ROS goal",
-                effect=Effect.MOVES,
+                effect=ToolEffect.MOVES,
                 former={"goal": "fields"},
             ),
-            Tool(function=self.ros_goal_status, title="How a ROS goal stands", effect=Effect.READS),
-            Tool(function=self.ros_cancel_goal, title="Cancel a ROS goal", effect=Effect.STOPS),
+            Tool(
+                function=self.ros_goal_status,
+                title="How a ROS goal stands",
+                effect=ToolEffect.READS,
+            ),
+            Tool(function=self.ros_cancel_goal, title="Cancel a ROS goal", effect=ToolEffect.STOPS),
         ]
 
     async def ros_actions(self, filter: Filter = None, page: Page = 1) -> str:  # noqa: A002
@@ -199,7 +203,7 @@ class ActionTools:
         except LinkError:
             return "(its type is not told)"
 
-    def _say_job(self, job: Job) -> str:
+    def _say_job(self, job: TrackedGoal) -> str:
         goal = job.goal
         passed_s = (goal.ended_s or anyio.current_time()) - goal.sent_s
         parts = [f"{job.handle} ({goal.action}): {goal.state} after {passed_s:.1f} s."]

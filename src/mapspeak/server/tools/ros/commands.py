@@ -137,7 +137,7 @@ BY_HAND = "If the robot still moves, stop it by hand; stop_robot works once the 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Publication:
+class PublishRequest:
     """What is to be published.
 
     Attributes:
@@ -184,7 +184,7 @@ class Publisher:
         self._commands = commands
         self._moving_until_s: dict[str, float] = {}
 
-    async def publish(self, wanted: Publication) -> str:
+    async def publish(self, wanted: PublishRequest) -> str:
         """Publishes, and says what was sent and what it ended with.
 
         Raises:
@@ -202,7 +202,7 @@ class Publisher:
             guard = self._session.guard
             return " ".join((said, *(() if guard is None else guard.warn_of_servers())))
 
-    async def _send(self, wanted: Publication, ticket: int) -> str:
+    async def _send(self, wanted: PublishRequest, ticket: int) -> str:
         await self._commands.prepare(wanted.topic, wanted.type)
         if self._was_stopped(ticket):
             raise LinkError(
@@ -214,7 +214,7 @@ class Publisher:
         await self._commands.publish(wanted.topic, wanted.message)
         return f"Published once on {wanted.topic}"
 
-    async def _send_for(self, wanted: Publication, duration_s: float, ticket: int) -> str:
+    async def _send_for(self, wanted: PublishRequest, duration_s: float, ticket: int) -> str:
         run = _Run()
         is_cut_off, has_stood = False, True
         try:
@@ -230,7 +230,9 @@ class Publisher:
             raise _cut_off(wanted, run, has_stood=has_stood)
         return f"{run.say()}{', then a stand' if wanted.is_moving else ''} on {wanted.topic}"
 
-    async def _repeat(self, wanted: Publication, duration_s: float, run: _Run, ticket: int) -> None:
+    async def _repeat(
+        self, wanted: PublishRequest, duration_s: float, run: _Run, ticket: int
+    ) -> None:
         """Publishes until the time is over or something else ends it.
 
         Raises:
@@ -256,7 +258,7 @@ class Publisher:
             return now != ticket
 
     @contextmanager
-    def _moving(self, wanted: Publication) -> Generator[None]:
+    def _moving(self, wanted: PublishRequest) -> Generator[None]:
         """Keeps others from the topic while the context lasts."""
         until_s = anyio.current_time() + (wanted.duration_s or 0.0)
         self._moving_until_s[wanted.topic] = until_s
@@ -297,7 +299,7 @@ class Publisher:
         return None if until_s is None else max(until_s - anyio.current_time(), 0.0)
 
 
-def _cut_off(wanted: Publication, run: _Run, *, has_stood: bool) -> LinkError:
+def _cut_off(wanted: PublishRequest, run: _Run, *, has_stood: bool) -> LinkError:
     said = f"{run.say()} on {wanted.topic}, then the connection was lost"
     if not wanted.is_moving:
         return LinkError(

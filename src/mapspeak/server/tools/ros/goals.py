@@ -23,7 +23,7 @@ USUAL_PATIENCE = ActionPatience()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Job:
+class TrackedGoal:
     """A goal with the handle that a model calls it by.
 
     Attributes:
@@ -71,7 +71,7 @@ class ActionBook:
         self._inquiry = inquiry
         self._commands = commands
         self._patience = patience
-        self._jobs: OrderedDict[str, Job] = OrderedDict()
+        self._jobs: OrderedDict[str, TrackedGoal] = OrderedDict()
         self._n_sent = 0
 
     @property
@@ -87,7 +87,7 @@ class ActionBook:
         type_name: str,
         client: str = "",
         n_stops: int | None = None,
-    ) -> Job:
+    ) -> TrackedGoal:
         """Send a goal, and wait until the action server has taken or refused it.
 
         Args:
@@ -107,14 +107,14 @@ class ActionBook:
             await self._commands.prepare(topic, topic_type)
         sent = await opened.send(goal, through=connection, owner=client, n_stops=n_stops)
         self._n_sent += 1
-        job = Job(handle=f"A{self._n_sent}", goal=sent, action=opened)
+        job = TrackedGoal(handle=f"A{self._n_sent}", goal=sent, action=opened)
         self._jobs[job.handle] = job
         while len(self._jobs) > MOST_KEPT:
             self._jobs.popitem(last=False)
         await opened.wait_until_taken(sent)
         return job
 
-    def find(self, handle: str | None) -> Job:
+    def find(self, handle: str | None) -> TrackedGoal:
         """Return a goal as it stands now; the latest when no handle is given.
 
         Raises:
@@ -131,14 +131,14 @@ class ActionBook:
         job.action.look()
         return job
 
-    async def wait(self, job: Job, *, wait_s: float) -> None:
+    async def wait(self, job: TrackedGoal, *, wait_s: float) -> None:
         """Wait until a goal is over, or so long in wall time."""
         until_s = anyio.current_time() + wait_s
         while not job.goal.is_over and (left_s := until_s - anyio.current_time()) > 0:
             await job.goal.wait_until_over(within_s=min(left_s, POLL_S))
             job.action.look()
 
-    async def cancel(self, job: Job) -> None:
+    async def cancel(self, job: TrackedGoal) -> None:
         """End a goal, and wait a moment for its end.
 
         Raises:

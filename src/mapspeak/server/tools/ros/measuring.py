@@ -17,7 +17,7 @@ from mapspeak.server.tools.ros.inquiry import RosInquiry, full_name
 from mapspeak.server.tools.ros.reading import Heard, hear, say_lag, say_rate, say_stamp
 from mapspeak.server.tools.ros.reports import cut
 from mapspeak.server.tools.ros.views import BULKY
-from mapspeak.server.tools.toolset import Effect, Tool
+from mapspeak.server.tools.toolset import Tool, ToolEffect
 from mapspeak.session import Session
 
 TRANSFORMS = "tf2_msgs/TFMessage"
@@ -277,8 +277,8 @@ class MeasuringTools:
     def tools(self) -> list[Tool]:
         """Gives the tools in their order."""
         return [
-            Tool(function=self.ros_rates, title="Rates of ROS topics", effect=Effect.READS),
-            Tool(function=self.ros_frames, title="The tree of TF frames", effect=Effect.READS),
+            Tool(function=self.ros_rates, title="Rates of ROS topics", effect=ToolEffect.READS),
+            Tool(function=self.ros_frames, title="The tree of TF frames", effect=ToolEffect.READS),
         ]
 
     async def ros_rates(self, topics: Topics, duration_s: Listen = 3.0) -> str:

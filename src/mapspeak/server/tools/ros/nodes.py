@@ -23,7 +23,7 @@ from mapspeak.server.tools.ros.reports import (
     say_page,
     show_value,
 )
-from mapspeak.server.tools.toolset import Effect, Tool
+from mapspeak.server.tools.toolset import Tool, ToolEffect
 
 MOST_DESCRIBED = 5
 MOST_AT_ONCE = 8
@@ -66,10 +66,14 @@ class NodeTools:
     def tools(self) -> list[Tool]:
         """Gives the tools in their order."""
         return [
-            Tool(function=self.ros_nodes, title="List ROS nodes", effect=Effect.READS),
-            Tool(function=self.ros_node, title="One ROS node", effect=Effect.READS),
-            Tool(function=self.ros_parameters, title="ROS parameters", effect=Effect.READS),
-            Tool(function=self.ros_set_parameter, title="Set a ROS parameter", effect=Effect.MOVES),
+            Tool(function=self.ros_nodes, title="List ROS nodes", effect=ToolEffect.READS),
+            Tool(function=self.ros_node, title="One ROS node", effect=ToolEffect.READS),
+            Tool(function=self.ros_parameters, title="ROS parameters", effect=ToolEffect.READS),
+            Tool(
+                function=self.ros_set_parameter,
+                title="Set a ROS parameter",
+                effect=ToolEffect.MOVES,
+            ),
         ]
 
     async def ros_overview(self) -> str:

@@ -16,7 +16,7 @@ from mapspeak.server.tools.ros.inquiry import Described, RosInquiry, full_name
 from mapspeak.server.tools.ros.reading import say_stamp
 from mapspeak.server.tools.ros.reports import Filter, Page, choose, cut, say_page, show_message
 from mapspeak.server.tools.ros.views import view_fields
-from mapspeak.server.tools.toolset import Effect, Tool
+from mapspeak.server.tools.toolset import Tool, ToolEffect
 from mapspeak.session import Session
 
 Service = Annotated[str, Field(description="full name, such as /reset", max_length=200)]
@@ -50,12 +50,12 @@ class ServiceTools:
     def tools(self) -> list[Tool]:
         """Gives the tools in their order."""
         return [
-            Tool(function=self.ros_services, title="List ROS services", effect=Effect.READS),
-            Tool(function=self.ros_service, title="One ROS service", effect=Effect.READS),
+            Tool(function=self.ros_services, title="List ROS services", effect=ToolEffect.READS),
+            Tool(function=self.ros_service, title="One ROS service", effect=ToolEffect.READS),
             Tool(
                 function=self.ros_call,
                 title="Call a ROS service",
-                effect=Effect.MOVES,
+                effect=ToolEffect.MOVES,
                 former={"arguments": "fields"},
             ),
         ]

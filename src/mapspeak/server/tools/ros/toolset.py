@@ -8,7 +8,7 @@ from mapspeak.server.tools.ros.measuring import MeasuringTools
 from mapspeak.server.tools.ros.nodes import NodeTools
 from mapspeak.server.tools.ros.services import ServiceTools
 from mapspeak.server.tools.ros.topics import TopicTools
-from mapspeak.server.tools.toolset import Effect, Tool
+from mapspeak.server.tools.toolset import Tool, ToolEffect
 from mapspeak.session import Session
 
 
@@ -34,7 +34,7 @@ class RosTools:
             Tool(
                 function=self._nodes.ros_overview,
                 title="The ROS system at a glance",
-                effect=Effect.READS,
+                effect=ToolEffect.READS,
                 is_entry=True,
             ),
             *self._topics.tools(),

@@ -14,13 +14,13 @@ from mapspeak.ros.messages import Message, bare_type
 from mapspeak.safety import Publish, zero_velocity_of
 from mapspeak.server.text.wording import list_some
 from mapspeak.server.tools.ros.census import Census, fetch_hearers, fetch_publishers, take_census
-from mapspeak.server.tools.ros.commands import VELOCITIES, Publication, Publisher, RosCommands
+from mapspeak.server.tools.ros.commands import VELOCITIES, Publisher, PublishRequest, RosCommands
 from mapspeak.server.tools.ros.inquiry import ACTION_GOAL, RosInquiry, full_name
 from mapspeak.server.tools.ros.measuring import check_frames, say_silence
 from mapspeak.server.tools.ros.reading import Heard, hear, say_rate, say_stamp
 from mapspeak.server.tools.ros.reports import Filter, Page, choose, cut, say_loss, say_page
-from mapspeak.server.tools.ros.views import BULKY, View, view_message
-from mapspeak.server.tools.toolset import Effect, Tool
+from mapspeak.server.tools.ros.views import BULKY, MessageView, view_message
+from mapspeak.server.tools.toolset import Tool, ToolEffect
 from mapspeak.session import Session
 
 LONGEST_S = 25.0
@@ -73,19 +73,21 @@ class TopicTools:
         self._inquiry = inquiry
         self._commands = commands
         self._publisher = Publisher(session, commands)
-        self._viewed: dict[str, tuple[Message, View]] = {}
+        self._viewed: dict[str, tuple[Message, MessageView]] = {}
 
     def tools(self) -> list[Tool]:
         """Gives the tools in their order."""
         return [
-            Tool(function=self.ros_topics, title="List ROS topics", effect=Effect.READS),
-            Tool(function=self.ros_topic, title="One ROS topic", effect=Effect.READS),
-            Tool(function=self.ros_type, title="What a ROS type looks like", effect=Effect.READS),
-            Tool(function=self.ros_read, title="Read a ROS topic", effect=Effect.READS),
+            Tool(function=self.ros_topics, title="List ROS topics", effect=ToolEffect.READS),
+            Tool(function=self.ros_topic, title="One ROS topic", effect=ToolEffect.READS),
+            Tool(
+                function=self.ros_type, title="What a ROS type looks like", effect=ToolEffect.READS
+            ),
+            Tool(function=self.ros_read, title="Read a ROS topic", effect=ToolEffect.READS),
             Tool(
                 function=self.ros_publish,
                 title="Publish on a ROS topic",
-                effect=Effect.MOVES,
+                effect=ToolEffect.MOVES,
                 former={"message": "fields"},
             ),
         ]
@@ -200,7 +202,7 @@ class TopicTools:
                 hint=f"Give duration_s, in seconds up to {LONGEST_S:g}.",
             )
         said = await self._publisher.publish(
-            Publication(
+            PublishRequest(
                 topic=name,
                 type=await self._inquiry.said(type_name),
                 message=checked,
@@ -273,7 +275,7 @@ class TopicTools:
         text = "\n".join([head, *texts])
         return [cut(text), *([] if picture is None else [picture])]
 
-    async def _view(self, topic: str, type_name: str, message: Message) -> View:
+    async def _view(self, topic: str, type_name: str, message: Message) -> MessageView:
         if type_name not in BULKY:
             return view_message(type_name, message)
         known = self._viewed.get(topic)
