@@ -29,7 +29,7 @@ from mapspeak.links.simulated import Clock, open_simulated_robot
 from mapspeak.ros.messages import Dialect
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.semantic import SemanticMapStore
-from mapspeak.server import build_server
+from mapspeak.server.app import build_server
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, load_world
 

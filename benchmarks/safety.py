@@ -45,7 +45,7 @@ from mapspeak.safety import (
     read_audit,
 )
 from mapspeak.semantic import SemanticMapStore
-from mapspeak.server import build_server
+from mapspeak.server.app import build_server
 from mapspeak.server.toolsets import build_toolsets
 from mapspeak.session import Session
 from mapspeak.simulator import BODY_RADIUS_M, Simulation, load_world

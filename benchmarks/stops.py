@@ -29,7 +29,7 @@ from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.ros.messages import Dialect
 from mapspeak.ros.robot import RosRobot
 from mapspeak.semantic import SemanticMapStore
-from mapspeak.server import build_server
+from mapspeak.server.app import build_server
 from mapspeak.session import Session
 
 __all__ = ["measure"]

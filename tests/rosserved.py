@@ -17,7 +17,7 @@ from mapspeak.ros.messages import Dialect
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.safety import Guard
 from mapspeak.semantic import SemanticMapStore
-from mapspeak.server import build_server
+from mapspeak.server.app import build_server
 from mapspeak.session import Session
 from rosbridge_robot import ScriptedRobot
 from rosbridge_script import PATIENCE_S, running

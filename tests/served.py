@@ -12,7 +12,9 @@ from mcp_types import CallToolResult, ImageContent, TextContent
 from mapspeak.robot import Robot
 from mapspeak.safety import Guard
 from mapspeak.semantic import SemanticMapStore
-from mapspeak.server import DEFAULT_TOOLSETS, CallLog, Representation, build_server
+from mapspeak.server.app import DEFAULT_TOOLSETS, build_server
+from mapspeak.server.calllog import CallLog
+from mapspeak.server.mapview.representations import Representation
 from mapspeak.session import Session
 
 MODES = ("auto", "legacy")

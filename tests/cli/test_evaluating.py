@@ -10,7 +10,7 @@ from mapspeak.evaluation.agents import agent_names
 from mapspeak.evaluation.agents.models import Thinking
 from mapspeak.evaluation.tasks import FAMILIES
 from mapspeak.evaluation.trials import read_results, trial_folder, write_result
-from mapspeak.server import Representation
+from mapspeak.server.mapview.representations import Representation
 from reportmaking import make_result, make_trial
 
 TWO_ROOMS = """

@@ -20,7 +20,7 @@ from mapspeak.cli import cli
 from mapspeak.cli.episodes import rename_memory
 from mapspeak.geometry import Pose
 from mapspeak.semantic import SemanticMapStore, Waypoint
-from mapspeak.server import DEFAULT_TOOLSETS
+from mapspeak.server.app import DEFAULT_TOOLSETS
 from mapspeak.server.toolsets import build_toolsets
 from mapspeak.session import Session
 from rosbridge_robot import ScriptedRobot

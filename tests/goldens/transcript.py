@@ -19,7 +19,7 @@ from mapspeak.robot import Robot
 from mapspeak.ros import RosConnection
 from mapspeak.safety import Policy
 from mapspeak.semantic import SemanticMapStore
-from mapspeak.server import build_server
+from mapspeak.server.app import build_server
 from mapspeak.session import Session
 from served import pictures_of, text_of
 

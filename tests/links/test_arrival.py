@@ -18,7 +18,7 @@ from mapspeak.ros.messages import Dialect
 from mapspeak.ros.robot.driving import DrivingPatience
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.semantic import SemanticMapStore
-from mapspeak.server import build_server
+from mapspeak.server.app import build_server
 from mapspeak.session import Session
 from rosbridge_robot import eventually
 from rosbridge_script import PATIENCE_S

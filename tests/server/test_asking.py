@@ -15,7 +15,7 @@ from guarding import make_guard
 from mapspeak.geometry import Pose
 from mapspeak.safety import Approval, CommandKind, Guard, Otherwise, Policy, Publish
 from mapspeak.semantic import SemanticMapStore
-from mapspeak.server import build_server
+from mapspeak.server.app import build_server
 from mapspeak.session import Session
 from served import connect, text_of
 

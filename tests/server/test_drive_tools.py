@@ -11,7 +11,7 @@ from mapspeak.driving.drivereport import DriveReport
 from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState, StampedPose
 from mapspeak.semantic import SemanticMapStore
-from mapspeak.server import DEFAULT_TOOLSETS
+from mapspeak.server.app import DEFAULT_TOOLSETS
 from mapspeak.session import Session
 from served import MODES, connect, report_of, text_of
 

@@ -11,7 +11,8 @@ from fakes import FakeRobot, two_rooms
 from mapspeak.errors import ConfigError, LinkError
 from mapspeak.geometry import Pose
 from mapspeak.semantic import SemanticMapStore
-from mapspeak.server import FleetServer, build_server
+from mapspeak.server.app import build_server
+from mapspeak.server.fleet import FleetServer
 from mapspeak.session import Session
 from served import MODES, report_of, text_of
 

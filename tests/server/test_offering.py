@@ -12,7 +12,7 @@ from fakes import FakeRobot, two_rooms
 from guarding import make_guard
 from mapspeak.geometry import Pose
 from mapspeak.robot import Detection
-from mapspeak.server import DEFAULT_TOOLSETS
+from mapspeak.server.app import DEFAULT_TOOLSETS
 from mapspeak.server.offering import tell_offered
 from served import connect, text_of
 

@@ -10,7 +10,7 @@ from mcp.client import Client
 
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.semantic import SemanticMapStore
-from mapspeak.server import build_server
+from mapspeak.server.app import build_server
 from mapspeak.session import Session
 from rosbridge_robot import ScriptedRobot
 from rosbridge_script import running

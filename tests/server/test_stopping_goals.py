@@ -14,7 +14,7 @@ from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.ros.messages import Dialect
 from mapspeak.ros.robot.driving import DrivingPatience
 from mapspeak.semantic import SemanticMapStore
-from mapspeak.server import build_server
+from mapspeak.server.app import build_server
 from mapspeak.session import Session
 from rosbridge_robot import CANCELED, ScriptedRobot, connect_scripted
 from rosbridge_script import PATIENCE_S, Operation, Visitor

@@ -14,8 +14,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from fakes import FakeRobot, two_rooms
 from mapspeak.errors import ConfigError
 from mapspeak.semantic import SemanticMapStore
-from mapspeak.server import build_server, serve_http
-from mapspeak.server.transport import HangUpWatch, TokenGuard
+from mapspeak.server.app import build_server
+from mapspeak.server.transport import HangUpWatch, TokenGuard, serve_http
 from mapspeak.session import Session
 
 pytestmark = pytest.mark.anyio

@@ -33,7 +33,9 @@ from mapspeak.geometry import Pose
 from mapspeak.installation import shell_command
 
 if TYPE_CHECKING:
-    from mapspeak.server import CallLog, MapspeakServer, Representation
+    from mapspeak.server.app import MapspeakServer
+    from mapspeak.server.calllog import CallLog
+    from mapspeak.server.mapview.representations import Representation
     from mapspeak.session import Session
 
 TOKEN_VARIABLE = "MAPSPEAK_HTTP_TOKEN"  # noqa: S105 - the variable's name, not a token
@@ -92,7 +94,7 @@ def _read_representation(
 ) -> "Representation | None":
     if value is None:
         return None
-    from mapspeak.server import Representation  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.server.mapview.representations import Representation  # noqa: PLC0415 - heavy; help must be quick
 
     if value not in set(Representation):
         raise click.BadParameter(f"choose from {', '.join(Representation)}")
@@ -284,7 +286,9 @@ def _is_for_one(choice: RobotChoice) -> bool:
 
 
 async def _serve(options: ServeOptions) -> None:
-    from mapspeak.server import CallLog, FleetServer, serve_http, serve_stdio  # noqa: PLC0415
+    from mapspeak.server.calllog import CallLog  # noqa: PLC0415
+    from mapspeak.server.fleet import FleetServer  # noqa: PLC0415
+    from mapspeak.server.transport import serve_http, serve_stdio  # noqa: PLC0415
 
     async with AsyncExitStack() as links:
         scratch = links.enter_context(TemporaryDirectory(prefix="mapspeak-"))
@@ -357,11 +361,8 @@ async def _open_session(
 def _build_server(
     session: "Session", options: ServeOptions, call_log: "CallLog | None"
 ) -> "MapspeakServer":
-    from mapspeak.server import (  # noqa: PLC0415 - heavy; help must be quick
-        DEFAULT_TOOLSETS,
-        Representation,
-        build_server,
-    )
+    from mapspeak.server.app import DEFAULT_TOOLSETS, build_server  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.server.mapview.representations import Representation  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.server.tools.ros import require_ros  # noqa: PLC0415
 
     named = options.toolsets or ()

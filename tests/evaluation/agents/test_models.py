@@ -22,7 +22,7 @@ from mapspeak.evaluation.agents.models import (
 from mapspeak.evaluation.agents.models.loop import estimate_picture_tokens
 from mapspeak.evaluation.client import Ledger, Picture, ToolAnswer, ToolClient, Witness
 from mapspeak.evaluation.trials import AgentEnd, Assignment, Limits, TrialState
-from mapspeak.server import Representation
+from mapspeak.server.mapview.representations import Representation
 from served import connect
 
 pytestmark = pytest.mark.anyio

@@ -15,7 +15,8 @@ from fakes import FakeRobot, two_rooms
 from mapspeak.cli.serving import serve
 from mapspeak.geometry import Pose
 from mapspeak.semantic import SemanticMapStore
-from mapspeak.server import Representation, build_server
+from mapspeak.server.app import build_server
+from mapspeak.server.mapview.representations import Representation
 from mapspeak.session import Session
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.picture import draw_robot_pose

@@ -14,7 +14,7 @@ from mapspeak.evaluation.inspected import InspectedSystem, play
 from mapspeak.evaluation.trials import ServerAccess
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.semantic import SemanticMapStore
-from mapspeak.server import build_server
+from mapspeak.server.app import build_server
 from mapspeak.session import Session
 
 __all__ = ["Inspection", "open_inspection", "serve_command"]

@@ -13,7 +13,7 @@ from mapspeak.evaluation.agents.finding import can_think, find_versions, read_th
 from mapspeak.evaluation.scores import GroundTruth
 from mapspeak.evaluation.tasks import EXPLORE, Task, choose_tasks, find_task
 from mapspeak.evaluation.trials import Trial
-from mapspeak.server import Representation
+from mapspeak.server.mapview.representations import Representation
 from mapspeak.simulator import World, load_world, world_names
 
 __all__ = ["RunOptions", "RunPlan", "plan_run", "prepare_world"]

@@ -20,7 +20,8 @@ from mapspeak.evaluation.trials import ServerAccess, Setting, Trial
 from mapspeak.links.simulated import SimulatedRobot, SoloRobot
 from mapspeak.safety import Approvals, AuditLog, Guard, Hold, Policy, WaitingRoom
 from mapspeak.semantic import SemanticMapStore
-from mapspeak.server import DEFAULT_TOOLSETS, Representation, build_server
+from mapspeak.server.app import DEFAULT_TOOLSETS, build_server
+from mapspeak.server.mapview.representations import Representation
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, StateLog, StateRecord, World
 from mapspeak.simulator.worlds.worldfiles import write_with_more

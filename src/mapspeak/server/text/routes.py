@@ -18,7 +18,7 @@ def say_route(progress: RouteProgress) -> str:
         return f"The robot stands at stop {number}, {stop.words}."
     if progress.ended is not None:
         return progress.ended.reason or f"The drive to stop {number} was {progress.ended.state}."
-    return f"RouteStop {number}, {stop.words}: {say_obstacle(stop)}"
+    return f"Stop {number}, {stop.words}: {say_obstacle(stop)}"
 
 
 def _say_driving(progress: RouteProgress) -> str:
