@@ -8,8 +8,13 @@ import pytest
 from closing import EAST, LATER, NOW, RADIUS_M, WEST, atlas_on, event, office, revision_with
 from fakes import FakeRobot
 from guarding import WallClock, corners, make_guard, rectangle
-from mapspeak.driving.exploration import ExplorationState
-from mapspeak.driving.exploration.progress import find_unreachable, judge_end
+from mapspeak.driving.exploration import Bounds, ExplorationState, Progress
+from mapspeak.driving.exploration.progress import (
+    find_unreachable,
+    judge_end,
+    known_area_m2,
+    known_ratio,
+)
 from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Pose
 from mapspeak.places.choosing import check_place, find_place
@@ -21,6 +26,7 @@ from mapspeak.places.notices import (
 from mapspeak.safety import Policy, Surveyor
 from mapspeak.semantic import SemanticMap, SemanticMapStore, Waypoint
 from mapspeak.semantic.events import Effect
+from mapspeak.server.text.exploration import say_progress
 from mapspeak.server.text.frontiers import say_refusal
 from mapspeak.server.text.look import MapLook, view_of
 from mapspeak.server.text.measures import describe_measures
@@ -87,14 +93,42 @@ def test_what_nobody_saw_behind_a_closure_is_told_as_closed_off() -> None:
     events = [event(Effect.CLOSED, id="E2"), event(Effect.CLOSED, outlines=(south,))]
     closed = bare.with_areas(tuple(close_floor_of(events, bare, NOW)))
 
-    state, sentence = judge_end(atlas_on(closed), ())
+    atlas = atlas_on(closed)
+    unreachable = find_unreachable(atlas)
 
-    assert state is ExplorationState.REST_UNREACHABLE
+    assert judge_end(atlas, ()) is ExplorationState.REST_UNREACHABLE
+    sentence = say_progress(ended_exploration(atlas))
     assert "behind what is closed (the area 'C1', closed by event E2 until 14:00" in sentence
     assert "behind walls" not in sentence
-    unreachable = find_unreachable(atlas_on(closed))
     assert {each.reason for each in unreachable} == {RefusalReason.CLOSED_OFF}
-    assert say_refusal(unreachable[0]) in describe_atlas(view_of(atlas_on(closed), MapLook()))
+    assert say_refusal(unreachable[0]) in describe_atlas(view_of(atlas, MapLook()))
+
+
+def ended_exploration(atlas: Atlas) -> Progress:
+    """Return an exploration that has ended without a drive, as it stands."""
+    return Progress(
+        state=judge_end(atlas, ()),
+        bounds=Bounds(),
+        bound=None,
+        seen_id=None,
+        trip_end=None,
+        n_goals=0,
+        n_arrived=0,
+        n_seen=0,
+        n_blocked=0,
+        driven_m=0.0,
+        elapsed_s=0.0,
+        known_area_m2=known_area_m2(atlas),
+        known_ratio=known_ratio(atlas),
+        frontiers=atlas.frontiers.frontiers,
+        trip=None,
+        pose=atlas.robot,
+        pose_doubt=None,
+        unreachable=find_unreachable(atlas),
+        blocked=(),
+        not_worth=(),
+        closed=tuple(atlas.map.areas),
+    )
 
 
 def test_a_way_that_is_closed_is_measured_as_none_with_what_closes_it() -> None:
