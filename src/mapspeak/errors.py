@@ -23,6 +23,11 @@ class NextStep(StrEnum):
     LOOK_AROUND = "look_around"
     LOOK_FROM = "look_from"
     CHECK_NEAR = "check_near"
+    WAIT_OR_CANCEL = "wait_or_cancel"
+    WAIT_OR_STOP = "wait_or_stop"
+    DRIVE_FIRST = "drive_first"
+    DRIVE_AGAIN = "drive_again"
+    BEGIN_ROUTE = "begin_route"
 
 
 def say_cause(error: Exception) -> str:

@@ -18,7 +18,7 @@ import anyio
 from mapspeak.driving.drivemonitor import DriveMonitor, Look
 from mapspeak.driving.drivereport import JUST_SENT, Drive, DriveReport, find_tried_frontiers
 from mapspeak.driving.stops import NEEDS_NO_STOP, OwedStop
-from mapspeak.errors import GoalError, LinkError, MapspeakError
+from mapspeak.errors import GoalError, LinkError, MapspeakError, NextStep
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import GoalState, GoalStatus, PoseDoubt, Robot
 from mapspeak.safety import WhenBusy
@@ -140,7 +140,8 @@ class DriveBook:
                 return self._keep(drive)
             raise GoalError(
                 f"{busy.goal_id} to {busy.place} is under way.",
-                hint="Wait for its end with wait_for_goal, or end it with cancel_goal.",
+                hint="Wait for its end, or end it.",
+                step=NextStep.WAIT_OR_CANCEL,
             )
 
     async def report(self, goal_id: str | None = None) -> DriveReport:
@@ -275,7 +276,8 @@ class DriveBook:
         if ticket != self._n_stops:
             raise GoalError(
                 "The robot was stopped while this goal was being checked.",
-                hint="Call navigate_to again when it may drive.",
+                hint="Send the robot again when it may drive.",
+                step=NextStep.DRIVE_AGAIN,
             )
 
     def _choose(self, busy: Drive, client: str, when_busy: WhenBusy | None) -> WhenBusy:
@@ -355,7 +357,8 @@ class DriveBook:
             raise GoalError(
                 f"navigate_to has sent the robot nowhere, but it follows another goal: "
                 f"{', '.join(goals)}.",
-                hint="Wait for its end, or end it with stop_robot.",
+                hint="Wait for its end, or end it.",
+                step=NextStep.WAIT_OR_STOP,
             )
 
     def _find(self, goal_id: str | None) -> Drive:
@@ -364,7 +367,9 @@ class DriveBook:
             return drive
         if not self._drives:
             raise GoalError(
-                "navigate_to has sent the robot nowhere yet.", hint="Call navigate_to first."
+                "navigate_to has sent the robot nowhere yet.",
+                hint="Send it somewhere first.",
+                step=NextStep.DRIVE_FIRST,
             )
         raise GoalError(
             f"There is no goal {str(goal_id)[:40]!r}.",

@@ -14,7 +14,7 @@ from mapspeak.driving.drive import OnProgress
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.exploration import TripContext
 from mapspeak.driving.routes.planning import RoutePlan, StopCandidate, plan_route
-from mapspeak.errors import GoalError
+from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Pose
 from mapspeak.places.goalcheck import GoalCheck, check_goal
 from mapspeak.places.standing import arrival_pose
@@ -155,7 +155,9 @@ class RouteBook:
         """
         if self._plan is None:
             raise GoalError(
-                "There is no route to go on with.", hint="Call follow_route with its stops."
+                "There is no route to go on with.",
+                hint="Begin one with its stops.",
+                step=NextStep.BEGIN_ROUTE,
             )
         async with self._advancing:
             deadline_s = self._site.robot.now_s + wait_s

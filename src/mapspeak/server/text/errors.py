@@ -11,6 +11,11 @@ STEPS = {
     NextStep.LOOK_AROUND: "Call describe_place with {about}, then choose another place.",
     NextStep.LOOK_FROM: "Call navigate_to with {about} and look from there.",
     NextStep.CHECK_NEAR: "{hint}, or call check_goal to find a pose near it that works.",
+    NextStep.WAIT_OR_CANCEL: "Wait for its end with wait_for_goal, or end it with cancel_goal.",
+    NextStep.WAIT_OR_STOP: "{hint} with stop_robot.",
+    NextStep.DRIVE_FIRST: "Call navigate_to first.",
+    NextStep.DRIVE_AGAIN: "Call navigate_to again when it may drive.",
+    NextStep.BEGIN_ROUTE: "Call follow_route with its stops.",
 }
 """What is said instead of a hint in plain words, with or without it."""
 
