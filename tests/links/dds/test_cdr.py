@@ -1,3 +1,6 @@
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from typing import Any
 
@@ -289,3 +292,32 @@ def test_a_type_is_learned_from_what_a_node_says() -> None:
 def test_a_node_that_does_not_know_its_type_is_an_error() -> None:
     with pytest.raises(LinkError, match="no such type"):
         read_type_description({"successful": False, "failure_reason": "no such type"})
+
+
+@pytest.fixture
+def eager_threads() -> Iterator[None]:
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(before)
+
+
+@pytest.mark.usefixtures("eager_threads")
+def test_threads_that_meet_new_types_at_once_do_not_mix_them_up() -> None:
+    n_fields = range(1, 30)
+    for _ in range(20):
+        codec = Codec(
+            TypeBook(
+                {
+                    f"odd/Of{n}": "\n".join(f"string text{number}" for number in range(n))
+                    for n in n_fields
+                }
+            )
+        )
+
+        def there_and_back(n: int, codec: Codec = codec) -> None:
+            message = {f"text{number}": f"{n} {number}" for number in range(n)}
+            assert codec.decode(f"odd/Of{n}", codec.encode(f"odd/Of{n}", message)) == message
+
+        with ThreadPoolExecutor(4) as threads:
+            list(threads.map(there_and_back, n_fields))

@@ -260,7 +260,7 @@ async def test_a_hundred_losses_leave_no_socket_behind() -> None:
 async def test_a_socket_without_a_sign_of_life_is_replaced() -> None:
     server = ScriptedServer(answers_pings=True)
     timing = Timing(
-        connect_s=0.2,
+        connect_s=PATIENCE_S,
         ping_s=0.01,
         silence_s=0.05,
         first_pause_s=0.001,

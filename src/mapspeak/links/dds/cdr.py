@@ -1,6 +1,7 @@
 """Messages as bytes: CDR, the encoding of DDS, by the code that rosbags makes of a definition."""
 
 import base64
+import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -153,10 +154,12 @@ class Store(Typestore):
     """What rosbags was told of, in all versions.
 
     Types and fields have numbers for names: what a robot calls them is kept out of the code.
+    The thread that listens may meet a new type while another one is written.
     """
 
     def __init__(self) -> None:
         super().__init__()
+        self._lock = threading.Lock()
         self._layouts: dict[object, _Layout] = {}
         self._n_messages_left = 0
 
@@ -173,38 +176,42 @@ class Store(Typestore):
             LinkError: It is too large, or holds what CDR cannot.
         """
         key = (message.fields, tuple(layout.name for layout in inner.values()))
-        if key not in self._layouts:
-            name = f"type{len(self._layouts)}"
-            fields = message.fields or (NOTHING,)
-            n_fields = {name: sum(map(_count_code, fields))}
-            for each in inner.values():
-                n_fields |= each.n_fields
-            least_bytes = sum(_least_bytes(field, inner) for field in fields)
-            if sum(n_fields.values()) > MOST_FIELDS or least_bytes > MOST_BYTES:
-                raise LinkError(
-                    f"{message.name[:80]} is too large a type: more than {MOST_FIELDS} fields or "
-                    f"{MOST_BYTES} bytes.",
-                    hint="Take rosbridge or rclpy for it.",
-                )
-            described = [
-                (
-                    _numbered(number),
-                    describe_field(
-                        field, inner[field.type].name if field.is_message else _kind_of(field)
-                    ),
-                )
-                for number, field in enumerate(fields)
-            ]
-            self.fielddefs[name] = ([], described)
-            self.types[name] = self._factory(message.fields)
-            self._layouts[key] = _Layout(
-                name=name,
-                fields=message.fields,
-                inner=inner,
-                least_bytes=least_bytes,
-                n_fields=n_fields,
+        with self._lock:
+            if key not in self._layouts:
+                self._layouts[key] = self._make_layout(message, inner)
+            return self._layouts[key]
+
+    def _make_layout(self, message: MessageType, inner: Mapping[str, _Layout]) -> _Layout:
+        name = f"type{len(self._layouts)}"
+        fields = message.fields or (NOTHING,)
+        n_fields = {name: sum(map(_count_code, fields))}
+        for each in inner.values():
+            n_fields |= each.n_fields
+        least_bytes = sum(_least_bytes(field, inner) for field in fields)
+        if sum(n_fields.values()) > MOST_FIELDS or least_bytes > MOST_BYTES:
+            raise LinkError(
+                f"{message.name[:80]} is too large a type: more than {MOST_FIELDS} fields or "
+                f"{MOST_BYTES} bytes.",
+                hint="Take rosbridge or rclpy for it.",
             )
-        return self._layouts[key]
+        described = [
+            (
+                _numbered(number),
+                describe_field(
+                    field, inner[field.type].name if field.is_message else _kind_of(field)
+                ),
+            )
+            for number, field in enumerate(fields)
+        ]
+        self.fielddefs[name] = ([], described)
+        self.types[name] = self._factory(message.fields)
+        return _Layout(
+            name=name,
+            fields=message.fields,
+            inner=inner,
+            least_bytes=least_bytes,
+            n_fields=n_fields,
+        )
 
     def _factory(self, fields: tuple[Field, ...]) -> Any:  # noqa: ANN401 - stands for a class
         names = [field.name for field in fields]
