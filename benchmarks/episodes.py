@@ -55,7 +55,7 @@ class _DrawnVectors:
 
 
 def measure() -> Iterator[Figure]:
-    """Gives medians, and for writes the slowest twentieth too."""
+    """Return medians, and for writes the slowest twentieth too."""
     with tempfile.TemporaryDirectory() as folder:
         store = EpisodeStore(Path(folder) / "drawn.memory")
         store.write_all(draw_observations(N_OBSERVATIONS))
@@ -73,7 +73,7 @@ def measure() -> Iterator[Figure]:
 
 
 def queries() -> dict[str, EpisodeQuery]:
-    """Gives the questions by what they ask for."""
+    """Return the questions by what they ask for."""
     morning = LAST_DAY - timedelta(hours=12)
     ladder = EpisodeQuery(words="red ladder", since=morning, order=EpisodeOrder.NEWEST)
     return {
@@ -103,7 +103,7 @@ def queries() -> dict[str, EpisodeQuery]:
 
 
 def draw_observations(n: int) -> Iterator[Observation]:
-    """Gives observations over thirty days and 60 x 40 m."""
+    """Return observations over thirty days and 60 x 40 m."""
     random = np.random.default_rng(11)
     numbers = random.random((n, 5))
     for i, (x, y, yaw, thing, colour) in enumerate(numbers.tolist()):

@@ -62,7 +62,7 @@ FloatArray = NDArray[np.float64]
 
 
 def build_worlds(folder: Path) -> Iterator[World]:
-    """Gives the two shipped worlds and three that are made from maps of map_server."""
+    """Return the two shipped worlds and three that are made from maps of map_server."""
     yield load_world("warehouse")
     yield load_world("office")
     house = load_world(MAPS / "aws_small_house" / "map.yaml")
@@ -73,7 +73,7 @@ def build_worlds(folder: Path) -> Iterator[World]:
 
 
 def draw_ring() -> OccupancyGrid:
-    """Draws a floor whose corridor runs all around a core, with rooms on both of its sides."""
+    """Draw a floor whose corridor runs all around a core, with rooms on both of its sides."""
     cells = np.full((420, 560), -1, dtype=np.int8)
 
     def room(x: float, y: float, width: float, height: float) -> None:
@@ -102,7 +102,7 @@ def draw_ring() -> OccupancyGrid:
 
 
 def choose_start(world: World, seed: int) -> World:
-    """Gives the world with the robot anywhere it can get to; seed 0 keeps its own start."""
+    """Return the world with the robot anywhere it can get to; seed 0 keeps its own start."""
     if seed == 0:
         return world
     floor, random = TrueFloor(world), np.random.default_rng(seed)
@@ -118,22 +118,22 @@ def choose_start(world: World, seed: int) -> World:
 
 
 def nearest(frontiers: Sequence[Frontier], _atlas: Atlas) -> Frontier:
-    """Takes the nearest by path (Yamauchi, 1997)."""
+    """Take the nearest by path (Yamauchi, 1997)."""
     return min(frontiers, key=lambda each: each.distance_m)
 
 
 def gain_per_metre(frontiers: Sequence[Frontier], _atlas: Atlas) -> Frontier:
-    """Takes the one with the most unknown in sight per metre of way."""
+    """Take the one with the most unknown in sight per metre of way."""
     return max(frontiers, key=lambda each: each.gain_m2 / (each.distance_m + 0.5))
 
 
 def near_and_long(frontiers: Sequence[Frontier], _atlas: Atlas) -> Frontier:
-    """Takes the least of three times the distance less the length, as explore_lite weighs them."""
+    """Take the least of three times the distance less the length, as explore_lite weighs them."""
     return min(frontiers, key=lambda each: 3 * each.distance_m - each.length_m)
 
 
 def mapspeak_ranking(frontiers: Sequence[Frontier], atlas: Atlas) -> Frontier:
-    """Takes the first of the ranking."""
+    """Take the first of the ranking."""
     return take_first(frontiers, atlas)
 
 
@@ -204,7 +204,7 @@ class Truth:
         )
 
     def find_in_view(self, place: Point) -> FloatArray:
-        """Finds the cells of floor that a LiDAR sees from a place, as points of shape (n, 2)."""
+        """Find the cells of floor that a LiDAR sees from a place, as points of shape (n, 2)."""
         rays = self._rays + np.array([place.x, place.y])
         rows, cols = self._grid.cells_at(rays.reshape(-1, 2))
         n_rows, n_cols = self._grid.cells.shape
@@ -218,7 +218,7 @@ class Truth:
 
 
 def known_ratio(grid: OccupancyGrid, points: FloatArray) -> float:
-    """Gives the share of some points that a map knows."""
+    """Return the share of some points that a map knows."""
     rows, cols = grid.cells_at(points)
     is_inside = grid.contains_cells(rows, cols)
     return float((~grid.unknown[rows[is_inside], cols[is_inside]]).sum() / max(len(points), 1))
@@ -240,7 +240,7 @@ class Watcher:
     _n_ticks: int = 0
 
     def after_step(self) -> None:
-        """Looks at the map now and then."""
+        """Look at the map now and then."""
         self._n_ticks += 1
         if self._n_ticks % LOOK_EVERY_TICKS or len(self.to_m) == len(SHARES):
             return
@@ -251,7 +251,7 @@ class Watcher:
 
 
 async def explore(world: World, seed: int, rule: Pick, truth: Truth) -> Run:
-    """Explores a world from its start by one rule, as a model does that calls nothing else."""
+    """Explore a world from its start by one rule, as a model does that calls nothing else."""
     simulation = Simulation(world, seed=seed)
     watcher = Watcher(simulation, truth)
     promises: list[Promise] = []
@@ -285,7 +285,7 @@ async def explore(world: World, seed: int, rule: Pick, truth: Truth) -> Run:
 
 
 def _try_out(truth: Truth, grid: OccupancyGrid, frontier: Frontier) -> Promise:
-    """Looks from a frontier's pose as if the robot were there."""
+    """Look from a frontier's pose as if the robot were there."""
     points = truth.find_in_view(frontier.pose.point)
     n_new = len(points) * (1.0 - known_ratio(grid, points))
     return Promise(frontier.gain_m2, n_new * CELL_M**2)
@@ -299,7 +299,7 @@ async def _tell_nobody(_report: DriveReport) -> None:
 
 
 def measure() -> Iterator[Figure]:
-    """Gives what the exploration reaches in five worlds from five starts each, beside others."""
+    """Return what the exploration reaches in five worlds from five starts each, beside others."""
     cv2.setNumThreads(1)
     with tempfile.TemporaryDirectory() as folder:
         for world in build_worlds(Path(folder)):
@@ -307,7 +307,7 @@ def measure() -> Iterator[Figure]:
 
 
 def run_all(world: World, seeds: Iterable[int]) -> dict[Pick, list[Run]]:
-    """Explores a world from several starts by all rules."""
+    """Explore a world from several starts by all rules."""
     runs: dict[Pick, list[Run]] = {rule: [] for rule in RULES}
     for seed in seeds:
         moved = choose_start(world, seed)
@@ -363,7 +363,7 @@ def _mean(values: Iterable[float]) -> float:
 @click.argument("worlds", nargs=-1)
 @click.option("--seeds", "n_seeds", default=len(SEEDS), show_default=True, help="Starts.")
 def main(worlds: tuple[str, ...], n_seeds: int) -> None:
-    """Compares all rules in some worlds: names, world files, or maps of map_server."""
+    """Compare all rules in some worlds: names, world files, or maps of map_server."""
     cv2.setNumThreads(1)
     with tempfile.TemporaryDirectory() as folder:
         for world in map(load_world, worlds) if worlds else build_worlds(Path(folder)):

@@ -14,7 +14,7 @@ N_LARGEST = 8
 
 
 def measure() -> Iterator[Figure]:
-    """Gives the size of all run-time packages, then of the largest, without byte code."""
+    """Return the size of all run-time packages, then of the largest, without byte code."""
     sizes_mb = find_sizes_mb()
     yield Figure(name="all packages", value=sum(sizes_mb.values()), unit="MB")
     for name in sorted(sizes_mb, key=sizes_mb.__getitem__, reverse=True)[:N_LARGEST]:
@@ -22,13 +22,13 @@ def measure() -> Iterator[Figure]:
 
 
 def find_sizes_mb() -> dict[str, float]:
-    """Gives the installed size of each pinned run-time package, in megabytes (1e6 bytes)."""
+    """Return the installed size of each pinned run-time package, in megabytes (1e6 bytes)."""
     names = re.findall(r"^([\w.-]+)==", PINS.read_text(), re.MULTILINE)
     return {name: _size_mb(found) for name in names if (found := _find_distribution(name))}
 
 
 def _find_distribution(name: str) -> Distribution | None:
-    """Finds a package; some are for other systems only."""
+    """Find a package; some are for other systems only."""
     try:
         return distribution(name)
     except PackageNotFoundError:

@@ -43,7 +43,7 @@ PROCESSES = multiprocessing.get_context("spawn")
 
 
 def measure() -> Iterator[Figure]:
-    """Gives the longest wait of another call, and the peak of memory."""
+    """Return the longest wait of another call, and the peak of memory."""
     n_frames = int(os.environ.get(N_FRAMES_VARIABLE, "100000"))
     seed = int(os.environ.get(SEED_VARIABLE, "0"))
     click.echo(f"seed {seed}", err=True)
@@ -92,7 +92,7 @@ def _measure_in_process(kind: str, n_frames: int, seed: int) -> dict[str, float]
 
 @contextmanager
 def _running(peer: Callable[..., None], *arguments: object) -> Generator[str]:
-    """Runs a server in a process of its own, and gives its address."""
+    """Run a server in a process of its own, and return its address."""
     ports, to_ports = PROCESSES.Pipe(duplex=False)
     process = PROCESSES.Process(target=peer, args=(to_ports, *arguments), daemon=True)
     process.start()
@@ -106,7 +106,7 @@ def _listen_to(results: Connection, url: str, other_url: str, kind: str) -> None
 
 
 async def _listen(url: str, other_url: str, kind: str) -> dict[str, float]:
-    """Subscribes, and calls another service until all frames have come."""
+    """Subscribe, and call another service until all frames have come."""
     waits, begun_s = Waits(), time.perf_counter()
     async with (
         open_client(RobotAddress(url=url)) as client,

@@ -33,7 +33,7 @@ STEP_M = 0.6
 
 
 def measure() -> Iterator[Figure]:
-    """Gives the median CPU time of a whole look and of its parts, for two sizes of map."""
+    """Return the median CPU time of a whole look and of its parts, for two sizes of map."""
     n_threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:
@@ -68,7 +68,7 @@ def _look(
     times_ms: dict[str, list[float]],
     prefix: str,
 ) -> Atlas:
-    """Looks at a map as the tool does, and notes how long each part took."""
+    """Look at a map as the tool does, and notes how long each part took."""
     memory = SemanticMap()
     started_s = time.process_time()
     atlas = Atlas(grid, robot, memory, radius_m=RADIUS_M, previous=previous)
@@ -92,7 +92,7 @@ def _note(times_ms: dict[str, list[float]], what: str, started_s: float) -> None
 
 
 def draw_building(n_cells: int, *, seed: int) -> OccupancyGrid:
-    """Gives rooms along corridors with furniture, of which a part has not been seen yet."""
+    """Return rooms along corridors with furniture, of which a part has not been seen yet."""
     generator = np.random.default_rng(seed)
     cells = np.zeros((n_cells, n_cells), dtype=np.int8)
     pitch = 2 * ROOM_CELLS + HALL_CELLS
@@ -118,7 +118,7 @@ def draw_building(n_cells: int, *, seed: int) -> OccupancyGrid:
 
 
 def _furnish(room: np.ndarray, generator: np.random.Generator) -> None:
-    """Puts three things of 0.3 to 1 m into the corners of a room of 6 x 6 m."""
+    """Put three things of 0.3 to 1 m into the corners of a room of 6 x 6 m."""
     for _ in range(3):
         row, col = generator.choice((10, 78), size=2) + generator.integers(0, 10, size=2)
         height, width = generator.integers(6, 20, size=2)
@@ -126,7 +126,7 @@ def _furnish(room: np.ndarray, generator: np.random.Generator) -> None:
 
 
 def _hide(cells: np.ndarray, generator: np.random.Generator) -> np.ndarray:
-    """Makes whole patches of the far part unknown, with ragged edges as a LiDAR leaves them."""
+    """Make whole patches of the far part unknown, with ragged edges as a LiDAR leaves them."""
     n_cells = cells.shape[0]
     coarse = generator.random((n_cells // 100 + 2, n_cells // 100 + 2), dtype=np.float32)
     waves = cv2.resize(coarse, (n_cells, n_cells), interpolation=cv2.INTER_CUBIC)
@@ -136,7 +136,7 @@ def _hide(cells: np.ndarray, generator: np.random.Generator) -> np.ndarray:
 
 
 def _stand(n_cells: int) -> Pose:
-    """Gives a place in the corridor nearest to the middle of what is seen."""
+    """Return a place in the corridor nearest to the middle of what is seen."""
     pitch = 2 * ROOM_CELLS + HALL_CELLS
     row = (n_cells // 3 // pitch) * pitch + ROOM_CELLS + HALL_CELLS // 2
     return Pose(n_cells / 2 * RESOLUTION_M, row * RESOLUTION_M, 0.7)

@@ -65,7 +65,7 @@ class Tally:
     faults: list[str] = field(default_factory=list)
 
     def note(self, line: str) -> None:
-        """Takes what a writer told."""
+        """Take what a writer told."""
         what, said = line.split()
         if what == "place":
             self.rounds[place_name(int(said))] = int(said)
@@ -75,12 +75,12 @@ class Tally:
 
 
 def place_name(number: int) -> str:
-    """Gives the place that a round changes."""
+    """Return the place that a round changes."""
     return f"place {number % N_PLACES}"
 
 
 def measure(n_kills: int = N_KILLS) -> Iterator[Figure]:
-    """Gives how many writers were killed, and what was lost."""
+    """Return how many writers were killed, and what was lost."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "places.yaml"
         tally = Tally()
@@ -100,7 +100,7 @@ def measure(n_kills: int = N_KILLS) -> Iterator[Figure]:
 
 
 def kill_at_steps(path: Path, tally: Tally, n_kills: int) -> None:
-    """Writers die, each a step further into its round; then from the first step again."""
+    """Writer die, each a step further into its round; then from the first step again."""
     step = 0
     for number in range(n_kills):
         step += 1
@@ -115,7 +115,7 @@ def kill_at_steps(path: Path, tally: Tally, n_kills: int) -> None:
 
 
 def kill_at_moments(path: Path, tally: Tally, n_kills: int) -> None:
-    """Writers that write all the time are killed from outside."""
+    """Writer that write all the time are killed from outside."""
     chance = random.Random(7)  # noqa: S311 - no secret
     for number in range(n_kills):
         first = (number + 1) * 1_000_000
@@ -160,7 +160,7 @@ def write_at_once(path: Path, tally: Tally, n_each: int) -> None:
 
 
 def write_place(path: Path, number: int, *, name: str | None = None) -> None:
-    """Changes a place, from a store that knows nothing yet."""
+    """Change a place, from a store that knows nothing yet."""
     store = SemanticMapStore(path, map_id="b1", lock_timeout_s=LOCK_TIMEOUT_S)
     place = Waypoint(
         name=name or place_name(number), pose=Pose(1.0, 2.0), description=f"round {number}"
@@ -169,7 +169,7 @@ def write_place(path: Path, number: int, *, name: str | None = None) -> None:
 
 
 def write_observation(path: Path, number: int) -> str:
-    """Keeps an observation with a picture of its own, and gives its id."""
+    """Keep an observation with a picture of its own, and return its id."""
     store = EpisodeStore(memory_folder(path), lock_timeout_s=LOCK_TIMEOUT_S)
     observation = Observation(
         recorded_at=START + timedelta(milliseconds=number),
@@ -181,7 +181,7 @@ def write_observation(path: Path, number: int) -> str:
 
 
 def write_round(path: Path, number: int, end: int) -> None:
-    """Writes both, and tells of each."""
+    """Write both, and tell of each."""
     write_place(path, number)
     os.write(end, f"place {number}\n".encode())
     observation_id = write_observation(path, number)
@@ -189,13 +189,13 @@ def write_round(path: Path, number: int, end: int) -> None:
 
 
 def write_forever(path: Path, number: int, end: int) -> None:
-    """Writes round after round."""
+    """Write round after round."""
     for n in count(number):
         write_round(path, n, end)
 
 
 def write_and_die(path: Path, number: int, n_steps: int, end: int) -> None:
-    """Writes a round, and dies at the n-th thing that Python asks of the system."""
+    """Write a round, and dies at the n-th thing that Python asks of the system."""
     steps = count(1)
 
     def die(event: str, _arguments: tuple[object, ...]) -> None:
@@ -209,7 +209,7 @@ def write_and_die(path: Path, number: int, n_steps: int, end: int) -> None:
 
 @contextlib.contextmanager
 def told_by(work: Callable[[int], None]) -> Iterator[tuple[TextIO, int]]:
-    """Starts a process, and gives the lines that it tells and its id; waits for its end."""
+    """Start a process, and return the lines that it tells and its id; wait for its end."""
     reading, writing = os.pipe()
     process_id = os.fork()
     if process_id == 0:
@@ -225,7 +225,7 @@ def told_by(work: Callable[[int], None]) -> Iterator[tuple[TextIO, int]]:
 
 
 def check_last(path: Path, tally: Tally) -> None:
-    """Looks whether the file is whole, and what was acknowledged last is there."""
+    """Look whether the file is whole, and what was acknowledged last is there."""
     try:
         check_places(path, tally)
     except SemanticMapError as error:
@@ -237,7 +237,7 @@ def check_last(path: Path, tally: Tally) -> None:
 
 
 def check_places(path: Path, tally: Tally) -> None:
-    """Looks whether each place says its last acknowledged round, or the one that was under way."""
+    """Look whether each place says its last acknowledged round, or the one that was under way."""
     places = SemanticMapStore(path).read() if path.exists() else None
     for name, number in tally.rounds.items():
         place = places.find_waypoint(name) if places else None
@@ -246,7 +246,7 @@ def check_places(path: Path, tally: Tally) -> None:
 
 
 def check_all(path: Path, tally: Tally) -> None:
-    """Looks for every observation and picture, and into every page of the database."""
+    """Look for every observation and picture, and into every page of the database."""
     episodes = EpisodeStore(memory_folder(path))
     for observation_id in tally.observation_ids:
         if not is_kept(episodes, observation_id):
@@ -261,7 +261,7 @@ def check_all(path: Path, tally: Tally) -> None:
 
 
 def is_kept(episodes: EpisodeStore, observation_id: str) -> bool:
-    """Looks for an observation, and for its picture unless the rule has dropped it by now."""
+    """Look for an observation, and for its picture unless the rule has dropped it by now."""
     observation = episodes.get(observation_id)
     if observation is None:
         return False
@@ -280,7 +280,7 @@ def _figure(name: str, value: int) -> Figure:
 @click.option("--kills", default=N_KILLS, show_default=True, help="Of each sort.")
 @click.option("--json", "as_json", is_flag=True, help="As JSON.")
 def main(kills: int, *, as_json: bool) -> None:
-    """Kills writers, and shows what was lost."""
+    """Kill writers, and shows what was lost."""
     figures = {figure.name: int(figure.value) for figure in measure(kills)}
     if as_json:
         click.echo(json.dumps(figures))

@@ -40,7 +40,7 @@ TURNED = Pose(-3.0, 7.0, 0.4)
 
 
 def measure() -> Iterator[Figure]:
-    """Gives the median CPU time and the size of each kind of picture, and the memory at worst."""
+    """Return the median CPU time and the size of each kind of picture, and the memory at worst."""
     n_threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:
@@ -64,7 +64,7 @@ def _measure_size(n_cells: int) -> Iterator[Figure]:
 
 
 def _measure_crowd() -> Iterator[Figure]:
-    """Measures a map with more labels than find room without being moved, and its legend."""
+    """Measure a map with more labels than find room without being moved, and its legend."""
     grid = _building(1000, Pose(0.0, 0.0))
     robot = Pose(grid.width_m / 2, grid.height_m / 2, 0.7)
     layers = _layers(grid, robot)
@@ -89,7 +89,7 @@ def _measure_crowd() -> Iterator[Figure]:
 
 
 def _measure_huge() -> Iterator[Figure]:
-    """Measures time and the memory that drawing takes besides the map and its labels."""
+    """Measure time and the memory that drawing takes besides the map and its labels."""
     part = _building(1000, Pose(0.0, 0.0)).cells
     n_parts = HUGE_CELLS // 1000
     for name, origin in (("", Pose(0.0, 0.0)), (", turned", TURNED)):
@@ -118,7 +118,7 @@ def _figures(name: str, draw: Callable[[], MapPicture]) -> Iterator[Figure]:
 
 
 def _building(n_cells: int, origin: Pose) -> OccupancyGrid:
-    """Gives rooms of 6 x 6 m with doors, furniture, and unknown ground around them."""
+    """Return rooms of 6 x 6 m with doors, furniture, and unknown ground around them."""
     generator = np.random.default_rng(n_cells)
     cells = np.zeros((n_cells, n_cells), dtype=np.int8)
     cells[generator.random(cells.shape) < 0.01] = 100
@@ -136,7 +136,7 @@ def _building(n_cells: int, origin: Pose) -> OccupancyGrid:
 
 
 def _layers(grid: OccupancyGrid, robot: Pose) -> MapLayers:
-    """Gives up to 64 rooms, 30 marks, a path across the map and the robot."""
+    """Return up to 64 rooms, 30 marks, a path across the map and the robot."""
     n_across = min(8, grid.n_cols // ROOM_CELLS)
     block = grid.n_cols // n_across
     block_of = (np.arange(grid.n_cols) // block).astype(np.uint16)

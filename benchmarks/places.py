@@ -36,7 +36,7 @@ WORLD = "school_2"
 
 
 def measure() -> Iterator[Figure]:
-    """Gives medians of what a client waits for, and the slowest twentieth."""
+    """Return medians of what a client waits for, and the slowest twentieth."""
     site = Site(load_world(WORLD))
     places = observe_from(site, _draw_poses(site, N_PLACES + N_WRITES), seed=1).places.waypoints
     known, new = places[:N_PLACES], places[N_PLACES:]
@@ -58,7 +58,7 @@ def measure() -> Iterator[Figure]:
 def _talk(
     server: ServerProcess, labels: Sequence[str], new: Sequence[Waypoint]
 ) -> Iterator[tuple[str, Sequence[float]]]:
-    """Gives what was asked of the server, and the milliseconds of each call."""
+    """Return what was asked of the server, and the milliseconds of each call."""
     first, *others = labels
     yield "find_place, the first", [_ask(server, first)]
     yield "find_place, another thing", [_ask(server, label) for label in others]
@@ -113,7 +113,7 @@ def _figures(what: str, times_ms: Sequence[float]) -> Iterator[Figure]:
 
 
 def _draw_poses(site: Site, n: int) -> list[Pose]:
-    """Gives places on which an observer can stand, looking any way."""
+    """Return places on which an observer can stand, looking any way."""
     random = np.random.default_rng(0)
     points = site.places[random.integers(len(site.places), size=n)]
     yaws_rad = random.uniform(-math.pi, math.pi, size=n)

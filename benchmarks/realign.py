@@ -105,7 +105,7 @@ class Result:
 
 
 def load_buildings() -> dict[str, OccupancyGrid]:
-    """Gives one map for each building."""
+    """Return one map for each building."""
     found = {
         "house": load_map(MAPS / "aws_small_house" / "map.yaml").grid,
         "freiburg79": load_map(MAPS / "freiburg79" / "whole.yaml").grid,
@@ -120,7 +120,7 @@ def load_buildings() -> dict[str, OccupancyGrid]:
 
 
 def map_world(world: World, *, seed: int, n_drives: int) -> OccupancyGrid:
-    """Gives the map that the simulated robot makes on so many drives to frontiers."""
+    """Return the map that the simulated robot makes on so many drives to frontiers."""
     simulation = Simulation(world, seed=seed)
     tried: list[Point] = []
     for _ in range(n_drives):
@@ -143,7 +143,7 @@ def map_world(world: World, *, seed: int, n_drives: int) -> OccupancyGrid:
 
 
 def turned(grid: OccupancyGrid, motion: Pose, *, resolution_m: float) -> OccupancyGrid:
-    """Draws a map anew in a moved frame, on cells that lie elsewhere."""
+    """Draw a map anew in a moved frame, on cells that lie elsewhere."""
     low, high = grid.bounds()
     corners = np.array([[x, y] for x in (low.x, high.x) for y in (low.y, high.y)])
     moved = placed(corners, motion)
@@ -165,7 +165,7 @@ def turned(grid: OccupancyGrid, motion: Pose, *, resolution_m: float) -> Occupan
 
 
 def cut(grid: OccupancyGrid, *, share: float, towards_rad: float) -> OccupancyGrid:
-    """Gives the part of a map on one side that holds so much of its walls."""
+    """Return the part of a map on one side that holds so much of its walls."""
     across = np.array([math.cos(towards_rad), math.sin(towards_rad)])
     limit = np.quantile(MapSurfaces(grid).points @ across, share)
     rows, cols = np.indices(grid.cells.shape).reshape(2, -1)
@@ -174,7 +174,7 @@ def cut(grid: OccupancyGrid, *, share: float, towards_rad: float) -> OccupancyGr
 
 
 def piece(grid: OccupancyGrid, random: np.random.Generator) -> OccupancyGrid:
-    """Gives what lies around a free place: a map that has just been begun."""
+    """Return what lies around a free place: a map that has just been begun."""
     free = np.argwhere(grid.free)
     row, col = free[random.integers(len(free))]
     rows, cols = np.indices(grid.cells.shape)
@@ -183,7 +183,7 @@ def piece(grid: OccupancyGrid, random: np.random.Generator) -> OccupancyGrid:
 
 
 def roughened(grid: OccupancyGrid, random: np.random.Generator) -> OccupancyGrid:
-    """Gives a map with a fifth of its wall cells gone, some beside them, and new clutter."""
+    """Return a map with a fifth of its wall cells gone, some beside them, and new clutter."""
     cells = grid.cells.copy()
     draw = random.random(cells.shape)
     beside = cv2.dilate(grid.occupied.view(np.uint8), np.ones((3, 3), np.uint8)) > 0
@@ -214,7 +214,7 @@ def _with_cells(grid: OccupancyGrid, cells: np.ndarray) -> OccupancyGrid:
 
 
 def moved_cases(buildings: Mapping[str, OccupancyGrid]) -> Iterator[Case]:
-    """Gives maps that were moved, and changed on the way."""
+    """Return maps that were moved, and changed on the way."""
     for (name, grid), turn in itertools.product(buildings.items(), range(N_TURNS)):
         random = np.random.default_rng([SEED, turn, len(name)])
         motion = _any_motion(random)
@@ -245,7 +245,7 @@ def moved_cases(buildings: Mapping[str, OccupancyGrid]) -> Iterator[Case]:
 
 
 def mapped_cases(worlds: Sequence[World]) -> Iterator[Case]:
-    """Gives worlds mapped anew from other starts, the whole of it or the beginning."""
+    """Return worlds mapped anew from other starts, the whole of it or the beginning."""
     for world in worlds:
         starts = [choose_start(world, seed) for seed in STARTS]
         wholes = [
@@ -271,7 +271,7 @@ def mapped_cases(worlds: Sequence[World]) -> Iterator[Case]:
 
 
 def foreign_cases(buildings: Mapping[str, OccupancyGrid]) -> Iterator[Case]:
-    """Gives maps of two buildings, whole ones and pieces."""
+    """Return maps of two buildings, whole ones and pieces."""
     for (name, old), (other, new) in itertools.combinations(buildings.items(), 2):
         pair = f"{name} / {other}"
         random = np.random.default_rng([SEED, len(name), len(other)])
@@ -288,7 +288,7 @@ def _any_motion(random: np.random.Generator) -> Pose:
 
 
 def judge(case: Case) -> Result:
-    """Compares the two maps of a case."""
+    """Compare the two maps of a case."""
     began_s = time.process_time()
     comparison = compare_maps(case.old, case.new)
     spent_s = time.process_time() - began_s
@@ -320,7 +320,7 @@ def _errors(case: Case, said: Pose | None) -> tuple[float | None, float | None]:
 
 
 def find_results() -> Iterator[Result]:
-    """Judges all cases."""
+    """Judge all cases."""
     buildings = load_buildings()
     with tempfile.TemporaryDirectory() as folder:
         worlds = [*build_worlds(Path(folder)), load_world("office")][:5]
@@ -330,7 +330,7 @@ def find_results() -> Iterator[Result]:
 
 
 def measure() -> Iterable[Figure]:
-    """Gives how exact, how often and how wrongly maps are laid on each other."""
+    """Return how exact, how often and how wrongly maps are laid on each other."""
     cv2.setNumThreads(1)
     return list(_figures(list(find_results())))
 
@@ -357,7 +357,7 @@ def _figures(results: Sequence[Result]) -> Iterator[Figure]:
 @click.command()
 @click.option("--all", "shows_all", is_flag=True, help="Every case, not only those to look at.")
 def main(*, shows_all: bool) -> None:
-    """Shows how maps are laid on each other, case by case, and the figures."""
+    """Show how maps are laid on each other, case by case, and the figures."""
     cv2.setNumThreads(1)
     results = []
     for each in find_results():

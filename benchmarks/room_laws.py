@@ -38,7 +38,7 @@ PAD = 37
 
 
 def measure() -> Iterator[Figure]:
-    """Gives the shares of regions and of floor that stay, by family and change."""
+    """Return the shares of regions and of floor that stay, by family and change."""
     cv2.setNumThreads(1)
     for family, grids in _families().items():
         for name, changes in CHANGES.items():
@@ -65,7 +65,7 @@ def _load(folder: Path) -> tuple[Cells, float]:
 
 
 def draw_building() -> Cells:
-    """Draws 24 x 16 m: offices on both sides of a corridor, with tables, chairs and cupboards."""
+    """Draw 24 x 16 m: offices on both sides of a corridor, with tables, chairs and cupboards."""
     generator = np.random.default_rng(11)
     cells = np.zeros((320, 480), np.int8)
     for row in (0, 136, 180, 316):
@@ -93,7 +93,7 @@ def _divide(cells: Cells, resolution_m: float, origin: Pose | None = None) -> La
 
 
 def _compare(before: Labels, after: Labels, cells: Cells) -> tuple[NDArray[np.float64], ...]:
-    """Gives for each region of before its best intersection over union, and its area in cells."""
+    """Return for each region of before its best intersection over union, and its area in cells."""
     is_free = (cells >= 0) & (cells < 50)
     here, there = before[is_free].astype(np.intp), after[is_free].astype(np.intp)
     shape = (int(here.max(initial=0)) + 1, int(there.max(initial=0)) + 1)

@@ -36,7 +36,7 @@ AHEAD = Pose(3.0, 0.0)
 
 
 def measure() -> Iterator[Figure]:
-    """Gives CPU times of decoding, and wall times of answers."""
+    """Return CPU times of decoding, and wall times of answers."""
     for side in SIDES:
         yield from _measure_decoding(side)
     for dialect in Dialect:
@@ -83,7 +83,7 @@ def _best_ms(work: Callable[[], object]) -> float:
 
 
 async def _drive(dialect: Dialect) -> dict[str, list[float]]:
-    """Asks for everything while the robot drives and looks."""
+    """Ask for everything while the robot drives and looks."""
     times_ms: dict[str, list[float]] = {}
     simulation = Simulation(load_world("warehouse"), seed=0)
     async with (

@@ -44,7 +44,7 @@ Connect = Callable[[int], AbstractAsyncContextManager[RosConnection]]
 
 
 def measure() -> Iterator[Figure]:
-    """Gives wall times with all that lies between, and CPU times of reading alone."""
+    """Return wall times with all that lies between, and CPU times of reading alone."""
     if find_spec("rclpy") is None:
         click.echo("ros2: not measured, for this Python has no rclpy: see its module.", err=True)
         return
@@ -68,7 +68,7 @@ def _figures(what: str, values_ms: list[float]) -> Iterator[Figure]:
 
 
 def _ways(side: int) -> Iterator[tuple[str, Connect]]:
-    """Gives what such a map can be had over, here."""
+    """Return what such a map can be had over, here."""
     yield "rclpy", _over_rclpy
     if find_spec("cyclonedds") is not None:
         yield "DDS", _over_dds
@@ -130,7 +130,7 @@ async def _receive(grid: OccupancyGrid) -> tuple[list[float], list[float]]:
 
 
 async def _ask(side: int, connect: Connect) -> list[float]:
-    """Gives how long a map takes to come that another process published long ago."""
+    """Return how long a map takes to come that another process published long ago."""
     domain_id = _enter_domain()
     processes = multiprocessing.get_context("spawn")
     is_there, is_over = processes.Event(), processes.Event()
@@ -164,7 +164,7 @@ async def _is_published(connection: RosConnection) -> bool:
 
 
 def _offer(side: int, domain_id: int, is_there: Any, is_over: Any) -> None:  # noqa: ANN401
-    """Publishes a map from one event until the other; a process of its own."""
+    """Publish a map from one event until the other; a process of its own."""
     from mapspeak.links.rclpy.messages import write_message  # noqa: PLC0415
     from mapspeak.links.rclpy.types import find_message  # noqa: PLC0415 - needs rclpy
 
@@ -182,7 +182,7 @@ def _enter_domain() -> int:
 
 @contextmanager
 def _publisher(message_class: Any, domain_id: int) -> Iterator[Any]:  # noqa: ANN401 - rclpy has no types
-    """A node that publishes latched maps and does nothing else."""
+    """Return a node that publishes latched maps and does nothing else."""
     import rclpy  # noqa: PLC0415 - not everywhere
     from rclpy.context import Context  # noqa: PLC0415
     from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: PLC0415

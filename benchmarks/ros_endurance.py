@@ -45,7 +45,7 @@ QUICK = Timing(first_pause_s=0.001, longest_pause_s=0.01)
 
 
 def measure() -> Iterator[Figure]:
-    """Gives counts of what went wrong, which should be zero, and what was left behind."""
+    """Return counts of what went wrong, which should be zero, and what was left behind."""
     yield from _measure_frames()
     tracemalloc.start()
     for name, value in anyio.run(_reconnect).items():
@@ -119,7 +119,7 @@ def _spoil(frame: bytes, chance: random.Random) -> bytes:
 
 
 def _read(event: object) -> NDArray[np.int8] | None:
-    """Reads what may be a map; what is none has to be said by an error of ours."""
+    """Read what may be a map; what is none has to be said by an error of ours."""
     if isinstance(event, Published) and event.topic == "/map":
         try:
             return read_grid(event.message).cells
@@ -168,7 +168,7 @@ async def _reconnect() -> dict[str, float]:
 
 
 def _is_restored(scripted: object) -> bool:
-    """True when both sockets are there and the states of goals are subscribed to."""
+    """Return True when both sockets are there and the states of goals are subscribed to."""
     visitors = scripted.server.present  # type: ignore[attr-defined]  # of the test suite
     return len(visitors) == 2 and any(
         operation["topic"].endswith("status")

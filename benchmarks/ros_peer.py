@@ -50,7 +50,7 @@ Times = dict[str, list[float]]
 
 
 def measure() -> Iterator[Figure]:
-    """Gives medians of wall time as a client sees them, and how many times faster ours is."""
+    """Return medians of wall time as a client sees them, and how many times faster ours is."""
     url = os.environ.get(URL_VARIABLE)
     if url is not None:
         yield from _figures("that rosbridge", anyio.run(_measure, url))
@@ -96,7 +96,7 @@ async def _measure(url: str) -> Times:
 
 
 async def _measure_in_server(times_ms: Times, url: str, memory: Path) -> None:
-    """Times calls in the server's own process, of a robot whose map and pose are at hand."""
+    """Time calls in the server's own process, of a robot whose map and pose are at hand."""
     async with open_rosbridge_robot(url) as robot:
         session = Session(robot, SemanticMapStore(memory), lease_s=60.0, ros=robot.connection)
         server = build_server(session, toolsets=("look", "ros"))
@@ -158,7 +158,7 @@ class _Client:
         self._n_asked = 0
 
     async def ask(self, method: str, **params: object) -> Any:  # noqa: ANN401 - any JSON
-        """Gives the result of a request."""
+        """Return the result of a request."""
         self._n_asked += 1
         await self.tell(method, id=self._n_asked, params=params)
         while True:
@@ -168,12 +168,12 @@ class _Client:
                 return answer["result"]
 
     async def tell(self, method: str, **more: object) -> None:
-        """Sends a message."""
+        """Send a message."""
         message = {"jsonrpc": "2.0", "method": method, **more}
         await self._input.send(json.dumps(message).encode() + b"\n")
 
     async def call(self, tool: str, **arguments: object) -> None:
-        """Calls a tool, which has to succeed."""
+        """Call a tool, which has to succeed."""
         result = await self.ask("tools/call", name=tool, arguments=arguments)
         if result.get("isError"):
             raise RuntimeError(f"{tool} failed: {result}")

@@ -56,17 +56,17 @@ class Ways:
         self._metres = np.array([truth.paths_m(point)[at] for point in points])
 
     def length_m(self, numbers: Sequence[int]) -> float:
-        """Gives the whole way past some places, from the robot on."""
+        """Return the whole way past some places, from the robot on."""
         legs = itertools.pairwise((0, *numbers))
         return math.fsum(float(self._metres[leg]) for leg in legs)
 
     def nearest(self, here: int, numbers: Sequence[int]) -> int:
-        """Gives the nearest of some places."""
+        """Return the nearest of some places."""
         return min(numbers, key=lambda number: float(self._metres[here, number]))
 
 
 def measure() -> Iterator[Figure]:
-    """Gives how many of the routes came out as short as brute force finds."""
+    """Return how many of the routes came out as short as brute force finds."""
     cv2.setNumThreads(1)
     n_right, n_all, saved_m, took_ms = 0, 0, 0.0, []
     sites = list(build_sites())
@@ -113,7 +113,7 @@ def _remember(poses: Sequence[Pose], kinds: Sequence[str]) -> SemanticMap:
 
 
 def _find_cases(ways: Ways, kinds: Sequence[str], generator: np.random.Generator) -> Iterator[Case]:
-    """Draws routes until greedy choice fails; without end, as such routes are common."""
+    """Draw routes until greedy choice fails; without end, as such routes are common."""
     numbers = {kind: [n + 1 for n, each in enumerate(kinds) if each == kind] for kind in KINDS}
     seen: set[tuple[str, ...]] = set()
     for _ in range(2000):
@@ -139,7 +139,7 @@ def _choose_greedily(ways: Ways, choices: Sequence[Sequence[int]]) -> list[int]:
 
 
 def _is_right(ways: Ways, plan: RoutePlan, case: Case) -> bool:
-    """True where the route chosen is as short as can be, by the benchmark's own measure."""
+    """Return True where the route chosen is as short as can be, by the benchmark's own measure."""
     length_m = ways.length_m([int(each.name[1:]) for each in plan.chosen])
     is_shortest = length_m <= case.best_m * (1 + SAME_RATIO) + SAME_M
     is_told = abs(plan.total_m - length_m) <= length_m * SAME_RATIO * 2 + 2 * SAME_M

@@ -29,7 +29,7 @@ NOT_BENCHMARKS = {"figure", "mutations", "run", "talking"}
 @click.argument("names", nargs=-1, metavar="[NAME]...")
 @click.option("--json", "as_json", is_flag=True, help="Figures and machine as JSON.")
 def main(names: tuple[str, ...], *, as_json: bool) -> None:
-    """Runs the benchmarks named, or all of them, and shows their figures."""
+    """Run the benchmarks named, or all of them, and shows their figures."""
     wanted = names or list_benchmarks()
     if unknown := sorted(set(wanted) - set(list_benchmarks())):
         raise click.UsageError(
@@ -40,18 +40,18 @@ def main(names: tuple[str, ...], *, as_json: bool) -> None:
 
 
 def list_benchmarks() -> tuple[str, ...]:
-    """Gives the names of all benchmarks, in alphabetical order."""
+    """Return the names of all benchmarks, in alphabetical order."""
     modules = {module.name for module in pkgutil.iter_modules(benchmarks.__path__)}
     return tuple(sorted(modules - NOT_BENCHMARKS))
 
 
 def measure(name: str) -> list[Figure]:
-    """Runs one benchmark."""
+    """Run one benchmark."""
     return list(importlib.import_module(f"benchmarks.{name}").measure())
 
 
 def describe_machine() -> dict[str, str | int | None]:
-    """Says where the figures hold: processor, system, and the libraries that do the work."""
+    """Say where the figures hold: processor, system, and the libraries that do the work."""
     return {
         "machine": platform.machine(),
         "system": platform.platform(),
@@ -64,7 +64,7 @@ def describe_machine() -> dict[str, str | int | None]:
 
 
 def show_json(figures: Mapping[str, Sequence[Figure]]) -> None:
-    """Writes the figures for programs."""
+    """Write the figures for programs."""
     result = {
         "machine": describe_machine(),
         "benchmarks": {name: [asdict(figure) for figure in rows] for name, rows in figures.items()},
@@ -73,7 +73,7 @@ def show_json(figures: Mapping[str, Sequence[Figure]]) -> None:
 
 
 def show_table(figures: Mapping[str, Sequence[Figure]]) -> None:
-    """Writes the figures for people."""
+    """Write the figures for people."""
     table = Table("benchmark", "what", "value", "unit")
     table.columns[2].justify = "right"
     for name, rows in figures.items():

@@ -84,7 +84,7 @@ class Witness:
     goals: list[tuple[float, Pose]] = field(default_factory=list)
 
     def note(self) -> None:
-        """Looks where the robot truly is."""
+        """Look where the robot truly is."""
         here = self.simulation.truth.pose.point
         for area in self.areas:
             inside = area.contains(here)
@@ -100,13 +100,13 @@ class WitnessedRobot(SimulatedRobot):
         self._witness = witness
 
     async def send_goal(self, goal: Pose) -> str:
-        """Starts a drive and tells the witness."""
+        """Start a drive and tells the witness."""
         self._witness.goals.append((self.now_s, goal))
         return await super().send_goal(goal)
 
 
 def make_guard(folder: Path, policy: Policy) -> Guard:
-    """Gives a guard with its files in a folder, whose operator's clock is the wall clock."""
+    """Return a guard with its files in a folder, whose operator's clock is the wall clock."""
 
     def now() -> datetime:
         return datetime.now(UTC)
@@ -133,7 +133,7 @@ class StopWatch(SimulatedRobot):
         self.was_stopped = anyio.Event()
 
     async def stop(self) -> None:
-        """Stops, and notes when the command was given."""
+        """Stop, and notes when the command was given."""
         await super().stop()
         self.stopped_s = time.perf_counter()
         self.was_stopped.set()
@@ -160,7 +160,7 @@ BUSY_CALLS: dict[str, dict[str, Any]] = {
 
 
 async def time_stops(busy_with: str) -> list[float]:
-    """Gives the milliseconds from a call of stop_robot to the command, during another call."""
+    """Return the milliseconds from a call of stop_robot to the command, during another call."""
     taken_ms = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -188,7 +188,7 @@ async def time_stops(busy_with: str) -> list[float]:
 
 
 async def time_outside_stops() -> list[float]:
-    """Gives the milliseconds from the hold's file to the command, while the robot drives."""
+    """Return the milliseconds from the hold's file to the command, while the robot drives."""
     taken_ms = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -213,7 +213,7 @@ async def time_outside_stops() -> list[float]:
 
 
 async def time_decisions() -> tuple[float, float]:
-    """Gives the milliseconds of processor time that a drive costs without and with the guard."""
+    """Return the milliseconds of processor time that a drive costs without and with the guard."""
     costs_ms = []
     for policy in (None, Policy(areas=(PIT,), rates={})):
         with tempfile.TemporaryDirectory() as name:
@@ -259,7 +259,7 @@ class Verdict:
 async def connect(
     folder: Path, robot: SimulatedRobot, policy: Policy
 ) -> AsyncGenerator[tuple[Client, Session]]:
-    """Gives a client of a server with all tools over a guarded robot, and its session."""
+    """Return a client of a server with all tools over a guarded robot, and its session."""
     guard = make_guard(folder, policy)
     session = Session(robot, SemanticMapStore(folder / "m.yaml"), lease_s=60.0, guard=guard)
     server = build_server(session, toolsets=tuple(build_toolsets(session)))
@@ -270,7 +270,7 @@ async def connect(
 
 
 async def attack(n_calls: int, *, seed: int) -> Verdict:
-    """Lets a hostile caller call whatever there is, and judges what came of it."""
+    """Let a hostile caller call whatever there is, and judge what came of it."""
     chooser = random.Random(seed)  # noqa: S311 - no secret
     policy = Policy(areas=(PIT,), rates={CommandKind.DRIVE: MOST_DRIVES}, farthest_m=FARTHEST_M)
     simulation = Simulation(load_world(WORLD), seed=seed)
@@ -299,7 +299,7 @@ async def attack(n_calls: int, *, seed: int) -> Verdict:
 
 
 def _choose_tool(chooser: random.Random, tools: Sequence[Tool]) -> Tool:
-    """Prefers what moves: pictures take long and harm nobody."""
+    """Prefer what moves: pictures take long and harm nobody."""
     return chooser.choices(tools, [_weight(tool) for tool in tools])[0]
 
 
@@ -345,7 +345,7 @@ def _value(chooser: random.Random, key: str, part: dict[str, Any]) -> Any:  # no
 
 
 def _find_broken(witness: Witness, lines: list[AuditLine], pit: ClosedArea) -> Iterator[str]:
-    """Finds rules that were broken, by the truth and by the log."""
+    """Find rules that were broken, by the truth and by the log."""
     if witness.nearest_m < 0.0:
         yield f"the robot was {-witness.nearest_m:.2f} m inside the closed area"
     for _, goal in witness.goals:
@@ -358,7 +358,7 @@ def _find_broken(witness: Witness, lines: list[AuditLine], pit: ClosedArea) -> I
 
 
 def find_busiest_minute(lines: Iterable[AuditLine]) -> int:
-    """Gives the largest number of drives that were allowed within less than a minute.
+    """Return the largest number of drives that were allowed within less than a minute.
 
     The log rounds to milliseconds. In these, as whole numbers, two drives a minute apart stay a
     minute apart; in seconds 64.1 - 4.1 is a little less than 60.
@@ -368,7 +368,7 @@ def find_busiest_minute(lines: Iterable[AuditLine]) -> int:
 
 
 def _find_missing(witness: Witness, lines: list[AuditLine]) -> Iterator[str]:
-    """Finds what the log lacks."""
+    """Find what the log lacks."""
     allowed = [line for line in lines if line.verdict == "allowed"]
     numbers = {line.number for line in allowed}
     counts = {
@@ -395,7 +395,7 @@ def _find_missing(witness: Witness, lines: list[AuditLine]) -> Iterator[str]:
 
 
 def measure() -> Iterable[Figure]:
-    """Measures stops, the cost of the guard, and a short attack."""
+    """Measure stops, the cost of the guard, and a short attack."""
     for busy_with in BUSY_CALLS:
         yield from _spread(f"stop_robot during {busy_with}", anyio.run(time_stops, busy_with))
     yield from _spread("stop from outside", anyio.run(time_outside_stops))
@@ -413,7 +413,7 @@ def _spread(name: str, values_ms: list[float]) -> Iterator[Figure]:
 
 
 def print_stops() -> None:
-    """Prints how long a stop takes during each kind of call."""
+    """Print how long a stop takes during each kind of call."""
     # As `mapspeak serve` does: what was loaded stays for good.
     gc.collect()
     gc.freeze()
@@ -433,7 +433,7 @@ def print_stops() -> None:
 @click.argument("part", default=str(N_CALLS))
 @click.option("--seed", default=0, show_default=True)
 def main(part: str, seed: int) -> None:
-    """Lets a hostile caller make PART calls, a number, or measures stops where PART is "stop"."""
+    """Let a hostile caller make PART calls, a number, or measure stops where PART is "stop"."""
     if part == "stop":
         print_stops()
         return

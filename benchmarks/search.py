@@ -77,7 +77,7 @@ AMONG_OTHERS = 0.2
 
 
 def build_worlds(folder: Path) -> Iterator[World]:
-    """Gives the shipped worlds and the drawn ones."""
+    """Return the shipped worlds and the drawn ones."""
     yield load_world("warehouse")
     yield load_world("office")
     for seed in range(N_DRAWN):
@@ -87,7 +87,7 @@ def build_worlds(folder: Path) -> Iterator[World]:
 
 
 def draw_world(random: np.random.Generator) -> dict[str, object]:
-    """Draws a floor: a corridor, often with one across it, rooms of all kinds along both."""
+    """Draw a floor: a corridor, often with one across it, rooms of all kinds along both."""
     width_m, length_m = 2.0, float(random.uniform(18.0, 30.0))
     depths_m = random.uniform(4.0, 6.5, size=2)
     walls: list[dict[str, object]] = []
@@ -173,7 +173,7 @@ class Task:
 
 
 def choose_task(world: World, seed: int) -> Task:
-    """Gives a start and a kind of thing of which none is near it."""
+    """Return a start and a kind of thing of which none is near it."""
     random = np.random.default_rng(1000 + seed)
     floor = TrueFloor(world)
     cells = np.argwhere(floor.standable & (clearance_m(floor.solid) >= START_ROOM_M))
@@ -193,12 +193,12 @@ def choose_task(world: World, seed: int) -> Task:
 
 
 def measure_from(floor: TrueFloor, place: Point) -> DistanceField:
-    """Gives the true ways from a place of the map frame."""
+    """Return the true ways from a place of the map frame."""
     return distances_from(floor.solid, place, radius_m=BODY_RADIUS_M)
 
 
 def way_to_nearest(world: World, kind: str, ways: DistanceField) -> float:
-    """Gives the metres to the nearest thing of a kind, to within reach of it."""
+    """Return the metres to the nearest thing of a kind, to within reach of it."""
     return min(
         (_way_to(world, thing, ways) for thing in world.objects if thing.kind == kind),
         default=math.inf,
@@ -222,18 +222,18 @@ def _way_to(world: World, thing: WorldObject, ways: DistanceField) -> float:
 
 
 def take_best(candidates: Sequence[SearchCandidate]) -> SearchCandidate | None:
-    """Takes the best one, as the tool does."""
+    """Take the best one, as the tool does."""
     return candidates[0]
 
 
 def nearest_frontier(candidates: Sequence[SearchCandidate]) -> SearchCandidate | None:
-    """Takes the nearest frontier by path (Yamauchi, 1997), until there is none."""
+    """Take the nearest frontier by path (Yamauchi, 1997), until there is none."""
     frontiers = [each for each in candidates if each.kind is CandidateKind.FRONTIER]
     return min(frontiers, key=lambda each: each.path_m, default=None)
 
 
 def nearest_of_all(candidates: Sequence[SearchCandidate]) -> SearchCandidate | None:
-    """Takes the nearest frontier or piece of floor that was not looked at."""
+    """Take the nearest frontier or piece of floor that was not looked at."""
     return min(candidates, key=lambda each: each.path_m)
 
 
@@ -241,7 +241,7 @@ RULES: tuple[Choose, ...] = (take_best, nearest_frontier, nearest_of_all)
 
 
 def judge(task: Task, detections: Sequence[Detection]) -> Judgement:
-    """Says what a model might say of a picture, by what the detector reports in it."""
+    """Say what a model might say of a picture, by what the detector reports in it."""
     labels = {each.label for each in detections}
     if task.thing in labels:
         return Judgement(is_seen=True)
@@ -280,7 +280,7 @@ class Run:
 
 
 async def search(task: Task, rule: Choose) -> Run:
-    """Searches once, as a model does that answers what the judge says."""
+    """Search once, as a model does that answers what the judge says."""
     simulation = Simulation(task.world, seed=task.seed)
     robot = SimulatedRobot(simulation, has_detector=True)
     n_looks, judgement = 0, Judgement()
@@ -320,7 +320,7 @@ async def _tell_nobody(_report: DriveReport) -> None:
 
 
 def measure() -> Iterator[Figure]:
-    """Gives success and SPL of all rules, with bootstrap intervals, and of the differences."""
+    """Return success and SPL of all rules, with bootstrap intervals, and of the differences."""
     cv2.setNumThreads(1)
     with tempfile.TemporaryDirectory() as folder:
         tasks = [choose_task(w, seed) for w in build_worlds(Path(folder)) for seed in SEEDS]
@@ -339,7 +339,7 @@ def measure() -> Iterator[Figure]:
 
 
 def _with_interval(name: str, values: list[float]) -> Iterator[Figure]:
-    """Gives a mean and the ends of its 95 % bootstrap interval."""
+    """Return a mean and the ends of its 95 % bootstrap interval."""
     sample = np.random.default_rng(3).choice(np.array(values), (N_RESAMPLES, len(values)))
     low, high = np.percentile(sample.mean(axis=1), (2.5, 97.5)).tolist()
     yield Figure(name=name, value=statistics.fmean(values), unit="")
@@ -350,7 +350,7 @@ def _with_interval(name: str, values: list[float]) -> Iterator[Figure]:
 @click.command()
 @click.option("--seeds", "n_seeds", default=len(SEEDS), show_default=True, help="Starts.")
 def main(n_seeds: int) -> None:
-    """Shows every search by every rule."""
+    """Show every search by every rule."""
     cv2.setNumThreads(1)
     table = Table("world", "seed", "thing", "shortest m", *(rule.__name__ for rule in RULES))
     with tempfile.TemporaryDirectory() as folder:

@@ -15,7 +15,7 @@ N_RUNS = 5
 
 
 def measure() -> Iterator[Figure]:
-    """Gives medians over fresh server processes, and sizes of what they send."""
+    """Return medians over fresh server processes, and sizes of what they send."""
     runs = [_talk() for _ in range(N_RUNS)]
     for name, unit in (
         ("initialize answered after start", "ms"),

@@ -17,7 +17,7 @@ N_PICTURES = 8
 
 
 def measure() -> Iterator[Figure]:
-    """Gives the figures of each shipped world, driven to frontiers, nothing else counted."""
+    """Return the figures of each shipped world, driven to frontiers, nothing else counted."""
     for name in world_names():
         simulation = Simulation(load_world(name), seed=0)
         stepped_s, errors_m = _explore(simulation)
@@ -33,7 +33,7 @@ def measure() -> Iterator[Figure]:
 
 
 def _explore(simulation: Simulation) -> tuple[float, list[float]]:
-    """Drives to the best frontiers; gives the seconds spent in stepping and the SLAM errors."""
+    """Drive to the best frontiers; return the seconds spent in stepping and the SLAM errors."""
     spent_s, errors_m = 0.0, []
     for _ in range(N_DRIVES):
         position = simulation.pose_in_map.point

@@ -20,7 +20,7 @@ PROGRAMS = {
 
 
 def measure() -> Iterator[Figure]:
-    """Gives the median time to start each program and end it again."""
+    """Return the median time to start each program and end it again."""
     for name, program in PROGRAMS.items():
         _run(program)  # once for the file cache
         times_ms = [_run(program) for _ in range(N_RUNS)]

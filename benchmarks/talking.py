@@ -33,17 +33,17 @@ class ServerProcess:
         self._n_asked = 0
 
     def begin(self) -> float:
-        """Shakes hands; gives the milliseconds from the process's start to the server's answer."""
+        """Shake hands; return the milliseconds from the process's start to the server's answer."""
         _, took_ms = self.ask("initialize", HELLO)
         self.tell("notifications/initialized")
         return took_ms
 
     def call(self, tool: str, **arguments: object) -> tuple[dict[str, Any], float]:
-        """Calls a tool; gives the result and the milliseconds that it took."""
+        """Call a tool; return the result and the milliseconds that it took."""
         return self.ask("tools/call", {"name": tool, "arguments": arguments})
 
     def ask(self, method: str, parameters: dict[str, Any]) -> tuple[dict[str, Any], float]:
-        """Gives the answer and the milliseconds until it came; the first since the start."""
+        """Return the answer and the milliseconds until it came; the first since the start."""
         begun_s = time.perf_counter() if self._n_asked else self._started_s
         self._n_asked += 1
         self.tell(method, id=self._n_asked, params=parameters)
@@ -52,14 +52,14 @@ class ServerProcess:
         return answer["result"], (time.perf_counter() - begun_s) * 1e3
 
     def tell(self, method: str, **fields: object) -> None:
-        """Sends a message that asks for nothing unless it has an id."""
+        """Send a message that asks for nothing unless it has an id."""
         assert self._process.stdin is not None  # noqa: S101 - it is a pipe
         line = json.dumps({"jsonrpc": "2.0", "method": method, **fields})
         self._process.stdin.write(line + "\n")
         self._process.stdin.flush()
 
     def close(self) -> None:
-        """Ends the server as clients do, and waits for it."""
+        """End the server as clients do, and wait for it."""
         assert self._process.stdin is not None  # noqa: S101 - it is a pipe
         self._process.stdin.close()
         self._process.wait(timeout=30)

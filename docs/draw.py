@@ -138,7 +138,7 @@ def _section(plate: Plate) -> str:
 
 
 def _stand(grid: OccupancyGrid) -> Pose:
-    """Gives the middle of the largest region, looking along x."""
+    """Return the middle of the largest region, looking along x."""
     largest = max(find_rooms(grid).regions, key=lambda region: region.floor_area_m2)
     return Pose(largest.widest.x, largest.widest.y, 0.0)
 

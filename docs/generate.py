@@ -48,7 +48,7 @@ TABLE = re.compile(r"(?<=<!-- tools -->\n).*?(?=<!-- /tools -->)", re.DOTALL)
 
 
 def main() -> None:
-    """Writes every document anew; with --check it only says whether that would change one."""
+    """Write every document anew; with --check only say whether that would change one."""
     stale = [path for path, text in write_documents().items() if _read(path) != text]
     if "--check" in sys.argv:
         sys.exit(f"Out of date, run ./run docs: {', '.join(map(str, stale))}" if stale else 0)
@@ -58,7 +58,7 @@ def main() -> None:
 
 
 def write_documents() -> dict[Path, str]:
-    """Gives the text of each generated document."""
+    """Return the text of each generated document."""
     session = Session(FakeRobot(two_rooms()), SemanticMapStore(Path("unused.yaml")), lease_s=60.0)
     groups = build_toolsets(session)
     listed = asyncio.run(build_server(session, toolsets=groups).list_tools())

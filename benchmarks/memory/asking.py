@@ -36,7 +36,7 @@ class Request:
 
 
 def open_atlas(site: Site, places: SemanticMap, find_model: FindModel) -> Atlas:
-    """Gives what the robot knows at its start: map and records, nothing that is true.
+    """Return what the robot knows at its start: map and records, nothing that is true.
 
     Args:
         site: The building.
@@ -55,7 +55,7 @@ def open_atlas(site: Site, places: SemanticMap, find_model: FindModel) -> Atlas:
 
 
 def list_requests(site: Site) -> Iterator[tuple[int, Request]]:
-    """Asks for every thing of a building, by its name alone and by name and room.
+    """Ask for every thing of a building, by its name alone and by name and room.
 
     Each comes with the number of the thing that gave rise to it.
     """
@@ -67,5 +67,5 @@ def list_requests(site: Site) -> Iterator[tuple[int, Request]]:
 
 
 def ask(atlas: Atlas, request: Request) -> Recall:
-    """Gives the answer of the memory."""
+    """Return the answer of the memory."""
     return recall(atlas, RecallQuery(words=request.words))

@@ -89,7 +89,7 @@ class Judged:
 
 
 def judge_all(site: Site, memory: Memory, atlas: Atlas) -> Iterator[Judged]:
-    """Asks for everything in a building and judges the answers."""
+    """Ask for everything in a building and judges the answers."""
     for number, request in list_requests(site):
         answer = ask(atlas, request)
         meant = [_meant(site, request, each) for each in answer.candidates]
@@ -123,7 +123,7 @@ def _off_m(site: Site, request: Request, answer: Recall) -> float:
 
 
 def _meant(site: Site, request: Request, candidate: RecallCandidate) -> TrueThing | None:
-    """Gives the true thing at the place that was named, where it is one that was asked for."""
+    """Return the true thing at the place that was named, where it is one that was asked for."""
     at = candidate.position
     if at is None or candidate.kind is not EntryKind.THING:
         return None
@@ -170,6 +170,6 @@ def _find_fault(
 
 
 def choose(judged: Sequence[Judged], *, n: int, seed: int) -> list[Judged]:
-    """Gives so many of the answers, drawn by a seed."""
+    """Return so many of the answers, drawn by a seed."""
     drawn = np.random.default_rng(seed).permutation(len(judged))[:n]
     return [judged[i] for i in sorted(drawn.tolist())]

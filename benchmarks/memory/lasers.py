@@ -34,7 +34,7 @@ class Laser:
         self._random = np.random.default_rng([seed, 77])
 
     def turn(self, pose: Pose) -> LaserRing:
-        """Gives what it meets where the robot takes itself to stand at a pose of the map."""
+        """Return what it meets where the robot takes itself to stand at a pose of the map."""
         x_m, y_m = POSE_M * self._random.normal(size=2)
         yaw_rad = wrap_angle(pose.yaw_rad + POSE_RAD * float(self._random.normal()))
         truly = self._world_from_map @ Pose(pose.x + x_m, pose.y + y_m, yaw_rad)

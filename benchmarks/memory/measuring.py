@@ -87,7 +87,7 @@ class Trial:
 
 
 def measure() -> Iterator[Figure]:
-    """Gives errors of places and how requests came out, each with ranges and without."""
+    """Return errors of places and how requests came out, each with ranges and without."""
     cv2.setNumThreads(1)
     for group in MEASURED:
         for has_ranges in (False, True):
@@ -152,7 +152,7 @@ def _measure_answers(kind: str, judged: Sequence[Judged]) -> Iterator[Figure]:
 
 
 def _measure_causes(kind: str, judged: Sequence[Judged]) -> Iterator[Figure]:
-    """Gives what the wrong answers were, and why goals do not face what was found."""
+    """Return what the wrong answers were, and why goals do not face what was found."""
     for fault in Fault:
         n = sum(each.fault is fault for each in judged)
         yield Figure(name=f"{kind}, wrong: {fault}", value=n, unit="answers")
@@ -183,7 +183,7 @@ def _share(name: str, values: Sequence[bool]) -> Figure:
 def main(
     *, seed: int, has_ranges: bool, group: str, way: str, shows_wrong: bool, shows_figures: bool
 ) -> None:
-    """Shows every building: errors of places in metres, and answers."""
+    """Show every building: errors of places in metres, and answers."""
     cv2.setNumThreads(1)
     console = Console(width=150)
     if shows_figures:

@@ -54,7 +54,7 @@ class _Notebook:
     waypoints: list[Waypoint] = field(default_factory=list)
 
     def look(self, pose: Pose) -> None:
-        """Writes down a place: everything in view that has too few views as yet."""
+        """Write down a place: everything in view that has too few views as yet."""
         name = f"view {len(self.waypoints)}"
         seen = [thing for thing, n in self.n_views.items() if n < self.most_views]
         seen = [thing for thing in seen if _is_in_view(self.site, pose, thing)]
@@ -79,7 +79,7 @@ class _Notebook:
         )
 
     def close(self) -> Memory:
-        """Gives all that was written down."""
+        """Return all that was written down."""
         return Memory(
             places=SemanticMap(waypoints=tuple(self.waypoints)),
             truth=self.truth,
@@ -112,7 +112,7 @@ class _Notebook:
 
 
 def observe(site: Site, *, seed: int, has_ranges: bool, laser: Laser | None = None) -> Memory:
-    """Writes down two things in three, each from three places.
+    """Write down two things in three, each from three places.
 
     What is seen, and how wrongly, is the same with a laser and without.
     """
@@ -129,7 +129,7 @@ def observe(site: Site, *, seed: int, has_ranges: bool, laser: Laser | None = No
 
 
 def observe_from(site: Site, poses: Iterable[Pose], *, seed: int) -> Memory:
-    """Writes down from each place all that is in view there, with ranges."""
+    """Write down from each place all that is in view there, with ranges."""
     random = np.random.default_rng(seed)
     book = _Notebook(
         site,
@@ -145,7 +145,7 @@ def observe_from(site: Site, poses: Iterable[Pose], *, seed: int) -> Memory:
 
 
 def _lookouts(site: Site, thing: TrueThing, random: np.random.Generator) -> Iterator[Pose]:
-    """Gives places from which a thing is in view, roughly ahead."""
+    """Return places from which a thing is in view, roughly ahead."""
     off_m = np.hypot(*(site.places - (thing.point.x, thing.point.y)).T)
     near = np.flatnonzero((off_m >= NEAREST_M) & (off_m <= FARTHEST_M))
     for i in random.permutation(near)[:MOST_TRIES].tolist():
@@ -164,7 +164,7 @@ def _is_in_view(site: Site, pose: Pose, thing: TrueThing) -> bool:
 
 
 def views_of(memory: Memory, thing: TrueThing) -> Sequence[tuple[Waypoint, Landmark]]:
-    """Gives the records that were made of a thing, wrong ones as well."""
+    """Return the records that were made of a thing, wrong ones as well."""
     return [
         (waypoint, landmark)
         for waypoint in memory.places.waypoints

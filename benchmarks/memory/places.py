@@ -46,7 +46,7 @@ class PlaceError:
 
 
 def truth_of(memory: Memory, thing: Thing) -> TrueThing | None:
-    """Gives what most views of a remembered thing were truly of, wrong ones not counted."""
+    """Return what most views of a remembered thing were truly of, wrong ones not counted."""
     counts: Counter[TrueThing] = Counter()
     for view in thing.supporting:
         key = view.waypoint, view.landmark
@@ -56,7 +56,7 @@ def truth_of(memory: Memory, thing: Thing) -> TrueThing | None:
 
 
 def measure_places(site: Site, memory: Memory, found: Things) -> Iterator[PlaceError]:
-    """Gives the errors of all things that were written down three times."""
+    """Return the errors of all things that were written down three times."""
     remembered: dict[TrueThing, Thing] = {}
     for thing in found.things:
         truth = truth_of(memory, thing)
@@ -100,7 +100,7 @@ def _first_wall(sight: SightMap, waypoint: Waypoint, landmark: Landmark) -> Poin
 
 
 def _intersection(views: Views) -> Point:
-    """Gives the point with the least squared distance to all lines of sight."""
+    """Return the point with the least squared distance to all lines of sight."""
     left, right = np.zeros((2, 2)), np.zeros(2)
     for waypoint, landmark in views:
         way = waypoint.pose.yaw_rad + (landmark.bearing_rad or 0.0)

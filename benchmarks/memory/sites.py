@@ -91,7 +91,7 @@ class TrueThing:
         return self.pose.point
 
     def distance_to(self, place: Point) -> float:
-        """Gives the metres from a place to the thing's body."""
+        """Return the metres from a place to the thing's body."""
         outlines = footprint(self.seen.kind, 0.0, BODY_HEIGHT_M)
         inside = self.pose.inverse().transform(place)
         offs = [
@@ -148,7 +148,7 @@ class Site:
         return self.revision.rooms
 
     def room_of(self, thing: TrueThing) -> str | None:
-        """Gives the room a thing faces."""
+        """Return the room a thing faces."""
         for off_m in (0.3, 0.6, 0.9, 0.0):
             region = self.rooms.find_region_at(thing.pose.transform(Point(off_m, 0.0)))
             if region is not None:
@@ -156,7 +156,7 @@ class Site:
         return None
 
     def sees(self, place: Point, thing: TrueThing) -> bool:
-        """True when a thing can be seen from a place of the map, as `is_in_sight` says."""
+        """Return True when a thing can be seen from a place of the map, as `is_in_sight` says."""
         start = self.world.start.transform(place)
         across = Pose(thing.seen.pose.x, thing.seen.pose.y, start.bearing_to(thing.seen.pose.point))
         return any(
@@ -170,7 +170,7 @@ class Site:
 
 
 def _free_m(edges: NDArray[np.float64], start: Point, end: Point) -> float:
-    """Gives the metres to the first edge on the way to a point and beyond it."""
+    """Return the metres to the first edge on the way to a point and beyond it."""
     far_m = start.distance_to(end)
     way = np.array([end.x - start.x, end.y - start.y]) / far_m
     first = edges[:, :2] - (start.x, start.y)
@@ -184,29 +184,29 @@ def _free_m(edges: NDArray[np.float64], start: Point, end: Point) -> float:
 
 
 def build_held_out() -> Iterator[Site]:
-    """Gives drawn buildings that nothing was chosen on."""
+    """Return drawn buildings that nothing was chosen on."""
     return _draw(HELD_OUT_SEEDS)
 
 
 def build_fresh(*, is_bare: bool = False) -> Iterator[Site]:
-    """Gives drawn buildings that nothing was chosen on, nor measured but once."""
+    """Return drawn buildings that nothing was chosen on, nor measured but once."""
     return _draw(FRESH_SEEDS, is_bare=is_bare)
 
 
 def build_newer(*, is_bare: bool = False) -> Iterator[Site]:
-    """Gives drawn buildings that nothing was chosen on, nor measured but once and later."""
+    """Return drawn buildings that nothing was chosen on, nor measured but once and later."""
     return _draw(NEWER_SEEDS, is_bare=is_bare)
 
 
 def build_worn() -> Iterator[Site]:
-    """Gives the shipped buildings that were held out until they had been looked at too often."""
+    """Return the shipped buildings that were held out until they had been looked at too often."""
     for name in world_names():
         if name not in USED_FOR_CHOOSING:
             yield Site(load_world(name))
 
 
 def build_drawn(*, is_bare: bool = False) -> Iterator[Site]:
-    """Gives buildings in the styles of those held out, for choosing."""
+    """Return buildings in the styles of those held out, for choosing."""
     return _draw(DRAWN_SEEDS, is_bare=is_bare)
 
 
@@ -220,7 +220,7 @@ def _draw(seeds: Sequence[int], *, is_bare: bool = False) -> Iterator[Site]:
 
 
 def build_sites() -> Iterator[Site]:
-    """Gives the buildings that were at hand when the memory was made."""
+    """Return the buildings that were at hand when the memory was made."""
     with TemporaryDirectory() as folder:
         for world in build_worlds(Path(folder)):
             yield Site(world)
@@ -229,7 +229,7 @@ def build_sites() -> Iterator[Site]:
 
 
 def furnish(world: World, random: np.random.Generator) -> World:
-    """Gives a building of a map with things along its walls."""
+    """Return a building of a map with things along its walls."""
     floor = TrueFloor(world)
     clear_m = clearance_m(floor.solid)
     beside = floor.standable & (clear_m <= BODY_RADIUS_M + 0.1)
@@ -257,7 +257,7 @@ def furnish(world: World, random: np.random.Generator) -> World:
 
 
 def _is_on_wall(floor: TrueFloor, at: Pose) -> bool:
-    """True where a wall begins, and floor lies before it."""
+    """Return True where a wall begins, and floor lies before it."""
     behind, before = (floor.solid.cell_at(at.transform(Point(x, 0.0))) for x in (-0.06, 0.15))
     return bool(
         floor.solid.occupied[behind.row, behind.col] and floor.solid.free[before.row, before.col]

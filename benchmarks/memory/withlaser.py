@@ -45,14 +45,14 @@ class _Row:
     n_waypoints: int = 0
 
     def add(self, trial: Trial) -> None:
-        """Adds a building."""
+        """Add a building."""
         self.errors += trial.errors
         self.judged += trial.judged[WAY]
         self.took_s += trial.took_s
         self.n_waypoints += trial.n_waypoints
 
     def cells(self) -> Iterator[str]:
-        """Gives the columns of the table."""
+        """Return the columns of the table."""
         offs = [min(error.ours_m, 99.0) for error in self.errors]
         yield f"{np.median(offs):.2f} / {np.percentile(offs, 90):.2f}"
         yield f"{sum(math.isinf(error.ours_m) for error in self.errors)}"
@@ -82,7 +82,7 @@ COLUMNS = (
 def measure_sites(
     sites: Sequence[Site], *, seeds: Sequence[int], bands: Sequence[str]
 ) -> dict[tuple[str, str], _Row]:
-    """Gives a row for each observer, without a laser and with the named ones."""
+    """Return a row for each observer, without a laser and with the named ones."""
     rows: dict[tuple[str, str], _Row] = {}
     for site in sites:
         for seed in seeds:
@@ -108,7 +108,7 @@ def measure_sites(
 def main(
     *, group: str, maps: Sequence[str], seeds: Sequence[int], every: int, has_flat: bool
 ) -> None:
-    """Shows what a laser adds, on fresh maps and on maps of bare walls."""
+    """Show what a laser adds, on fresh maps and on maps of bare walls."""
     cv2.setNumThreads(1)
     console = Console(width=150)
     bands = list(BANDS) if has_flat else list(BANDS)[:2]

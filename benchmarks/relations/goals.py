@@ -22,7 +22,7 @@ SIDEWAYS = ("left of", "right of")
 
 
 def build_goals(truth: Truth, atlas: Atlas) -> Iterator[Goal]:
-    """Gives the goals of a site, under the ids that the atlas gives its rooms and doors."""
+    """Return the goals of a site, under the ids that the atlas gives its rooms and doors."""
     rooms = dict(_name_rooms(truth, atlas))
     doors = dict(_name_doors(truth, atlas))
     places = [(each.id, each.waypoint.pose) for each in atlas.places]
@@ -38,7 +38,7 @@ def build_goals(truth: Truth, atlas: Atlas) -> Iterator[Goal]:
 
 
 def _name_rooms(truth: Truth, atlas: Atlas) -> Iterator[tuple[str, TrueRoom]]:
-    """Gives the rooms that the division of the map found as they are: ids name its rooms."""
+    """Return the rooms that the division of the map found as they are: ids name its rooms."""
     rows, cols = np.nonzero(atlas.rooms.labels)
     points = truth.site.grid.points_at(rows, cols)
     labels = atlas.rooms.labels[rows, cols]
@@ -145,7 +145,7 @@ def _pairs(truth: Truth, places: Sequence[tuple[str, Pose]]) -> Iterator[Goal]:
 
 
 def _between(truth: Truth, one: Point, other: Point) -> Fit:
-    """Gives what is half way: on the line where it is free, else on the shortest way."""
+    """Return what is half way: on the line where it is free, else on the shortest way."""
     gap_m = one.distance_to(other)
     is_free = truth.sees(np.array([[one.x, one.y]]), other)[0]
 
@@ -169,7 +169,7 @@ def _between(truth: Truth, one: Point, other: Point) -> Fit:
 
 
 def _views(truth: Truth, places: Sequence[tuple[str, Pose]]) -> Iterator[Goal]:
-    """Gives sides of bare points, which have no front of their own."""
+    """Return sides of bare points, which have no front of their own."""
     robot = truth.site.robot
     for (_, pose), (side, turn_rad) in zip(places, itertools.cycle(SIDES.items()), strict=False):
         spot = Point(round(pose.x, 1), round(pose.y, 1))
@@ -274,7 +274,7 @@ def _chains(
 
 
 def _loosely_towards(truth: Truth, thing: Point, heading_rad: float) -> Fit:
-    """Gives a direction from what is known to a quarter of a metre only."""
+    """Return a direction from what is known to a quarter of a metre only."""
 
     def fits(points: Places, *, strict: bool) -> Fitting:
         off = angle_off(bearing(thing, points), heading_rad)
@@ -290,7 +290,7 @@ def _loosely_towards(truth: Truth, thing: Point, heading_rad: float) -> Fit:
 
 
 def _questions(rooms: dict[str, TrueRoom], places: Sequence[tuple[str, Pose]]) -> Iterator[Goal]:
-    """Gives what has to be refused or asked back."""
+    """Return what has to be refused or asked back."""
     first = places[0][0]
     yield Goal(words="left of W99", expected=Expected.REFUSED, says=("W99",))
     yield Goal(words=f"between {first} and {first}", expected=Expected.REFUSED, says=("next to",))

@@ -55,12 +55,12 @@ class Verdict:
 
 
 def is_question(message: str) -> bool:
-    """True for an error that asks which of several things is meant."""
+    """Return True for an error that asks which of several things is meant."""
     return any(sign in message for sign in ("Several things", "are called", "corners. Say which"))
 
 
 def measure() -> Iterator[Figure]:
-    """Gives how many goals came out how, over all maps."""
+    """Return how many goals came out how, over all maps."""
     verdicts = list(judge_all())
     counts = Counter(verdict.outcome for verdict in verdicts)
     yield Figure(name="goals", value=len(verdicts), unit="")
@@ -76,7 +76,7 @@ def measure() -> Iterator[Figure]:
 
 
 def judge_all() -> Iterator[Verdict]:
-    """Asks for every goal of every site."""
+    """Ask for every goal of every site."""
     cv2.setNumThreads(1)
     for site in build_sites():
         truth = Truth(site)
@@ -93,7 +93,7 @@ def _look(site: Site, memory: SemanticMap) -> Atlas:
 
 
 def _look_at_twins(site: Site) -> Atlas:
-    """Gives the site with its last two remembered places under one name."""
+    """Return the site with its last two remembered places under one name."""
     waypoints = site.memory.waypoints
     twins = (replace(each, name="twin") for each in waypoints[-2:])
     return _look(site, SemanticMap(waypoints=(*waypoints[:-2], *twins)))
@@ -144,7 +144,7 @@ def _judge_answer(truth: Truth, goal: Goal, name: str, checked: CheckedGoal) -> 
 @click.command()
 @click.option("--all", "is_all", is_flag=True, help="Those that are right as well.")
 def main(*, is_all: bool) -> None:
-    """Lists the goals that were not answered rightly."""
+    """List the goals that were not answered rightly."""
     counts: Counter[tuple[str, Outcome]] = Counter()
     for verdict in judge_all():
         counts[verdict.site, verdict.outcome] += 1

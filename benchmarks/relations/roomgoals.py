@@ -22,7 +22,7 @@ DIAGONAL = {
 
 
 def build_room_goals(truth: Truth, rooms: dict[str, TrueRoom]) -> Iterator[Goal]:
-    """Gives the goals of up to four rooms, by the ids they go by."""
+    """Return the goals of up to four rooms, by the ids they go by."""
     for room_id, room in itertools.islice(rooms.items(), 4):
         yield from _corners(truth, room_id, room)
         yield from _walls(truth, room_id, room)

@@ -63,7 +63,7 @@ class Site:
 
 
 def build_sites() -> Iterator[Site]:
-    """Gives every map, robots and remembered places included."""
+    """Return every map, robots and remembered places included."""
     yield _offices("offices", turn=Pose(0.0, 0.0, 0.0))
     yield _offices("offices turned by 30 degrees", turn=Pose(-7.0, 3.0, math.radians(30)))
     yield _flat()
@@ -90,7 +90,7 @@ def _box(name: str, x: float, y: float, width: float, height: float, turn: Pose)
 def _paint(
     size: tuple[float, float], walls: Sequence[Box], gaps: Sequence[Box], things: Sequence[Box]
 ) -> np.ndarray:
-    """Gives cells of 0.05 m with walls, openings cut into them, and furniture, as x, y, w, h."""
+    """Return cells of 0.05 m with walls, openings cut into them, and furniture, as x, y, w, h."""
     cells = np.zeros((round(size[1] / CELL_M), round(size[0] / CELL_M)), dtype=np.int8)
     for value, boxes in ((100, walls), (0, gaps), (100, things)):
         for x, y, width, height in boxes:
@@ -100,7 +100,7 @@ def _paint(
 
 
 def _offices(name: str, *, turn: Pose) -> Site:
-    """Draws six rooms along a corridor, with walls of 0.1 m, desks and cupboards; 14 x 10 m."""
+    """Draw six rooms along a corridor, with walls of 0.1 m, desks and cupboards; 14 x 10 m."""
     outer: list[Box] = [(0, 0, 14, 0.1), (0, 9.9, 14, 0.1), (0, 0, 0.1, 10), (13.9, 0, 0.1, 10)]
     inner: list[Box] = [(0, 4, 14, 0.1), (0, 5.9, 14, 0.1)]
     inner += [(x, 0, 0.1, 4) for x in (4.5, 9.5)] + [(x, 6, 0.1, 4) for x in (5, 9)]
@@ -144,7 +144,7 @@ def _offices(name: str, *, turn: Pose) -> Site:
 
 
 def _flat() -> Site:
-    """Draws three rooms in a row with partitions of one cell, and a half-high one; 12 x 5 m."""
+    """Draw three rooms in a row with partitions of one cell, and a half-high one; 12 x 5 m."""
     walls: list[Box] = [(0, 0, 12, 0.05), (0, 4.95, 12, 0.05), (0, 0, 0.05, 5), (11.95, 0, 0.05, 5)]
     walls += [(4, 0, 0.05, 5), (8, 0, 0.05, 5), (6, 0, 0.05, 2)]
     gaps = [(3.95, 3.0, 0.15, 1.0), (7.95, 3.0, 0.15, 1.0)]
@@ -199,7 +199,7 @@ DRAWN = """
 
 
 def _drawn() -> Site:
-    """Reads a map drawn as text, 0.25 m to each sign; one of its rooms is L-shaped."""
+    """Read a map drawn as text, 0.25 m to each sign; one of its rooms is L-shaped."""
     lines = [line for line in DRAWN.split("\n") if line]
     cells = np.array([[100 if sign == "#" else 0 for sign in line] for line in reversed(lines)])
     plain = Pose(0.0, 0.0)
@@ -224,7 +224,7 @@ def _drawn() -> Site:
 
 
 def _world(name: str) -> Site:
-    """Gives a shipped world as its robot's map would be, its objects as seen from the dock."""
+    """Return a shipped world as its robot's map would be, its objects as seen from the dock."""
     world = load_world(name)
     floor = TrueFloor(world)
     to_map = world.start.inverse()
@@ -263,7 +263,7 @@ def _freiburg() -> Site:
 
 
 def _surveyed(name: str, grid: OccupancyGrid) -> Site:
-    """Gives a map of which only the cells are known; places are spread over the open floor."""
+    """Return a map of which only the cells are known; places are spread over the open floor."""
     clear = cv2.distanceTransform((~grid.occupied & grid.free).astype(np.uint8), cv2.DIST_L2, 5)
     poses = []
     for number in range(7):

@@ -25,22 +25,22 @@ class Fit(Protocol):
     """Says which points, shape (n, 2), fit: with a margin where it is strict, else just so."""
 
     def __call__(self, points: Places, *, strict: bool) -> Fitting:
-        """Gives one truth value for each point."""
+        """Return one truth value for each point."""
         ...
 
 
 def angle_off(one: Places | float, other: float) -> Places:
-    """Gives how far an angle is from another, without sign."""
+    """Return how far an angle is from another, without sign."""
     return np.abs(np.remainder(np.asarray(one) - other + math.pi, math.tau) - math.pi)
 
 
 def bearing(origin: Point, points: Places) -> Places:
-    """Gives the directions from a point to others."""
+    """Return the directions from a point to others."""
     return np.arctan2(points[:, 1] - origin.y, points[:, 0] - origin.x)
 
 
 def away(origin: Point, points: Places) -> Places:
-    """Gives the distances from a point to others."""
+    """Return the distances from a point to others."""
     return np.hypot(points[:, 0] - origin.x, points[:, 1] - origin.y)
 
 
@@ -72,12 +72,12 @@ class Truth:
         return self.site.grid.points_at(*np.nonzero(self.standable))
 
     def is_standable(self, point: Point) -> bool:
-        """True where the robot fits and gets to."""
+        """Return True where the robot fits and gets to."""
         cell = self.site.grid.cell_at(point)
         return self.site.grid.contains(cell) and bool(self.standable[cell.row, cell.col])
 
     def paths_m(self, start: Point) -> Places:
-        """Gives the way to each of the places, over eight neighbours, round corners."""
+        """Return the way to each of the places, over eight neighbours, round corners."""
         number = np.full(self.standable.shape, -1, dtype=np.intp)
         number[self.standable] = np.arange(len(self.places))
         ends, costs = [], []
@@ -106,11 +106,11 @@ class Truth:
         return self.paths_m(self.site.robot.point)
 
     def way_m(self, ways_m: Places, point: Point) -> float:
-        """Gives the way to the place nearest to a point."""
+        """Return the way to the place nearest to a point."""
         return float(ways_m[int(np.argmin(away(point, self.places)))])
 
     def sees(self, points: Places, thing: Point) -> Fitting:
-        """True where every cell between is floor, but for those the thing itself stands in."""
+        """Return True where all cells between are floor, but for those the thing stands in."""
         grid, n_steps = self.site.grid, 160
         solid = grid.cells != 0 if grid.cells.max() in (0, 100) else ~grid.free
         blocked = np.zeros(len(points), dtype=bool)
@@ -126,7 +126,7 @@ class Truth:
         return ~is_open_after
 
     def in_room(self, room: TrueRoom | None, points: Places) -> Fitting:
-        """True inside a room's outline."""
+        """Return True inside a room's outline."""
         if room is None:
             return np.ones(len(points), dtype=bool)
         inside = np.ones(len(points), dtype=bool)
@@ -138,12 +138,12 @@ class Truth:
         return inside
 
     def room_at(self, point: Point) -> TrueRoom | None:
-        """Gives the room that a point lies in."""
+        """Return the room that a point lies in."""
         at = np.array([[point.x, point.y]])
         return next((room for room in self.site.rooms if self.in_room(room, at)[0]), None)
 
     def towards(self, thing: Point, heading_rad: float, away_m: float | None = None) -> Fit:
-        """Gives what lies in a direction from a point, in its room, with a free view of it."""
+        """Return what lies in a direction from a point, in its room, with a free view of it."""
         room = self.room_at(thing)
 
         def fits(points: Places, *, strict: bool) -> Fitting:
@@ -159,11 +159,11 @@ class Truth:
         return fits
 
     def near(self, thing: Point, room: TrueRoom | None, points: Places) -> Fitting:
-        """True in the same room and in sight of a point."""
+        """Return True in the same room and in sight of a point."""
         return self.in_room(room, points) & self.sees(points, thing)
 
     def at_distance(self, thing: Point, away_m: float | None) -> Fit:
-        """Gives what is as far from a point as was asked for, or not far where nothing was."""
+        """Return what is as far from a point as was asked for, or not far where nothing was."""
         cell_m = self.site.grid.resolution_m
 
         def fits(points: Places, *, strict: bool) -> Fitting:
@@ -176,7 +176,7 @@ class Truth:
         return fits
 
     def beside_door(self, door: TrueDoor, side: str, viewer: Point) -> Fit:
-        """Gives what is left, right, in front or behind of a door as somebody sees it."""
+        """Return what is left, right, in front or behind of a door as somebody sees it."""
         normal_rad = door.normal_rad
         if math.cos(door.place.bearing_to(viewer) - normal_rad) < 0:
             normal_rad += math.pi
@@ -202,7 +202,7 @@ class Truth:
         return fits
 
     def out_of_the_way(self, door: TrueDoor, viewer: Point) -> Fit:
-        """Gives what is beside a door, on the side of a viewer, and not before its opening."""
+        """Return what is beside a door, on the side of a viewer, and not before its opening."""
         room = self.room_at(viewer)
 
         def fits(points: Places, *, strict: bool) -> Fitting:
@@ -215,7 +215,7 @@ class Truth:
         return fits
 
     def before_door(self, door: TrueDoor, viewer: Point, away_m: float) -> Fit:
-        """Gives what is so far from a door, on the side of a viewer."""
+        """Return what is so far from a door, on the side of a viewer."""
         cell_m = self.site.grid.resolution_m
 
         def fits(points: Places, *, strict: bool) -> Fitting:
@@ -229,7 +229,7 @@ class Truth:
 
 
 def _around(door: TrueDoor, viewer: Point, points: Places) -> tuple[Places, Places]:
-    """Gives how far points are before a door, on a viewer's side, and how far beside its middle."""
+    """Return how far points are before a door, on a viewer's side, and how far beside it."""
     normal_rad = door.normal_rad
     if math.cos(door.place.bearing_to(viewer) - normal_rad) < 0:
         normal_rad += math.pi

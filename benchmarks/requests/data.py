@@ -38,7 +38,7 @@ class Request:
 
 
 def read_requests(paths: Sequence[Path]) -> list[Request]:
-    """Reads files of requests."""
+    """Read files of requests."""
     return [
         Request(
             building=each["building"],
@@ -53,7 +53,7 @@ def read_requests(paths: Sequence[Path]) -> list[Request]:
 
 @cache
 def read_maps() -> Mapping[str, SemanticMap]:
-    """Reads the memory of each building."""
+    """Read the memory of each building."""
     return {
         path.stem: parse_document(path.read_bytes(), source=path.name).to_map()
         for path in sorted((_FOLDER / "buildings").glob("*.yaml"))
@@ -61,5 +61,5 @@ def read_maps() -> Mapping[str, SemanticMap]:
 
 
 def things_of(semantic_map: SemanticMap) -> Sequence[Entry]:
-    """Gives what the answers are chosen from: things, not places."""
+    """Return what the answers are chosen from: things, not places."""
     return [entry for entry in list_entries(semantic_map) if entry.kind is EntryKind.THING]

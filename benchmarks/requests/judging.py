@@ -64,17 +64,17 @@ class Judged:
 
 
 def judge(method: Method, requests: Sequence[Request]) -> list[Judged]:
-    """Asks for everything."""
+    """Ask for everything."""
     return [Judged(request, method.ask(request)) for request in requests]
 
 
 def kinds_of(requests: Sequence[Request]) -> list[str]:
-    """Gives the kinds that have answers, all together and the abstract ones together first."""
+    """Return the kinds that have answers, all together and the abstract ones together first."""
     return [ALL, ABSTRACT, *sorted({each.kind for each in requests} - {NOTHING})]
 
 
 def shares_of(judged: Sequence[Judged], kind: str) -> list[Share]:
-    """Gives the shares for the requests of a kind that have an answer."""
+    """Return the shares for the requests of a kind that have an answer."""
     own = [each for each in judged if _is_of(each.request.kind, kind)]
     shares = [
         _share("first is right", own, lambda each: each.is_first_right),

@@ -24,7 +24,7 @@ N_QUERIES = 60
 
 
 def measure() -> Iterator[Figure]:
-    """Measures what is found of the requests kept apart, by each method and kind; and speed."""
+    """Measure what is found of the requests kept apart, by each method and kind; and speed."""
     requests = read_requests(HELD_OUT)
     methods, _ = list_methods()
     for method in methods:
@@ -46,7 +46,7 @@ def measure() -> Iterator[Figure]:
 @click.option("--tuning", is_flag=True, help="Asks what settings may be chosen with.")
 @click.option("--missed", is_flag=True, help="Lists what the tuning requests miss.")
 def main(*, tuning: bool, missed: bool) -> None:
-    """Shows what is found, by method and kind of request, each with its 95 % interval."""
+    """Show what is found, by method and kind of request, each with its 95 % interval."""
     paths = TUNING if tuning or missed else HELD_OUT
     requests = read_requests(paths)
     methods, missing = list_methods()
@@ -86,7 +86,7 @@ def _columns(share: Share) -> tuple[str, ...]:
 
 
 def _measure_speed(method: Method, requests: list[Request]) -> Iterator[Figure]:
-    """Measures processor time with 1,000 waypoints: those of the buildings over again."""
+    """Measure processor time with 1,000 waypoints: those of the buildings over again."""
     entries = list_entries(_large_map())
     vectors = TextVectors(method.embedder) if method.embedder else None
     if method.embedder is not None and vectors is not None:

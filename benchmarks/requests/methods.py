@@ -53,7 +53,7 @@ class Method:
 
 
 def list_methods() -> tuple[list[Method], list[str]]:
-    """Gives the methods that can be run here, and a sentence for each that cannot."""
+    """Return the methods that can be run here, and a sentence for each that cannot."""
     methods, missing = [_overlap(), Method("words only", _searching(None))], []
     if find_spec("rapidfuzz"):
         methods.insert(1, _fuzzy())
@@ -88,7 +88,7 @@ def _searching(embedder: Embedder | None) -> Callable[[Request], Reply]:
 
 
 def _overlap() -> Method:
-    """Gives BM25 (Robertson et al., 1994) over label, purpose and note, words as they stand."""
+    """Return BM25 (Robertson et al., 1994) over label, purpose and note, words as they stand."""
     scorers = {name: _Bm25(things_of(each)) for name, each in read_maps().items()}
     return Method("word overlap (BM25)", lambda request: scorers[request.building].ask(request))
 
@@ -166,7 +166,7 @@ class _WordLlama:
         self._pieces.no_padding()
 
     def embed(self, texts: Sequence[str]) -> NDArray[np.float32]:
-        """Gives one row for each text, a vector of length 1."""
+        """Return one row for each text, a vector of length 1."""
         return np.array([self._embed_one(text) for text in texts], dtype=np.float32)
 
     def _embed_one(self, text: str) -> NDArray[np.float32]:

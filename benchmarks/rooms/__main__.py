@@ -14,7 +14,7 @@ from benchmarks.rooms.people import show_maps
 @click.option("--json", "as_json", is_flag=True, help="The scores of every map as JSON.")
 @click.option("--drawn", is_flag=True, help="Simulated buildings too, and what is wrong in each.")
 def main(maps: tuple[Path, ...], *, as_json: bool, drawn: bool) -> None:
-    """Scores the division of every map in MAPS that people have divided."""
+    """Score the division of every map in MAPS that people have divided."""
     cv2.setNumThreads(1)
     for folder in maps:
         show_maps(folder, as_json=as_json)

@@ -66,19 +66,19 @@ class DrawnScore:
 
 
 def ship_worlds() -> Iterator[World]:
-    """Gives the worlds that are shipped."""
+    """Return the worlds that are shipped."""
     return (load_world(name) for name in world_names())
 
 
 def draw_worlds(seeds: Iterable[int]) -> Iterator[World]:
-    """Gives a building of each style for each seed."""
+    """Return a building of each style for each seed."""
     for seed in seeds:
         for style in style_names():
             yield parse_world(draw_plan(style, seed=seed), name=f"{style} {seed}")
 
 
 def drawn_figures(family: str, worlds: Iterable[World]) -> Iterator[Figure]:
-    """Gives what is right and wrong in all worlds of a family together."""
+    """Return what is right and wrong in all worlds of a family together."""
     scores = [score_world(world, TrueFloor(world).visible) for world in worlds]
     n_true = sum(score.n_true for score in scores)
     n_found = sum(score.n_found for score in scores)
@@ -97,14 +97,14 @@ def drawn_figures(family: str, worlds: Iterable[World]) -> Iterator[Figure]:
 
 
 def show_worlds() -> None:
-    """Writes the scores of every world."""
+    """Write the scores of every world."""
     for worlds in (ship_worlds(), draw_worlds(DEVELOPED_ON), draw_worlds(HELD_OUT)):
         for world in worlds:
             click.echo(str(score_world(world, TrueFloor(world).visible)))
 
 
 def score_world(world: World, grid: OccupancyGrid) -> DrawnScore:
-    """Divides a map of a building, in the frame of the robot's map, and compares it with truth."""
+    """Divide a map of a building, in the frame of the robot's map, and compare it with truth."""
     truth, classes = _number_spaces(world, grid)
     rooms = find_rooms(grid)
     overlap = find_overlap(rooms.labels.astype(np.intp), truth, grid.free & (truth > 0))
@@ -128,7 +128,7 @@ def score_world(world: World, grid: OccupancyGrid) -> DrawnScore:
 
 
 def _number_spaces(world: World, grid: OccupancyGrid) -> tuple[Numbers, list[RoomClass]]:
-    """Gives each cell the number of its space from 1, 0 outside; and what the spaces are."""
+    """Return each cell the number of its space from 1, 0 outside; and what the spaces are."""
     others = [space for space in world.rooms if space.room_class is not RoomClass.CORRIDOR]
     corridors = [space for space in world.rooms if space.room_class is RoomClass.CORRIDOR]
     truth = np.zeros(grid.cells.shape, np.intp)
@@ -141,7 +141,7 @@ def _number_spaces(world: World, grid: OccupancyGrid) -> tuple[Numbers, list[Roo
 
 
 def _fill(world: World, grid: OccupancyGrid, spaces: Sequence[TrueRoom]) -> NDArray[np.uint8]:
-    """Gives 1 in the outlines of spaces."""
+    """Return 1 in the outlines of spaces."""
     picture = np.zeros(grid.cells.shape, np.uint8)
     grid_from_world = grid.origin.inverse() @ world.start.inverse()
     for space in spaces:

@@ -26,7 +26,7 @@ RESOLUTION_M = 0.05
 
 
 def measure() -> Iterator[Figure]:
-    """Gives the median CPU time for drawn buildings of three sizes, and the scores."""
+    """Return the median CPU time for drawn buildings of three sizes, and the scores."""
     cv2.setNumThreads(1)
     for n_cells in (1000, 2000, 4000):
         grid = _building(n_cells)
@@ -42,7 +42,7 @@ def measure() -> Iterator[Figure]:
 
 
 def _building(n_cells: int) -> OccupancyGrid:
-    """Gives rooms of 6 x 6 m, each with a door to the next, and scattered furniture."""
+    """Return rooms of 6 x 6 m, each with a door to the next, and scattered furniture."""
     generator = np.random.default_rng(n_cells)
     cells = np.zeros((n_cells, n_cells), dtype=np.int8)
     cells[generator.random(cells.shape) < 0.002] = 100

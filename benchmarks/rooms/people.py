@@ -65,19 +65,19 @@ Ratios = NDArray[np.float64]
 
 
 def find_labelled_maps() -> Path | None:
-    """Gives the folder of maps that people have divided, or None where there is none."""
+    """Return the folder of maps that people have divided, or None where there is none."""
     named = os.environ.get("MAPSPEAK_LABELLED_MAPS")
     folder = Path(named) if named else Path(__file__).parents[3] / "shared" / "maps"
     return folder if folder.is_dir() else None
 
 
 def list_labelled_maps(maps: Path) -> list[Path]:
-    """Gives the folders of the maps in it, in alphabetical order."""
+    """Return the folders of the maps in it, in alphabetical order."""
     return [found.parent for found in sorted(maps.glob("*/*/rooms.png"))]
 
 
 def score_figures(scores: Sequence["Score"]) -> Iterator[Figure]:
-    """Gives the means of groups of maps, and how often the questions are answered rightly."""
+    """Return the means of groups of maps, and how often the questions are answered rightly."""
     for group, own in _by_group(scores).items():
         f1_50 = statistics.mean(score.f1_50 for score in own)
         f1_75 = statistics.mean(score.f1_75 for score in own)
@@ -97,7 +97,7 @@ def _by_group(scores: Sequence["Score"]) -> dict[str, list["Score"]]:
 
 
 def timed_rooms(grid: OccupancyGrid) -> tuple[RoomMap, float]:
-    """Divides a map; gives also the milliseconds of CPU time that it took."""
+    """Divide a map; return also the milliseconds of CPU time that it took."""
     started_s = time.process_time()
     rooms = find_rooms(grid)
     return rooms, (time.process_time() - started_s) * 1e3
@@ -133,7 +133,7 @@ class Score:
 
 
 def score_map(folder: Path) -> Score:
-    """Divides one map and compares it with what people drew."""
+    """Divide one map and compares it with what people drew."""
     meta = json.loads((folder / "meta.json").read_text())
     loaded = load_picture(folder / "map.png", resolution_m=meta["resolution"])
     rooms, time_ms = timed_rooms(loaded.grid)
@@ -158,14 +158,14 @@ def score_map(folder: Path) -> Score:
 
 
 def find_overlap(found: Numbers, truth: Numbers, counted: NDArray[np.bool_]) -> Numbers:
-    """Gives the number of shared cells; row by region found, column by region drawn."""
+    """Return the number of shared cells; row by region found, column by region drawn."""
     shape = (int(found.max(initial=0)) + 1, int(truth.max(initial=0)) + 1)
     flat = found[counted] * shape[1] + truth[counted]
     return np.bincount(flat, minlength=shape[0] * shape[1]).reshape(shape)
 
 
 def find_agreement(overlap: Numbers) -> Ratios:
-    """Gives the intersection over union; above 0.5 it pairs regions one to one."""
+    """Return the intersection over union; above 0.5 it pairs regions one to one."""
     union = overlap.sum(axis=1, keepdims=True) + overlap.sum(axis=0, keepdims=True) - overlap
     ratios: Ratios = overlap / np.maximum(union, 1)
     ratios[0] = ratios[:, 0] = 0
@@ -217,7 +217,7 @@ def _ranks_right(
 
 
 def show_maps(maps: Path, *, as_json: bool) -> None:
-    """Writes the scores of a folder of maps."""
+    """Write the scores of a folder of maps."""
     scores = [score_map(folder) for folder in list_labelled_maps(maps)]
     if as_json:
         click.echo(json.dumps([asdict(score) for score in scores], indent=2))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 
 def wrap_angle(angle_rad: float) -> float:
-    """Gives the same angle in (-pi, pi]."""
+    """Return the same angle in (-pi, pi]."""
     wrapped = math.remainder(angle_rad, math.tau)
     return math.pi if wrapped == -math.pi else wrapped
 
@@ -22,11 +22,11 @@ class Point:
     y: float
 
     def distance_to(self, other: "Point") -> float:
-        """Gives the straight distance in metres."""
+        """Return the straight distance in metres."""
         return math.hypot(other.x - self.x, other.y - self.y)
 
     def bearing_to(self, other: "Point") -> float:
-        """Gives the direction to the other point, as a yaw in radians."""
+        """Return the direction to the other point, as a yaw in radians."""
         return math.atan2(other.y - self.y, other.x - self.x)
 
 
@@ -55,22 +55,22 @@ class Pose:
         return math.degrees(self.yaw_rad)
 
     def __matmul__(self, inner: "Pose") -> "Pose":
-        """Chains two transforms: `map_from_odom @ odom_from_base` gives `map_from_base`."""
+        """Chain two transforms: `map_from_odom @ odom_from_base` gives `map_from_base`."""
         place = self.transform(inner.point)
         return Pose(place.x, place.y, wrap_angle(self.yaw_rad + inner.yaw_rad))
 
     def inverse(self) -> "Pose":
-        """Gives the transform the other way round."""
+        """Return the transform the other way round."""
         cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         return Pose(
             -cos * self.x - sin * self.y, sin * self.x - cos * self.y, wrap_angle(-self.yaw_rad)
         )
 
     def transform(self, point: Point) -> Point:
-        """Takes a point of this pose's own frame to the outer frame."""
+        """Take a point of this pose's own frame to the outer frame."""
         cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         return Point(self.x + cos * point.x - sin * point.y, self.y + sin * point.x + cos * point.y)
 
     def is_finite(self) -> bool:
-        """True when no coordinate is NaN or infinite."""
+        """Return True when no coordinate is NaN or infinite."""
         return all(math.isfinite(value) for value in (self.x, self.y, self.yaw_rad))

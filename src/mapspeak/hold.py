@@ -40,7 +40,7 @@ class Hold:
         return self.folder / HOLD
 
     def read(self) -> str | None:
-        """Gives why the robot is held; None where it is not. What cannot be read holds too."""
+        """Return why the robot is held; None where it is not. What cannot be read holds too."""
         try:
             return self.file.read_text(encoding="utf-8", errors="replace").strip() or "by hand"
         except (FileNotFoundError, NotADirectoryError):
@@ -49,7 +49,7 @@ class Hold:
             return f"{self.file} cannot be read ({error.strerror or error})"
 
     def put(self, reason: str, *, at: datetime) -> None:
-        """Holds every robot of this folder.
+        """Hold every robot of this folder.
 
         Raises:
             ConfigError: The file cannot be written.
@@ -58,7 +58,7 @@ class Hold:
         self._do(lambda: self._write(self.file, text))
 
     def lift(self) -> bool:
-        """Lets robots drive again, and gives whether they were held.
+        """Let robots drive again, and return whether they were held.
 
         Raises:
             ConfigError: The file cannot be removed.
@@ -118,12 +118,12 @@ class Hold:
         return tuple(sorted(found - {os.getpid()}))
 
     def leave(self, robot: str) -> None:
-        """Tells that it no longer is."""
+        """Tell that it no longer is."""
         with suppress(OSError):
             (self.folder / SERVED / _file_of(robot)).unlink(missing_ok=True)
 
     def unanswered(self) -> tuple[str, ...]:
-        """Gives the robots that are served and have not answered to the present hold."""
+        """Return the robots that are served and have not answered to the present hold."""
         held_by = self.read()
         answered = {
             path.name
@@ -154,7 +154,7 @@ class Hold:
 
 
 def say_hold(held_by: str) -> str:
-    """Gives why a robot is held, to the second; the rest tells one hold from another."""
+    """Return why a robot is held, to the second; the rest tells one hold from another."""
     return FRACTION.sub("", held_by)
 
 
@@ -163,7 +163,7 @@ def _file_of(robot: str) -> str:
 
 
 def _read_all(folder: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
-    """Gives what servers have written there; what cannot be read is left away."""
+    """Return what servers have written there; what cannot be read is left away."""
     for path in sorted(folder.glob("*.json")):
         try:
             told = json.loads(path.read_text(encoding="utf-8"))
@@ -174,7 +174,7 @@ def _read_all(folder: Path) -> Iterator[tuple[Path, dict[str, Any]]]:
 
 
 def _is_running(process: object) -> bool:
-    """True unless a process has ended for sure; one that hangs still has a robot."""
+    """Return True unless a process has ended for sure; one that hangs still has a robot."""
     try:
         os.kill(int(str(process)), 0)
     except (ProcessLookupError, ValueError, OverflowError):

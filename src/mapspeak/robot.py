@@ -149,7 +149,7 @@ class RangeScan:
     stamp_s: float
 
     def __post_init__(self) -> None:
-        """Copies and locks the arrays."""
+        """Copy and lock the arrays."""
         for name in ("angles_rad", "ranges_m"):
             values = np.array(getattr(self, name), dtype=np.float64)
             values.setflags(write=False)
@@ -239,27 +239,27 @@ class Robot(Protocol):
         ...
 
     async def sleep(self, duration_s: float) -> None:
-        """Returns when that much robot time has passed."""
+        """Return when that much robot time has passed."""
         ...
 
     async def fetch_map(self) -> OccupancyGrid:
-        """Gives the latest map."""
+        """Return the latest map."""
         ...
 
     async def fetch_pose(self) -> StampedPose:
-        """Gives where the robot believes it is."""
+        """Return where the robot believes it is."""
         ...
 
     async def fetch_picture(self) -> CameraPicture:
-        """Takes a picture with the front camera."""
+        """Take a picture with the front camera."""
         ...
 
     async def fetch_detections(self) -> tuple[Detection, ...]:
-        """Gives what the robot's own object detector reports in the camera view."""
+        """Return what the robot's own object detector reports in the camera view."""
         ...
 
     async def fetch_scan(self) -> RangeScan | None:
-        """Gives what the laser meets now; None without a laser, or where no scan comes in time.
+        """Return what the laser meets now; None without a laser, or where no scan comes in time.
 
         It is evidence on the side: it takes no longer than `SCAN_PATIENCE_S`, and no laser that is
         silent, late or turned on its side raises.
@@ -267,21 +267,21 @@ class Robot(Protocol):
         ...
 
     async def send_goal(self, goal: Pose) -> str:
-        """Starts a drive in the robot's navigation and gives the id it is known by."""
+        """Start a drive in the robot's navigation and return the id it is known by."""
         ...
 
     async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
-        """Gives how a drive stands, also after it has ended."""
+        """Return how a drive stands, also after it has ended."""
         ...
 
     async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
-        """Gives how goals stand that others have sent and that are under way; empty when none."""
+        """Return how goals stand that others have sent and that are under way; empty when none."""
         ...
 
     async def cancel_goal(self, robot_goal_id: str) -> None:
-        """Asks the navigation to end a drive; the robot comes to a stand."""
+        """Ask the navigation to end a drive; the robot comes to a stand."""
         ...
 
     async def stop(self) -> None:
-        """Ends every drive and commands zero velocity, at once."""
+        """End every drive and commands zero velocity, at once."""
         ...

@@ -125,11 +125,11 @@ class Session:
         self._surveying = anyio.Lock()
 
     def client_is_heard(self) -> AbstractContextManager[None]:
-        """Marks a client's call, so that the robot knows somebody is there."""
+        """Mark a client's call, so that the robot knows somebody is there."""
         return self._lease.call()
 
     async def client_is_gone(self, client: str) -> None:
-        """Stops the robot when the client that sent it somewhere has gone away."""
+        """Stop the robot when the client that sent it somewhere has gone away."""
         drive = self.drives.under_way
         is_drivers = self.drives.is_busy and (drive is None or drive.client == client)
         if is_drivers or client in started_over(self.ros).owners:
@@ -142,11 +142,11 @@ class Session:
         return self.drives.is_busy or started_over(self.ros).is_busy
 
     async def compute(self, work: Callable[[], T]) -> T:
-        """Does heavy work in a thread, so that a stop is answered meanwhile."""
+        """Do heavy work in a thread, so that a stop is answered meanwhile."""
         return await anyio.to_thread.run_sync(work)
 
     async def fetch_atlas(self, *, needs_memory: bool = False) -> Atlas:
-        """Gives the map as it is now, with everything on it under its id.
+        """Return the map as it is now, with everything on it under its id.
 
         Args:
             needs_memory: Nothing can be said without the memory: what cannot be read is not empty.
@@ -183,7 +183,7 @@ class Session:
             return self._atlas
 
     async def find_room_id(self, point: Point) -> str | None:
-        """Gives the room a point lies in, on the map that was looked at last.
+        """Return the room a point lies in, on the map that was looked at last.
 
         Rooms of an earlier map may be gone on this one, and its new ones have no id there.
 
@@ -197,7 +197,7 @@ class Session:
         return await self.compute(lambda: atlas.find_room_id(point))
 
     async def keep_picture(self, picture: CameraPicture, *, labels: tuple[str, ...]) -> Keeping:
-        """Keeps a picture as an episode, with what the robot's detector reports in it."""
+        """Keep a picture as an episode, with what the robot's detector reports in it."""
         if not self.diary.is_kept:
             return Keeping()
         try:
@@ -216,11 +216,11 @@ class Session:
         )
 
     def find_wall_time(self) -> datetime | None:
-        """Gives the time by the calendar; None where the operator's clock is not known."""
+        """Return the time by the calendar; None where the operator's clock is not known."""
         return None if self.guard is None else self.guard.wall_clock()
 
     def find_episodes(self, query: EpisodeQuery) -> EpisodePage:
-        """Gives the observations that pass a query, compared by meaning where that is possible."""
+        """Return the observations that pass a query, compared by meaning where that is possible."""
         find = self.diary.store.find
         compares_words = query.words or isinstance(query.near, EpisodeQuery)
         embedder = self.recollector.embedder if compares_words else None
@@ -233,7 +233,7 @@ class Session:
             return find(query, rank=self._rank)
 
     async def warm_memory(self) -> None:
-        """Loads what the first question would wait for: the model, the index of the memory.
+        """Load what the first question would wait for: the model, the index of the memory.
 
         Meanwhile everything else is answered. What cannot be read now is told who asks for it.
         """
@@ -250,12 +250,12 @@ class Session:
                 await in_thread(partial(self.find_episodes, ANY_EPISODE))
 
     async def keep_vectors(self) -> None:
-        """Keeps the vectors of remembered texts, so that a later session need not make them."""
+        """Keep the vectors of remembered texts, so that a later session need not make them."""
         if self.diary.is_kept:
             await self.compute(self.recollector.keep)
 
     async def keep_map(self) -> str:
-        """Keeps the map with the memory after a write; gives what a reader should hear of it."""
+        """Keep the map with the memory after a write; return what a reader should hear of it."""
         try:
             grid = await self.robot.fetch_map()
         except LinkError:
@@ -265,13 +265,13 @@ class Session:
         return await self.compute(lambda: _said_of(self.keeper.keep, grid))
 
     async def find_map_warning(self, grid: OccupancyGrid) -> str:
-        """Says so where the memory belongs to another map, or to this one before it moved."""
+        """Say so where the memory belongs to another map, or to this one before it moved."""
         return await self.compute(lambda: _said_of(self.keeper.compare, grid))
 
     async def find_goal(
         self, *, place: str | None, x: float | None, y: float | None, yaw_deg: float | None
     ) -> CheckedGoal:
-        """Gives the pose to drive to for a place or for coordinates, checked against the map.
+        """Return the pose to drive to for a place or for coordinates, checked against the map.
 
         Raises:
             GoalError: Neither or both were given, or the robot cannot drive there; the hint names
@@ -283,7 +283,7 @@ class Session:
         )
 
     async def _survey(self, grid: OccupancyGrid) -> tuple[MapRevision | None, tuple[str, ...]]:
-        """Gives the map with what is closed on it now, and what is to be said of that."""
+        """Return the map with what is closed on it now, and what is to be said of that."""
         surveyor = self._surveyor
         if surveyor is None:
             return None, ()
@@ -292,7 +292,7 @@ class Session:
         return revision, (*others, *await self.compute(lambda: surveyor.describe(revision)))
 
     async def _learn(self, revision: MapRevision) -> bool:
-        """Remembers what the last drive tells of doors; true when that changes ways."""
+        """Remember what the last drive tells of doors; true when that changes ways."""
         drive, wall_time = self.drives.last_ended, self.find_wall_time()
         is_new = drive is not None and drive.goal_id != self._learned_from
         if drive is None or not is_new or wall_time is None:
@@ -309,27 +309,27 @@ class Session:
             return False
 
     def _recall_events(self) -> tuple[Event, ...]:
-        """Gives the events that are remembered; of a broken file those that were read before."""
+        """Return the events that are remembered; of a broken file those that were read before."""
         try:
             return self.memory.read_events()
         except SemanticMapError:
             return ()
 
     def _recall(self) -> SemanticMap:
-        """Gives what is remembered; a broken file costs the memory, not the map."""
+        """Return what is remembered; a broken file costs the memory, not the map."""
         try:
             return self.memory.read()
         except SemanticMapError as error:
             return SemanticMap(warnings=(str(error),))
 
     async def keep_watch(self) -> None:
-        """Stops a driving robot for a hold, a closed area, or want of clients; until cancelled."""
+        """Stop a driving robot for a hold, a closed area, or want of clients; until cancelled."""
         with self._announced():
             await self._keep_watch()
 
     @contextmanager
     def _announced(self) -> Generator[None]:
-        """Lets an operator's stop know of this robot for as long."""
+        """Let an operator's stop know of this robot for as long."""
         if self._guarded is None or self.guard is None:
             yield
             return
@@ -370,7 +370,7 @@ class Session:
         await self.drives.watch()
 
     async def close(self) -> None:
-        """Leaves the robot standing."""
+        """Leave the robot standing."""
         if self.guard is not None:
             self.guard.approvals.close()
         with anyio.CancelScope(shield=True):
@@ -379,13 +379,13 @@ class Session:
 
 
 def _prepare(atlas: Atlas) -> None:
-    """Makes what the first question would: things, their index, what speaks against them."""
+    """Make what the first question would: things, their index, what speaks against them."""
     atlas.recollection.prepare()
     _ = atlas.judge
 
 
 def _said_of(compare: Callable[[OccupancyGrid], MapComparison | None], grid: OccupancyGrid) -> str:
-    """Gives what a comparison of maps gives a reader to do; empty where all is well."""
+    """Return what a comparison of maps gives a reader to do; empty where all is well."""
     try:
         comparison = compare(grid)
     except SemanticMapError as error:

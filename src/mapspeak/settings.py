@@ -36,7 +36,7 @@ def read_settings(
     advice: str,
     context: Mapping[str, Any] | None = None,
 ) -> Settings:
-    """Reads a file into a model; an empty file takes every default.
+    """Read a file into a model; an empty file takes every default.
 
     Args:
         path: The file.
@@ -116,7 +116,7 @@ def _say_fault(fault: ErrorDetails) -> str:
 
 
 def _keys_beside(model: Any, location: Location) -> list[str]:  # noqa: ANN401 - see below
-    """Gives the keys that a place of the file may have; models lie within models and lists."""
+    """Return the keys that a place of the file may have; models lie within models and lists."""
     for part in location[:-1]:
         if isinstance(part, int):
             continue
@@ -126,7 +126,7 @@ def _keys_beside(model: Any, location: Location) -> list[str]:  # noqa: ANN401 -
 
 
 def _line_of(tree: CommentedMap, location: Location) -> int:
-    """Gives the line of the innermost part of a place that the file has, from 1."""
+    """Return the line of the innermost part of a place that the file has, from 1."""
     node: Any = tree
     line = 0
     for part in location:

@@ -170,7 +170,7 @@ def _name_spaces(spaces: Sequence[Space]) -> dict[str, str]:
 
 
 def _number(names: Iterable[str]) -> list[str]:
-    """Number names that come more than once."""
+    """Add numbers to names that come more than once."""
     all_names = list(names)
     total = Counter(all_names)
     seen: Counter[str] = Counter()

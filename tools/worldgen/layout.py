@@ -32,7 +32,7 @@ class Dice:
         return low + min(int(self._random.random() * (high - low + 1)), high - low)
 
     def happens(self, ratio: float) -> bool:
-        """True in so many of all cases."""
+        """Return True in so many of all cases."""
         return float(self._random.random()) < ratio
 
     def choose(self, of: Sequence[T]) -> T:
@@ -85,7 +85,7 @@ class Rect:
         )
 
     def overlaps(self, other: "Rect") -> bool:
-        """True when both have floor in common."""
+        """Return True when both have floor in common."""
         is_beside = self.right <= other.left or other.right <= self.left
         is_above = self.top <= other.bottom or other.top <= self.bottom
         return not (is_beside or is_above)

@@ -21,7 +21,7 @@ from mapspeak.errors import MapspeakError
 @click.version_option(__version__, prog_name="mapspeak")
 @click.pass_context
 def cli(context: click.Context) -> None:
-    """A robot's map, eyes and memory of places for any language model, over MCP.
+    """Return a robot's map, eyes and memory of places for any language model, over MCP.
 
     Without a command it serves the simulated robot over stdio, as an MCP client expects.
     """

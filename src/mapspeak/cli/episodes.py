@@ -28,7 +28,7 @@ JSON_OPTION = click.option("--json", "as_json", is_flag=True, help="As JSON.")
 
 
 def find_memory(given: Path | None) -> Path:
-    """Gives the semantic map file.
+    """Return the semantic map file.
 
     Raises:
         ConfigError: None is given, and the data folder has none or several.
@@ -43,7 +43,7 @@ def find_memory(given: Path | None) -> Path:
 
 
 def open_memory(given: Path | None) -> "SemanticMapStore":
-    """Opens a semantic map file that is there.
+    """Open a semantic map file that is there.
 
     Raises:
         ConfigError: It is not.
@@ -57,7 +57,7 @@ def open_memory(given: Path | None) -> "SemanticMapStore":
 
 
 def read_places(store: "SemanticMapStore") -> "SemanticMap":
-    """Reads all places, and says on stderr what is odd about the file."""
+    """Read all places, and say on stderr what is odd about the file."""
     places = store.read()
     for warning in places.warnings:
         click.echo(f"mapspeak: {warning}", err=True)
@@ -103,7 +103,7 @@ def rename_memory(old: Path, new: Path) -> None:
 
 
 def write_out(text: str, out: Path | None) -> None:
-    """Writes to a file, or to stdout.
+    """Write to a file, or to stdout.
 
     Raises:
         ConfigError: The file cannot be written.
@@ -129,7 +129,7 @@ KINDS = ("picture", "record", "note")
 
 
 def read_time(text: str) -> datetime:
-    """Gives a moment, in the zone of this machine where none is said."""
+    """Return a moment, in the zone of this machine where none is said."""
     try:
         if age := _AGE.fullmatch(text):
             return wall_clock() - timedelta(**{_UNITS[age[2]]: float(age[1])})
@@ -144,7 +144,7 @@ def read_time(text: str) -> datetime:
 
 
 def read_place(text: str) -> tuple[float, ...]:
-    """Gives x and y in metres of the map frame, and the radius in metres where it is said."""
+    """Return x and y in metres of the map frame, and the radius in metres where it is said."""
     try:
         numbers = tuple(float(part) for part in text.split(","))
     except ValueError:
@@ -177,7 +177,7 @@ def read_place(text: str) -> tuple[float, ...]:
 @MEMORY_OPTION
 @JSON_OPTION
 def episodes(semantic_map: Path | None, as_json: bool, **asked: Any) -> None:  # noqa: ANN401, FBT001 - click's options
-    """Lists observations that pass every filter, each with the reason why."""
+    """List observations that pass every filter, each with the reason why."""
     from mapspeak.semantic.episodes import EpisodeStore, memory_folder  # noqa: PLC0415 - heavy
 
     store = EpisodeStore(memory_folder(find_memory(semantic_map)))
@@ -224,7 +224,7 @@ def _query(
 
 
 def _rank(store: "EpisodeStore") -> "Rank | None":
-    """Compares meanings where a model is installed; else words are compared."""
+    """Compare meanings where a model is installed; else words are compared."""
     from mapspeak.semantic.episodes import VectorRank  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.semantic.retrieval import find_model  # noqa: PLC0415
 

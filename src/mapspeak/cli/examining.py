@@ -31,7 +31,7 @@ def doctor(
     seed: int,
     as_json: bool,  # noqa: FBT001 - a flag
 ) -> None:
-    """Checks a robot: what was found, how fresh it is, what is missing and how to start it.
+    """Check a robot: what was found, how fresh it is, what is missing and how to start it.
 
     Ends with 0 when all is well, with 1 when something is missing, with 2 when it cannot be
     reached.

@@ -59,7 +59,7 @@ class GuardChoice:
 
 
 def build_guard(choice: GuardChoice, *, robot: str, address: str = "") -> "Guard":
-    """Builds what commands to a robot are held to.
+    """Build what commands to a robot are held to.
 
     Args:
         choice: Of files.
@@ -123,15 +123,15 @@ def usual_modes() -> Generator[None]:
 
 
 def data_folder() -> Path:
-    """Gives the user's folder for what mapspeak keeps."""
+    """Return the user's folder for what mapspeak keeps."""
     return Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share") / "mapspeak"
 
 
 def control_folder(given: Path | None) -> Path:
-    """Gives the folder that servers and operators share."""
+    """Return the folder that servers and operators share."""
     return given or data_folder() / "control"
 
 
 def wall_clock() -> datetime:
-    """Gives the operator's time, with its zone."""
+    """Return the operator's time, with its zone."""
     return datetime.now().astimezone()

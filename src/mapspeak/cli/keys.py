@@ -38,7 +38,7 @@ class StopKeys:
         self._is_over = threading.Event()
 
     def press(self, keys: bytes) -> None:
-        """Does what each key says, in their order; other keys do nothing."""
+        """Do what each key says, in their order; other keys do nothing."""
         for key in keys:
             try:
                 if key in STOP:
@@ -49,12 +49,12 @@ class StopKeys:
                 self._tell(str(error))
 
     def wait_until_released(self) -> None:
-        """Returns at once, or when nothing is held any more; for a program that shall pause."""
+        """Return at once, or when nothing is held any more; for a program that shall pause."""
         while self._hold.read() is not None and not self._is_over.wait(LOOK_S):
             pass
 
     def end(self) -> None:
-        """Lets whoever waits go on."""
+        """Let whoever waits go on."""
         self._is_over.set()
 
     def _stop(self) -> None:
@@ -73,7 +73,7 @@ class StopKeys:
 def stop_keys(
     hold: "Hold", *, tell: Tell, terminal: int | None = None
 ) -> Generator[StopKeys | None]:
-    """Listens for keys in a terminal; gives None, and does nothing, where there is none.
+    """Listen for keys in a terminal; return None, and do nothing, where there is none.
 
     The terminal gives each key at once meanwhile, and is set back afterwards. Ctrl-C stays.
 
@@ -111,7 +111,7 @@ def stop_keys(
 
 
 def _listen(terminal: int, wake: int, keys: StopKeys) -> None:
-    """Hands on what is typed, until woken or the terminal is gone."""
+    """Hand on what is typed, until woken or the terminal is gone."""
     while True:
         ready, _, _ = select.select([terminal, wake], [], [])
         if wake in ready:
@@ -126,7 +126,7 @@ def _listen(terminal: int, wake: int, keys: StopKeys) -> None:
 
 
 def _find_standard_input() -> int | None:
-    """Gives its file descriptor; None where it is closed, or no file, as in tests."""
+    """Return its file descriptor; None where it is closed, or no file, as in tests."""
     try:
         return sys.stdin.fileno()
     except (AttributeError, OSError, ValueError):
@@ -134,7 +134,7 @@ def _find_standard_input() -> int | None:
 
 
 def _is_in_background(terminal: int) -> bool:
-    """True for a job whose terminal belongs to another one now: changing it would suspend us."""
+    """Return True for a job in the background: changing the terminal would suspend it."""
     try:
         return os.tcgetpgrp(terminal) != os.getpgrp()
     except OSError:

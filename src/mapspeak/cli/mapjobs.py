@@ -42,7 +42,7 @@ class MapSelection:
 
 
 def find_maps(asked: Iterable[Path]) -> MapSelection:
-    """Gives the map files among files, folders and patterns such as `maps/**/map.yaml`.
+    """Return the map files among files, folders and patterns such as `maps/**/map.yaml`.
 
     In a folder, .yaml files that name an image and a resolution are maps; so are pictures called
     map that have no .yaml.
@@ -63,7 +63,7 @@ def find_maps(asked: Iterable[Path]) -> MapSelection:
 
 
 def _resolve(asked: Path) -> tuple[Path, list[Path]]:
-    """Gives the folder that names are relative to, and the map files."""
+    """Return the folder that names are relative to, and the map files."""
     try:
         if asked.is_dir():
             return asked, _maps_in(asked)
@@ -140,7 +140,7 @@ def _files_under(folder: Path) -> list[Path]:
 
 
 def is_description(file: Path) -> bool:
-    """True for a .yaml; anything else is taken for a bare picture."""
+    """Return True for a .yaml; anything else is taken for a bare picture."""
     return file.suffix.lower() in DESCRIPTION_SUFFIXES
 
 
@@ -149,7 +149,7 @@ def _is_picture_of_a_map(file: Path) -> bool:
 
 
 def find_image(description: Path) -> Path | None:
-    """Gives the picture that a map's .yaml names, or None for a .yaml that is no map's.
+    """Return the picture that a map's .yaml names, or None for a .yaml that is no map's.
 
     One that cannot be read gives itself: what is wrong with it is told when it is shown.
     """
@@ -164,7 +164,7 @@ def find_image(description: Path) -> Path | None:
 
 
 def _names(files: list[Path], base: str) -> dict[Path, str]:
-    """Gives each file a name from its path; the same one however many others there are.
+    """Return each file a name from its path; the same one however many others there are.
 
     Where paths differ only in ways that such a name does not show, a digest of the path does.
     """
@@ -178,7 +178,7 @@ def _names(files: list[Path], base: str) -> dict[Path, str]:
 
 
 def _spelled_one_way(path: Path) -> str:
-    """Gives the absolute path without following links: two links are two maps."""
+    """Return the absolute path without following links: two links are two maps."""
     return os.path.normpath(path.absolute())
 
 
@@ -223,7 +223,7 @@ def plan_jobs(
     anchor: MapAnchor | None,
     outputs: Mapping[Output, Path],
 ) -> list[MapJob]:
-    """Gives one job for each map, after looking whether all of them can be done.
+    """Return one job for each map, after looking whether all of them can be done.
 
     Args:
         selection: The maps.
@@ -305,7 +305,7 @@ def _is_folder(target: Path, selection: MapSelection) -> bool:
 
 
 def _check_targets(jobs: list[MapJob]) -> None:
-    """Looks that no result overwrites a map or another result, before anything is written."""
+    """Look that no result overwrites a map or another result, before anything is written."""
     maps = {path.resolve() for job in jobs for path in _inputs(job.file)}
     written: set[Path] = set()
     for path in (path for job in jobs for path in job.outputs.values()):

@@ -47,7 +47,7 @@ def map_command(
     geojson: Path | None,
     osm: Path | None,
 ) -> None:
-    """Shows map_server maps, or bare pictures, as a robot's map is shown; no robot is needed.
+    """Show map_server maps, or bare pictures, as a robot's map is shown; no robot is needed.
 
     FILES are .yaml files, pictures, folders of them, or quoted patterns such as
     "maps/**/map.yaml". With several maps, --out, --json, --rooms, --graph, --geojson and --osm
@@ -82,7 +82,7 @@ def map_command(
 
 
 def _show_maps(jobs: "list[MapJob]") -> int:
-    """Shows one map after the other, and gives how many could not be."""
+    """Show one map after the other, and return how many could not be."""
     from mapspeak.cli.mapshowing import show_map  # noqa: PLC0415 - heavy; help must be quick
 
     n_failed = 0
@@ -102,10 +102,10 @@ def _show_maps(jobs: "list[MapJob]") -> int:
 
 
 def _tell_watcher(text: str) -> None:
-    """Shows a line in place of the one before it."""
+    """Show a line in place of the one before it."""
     width = shutil.get_terminal_size().columns - 1
     click.echo(f"\r\x1b[2K{text[:width]}", nl=False, err=True)
 
 
 def _tell_nobody(_text: str) -> None:
-    """Leaves a log or a pipe as it is."""
+    """Leave a log or a pipe as it is."""

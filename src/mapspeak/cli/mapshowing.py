@@ -25,7 +25,7 @@ from mapspeak.spatial.rooms import RoomMap, find_rooms
 
 
 def show_map(job: MapJob) -> str:
-    """Writes what was asked for, and gives a map's facts in a few lines.
+    """Write what was asked for, and return a map's facts in a few lines.
 
     Raises:
         MapError: The map cannot be read, or cannot be written in the form asked for.
@@ -61,7 +61,7 @@ def _content(
 
 
 def _label_picture(rooms: RoomMap) -> bytes:
-    """Gives the labels with the highest row on top, as in the map file."""
+    """Return the labels with the highest row on top, as in the map file."""
     content = io.BytesIO()
     Image.fromarray(np.flipud(rooms.labels).astype(np.uint16)).save(content, format="PNG")
     return content.getvalue()

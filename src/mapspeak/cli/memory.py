@@ -48,7 +48,7 @@ def export(
     anchor: tuple[float, float, float] | None,
     semantic_map: Path | None,
 ) -> None:
-    """Writes the places as GeoJSON, CSV, or osmAG for JOSM."""
+    """Write the places as GeoJSON, CSV, or osmAG for JOSM."""
     from mapspeak.semantic.exchange import export_text  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.spatial.areagraph import MapAnchor  # noqa: PLC0415
 
@@ -70,7 +70,7 @@ def export(
 )
 @MEMORY_OPTION
 def import_(file: Path, form: str | None, semantic_map: Path | None) -> None:
-    """Joins what was exported, and perhaps edited, into the semantic map file: all or nothing."""
+    """Join what was exported, and perhaps edited, into the semantic map file: all or nothing."""
     from mapspeak.semantic import SemanticMapStore  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.semantic.exchange import import_text, merge_into  # noqa: PLC0415
 
@@ -91,7 +91,7 @@ def import_(file: Path, form: str | None, semantic_map: Path | None) -> None:
 @click.argument("second", type=FILE)
 @click.option("--out", type=FILE, required=True, help="The new file; must not be there yet.")
 def merge(first: Path, second: Path, out: Path) -> None:
-    """Joins two semantic map files of one map, and their observations, into a new one."""
+    """Join two semantic map files of one map, and their observations, into a new one."""
     from mapspeak.semantic.exchange import merge_files  # noqa: PLC0415 - heavy; help must be quick
 
     union, came = merge_files(first, second, out=out)
@@ -119,14 +119,14 @@ def _tell(union: "Union", path: Path) -> None:
 
 @click.group()
 def memory() -> None:
-    """Looks at, checks and shares a memory of places: a semantic map file and its episodes."""
+    """Look at, checks and shares a memory of places: a semantic map file and its episodes."""
 
 
 @memory.command("list")
 @MEMORY_OPTION
 @JSON_OPTION
 def list_(semantic_map: Path | None, as_json: bool) -> None:  # noqa: FBT001 - a flag
-    """Lists all places."""
+    """List all places."""
     places = read_places(open_memory(semantic_map))
     if as_json:
         click.echo(json.dumps(_facts_of(places), ensure_ascii=False, indent=2))
@@ -141,7 +141,7 @@ def list_(semantic_map: Path | None, as_json: bool) -> None:  # noqa: FBT001 - a
 @MEMORY_OPTION
 @JSON_OPTION
 def show(name: tuple[str, ...], semantic_map: Path | None, as_json: bool) -> None:  # noqa: FBT001 - a flag
-    """Shows all that is known of the place NAME."""
+    """Show all that is known of the place NAME."""
     facts = _facts(_named(" ".join(name), read_places(open_memory(semantic_map))))
     if as_json:
         click.echo(json.dumps(facts, ensure_ascii=False, indent=2))
@@ -167,7 +167,7 @@ def find(
     semantic_map: Path | None,
     as_json: bool,  # noqa: FBT001 - a flag
 ) -> None:
-    """Finds the places and things that WORDS may mean.
+    """Find the places and things that WORDS may mean.
 
     Ends with 1 when nothing of the kind is remembered.
     """
@@ -209,7 +209,7 @@ def find(
 @MEMORY_OPTION
 @JSON_OPTION
 def check(map_file: Path | None, semantic_map: Path | None, as_json: bool) -> None:  # noqa: FBT001 - a flag
-    """Checks the file, and with --map whether what it says can be true on that map.
+    """Check the file, and with --map whether what it says can be true on that map.
 
     Ends with 0 when nothing is odd, with 1 when something is, with 2 when the file has a fault.
     """

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @click.argument("wish_id", required=False)
 @CONTROL_OPTION
 def approve(wish_id: str | None, control: Path | None) -> None:
-    """Approves a command that waits, once; without an id it lists what waits."""
+    """Approve a command that waits, once; without an id it lists what waits."""
     from mapspeak.safety import WaitingRoom  # noqa: PLC0415 - heavy; help must be quick
 
     room = WaitingRoom(control_folder(control) / "approvals")
@@ -44,7 +44,7 @@ POLL_S = 0.01
     "--wait-s", default=2.0, show_default=True, help="How long to wait for servers to answer."
 )
 def stop(control: Path | None, reason: str, wait_s: float) -> None:
-    """Stops every robot that is served from here, and holds it until `mapspeak release`.
+    """Stop every robot that is served from here, and hold it until `mapspeak release`.
 
     Ends with 1 when a robot has not answered, or none; the hold is there all the same.
     """
@@ -69,7 +69,7 @@ def stop(control: Path | None, reason: str, wait_s: float) -> None:
 @click.command()
 @CONTROL_OPTION
 def release(control: Path | None) -> None:
-    """Lets robots that were held by `mapspeak stop`, or by a client's stop, drive again."""
+    """Let robots that were held by `mapspeak stop`, or by a client's stop, drive again."""
     was_held = Hold(control_folder(control)).lift()
     click.echo("Released." if was_held else "Nothing was held.")
 
@@ -106,7 +106,7 @@ def _wait_for_answers(hold: Hold, *, wait_s: float) -> None:
 @click.argument("file", type=FILE)
 @click.option("--refused", "only_refused", is_flag=True, help="Only what was refused.")
 def replay(file: Path, only_refused: bool) -> None:  # noqa: FBT001 - a flag
-    """Shows an audit log: who wanted what, what became of it, and why."""
+    """Show an audit log: who wanted what, what became of it, and why."""
     from mapspeak.safety import read_audit  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.semantic.waypoint import clean_line  # noqa: PLC0415
 

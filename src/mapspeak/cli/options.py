@@ -40,7 +40,7 @@ ROBOT_OPTIONS = (
 
 
 def add_options(options: Sequence[Decorator]) -> Decorator:
-    """Gives a decorator that adds several options, in their order."""
+    """Return a decorator that adds several options, in their order."""
 
     def add(function: Command) -> Command:
         for option in reversed(options):

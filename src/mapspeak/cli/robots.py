@@ -33,7 +33,7 @@ ONLY = ""
 
 
 def name_robots(given: Sequence[str]) -> dict[str, str]:
-    """Gives the address of each robot by its name; a single one needs no name.
+    """Return the address of each robot by its name; a single one needs no name.
 
     Raises:
         ConfigError: Several robots, of which not each has a name of its own.
@@ -60,7 +60,7 @@ def name_robots(given: Sequence[str]) -> dict[str, str]:
 
 
 def split_files(given: Sequence[str], robots: Mapping[str, str], what: str) -> dict[str, Path]:
-    """Gives the file of each robot by its name: "NAME=FILE", or "FILE" for those without.
+    """Return the file of each robot by its name: "NAME=FILE", or "FILE" for those without.
 
     Args:
         given: As on the command line.
@@ -89,7 +89,7 @@ def split_files(given: Sequence[str], robots: Mapping[str, str], what: str) -> d
 
 
 def file_for(name: str, files: Mapping[str, Path]) -> Path | None:
-    """Gives a robot's own file, else the one for all, else None."""
+    """Return a robot's own file, else the one for all, else None."""
     return files.get(name, files.get(ONLY))
 
 
@@ -163,7 +163,7 @@ class ServedRobot:
 
 @asynccontextmanager
 async def open_robot(choice: RobotChoice) -> AsyncGenerator["Robot"]:
-    """Offers the chosen robot while the context lasts.
+    """Offer the chosen robot while the context lasts.
 
     Raises:
         ConfigError: There is no such link, or something was asked of it that it has not.
@@ -180,7 +180,7 @@ async def open_robot(choice: RobotChoice) -> AsyncGenerator["Robot"]:
 
 @asynccontextmanager
 async def open_served_robot(choice: RobotChoice) -> AsyncGenerator[ServedRobot]:
-    """Offers the chosen robot at once while the context lasts; one that speaks ROS may come later.
+    """Offer the chosen robot at once while the context lasts; one that speaks ROS may come later.
 
     Raises:
         ConfigError: As with `open_robot`.
@@ -280,7 +280,7 @@ def _read_domain(said: str, kind: str) -> int:
 
 
 def read_network(domain: str, environment: Mapping[str, str]) -> "DdsNetwork":
-    """Gives where to look for a ROS 2 system, as the variables say that ROS itself heeds.
+    """Return where to look for a ROS 2 system, as the variables say that ROS itself heeds.
 
     Args:
         domain: As given with --robot; empty takes ROS_DOMAIN_ID.

@@ -214,7 +214,7 @@ def serve(
     audit: Path | None,
     control: Path | None,
 ) -> None:
-    """Serves a robot, or several, to MCP clients, over stdio or streaming HTTP."""
+    """Serve a robot, or several, to MCP clients, over stdio or streaming HTTP."""
     starts = _read_starts(
         RobotOptions(robots, robot_files, semantic_maps, policies),
         RobotChoice(
@@ -246,7 +246,7 @@ def serve(
 def _read_starts(
     given: RobotOptions, choice: RobotChoice, guard: GuardChoice
 ) -> dict[str, RobotStart]:
-    """Gives each robot as it is to be served, by its name.
+    """Return each robot as it is to be served, by its name.
 
     Args:
         given: What may differ between robots.
@@ -390,7 +390,7 @@ async def _end_on_signal(sessions: "Collection[Session]", scratch: Path) -> None
 
 
 async def _close_all(sessions: "Collection[Session]") -> None:
-    """Leaves every robot standing, all at once."""
+    """Leave every robot standing, all at once."""
     with anyio.CancelScope(shield=True):
         async with anyio.create_task_group() as tasks:
             for session in sessions:

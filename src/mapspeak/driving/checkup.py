@@ -20,7 +20,7 @@ LEAST_ON_MAP_RATIO = 0.5
 
 
 async def examine(robot: Robot) -> tuple[Finding, ...]:
-    """Asks a robot for its map, its pose and a picture, and judges what comes."""
+    """Ask a robot for its map, its pose and a picture, and judge what comes."""
     # A map that does not come is waited for once.
     grid: OccupancyGrid | None = None
     try:
@@ -163,7 +163,7 @@ async def _look_at_laser(robot: Robot, grid: OccupancyGrid | None) -> Finding:
 
 
 def _share_on_map(grid: OccupancyGrid, scan: RangeScan) -> float | None:
-    """Gives the share of what a laser met that lies at what the map has; None where it met none."""
+    """Return share of what a laser met that lies at what the map has; None where it met none."""
     is_met = np.isfinite(scan.ranges_m)
     if not is_met.any():
         return None

@@ -50,7 +50,7 @@ class Diary:
         return self._is_open and self._wall_clock is not None
 
     def close(self) -> None:
-        """Keeps nothing from now on: whoever only reads leaves no traces."""
+        """Keep nothing from now on: whoever only reads leaves no traces."""
         self._is_open = False
 
     def keep_picture(
@@ -63,7 +63,7 @@ class Diary:
         room_id: str | None = None,
         map_id: str | None = None,
     ) -> Keeping:
-        """Keeps a picture that was just taken.
+        """Keep a picture that was just taken.
 
         Args:
             content: JPEG or PNG.
@@ -87,7 +87,7 @@ class Diary:
         )
 
     def keep_record(self, waypoint: Waypoint) -> Keeping:
-        """Keeps that a place was written down, with what was seen this time."""
+        """Keep that a place was written down, with what was seen this time."""
         if not self.is_kept:
             return Keeping()
         keeping = Keeping()
@@ -98,7 +98,7 @@ class Diary:
     def keep_note(
         self, text: str, *, pose: Pose, room_id: str | None = None, map_id: str | None = None
     ) -> Keeping:
-        """Keeps words alone, such as that an event was noted or ended.
+        """Keep words alone, such as that an event was noted or ended.
 
         Args:
             text: The words.
@@ -120,7 +120,7 @@ class Diary:
     def _note(
         self, observe: Callable[[datetime], Observation], picture: bytes | None = None
     ) -> Keeping:
-        """Keeps what is observed now; nothing where nothing is kept."""
+        """Keep what is observed now; nothing where nothing is kept."""
         if not self._is_open or self._wall_clock is None:
             return Keeping()
         return self._write(observe(self._wall_clock()), picture)

@@ -31,7 +31,7 @@ PAUSE_GROWTH = 4
 def learn_from_drive(
     drive: Drive, store: SemanticMapStore, *, revision: MapRevision, now: datetime
 ) -> tuple[Event, ...]:
-    """Notes the door at which a drive gave up, or ends what was noted of one it came through.
+    """Note the door at which a drive gave up, or end what was noted of one it came through.
 
     Args:
         drive: The last that has ended.
@@ -61,7 +61,7 @@ def learn_from_drive(
 def _find_crossed(
     events: Iterable[Event], revision: MapRevision, path: Path | None, now: datetime
 ) -> list[Event]:
-    """Gives those events that last and lie on a way."""
+    """Return those events that last and lie on a way."""
     if path is None:
         return []
     return [
@@ -74,7 +74,7 @@ def _find_crossed(
 def _find_door_ahead(
     revision: MapRevision, begun: Point, robot: Point, goal: Point, now: datetime
 ) -> Event | None:
-    """Gives an event for the door close before the robot that its way goes on through."""
+    """Return an event for the door close before the robot that its way goes on through."""
     rooms = revision.rooms
     near = [
         Event(
@@ -100,7 +100,7 @@ def _end(store: SemanticMapStore, event: Event, now: datetime) -> Event:
 
 
 def _prolong(shut: Event, own: Iterable[Event], now: datetime) -> Event:
-    """Gives the event an end: later each time that the robot finds the same door shut again.
+    """Return the event an end: later each time that the robot finds the same door shut again.
 
     A door has one event, which is written anew. What is long over, or was open in between, counts
     no more.

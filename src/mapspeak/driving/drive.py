@@ -95,7 +95,7 @@ class DriveBook:
 
     @contextmanager
     def preparing(self) -> Generator[int]:
-        """Marks that a goal is being checked, and gives the ticket to start its drive with."""
+        """Mark that a goal is being checked, and return the ticket to start its drive with."""
         self._n_preparing += 1
         try:
             yield self._n_stops
@@ -111,7 +111,7 @@ class DriveBook:
         client: str = "",
         when_busy: WhenBusy | None = None,
     ) -> Drive:
-        """Sends a goal to the robot, or lets it wait its turn.
+        """Send a goal to the robot, or let it wait its turn.
 
         Args:
             goal: Where to.
@@ -174,7 +174,7 @@ class DriveBook:
     async def wait(
         self, goal_id: str | None, *, wait_s: float, on_progress: OnProgress
     ) -> DriveReport:
-        """Waits until a drive ends or that much robot time has passed; gives how it stands then.
+        """Wait until a drive ends or that much robot time has passed; return how it stands then.
 
         Whoever gives up waiting gives up the drive: the robot comes to a stand.
         """
@@ -253,20 +253,20 @@ class DriveBook:
     # --- inside ---
 
     def _open(self) -> list[Drive]:
-        """Gives the drives that have not ended, in their order."""
+        """Return the drives that have not ended, in their order."""
         return [each for each in self._drives.values() if each.final is None]
 
     def _waiting(self) -> list[Drive]:
-        """Gives the drives that wait their turn, in their order."""
+        """Return the drives that wait their turn, in their order."""
         return [each for each in self._open() if each.robot_goal_id is None]
 
     def _dismiss(self, reason: str) -> None:
-        """Ends the drives that wait."""
+        """End the drives that wait."""
         for drive in self._waiting():
             self._end(drive, GoalStatus(state=GoalState.CANCELLED, reason=reason))
 
     async def _find_busy(self) -> Drive | None:
-        """Finds the drive that is under way, after asking the robot whether it has ended."""
+        """Find the drive that is under way, after asking the robot whether it has ended."""
         drive = self.under_way
         if drive is not None:
             await self.report(drive.goal_id)
@@ -305,14 +305,14 @@ class DriveBook:
         return self._keep(replace(drive, heard=JUST_SENT))
 
     def _end_all(self, reason: str, *, but: Drive) -> None:
-        """Notes that all drives but one are over: the robot has one goal."""
+        """Note that all drives but one are over: the robot has one goal."""
         status = GoalStatus(state=GoalState.PREEMPTED, reason=reason)
         for drive in self._open():
             if drive.goal_id != but.goal_id:
                 self._end(drive, status)
 
     async def _start_next(self) -> None:
-        """Sends the next drive that waits, once the one before it has ended."""
+        """Send the next drive that waits, once the one before it has ended."""
         if not self._waiting():
             return
         async with self._starting:

@@ -109,7 +109,7 @@ class Lease:
 
     @contextmanager
     def call(self) -> Generator[None]:
-        """Marks a client's call: heard when it begins and when it ends."""
+        """Mark a client's call: heard when it begins and when it ends."""
         self._n_calls += 1
         try:
             yield

@@ -112,7 +112,10 @@ class ExplorationPolicy:
 
 
 def is_room(row: Row, doors: tuple[Row, ...]) -> bool:
-    """True for a room; what furniture cuts off is tiny, or open to one neighbour several times."""
+    """Return True for a room.
+
+    What furniture cuts off is tiny, or open to one neighbour several times.
+    """
     names = re.findall(r"D\d+", row.cells["doors"])
     ways_in = [
         door.cells["joins"]

@@ -96,35 +96,35 @@ class SimulatedRobot:
         return self._simulation.time_s
 
     async def sleep(self, duration_s: float) -> None:
-        """Lets that much robot time pass, as fast as it can be computed."""
+        """Let that much robot time pass, as fast as it can be computed."""
         deadline_s = self.now_s + duration_s
         while self.now_s < deadline_s - EPSILON_S:
             await self.advance_to(min(deadline_s, self.now_s + CHUNK_S))
 
     async def fetch_map(self) -> OccupancyGrid:
-        """Gives the map that the simulated SLAM publishes."""
+        """Return the map that the simulated SLAM publishes."""
         return await self._run(self._simulation.map)
 
     async def fetch_pose(self) -> StampedPose:
-        """Gives the pose that the simulated SLAM believes in."""
+        """Return the pose that the simulated SLAM believes in."""
         async with self._turn:
             return StampedPose(self._simulation.pose_in_map, self._simulation.time_s)
 
     async def fetch_picture(self) -> CameraPicture:
-        """Draws what the front camera sees."""
+        """Draw what the front camera sees."""
         # Drawing takes long and needs only the pose: a stop must not wait for it.
         async with self._looking:
             return await anyio.to_thread.run_sync(self._take_picture)
 
     async def fetch_detections(self) -> tuple[Detection, ...]:
-        """Gives what the simulated detector reports; nothing when it is switched off."""
+        """Return what the simulated detector reports; nothing when it is switched off."""
         if not self._has_detector:
             return ()
         async with self._looking:
             return await anyio.to_thread.run_sync(self._detect)
 
     async def fetch_scan(self) -> RangeScan | None:
-        """Gives the latest turn of the simulated LiDAR, and where SLAM took the robot to be."""
+        """Return the latest turn of the simulated LiDAR, and where SLAM took the robot to be."""
         with anyio.move_on_after(SCAN_PATIENCE_S):
             async with self._turn:
                 scan = self._simulation.scan
@@ -138,29 +138,29 @@ class SimulatedRobot:
         return None
 
     async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
-        """Gives nothing: nobody else can send this robot anywhere."""
+        """Return nothing: nobody else can send this robot anywhere."""
         return ()
 
     async def send_goal(self, goal: Pose) -> str:
-        """Starts a drive in the simulated navigation."""
+        """Start a drive in the simulated navigation."""
         async with self._turn:
             return str(self._simulation.start_goal(goal))
 
     async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
-        """Gives how a drive stands."""
+        """Return how a drive stands."""
         async with self._turn:
             return self._goal_status(robot_goal_id)
 
     async def cancel_goal(self, robot_goal_id: str) -> None:
-        """Ends a drive."""
+        """End a drive."""
         await self._run(lambda: self._simulation.cancel_goal(_number(robot_goal_id)))
 
     async def stop(self) -> None:
-        """Ends every drive and commands zero velocity."""
+        """End every drive and commands zero velocity."""
         await self._run(self._simulation.stop)
 
     async def advance_to(self, until_s: float) -> None:
-        """Computes the world up to that robot time."""
+        """Compute the world up to that robot time."""
         await self._run(lambda: self._advance_to(until_s))
 
     async def _run(self, work: Callable[[], T]) -> T:
@@ -222,13 +222,13 @@ class PacedRobot(SimulatedRobot):
         self._moved_on = anyio.Event()
 
     async def sleep(self, duration_s: float) -> None:
-        """Returns when that much robot time has passed."""
+        """Return when that much robot time has passed."""
         deadline_s = self.now_s + duration_s
         while self.now_s < deadline_s - EPSILON_S:
             await self._moved_on.wait()
 
     async def keep_pace(self) -> None:
-        """Lets robot time pass as the wall clock does, until cancelled."""
+        """Let robot time pass as the wall clock does, until cancelled."""
         wall_s, robot_s = anyio.current_time(), self.now_s
         while True:
             due_s = robot_s + anyio.current_time() - wall_s
@@ -260,7 +260,7 @@ async def open_simulated_robot(
     has_detector: bool,
     after_step: Callable[[], None] | None = None,
 ) -> AsyncGenerator[SimulatedRobot]:
-    """Offers a simulation as a robot while the context lasts.
+    """Offer a simulation as a robot while the context lasts.
 
     Args:
         simulation: The world and the robot in it.
@@ -279,9 +279,9 @@ async def open_simulated_robot(
 
 
 def _number(robot_goal_id: str) -> int:
-    """Gives the simulation's own id; an id of another robot is none of its."""
+    """Return the simulation's own id; an id of another robot is none of its."""
     return int(robot_goal_id) if robot_goal_id.isdecimal() else 0
 
 
 def _do_nothing() -> None:
-    """Stands for the observer that nobody asked for."""
+    """Stand for the observer that nobody asked for."""

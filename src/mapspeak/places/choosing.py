@@ -31,7 +31,7 @@ from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
 
 
 def find_place(atlas: Atlas, words: str) -> Place:
-    """Finds what is meant by an id, a remembered name, coordinates, "robot", a relation or a thing.
+    """Find what is meant by an id, a remembered name, coordinates, "robot", a relation or a thing.
 
     A relation is such as "left of W3" or "between D1 and D2"; `mapspeak.places.relations`. A
     thing is meant by its label, such as "fire extinguisher", where nothing else is called so.
@@ -81,7 +81,7 @@ class CheckedGoal:
 def choose_goal(
     atlas: Atlas, *, place: str | None, x: float | None, y: float | None, yaw_deg: float | None
 ) -> CheckedGoal:
-    """Gives the pose to drive to for a place or for coordinates, checked against the map.
+    """Return the pose to drive to for a place or for coordinates, checked against the map.
 
     Raises:
         GoalError: Neither or both were given, there is no such place, or the robot cannot drive
@@ -97,7 +97,7 @@ def choose_goal(
 
 
 def read_place(atlas: Atlas, *, place: str | None, x: float | None, y: float | None) -> Place:
-    """Gives the place that was named, or that of the coordinates.
+    """Return the place that was named, or that of the coordinates.
 
     Raises:
         GoalError: Neither or both were given, or there is no such place.
@@ -114,7 +114,7 @@ def read_place(atlas: Atlas, *, place: str | None, x: float | None, y: float | N
 
 
 def check_place(atlas: Atlas, place: Place, *, yaw_deg: float | None = None) -> CheckedGoal:
-    """Judges the pose in which the robot would stand at a place."""
+    """Judge the pose in which the robot would stand at a place."""
     pose = stand_at(atlas, place)
     if yaw_deg is not None:
         pose = Pose(pose.x, pose.y, wrap_angle(math.radians(yaw_deg)))
@@ -127,7 +127,7 @@ def check_place(atlas: Atlas, place: Place, *, yaw_deg: float | None = None) -> 
 
 
 def _has_heading(place: Place) -> bool:
-    """True where it matters how the robot stands there, and not only where."""
+    """Return True where it matters how the robot stands there, and not only where."""
     match place.thing:
         case Region() | Door():
             return False
@@ -138,7 +138,7 @@ def _has_heading(place: Place) -> bool:
 
 
 def stand_at(atlas: Atlas, place: Place) -> Pose:
-    """Gives the pose to drive to for a place, whether or not the robot can stand there."""
+    """Return the pose to drive to for a place, whether or not the robot can stand there."""
     match place.thing:
         case Region() as region:
             point = choose_standing_point(atlas, region)

@@ -78,7 +78,7 @@ WALL_SIDES_M = 0.15
 def check_goal(
     grid: OccupancyGrid, distances: DistanceField, goal: Pose, *, opened: Opened | None = None
 ) -> GoalCheck:
-    """Judges a goal before driving, and finds the nearest pose that would work.
+    """Judge a goal before driving, and find the nearest pose that would work.
 
     Args:
         grid: The map.
@@ -178,7 +178,7 @@ def _find_closing(
 
 
 def _find_nearest(grid: OccupancyGrid, distances: DistanceField, goal: Pose) -> Pose | None:
-    """Finds the reachable cell nearest to the goal by ways that pass through no wall.
+    """Find the reachable cell nearest to the goal by ways that pass through no wall.
 
     What nobody has seen may be floor, so such ways may lead through it. A goal that is walled in,
     such as the inside of a cupboard, gets the nearest cell as the crow flies.
@@ -207,7 +207,7 @@ def _reachable_points(window: OccupancyGrid, distances: DistanceField) -> FloatA
 
 
 def _ways_around_walls(window: OccupancyGrid, goal: Point, points: FloatArray) -> FloatArray:
-    """Gives the lengths of ways from the goal over free and unseen floor."""
+    """Return the lengths of ways from the goal over free and unseen floor."""
     floor = OccupancyGrid(
         cells=np.where(window.occupied & ~_wall_around(window, goal), 100, 0).astype(np.int8),
         resolution_m=window.resolution_m,
@@ -221,7 +221,10 @@ def _ways_around_walls(window: OccupancyGrid, goal: Point, points: FloatArray) -
 
 
 def _wall_around(window: OccupancyGrid, goal: Point) -> Mask:
-    """True around a goal in a wall, as far as to where the wall ends; nowhere for other goals."""
+    """Return True around a goal in a wall, as far as to where the wall ends.
+
+    Nowhere for other goals.
+    """
     inside = window.fractional_cells_at(np.array([[goal.x, goal.y]]))[0]
     rows, cols = np.indices(window.cells.shape)
     away_m = np.hypot(rows + 0.5 - inside[0], cols + 0.5 - inside[1]) * window.resolution_m
@@ -232,7 +235,7 @@ def _wall_around(window: OccupancyGrid, goal: Point) -> Mask:
 
 
 def _into(grid: OccupancyGrid, point: Point) -> Point:
-    """Gives the point itself, or the centre of the nearest cell where it lies off the map."""
+    """Return the point itself, or the centre of the nearest cell where it lies off the map."""
     cell = grid.cell_at(point)
     if grid.contains(cell):
         return point
@@ -250,7 +253,7 @@ def _clearance_at(grid: OccupancyGrid, point: Point) -> float:
 
 
 def _nearest_obstacle_m(grid: OccupancyGrid, cell: Cell, reach_m: float) -> float:
-    """Gives the metres to the nearest obstacle in the square within reach; infinite without one."""
+    """Return metres to the nearest obstacle in the square within reach; infinite without one."""
     margin = math.ceil(reach_m / grid.resolution_m)
     down, across = grid.window(cell.row, cell.col, margin=margin)
     rows, cols = np.nonzero(grid.crop(down, across).occupied)
@@ -259,7 +262,7 @@ def _nearest_obstacle_m(grid: OccupancyGrid, cell: Cell, reach_m: float) -> floa
 
 
 def _window(grid: OccupancyGrid, centre: Point, reach_m: float) -> OccupancyGrid:
-    """Gives the part of a map around a point, or around the part of the map nearest to it."""
+    """Return the part of a map around a point, or around the part of the map nearest to it."""
     cell = grid.cell_at(_into(grid, centre))
     n = max(grid.n_rows, grid.n_cols) if math.isinf(reach_m) else int(reach_m / grid.resolution_m)
     return grid.crop(*grid.window(cell.row, cell.col, margin=n))

@@ -87,7 +87,7 @@ class AmbiguousPlaceError(GoalError):
 
 
 def find_named(atlas: Atlas, words: str) -> Place | None:
-    """Finds what is called so: an id, a remembered name, "x, y", "x, y, yaw", or "robot".
+    """Find what is called so: an id, a remembered name, "x, y", "x, y, yaw", or "robot".
 
     Raises:
         AmbiguousPlaceError: Several remembered places have that name.
@@ -98,27 +98,27 @@ def find_named(atlas: Atlas, words: str) -> Place | None:
 
 
 def no_such_place(atlas: Atlas, words: str) -> GoalError:
-    """Gives the error for words that name no place: what became of it, and what there is."""
+    """Return the error for words that name no place: what became of it, and what there is."""
     wanted = words.strip()
     hint, step = _known_places(atlas, wanted)
     return GoalError(_what_became_of(atlas, wanted), hint=hint, step=step)
 
 
 def is_taken_name(name: str) -> bool:
-    """True for what is read as something else than a remembered name: "R3", "1, 2", "robot"."""
+    """Return True for what is read as no remembered name: "R3", "1, 2", "robot"."""
     words = name.strip()
     is_spot = SPOT.fullmatch(words) is not None
     return ID.fullmatch(words) is not None or is_spot or words.casefold() in ROBOT_NAMES
 
 
 def say_spot(point: Point) -> str:
-    """Gives a point as a name for it."""
+    """Return a point as a name for it."""
     is_on_earth = max(abs(point.x), abs(point.y)) < FARTHEST_M
     return f"({point.x:.2f}, {point.y:.2f})" if is_on_earth else f"({point.x:g}, {point.y:g})"
 
 
 def _find_by_id(atlas: Atlas, place_id: str) -> Place | None:
-    """Finds a thing by its id; a region whatever it was taken for when it got its number."""
+    """Find a thing by its id; a region whatever it was taken for when it got its number."""
     region = atlas.rooms.find_region(place_id)
     if region is not None:
         return Place(region.id, region)
@@ -190,7 +190,7 @@ def _known_places(atlas: Atlas, wanted: str) -> tuple[str, NextStep]:
 
 
 def _say_guesses(answer: Answer) -> str:
-    """Names what may be meant, for the reader to confirm: a likeness alone is no goal."""
+    """Name what may be meant, for the reader to confirm: a likeness alone is no goal."""
     first = answer.candidates[0]
     by = "meaning" if first.basis is Basis.MEANING else "words"
     told = ", ".join(f"{each.entry.id} {quote_name(each.entry.name)}" for each in answer.candidates)
@@ -215,7 +215,7 @@ IN_ROOM = re.compile(r"(?P<label>.+)\s+in\s+(?:the\s+)?(?P<room>.+)", re.IGNOREC
 
 
 def find_thing(atlas: Atlas, words: str) -> Place | None:
-    """Finds the thing that is called so: "fire extinguisher", "nearest sink", "ladder in R2".
+    """Find the thing that is called so: "fire extinguisher", "nearest sink", "ladder in R2".
 
     Only its name counts, never what it means: nobody is driven to a guess.
 
@@ -251,7 +251,7 @@ def find_thing(atlas: Atlas, words: str) -> Place | None:
 
 
 def place_of(atlas: Atlas, remembered: RememberedThing, *, name: str | None = None) -> Place:
-    """Gives a thing as a place, with where it is known to be and how well.
+    """Return a thing as a place, with where it is known to be and how well.
 
     Args:
         atlas: The map.
@@ -278,7 +278,7 @@ def place_of(atlas: Atlas, remembered: RememberedThing, *, name: str | None = No
 
 
 def split_room(atlas: Atlas, words: str) -> tuple[str, str | None]:
-    """Divides "ladder in R2" into the name and the room's id; None where no room is named so."""
+    """Divide "ladder in R2" into the name and the room's id; None where no room is named so."""
     match = IN_ROOM.fullmatch(words)
     room = None if match is None else find_named(atlas, match["room"])
     if match is None or room is None or not isinstance(room.thing, Region):
@@ -287,7 +287,7 @@ def split_room(atlas: Atlas, words: str) -> tuple[str, str | None]:
 
 
 def _away_m(atlas: Atlas, remembered: RememberedThing, start: Place | None) -> float:
-    """Gives the metres to a thing: by path from the robot, straight from another place."""
+    """Return the metres to a thing: by path from the robot, straight from another place."""
     if start is not None:
         return start.point.distance_to(remembered.point)
     path_m = _path_m(atlas, remembered)

@@ -50,7 +50,7 @@ def note_event(
     until: datetime | None = None,
     source: str = "",
 ) -> Event:
-    """Remembers an event, with the outline that its place has now; gives it as it was written.
+    """Remember an event, with the outline that its place has now; return it as it was written.
 
     Args:
         atlas: The map as it is now.
@@ -101,7 +101,7 @@ def _require_no_orders(**said: str) -> None:
 
 
 def say_consequences(atlas: Atlas, event: Event, now: datetime) -> tuple[str, ...]:
-    """Gives what an event that closes floor means for the robot, where it stands now.
+    """Return what an event that closes floor means for the robot, where it stands now.
 
     Args:
         atlas: The map before the event.
@@ -122,7 +122,7 @@ def say_consequences(atlas: Atlas, event: Event, now: datetime) -> tuple[str, ..
 
 
 def _require_robot_outside(atlas: Atlas, event: Event, now: datetime) -> None:
-    """Refuses what would close the floor below the robot: it could drive nowhere any more."""
+    """Refuse what would close the floor below the robot: it could drive nowhere any more."""
     if event.effect is not Effect.CLOSED or not event.is_current(now):
         return
     area = _area_of(event, atlas.map, now)
@@ -135,7 +135,7 @@ def _require_robot_outside(atlas: Atlas, event: Event, now: datetime) -> None:
 
 
 def _find_cut_off(atlas: Atlas, area: ClosedArea) -> list[str]:
-    """Gives the rooms beside a closed area that the robot gets to only while it is open."""
+    """Return the rooms beside a closed area that the robot gets to only while it is open."""
     before = atlas.distances.build_reachable_mask()
     closed = atlas.map.with_areas((*atlas.map.areas, area), atlas.map.hindrances)
     after = closed.distances_from(atlas.robot.point).build_reachable_mask()
@@ -150,7 +150,7 @@ def _find_cut_off(atlas: Atlas, area: ClosedArea) -> list[str]:
 
 
 def end_event(store: SemanticMapStore, event_id: str, *, now: datetime) -> Event:
-    """Ends an event at once; its record stays, as something that was.
+    """End an event at once; its record stays, as something that was.
 
     Raises:
         SemanticMapError: There is none of that id, it is over already, or it cannot be written.
@@ -172,13 +172,13 @@ def end_event(store: SemanticMapStore, event_id: str, *, now: datetime) -> Event
 
 
 def say_events(events: Iterable[Event], now: datetime) -> tuple[str, ...]:
-    """Gives the events that last, and those still to come, one sentence each."""
+    """Return the events that last, and those still to come, one sentence each."""
     lasting = [each for each in events if each.until is None or now < each.until]
     return tuple(event.sentence(now) for event in lasting)
 
 
 def say_unplaced(events: Iterable[Event], revision: MapRevision, now: datetime) -> tuple[str, ...]:
-    """Gives the events that should change ways, but name no place on this map."""
+    """Return the events that should change ways, but name no place on this map."""
     return tuple(
         f"The event {event.id} names no place on this map, so it changes no way: {event.told_text}."
         for event in current_events(events, now)
@@ -189,7 +189,7 @@ def say_unplaced(events: Iterable[Event], revision: MapRevision, now: datetime) 
 def close_floor_of(
     events: Iterable[Event], revision: MapRevision, now: datetime
 ) -> Iterator[ClosedArea]:
-    """Gives what events close at a moment; none opens what something else closes."""
+    """Return what events close at a moment; none opens what something else closes."""
     for event in current_events(events, now):
         if event.effect is Effect.CLOSED:
             area = _area_of(event, revision, now)
@@ -200,7 +200,7 @@ def close_floor_of(
 def find_hindrances(
     events: Iterable[Event], revision: MapRevision, now: datetime
 ) -> Iterator[Hindrance]:
-    """Gives where events make ways slow, or better avoided, at a moment."""
+    """Return where events make ways slow, or better avoided, at a moment."""
     for event in current_events(events, now):
         if event.effect in (Effect.SLOW, Effect.AVOID):
             area = _area_of(event, revision, now)
@@ -232,13 +232,13 @@ def _area_of(event: Event, revision: MapRevision, now: datetime) -> ClosedArea |
 
 
 def _title_of(event: Event) -> str:
-    """Gives how the area is called: by the event's words only where these give no orders."""
+    """Return how the area is called: by the event's words only where these give no orders."""
     words = (event.place, *find_place_ids(event.place), event.text)
     return next((each for each in words if each and not gives_orders(each)), event.id)
 
 
 def _find_outlines(event: Event, revision: MapRevision) -> tuple[Outline, ...]:
-    """Gives the outlines that were written, else those of the ids that its place names."""
+    """Return the outlines that were written, else those of the ids that its place names."""
     if event.outlines:
         return event.outlines
     found: list[Outline] = []
@@ -267,7 +267,7 @@ def _outlines_of(rooms: RoomMap, place: Place) -> tuple[Outline, ...]:
 
 
 def _name_of(place: Place, words: str, effect: Effect) -> str:
-    """Gives the id with the words that were used for it, where these are others.
+    """Return the id with the words that were used for it, where these are others.
 
     What has no extent of its own tells how much floor is taken around it.
     """
@@ -284,5 +284,5 @@ def _name_of(place: Place, words: str, effect: Effect) -> str:
 
 
 def _say_point(point: Point) -> str:
-    """Gives a point as it is written for a goal."""
+    """Return a point as it is written for a goal."""
     return f"{point.x:.2f}, {point.y:.2f}"

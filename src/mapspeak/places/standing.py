@@ -24,7 +24,7 @@ HALF_VIEW_RAD = math.radians(30)
 
 
 def find_standing_point(atlas: Atlas, region: Region) -> Point | None:
-    """Finds a reachable point of a region with room around it, near its middle, or None."""
+    """Find a reachable point of a region with room around it, near its middle, or None."""
     known = atlas.reach.standing
     if region.id not in known:
         known[region.id] = _search(atlas, atlas.map, region)
@@ -32,7 +32,7 @@ def find_standing_point(atlas: Atlas, region: Region) -> Point | None:
 
 
 def choose_standing_point(atlas: Atlas, region: Region) -> Point:
-    """Gives where the robot stands in a region, or would if it got there.
+    """Return where the robot stands in a region, or would if it got there.
 
     What is asked about a region out of reach is then answered for the way there, and not for
     furniture that happens to be in the middle of it.
@@ -47,7 +47,7 @@ def choose_standing_point(atlas: Atlas, region: Region) -> Point:
 
 
 def choose_crossing(atlas: Atlas, door: Door) -> Point:
-    """Gives where the robot passes a door, or would if nothing was closed; else its middle."""
+    """Return where the robot passes a door, or would if nothing was closed; else its middle."""
     found = atlas.find_crossing(door)
     if found is None and atlas.map.open is not atlas.map:
         opened = atlas.map.open.distances_from(atlas.robot.point)
@@ -56,7 +56,7 @@ def choose_crossing(atlas: Atlas, door: Door) -> Point:
 
 
 def _search(atlas: Atlas, revision: MapRevision, region: Region) -> Point | None:
-    """Finds where to stand by the ways and the clearances of one state of the map."""
+    """Find where to stand by the ways and the clearances of one state of the map."""
     middle = _middle_of(atlas, region)
     distances = revision.distances_from(atlas.robot.point)
     comfortable_m = atlas.radius_m + COMFORT_M
@@ -79,7 +79,7 @@ def _search(atlas: Atlas, revision: MapRevision, region: Region) -> Point | None
 
 
 def _roomiest(atlas: Atlas, revision: MapRevision, region: Region) -> Point:
-    """Gives the point of a region that is farthest from what stands in it."""
+    """Return the point of a region that is farthest from what stands in it."""
     rows, cols = _cells_of(atlas.rooms, region)
     clear_m = np.where(atlas.grid.free[rows, cols], revision.clearance_m[rows, cols], -1.0)
     best = int(np.argmax(clear_m))
@@ -87,20 +87,20 @@ def _roomiest(atlas: Atlas, revision: MapRevision, region: Region) -> Point:
 
 
 def _cells_of(rooms: RoomMap, region: Region) -> tuple[IntArray, IntArray]:
-    """Gives the rows and the columns of a region's cells."""
+    """Return the rows and the columns of a region's cells."""
     window = rooms.window_of(region)
     rows, cols = np.nonzero(rooms.labels[window] == region.index)
     return rows + window[0].start, cols + window[1].start
 
 
 def _middle_of(atlas: Atlas, region: Region) -> Point:
-    """Gives the widest point of a room, and the middle of the walk along a corridor."""
+    """Return the widest point of a room, and the middle of the walk along a corridor."""
     walk = atlas.map.walk_along(region) if region.room_class is RoomClass.CORRIDOR else None
     return region.widest if walk is None else walk.middle
 
 
 def arrival_pose(atlas: Atlas, point: Point) -> Pose:
-    """Gives the pose at a point in which the robot ends when it drives there straight on.
+    """Return the pose at a point in which the robot ends when it drives there straight on.
 
     It is the direction of the last stretch of the way, as long as the robot: a way over cells may
     end with a step aside, and nobody wants the robot to turn for that.
@@ -113,7 +113,7 @@ def arrival_pose(atlas: Atlas, point: Point) -> Pose:
 
 
 def _back_from_end(path: Path, away_m: float) -> Point | None:
-    """Gives the point of a way so far before its end, or its start; None where it has no length."""
+    """Return point of a way so far before its end, or its start; None where it has no length."""
     backwards = path.points[::-1]
     for end, start in itertools.pairwise(backwards):
         leg_m = start.distance_to(end)
@@ -125,7 +125,7 @@ def _back_from_end(path: Path, away_m: float) -> Point | None:
 
 
 def stand_before(atlas: Atlas, remembered: RememberedThing) -> Pose:
-    """Gives the pose that faces a thing from near, else one that it was seen from."""
+    """Return the pose that faces a thing from near, else one that it was seen from."""
     near = atlas.find_approach(remembered)
     if near is not None:
         return near
@@ -139,7 +139,7 @@ def stand_before(atlas: Atlas, remembered: RememberedThing) -> Pose:
 
 
 def facing_in(atlas: Atlas, region: Region, point: Point) -> float:
-    """Gives the heading, in radians, in which most of a region lies before a robot at a point."""
+    """Return the heading, in radians, in which most of a region lies before a robot at a point."""
     angles = np.linspace(0.0, math.tau, N_RAYS, endpoint=False)
     sights_m = _sights_in(atlas, region, point, angles)
     half = round(HALF_VIEW_RAD / (math.tau / N_RAYS))
@@ -149,7 +149,7 @@ def facing_in(atlas: Atlas, region: Region, point: Point) -> float:
 
 
 def _sights_in(atlas: Atlas, region: Region, point: Point, angles: FloatArray) -> FloatArray:
-    """Gives how far one sees over free floor of the region along each angle, in metres."""
+    """Return how far one sees over free floor of the region along each angle, in metres."""
     step_m = atlas.grid.resolution_m
     steps_m = np.arange(1, math.ceil(math.hypot(region.length_m, region.width_m) / step_m)) * step_m
     grid = atlas.grid

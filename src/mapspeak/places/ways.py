@@ -38,7 +38,7 @@ class Way:
 
 
 def measure_path(atlas: Atlas, start: Place, goal: Place) -> float | None:
-    """Gives the metres by path between two places; None where the robot cannot get through."""
+    """Return the metres by path between two places; None where the robot cannot get through."""
     distances = _distances_from(atlas, start)
     end = standing_point(atlas, goal)
     if distances is None or atlas.map.weights is None:
@@ -47,7 +47,7 @@ def measure_path(atlas: Atlas, start: Place, goal: Place) -> float | None:
 
 
 def find_way(atlas: Atlas, start: Place, goal: Place) -> Way:
-    """Finds the way between two places; of a room it is the point to stand in that counts."""
+    """Find the way between two places; of a room it is the point to stand in that counts."""
     begin, end = standing_point(atlas, start), standing_point(atlas, goal)
     straight_m = begin.distance_to(end)
     distances = _distances_from(atlas, start)
@@ -70,7 +70,7 @@ def find_way(atlas: Atlas, start: Place, goal: Place) -> Way:
 def _measure(
     atlas: Atlas, distances: DistanceField | None, path: Path | None, end: Point
 ) -> float | None:
-    """Gives the metres to the end: by the way round where that is not the shortest one."""
+    """Return the metres to the end: by the way round where that is not the shortest one."""
     if distances is None or path is None:
         return None
     is_shortest = atlas.map.weights is None
@@ -78,7 +78,7 @@ def _measure(
 
 
 def _distances_from(atlas: Atlas, start: Place) -> DistanceField | None:
-    """Gives the distances from a place; None where no way begins.
+    """Return the distances from a place; None where no way begins.
 
     Elsewhere than where it is, a robot cannot squeeze out of a place that is too tight for it.
     """
@@ -90,7 +90,7 @@ def _distances_from(atlas: Atlas, start: Place) -> DistanceField | None:
 
 
 def standing_point(atlas: Atlas, place: Place) -> Point:
-    """Gives the point from which and to which ways to a place are measured."""
+    """Return the point from which and to which ways to a place are measured."""
     match place.thing:
         case Region() as region:
             return choose_standing_point(atlas, region)
@@ -103,14 +103,14 @@ def standing_point(atlas: Atlas, place: Place) -> Point:
 
 
 def _cells_along(atlas: Atlas, path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Gives rows and columns of the cells that a path passes, a step for each cell's length."""
+    """Return rows and columns of the cells that a path passes, a step for each cell's length."""
     points = path.sampled(atlas.grid.resolution_m)
     rows, cols = atlas.grid.cells_at(np.array([[point.x, point.y] for point in points]))
     return rows.clip(0, atlas.grid.n_rows - 1), cols.clip(0, atlas.grid.n_cols - 1)
 
 
 def _name_regions(atlas: Atlas, rows: np.ndarray, cols: np.ndarray) -> tuple[str, ...]:
-    """Gives the regions that some cells lie in, with the door between each and the next."""
+    """Return the regions that some cells lie in, with the door between each and the next."""
     by_index = {region.index: region.id for region in atlas.rooms.regions}
     names: list[str] = []
     for row, col in zip(rows.tolist(), cols.tolist(), strict=True):

@@ -30,26 +30,26 @@ class PursuedGoal:
         self._listeners: list[Callable[[], None]] = []
 
     def listen(self, listener: Callable[[], None]) -> None:
-        """Calls a function whenever something is said about the goal; it must not raise."""
+        """Call a function whenever something is said about the goal; it must not raise."""
         self._listeners.append(listener)
 
     def take_acceptance(self) -> None:
-        """Notes that the server has taken it."""
+        """Note that the server has taken it."""
         self.is_accepted = True
         self._tell()
 
     def take_feedback(self, feedback: Message) -> None:
-        """Keeps the latest feedback."""
+        """Keep the latest feedback."""
         self.feedback = feedback
         self._tell()
 
     def take_end(self, end: ActionEnd) -> None:
-        """Keeps how it ended."""
+        """Keep how it ended."""
         self.end = end
         self._tell()
 
     def take_loss(self) -> None:
-        """Notes that nothing more will be heard this way."""
+        """Note that nothing more will be heard this way."""
         self.is_lost = True
         self._tell()
 

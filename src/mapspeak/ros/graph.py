@@ -14,12 +14,12 @@ TYPE = re.compile(r"[A-Za-z]\w*(?:/(?:msg|srv|action))?/[A-Za-z]\w*")
 
 
 def new_id() -> str:
-    """Gives an id that no other client of the same robot uses: 32 hex digits."""
+    """Return an id that no other client of the same robot uses: 32 hex digits."""
     return uuid.uuid4().hex
 
 
 def find_nearest(name: str, names: Iterable[str], *, most: int = 3) -> list[str]:
-    """Gives the names most like one, the most alike first: what somebody may have meant."""
+    """Return the names most like one, the most alike first: what somebody may have meant."""
     known = list(names)
     last = name.rstrip("/").rpartition("/")[2].lower()
     ending = [each for each in known if last and each.lower().endswith(f"/{last}")]
@@ -44,7 +44,7 @@ class RosGraph:
     actions: tuple[str, ...] = ()
 
     def topics_of(self, *types: str) -> list[str]:
-        """Gives the topics of some types, in the order of their names."""
+        """Return the topics of some types, in the order of their names."""
         return sorted(topic for topic, type_name in self.types.items() if type_name in types)
 
 

@@ -53,7 +53,7 @@ class NativeTopics(ABC, Generic[Request]):
     def subscribe(
         self, topic: str, *, type_name: str | None, is_bulky: bool, throttle_ms: int
     ) -> TopicSubscription:
-        """Gives the subscription to a topic; the first subscriber decides how often it is heard.
+        """Return the subscription to a topic; the first subscriber decides how often it is heard.
 
         Raises:
             LinkError: The name or the type is none, or the topic has another type.
@@ -69,7 +69,7 @@ class NativeTopics(ABC, Generic[Request]):
         return request.subscription
 
     def unsubscribe(self, topic: str, subscription: object) -> None:
-        """Ends one use of a subscription, and with the last one the reading."""
+        """End one use of a subscription, and with the last one the reading."""
         request = self.requests.get(topic)
         if request is None or request.subscription is not subscription:
             return
@@ -79,7 +79,7 @@ class NativeTopics(ABC, Generic[Request]):
             self.end(request)
 
     def renew(self, topic: str) -> None:
-        """Reads a topic anew: latched messages come again."""
+        """Read a topic anew: latched messages come again."""
         request = self.requests.get(topic)
         if request is not None:
             self.end(request)
@@ -87,37 +87,37 @@ class NativeTopics(ABC, Generic[Request]):
 
     @abstractmethod
     def check(self, topic: str, type_name: str | None) -> None:
-        """Raises `LinkError` where a name or a type is none, or does not go with the other."""
+        """Raise `LinkError` where a name or a type is none, or do not go with the other."""
 
     @abstractmethod
     def request(
         self, subscription: TopicSubscription, *, is_bulky: bool, throttle_s: float
     ) -> Request:
-        """Gives a request that nothing has been done for yet."""
+        """Return a request that nothing has been done for yet."""
 
     @abstractmethod
     def arrange(self, request: Request) -> None:
-        """Reads a topic in the best quality that all of its writers offer."""
+        """Read a topic in the best quality that all of its writers offer."""
 
     @abstractmethod
     def end(self, request: Request) -> None:
-        """Reads a topic no longer."""
+        """Read a topic no longer."""
 
     @abstractmethod
     def advertise(self, topic: str, *, type_name: str) -> None:
-        """Says that we will publish."""
+        """Say that we will publish."""
 
     @abstractmethod
     def unadvertise(self, topic: str) -> None:
-        """Takes back what `advertise` said."""
+        """Take back what `advertise` said."""
 
     @abstractmethod
     async def publish(self, topic: str, message: Message) -> None:
-        """Publishes, once those who are known to listen are connected."""
+        """Publish, once those who are known to listen are connected."""
 
     @abstractmethod
     def publish_at_once(self, topic: str, message: Message) -> None:
-        """Publishes to those who are connected already."""
+        """Publish to those who are connected already."""
 
 
 class NativeConnection(ABC):
@@ -148,17 +148,17 @@ class NativeConnection(ABC):
         is_bulky: bool = False,
         throttle_ms: int = 0,
     ) -> TopicSubscription:
-        """Gives the subscription to a topic; it is read as soon as somebody writes it."""
+        """Return the subscription to a topic; it is read as soon as somebody writes it."""
         return self.topics.subscribe(
             topic, type_name=type_name, is_bulky=is_bulky, throttle_ms=throttle_ms
         )
 
     def unsubscribe(self, subscription: Subscription) -> None:
-        """Ends one use of a subscription; the last one ends the reading too."""
+        """End one use of a subscription; the last one ends the reading too."""
         self.topics.unsubscribe(subscription.topic, subscription)
 
     def renew(self, subscription: Subscription) -> None:
-        """Reads a topic anew: latched messages come again."""
+        """Read a topic anew: latched messages come again."""
         self.topics.renew(subscription.topic)
 
     @property
@@ -168,32 +168,32 @@ class NativeConnection(ABC):
 
     @abstractmethod
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
-        """Runs something in the background until the connection is closed."""
+        """Run something in the background until the connection is closed."""
 
     def advertise(self, topic: str, *, type_name: str) -> None:
-        """Says that we will publish."""
+        """Say that we will publish."""
         self.topics.check(topic, type_name)
         self.topics.announcements.advertise(topic, type_name)
 
     def unadvertise(self, topic: str) -> None:
-        """Takes back what `advertise` said."""
+        """Take back what `advertise` said."""
         self.topics.announcements.unadvertise(topic)
 
     def advertise_late(self) -> None:
-        """Tells the robot of what is advertised from now on only with the first message there."""
+        """Tell the robot of what is advertised from now on only with the first message there."""
         self.topics.announcements.be_late()
 
     def advertise_early(self) -> None:
-        """Tells the robot at once of all that is advertised, now and from now on."""
+        """Tell the robot at once of all that is advertised, now and from now on."""
         self.topics.announcements.be_early()
 
     async def publish(self, topic: str, message: Message) -> None:
-        """Publishes on an advertised topic, once known listeners are connected to it."""
+        """Publish on an advertised topic, once known listeners are connected to it."""
         self.topics.announcements.use(topic)
         await self.topics.publish(topic, message)
 
     def publish_everywhere(self, topic: str, message: Message) -> int:
-        """Publishes at once, for a stop; there is one way, so it gives 1."""
+        """Publish at once, for a stop; there is one way, so it gives 1."""
         say = partial(self.topics.publish_at_once, topic, message)
         if self.topics.announcements.use(topic):
             self.start_soon(partial(say_again, say))
@@ -201,14 +201,14 @@ class NativeConnection(ABC):
         return 1
 
     def clear_the_way(self) -> None:  # noqa: B027 - nothing is to be done, by anybody
-        """Does nothing: in ROS 2 itself, nothing is held up by what was sent before."""
+        """Do nothing: in ROS 2 itself, nothing is held up by what was sent before."""
 
     def give_up_goal(self, goal: ActionGoal) -> None:  # noqa: B027 - as above
-        """Does nothing: in ROS 2 itself, a goal holds up nothing."""
+        """Do nothing: in ROS 2 itself, a goal holds up nothing."""
 
 
 def check_name(name: str) -> None:
-    """Does nothing for the full name of a topic, a service or an action.
+    """Do nothing for the full name of a topic, a service or an action.
 
     Raises:
         LinkError: It is none.
@@ -218,7 +218,7 @@ def check_name(name: str) -> None:
 
 
 def wrong_type(name: str, found: str, given: str) -> LinkError:
-    """Gives the error for a topic, service or action that is of another type than given."""
+    """Return the error for a topic, service or action that is of another type than given."""
     return LinkError(
         f"{name} is a {bare_type(found)}, not a {bare_type(given)}.",
         hint="Use the type that the robot uses.",

@@ -45,7 +45,7 @@ class NodeParameters:
         self._caller = caller
 
     async def fetch_names(self, node: str) -> tuple[str, ...]:
-        """Gives the names of a node's parameters, in their order.
+        """Return the names of a node's parameters, in their order.
 
         Raises:
             LinkError: The node does not answer.
@@ -55,7 +55,7 @@ class NodeParameters:
         return tuple(sorted(str(name) for name in names))
 
     async def fetch(self, node: str, name: str) -> Any:  # noqa: ANN401 - any value ROS has
-        """Gives the value of a parameter; None where it is not set.
+        """Return the value of a parameter; None where it is not set.
 
         Raises:
             LinkError: The node does not answer.
@@ -67,7 +67,7 @@ class NodeParameters:
         return None if field is None else value.get(field)
 
     async def put(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401 - likewise
-        """Sets a parameter; a whole number becomes a double where the node keeps doubles.
+        """Set a parameter; a whole number becomes a double where the node keeps doubles.
 
         None deletes it, which a node allows only for what it has not declared.
 
@@ -127,7 +127,7 @@ def _part(answer: Any, key: str, node: str) -> Any:  # noqa: ANN401 - ROS JSON e
 
 
 def _write(value: Any, *, wanted: int) -> dict[str, Any]:  # noqa: ANN401 - any value ROS has
-    """Gives a rcl_interfaces/ParameterValue."""
+    """Return a rcl_interfaces/ParameterValue."""
     kind = _kind_of(value)
     if (kind, wanted) == (KIND_OF[int], DOUBLE):
         kind, value = DOUBLE, float(value)

@@ -56,11 +56,11 @@ class Subscription(Protocol):
         ...
 
     def listen(self, listener: Listener) -> None:
-        """Calls a function with every message that comes from now on; it must not raise."""
+        """Call a function with every message that comes from now on; it must not raise."""
         ...
 
     async def wait_for_more_than(self, n_received: int, *, timeout_s: float) -> Message:
-        """Gives the latest message once more than so many have come; waits in wall time.
+        """Return the latest message once more than so many have come; wait in wall time.
 
         Raises:
             LinkError: None came in time. The subscription goes on.
@@ -107,7 +107,7 @@ class ActionGoal(Protocol):
         ...
 
     def listen(self, listener: Callable[[], None]) -> None:
-        """Calls a function whenever something is said about the goal; it must not raise."""
+        """Call a function whenever something is said about the goal; it must not raise."""
         ...
 
 
@@ -149,11 +149,11 @@ class RosConnection(Protocol):
         ...
 
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
-        """Runs something in the background until the connection is closed."""
+        """Run something in the background until the connection is closed."""
         ...
 
     async def wait_until_connected(self) -> None:
-        """Returns at once, or when the connection is open again."""
+        """Return at once, or when the connection is open again."""
         ...
 
     def subscribe(
@@ -164,7 +164,7 @@ class RosConnection(Protocol):
         is_bulky: bool = False,
         throttle_ms: int = 0,
     ) -> Subscription:
-        """Gives the subscription to a topic, which is begun where there is none yet.
+        """Return the subscription to a topic, which is begun where there is none yet.
 
         Args:
             topic: Its full name.
@@ -175,23 +175,23 @@ class RosConnection(Protocol):
         ...
 
     def unsubscribe(self, subscription: Subscription) -> None:
-        """Ends one use of a subscription; the last one ends it at the robot too."""
+        """End one use of a subscription; the last one ends it at the robot too."""
         ...
 
     def renew(self, subscription: Subscription) -> None:
-        """Subscribes again, perhaps in another way: a latched message may have been missed."""
+        """Subscribe again, perhaps in another way: a latched message may have been missed."""
         ...
 
     def advertise(self, topic: str, *, type_name: str) -> None:
-        """Says that we will publish; the robot needs a moment until it listens."""
+        """Say that we will publish; the robot needs a moment until it listens."""
         ...
 
     def unadvertise(self, topic: str) -> None:
-        """Takes back what `advertise` said; does nothing for what was not advertised."""
+        """Take back what `advertise` said; do nothing for what was not advertised."""
         ...
 
     def advertise_late(self) -> None:
-        """Tells the robot of what is advertised from now on only with the first message there.
+        """Tell the robot of what is advertised from now on only with the first message there.
 
         For one that is only watched: it should not look as if we drove it. A stop is then said for
         a second, until the robot has noticed who speaks.
@@ -199,18 +199,18 @@ class RosConnection(Protocol):
         ...
 
     def advertise_early(self) -> None:
-        """Tells the robot at once of all that is advertised, now and from now on.
+        """Tell the robot at once of all that is advertised, now and from now on.
 
         For whoever may move it, so that a stop is heard at once; so it is from the beginning.
         """
         ...
 
     async def publish(self, topic: str, message: Message) -> None:
-        """Publishes on an advertised topic."""
+        """Publish on an advertised topic."""
         ...
 
     def publish_everywhere(self, topic: str, message: Message) -> int:
-        """Publishes at once by every way that is open, and gives how many: for a stop."""
+        """Publish at once by every way that is open, and return how many: for a stop."""
         ...
 
     async def call_service(
@@ -221,7 +221,7 @@ class RosConnection(Protocol):
         type_name: str | None = None,
         timeout_s: float | None = None,
     ) -> dict[str, Any]:
-        """Gives what a service answers.
+        """Return what a service answers.
 
         Args:
             service: Its full name.
@@ -232,63 +232,63 @@ class RosConnection(Protocol):
         ...
 
     async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
-        """Sends a goal to an action of ROS 2 and gives what becomes of it, as it becomes."""
+        """Send a goal to an action of ROS 2 and return what becomes of it, as it becomes."""
         ...
 
     def cancel_goal(self, goal: ActionGoal) -> None:
-        """Asks for the end of a goal that the server has taken; its `end` tells if that worked."""
+        """Ask for the end of a goal that the server has taken; its `end` tells if that worked."""
         ...
 
     def give_up_goal(self, goal: ActionGoal) -> None:
-        """Lets a goal without a sign of life hold up nothing; what is heard of it is told on."""
+        """Let a goal without a sign of life hold up nothing; what is heard of it is told on."""
         ...
 
     def clear_the_way(self) -> None:
-        """Makes sure that what is sent next is not held up by what was sent before: for a stop."""
+        """Make sure that what is sent next is not held up by what was sent before: for a stop."""
         ...
 
     async def fetch_graph(self) -> RosGraph:
-        """Gives the topics and actions there are."""
+        """Return the topics and actions there are."""
         ...
 
     async def fetch_topics(self) -> Mapping[str, str]:
-        """Gives the type of each topic, as "package/Type"; costs less than the whole graph."""
+        """Return the type of each topic, as "package/Type"; costs less than the whole graph."""
         ...
 
     async def fetch_time_s(self) -> float | None:
-        """Gives robot time; None where the robot does not say."""
+        """Return robot time; None where the robot does not say."""
         ...
 
     async def fetch_nodes(self) -> tuple[str, ...]:
-        """Gives the full names of all nodes, in their order."""
+        """Return the full names of all nodes, in their order."""
         ...
 
     async def fetch_node(self, node: str) -> NodeLinks:
-        """Gives what a node publishes, subscribes to and serves."""
+        """Return what a node publishes, subscribes to and serves."""
         ...
 
     async def fetch_publishers(self, topic: str) -> tuple[str, ...]:
-        """Gives the nodes that publish on a topic."""
+        """Return the nodes that publish on a topic."""
         ...
 
     async def fetch_subscribers(self, topic: str) -> tuple[str, ...]:
-        """Gives the nodes that listen to a topic."""
+        """Return the nodes that listen to a topic."""
         ...
 
     async def fetch_services(self) -> tuple[str, ...]:
-        """Gives the full names of all services, in their order."""
+        """Return the full names of all services, in their order."""
         ...
 
     async def fetch_service_type(self, service: str) -> str:
-        """Gives a service's type, as "package/Type"."""
+        """Return a service's type, as "package/Type"."""
         ...
 
     async def fetch_action_type(self, action: str) -> str:
-        """Gives an action's type, as "package/Type"."""
+        """Return an action's type, as "package/Type"."""
         ...
 
     async def fetch_definitions(self, type_name: str) -> Mapping[str, str]:
-        """Gives the .msg texts of a type and of every type within it.
+        """Return the .msg texts of a type and of every type within it.
 
         Args:
             type_name: Of a message, a service or an action, such as "nav_msgs/srv/GetMap" or
@@ -302,15 +302,15 @@ class RosConnection(Protocol):
         ...
 
     async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
-        """Gives the names of a node's parameters; ROS 1 keeps them below the node's name."""
+        """Return the names of a node's parameters; ROS 1 keeps them below the node's name."""
         ...
 
     async def fetch_parameter(self, node: str, name: str) -> Any:  # noqa: ANN401 - any YAML value
-        """Gives the value of a node's parameter; None where it is not set."""
+        """Return the value of a node's parameter; None where it is not set."""
         ...
 
     async def set_parameter(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401
-        """Sets a node's parameter; None deletes it.
+        """Set a node's parameter; None deletes it.
 
         Raises:
             LinkError: The node refuses it, and says why.

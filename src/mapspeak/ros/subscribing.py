@@ -12,7 +12,7 @@ from mapspeak.ros.messages import Message
 
 @contextmanager
 def plain_errors() -> Iterator[None]:
-    """Lets an error pass as it was raised, out of the group that a task group makes of it."""
+    """Let an error pass as it was raised, out of the group that a task group makes of it."""
     try:
         yield
     except BaseExceptionGroup as group:
@@ -52,11 +52,11 @@ class Announcements:
         return frozenset(self._told)
 
     def type_of(self, topic: str) -> str | None:
-        """Gives the type that a topic was advertised with; None for one that was not."""
+        """Return the type that a topic was advertised with; None for one that was not."""
         return self._types.get(topic)
 
     def advertise(self, topic: str, type_name: str) -> None:
-        """Notes a topic, and tells the robot of it where that is to be early."""
+        """Note a topic, and tell the robot of it where that is to be early."""
         if self._is_early or topic in self._told:
             # Told again, also where it is known: the robot may have been started anew.
             self._tell(topic, type_name)
@@ -64,23 +64,23 @@ class Announcements:
         self._types[topic] = type_name
 
     def unadvertise(self, topic: str) -> None:
-        """Forgets a topic."""
+        """Forget a topic."""
         if self._types.pop(topic, None) is not None and topic in self._told:
             self._told.discard(topic)
             self._take_back(topic)
 
     def be_late(self) -> None:
-        """Tells the robot of topics that follow with the first message on each."""
+        """Tell the robot of topics that follow with the first message on each."""
         self._is_early = False
 
     def be_early(self) -> None:
-        """Tells the robot of all topics that were noted, and at once of those that follow."""
+        """Tell the robot of all topics that were noted, and at once of those that follow."""
         self._is_early = True
         for topic in self._types:
             self.use(topic)
 
     def use(self, topic: str) -> bool:
-        """Tells the robot of a topic before a message; True when it hears of it only now."""
+        """Tell the robot of a topic before a message; True when it hears of it only now."""
         type_name = self._types.get(topic)
         if type_name is None or topic in self._told:
             return False
@@ -90,7 +90,7 @@ class Announcements:
 
 
 async def say_again(say: Callable[[], object]) -> None:
-    """Says what must not be missed for another second: the robot may not listen at once."""
+    """Say what must not be missed for another second: the robot may not listen at once."""
     for _ in range(N_AGAIN):
         await anyio.sleep(PAUSE_S)
         say()
@@ -124,7 +124,7 @@ class Lingering:
 
     @contextmanager
     def look(self) -> Generator[tuple[Subscription, ...]]:
-        """Keeps the subscriptions while somebody looks, and gives them."""
+        """Keep the subscriptions while somebody looks, and return them."""
         self._n_looking += 1
         try:
             if not self.subscriptions:
@@ -137,7 +137,7 @@ class Lingering:
             self._looked_s = anyio.current_time()
 
     async def close_when_idle(self) -> None:
-        """Ends the subscriptions whenever nobody has looked for a while; runs until cancelled."""
+        """End the subscriptions whenever nobody has looked for a while; run until cancelled."""
         while True:
             await self._is_open.wait()
             await anyio.sleep_until(self._looked_s + LINGER_S)
@@ -176,11 +176,11 @@ class TopicSubscription:
         self._news = anyio.Event()
 
     def listen(self, listener: Listener) -> None:
-        """Calls a function with every message that comes from now on; it must not raise."""
+        """Call a function with every message that comes from now on; it must not raise."""
         self._listeners.append(listener)
 
     def take(self, message: Message) -> None:
-        """Makes a message the latest."""
+        """Make a message the latest."""
         self.latest = message
         self.n_received += 1
         self.arrived_s = anyio.current_time()
@@ -190,7 +190,7 @@ class TopicSubscription:
         news.set()
 
     async def wait_for_more_than(self, n_received: int, *, timeout_s: float) -> Message:
-        """Gives the latest message once more than so many have come.
+        """Return the latest message once more than so many have come.
 
         Args:
             n_received: How many are too few; 0 takes one that is there already.

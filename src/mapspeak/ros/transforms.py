@@ -66,7 +66,7 @@ class TransformTree:
         return is_news
 
     def find(self, *, outer: str, inner: str) -> FoundTransform:
-        """Gives where a frame lies in one that is above it in the tree.
+        """Return where a frame lies in one that is above it in the tree.
 
         Raises:
             LinkError: There is no such way, or it goes round in a circle.
@@ -82,7 +82,7 @@ class TransformTree:
     def find_ways(
         self, one: str, other: str
     ) -> tuple[tuple[FrameTransform, ...], tuple[FrameTransform, ...]]:
-        """Gives the transforms from each of two frames up to the first that both lie in.
+        """Return the transforms from each of two frames up to the first that both lie in.
 
         Raises:
             LinkError: They lie in no common frame.
@@ -170,7 +170,7 @@ class FrameListener:
                 self._subscriptions[topic] = subscription
 
     def has_way(self, *, outer: str, inner: str) -> bool:
-        """True when the tree leads from one frame to the other."""
+        """Return True when the tree leads from one frame to the other."""
         try:
             self.tree.find(outer=outer, inner=inner)
         except LinkError:
@@ -178,7 +178,7 @@ class FrameListener:
         return True
 
     async def wait_for_news(self) -> None:
-        """Returns after the next message."""
+        """Return after the next message."""
         await self._news.wait()
 
     def _take_moving(self, message: Message) -> None:

@@ -40,14 +40,14 @@ class GoalOperations:
         self._blocks = blocks
 
     async def send(self, operation: Operation) -> None:
-        """Carries out `send_action_goal`."""
+        """Carry out `send_action_goal`."""
         if self._blocks:
             await self._carry_out(operation)
         else:
             self._tasks.start_soon(self._carry_out, operation)
 
     async def cancel(self, operation: Operation) -> None:
-        """Carries out `cancel_action_goal`; nothing is ever answered."""
+        """Carry out `cancel_action_goal`; nothing is ever answered."""
         nav2 = self._stack.nav2
         if nav2 is not None:
             await nav2.cancel_operation(str(operation.get("id")))
@@ -75,7 +75,7 @@ class GoalOperations:
         return await nav2.navigate(self._stack.interfaces.fill(f"{ACTION_TYPE}_Goal", args))
 
     async def _reject(self, operation: Operation, error: MapspeakError) -> None:
-        """Answers as newer rosbridges do; 2.1 never says so, and blocks the socket for ever."""
+        """Answer as newer rosbridges do; 2.1 never says so, and blocks the socket for ever."""
         if self._blocks:
             await anyio.sleep_forever()
         self._answer(operation, refusal(error), status=0, is_done=False)
@@ -95,7 +95,7 @@ class GoalOperations:
         self._answer(operation, result_of(drive), status=status_of(drive), is_done=True)
 
     async def _feed_back(self, nav2: Nav2, operation: Operation, drive: ServedDrive) -> None:
-        """Passes the feedback on until the drive is over; to a slow client only the latest."""
+        """Pass the feedback on until the drive is over; to a slow client only the latest."""
         lane = f"goal {operation.get('id')}"
         answer = {"op": "action_feedback", "action": operation["action"]}
 
@@ -181,7 +181,7 @@ class ClientConversation:
             self._operations["cancel_action_goal"] = self._goals.cancel
 
     def frame_of(self, publication: Publication) -> Frame | None:
-        """Gives a message as the client wants it; None where the real one stays silent."""
+        """Return a message as the client wants it; None where the real one stays silent."""
         subscription = self._subscriptions.get(publication.topic)
         compression = subscription.compression if subscription else None
         if compression is None or self._is_broken(compression, publication.type):
@@ -189,7 +189,7 @@ class ClientConversation:
         return publication.frame(compression)
 
     async def handle(self, frame: str | bytes) -> None:
-        """Carries one operation out."""
+        """Carry one operation out."""
         try:
             operation = decode_json(frame.encode() if isinstance(frame, str) else frame)
         except (FrameError, UnicodeEncodeError):
@@ -204,7 +204,7 @@ class ClientConversation:
             self._stack.complain(f"[id: {operation.get('id')}] {name}: {error.message}")
 
     def close(self) -> None:
-        """Forgets the client; its goals go on, as behind a real rosbridge."""
+        """Forget the client; its goals go on, as behind a real rosbridge."""
         for topic in self._subscriptions:
             self._stack.hub.unsubscribe(topic, self._outbox.hear)
         for topic in self._advertised:
@@ -302,7 +302,7 @@ class ClientConversation:
         self._outbox.reply(answer_frame(operation, answer))
 
     def _is_broken(self, compression: Compression, message_type: str) -> bool:
-        """True for what rosbridge on ROS 2 cannot send: any png, and lists of fixed length."""
+        """Return True for what rosbridge on ROS 2 cannot send: png, lists of fixed length."""
         if self._stack.dialect is Dialect.ROS1 or compression is Compression.NONE:
             return False
         return compression is Compression.PNG or self._stack.interfaces.has_fixed_array(
@@ -310,7 +310,7 @@ class ClientConversation:
         )
 
     def _checked_type(self, topic: str, given: object) -> str:
-        """Gives the topic's type; what is given must be that type, in either ROS's words."""
+        """Return the topic's type; what is given must be that type, in either ROS's words."""
         known = self._stack.hub.find(topic)
         if given is None and known is not None:
             return known.type

@@ -52,7 +52,7 @@ class Drives:
         return list(self._drives)
 
     async def resolve(self, framed: FramedPose) -> Pose | None:
-        """Gives a pose in the map; None for a frame that nobody knows."""
+        """Return a pose in the map; None for a frame that nobody knows."""
         if framed.frame_id in ("map", "odom"):
             return framed.pose
         if framed.frame_id in ("base_link", BASE_FRAME):
@@ -60,7 +60,7 @@ class Drives:
         return None
 
     async def start(self, goal: Pose, *, goal_id: str | None = None) -> ServedDrive:
-        """Sends the robot off; the goal before it ends first.
+        """Send the robot off; the goal before it ends first.
 
         Raises:
             MapspeakError: The robot refuses.
@@ -74,11 +74,11 @@ class Drives:
             return self._note(goal_id, robot_goal_id, status)
 
     def wait_for_ever(self, *, goal_id: str | None = None) -> ServedDrive:
-        """Takes a goal that the robot cannot drive to, and stays silent about it, as move_base."""
+        """Take a goal that the robot cannot drive to, and stays silent about it, as move_base."""
         return self._note(goal_id, None, GoalStatus(state=GoalState.DRIVING))
 
     async def cancel(self, drive: ServedDrive) -> None:
-        """Ends a goal, if it still goes on."""
+        """End a goal, if it still goes on."""
         if drive.is_over.is_set():
             return
         drive.is_cancelling = True
@@ -89,7 +89,7 @@ class Drives:
         await self.look()
 
     async def look(self) -> None:
-        """Asks the robot how the goals under way stand."""
+        """Ask the robot how the goals under way stand."""
         if any(not drive.is_over.is_set() for drive in self._drives):
             async with self._turn:
                 await self._look_at_all()

@@ -18,12 +18,12 @@ NAVIGATORS = {Dialect.ROS1: "/move_base", Dialect.ROS2: "/bt_navigator"}
 
 
 def navigator_of(dialect: Dialect) -> str:
-    """Gives the node that drives to goals."""
+    """Return the node that drives to goals."""
     return NAVIGATORS[dialect]
 
 
 def topics_of(dialect: Dialect, offered: RobotDescription) -> list[Topic]:
-    """Gives the topics of the robot's own nodes."""
+    """Return the topics of the robot's own nodes."""
     slam = SLAM_NODES[dialect]
     topics = [
         Topic(name="/clock", type="rosgraph_msgs/Clock", publishers=(BASE_NODE,)),
@@ -118,9 +118,9 @@ class Services:
         return sorted(self._services.values(), key=lambda service: service.name)
 
     def add(self, service: Service) -> None:
-        """Offers one more."""
+        """Offer one more."""
         self._services[service.name] = service
 
     def find(self, name: str) -> Service | None:
-        """Finds a service; a leading slash may be missing."""
+        """Find a service; a leading slash may be missing."""
         return self._services.get(f"/{name.strip('/')}")

@@ -50,7 +50,7 @@ class Publication:
         self.message = message
 
     def frame(self, compression: Compression) -> Frame:
-        """Gives the message as a client wants it."""
+        """Return the message as a client wants it."""
         match compression:
             case Compression.CBOR:
                 return Frame(self._cbor, is_text=False)
@@ -77,13 +77,13 @@ class Publication:
 
 
 def answer_frame(operation: Message, answer: Message) -> Frame:
-    """Gives the answer to an operation, with its id if it had one."""
+    """Return the answer to an operation, with its id if it had one."""
     named = {**answer, "id": operation["id"]} if "id" in operation else answer
     return Frame(to_json(named), is_text=True)
 
 
 def fragments_of(frame: Frame, *, length: int, fragment_id: str) -> Iterator[Frame]:
-    """Gives a text in pieces of so many characters, as the operation `fragment`."""
+    """Return a text in pieces of so many characters, as the operation `fragment`."""
     text = frame.data.decode()
     for number, start in enumerate(range(0, len(text), length)):
         piece = {
@@ -98,7 +98,7 @@ def fragments_of(frame: Frame, *, length: int, fragment_id: str) -> Iterator[Fra
 
 
 def _as_picture(text: bytes) -> bytes:
-    """Lays a text out as the pixels of a PNG, filled up with line ends, as rosbridge does."""
+    """Lay a text out as the pixels of a PNG, filled up with line ends, as rosbridge does."""
     n_pixels = len(text) / 3.0
     width_px = max(math.floor(math.sqrt(n_pixels)), 1)
     height_px = max(math.ceil(n_pixels / width_px), 1)
@@ -150,15 +150,15 @@ class Hub:
         return sorted(self._topics.values(), key=lambda topic: topic.name)
 
     def find(self, name: str) -> Topic | None:
-        """Finds a topic."""
+        """Find a topic."""
         return self._topics.get(name)
 
     def is_wanted(self, name: str) -> bool:
-        """True when a client listens."""
+        """Return True when a client listens."""
         return name in self._topics and bool(self._topics[name].listeners)
 
     def publish(self, name: str, message: Message) -> None:
-        """Hands a message to all who hear the topic."""
+        """Hand a message to all who hear the topic."""
         topic = self._topics[name]
         publication = Publication(name, topic.type, message)
         if topic.is_latched:
@@ -167,11 +167,11 @@ class Hub:
             hear(publication)
 
     def take(self, name: str, taker: Listener) -> None:
-        """Lets one of the robot's own nodes hear a topic."""
+        """Let one of the robot's own nodes hear a topic."""
         self._topics[name].takers.append(taker)
 
     def subscribe(self, name: str, message_type: str, listener: Listener) -> None:
-        """Lets a client hear a topic, and gives it the last message of a latched one."""
+        """Let a client hear a topic, and return it the last message of a latched one."""
         topic = self._topics.setdefault(name, Topic(name=name, type=bare_type(message_type)))
         if listener not in topic.listeners:
             topic.listeners.append(listener)
@@ -179,31 +179,31 @@ class Hub:
             listener(topic.last)
 
     def unsubscribe(self, name: str, listener: Listener) -> None:
-        """Ends a client's hearing."""
+        """End a client's hearing."""
         topic = self._topics.get(name)
         if topic is not None and listener in topic.listeners:
             topic.listeners.remove(listener)
             self._forget_unused(topic)
 
     def advertise(self, name: str, message_type: str, *, is_latched: bool) -> None:
-        """Notes that a client publishes a topic."""
+        """Note that a client publishes a topic."""
         topic = self._topics.setdefault(name, Topic(name=name, type=bare_type(message_type)))
         topic.n_advertisers += 1
         topic.is_latched = topic.is_latched or (is_latched and name not in self._own)
 
     def unadvertise(self, name: str) -> None:
-        """Notes that a client publishes a topic no more."""
+        """Note that a client publishes a topic no more."""
         topic = self._topics.get(name)
         if topic is not None:
             topic.n_advertisers -= 1
             self._forget_unused(topic)
 
     def publishers_of(self, topic: Topic) -> list[str]:
-        """Gives the nodes that publish a topic; clients do so through rosbridge."""
+        """Return the nodes that publish a topic; clients do so through rosbridge."""
         return [*topic.publishers, *([ROSBRIDGE_NODE] if topic.n_advertisers else [])]
 
     def subscribers_of(self, topic: Topic) -> list[str]:
-        """Gives the nodes that hear a topic."""
+        """Return the nodes that hear a topic."""
         return [*topic.subscribers, *([ROSBRIDGE_NODE] if topic.listeners else [])]
 
     def _forget_unused(self, topic: Topic) -> None:

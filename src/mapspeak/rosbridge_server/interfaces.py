@@ -52,7 +52,7 @@ class Interfaces:
         return sorted({GENERATED.sub("", self.said(name)) for name in self._book.texts})
 
     def said(self, name: str) -> str:
-        """Gives a type's name as this ROS writes it; one that is no message keeps its name."""
+        """Return a type's name as this ROS writes it; one that is no message keeps its name."""
         generated = GENERATED.search(name)
         if "/" not in name or self._dialect is Dialect.ROS1:
             return name
@@ -61,11 +61,11 @@ class Interfaces:
         return f"{package}/{kind}/{last}"
 
     def knows(self, name: str) -> bool:
-        """True for a type that is described here, however its name is written."""
+        """Return True for a type that is described here, however its name is written."""
         return self._book.knows(name)
 
     def has_fixed_array(self, name: str) -> bool:
-        """True when a list of fixed length is somewhere within."""
+        """Return True when a list of fixed length is somewhere within."""
         bare = bare_type(name)
         if bare not in self._fixed_arrays:
             self._fixed_arrays[bare] = any(
@@ -76,15 +76,15 @@ class Interfaces:
         return self._fixed_arrays[bare]
 
     def full_text(self, name: str) -> str:
-        """Gives a type's definition and those of all types within, as `gendeps --cat` does."""
+        """Return a type's definition and those of all types within, as `gendeps --cat` does."""
         return write_definition(self._book.texts, self._book.within(name))
 
     def details(self, name: str) -> list[dict[str, object]]:
-        """Gives what rosapi's message_details says of a type and of all types within."""
+        """Return what rosapi's message_details says of a type and of all types within."""
         return [self._detail(each) for each in self._book.within(name)]
 
     def fill(self, name: str, message: object) -> dict[str, Any]:
-        """Gives a client's message with all fields; those left out hold their defaults.
+        """Return a client's message with all fields; those left out hold their defaults.
 
         Raises:
             LinkError: A field is not of that type, or does not hold what it should.
@@ -105,7 +105,7 @@ class Interfaces:
         }
 
     def filled(self, name: str, answer: Answer) -> Answer:
-        """Gives what answers a request of that type, once it has all its fields."""
+        """Return what answers a request of that type, once it has all its fields."""
 
         async def reply(request: dict[str, Any]) -> dict[str, Any]:
             return await answer(self.fill(name, request))
@@ -161,7 +161,7 @@ class Interfaces:
 
 
 def _is_unicode(text: str) -> bool:
-    """False for half a surrogate pair, which JSON can say and no wire can carry."""
+    """Return False for half a surrogate pair, which JSON can say and no wire can carry."""
     return not any("\ud800" <= sign <= "\udfff" for sign in text)
 
 
@@ -205,7 +205,7 @@ class RosSystem:
         self.nav2: Nav2 | None = None
 
     def complain(self, text: str) -> None:
-        """Says what was wrong with an operation where rosbridge says it: on ROS 1, to /rosout."""
+        """Say what was wrong with an operation where rosbridge says it: on ROS 1, to /rosout."""
         if self.dialect is Dialect.ROS1:
             said = text[:LONGEST_COMPLAINT].encode(errors="replace").decode()
             entry = {"level": LOGGED_ERROR, "name": "/rosbridge_websocket", "msg": said}
@@ -213,5 +213,5 @@ class RosSystem:
 
 
 def refusal(error: MapspeakError) -> str:
-    """Gives the text of an error as rosbridge answers it."""
+    """Return the text of an error as rosbridge answers it."""
     return error.message if isinstance(error, LinkError) else str(error)

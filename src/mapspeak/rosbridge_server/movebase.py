@@ -43,16 +43,16 @@ class MoveBase:
         drives.listeners.append(self._tell)
 
     async def take_goal(self, publication: Publication) -> None:
-        """Starts the drive of a MoveBaseActionGoal."""
+        """Start the drive of a MoveBaseActionGoal."""
         message = publication.message
         await self._start(message["goal"]["target_pose"], message["goal_id"]["id"])
 
     async def take_simple_goal(self, publication: Publication) -> None:
-        """Starts the drive of a PoseStamped."""
+        """Start the drive of a PoseStamped."""
         await self._start(publication.message, "")
 
     async def take_cancel(self, publication: Publication) -> None:
-        """Ends one goal, all of them, or those up to a time, as actionlib's GoalID says."""
+        """End one goal, all of them, or those up to a time, as actionlib's GoalID says."""
         goal_id, until_s = publication.message["id"], _stamp_of(publication.message)
         for drive in self._drives.all:
             is_meant = drive.goal_id == goal_id or drive.started_s <= until_s
@@ -63,7 +63,7 @@ class MoveBase:
                     continue
 
     def publish_feedback(self, pose: Pose) -> None:
-        """Publishes the feedback of the drive under way, if there is one."""
+        """Publish the feedback of the drive under way, if there is one."""
         for drive in self._drives.all:
             if not drive.is_over.is_set():
                 here = FramedPose(pose=pose, frame_id="map", stamp_s=self._robot.now_s)
@@ -71,7 +71,7 @@ class MoveBase:
                 self._publish("feedback", drive, {"feedback": {"base_position": base}})
 
     def publish_status(self) -> None:
-        """Publishes how all goals stand; actionlib does so five times a second."""
+        """Publish how all goals stand; actionlib does so five times a second."""
         entries = [_status_message(drive) for drive in self._drives.all]
         self._hub.publish("/move_base/status", {"header": self._header(), "status_list": entries})
 
@@ -89,7 +89,7 @@ class MoveBase:
             self._refuse(goal_id, error)
 
     def _refuse(self, goal_id: str, error: MapspeakError) -> None:
-        """Ends a goal that never began: with a bad quaternion move_base aborts it."""
+        """End a goal that never began: with a bad quaternion move_base aborts it."""
         stamp = write_stamp(self._robot.now_s, dialect=Dialect.ROS1)
         code = ABORTED if isinstance(error, LinkError) else REJECTED
         status = {

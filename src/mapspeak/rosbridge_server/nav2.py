@@ -55,13 +55,13 @@ class Nav2:
         hub.publish(f"{ACTION}/_action/status", {"status_list": []})
 
     async def cancel_operation(self, operation_id: str) -> None:
-        """Asks the drive of one of rosbridge's operations to end, if it is under way."""
+        """Ask the drive of one of rosbridge's operations to end, if it is under way."""
         drive = self.by_operation.get(operation_id)
         if drive is not None:
             await self._drives.cancel(drive)
 
     async def navigate(self, args: dict[str, Any]) -> ServedDrive | str:
-        """Starts a drive for a goal of the action; gives a text where the goal is aborted at once.
+        """Start a drive for a goal of the action; return a text where the goal is aborted at once.
 
         Raises:
             MapspeakError: The goal is rejected.
@@ -72,14 +72,14 @@ class Nav2:
         return await self._drives.start(goal)
 
     async def take_goal_pose(self, publication: Publication) -> None:
-        """Starts a drive for what was published on /goal_pose; errors are silent there."""
+        """Start a drive for what was published on /goal_pose; errors are silent there."""
         try:
             await self.navigate({"pose": publication.message})
         except MapspeakError:
             return
 
     def feedback_of(self, drive: ServedDrive, pose: Pose) -> dict[str, Any]:
-        """Gives what the action feeds back, with the robot's pose in the map."""
+        """Return what the action feeds back, with the robot's pose in the map."""
         now_s = self._robot.now_s
         left_m = min(drive.status.distance_left_m or 0.0, FARTHEST_M)
         here = FramedPose(pose=pose, frame_id="map", stamp_s=now_s)
@@ -92,7 +92,7 @@ class Nav2:
         }
 
     def publish_feedback(self, pose: Pose) -> None:
-        """Publishes the feedback of the drive under way, if there is one."""
+        """Publish the feedback of the drive under way, if there is one."""
         for drive in self._drives.all:
             if not drive.is_over.is_set():
                 feedback = self.feedback_of(drive, pose)
@@ -102,7 +102,7 @@ class Nav2:
                     follow(drive, feedback)
 
     async def cancel_goals(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Answers action_msgs/CancelGoal; an id of zeros means every goal (ROS 2 design)."""
+        """Answer action_msgs/CancelGoal; an id of zeros means every goal (ROS 2 design)."""
         wanted = _uuid_bytes(request["goal_info"]["goal_id"]["uuid"])
         chosen = self._drives.all
         if any(wanted):
@@ -116,7 +116,7 @@ class Nav2:
         return {"return_code": code, "goals_canceling": [_goal_info(drive) for drive in going]}
 
     def _tell(self, _drive: ServedDrive) -> None:
-        """Publishes the status of all goals, when one has changed."""
+        """Publish the status of all goals, when one has changed."""
         statuses = {drive: status_of(drive) for drive in self._drives.all}
         if statuses == self._statuses:
             return
@@ -128,14 +128,14 @@ class Nav2:
 
 
 def status_of(drive: ServedDrive) -> int:
-    """Gives the number that action_msgs/GoalStatus has for how a drive stands."""
+    """Return the number that action_msgs/GoalStatus has for how a drive stands."""
     if drive.is_over.is_set():
         return STATUS[drive.status.state]
     return CANCELING if drive.is_cancelling else EXECUTING
 
 
 def result_of(drive: ServedDrive) -> dict[str, Any]:
-    """Gives the action's result of a drive that has ended."""
+    """Return the action's result of a drive that has ended."""
     is_failed = drive.status.state in (GoalState.BLOCKED, GoalState.LOST)
     return {
         "error_code": FAILED_TO_MAKE_PROGRESS if is_failed else 0,
@@ -153,7 +153,7 @@ def _uuid_message(drive: ServedDrive) -> dict[str, Any]:
 
 
 def _uuid_bytes(value: object) -> bytes:
-    """Gives the bytes of uint8[16]: base64 text, as rosbridge writes it, or a list."""
+    """Return the bytes of uint8[16]: base64 text, as rosbridge writes it, or a list."""
     try:
         data = base64.b64decode(value) if isinstance(value, str) else bytes(value)  # type: ignore[call-overload]
     except (TypeError, ValueError):

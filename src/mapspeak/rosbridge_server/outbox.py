@@ -23,14 +23,14 @@ class Lane:
         self.due_s = -math.inf
 
     def offer(self, item: Item, now_s: float) -> None:
-        """Takes a message in, unless it comes too early and nothing may wait."""
+        """Take a message in, unless it comes too early and nothing may wait."""
         if now_s >= self.due_s or self.holds_back:
             self.waiting.append(item)
         if now_s >= self.due_s and not self.holds_back:
             self.due_s = now_s + self.throttle_s
 
     def take(self, now_s: float) -> Item | None:
-        """Gives the message that may go now."""
+        """Return the message that may go now."""
         if not self.waiting or (self.holds_back and now_s < self.due_s):
             return None
         if self.holds_back:
@@ -52,18 +52,18 @@ class Outbox:
         self._news = anyio.Event()
 
     def open_lane(self, topic: str, *, depth: int, throttle_s: float, holds_back: bool) -> None:
-        """Makes room for a topic, or changes the room it has."""
+        """Make room for a topic, or change the room it has."""
         lane = Lane(depth=depth, throttle_s=throttle_s, holds_back=holds_back)
         if topic in self._lanes:
             lane.waiting.extend(self._lanes[topic].waiting)
         self._lanes[topic] = lane
 
     def close_lane(self, topic: str) -> None:
-        """Forgets a topic and what waits on it."""
+        """Forget a topic and what waits on it."""
         self._lanes.pop(topic, None)
 
     def reply(self, frame: Frame) -> None:
-        """Puts an answer behind the others; none is ever left out."""
+        """Put an answer behind the others; none is ever left out."""
         if len(self._replies) >= MOST_REPLIES:
             self._give_up()
             return
@@ -71,17 +71,17 @@ class Outbox:
         self._news.set()
 
     def hear(self, publication: Publication) -> None:
-        """Puts a message on its topic's lane."""
+        """Put a message on its topic's lane."""
         self.offer(publication.topic, publication)
 
     def offer(self, lane: str, item: Item) -> None:
-        """Puts something on a lane, if it is open; one too many pushes the oldest out."""
+        """Put something on a lane, if it is open; one too many pushes the oldest out."""
         if lane in self._lanes:
             self._lanes[lane].offer(item, anyio.current_time())
             self._news.set()
 
     async def take(self) -> Iterable[Item]:
-        """Waits for something to send: all answers, then at most one message of each topic."""
+        """Wait for something to send: all answers, then at most one message of each topic."""
         while True:
             if self._news.is_set():
                 self._news = anyio.Event()

@@ -52,7 +52,7 @@ class Parameters:
 
     @classmethod
     def of_robot(cls, dialect: Dialect, *, radius_m: float) -> "Parameters":
-        """Gives those of a robot with SLAM and navigation."""
+        """Return those of a robot with SLAM and navigation."""
         frames = {"map_frame": "map", "odom_frame": "odom", "base_frame": BASE_FRAME}
         by_node: dict[str, Values] = {
             SLAM_NODES[dialect]: frames,
@@ -74,19 +74,19 @@ class Parameters:
         return sorted({name.rpartition(self._mark)[0] for name in self._values} - {""})
 
     def find(self, name: str) -> object | None:
-        """Finds a value by its full name; a leading slash may be missing."""
+        """Find a value by its full name; a leading slash may be missing."""
         return self._values.get(f"/{name.lstrip('/')}")
 
     def put(self, name: str, value: object) -> None:
-        """Sets a value by its full name."""
+        """Set a value by its full name."""
         self._values[f"/{name.lstrip('/')}"] = value
 
     def forget(self, name: str) -> None:
-        """Removes a value, if it is there."""
+        """Remove a value, if it is there."""
         self._values.pop(f"/{name.lstrip('/')}", None)
 
     def of_node(self, node: str) -> Values:
-        """Gives one node's parameters by their short names."""
+        """Return one node's parameters by their short names."""
         begin = f"{node}{self._mark}"
         return {
             name.removeprefix(begin): value
@@ -98,7 +98,7 @@ class Parameters:
 def add_parameter_services(
     services: Services, parameters: Parameters, interfaces: Interfaces
 ) -> None:
-    """Offers for each node what every node of ROS 2 offers about its parameters."""
+    """Offer for each node what every node of ROS 2 offers about its parameters."""
     for node in parameters.nodes:
         of_node = ServedNodeParameters(node, parameters)
         answers = {
@@ -128,24 +128,24 @@ class ServedNodeParameters:
         self._parameters = parameters
 
     async def list_all(self, request: Values) -> Values:
-        """Gives the names, those that begin as asked for."""
+        """Return the names, those that begin as asked for."""
         begins = tuple(request["prefixes"])
         names = self._parameters.of_node(self._node)
         found = [name for name in names if not begins or name.startswith(begins)]
         return {"result": {"names": found, "prefixes": []}}
 
     async def get(self, request: Values) -> Values:
-        """Gives the values; one that is not there is not set."""
+        """Return the values; one that is not there is not set."""
         values = self._parameters.of_node(self._node)
         return {"values": [_written(values.get(name)) for name in request["names"]]}
 
     async def get_types(self, request: Values) -> Values:
-        """Gives the kinds."""
+        """Return the kinds."""
         values = self._parameters.of_node(self._node)
         return {"types": bytes(_kind_of(values.get(name)) for name in request["names"])}
 
     async def describe(self, request: Values) -> Values:
-        """Gives the kinds with their names."""
+        """Return the kinds with their names."""
         values = self._parameters.of_node(self._node)
         descriptors = [
             {"name": name, "type": _kind_of(values.get(name)), "description": ""}
@@ -154,7 +154,7 @@ class ServedNodeParameters:
         return {"descriptors": descriptors}
 
     async def set(self, request: Values) -> Values:
-        """Sets values of the kind that they have."""
+        """Set values of the kind that they have."""
         return {"results": [self._set_one(each) for each in request["parameters"]]}
 
     def _set_one(self, parameter: Values) -> Values:
@@ -176,7 +176,7 @@ def _kind_of(value: object) -> int:
 
 
 def _written(value: object) -> Values:
-    """Writes rcl_interfaces/ParameterValue: one field is meant, the others are empty."""
+    """Write rcl_interfaces/ParameterValue: one field is meant, the others are empty."""
     empty: Values = {field: kind() for kind, (_, field) in KINDS.items()}
     arrays = ("byte", "bool", "integer", "double", "string")
     empty |= {f"{each}_array_value": [] for each in arrays}

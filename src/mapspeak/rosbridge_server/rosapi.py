@@ -19,7 +19,7 @@ HIDDEN = "/_action/"
 
 
 def add_rosapi(system: RosSystem, parameters: Parameters, clock: Callable[[], float]) -> None:
-    """Adds rosapi's services to those there are.
+    """Add rosapi's services to those there are.
 
     Args:
         system: What they tell of, and where they are added.
@@ -40,7 +40,7 @@ def add_rosapi(system: RosSystem, parameters: Parameters, clock: Callable[[], fl
 
 
 def _answers(questions: "Questions", dialect: Dialect) -> dict[str, tuple[str, Answer | None]]:
-    """Gives the services' names with their types and what answers them."""
+    """Return the services' names with their types and what answers them."""
     answers: dict[str, tuple[str, Answer | None]] = {
         "topics": ("Topics", questions.topics),
         "topics_for_type": ("TopicsForType", questions.topics_for_type),
@@ -101,7 +101,7 @@ class Questions:
         }
 
     def topics_for_type(self, args: Values) -> Values:
-        """The topics of one type."""
+        """Return the topics of one type."""
         wanted = bare_type(_text(args, "type"))
         return {"topics": [topic.name for topic in self._shown() if topic.type == wanted]}
 
@@ -115,22 +115,22 @@ class Questions:
         return {**self.topics(args), "typedefs_full_text": texts}
 
     def topic_type(self, args: Values) -> Values:
-        """The type of one topic; empty for one that is not there."""
+        """Return the type of one topic; empty for one that is not there."""
         topic = self._hub.find(_text(args, "topic"))
         return {"type": self._interfaces.said(topic.type) if topic else ""}
 
     def publishers(self, args: Values) -> Values:
-        """The nodes that publish a topic."""
+        """Return the nodes that publish a topic."""
         topic = self._hub.find(_text(args, "topic"))
         return {"publishers": self._hub.publishers_of(topic) if topic else []}
 
     def subscribers(self, args: Values) -> Values:
-        """The nodes that hear a topic."""
+        """Return the nodes that hear a topic."""
         topic = self._hub.find(_text(args, "topic"))
         return {"subscribers": self._hub.subscribers_of(topic) if topic else []}
 
     def message_details(self, args: Values) -> Values:
-        """The fields of a type and of all types within."""
+        """Return the fields of a type and of all types within."""
         name = _text(args, "type")
         if not self._interfaces.knows(name):
             raise LinkError(f"Unable to load the type {name}.", hint="Is its package installed?")
@@ -146,7 +146,7 @@ class Questions:
         return {"nodes": sorted(found)}
 
     def node_details(self, args: Values) -> Values:
-        """What one node hears, publishes and offers."""
+        """Return what one node hears, publishes and offers."""
         node, topics = _text(args, "node"), self._shown()
         return {
             "subscribing": [each.name for each in topics if node in self._hub.subscribers_of(each)],
@@ -161,43 +161,43 @@ class Questions:
         return {"services": [each.name for each in self._services.all if HIDDEN not in each.name]}
 
     def services_for_type(self, args: Values) -> Values:
-        """The services of one type."""
+        """Return the services of one type."""
         wanted = bare_type(_text(args, "type"))
         return {"services": [each.name for each in self._services.all if each.type == wanted]}
 
     def service_type(self, args: Values) -> Values:
-        """The type of one service; empty for one that is not there."""
+        """Return the type of one service; empty for one that is not there."""
         service = self._services.find(_text(args, "service"))
         return {"type": self._dialect.service_type_name(service.type) if service else ""}
 
     def service_node(self, args: Values) -> Values:
-        """The node that offers a service."""
+        """Return the node that offers a service."""
         service = self._services.find(_text(args, "service"))
         return {"node": service.node if service else ""}
 
     def request_details(self, args: Values) -> Values:
-        """The fields that a service type is asked with."""
+        """Return the fields that a service type is asked with."""
         return self.message_details({"type": f"{_text(args, 'type')}_Request"})
 
     def response_details(self, args: Values) -> Values:
-        """The fields that a service type answers with."""
+        """Return the fields that a service type answers with."""
         return self.message_details({"type": f"{_text(args, 'type')}_Response"})
 
     def action_servers(self, _args: Values) -> Values:
-        """The actions; on ROS 1 rosapi finds none, whatever there is."""
+        """Return the actions; on ROS 1 rosapi finds none, whatever there is."""
         hidden = [
             topic.name for topic in self._hub.topics if topic.name.endswith(f"{HIDDEN}feedback")
         ]
         return {"action_servers": [name.partition(HIDDEN)[0] for name in hidden]}
 
     def action_type(self, args: Values) -> Values:
-        """The type of one action; empty for one that is not there."""
+        """Return the type of one action; empty for one that is not there."""
         feedback = self._hub.find(f"{_text(args, 'action')}{HIDDEN}feedback")
         name = self._interfaces.said(feedback.type) if feedback else ""
         return {"type": name.removesuffix("_FeedbackMessage")}
 
     def action_details(self, part: str, args: Values) -> Values:
-        """The fields of an action type's goal, result or feedback."""
+        """Return the fields of an action type's goal, result or feedback."""
         return self.message_details({"type": f"{_text(args, 'type')}_{part}"})
 
     def interfaces(self, _args: Values) -> Values:
@@ -215,12 +215,12 @@ class Questions:
         return {"version": 2, "distro": ROS2_DISTRIBUTION}
 
     def get_param(self, args: Values) -> Values:
-        """The value of a parameter as JSON; the default given for one that is not there."""
+        """Return the value of a parameter as JSON; the default given for one that is not there."""
         value = self._parameters.find(_text(args, "name"))
         return {"value": str(args.get("default", "")) if value is None else json.dumps(value)}
 
     def set_param(self, args: Values) -> Values:
-        """Keeps a parameter; its value is JSON."""
+        """Keep a parameter; its value is JSON."""
         value = _text(args, "value")
         with contextlib.suppress(json.JSONDecodeError, RecursionError):
             value = json.loads(value)
@@ -232,7 +232,7 @@ class Questions:
         return {"exists": self._parameters.find(_text(args, "name")) is not None}
 
     def delete_param(self, args: Values) -> Values:
-        """Forgets a parameter."""
+        """Forget a parameter."""
         self._parameters.forget(_text(args, "name"))
         return {}
 

@@ -51,7 +51,7 @@ async def open_rosbridge_server(
     port: int = 0,
     goals_in_new_thread: bool = False,
 ) -> AsyncGenerator[RosbridgeServer]:
-    """Offers a robot as a rosbridge server with rosapi while the context lasts.
+    """Offer a robot as a rosbridge server with rosapi while the context lasts.
 
     Args:
         robot: Its `sleep` must give way to other tasks: time passes here, and only by it.
@@ -84,7 +84,7 @@ async def open_rosbridge_server(
 async def serve_system(
     system: RosSystem, *, host: str = "127.0.0.1", port: int = 0
 ) -> AsyncGenerator[RosbridgeServer]:
-    """Offers a ROS that stands for itself, with no robot behind it, while the context lasts.
+    """Offer a ROS that stands for itself, with no robot behind it, while the context lasts.
 
     Args:
         system: What clients find; whoever made it publishes on its topics.
@@ -113,7 +113,7 @@ class Reception:
         self._blocks = not goals_in_new_thread
 
     async def receive(self, stream: ByteStream) -> None:
-        """Serves one client until it hangs up."""
+        """Serve one client until it hangs up."""
         socket = ServerWebSocket(stream)
         try:
             if await socket.accept():
@@ -155,7 +155,7 @@ class Reception:
             return
 
     def _pieces(self, frame: Frame | None, conversation: ClientConversation) -> list[Frame]:
-        """Cuts a long text up as rosbridge does; long CBOR is silently lost on ROS 2."""
+        """Cut a long text up as rosbridge does; long CBOR is silently lost on ROS 2."""
         if frame is None:
             return []
         length = conversation.fragment_length
@@ -190,7 +190,7 @@ async def run_rosbridge_server(
     goals_in_new_thread: bool,
     say: Callable[[str], None],
 ) -> None:
-    """Offers a robot as a rosbridge server until the process is interrupted or told to end.
+    """Offer a robot as a rosbridge server until the process is interrupted or told to end.
 
     Args:
         robot: As for `open_rosbridge_server`, as are the others.

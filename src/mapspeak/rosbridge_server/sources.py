@@ -79,7 +79,7 @@ class Sources:
             self._slow.append(Source(self._publish_scan, SCAN_PERIOD_S))
 
     async def start(self) -> None:
-        """Publishes what is latched, so that the first client finds it."""
+        """Publish what is latched, so that the first client finds it."""
         fixed = [("base_link", BASE_FRAME), (CAMERA_FRAME, "base_link")]
         if self._robot.description.has_laser:
             fixed.append((LASER_FRAME, "base_link"))
@@ -91,7 +91,7 @@ class Sources:
         await self._attempt(self._publish_map)
 
     async def publish_due(self, tasks: TaskGroup) -> None:
-        """Publishes what is due; what takes long is done aside."""
+        """Publish what is due; what takes long is done aside."""
         now_s = self._robot.now_s
         if self._hub.is_wanted("/clock"):
             self._hub.publish("/clock", {"clock": write_stamp(now_s, dialect=self._dialect)})
@@ -176,7 +176,7 @@ class Sources:
             self._hub.publish(self._estimate_topic, estimate)
 
     def _velocity(self, here: StampedPose) -> Twist:
-        """Gives the velocity since the last pose, which is all that the port tells of it."""
+        """Return the velocity since the last pose, which is all that the port tells of it."""
         if self._last is None or not 0.0 < here.stamp_s - self._last.stamp_s < 1.0:
             return Twist(forward_mps=0.0, left_mps=0.0, turn_radps=0.0)
         passed_s = here.stamp_s - self._last.stamp_s
@@ -189,7 +189,7 @@ class Sources:
 
 
 def _in_even_steps(scan: RangeScan) -> LaserScan:
-    """Gives a scan as its message has it: one beam to every half degree, from behind."""
+    """Return a scan as its message has it: one beam to every half degree, from behind."""
     step_rad = math.tau / N_BEAMS
     ranges_m = np.full(N_BEAMS, np.nan)
     numbers = np.round((scan.angles_rad + math.pi) / step_rad).astype(np.intp) % N_BEAMS

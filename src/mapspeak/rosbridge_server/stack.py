@@ -67,7 +67,7 @@ class RosStack(RosSystem):
         add_rosapi(self, parameters, lambda: robot.now_s)
 
     async def keep_going(self, *, task_status: anyio.abc.TaskStatus[None]) -> None:
-        """Publishes and watches the drives as robot time passes, until cancelled."""
+        """Publish and watch the drives as robot time passes, until cancelled."""
         await self._sources.start()
         task_status.started()
         while True:
@@ -96,7 +96,7 @@ class RosStack(RosSystem):
             navigation.publish_feedback(here.pose)
 
     def _take(self, topic: str, handle: Callable[[Publication], Coroutine[Any, Any, None]]) -> None:
-        """Lets the robot act on a topic; whoever published does not wait for it."""
+        """Let the robot act on a topic; whoever published does not wait for it."""
 
         def act(publication: Publication) -> None:
             self._tasks.start_soon(handle, publication)
@@ -104,7 +104,7 @@ class RosStack(RosSystem):
         self.hub.take(topic, act)
 
     async def _take_velocity(self, publication: Publication) -> None:
-        """Stops on zero; the port knows no other velocity, and what it cannot do it leaves."""
+        """Stop on zero; the port knows no other velocity, and what it cannot do it leaves."""
         try:
             if read_twist(publication.message).is_standing:
                 await self._robot.stop()

@@ -29,7 +29,7 @@ class ServerWebSocket:
         self._frames: list[Frame] = []
 
     async def accept(self) -> bool:
-        """Shakes hands; False when the other end is no websocket client."""
+        """Shake hands; False when the other end is no websocket client."""
         with anyio.move_on_after(HANDSHAKE_TIMEOUT_S):
             while self._protocol.state is State.CONNECTING and await self._read():
                 for event in self._protocol.events_received():
@@ -41,7 +41,7 @@ class ServerWebSocket:
         return self._protocol.state is State.OPEN
 
     async def receive(self) -> str | bytes | None:
-        """Gives the next message; None when there will be no more."""
+        """Return the next message; None when there will be no more."""
         parts: list[Frame] = []
         while (frame := await self._next_frame()) is not None:
             if frame.opcode in (Opcode.TEXT, Opcode.BINARY, Opcode.CONT):
@@ -59,7 +59,7 @@ class ServerWebSocket:
         return None
 
     async def send(self, message: bytes, *, is_text: bool) -> None:
-        """Sends one message; returns when the network has taken it.
+        """Send one message; return when the network has taken it.
 
         Raises:
             anyio.BrokenResourceError: The connection is gone.
@@ -76,7 +76,7 @@ class ServerWebSocket:
                 await self._flush()
 
     async def close(self) -> None:
-        """Says goodbye, and hangs up without waiting long for an answer."""
+        """Say goodbye, and hangs up without waiting long for an answer."""
         with anyio.move_on_after(CLOSING_TIMEOUT_S, shield=True):
             try:
                 if self._protocol.state is State.OPEN:
@@ -106,7 +106,7 @@ class ServerWebSocket:
         return self._frames.pop(0)
 
     async def _read(self) -> bool:
-        """Takes in what has arrived; False when the other end has hung up."""
+        """Take in what has arrived; False when the other end has hung up."""
         try:
             data = await self._stream.receive()
         except (anyio.EndOfStream, anyio.BrokenResourceError, anyio.ClosedResourceError):

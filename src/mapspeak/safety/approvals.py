@@ -39,13 +39,13 @@ _ERRAND: ContextVar[Errand | None] = ContextVar("errand", default=None)
 
 
 def current_errand() -> Errand | None:
-    """Gives the errand that drives are for now; None where each is for itself."""
+    """Return the errand that drives are for now; None where each is for itself."""
     return _ERRAND.get()
 
 
 @contextmanager
 def on_errand(errand: Errand) -> Generator[None]:
-    """Marks the drives that are begun in the `with` block as parts of an errand."""
+    """Mark the drives that are begun in the `with` block as parts of an errand."""
     token = _ERRAND.set(errand)
     try:
         yield
@@ -69,11 +69,11 @@ class Errands:
         self._approved: dict[tuple[str, Errand], _Approved] = {}
 
     def begin(self, errand: Errand, *, client: str, wish_id: str, robot_s: float) -> None:
-        """Notes that a person has agreed; the first drive is yet to be taken."""
+        """Note that a person has agreed; the first drive is yet to be taken."""
         self._approved[client, errand] = _Approved(wish_id, robot_s, errand.n_drives)
 
     def take_drive(self, errand: Errand, *, client: str, robot_s: float) -> str | None:
-        """Uses up one drive and gives the id of the word that covers it; None where none does."""
+        """Use up one drive and return the id of the word that covers it; None where none does."""
         approved = self._approved.get((client, errand))
         if approved is None:
             return None
@@ -85,7 +85,7 @@ class Errands:
         return approved.wish_id
 
     def end_all(self) -> None:
-        """Forgets them: after a stop a person is asked again."""
+        """Forget them: after a stop a person is asked again."""
         self._approved.clear()
 
 
@@ -128,7 +128,7 @@ class WaitingRoom:
     folder: Path
 
     def add(self, wish_id: str, said: str) -> None:
-        """Writes a command that waits."""
+        """Write a command that waits."""
         self.folder.mkdir(parents=True, exist_ok=True)
         self._file(wish_id, "waiting").write_text(json.dumps({"what": said}), encoding="utf-8")
 
@@ -144,7 +144,7 @@ class WaitingRoom:
         return waiting
 
     def approve(self, wish_id: str) -> str:
-        """Approves a waiting command and gives it in words.
+        """Approve a waiting command and return it in words.
 
         Raises:
             ConfigError: Nothing waits under that id.
@@ -159,7 +159,7 @@ class WaitingRoom:
         return waiting[wish_id]
 
     def take_approved(self, wish_id: str) -> bool:
-        """Gives whether a command was approved; once."""
+        """Return whether a command was approved; once."""
         try:
             self._file(wish_id, "approved").unlink()
         except OSError:
@@ -167,7 +167,7 @@ class WaitingRoom:
         return True
 
     def remove(self, wish_id: str) -> None:
-        """Forgets a command."""
+        """Forget a command."""
         for state in ("waiting", "approved"):
             self._file(wish_id, state).unlink(missing_ok=True)
 
@@ -193,7 +193,7 @@ class Approvals:
     _prefix: str = field(default_factory=lambda: secrets.token_hex(2))
 
     def ask(self, wanted: Wanted, *, client: str) -> str:
-        """Notes a wish and gives its id; the same one for the same wish."""
+        """Note a wish and return its id; the same one for the same wish."""
         self._forget_old()
         for known in self._wishes.values():
             if _is_of(known, wanted, client):
@@ -206,7 +206,7 @@ class Approvals:
         return wish_id
 
     def queue(self, wish_id: str) -> None:
-        """Lets a wish wait for `mapspeak approve`."""
+        """Let a wish wait for `mapspeak approve`."""
         wish = self._wishes[wish_id]
         who = f", asked by {wish.client}" if wish.client else ""
         self.room.add(wish_id, f"{_say(wish.wanted)}{who}")
@@ -228,7 +228,7 @@ class Approvals:
         return True
 
     def take_word(self, wanted: Wanted, *, client: str) -> str | None:
-        """Gives the id of the word that a person gave for this wish of this client, once."""
+        """Return the id of the word that a person gave for this wish of this client, once."""
         self._forget_old()
         for wish in list(self._wishes.values()):
             if not _is_of(wish, wanted, client):
@@ -239,7 +239,7 @@ class Approvals:
         return None
 
     def close(self) -> None:
-        """Forgets everything: what waits here can no longer be done."""
+        """Forget everything: what waits here can no longer be done."""
         for wish_id in list(self._wishes):
             self._forget(wish_id)
 

@@ -38,13 +38,13 @@ _CALLER: ContextVar[Caller] = ContextVar("caller", default=NOBODY)
 
 
 def current_caller() -> Caller:
-    """Gives whose call this is; nobody's where mapspeak acts by itself."""
+    """Return whose call this is; nobody's where mapspeak acts by itself."""
     return _CALLER.get()
 
 
 @contextmanager
 def calling(caller: Caller) -> Generator[None]:
-    """Marks what is done in the `with` block as done for a caller."""
+    """Mark what is done in the `with` block as done for a caller."""
     token = _CALLER.set(caller)
     try:
         yield
@@ -117,7 +117,7 @@ class AuditLog:
         self._numbers = itertools.count(1)
 
     def next_number(self) -> int:
-        """Gives the number of another command."""
+        """Return the number of another command."""
         return next(self._numbers)
 
     def write(
@@ -131,7 +131,7 @@ class AuditLog:
         verdict: str = "",
         said: str = "",
     ) -> None:
-        """Appends one line.
+        """Append one line.
 
         Raises:
             PolicyError: The line could not be written.
@@ -155,7 +155,7 @@ class AuditLog:
         self._append(f"{text}\n".encode(errors="replace"))
 
     def _append(self, line: bytes) -> None:
-        """Writes a whole line or raises: opened anew, so that a file that was moved is noticed."""
+        """Write a whole line or raises: opened anew, so that a file that was moved is noticed."""
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT
@@ -187,7 +187,7 @@ class AuditLog:
 
 
 def read_audit(path: Path) -> Iterator[AuditLine]:
-    """Reads a log, line by line; a last line that was cut off by a crash is left out.
+    """Read a log, line by line; a last line that was cut off by a crash is left out.
 
     Raises:
         ConfigError: The file cannot be read, or is no audit log.

@@ -116,7 +116,7 @@ Command = DriveCommand | Publish | Call | Act | SetParameter
 
 
 def say_command(command: Command) -> str:
-    """Gives a command in words."""
+    """Return a command in words."""
     match command:
         case DriveCommand(goal=goal):
             return f"drive to ({goal.x:.2f}, {goal.y:.2f}), yaw {goal.yaw_deg:.0f} deg"
@@ -148,7 +148,7 @@ def _in_brackets(text: str) -> str:
 
 
 def is_same(one: Command, other: Command) -> bool:
-    """True when what was approved of one holds for the other."""
+    """Return True when what was approved of one holds for the other."""
     if isinstance(one, DriveCommand) and isinstance(other, DriveCommand):
         turned_rad = wrap_angle(one.goal.yaw_rad - other.goal.yaw_rad)
         is_near = one.goal.point.distance_to(other.goal.point) <= SAME_GOAL_M

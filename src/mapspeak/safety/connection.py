@@ -74,7 +74,7 @@ class GuardedConnection:
     # --- what changes something ---
 
     async def publish(self, topic: str, message: Message) -> None:
-        """Publishes on an advertised topic what the policy allows.
+        """Publish on an advertised topic what the policy allows.
 
         Raises:
             PolicyError: It does not.
@@ -95,7 +95,7 @@ class GuardedConnection:
         await self._guarded(command, done, objection)
 
     def publish_everywhere(self, topic: str, message: Message) -> int:
-        """Publishes at once by every way that is open, and gives how many: for a stop.
+        """Publish at once by every way that is open, and return how many: for a stop.
 
         Raises:
             PolicyError: It is no stop, and the policy does not allow it.
@@ -119,7 +119,7 @@ class GuardedConnection:
         type_name: str | None = None,
         timeout_s: float | None = None,
     ) -> dict[str, Any]:
-        """Gives what a service answers that the policy allows to be called.
+        """Return what a service answers that the policy allows to be called.
 
         Raises:
             PolicyError: It does not.
@@ -134,7 +134,7 @@ class GuardedConnection:
         return await self._guarded(command, answer)
 
     async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
-        """Sends a goal to an action of ROS 2 that the policy allows.
+        """Send a goal to an action of ROS 2 that the policy allows.
 
         Raises:
             PolicyError: It does not.
@@ -168,7 +168,7 @@ class GuardedConnection:
         return ""
 
     async def set_parameter(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401
-        """Sets a node's parameter that the policy allows to be set.
+        """Set a node's parameter that the policy allows to be set.
 
         Raises:
             PolicyError: It does not.
@@ -177,7 +177,7 @@ class GuardedConnection:
         await self._guarded(command, self._connection.set_parameter(node, name, value))
 
     def check_name(self, command: Command) -> None:
-        """Returns when a command is not denied for its name, whatever else it says.
+        """Return when a command is not denied for its name, whatever else it says.
 
         Raises:
             PolicyError: It is.
@@ -187,7 +187,7 @@ class GuardedConnection:
             self._guard.clear(command, robot_s=self._now_s())
 
     def _watch_over(self, command: Publish, objection: Refused | None) -> None:
-        """Lets the robot be watched that is about to be driven by a velocity."""
+        """Let the robot be watched that is about to be driven by a velocity."""
         is_velocity = _is_velocity(command.type)
         if self._by_hand is None or objection is not None or not is_velocity:
             return
@@ -207,7 +207,7 @@ class GuardedConnection:
     async def _guarded(
         self, command: Command, work: Coroutine[Any, Any, T], objection: Refused | None = None
     ) -> T:
-        """Does what was decided to be allowed, and notes how it ended."""
+        """Do what was decided to be allowed, and notes how it ended."""
         try:
             permit = self._guard.clear(command, robot_s=self._now_s(), objection=objection)
         except BaseException:
@@ -231,16 +231,16 @@ class GuardedConnection:
     # --- what ends something: never refused ---
 
     def cancel_goal(self, goal: ActionGoal) -> None:
-        """Asks for the end of a goal that the server has taken; its `end` tells if that worked."""
+        """Ask for the end of a goal that the server has taken; its `end` tells if that worked."""
         self._connection.cancel_goal(goal)
         self._guard.note_event("stop", f"cancelled {goal.goal_id}", robot_s=self._now_s())
 
     def give_up_goal(self, goal: ActionGoal) -> None:
-        """Lets a goal without a sign of life hold up nothing; what is heard of it is told on."""
+        """Let a goal without a sign of life hold up nothing; what is heard of it is told on."""
         self._connection.give_up_goal(goal)
 
     def clear_the_way(self) -> None:
-        """Makes sure that what is sent next is not held up by what was sent before."""
+        """Make sure that what is sent next is not held up by what was sent before."""
         self._connection.clear_the_way()
 
     # --- what reads ---
@@ -276,11 +276,11 @@ class GuardedConnection:
         return self._connection.started
 
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
-        """Runs something in the background until the connection is closed."""
+        """Run something in the background until the connection is closed."""
         self._connection.start_soon(work)
 
     async def wait_until_connected(self) -> None:
-        """Returns at once, or when the connection is open again."""
+        """Return at once, or when the connection is open again."""
         await self._connection.wait_until_connected()
 
     def subscribe(
@@ -291,21 +291,21 @@ class GuardedConnection:
         is_bulky: bool = False,
         throttle_ms: int = 0,
     ) -> Subscription:
-        """Gives the subscription to a topic, which is begun where there is none yet."""
+        """Return the subscription to a topic, which is begun where there is none yet."""
         return self._connection.subscribe(
             topic, type_name=type_name, is_bulky=is_bulky, throttle_ms=throttle_ms
         )
 
     def unsubscribe(self, subscription: Subscription) -> None:
-        """Ends one use of a subscription; the last one ends it at the robot too."""
+        """End one use of a subscription; the last one ends it at the robot too."""
         self._connection.unsubscribe(subscription)
 
     def renew(self, subscription: Subscription) -> None:
-        """Subscribes again, perhaps in another way: a latched message may have been missed."""
+        """Subscribe again, perhaps in another way: a latched message may have been missed."""
         self._connection.renew(subscription)
 
     def advertise(self, topic: str, *, type_name: str) -> None:
-        """Says that we will publish; the robot needs a moment until it listens.
+        """Say that we will publish; the robot needs a moment until it listens.
 
         Raises:
             PolicyError: The policy forbids the topic: the robot must not even hear of it.
@@ -316,72 +316,72 @@ class GuardedConnection:
         self._connection.advertise(topic, type_name=type_name)
 
     def unadvertise(self, topic: str) -> None:
-        """Takes back what `advertise` said; does nothing for what was not advertised."""
+        """Take back what `advertise` said; do nothing for what was not advertised."""
         self._connection.unadvertise(topic)
 
     def advertise_late(self) -> None:
-        """Tells the robot of what is advertised from now on only with the first message there."""
+        """Tell the robot of what is advertised from now on only with the first message there."""
         self._connection.advertise_late()
 
     def advertise_early(self) -> None:
-        """Tells the robot at once of all that is advertised, now and from now on."""
+        """Tell the robot at once of all that is advertised, now and from now on."""
         self._connection.advertise_early()
 
     async def fetch_graph(self) -> RosGraph:
-        """Gives the topics and actions there are."""
+        """Return the topics and actions there are."""
         return await self._connection.fetch_graph()
 
     async def fetch_topics(self) -> Mapping[str, str]:
-        """Gives the type of each topic."""
+        """Return the type of each topic."""
         return await self._connection.fetch_topics()
 
     async def fetch_time_s(self) -> float | None:
-        """Gives robot time; None where the robot does not say."""
+        """Return robot time; None where the robot does not say."""
         return await self._connection.fetch_time_s()
 
     async def fetch_nodes(self) -> tuple[str, ...]:
-        """Gives the full names of all nodes, in their order."""
+        """Return the full names of all nodes, in their order."""
         return await self._connection.fetch_nodes()
 
     async def fetch_node(self, node: str) -> NodeLinks:
-        """Gives what a node publishes, subscribes to and serves."""
+        """Return what a node publishes, subscribes to and serves."""
         return await self._connection.fetch_node(node)
 
     async def fetch_publishers(self, topic: str) -> tuple[str, ...]:
-        """Gives the nodes that publish on a topic."""
+        """Return the nodes that publish on a topic."""
         return await self._connection.fetch_publishers(topic)
 
     async def fetch_subscribers(self, topic: str) -> tuple[str, ...]:
-        """Gives the nodes that listen to a topic."""
+        """Return the nodes that listen to a topic."""
         return await self._connection.fetch_subscribers(topic)
 
     async def fetch_services(self) -> tuple[str, ...]:
-        """Gives the full names of all services, in their order."""
+        """Return the full names of all services, in their order."""
         return await self._connection.fetch_services()
 
     async def fetch_service_type(self, service: str) -> str:
-        """Gives a service's type, as "package/Type"."""
+        """Return a service's type, as "package/Type"."""
         return await self._connection.fetch_service_type(service)
 
     async def fetch_action_type(self, action: str) -> str:
-        """Gives an action's type, as "package/Type"."""
+        """Return an action's type, as "package/Type"."""
         return await self._connection.fetch_action_type(action)
 
     async def fetch_definitions(self, type_name: str) -> Mapping[str, str]:
-        """Gives the .msg texts of a type and of every type within it."""
+        """Return the .msg texts of a type and of every type within it."""
         return await self._connection.fetch_definitions(type_name)
 
     async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
-        """Gives the names of a node's parameters; ROS 1 keeps them below the node's name."""
+        """Return the names of a node's parameters; ROS 1 keeps them below the node's name."""
         return await self._connection.fetch_parameter_names(node)
 
     async def fetch_parameter(self, node: str, name: str) -> Any:  # noqa: ANN401 - any YAML value
-        """Gives the value of a node's parameter; None where it is not set."""
+        """Return the value of a node's parameter; None where it is not set."""
         return await self._connection.fetch_parameter(node, name)
 
 
 def _is_stop(command: Publish | Call) -> bool:
-    """True for a velocity of zero, and for what cancels goals in ROS 1 and ROS 2."""
+    """Return True for a velocity of zero, and for what cancels goals in ROS 1 and ROS 2."""
     if isinstance(command, Call):
         # The name is asked for too: a type is what the caller says, and some links do not check it.
         is_cancel = not command.type or CANCEL_SERVICE_TYPE.fullmatch(command.type) is not None

@@ -88,7 +88,7 @@ class Situation:
 
 
 def decide(command: Command, *, policy: Policy, situation: Situation) -> Decision:
-    """Decides on a command."""
+    """Decide on a command."""
     refusals = (
         _against_everything(policy, situation),
         _against_name(command, policy),
@@ -122,7 +122,7 @@ def _against_everything(policy: Policy, situation: Situation) -> Refused | None:
 
 
 def is_name_denied(command: Command, policy: Policy) -> bool:
-    """True when the policy forbids a command for its name, whatever it says."""
+    """Return True when the policy forbids a command for its name, whatever it says."""
     return _against_name(command, policy) is not None
 
 
@@ -213,7 +213,7 @@ def _against_speed(command: Command, policy: Policy) -> Refused | None:
 
 
 def find_speeds(value: object, depth: int = 0) -> Iterator[tuple[str, float]]:
-    """Finds speeds anywhere in a message: of Twist, TwistStamped, and drives with a speed."""
+    """Find speeds anywhere in a message: of Twist, TwistStamped, and drives with a speed."""
     if depth > MOST_NESTED:
         yield "linear", math.nan
     elif isinstance(value, Mapping):
@@ -234,7 +234,7 @@ def _length_of(vector: Mapping[str, Any]) -> float:
 
 
 def _number(value: object) -> float:
-    """Gives a finite number as it is, and what is none as NaN."""
+    """Return a finite number as it is, and what is none as NaN."""
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     try:
         return float(value) if is_number else math.nan  # type: ignore[arg-type]

@@ -27,7 +27,7 @@ LEAVING_M = 0.01
 
 
 def plan_legs(revision: MapRevision, here: Point, goal: Pose) -> tuple[Pose, ...]:
-    """Gives the poses to drive to one after the other, the goal last.
+    """Return the poses to drive to one after the other, the goal last.
 
     The robot's own navigation is expected to go the shortest way over the floor as it knows it.
     Where that is clear of areas, and of hindrances that can be avoided, it gets the goal alone;
@@ -59,12 +59,12 @@ def plan_legs(revision: MapRevision, here: Point, goal: Pose) -> tuple[Pose, ...
 
 
 def _find_crossed(revision: MapRevision, way: Path) -> set[int]:
-    """Gives the numbers of the hindrances that a way leads over."""
+    """Return the numbers of the hindrances that a way leads over."""
     return {n for n, each in enumerate(revision.hindrances) if each.is_crossed_by(way)}
 
 
 def _simplify(points: Sequence[Point]) -> list[Point]:
-    """Leaves points out while the way stays where it was: at each one left the robot stops.
+    """Leave points out while the way stays where it was: at each one left the robot stops.
 
     This is Douglas and Peucker, "Algorithms for the reduction of the number of points required to
     represent a digitized line or its caricature" (1973).
@@ -78,7 +78,7 @@ def _simplify(points: Sequence[Point]) -> list[Point]:
 
 
 def _split(revision: MapRevision, points: Sequence[Point]) -> list[Point]:
-    """Makes legs shorter by which a robot that keeps off walls would come too near to an area."""
+    """Make legs shorter by which a robot that keeps off walls would come too near to an area."""
     split = [points[0]]
     for start, end in itertools.pairwise(points):
         n_parts = _count_parts(revision, start, end)
@@ -88,7 +88,7 @@ def _split(revision: MapRevision, points: Sequence[Point]) -> list[Point]:
 
 
 def _count_parts(revision: MapRevision, start: Point, end: Point) -> int:
-    """Gives into how many parts a leg is cut, until the robot goes clear or they are short."""
+    """Return into how many parts a leg is cut, until the robot goes clear or they are short."""
     reach_m = revision.radius_m + KEEP_M + STRAY_M
     near = [
         area
@@ -108,19 +108,19 @@ def _count_parts(revision: MapRevision, start: Point, end: Point) -> int:
 def _goes_clear(
     revision: MapRevision, areas: Sequence[ClosedArea], ends: tuple[Point, Point], reach_m: float
 ) -> bool:
-    """True when the robot is expected to keep off areas by its own way from one end to another."""
+    """Return True when the robot is expected to keep off areas by its own planning."""
     way = find_path(_crop_around(revision.grid, ends), *ends, radius_m=revision.radius_m)
     return way is None or _is_clear(way.points, areas, reach_m)
 
 
 def _crop_around(grid: OccupancyGrid, ends: tuple[Point, Point]) -> OccupancyGrid:
-    """Gives the part of the map on which a way between two near places is looked for."""
+    """Return the part of the map on which a way between two near places is looked for."""
     rows, cols = grid.cells_at(np.array([[each.x, each.y] for each in ends]))
     return grid.crop(*grid.window(rows, cols, margin=math.ceil(AROUND_M / grid.resolution_m)))
 
 
 def _is_clear(points: Sequence[Point], areas: Sequence[ClosedArea], reach_m: float) -> bool:
-    """True when a way keeps off all areas, or leads away from one that it begins too near to."""
+    """Return True when a way keeps off all areas, or leads away from one that is too near."""
     steps = Path.through(tuple(points)).sampled(STEP_M)[1:]
     for area in areas:
         least_m = min(area.distance_to_border(points[0]) - LEAVING_M, reach_m)

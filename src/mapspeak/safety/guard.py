@@ -28,11 +28,11 @@ class RateLog:
         )
 
     def note(self, kind: CommandKind, now_s: float) -> None:
-        """Counts a command."""
+        """Count a command."""
         self._times_s[kind].append(now_s)
 
     def count(self, kind: CommandKind, now_s: float) -> int:
-        """Gives how many commands there were within a minute of now."""
+        """Return how many commands there were within a minute of now."""
         times_s = self._times_s[kind]
         while times_s and now_s - times_s[0] >= MINUTE_S:
             times_s.popleft()
@@ -106,7 +106,7 @@ class Guard:
     def clear(
         self, command: Command, *, robot_s: float, objection: Refused | None = None
     ) -> Permit:
-        """Allows a command, and notes that; between this and the command nothing may wait.
+        """Allow a command, and notes that; between this and the command nothing may wait.
 
         Args:
             command: What is wanted.
@@ -134,15 +134,15 @@ class Guard:
         return permit
 
     def note_result(self, permit: Permit, said: str, *, robot_s: float) -> None:
-        """Notes what the robot answered to a command that was allowed."""
+        """Note what the robot answered to a command that was allowed."""
         self._note_after("result", permit, robot_s=robot_s, said=said)
 
     def note_end(self, permit: Permit, said: str, *, robot_s: float) -> None:
-        """Notes how something that took a while has ended."""
+        """Note how something that took a while has ended."""
         self._note_after("ended", permit, robot_s=robot_s, said=said)
 
     def note_leg(self, permit: Permit, said: str, *, robot_s: float) -> None:
-        """Notes that the robot is sent on within a drive that was allowed.
+        """Note that the robot is sent on within a drive that was allowed.
 
         Raises:
             PolicyError: The line could not be written.
@@ -150,7 +150,7 @@ class Guard:
         self._note("leg", permit, robot_s=robot_s, said=said)
 
     def note_event(self, event: str, said: str, *, robot_s: float) -> None:
-        """Notes what is no command: a stop, a hold. It never fails: stopping goes first."""
+        """Note what is no command: a stop, a hold. It never fails: stopping goes first."""
         try:
             self.audit.write(
                 event,
@@ -180,7 +180,7 @@ class Guard:
         return Allowed(by=wish_id if errand is None else f"{wish_id}: {errand.said}")
 
     def _take_part(self, errand: Errand, client: str, robot_s: float) -> str | None:
-        """Gives the word that covers another drive of an errand; None where none does any more."""
+        """Return the word that covers another drive of an errand; None where none does any more."""
         wish_id = self._errands.take_drive(errand, client=client, robot_s=robot_s)
         if wish_id is not None:
             return wish_id
@@ -191,7 +191,7 @@ class Guard:
         return self._errands.take_drive(errand, client=client, robot_s=robot_s)
 
     def end_errands(self) -> None:
-        """Lets a person be asked again for what is left of errands: the robot was stopped."""
+        """Let a person be asked again for what is left of errands: the robot was stopped."""
         self._errands.end_all()
 
     def _situation(self, command: Command, robot_s: float) -> Situation:
@@ -220,7 +220,7 @@ class Guard:
         )
 
     def _note_after(self, event: str, permit: Permit, *, robot_s: float, said: str) -> None:
-        """Notes what has happened already: an error here could only hide it."""
+        """Note what has happened already: an error here could only hide it."""
         try:
             self._note(event, permit, robot_s=robot_s, said=said)
         except PolicyError as error:
@@ -238,7 +238,7 @@ def _say_decision(decision: Decision) -> tuple[str, str]:
 
 
 def _errand_of(command: Command) -> Errand | None:
-    """Gives what a drive is a part of; None for one that is for itself, and for other commands."""
+    """Return what a drive is a part of; None for one that is for itself, and for other commands."""
     return current_errand() if isinstance(command, DriveCommand) else None
 
 

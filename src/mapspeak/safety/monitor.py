@@ -134,7 +134,7 @@ class KeepOutMonitor:
 def find_entered(
     areas: Sequence[ClosedArea], here: Point, way: Sequence[Point], *, radius_m: float
 ) -> ClosedArea | None:
-    """Finds the area that a robot would come too near to on a way; it may always drive away."""
+    """Find the area that a robot would come too near to on a way; it may always drive away."""
     for area in areas:
         least_m = min(radius_m + KEEP_M, area.distance_to_border(here) - WAVER_M)
         if any(area.distance_to_border(each) < least_m for each in way):
@@ -143,7 +143,7 @@ def find_entered(
 
 
 def _find_turn(then: Pose, here: Pose) -> float:
-    """Gives by how much a robot turned as it drove, without what it turned on the spot before.
+    """Return by how much a robot turned as it drove, without what it turned on the spot before.
 
     At the end of an arc it looks half the turn away from the chord, and after a turn on the spot
     along it.
@@ -159,7 +159,7 @@ def _find_turn(then: Pose, here: Pose) -> float:
 def _follow_arc(
     start: Point, heading_rad: float, curvature_radpm: float, length_m: float
 ) -> tuple[Point, ...]:
-    """Gives places along a way that goes on turning as it did."""
+    """Return places along a way that goes on turning as it did."""
     step_m = length_m / N_STEPS
     points = [start]
     for number in range(N_STEPS):

@@ -106,7 +106,7 @@ class Hours:
     days: frozenset[int] = frozenset(range(7))
 
     def end_of(self, at: datetime) -> datetime | None:
-        """Gives when the time ends that a moment lies in; None where it lies in none."""
+        """Return when the time ends that a moment lies in; None where it lies in none."""
         for n_days_ago in (0, 1):
             day = at - timedelta(days=n_days_ago)
             begins = datetime.combine(day.date(), self.begins, at.tzinfo)

@@ -40,7 +40,7 @@ FINE = 2
 
 
 def load_mask(path: Path) -> tuple[Outline, ...]:
-    """Reads a mask and gives outlines in the map frame: of what it closes, and of holes in it.
+    """Read a mask and return outlines in the map frame: of what it closes, and of holes in it.
 
     Raises:
         MapError: A file is missing or damaged, or the mask closes nothing, or is too ragged.
@@ -63,7 +63,7 @@ def load_mask(path: Path) -> tuple[Outline, ...]:
 
 
 def _find_outlines(grid: OccupancyGrid) -> Iterator[Outline]:
-    """Gives outlines a quarter of a cell outside the borders of the closed cells.
+    """Return outlines a quarter of a cell outside the borders of the closed cells.
 
     OpenCV's contours run through the centres of border cells: in cells half as large, grown by one.
     """
@@ -105,7 +105,7 @@ _PerMinute = Annotated[int, Field(ge=0)]
 
 
 def _read_mask(written: Any, info: ValidationInfo) -> tuple[Outline, ...]:  # noqa: ANN401 - YAML
-    """Reads the mask that is named, from beside the policy's file."""
+    """Read the mask that is named, from beside the policy's file."""
     if not isinstance(written, str) or not written:
         message = "the name of a map's .yaml is wanted"
         raise ValueError(message)
@@ -272,7 +272,7 @@ class _PolicyFile(_Written):
 
 
 def load_policy(path: Path) -> Policy:
-    """Reads policy.yaml; what is left away keeps its default.
+    """Read policy.yaml; what is left away keeps its default.
 
     Raises:
         ConfigError: The file cannot be read, or has a mistake; says the line and the key. So does
@@ -296,6 +296,6 @@ def _is_a_line(corners: Sequence[Sequence[float]]) -> bool:
 
 
 def _read_time(text: str) -> time:
-    """Reads a time of day; the end of a day is the midnight that follows."""
+    """Read a time of day; the end of a day is the midnight that follows."""
     hour, minute = (int(part) for part in text.split(":"))
     return time(hour % 24, minute)

@@ -90,7 +90,7 @@ class GuardedRobot:
         return self._robot.now_s
 
     async def sleep(self, duration_s: float) -> None:
-        """Returns when that much robot time has passed; a drive is watched meanwhile."""
+        """Return when that much robot time has passed; a drive is watched meanwhile."""
         deadline_s = self.now_s + duration_s
         while self._is_watched and self.now_s < deadline_s - EPSILON_S:
             await self._robot.sleep(min(WATCH_S, deadline_s - self.now_s))
@@ -104,31 +104,31 @@ class GuardedRobot:
         return self._drive is not None or self.by_hand.is_under_way or self._surveyor.has_rules
 
     async def fetch_map(self) -> OccupancyGrid:
-        """Gives the latest map."""
+        """Return the latest map."""
         return await self._robot.fetch_map()
 
     async def fetch_pose(self) -> StampedPose:
-        """Gives where the robot believes it is."""
+        """Return where the robot believes it is."""
         return await self._robot.fetch_pose()
 
     async def fetch_picture(self) -> CameraPicture:
-        """Takes a picture with the front camera."""
+        """Take a picture with the front camera."""
         return await self._robot.fetch_picture()
 
     async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
-        """Gives how goals stand that others have sent."""
+        """Return how goals stand that others have sent."""
         return await self._robot.fetch_foreign_goals()
 
     async def fetch_detections(self) -> tuple[Detection, ...]:
-        """Gives what the robot's own object detector reports in the camera view."""
+        """Return what the robot's own object detector reports in the camera view."""
         return await self._robot.fetch_detections()
 
     async def fetch_scan(self) -> RangeScan | None:
-        """Gives what the laser meets now; None without one."""
+        """Return what the laser meets now; None without one."""
         return await self._robot.fetch_scan()
 
     async def send_goal(self, goal: Pose) -> str:
-        """Starts a drive that the policy allows, and gives the id it is known by.
+        """Start a drive that the policy allows, and return the id it is known by.
 
         Raises:
             PolicyError: The policy, a hold or a person does not allow it, or it was stopped.
@@ -154,7 +154,7 @@ class GuardedRobot:
         return robot_goal_id
 
     async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
-        """Gives how a drive stands; why it was ended here comes before what the robot says."""
+        """Return how a drive stands; why it was ended here comes before what the robot says."""
         drive = self._drive
         if drive is not None and drive.goal_id == robot_goal_id:
             status = await self._follow(drive)
@@ -165,7 +165,7 @@ class GuardedRobot:
         return status
 
     async def cancel_goal(self, robot_goal_id: str) -> None:
-        """Asks the navigation to end a drive; never refused."""
+        """Ask the navigation to end a drive; never refused."""
         drive = self._drive
         leg_id = robot_goal_id
         if drive is not None and drive.goal_id == robot_goal_id:
@@ -177,7 +177,7 @@ class GuardedRobot:
             self._guard.note_event("stop", f"cancelled {robot_goal_id}", robot_s=self.now_s)
 
     async def stop(self) -> None:
-        """Ends every drive and commands zero velocity, at once; never refused."""
+        """End every drive and commands zero velocity, at once; never refused."""
         await self._stop("stopped")
 
     @property
@@ -241,7 +241,7 @@ class GuardedRobot:
         return Mover.VELOCITY if self.by_hand.is_under_way else Mover.OTHERS
 
     def _take_up(self, robot_goal_id: str, plan: Plan, permit: Permit) -> None:
-        """Begins to look after a drive that the robot has accepted."""
+        """Begin to look after a drive that the robot has accepted."""
         self._note_replaced()
         self._seen_at_s = anyio.current_time()
         first, *others = plan.legs
@@ -258,7 +258,7 @@ class GuardedRobot:
         self._guard.note_result(permit, f"accepted as {robot_goal_id}{said}", robot_s=self.now_s)
 
     async def _follow(self, drive: GuardedDrive) -> GoalStatus:
-        """Gives how a drive stands, and sends the robot on where a leg of it has ended."""
+        """Return how a drive stands, and send the robot on where a leg of it has ended."""
         async with self._stepping:
             status = await self._robot.fetch_goal_status(drive.leg_id)
             if status.state is GoalState.ARRIVED and drive.legs and drive is self._drive:
@@ -304,7 +304,7 @@ class GuardedRobot:
         return fault
 
     async def _end(self, drive: GuardedDrive, state: GoalState, reason: str) -> None:
-        """Stops the robot and remembers why, whatever its navigation will say of the drive."""
+        """Stop the robot and remembers why, whatever its navigation will say of the drive."""
         self._verdicts[drive.goal_id] = GoalStatus(state=state, reason=reason)
         logger.warning("%s", reason)
         with anyio.CancelScope(shield=True):
@@ -342,7 +342,7 @@ class GuardedRobot:
             self._latch()
 
     def _latch(self) -> None:
-        """Holds the robot after a client's stop, where the policy says so."""
+        """Hold the robot after a client's stop, where the policy says so."""
         caller = current_caller()
         if caller is NOBODY or not self._guard.policy.latches_on_stop:
             return
@@ -365,7 +365,7 @@ class GuardedRobot:
         self._guard.note_end(drive.permit, said, robot_s=self.now_s)
 
     def _give_up_legs(self, drive: GuardedDrive, reason: str) -> None:
-        """Ends a drive that was to go on after its present leg: its end is not the goal."""
+        """End a drive that was to go on after its present leg: its end is not the goal."""
         if drive.legs:
             drive.legs.clear()
             status = GoalStatus(state=GoalState.CANCELLED, reason=reason)

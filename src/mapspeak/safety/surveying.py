@@ -61,13 +61,13 @@ class Surveyor:
         return self._latest
 
     async def survey(self, grid: OccupancyGrid, *, radius_m: float) -> MapRevision:
-        """Gives the revision of a map: the same one while map and closed areas are the same."""
+        """Return the revision of a map: the same one while map and closed areas are the same."""
         async with self._turn:
             self._latest = await anyio.to_thread.run_sync(self._survey, grid, radius_m)
             return self._latest
 
     def describe(self, revision: MapRevision) -> tuple[str, ...]:
-        """Gives events in words, and which rules are about regions that are not on the map."""
+        """Return events in words, and which rules are about regions that are not on the map."""
         events, now = self._read_events(), self._wall_clock()
         return (
             *self._say_off(revision),
@@ -133,7 +133,7 @@ def _is_off(rule: AreaRule, grid: OccupancyGrid) -> bool:
 
 
 def _outlines_of(rule: AreaRule, revision: MapRevision) -> Iterator[tuple[Outline, ...]]:
-    """Gives the outlines of each area that a rule closes."""
+    """Return the outlines of each area that a rule closes."""
     if rule.outline:
         yield (rule.outline, *rule.further_outlines)
         return

@@ -30,7 +30,7 @@ _UNTIL_S: ContextVar[float] = ContextVar("publishing_until", default=-math.inf)
 
 @contextmanager
 def publishing_for(duration_s: float) -> Generator[None]:
-    """Says that what is published in the `with` block is published again for so long."""
+    """Say that what is published in the `with` block is published again for so long."""
     token = _UNTIL_S.set(anyio.current_time() + duration_s)
     try:
         yield
@@ -85,7 +85,7 @@ class HandDriving:
         return bool(self._moving)
 
     async def find_objection(self, message: Message) -> Refused | None:
-        """Gives which closed area a velocity would take the robot into; None where into none.
+        """Return which closed area a velocity would take the robot into; None where into none.
 
         That nobody knows where the robot is counts as an objection.
         """
@@ -155,7 +155,7 @@ def refuse_velocity(reason: str) -> Refused:
 
 
 def zero_velocity_of(message: Message) -> dict[str, Any]:
-    """Gives a velocity message with every number at zero; header and texts stay."""
+    """Return a velocity message with every number at zero; header and texts stay."""
     return {name: value if name == "header" else _zero_of(value) for name, value in message.items()}
 
 
@@ -192,13 +192,16 @@ def _zero_of(value: Any) -> Any:  # noqa: ANN401 - ROS JSON
 
 
 def _is_moving(message: Message) -> bool:
-    """True for a message with speeds; one that is no number is refused for that elsewhere."""
+    """Return True for a message with speeds.
+
+    One that is no number is refused for that elsewhere.
+    """
     speeds = [speed for _, speed in find_speeds(message)]
     return any(speeds) and all(map(math.isfinite, speeds))
 
 
 def _read_velocity(message: Message) -> Velocity | None:
-    """Gives the velocity of a Twist or TwistStamped; None for all that holds other speeds."""
+    """Return the velocity of a Twist or TwistStamped; None for all that holds other speeds."""
     twist = message.get("twist", message)
     parts = {"linear", "angular"} & twist.keys() if isinstance(twist, Mapping) else set()
     if not parts or len(parts) != len(list(find_speeds(message))):
@@ -212,12 +215,12 @@ def _read_velocity(message: Message) -> Velocity | None:
 
 
 def _reach_m(speed_mps: float, lasts_s: float) -> float:
-    """Gives how far a robot gets until it stands."""
+    """Return how far a robot gets until it stands."""
     return speed_mps * lasts_s + speed_mps**2 / (2 * BRAKING_MPS2)
 
 
 def _predict(here: Pose, velocity: Velocity, lasts_s: float) -> tuple[Point, ...]:
-    """Gives places along the way to the stand, with the velocity held until it brakes."""
+    """Return places along the way to the stand, with the velocity held until it brakes."""
     speed_mps = velocity.speed_mps
     if speed_mps == 0.0:
         return ()

@@ -36,13 +36,13 @@ class Fingerprint:
 
     @classmethod
     def of(cls, status: os.stat_result) -> "Fingerprint":
-        """Takes it from what the file system says of a file."""
+        """Take it from what the file system says of a file."""
         return cls(
             status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns
         )
 
     def renamed(self, later: "Fingerprint | None") -> "Fingerprint":
-        """Gives the state once the file has its new name, which counts as a change of it.
+        """Return the state once the file has its new name, which counts as a change of it.
 
         Args:
             later: What the file system says of it then; another file may be there already.
@@ -65,13 +65,13 @@ class DurableFile:
         self._lock_timeout_s = lock_timeout_s
 
     def fingerprint(self) -> Fingerprint | None:
-        """Gives the file's present state; None where there is no file."""
+        """Return the file's present state; None where there is no file."""
         with self._explained("look at"):
             status = self._status()
             return None if status is None else Fingerprint.of(status)
 
     def read(self) -> tuple[bytes, Fingerprint | None]:
-        """Gives the content and the state it belongs to; nothing and None where no file is."""
+        """Return the content and the state it belongs to; nothing and None where no file is."""
         with self._explained("read"):
             status = self._status()
             if status is None:
@@ -84,7 +84,7 @@ class DurableFile:
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
-        """Keeps other writers that use this class away for the time of a `with` block."""
+        """Keep other writers that use this class away for the time of a `with` block."""
         target = self._target()
         lock_path = target.with_name(f".{target.name}.lock")
         with self._explained("lock"):
@@ -102,7 +102,7 @@ class DurableFile:
             lock.release()
 
     def replace(self, content: bytes, *, expected: Fingerprint | None) -> Fingerprint | None:
-        """Puts a new content in place, for a caller that holds the lock.
+        """Put a new content in place, for a caller that holds the lock.
 
         Returns:
             The state after; None, with nothing done, where the file is not in the expected state.
@@ -174,7 +174,7 @@ def _write_new(path: Path, content: bytes, *, like: os.stat_result | None) -> Fi
 
 
 def _take_after(path: Path, like: os.stat_result) -> None:
-    """Gives a new file the owner, as far as we may, and the permissions of another."""
+    """Return a new file the owner, as far as we may, and the permissions of another."""
     if sys.platform != "win32":
         with contextlib.suppress(PermissionError):
             os.chown(path, like.st_uid, like.st_gid)
@@ -182,7 +182,7 @@ def _take_after(path: Path, like: os.stat_result) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Makes the new name of a file last, where the system can."""
+    """Make the new name of a file last, where the system can."""
     if sys.platform == "win32":
         return
     descriptor = os.open(folder, os.O_RDONLY)

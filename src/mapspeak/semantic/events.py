@@ -26,25 +26,28 @@ _OWN_PLACE = re.compile(rf"(?:{_NUMBER} m around )?(?:[RCODFPT]\d+|{_NUMBER}, ?{
 
 
 def gives_orders(text: str) -> bool:
-    """True for words of an event that tell their reader what to do; quotes hide none of them."""
+    """Return True for words of an event that tell their reader what to do.
+
+    Quotes hide none of them.
+    """
     # An order may stand within one pair of quotes, and it may go on behind them.
     return any(tells_what_to_do(_WAYS.sub("", _QUOTE_SIGN.sub(by, text))) for by in (" ", "\n"))
 
 
 def tell_text(text: str) -> str:
-    """Gives what is the matter as an observation: `"painters at work"`."""
+    """Return what is the matter as an observation: `"painters at work"`."""
     return "(its text gives orders and is left out)" if gives_orders(text) else quote(text)
 
 
 def tell_place(place: str) -> str:
-    """Gives where it is: an id or a point as it is, other words quoted."""
+    """Return where it is: an id or a point as it is, other words quoted."""
     if _OWN_PLACE.fullmatch(place):
         return place
     return "its place gives orders and is left out" if gives_orders(place) else quote(place)
 
 
 def tell_source(source: str) -> str:
-    """Gives who said it."""
+    """Return who said it."""
     return "a source left out, for it gives orders" if gives_orders(source) else quote(source)
 
 
@@ -141,7 +144,7 @@ class Event:
         return self.source == ROBOT and is_in_its_words
 
     def is_current(self, now: datetime) -> bool:
-        """True while it lasts; `now` has a zone."""
+        """Return True while it lasts; `now` has a zone."""
         has_begun = self.begins is None or self.begins <= now
         return has_begun and (self.until is None or now < self.until)
 
@@ -158,7 +161,7 @@ class Event:
         return f"{self.id}{mark} {told}".lstrip()
 
     def sentence(self, now: datetime) -> str:
-        """The event for a reader, with times as `now` counts them; its words are quoted."""
+        """Return the event for a reader, with times as `now` counts them; its words are quoted."""
         where = f" ({tell_place(self.place)})" if self._names_more_than_text() else ""
         parts = [f"{self.told_title}{where}"]
         if self.effect is not Effect.NONE:
@@ -177,7 +180,7 @@ class Event:
         return f"; said by {said_by}"
 
     def _names_more_than_text(self) -> bool:
-        """True where a reader of the text does not read the place in it."""
+        """Return True where a reader of the text does not read the place in it."""
         is_told = self.told_text.startswith('"') and self.place in self.text
         return bool(self.place) and not is_told
 
@@ -186,7 +189,7 @@ _NAMES_OF_ROBOT = (ROBOT, "robot")
 
 
 def is_name_of_robot(source: str) -> bool:
-    """True for the name under which the robot notes what it found, however it is written."""
+    """Return True for the name under which the robot notes what it found, however it is written."""
     return name_key(source) in _NAMES_OF_ROBOT
 
 
@@ -198,17 +201,17 @@ _EFFECTS = {
 
 
 def current_events(events: Iterable[Event], now: datetime) -> tuple[Event, ...]:
-    """Gives those events that last at a moment, in the order of the file."""
+    """Return those events that last at a moment, in the order of the file."""
     return tuple(event for event in events if event.is_current(now))
 
 
 def is_event_id(text: str) -> bool:
-    """True for what may be the id of an event: "E3", "wet-floor_2"."""
+    """Return True for what may be the id of an event: "E3", "wet-floor_2"."""
     return _ID.fullmatch(text) is not None
 
 
 def find_place_ids(words: str) -> tuple[str, ...]:
-    """Gives the ids of rooms, corridors and doors that words name: "corridor C1" has C1."""
+    """Return the ids of rooms, corridors and doors that words name: "corridor C1" has C1."""
     return tuple(dict.fromkeys(_PLACE_ID.findall(words.upper())))
 
 

@@ -113,7 +113,7 @@ _SENTENCE_END = re.compile(r"[.!?]+(?=\s|$)|\n")
 
 
 def find_objection(label: str) -> Objection | None:
-    """Gives why a landmark of that label, or a feature in those words, stays out; None if not.
+    """Return why a landmark of that label, or a feature in those words, stays out; None if not.
 
     Args:
         label: What somebody calls a thing, in a few words.
@@ -129,7 +129,7 @@ def find_objection(label: str) -> Objection | None:
 
 
 def find_head(label: str) -> tuple[str, ...]:
-    """Gives the words of a label, in small letters, up to the one that says what the thing is.
+    """Return the words of a label, in small letters, up to the one that says what the thing is.
 
     "Red sofa by the window" gives "red sofa"; "sign: toilet" gives "sign".
     """
@@ -137,7 +137,7 @@ def find_head(label: str) -> tuple[str, ...]:
 
 
 def gives_orders(text: str) -> bool:
-    """True for a text that tells its reader what to do and names no thing that it stands on."""
+    """Return True for a text that tells its reader what to do and names no thing."""
     plain = _QUOTED.sub(" ", _plain(text)).strip()
     if _ADDRESSED.search(plain):
         return True
@@ -148,7 +148,7 @@ def gives_orders(text: str) -> bool:
 
 
 def tells_what_to_do(text: str) -> bool:
-    """True for a text of one or more sentences of which one gives orders."""
+    """Return True for a text of one or more sentences of which one gives orders."""
     return any(gives_orders(part) for part in _SENTENCE_END.split(_unquoted(text)))
 
 
@@ -157,13 +157,13 @@ def _unquoted(text: str) -> str:
 
 
 def _plain(text: str) -> str:
-    """Gives a text in small letters, with one kind of quotes and of space."""
+    """Return a text in small letters, with one kind of quotes and of space."""
     folded = unicodedata.normalize("NFKC", text).casefold().translate(_STRAIGHT)
     return " ".join(folded.split())
 
 
 def _own_words(text: str) -> str:
-    """Gives what the observer says, without what is read off the thing."""
+    """Return what the observer says, without what is read off the thing."""
     return _AFTER_CARRIER.sub(r"\1", _TOLD.sub(" ", _QUOTED.sub(" ", text)))
 
 
@@ -172,7 +172,7 @@ def _words_about(text: str) -> list[str]:
 
 
 def _head(words: Sequence[str]) -> Sequence[str]:
-    """Gives the words up to the one that says what the thing is.
+    """Return the words up to the one that says what the thing is.
 
     "two men by the door" gives "two men"; "a stack of boxes on a shelf" gives "boxes".
     """
@@ -183,7 +183,7 @@ def _head(words: Sequence[str]) -> Sequence[str]:
 
 
 def _ends_head(words: Sequence[str], index: int) -> bool:
-    """True where a new thing or a deed begins: at "waiting" in "man waiting"."""
+    """Return True where a new thing or a deed begins: at "waiting" in "man waiting"."""
     word = words[index]
     if word in ENDS_OF_HEADS:
         return True
@@ -220,7 +220,7 @@ def _concern_about_life(noun: str, before: Sequence[str], *, is_bare: bool) -> C
 
 
 def _find_underway(words: Sequence[str]) -> Objection | None:
-    """Finds a vehicle on its way: "passing truck", "a forklift driving by"."""
+    """Find a vehicle on its way: "passing truck", "a forklift driving by"."""
     head = _head(words)
     if not head or head[-1] not in VEHICLES:
         return None

@@ -90,7 +90,7 @@ class LaserFan:
         return f"from {_decimals(first)} to {_decimals(last)} deg at {said} m"
 
     def turned(self, turn_rad: float) -> "LaserFan":
-        """Gives the same beams from another heading.
+        """Return the same beams from another heading.
 
         Args:
             turn_rad: From the new heading to the old one, counter-clockwise.
@@ -104,7 +104,7 @@ class LaserFan:
 
     @classmethod
     def read(cls, text: str) -> "LaserFan":
-        """Reads what `text` gives.
+        """Read what `text` gives.
 
         Raises:
             SemanticMapError: It is none; says what is wrong.
@@ -154,7 +154,7 @@ class LaserRing:
         object.__setattr__(self, "ranges_m", ranges_m)
 
     def find_fan(self, stood: Pose, bearing_rad: float) -> LaserFan | None:
-        """Gives what was met around a direction; None from elsewhere, or where nothing is known.
+        """Return what was met around a direction; None from elsewhere, or where nothing is known.
 
         Args:
             stood: Where one looked from, in the map frame.
@@ -184,7 +184,7 @@ def build_ring(
     ranges_m: NDArray[np.float64],
     reach_m: float,
 ) -> LaserRing:
-    """Gives a turn of the laser in even steps: of several beams to a step, the one nearest to it.
+    """Return a turn of the laser in even steps: of several beams to a step, the one nearest to it.
 
     Args:
         pose: From where, in the map frame.
@@ -212,7 +212,7 @@ def _read_range(token: str) -> float | None:
 
 
 def _decimals(value: float) -> str:
-    """Gives hundredths, or tenths where that is the same."""
+    """Return hundredths, or tenths where that is the same."""
     # Adding zero turns -0.0 into 0.0.
     return f"{round(value, 2) + 0.0:.2f}".removesuffix("0")
 

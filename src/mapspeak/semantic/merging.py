@@ -66,7 +66,7 @@ class Merge:
 
 
 def merge_waypoint(before: Waypoint | None, now: Waypoint, *, gone: Iterable[str] = ()) -> Merge:
-    """Gives what is remembered of a place that is seen again.
+    """Return what is remembered of a place that is seen again.
 
     The same label near the same bearing is the same thing. Of its two looks from one spot the surer
     one counts, or the later of two equally sure ones; what that leaves open, the other fills in.
@@ -108,7 +108,7 @@ def merge_waypoint(before: Waypoint | None, now: Waypoint, *, gone: Iterable[str
 
 
 def group_views(waypoint: Waypoint) -> tuple[Views, ...]:
-    """Gives the landmarks of a place by thing: views of one label from different spots are of one.
+    """Return the landmarks of a place by thing: views of one label from different spots are of one.
 
     Two of one label from one spot are two things, as are two that lie in different places.
     """
@@ -119,7 +119,7 @@ def group_views(waypoint: Waypoint) -> tuple[Views, ...]:
 
 
 def seen_from(landmark: Landmark, old: Pose, new: Pose) -> Landmark:
-    """Gives a landmark with its bearing and range as from another pose.
+    """Return a landmark with its bearing and range as from another pose.
 
     A range goes with a bearing into a point, and that moves exactly. A bearing alone, or a range
     alone, holds only within half a metre of where it was taken, and is left out beyond. What the
@@ -151,7 +151,7 @@ def seen_from(landmark: Landmark, old: Pose, new: Pose) -> Landmark:
 
 
 def noted_at(landmark: Landmark, seen: Pose, pose: Pose) -> Landmark:
-    """Gives a landmark as a waypoint at a pose holds it: with its own pose where that is elsewhere.
+    """Return a landmark as a waypoint at a pose holds it: with its own pose if that differs.
 
     Args:
         landmark: With its bearing from where it was seen.
@@ -176,12 +176,12 @@ def _group(waypoint: Waypoint, landmarks: Iterable[Landmark]) -> tuple[Views, ..
 
 
 def _dated_views(waypoint: Waypoint, views: Views) -> Views:
-    """Gives views with all that they have from their waypoint: time, picture and pose."""
+    """Return views with all that they have from their waypoint: time, picture and pose."""
     return tuple(replace(waypoint.dated(each), pose=waypoint.pose_of(each)) for each in views)
 
 
 def _noted(views: Views, now: Waypoint) -> Views:
-    """Gives views as a waypoint holds them: without what it says of itself."""
+    """Return views as a waypoint holds them: without what it says of itself."""
     told = (now.stamp_s, now.recorded_at, now.picture)
     plain = (
         replace(view, stamp_s=None, recorded_at=None, picture=None)
@@ -202,7 +202,7 @@ def _is_among(views: Views, keys: Iterable[str]) -> bool:
 
 
 def _is_further_view(waypoint: Waypoint, view: Landmark, others: Sequence[Landmark]) -> bool:
-    """True when a view may be of the same thing as others, each from another spot."""
+    """Return True when a view may be of the same thing as others, each from another spot."""
     view, *seen = (replace(each, pose=waypoint.pose_of(each)) for each in (view, *others))
     return all(
         _is_measured(view)
@@ -214,7 +214,7 @@ def _is_further_view(waypoint: Waypoint, view: Landmark, others: Sequence[Landma
 
 
 def _pair(looks: Sequence[Landmark], things: Sequence[Views]) -> list[tuple[int, int]]:
-    """Pairs what is the same thing, the nearest bearings first."""
+    """Pair what is the same thing, the nearest bearings first."""
     likenesses = sorted(
         (turn_rad, i, j)
         for i, look in enumerate(looks)
@@ -229,7 +229,7 @@ def _pair(looks: Sequence[Landmark], things: Sequence[Views]) -> list[tuple[int,
 
 
 def _find_least_turn_rad(look: Landmark, views: Views) -> float | None:
-    """Gives how far a look points past a thing; None where it is of another one.
+    """Return how far a look points past a thing; None where it is of another one.
 
     Views from the spot of the look decide, where there are any: those from elsewhere say less.
     """
@@ -240,7 +240,7 @@ def _find_least_turn_rad(look: Landmark, views: Views) -> float | None:
 
 
 def _find_turn_rad(one: Landmark, view: Landmark) -> float | None:
-    """Gives how far apart two looks at the same thing point, as from one pose; None for two."""
+    """Return how far apart two looks at the same thing point, as from one pose; None for two."""
     if name_key(one.label) != name_key(view.label):
         return None
     other = _turned_to(view, one)
@@ -255,7 +255,7 @@ def _find_turn_rad(one: Landmark, view: Landmark) -> float | None:
 
 
 def _united(look: Landmark, views: Views) -> Views:
-    """Gives a thing's views with a look of now, which comes first."""
+    """Return a thing's views with a look of now, which comes first."""
     if _is_measured(look):
         joining = [v for v in views if _apart_m(look, v) <= SAME_SPOT_M or not _is_measured(v)]
     else:
@@ -270,7 +270,7 @@ def _united(look: Landmark, views: Views) -> Views:
 
 
 def _best_apart(views: Sequence[Landmark]) -> Views:
-    """Gives no more views than count: of the two nearest to each other the later one stays."""
+    """Return no more views than count: of the two nearest to each other the later one stays."""
     left = list(views)
     while len(left) > MOST_VIEWS:
         pairs = ((i, j) for j in range(len(left)) for i in range(j))
@@ -280,7 +280,7 @@ def _best_apart(views: Sequence[Landmark]) -> Views:
 
 
 def _joined(before: Landmark, now: Landmark) -> Landmark:
-    """Gives one view from two looks at a thing, with the pose that its bearing is from."""
+    """Return one view from two looks at a thing, with the pose that its bearing is from."""
     is_surer_before = _WEIGHT[before.confidence] > _WEIGHT[now.confidence]
     is_equal = _WEIGHT[before.confidence] == _WEIGHT[now.confidence]
     surer, other = (before, now) if is_surer_before else (now, before)
@@ -301,7 +301,7 @@ def _joined(before: Landmark, now: Landmark) -> Landmark:
 
 
 def _turned_to(view: Landmark, other: Landmark) -> Landmark:
-    """Gives a view with its bearing and range as from where another one was seen."""
+    """Return a view with its bearing and range as from where another one was seen."""
     return (
         view if view.pose is None or other.pose is None else seen_from(view, view.pose, other.pose)
     )

@@ -62,13 +62,13 @@ class TakenPicture:
     reported: tuple[str, ...] | None = None
 
     def shows(self, bearing_rad: float) -> bool:
-        """True for a direction from the heading that lies in the picture, or just beside it."""
+        """Return True for a direction from the heading in the picture, or just beside it."""
         if self.horizontal_fov_rad is None:
             return True
         return abs(wrap_angle(bearing_rad)) <= self.horizontal_fov_rad / 2 + BESIDE_RAD
 
     def bearing_of(self, column_px: float) -> float:
-        """Gives the direction of a column from the heading, left positive, in radians.
+        """Return the direction of a column from the heading, left positive, in radians.
 
         The lens is a pinhole, as the simulated camera's and that of a ROS CameraInfo: columns are
         evenly spaced on a plane, not on a circle.
@@ -126,7 +126,7 @@ class PictureBook:
         laser: LaserRing | None = None,
         reported: tuple[str, ...] | None = None,
     ) -> TakenPicture:
-        """Names a picture that was just taken.
+        """Name a picture that was just taken.
 
         Args:
             data: The encoded picture.
@@ -163,13 +163,13 @@ class PictureBook:
         return taken
 
     def forget(self) -> bool:
-        """Lets nobody speak of earlier pictures any more; gives whether there were any."""
+        """Let nobody speak of earlier pictures any more; return whether there were any."""
         had_any = bool(self._taken)
         self._taken.clear()
         return had_any
 
     def find(self, said: str) -> TakenPicture | None:
-        """Gives the picture of that id ("P12", "picture p12") or name, or None."""
+        """Return the picture of that id ("P12", "picture p12") or name, or None."""
         key = said.strip().casefold().removeprefix("picture").strip()
         taken = self._taken.values()
         return next(

@@ -13,7 +13,7 @@ _ID = re.compile(r"[\w./-]{1,100}")
 
 
 def quote(text: str, *, most: int | None = None) -> str:
-    """Gives a text on one line between double quotes, with none inside.
+    """Return a text on one line between double quotes, with none inside.
 
     What is told beside it would else be taken for ours: `"` and what looks like it become `'`, and
     line breaks and control signs become spaces. A backslash at the end escapes nothing.
@@ -27,10 +27,10 @@ def quote(text: str, *, most: int | None = None) -> str:
 
 
 def quote_name(name: str) -> str:
-    """Gives what a place or a thing is called, as a quote that is no longer than names are."""
+    """Return what a place or a thing is called, as a quote that is no longer than names are."""
     return quote(name, most=LONGEST_NAME)
 
 
 def tell_name(name: str) -> str:
-    """Gives an id or the name of a file; quoted where it does not read like one."""
+    """Return an id or the name of a file; quoted where it does not read like one."""
     return name if _ID.fullmatch(name) else quote_name(name)

@@ -15,20 +15,20 @@ _JOINERS = "\u200c\u200d"
 
 
 def clean_line(text: str) -> str:
-    """Gives the text on one line: every run of spaces and unprintable characters is one space."""
+    """Return the text on one line: every run of spaces and unprintable characters is one space."""
     if not text.isprintable():
         text = "".join(c if c.isprintable() or c in _JOINERS else " " for c in text)
     return " ".join(text.split())
 
 
 def clean_text(text: str) -> str:
-    """Gives the text with every line cleaned and empty lines at its ends cut."""
+    """Return the text with every line cleaned and empty lines at its ends cut."""
     lines = text.replace("\r\n", "\n").split("\n")
     return "\n".join(map(clean_line, lines)).strip("\n")
 
 
 def name_key(name: str) -> str:
-    """Gives what two spellings of one place's name have in common: case and spaces do not count."""
+    """Return what the spellings of a place's name have in common: no case, no spaces."""
     return clean_line(unicodedata.normalize("NFKC", name).casefold())
 
 
@@ -161,11 +161,11 @@ class Waypoint:
         )
 
     def pose_of(self, landmark: Landmark) -> Pose:
-        """Gives the pose that one of its landmarks was seen from, in the map frame."""
+        """Return the pose that one of its landmarks was seen from, in the map frame."""
         return landmark.pose or self.pose
 
     def moved(self, motion: Pose) -> "Waypoint":
-        """Gives it with all its poses in another frame; ids of rooms mean nothing there.
+        """Return it with all its poses in another frame; ids of rooms mean nothing there.
 
         Args:
             motion: From the frame of its poses to the new one.
@@ -182,7 +182,7 @@ class Waypoint:
         return tuple(each for each in landmarks if self.pose_of(each) == pose)
 
     def dated(self, landmark: Landmark) -> Landmark:
-        """Gives one of its landmarks with the time and picture that it has from this waypoint.
+        """Return one of its landmarks with the time and picture that it has from this waypoint.
 
         A landmark with a time of its own was last seen in an earlier picture, if in any.
         """
@@ -212,7 +212,7 @@ class SemanticMap:
     warnings: tuple[str, ...] = ()
 
     def find_waypoint(self, name: str) -> Waypoint | None:
-        """Gives the place of that name, whatever its case, or None."""
+        """Return the place of that name, whatever its case, or None."""
         key = name_key(name)
         return next((place for place in self.waypoints if name_key(place.name) == key), None)
 
@@ -222,7 +222,7 @@ def _moved(landmark: Landmark, motion: Pose) -> Landmark:
 
 
 def _clean_lines(value: Landmark | Waypoint, *names: str) -> None:
-    """Puts texts that may be absent on one line, and None where nothing is left of them."""
+    """Put texts that may be absent on one line, and None where nothing is left of them."""
     for name in names:
         text = getattr(value, name)
         if text is not None:

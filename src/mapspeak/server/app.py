@@ -85,7 +85,7 @@ class MapspeakServer(MCPServer[Any]):
     async def call_tool(
         self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None = None
     ) -> CallToolResult | InputRequiredResult:
-        """Calls a tool; what went wrong on purpose reaches the model with its hint."""
+        """Call a tool; what went wrong on purpose reaches the model with its hint."""
         former = self._former.get(name, {})
         arguments = {
             key if former.get(key, key) in arguments else former[key]: value
@@ -124,7 +124,7 @@ class MapspeakServer(MCPServer[Any]):
             return show_controls_of(tell_offered_in(answer, self._missing) if is_own else answer)
 
     def _note_memory(self, name: str, arguments: dict[str, Any]) -> None:
-        """Notes in the audit log that a tool has changed what is remembered."""
+        """Note in the audit log that a tool has changed what is remembered."""
         guard = self._session.guard
         if guard is not None and name in self._remembering:
             what = arguments.get("name") or arguments.get("text") or arguments.get("event") or name
@@ -134,7 +134,7 @@ class MapspeakServer(MCPServer[Any]):
     async def _call_with_approval(
         self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None
     ) -> CallToolResult | InputRequiredResult:
-        """Calls a tool, and once more when a person has agreed to what it needs their word for."""
+        """Call a tool, and once more when a person has agreed to what it needs their word for."""
         guard = self._session.guard
         if guard is None:
             return await super().call_tool(name, arguments, context)
@@ -155,7 +155,7 @@ class MapspeakServer(MCPServer[Any]):
         return await super().call_tool(name, arguments, context)
 
     def offer(self, tool: Tool) -> None:
-        """Adds a tool to those that can be called; its description leads to no missing one."""
+        """Add a tool to those that can be called; its description leads to no missing one."""
         self._arguments[tool.name] = tool.arguments
         self._numbers[tool.name] = tool.numbers
         self._former[tool.name] = tool.former
@@ -176,7 +176,7 @@ class MapspeakServer(MCPServer[Any]):
         arguments: dict[str, Any] | None = None,
         context: Context[Any, Any] | None = None,
     ) -> GetPromptResult | InputRequiredResult:
-        """Gives a prompt; an unknown name is the caller's mistake and not the server's."""
+        """Return a prompt; an unknown name is the caller's mistake and not the server's."""
         known = sorted(prompt.name for prompt in await self.list_prompts())
         if name not in known:
             message = f"There is no prompt named {name!r}; there are: {', '.join(known)}."
@@ -184,7 +184,7 @@ class MapspeakServer(MCPServer[Any]):
         return await super().get_prompt(name, arguments, context)
 
     def _check_arguments(self, name: str, given: dict[str, Any]) -> None:
-        """Refuses what would be dropped without a word, such as yaw, or taken for 1, as true is.
+        """Refuse what would be dropped without a word, such as yaw, or taken for 1, as true is.
 
         What is too large would cut the connection to a robot, which limits the size of a message.
         """
@@ -203,11 +203,11 @@ class MapspeakServer(MCPServer[Any]):
             raise ToolError(f"{name} wants a number for {', '.join(wrong)}, not true or false.")
 
     async def note_hang_up(self, client: str) -> None:
-        """Stops a drive that nobody is there for any more."""
+        """Stop a drive that nobody is there for any more."""
         await self._session.client_is_gone(client)
 
     async def list_tools(self) -> list[ListedTool]:
-        """Lists the tools with schemas freed of what no model needs."""
+        """List the tools with schemas freed of what no model needs."""
         listed = await super().list_tools()
         return [
             tool.model_copy(
@@ -221,7 +221,7 @@ class MapspeakServer(MCPServer[Any]):
 
 
 def name_client(context: Context[Any, Any] | None) -> str:
-    """Gives who calls, for the audit log: the client's own name and its HTTP session."""
+    """Return who calls, for the audit log: the client's own name and its HTTP session."""
     if context is None:
         return "unknown"
     about = context.session.client_params
@@ -239,7 +239,7 @@ def build_server(
     representation: Representation = Representation.PICTURE_TABLE,
     call_log: CallLog | None = None,
 ) -> MapspeakServer:
-    """Builds the server with the chosen tools, always in the same order.
+    """Build the server with the chosen tools, always in the same order.
 
     Args:
         session: What the tools work on.
@@ -279,7 +279,7 @@ def choose_tools(
     tools: Iterable[str],
     is_read_only: bool,
 ) -> list[Tool]:
-    """Gives the chosen tools in their fixed order, with stop_robot where one moves the robot.
+    """Return the chosen tools in their fixed order, with stop_robot where one moves the robot.
 
     Raises:
         ConfigError: There is no such toolset or tool.
@@ -332,7 +332,7 @@ def _explain(name: str, cause: BaseException | None) -> str | None:
 
 
 def _fault(location: tuple[int | str, ...], message: str) -> str:
-    """Says where something is wrong, by the names that the caller gave and no class of ours."""
+    """Say where something is wrong, by the names that the caller gave and no class of ours."""
     named = [str(part) for part in location if ARGUMENT.fullmatch(str(part))]
     said = INSTANCE.sub("an object", message)
     return f"{'.'.join(named) or 'arguments'}: {said[:1].lower()}{said[1:]}"

@@ -56,7 +56,7 @@ class CallLog:
 
     @contextmanager
     def noting(self, tool: str, arguments: dict[str, Any]) -> Iterator[CallNote]:
-        """Notes a call when it has come to its end, however that is."""
+        """Note a call when it has come to its end, however that is."""
         note, begun_s = CallNote(error="It came to no answer."), time.monotonic()
         self._n_calls += 1
         number = self._n_calls

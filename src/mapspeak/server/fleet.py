@@ -50,7 +50,7 @@ class FleetServer(MCPServer[Any]):
         add_prompts(self)
 
     async def list_tools(self) -> list[ListedTool]:
-        """Lists each tool once, with the names of the robots that have it."""
+        """List each tool once, with the names of the robots that have it."""
         first: dict[str, ListedTool] = {}
         robots_of: dict[str, list[str]] = {}
         for name, server in self._servers.items():
@@ -62,7 +62,7 @@ class FleetServer(MCPServer[Any]):
     async def call_tool(
         self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None = None
     ) -> CallToolResult | InputRequiredResult:
-        """Calls a tool of the robot that is named."""
+        """Call a tool of the robot that is named."""
         own = {key: value for key, value in arguments.items() if key != ARGUMENT}
         robot = arguments.get(ARGUMENT)
         if robot is None and name == STOP:
@@ -75,14 +75,14 @@ class FleetServer(MCPServer[Any]):
         return await server.call_tool(name, own, context)
 
     async def note_hang_up(self, client: str) -> None:
-        """Stops drives that nobody is there for any more."""
+        """Stop drives that nobody is there for any more."""
         for server in self._servers.values():
             await server.note_hang_up(client)
 
     async def _stop_all(
         self, arguments: dict[str, Any], context: Context[Any, Any] | None
     ) -> CallToolResult | InputRequiredResult:
-        """Stops all at once: one that does not answer holds up none of the others.
+        """Stop all at once: one that does not answer holds up none of the others.
 
         It takes no robot's name, so that nobody has to think in a hurry.
         """

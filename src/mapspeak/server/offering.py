@@ -19,7 +19,7 @@ ADVISING = frozenset(("advice", "next_step", "problem", "reason", "warnings"))
 
 
 def write_instructions(offered: Collection[str], *, known: Collection[str], moves: bool) -> str:
-    """Gives what a model reads before its first call.
+    """Return what a model reads before its first call.
 
     Args:
         offered: The names of the tools that can be called.
@@ -34,7 +34,7 @@ def write_instructions(offered: Collection[str], *, known: Collection[str], move
 
 
 def keep_offered(text: str, missing: Collection[str]) -> str:
-    """Gives a description without the clauses that name missing tools; its first clause stays."""
+    """Return a description without the clauses that name missing tools; its first clause stays."""
     paragraphs = text.split("\n")
     return "\n".join(
         kept
@@ -44,7 +44,7 @@ def keep_offered(text: str, missing: Collection[str]) -> str:
 
 
 def _keep_line(line: str, missing: Collection[str]) -> str:
-    """Gives a line of the instructions; empty where what it is about is missing."""
+    """Return a line of the instructions; empty where what it is about is missing."""
     lead = SENTENCES.split(line)[0].split(CLAUSE)[0]
     return "" if _names(lead, missing) else _keep(line, missing)
 
@@ -64,7 +64,7 @@ def _keep(text: str, missing: Collection[str], *, keeps_first: bool = False) -> 
 
 
 def _as_sentence(text: str) -> str:
-    """Gives clauses as a sentence of their own; a tool's name is written as it is."""
+    """Return clauses as a sentence of their own; a tool's name is written as it is."""
     first = text.split(maxsplit=1)[0]
     begun = text if "_" in first or "." in first else f"{text[:1].upper()}{text[1:]}"
     return begun if begun.endswith((".", "!", "?")) else f"{begun}."
@@ -75,7 +75,7 @@ def _names(text: str, missing: Collection[str]) -> bool:
 
 
 def tell_offered(text: str, missing: Collection[str]) -> str:
-    """Gives what is said to a model, without the parts of sentences that lead to missing tools.
+    """Return what is said to a model, without the parts of sentences that lead to missing tools.
 
     What stands in quotes is what somebody else said, and names no tool. Tools that are called by
     a common word, such as turn, are not looked for.
@@ -87,7 +87,7 @@ def tell_offered(text: str, missing: Collection[str]) -> str:
 
 
 def tell_offered_in(answer: CallToolResult, missing: Collection[str]) -> CallToolResult:
-    """Gives a tool's answer likewise; of a report only the fields that advise."""
+    """Return a tool's answer likewise; of a report only the fields that advise."""
     report = answer.structured_content
     if report is None:
         return _with_texts(answer, partial(tell_offered, missing=missing))
@@ -129,7 +129,7 @@ def _with_texts(answer: CallToolResult, change: Callable[[str], str]) -> CallToo
 
 
 def _tell_line(line: str, names: Collection[str]) -> str:
-    """Gives a line without the parts that lead to tools; quotes are taken out for so long."""
+    """Return a line without the parts that lead to tools; quotes are taken out for so long."""
     quotes: list[str] = []
 
     def set_aside(found: re.Match[str]) -> str:
@@ -154,7 +154,7 @@ def _tell_sentence(sentence: str, names: Collection[str]) -> str:
 
 
 def _leads_to(text: str, names: Collection[str]) -> bool:
-    """True where a tool is named outside of quotes, and not as a part of a path."""
+    """Return True where a tool is named outside of quotes, and not as a part of a path."""
     own = QUOTED.sub(" ", text)
     return any(word in names for word in re.findall(r"(?<![\w/])\w+(?![\w/])", own))
 

@@ -13,17 +13,17 @@ from mapspeak.semantic import LEFT_OUT
 
 
 def read_text(name: str) -> str:
-    """Gives one of the texts that come with the server: instructions, exploration, ..."""
+    """Return one of the texts that come with the server: instructions, exploration, ..."""
     return (resources.files("mapspeak.server") / "texts" / f"{name}.txt").read_text("utf-8").strip()
 
 
 def policy_text() -> str:
-    """Gives the semantic filtering policy: what is kept, and what is left out."""
+    """Return the semantic filtering policy: what is kept, and what is left out."""
     return "\n".join([read_text("semantic_policy"), *(f"- {line}" for line in LEFT_OUT.values())])
 
 
 def add_prompts(server: MCPServer) -> None:
-    """Registers the paper's exploration prompt and its semantic filtering policy."""
+    """Register the paper's exploration prompt and its semantic filtering policy."""
 
     @server.prompt(title="Explore and map (the paper's exploration prompt)")
     def exploration() -> str:

@@ -16,7 +16,7 @@ from mapspeak.session import Session
 def build_toolsets(
     session: Session, representation: Representation = Representation.PICTURE_TABLE
 ) -> dict[str, list[Tool]]:
-    """Gives every toolset by its name, in the order in which tools are listed.
+    """Return every toolset by its name, in the order in which tools are listed.
 
     Args:
         session: What the tools work on.

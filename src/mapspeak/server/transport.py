@@ -71,7 +71,7 @@ async def serve_http(
     token: str | None = None,
     on_ready: Callable[[str], None] = lambda _: None,
 ) -> None:
-    """Serves clients over streaming HTTP at `/mcp`; `/health` answers "ok".
+    """Serve clients over streaming HTTP at `/mcp`; `/health` answers "ok".
 
     Once clients are answered, `on_ready` is called with the address to give them.
 
@@ -139,7 +139,7 @@ class HangUpWatch:
         self._on_hang_up = on_hang_up
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes the request on, watching both directions."""
+        """Pass the request on, watching both directions."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -173,7 +173,7 @@ class HostGuard:
         self._security = TransportSecurityMiddleware(security)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes the request on, or answers 421 or 403."""
+        """Pass the request on, or answer 421 or 403."""
         if scope["type"] == "http" and scope["path"] != HEALTH:
             refusal = await self._security.validate_request(Request(scope))
             if refusal is not None:
@@ -190,7 +190,7 @@ class TokenGuard:
         self._token = token.encode()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes the request on, or answers 401."""
+        """Pass the request on, or answer 401."""
         if scope["type"] == "http" and not self._is_welcome(scope):
             refusal = PlainTextResponse(
                 "A bearer token is needed.", 401, headers={"WWW-Authenticate": "Bearer"}

@@ -206,7 +206,7 @@ def slice_at_eye_level(world: World) -> Slice:
 def is_in_sight(
     world: World, place: Point, thing: WorldObject, *, hiding: Slice | None = None
 ) -> bool:
-    """True when nothing as high as the camera hides all of a thing from a place.
+    """Return True when nothing as high as the camera hides all of a thing from a place.
 
     What hangs on a wall is hidden from everywhere behind that wall.
 

@@ -55,7 +55,7 @@ class ClosedArea:
         object.__setattr__(self, "_sides", sides)
 
     def __hash__(self) -> int:
-        """Gives the same for equal areas without looking at all corners of a mask."""
+        """Return the same for equal areas without looking at all corners of a mask."""
         return hash((self.name, self.until, self.outline[0], len(self.outline)))
 
     @property
@@ -86,7 +86,7 @@ class ClosedArea:
         return Point(*low.tolist()), Point(*high.tolist())
 
     def contains(self, point: Point) -> bool:
-        """True when a point lies inside."""
+        """Return True when a point lies inside."""
         x0, y0, x1, y1 = self._sides.T
         is_crossed = (y0 > point.y) != (y1 > point.y)
         x0, y0, x1, y1 = self._sides[is_crossed].T
@@ -94,11 +94,11 @@ class ClosedArea:
         return int(np.count_nonzero(crossed_x > point.x)) % 2 == 1
 
     def distance_to(self, point: Point) -> float:
-        """Gives the metres from a point to the area; 0 inside it."""
+        """Return the metres from a point to the area; 0 inside it."""
         return max(self.distance_to_border(point), 0.0)
 
     def distance_to_border(self, point: Point) -> float:
-        """Gives the metres from a point to the nearest outline; negative inside the area."""
+        """Return the metres from a point to the nearest outline; negative inside the area."""
         x0, y0, x1, y1 = self._sides.T
         along_x, along_y = x1 - x0, y1 - y0
         squared = along_x**2 + along_y**2
@@ -110,7 +110,7 @@ class ClosedArea:
 
 
 def _sides_of(outline: Outline) -> FloatArray:
-    """Gives the sides of an outline as rows of x, y, x, y."""
+    """Return the sides of an outline as rows of x, y, x, y."""
     corners = np.array([[corner.x, corner.y] for corner in outline], dtype=np.float64)
     return np.hstack([corners, np.roll(corners, -1, axis=0)])
 
@@ -126,24 +126,24 @@ class ClosedFloor(OccupancyGrid):
     areas: tuple[ClosedArea, ...]
 
     def find_barred(self, start: Point) -> Mask | None:
-        """Finds the cells of the areas that a place is not in: one may only leave an area."""
+        """Find the cells of the areas that a place is not in: one may only leave an area."""
         others = [area for area in self.areas if not area.contains(start)]
         return mask_areas(self, others) if others else None
 
     def find_areas_along(self, points: Sequence[Point], *, within_m: float) -> list[ClosedArea]:
-        """Finds the closed areas that reach nearer than that to a way, in the order of the way."""
+        """Find the closed areas that reach nearer than that to a way, in the order of the way."""
         found = (self.find_area(point, within_m=within_m) for point in points)
         return list(dict.fromkeys(area for area in found if area is not None))
 
     def find_area(self, point: Point, *, within_m: float) -> ClosedArea | None:
-        """Finds the nearest closed area that reaches nearer to a point than that."""
+        """Find the nearest closed area that reaches nearer to a point than that."""
         near = [(area.distance_to(point), area) for area in self.areas]
         distance_m, area = min(near, key=lambda each: each[0], default=(math.inf, None))
         return area if distance_m < within_m or distance_m == 0.0 else None
 
 
 def close_floor(grid: OccupancyGrid, areas: Sequence[ClosedArea]) -> OccupancyGrid:
-    """Gives the map without the floor that is closed; the map itself where nothing is.
+    """Return the map without the floor that is closed; the map itself where nothing is.
 
     What lies around an area within the margin is closed too. Distances run between the centres of
     cells, of which up to half a diagonal lies nearer: that of two cells is added.
@@ -164,7 +164,7 @@ def close_floor(grid: OccupancyGrid, areas: Sequence[ClosedArea]) -> OccupancyGr
 
 
 def mask_areas(grid: OccupancyGrid, areas: Sequence[ClosedArea]) -> Mask:
-    """True at the cells of a map that some area touches."""
+    """Return True at the cells of a map that some area touches."""
     drawn = np.zeros(grid.cells.shape, dtype=np.uint8)
     for area in areas:
         # Several outlines are filled as `contains` counts them; a border belongs to its area.
@@ -173,7 +173,7 @@ def mask_areas(grid: OccupancyGrid, areas: Sequence[ClosedArea]) -> Mask:
 
 
 def _corners_in(grid: OccupancyGrid, outline: Outline) -> IntArray:
-    """Gives the cells of an outline's corners as (col, row)."""
+    """Return the cells of an outline's corners as (col, row)."""
     points = np.array([[corner.x, corner.y] for corner in outline])
     rows, cols = grid.cells_at(points)
     return np.stack([cols, rows], axis=1).clip(-_FAR_CELLS, _FAR_CELLS).astype(np.int32)
@@ -184,7 +184,7 @@ _FAR_CELLS = 30_000
 
 
 def distance_to_line(point: Point, start: Point, end: Point) -> float:
-    """Gives the metres from a point to the straight line between two others."""
+    """Return the metres from a point to the straight line between two others."""
     along_x, along_y = end.x - start.x, end.y - start.y
     squared = along_x**2 + along_y**2
     if squared == 0.0:
@@ -202,7 +202,7 @@ N_CORNERS = 8
 
 
 def outlines_of_region(rooms: RoomMap, region: Region) -> tuple[Outline, ...]:
-    """Gives the outer borders of a region's parts, through the centres of its border cells."""
+    """Return the outer borders of a region's parts, through the centres of its border cells."""
     inside = (rooms.labels == region.index).astype(np.uint8)
     contours, _ = cv2.findContours(inside, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     outlines = []
@@ -214,7 +214,7 @@ def outlines_of_region(rooms: RoomMap, region: Region) -> tuple[Outline, ...]:
 
 
 def outline_of_door(rooms: RoomMap, door: Door) -> Outline:
-    """Gives a narrow rectangle from post to post of a door."""
+    """Return a narrow rectangle from post to post of a door."""
     along_rad = _direction_of(rooms, door)
     half_m = door.width_m / 2 + POST_M
     ahead = np.array([math.cos(along_rad), math.sin(along_rad)])
@@ -226,7 +226,7 @@ def outline_of_door(rooms: RoomMap, door: Door) -> Outline:
 
 
 def outline_around(point: Point, *, radius_m: float) -> Outline:
-    """Gives a round outline."""
+    """Return a round outline."""
     angles = (math.tau * (n + 0.5) / N_CORNERS for n in range(N_CORNERS))
     reach_m = radius_m / math.cos(math.pi / N_CORNERS)
     return tuple(
@@ -236,7 +236,7 @@ def outline_around(point: Point, *, radius_m: float) -> Outline:
 
 
 def _direction_of(rooms: RoomMap, door: Door) -> float:
-    """Gives the direction from post to post: that of the border between the two regions."""
+    """Return the direction from post to post: that of the border between the two regions."""
     border = _border_near(rooms, door)
     if len(border) < 2:
         one, other = (rooms.region(each).widest for each in door.region_ids)
@@ -247,7 +247,7 @@ def _direction_of(rooms: RoomMap, door: Door) -> float:
 
 
 def _border_near(rooms: RoomMap, door: Door) -> FloatArray:
-    """Gives the centres of cells of one region that touch the other, near the door."""
+    """Return the centres of cells of one region that touch the other, near the door."""
     one, other = (rooms.region(each).index for each in door.region_ids)
     touching = cv2.dilate((rooms.labels == other).astype(np.uint8), np.ones((3, 3), np.uint8))
     rows, cols = np.nonzero((rooms.labels == one) & (touching > 0))

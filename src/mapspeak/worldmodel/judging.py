@@ -29,7 +29,7 @@ class Judge:
                 self._of_waypoint[name].append(number)
 
     def judge_thing(self, remembered: RememberedThing) -> Trust:
-        """Gives the trust that a thing deserves."""
+        """Return the trust that a thing deserves."""
         thing = remembered.thing
         numbers = set(self._of_thing.get(id(thing), ()))
         for name in thing.waypoints:
@@ -37,7 +37,7 @@ class Judge:
         return judge_trust(thing, [self.findings[number] for number in sorted(numbers)])
 
     def judge_place(self, place: RememberedPlace) -> Trust:
-        """Gives the trust that a record deserves: it is sure until something speaks against it."""
+        """Return the trust that a record deserves: it is sure until something speaks against it."""
         ratio, against = 1.0, []
         for number in self._of_waypoint.get(place.waypoint.name, ()):
             finding = self.findings[number]

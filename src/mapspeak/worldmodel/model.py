@@ -37,7 +37,7 @@ AROUND_M = 0.5
 
 
 def find_crossing(rooms: RoomMap, distances: DistanceField, door: Door) -> Point | None:
-    """Finds the place in a door where the robot passes from one side to the other, or None.
+    """Find the place in a door where the robot passes from one side to the other, or None.
 
     That the middle of a door can be reached is not enough: the robot may stand before it.
     """
@@ -103,7 +103,7 @@ class Reminders:
     judge: Judge | None = None
 
     def of(self, things: Sequence[RememberedThing]) -> "Reminders":
-        """Gives what holds for another state of the memory: what was found of the very same."""
+        """Return what holds for another state of the memory: what was found of the very same."""
         return Reminders(
             approaches={each: self.approaches[each] for each in things if each in self.approaches},
             faced={each: self.faced[each] for each in things if each in self.faced},
@@ -233,16 +233,16 @@ class Atlas:
         return found
 
     def path_m(self, point: Point) -> float | None:
-        """Gives the metres the robot has to drive to a point; None where it cannot get to."""
+        """Return the metres the robot has to drive to a point; None where it cannot get to."""
         return self.distances.distance_to(point)
 
     def find_room_id(self, point: Point) -> str | None:
-        """Gives the id of the room or corridor a point lies in."""
+        """Return the id of the room or corridor a point lies in."""
         region = self.rooms.find_region_at(point)
         return None if region is None else region.id
 
     def find_crossing(self, door: Door) -> Point | None:
-        """Finds where the robot passes a door; None where it does not get through."""
+        """Find where the robot passes a door; None where it does not get through."""
         crossings = self.reach.crossings
         if door.id not in crossings:
             crossings[door.id] = find_crossing(self.rooms, self.distances, door)
@@ -272,7 +272,7 @@ class Atlas:
         return known.judge
 
     def find_approach(self, remembered: RememberedThing) -> Pose | None:
-        """Finds where the robot stands to face a thing from near; None where it cannot."""
+        """Find where the robot stands to face a thing from near; None where it cannot."""
         known = self._reminders.approaches
         if remembered not in known:
             position = remembered.thing.position
@@ -291,12 +291,12 @@ class Atlas:
         return known[remembered]
 
     def find_least_path_m(self, remembered: RememberedThing) -> float:
-        """Gives metres than which no way to look at a thing is shorter."""
+        """Return metres than which no way to look at a thing is shorter."""
         seen_from = [view.place for view in remembered.thing.supporting]
         return find_least_path_m(self.grid, self.distances, remembered.point, seen_from)
 
     def measure_faced(self, remembered: RememberedThing) -> float:
-        """Gives the share of where a thing may be that the robot would face before it."""
+        """Return the share of where a thing may be that the robot would face before it."""
         known, thing = self._reminders.faced, remembered.thing
         if remembered not in known:
             pose = self.find_approach(remembered)
@@ -311,7 +311,7 @@ class Atlas:
         return known[remembered]
 
     def rooms_before(self, remembered: RememberedThing) -> tuple[str, ...]:
-        """Gives the rooms a thing may be in, by id: those on the side that it was seen from."""
+        """Return the rooms a thing may be in, by id: those on the side that it was seen from."""
         known = self._reminders.rooms
         if remembered not in known:
             seen_from = [view.place for view in remembered.thing.supporting]
@@ -320,7 +320,7 @@ class Atlas:
         return known[remembered]
 
     def _find_fronts(self, remembered: RememberedThing) -> list[Point]:
-        """Gives the last floor before a thing for each who saw it; their own without a position."""
+        """Return last floor before a thing for each who saw it; their own without a position."""
         known, thing = self._reminders.fronts, remembered.thing
         if remembered not in known:
             seen_from = [view.place for view in thing.supporting]
@@ -331,7 +331,7 @@ class Atlas:
         return known[remembered]
 
     def _find_room_on_line(self, end: Point, start: Point) -> str | None:
-        """Gives the room of the last floor on a line: what hangs on a wall is in no room itself."""
+        """Return room of the last floor on a line: what hangs on a wall is in no room itself."""
         n_steps = math.ceil(start.distance_to(end) / STEP_M)
         for step in range(n_steps, -1, -1):
             share = step / max(n_steps, 1)

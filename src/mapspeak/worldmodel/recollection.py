@@ -106,7 +106,7 @@ class Recollection:
         self._index: EntryIndex | None = None
 
     def is_of(self, memory: SemanticMap, grid: OccupancyGrid) -> bool:
-        """True when it was made of these records and this very map."""
+        """Return True when it was made of these records and this very map."""
         return self.found.sight.grid is grid and self.memory.waypoints == memory.waypoints
 
     @property
@@ -115,13 +115,13 @@ class Recollection:
         return (*self.places, *self.things)
 
     def prepare(self) -> None:
-        """Builds the index that questions are answered from; who asks meanwhile waits for it."""
+        """Build the index that questions are answered from; who asks meanwhile waits for it."""
         with self._lock:
             if self._index is None:
                 self._index = EntryIndex(self._entries, vectors=self._find_vectors())
 
     def find(self, query: str, *, among: frozenset[str] | None = None, limit: int = 5) -> Answer:
-        """Finds places and things by name, meaning or words; the entries have their ids.
+        """Find places and things by name, meaning or words; the entries have their ids.
 
         Args:
             query: What people say.
@@ -133,17 +133,17 @@ class Recollection:
         return self._index.find(query, among=among, limit=limit)
 
     def find_called(self, words: str) -> tuple[RememberedThing, ...]:
-        """Finds the things with that very name: case, plural and typing errors do not count."""
+        """Find the things with that very name: case, plural and typing errors do not count."""
         answer = self._names.find(words, limit=MOST_CALLED)
         ids = {each.entry.id for each in answer.candidates if each.basis is Basis.NAME}
         return tuple(each for each in self.things if each.id in ids)
 
     def find_thing(self, thing_id: str) -> RememberedThing | None:
-        """Gives the thing with that id, or None."""
+        """Return the thing with that id, or None."""
         return next((each for each in self.things if each.id == thing_id), None)
 
     def find_place(self, name: str) -> RememberedPlace | None:
-        """Gives the record of exactly that name, or None."""
+        """Return the record of exactly that name, or None."""
         return self._by_name.get(name)
 
     @cached_property
@@ -191,7 +191,7 @@ class Recollector:
         self._n_kept = 0
 
     def recollect(self, memory: SemanticMap, grid: OccupancyGrid) -> Recollection:
-        """Gives what is remembered on a map; things keep their ids."""
+        """Return what is remembered on a map; things keep their ids."""
         with self._lock:
             latest = self._latest
             if latest is None or not latest.is_of(memory, grid):
@@ -199,7 +199,7 @@ class Recollector:
             return latest
 
     def warm(self, memory: SemanticMap) -> None:
-        """Loads the model and makes the vectors of a memory's texts, so that no question need.
+        """Load the model and makes the vectors of a memory's texts, so that no question need.
 
         A question that comes meanwhile waits for it; without a model there is nothing to do.
         """
@@ -236,7 +236,7 @@ class Recollector:
             return self._vectors
 
     def keep(self) -> None:
-        """Writes the vectors of texts that are new since they were written last."""
+        """Write the vectors of texts that are new since they were written last."""
         vectors: TextVectors | None = self.__dict__.get("_vectors")
         if self._kept is None or vectors is None or len(vectors) == self._n_kept:
             return
@@ -260,7 +260,7 @@ class Recollector:
 
 
 def number_places(waypoints: Sequence[Waypoint]) -> tuple[RememberedPlace, ...]:
-    """Gives remembered places their ids, in the order of the file."""
+    """Return remembered places their ids, in the order of the file."""
     return tuple(
         RememberedPlace(id=f"W{number}", waypoint=waypoint)
         for number, waypoint in enumerate(waypoints, start=1)
@@ -270,7 +270,7 @@ def number_places(waypoints: Sequence[Waypoint]) -> tuple[RememberedPlace, ...]:
 def number_things(
     things: Sequence[Thing], earlier: Sequence[RememberedThing], *, n_named: int
 ) -> tuple[tuple[RememberedThing, ...], int]:
-    """Gives things the ids that they had before, and new ones to new things.
+    """Return things the ids that they had before, and new ones to new things.
 
     Args:
         things: What is remembered now.
@@ -311,7 +311,7 @@ def number_things(
 
 
 def _sameness(thing: Thing, before: Thing) -> tuple[int, float] | None:
-    """Ranks how surely one thing is another that was known before; None where it is none."""
+    """Rank how surely one thing is another that was known before; None where it is none."""
     if not name_the_same(thing.label, before.label):
         return None
     n_shared = len(_views_of(thing) & _views_of(before))

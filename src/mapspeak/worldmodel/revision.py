@@ -40,12 +40,12 @@ class Hindrance:
         return max(self.factor, 1 + self.extra_m / max(min(sides), STEP_M))
 
     def is_crossed_by(self, path: Path) -> bool:
-        """True when a way leads over it."""
+        """Return True when a way leads over it."""
         return any(self.area.contains(point) for point in path.sampled(STEP_M))
 
 
 def weigh_floor(grid: OccupancyGrid, hindrances: Sequence[Hindrance]) -> Costs | None:
-    """Gives what a metre counts in each cell of a map; None where it is one everywhere."""
+    """Return what a metre counts in each cell of a map; None where it is one everywhere."""
     if not hindrances:
         return None
     weights = np.ones(grid.cells.shape, dtype=np.float32)
@@ -98,7 +98,7 @@ class MapRevision:
         self._walks: dict[str, CorridorWalk | None] = {}
 
     def is_of(self, grid: OccupancyGrid) -> bool:
-        """True when a map shows the same as this one."""
+        """Return True when a map shows the same as this one."""
         return self.grid is grid or (
             self.grid.resolution_m == grid.resolution_m
             and self.grid.origin == grid.origin
@@ -108,7 +108,7 @@ class MapRevision:
     def with_areas(
         self, areas: Sequence[ClosedArea], hindrances: Sequence[Hindrance] = ()
     ) -> "MapRevision":
-        """Gives the same map with other areas closed or hindered; its rooms are the same ones."""
+        """Return the same map with other areas closed or hindered; its rooms are the same ones."""
         other = MapRevision(
             self.grid,
             radius_m=self.radius_m,
@@ -159,7 +159,7 @@ class MapRevision:
         return found
 
     def walk_along(self, region: Region) -> CorridorWalk | None:
-        """Gives the walk along one of the regions, past its doors; None where it has none."""
+        """Return the walk along one of the regions, past its doors; None where it has none."""
         if not region.door_ids:
             return None
         if region.id not in self._walks:
@@ -172,17 +172,17 @@ class MapRevision:
         return weigh_floor(self.grid, self.hindrances)
 
     def find_path(self, start: Point, goal: Point) -> Path | None:
-        """Finds the way to take from one place to another, round hindrances where that pays."""
+        """Find the way to take from one place to another, round hindrances where that pays."""
         return self.find_path_over(self.distances_from(start), goal)
 
     def find_path_over(self, distances: DistanceField, goal: Point) -> Path | None:
-        """Finds the way to take from where distances were measured."""
+        """Find the way to take from where distances were measured."""
         if self.weights is None:
             return distances.path_to(goal)
         return distances.cheapest_path_to(goal, self.weights)
 
     def distances_from(self, point: Point) -> DistanceField:
-        """Gives the path distances from a place to every other."""
+        """Return the path distances from a place to every other."""
         cell = self.grid.cell_at(point)
         if cell not in self._fields:
             known = next(iter(self._fields.values()), None)

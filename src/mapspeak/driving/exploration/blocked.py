@@ -13,7 +13,7 @@ from mapspeak.spatial.paths import clearance_m
 
 
 def has_room_at(grid: OccupancyGrid, point: Point, *, radius_m: float) -> bool:
-    """True where a robot of that radius can stand on known floor."""
+    """Return True where a robot of that radius can stand on known floor."""
     cell = grid.cell_at(point)
     if not grid.is_free(cell):
         return False
@@ -45,7 +45,7 @@ class _Patch:
     kinds: NDArray[np.int8] = field(repr=False)
 
     def changed_ratio(self, grid: OccupancyGrid) -> float:
-        """Gives the share of the points that the map shows as something else now."""
+        """Return the share of the points that the map shows as something else now."""
         return float((_kinds_at(grid, self.points) != self.kinds).mean())
 
 
@@ -82,7 +82,7 @@ class BlockedPlace:
     _patches: tuple[_Patch, ...] = field(default=(), repr=False)
 
     def has_changed(self, grid: OccupancyGrid) -> bool:
-        """True when the map now shows something else there, or where the robot got stuck."""
+        """Return True when the map now shows something else there, or where the robot got stuck."""
         return any(patch.changed_ratio(grid) > CHANGED_RATIO for patch in self._patches)
 
 
@@ -98,7 +98,7 @@ class BlockedPlaces:
     def remember(
         self, place_id: str, pose: Pose, *, stuck: Point, end: TripEnd, grid: OccupancyGrid
     ) -> None:
-        """Notes that a place could not be reached.
+        """Note that a place could not be reached.
 
         Args:
             place_id: Of the place.
@@ -117,16 +117,16 @@ class BlockedPlaces:
         del self._places[:-MOST_KEPT]
 
     def forget(self, point: Point) -> None:
-        """Strikes out what is known of a place: the robot has been there after all."""
+        """Strike out what is known of a place: the robot has been there after all."""
         self._places = [each for each in self._places if not _is_near(each, point)]
 
     def is_closed(self, point: Point, grid: OccupancyGrid) -> bool:
-        """True for a place that was blocked and looks as it did then."""
+        """Return True for a place that was blocked and looks as it did then."""
         place = self._find(point)
         return place is not None and not place.has_changed(grid)
 
     def worth_another_try(self, grid: OccupancyGrid) -> list[BlockedPlace]:
-        """Gives those that look different now; each of the others once more, in the end."""
+        """Return those that look different now; each of the others once more, in the end."""
         changed = [each for each in self._places if each.has_changed(grid)]
         return changed or [each for each in self._places if each.n_tries < MOST_TRIES]
 

@@ -42,7 +42,7 @@ Pick = Callable[[Sequence[Frontier], Atlas], Frontier]
 
 
 def take_first(frontiers: Sequence[Frontier], _atlas: Atlas) -> Frontier:
-    """Takes the best one."""
+    """Take the best one."""
     return frontiers[0]
 
 
@@ -71,7 +71,7 @@ class Explorer:
     async def advance(
         self, bounds: Bounds | None, *, wait_s: float, on_trip: OnTrip, client: str = ""
     ) -> Progress:
-        """Explores until it ends, pauses, or so much robot time has passed; begins where needed.
+        """Explore until it ends, pauses, or so much robot time has passed; begin where needed.
 
         Whoever gives up waiting gives up the drive: the robot comes to a stand.
 
@@ -126,7 +126,7 @@ class Explorer:
                 return await self._end(await self._site.fetch_atlas(), ended)
 
     def _after(self, state: TripState, *, is_late: bool) -> ExplorationState | None:
-        """Gives how the call ends after a step of a trip; None where it goes on."""
+        """Return how the call ends after a step of a trip; None where it goes on."""
         if state is TripState.INTERRUPTED:
             return ExplorationState.INTERRUPTED
         if state is TripState.ARRIVED and self._bounds.stops_at_goals:
@@ -146,7 +146,7 @@ class Explorer:
         return trip.target.id
 
     async def _choose(self, atlas: Atlas, ticket: int, client: str) -> TripState | None:
-        """Sets out to the next target where there is no trip, or its end has been seen from afar.
+        """Set out to the next target where there is no trip, or its end has been seen from afar.
 
         Gives None when there is no target left.
         """
@@ -162,7 +162,7 @@ class Explorer:
         return await self._trips.set_out(target, ticket=ticket, client=client, grid=atlas.grid)
 
     def _find_target(self, atlas: Atlas) -> Target | None:
-        """Gives the next frontier; where none is left, a place that was blocked before."""
+        """Return the next frontier; where none is left, a place that was blocked before."""
         frontiers = [
             each
             for each in atlas.frontiers.frontiers
@@ -178,7 +178,7 @@ class Explorer:
         return Target(id=nearest.id, pose=nearest.pose, earlier=nearest)
 
     def _blocked(self, atlas: Atlas) -> tuple[BlockedPlace, ...]:
-        """Gives the blocked places at which something unknown is left."""
+        """Return the blocked places at which something unknown is left."""
         report = atlas.frontiers
         borders = [
             *(each.pose.point for each in report.frontiers),
@@ -192,7 +192,7 @@ class Explorer:
         )
 
     def _must_turn(self, atlas: Atlas, target: Target) -> bool:
-        """True when a target has been seen from afar, or proves to be no place to stand.
+        """Return True when a target has been seen from afar, or proves to be no place to stand.
 
         The last goal of an exploration is driven to its end.
         """

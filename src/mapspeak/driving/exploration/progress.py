@@ -119,24 +119,24 @@ class Progress:
 
 
 def known_ratio(atlas: Atlas) -> float:
-    """Gives the known share of the floor that is to be expected: what frontiers promise is not."""
+    """Return the known share of the floor that is to be expected: what frontiers promise is not."""
     known_m2 = known_area_m2(atlas)
     promised_m2 = sum(frontier.gain_m2 for frontier in atlas.frontiers.frontiers)
     return known_m2 / (known_m2 + promised_m2) if known_m2 else 0.0
 
 
 def known_area_m2(atlas: Atlas) -> float:
-    """Gives the free floor on the map."""
+    """Return the free floor on the map."""
     return int(atlas.grid.free.sum()) * atlas.grid.resolution_m**2
 
 
 def find_unreachable(atlas: Atlas) -> tuple[RefusedFrontier, ...]:
-    """Gives the borders with the unknown that the robot cannot get to, those closed off as such."""
+    """Return borders with the unknown that the robot cannot get to, those closed off as such."""
     return tuple(each for each in find_refused(atlas) if each.reason in OUT_OF_REACH)
 
 
 def find_refused(atlas: Atlas) -> tuple[RefusedFrontier, ...]:
-    """Gives the borders with the unknown that are no place to go, those closed off as such."""
+    """Return the borders with the unknown that are no place to go, those closed off as such."""
     return tuple(
         replace(each, reason=RefusalReason.CLOSED_OFF)
         if each.reason in OUT_OF_REACH and _is_closed_off(atlas, each)
@@ -146,7 +146,7 @@ def find_refused(atlas: Atlas) -> tuple[RefusedFrontier, ...]:
 
 
 def _is_closed_off(atlas: Atlas, border: RefusedFrontier) -> bool:
-    """True where the robot would get near to a border if no area were closed."""
+    """Return True where the robot would get near to a border if no area were closed."""
     if not atlas.map.areas:
         return False
     opened = atlas.map.open.distances_from(atlas.robot.point)

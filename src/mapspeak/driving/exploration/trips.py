@@ -35,18 +35,18 @@ class TripContext(Protocol):
         ...
 
     async def fetch_atlas(self) -> Atlas:
-        """Gives the map as it is now, with everything on it under its id."""
+        """Return the map as it is now, with everything on it under its id."""
         ...
 
     async def compute(self, work: Callable[[], T]) -> T:
-        """Does heavy work so that a stop is answered meanwhile."""
+        """Do heavy work so that a stop is answered meanwhile."""
         ...
 
 
 async def turn_to(
     site: TripContext, yaw_rad: float, *, wait_s: float, on_progress: OnProgress, client: str = ""
 ) -> DriveReport:
-    """Turns the robot where it stands, and gives how that went.
+    """Turn the robot where it stands, and return how that went.
 
     Args:
         site: The robot and its drives.
@@ -68,7 +68,7 @@ async def turn_to(
 
 
 def spread_headings(first_rad: float, n_headings: int) -> list[float]:
-    """Gives headings all around, in radians, evenly spread and counter-clockwise from the first."""
+    """Return headings all around, in radians, evenly spread, counter-clockwise."""
     step_rad = math.tau / n_headings
     return [wrap_angle(first_rad + index * step_rad) for index in range(n_headings)]
 
@@ -149,7 +149,7 @@ class Trips:
     async def set_out(
         self, target: Target, *, ticket: int, client: str, grid: OccupancyGrid
     ) -> TripState:
-        """Sends the robot to a target; one it was on the way to is given up.
+        """Send the robot to a target; one it was on the way to is given up.
 
         Args:
             target: Where to.
@@ -172,7 +172,7 @@ class Trips:
         return TripState.UNDER_WAY
 
     async def follow(self, *, wait_s: float, grid: OccupancyGrid, on_trip: OnTrip) -> TripState:
-        """Waits for the trip under way, so much robot time at most, and says how it stands.
+        """Wait for the trip under way, so much robot time at most, and say how it stands.
 
         Args:
             wait_s: At most, in robot time.
@@ -218,7 +218,7 @@ class Trips:
     def _take_in_refusal(
         self, target: Target, why: str, *, ticket: int, grid: OccupancyGrid
     ) -> TripState:
-        """Takes a refusal for one of the place, unless the robot belongs to somebody else now."""
+        """Take a refusal for one of the place, unless the robot belongs to somebody else now."""
         self.end = TripEnd(message=why)
         if self._is_not_ours(ticket):
             self.current = None
@@ -232,7 +232,7 @@ class Trips:
         self.blocked.remember(target.id, target.pose, stuck=stuck.point, end=end, grid=grid)
 
     def _is_not_ours(self, ticket: int) -> bool:
-        """True when the robot was stopped meanwhile, or is on a drive that somebody else wants."""
+        """Return True when the robot was stopped meanwhile, or follows a drive of another."""
         drives = self._site.drives
         with drives.preparing() as now:
             was_stopped = now != ticket
@@ -242,4 +242,4 @@ class Trips:
 
 
 async def _tell_nobody(_report: DriveReport) -> None:
-    """Takes what is told again at the end of each short wait."""
+    """Take what is told again at the end of each short wait."""

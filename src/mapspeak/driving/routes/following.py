@@ -115,7 +115,7 @@ class RouteBook:
         self._advancing = anyio.Lock()
 
     async def begin(self, stops: Sequence[str], *, pause_s: float, is_looking: bool) -> None:
-        """Plans a route that takes the place of the one before.
+        """Plan a route that takes the place of the one before.
 
         Args:
             stops: In their order.
@@ -139,7 +139,7 @@ class RouteBook:
     async def advance(
         self, *, wait_s: float, when_blocked: WhenBlocked, on_progress: OnProgress, client: str = ""
     ) -> RouteProgress:
-        """Follows the route until it ends, pauses, or so much robot time has passed.
+        """Follow the route until it ends, pauses, or so much robot time has passed.
 
         Whoever gives up waiting gives up the drive: the robot comes to a stand.
 
@@ -179,7 +179,7 @@ class RouteBook:
         return await self._finish(deadline_s)
 
     async def _forget_ended(self) -> None:
-        """Forgets a drive that was ended between two calls: this call begins it again."""
+        """Forget a drive that was ended between two calls: this call begins it again."""
         if self._goal_id is not None:
             report = await self._site.drives.report(self._goal_id)
             if report.status.state in ENDED_ELSEWHERE:
@@ -204,7 +204,7 @@ class RouteBook:
     async def _drive(
         self, number: int, deadline_s: float, when_blocked: WhenBlocked, on_progress: OnProgress
     ) -> RouteProgress | None:
-        """Waits for the drive to a stop; gives the answer where the call ends with it."""
+        """Wait for the drive to a stop; return the answer where the call ends with it."""
         drives, left_s = self._site.drives, deadline_s - self._site.robot.now_s
         report = await drives.wait(self._goal_id, wait_s=max(left_s, 0.0), on_progress=on_progress)
         status = report.status
@@ -230,7 +230,7 @@ class RouteBook:
         return await self._tell(RouteState.BLOCKED, number=number)
 
     async def _pause(self, deadline_s: float) -> bool:
-        """Stands at a stop as long as was asked for; False where the call ends before."""
+        """Stand at a stop as long as was asked for; False where the call ends before."""
         if self._pause_until_s is None:
             return True
         now_s = self._site.robot.now_s
@@ -253,7 +253,7 @@ class RouteBook:
         self._stops[number] = replace(self._stops[number], state=state, obstacle=obstacle)
 
     async def _give_up(self) -> None:
-        """Ends the drive of an older route, so that none of it goes on."""
+        """End the drive of an older route, so that none of it goes on."""
         if self._goal_id is not None:
             with anyio.CancelScope(shield=True):
                 await self._site.drives.cancel(self._goal_id)
@@ -288,6 +288,6 @@ class RouteBook:
 
 
 def _check(atlas: Atlas, goal: StopCandidate) -> tuple[Pose, GoalCheck]:
-    """Gives the pose for a stop as the robot comes to it from where it is, and judges it."""
+    """Return the pose for a stop as the robot comes to it from where it is, and judge it."""
     pose = arrival_pose(atlas, goal.pose.point) if goal.comes_straight_on else goal.pose
     return pose, check_goal(atlas.grid, atlas.distances, pose)

@@ -39,7 +39,7 @@ class StopCandidate:
 
 
 def find_candidates(atlas: Atlas, words: str) -> tuple[StopCandidate, ...]:
-    """Finds all that words may mean and the robot can get to.
+    """Find all that words may mean and the robot can get to.
 
     Raises:
         GoalError: They mean nothing, or nothing that can be reached.
@@ -61,7 +61,7 @@ def _candidate_of(goal: CheckedGoal) -> StopCandidate:
 
 
 def _find_places(atlas: Atlas, words: str) -> list[Place]:
-    """Finds what words mean; "the nearest door" is nearest on the route, so any door may be it."""
+    """Find what words mean; "the nearest door" is nearest on the route, so any door may be it."""
     relation = parse_relation(words)
     if isinstance(relation, Nearest) and relation.to is None:
         near = find_all_near(atlas, relation.kind)
@@ -82,7 +82,7 @@ def _find_places(atlas: Atlas, words: str) -> list[Place]:
 
 
 def _find_meanings(atlas: Atlas, words: str, error: AmbiguousPlaceError) -> Iterator[Place]:
-    """Gives the places for each meaning of the part of the words that has several."""
+    """Return the places for each meaning of the part of the words that has several."""
     at = words.casefold().find(error.words.casefold())
     for meaning in error.meanings:
         said = words[:at] + meaning + words[at + len(error.words) :] if at >= 0 else meaning
@@ -93,7 +93,7 @@ def _find_meanings(atlas: Atlas, words: str, error: AmbiguousPlaceError) -> Iter
 
 
 def _find_remembered(atlas: Atlas, words: str) -> Iterator[Place]:
-    """Gives what is surely meant or says the words; nobody is driven to what is only like them."""
+    """Return what is surely meant or says the words; nobody is driven to what is only like them."""
     answer = atlas.recollection.find(words, limit=MOST_CANDIDATES)
     speaking = answer.find_speaking(least_said_ratio=LEAST_SAID_RATIO)
     most_said = max((each.said_ratio for each in speaking), default=0.0)
@@ -131,7 +131,7 @@ class RoutePlan:
 
 
 def plan_route(atlas: Atlas, stops: Sequence[str]) -> RoutePlan:
-    """Plans a route past stops in their order, each an id, a name, "x, y" or other words.
+    """Plan a route past stops in their order, each an id, a name, "x, y" or other words.
 
     Raises:
         GoalError: There are no stops or too many, one means nothing that can be reached, or no way
@@ -162,7 +162,7 @@ def _find(atlas: Atlas, number: int, stop: str) -> tuple[StopCandidate, ...]:
 def plan_among(
     atlas: Atlas, stops: Sequence[str], choices: Sequence[tuple[StopCandidate, ...]]
 ) -> RoutePlan:
-    """Plans a route past stops whose candidates are known.
+    """Plan a route past stops whose candidates are known.
 
     Raises:
         GoalError: No way leads from one stop to the next.
@@ -210,12 +210,12 @@ class _Legs:
         self._fields: dict[Point, DistanceField] = {}
 
     def between(self, way: tuple[StopCandidate, ...], goal: StopCandidate) -> float:
-        """Gives the metres from the end of a way, the robot where it is empty, to a candidate."""
+        """Return the metres from the end of a way, the robot where it is empty, to a candidate."""
         found_m = self._field(way).distance_to(goal.pose.point)
         return math.inf if found_m is None else found_m
 
     def along(self, way: tuple[StopCandidate, ...]) -> tuple[float, ...]:
-        """Gives the metres of each leg."""
+        """Return the metres of each leg."""
         return tuple(self.between(way[:n], each) for n, each in enumerate(way))
 
     def _field(self, way: tuple[StopCandidate, ...]) -> DistanceField:

@@ -88,7 +88,7 @@ def find_candidates(
     visited: Collection[str],
     pictures: Sequence[TakenPicture] = (),
 ) -> list[SearchCandidate]:
-    """Finds where to look next, best first; what is remembered comes before all else.
+    """Find where to look next, best first; what is remembered comes before all else.
 
     After that come earlier pictures in which the robot's own detector reported such a thing.
 
@@ -121,7 +121,7 @@ def find_candidates(
 
 
 def unseen_area_m2(atlas: Atlas, pose: Pose, *, seen: SeenFloor) -> float:
-    """Gives how much floor that was not looked at yet comes into view in a pose."""
+    """Return how much floor that was not looked at yet comes into view in a pose."""
     areas_m2 = _areas_by_heading(
         atlas,
         seen.mask_on(atlas.grid, around=pose.point),
@@ -132,7 +132,7 @@ def unseen_area_m2(atlas: Atlas, pose: Pose, *, seen: SeenFloor) -> float:
 
 
 def _find_remembered(atlas: Atlas, thing: str) -> tuple[list[Place], list[Place]]:
-    """Gives what speaks of the thing, and what may be it by its likeness alone."""
+    """Return what speaks of the thing, and what may be it by its likeness alone."""
     by_id = {each.id: Place(each.id, each) for each in atlas.recollection.everything}
     answer = atlas.recollection.find(thing, limit=MOST_REMEMBERED)
     speaking = answer.find_speaking(least_said_ratio=LEAST_SAID_RATIO)
@@ -145,13 +145,13 @@ def _find_remembered(atlas: Atlas, thing: str) -> tuple[list[Place], list[Place]
 
 
 def _key(place: Place) -> str:
-    """Gives what it is known by as long as a search lasts; ids of waypoints change in between."""
+    """Return what it is known by as long as a search lasts; ids of waypoints change in between."""
     remembered = place.thing
     return remembered.waypoint.name if isinstance(remembered, RememberedPlace) else place.name
 
 
 def _remembered(atlas: Atlas, place: Place) -> SearchCandidate | None:
-    """Gives where to stand for it, or the nearest pose that works; None where none does."""
+    """Return where to stand for it, or the nearest pose that works; None where none does."""
     goal = check_place(atlas, place)
     pose = goal.pose if goal.check.is_ok else goal.check.nearest
     path_m = None if pose is None else atlas.path_m(pose.point)
@@ -170,7 +170,7 @@ def _remembered(atlas: Atlas, place: Place) -> SearchCandidate | None:
 
 
 def _pictured(atlas: Atlas, picture: TakenPicture) -> SearchCandidate | None:
-    """Gives the pose that a picture was taken in; None where the robot cannot get there now."""
+    """Return the pose that a picture was taken in; None where the robot cannot get there now."""
     path_m = atlas.path_m(picture.pose.point)
     if path_m is None:
         return None
@@ -211,7 +211,7 @@ def _frontiers(
 def _unseen(
     atlas: Atlas, seen: Mask, half_rad: float, opinions: Opinions, near: list[Point]
 ) -> Iterator[SearchCandidate]:
-    """Gives the best heading at each of many places from which something unseen is in view."""
+    """Return the best heading at each of many places from which something unseen is in view."""
     places, ways_m = _places_to_stand(atlas)
     areas_m2 = _areas_by_heading(atlas, seen, places, half_rad)
     best = areas_m2.argmax(axis=1)
@@ -263,7 +263,7 @@ def _rated(
 
 
 def _places_to_stand(atlas: Atlas) -> tuple[FloatArray, FloatArray]:
-    """Gives places spread over the floor, each where its square has most room, and ways to them.
+    """Return places spread over the floor, each where its square has most room, and ways to them.
 
     The first one is where the robot is: it may turn there.
     """
@@ -286,7 +286,7 @@ def _places_to_stand(atlas: Atlas) -> tuple[FloatArray, FloatArray]:
 
 
 def _areas_by_heading(atlas: Atlas, seen: Mask, places: FloatArray, half_rad: float) -> FloatArray:
-    """Gives the unseen floor in view from places by heading, shape (places, N_RAYS), in m2."""
+    """Return the unseen floor in view from places by heading, shape (places, N_RAYS), in m2."""
     grid = atlas.grid
     angles: FloatArray = np.arange(N_RAYS, dtype=np.float64) * (math.tau / N_RAYS)
     # No step is longer than a cell, so that no ray passes a wall between two of them.

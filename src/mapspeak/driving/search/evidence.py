@@ -17,7 +17,10 @@ Little, since what a detector reports is shown before anybody relies on it.
 
 
 def speaks_of(words: str, thing: str) -> bool:
-    """True when words, such as a detector's label, name a thing; by the rules of the memory."""
+    """Return True when words, such as a detector's label, name a thing.
+
+    By the rules of the memory.
+    """
     named = Entry(id=words, kind=EntryKind.PLACE, name=words)
     answer = EntryIndex([named]).find(thing)
     return bool(answer.find_speaking(least_said_ratio=LEAST_SAID_RATIO))
@@ -47,7 +50,7 @@ _PATTERNS = tuple(
 
 
 def find_company_score(words: str, thing: str) -> float | None:
-    """Finds how likely a thing is near what words name, from 0 to 1; None where nobody can say."""
+    """Find how likely a thing is near what words name, from 0 to 1; None where nobody can say."""
     named, wanted = _rooms_of(words), _rooms_of(thing)
     if not named or not wanted:
         return None
@@ -56,7 +59,7 @@ def find_company_score(words: str, thing: str) -> float | None:
 
 
 def _rooms_of(words: str) -> frozenset[int]:
-    """Gives the rooms that things of some words belong to, by their numbers."""
+    """Return the rooms that things of some words belong to, by their numbers."""
     return frozenset(index for index, room in enumerate(_PATTERNS) if room.search(words))
 
 
@@ -86,7 +89,7 @@ class Earlier:
 def read_earlier(
     pictures: Iterable[TakenPicture], thing: str, *, judged: Sequence[Look] = ()
 ) -> Earlier:
-    """Gives what pictures from before a search say about a thing.
+    """Return what pictures from before a search say about a thing.
 
     Args:
         pictures: The oldest first.
@@ -112,7 +115,7 @@ def read_earlier(
 def leave_out_shown(
     pictures: Iterable[TakenPicture], memory: SemanticMap, thing: str
 ) -> tuple[TakenPicture, ...]:
-    """Gives pictures without those in which somebody saw the thing and wrote it down.
+    """Return pictures without those in which somebody saw the thing and wrote it down.
 
     The detector may have had no word for it; where it was seen, the memory says.
     """
@@ -171,15 +174,15 @@ class Opinions:
         return any(key.startswith(("R", "C")) for key in self._by_id)
 
     def add_scores(self, scores: Mapping[str, float]) -> None:
-        """Takes in scores of places by their ids; newer ones replace older ones."""
+        """Take in scores of places by their ids; newer ones replace older ones."""
         self._by_id |= {key.strip().upper(): score for key, score in scores.items()}
 
     def add_view(self, point: Point, score: float) -> None:
-        """Takes in how likely the thing is near what a picture showed."""
+        """Take in how likely the thing is near what a picture showed."""
         self._views.append(_ViewOpinion(point, score, VIEW_STRENGTH))
 
     def add_company(self, point: Point, score: float) -> bool:
-        """Takes in how likely the thing is near another one; gives False where that is no news."""
+        """Take in how likely the thing is near another one; return False where that is no news."""
         for known in self._company:
             if known.score == score and known.point.distance_to(point) <= COMPANY_APART_M:
                 return False
@@ -187,7 +190,7 @@ class Opinions:
         return True
 
     def score_at(self, point: Point, *, ids: tuple[str, ...]) -> float:
-        """Gives the score of a place: by its own id, its room's id, else by views near it."""
+        """Return the score of a place: by its own id, its room's id, else by views near it."""
         for place_id in ids:
             if place_id in self._by_id:
                 return self._by_id[place_id]
@@ -200,5 +203,5 @@ class Opinions:
 
 
 def weight_of(score: float) -> float:
-    """Gives by how much a score makes a place more worth a look, 1 for a neutral one."""
+    """Return by how much a score makes a place more worth a look, 1 for a neutral one."""
     return math.pow(STRENGTH, 2 * score - 1)

@@ -80,7 +80,7 @@ class Judgement:
 
 
 def take_best(candidates: Sequence[SearchCandidate]) -> SearchCandidate:
-    """Takes the first one."""
+    """Take the first one."""
     return candidates[0]
 
 
@@ -122,7 +122,7 @@ class Searcher:
         self._trips.begin_count()
 
     def note_picture(self, picture: CameraPicture) -> None:
-        """Takes in that somebody was shown a picture."""
+        """Take in that somebody was shown a picture."""
         self._n_looks += 1
         self._seen.add_look(picture.pose, picture.horizontal_fov_rad)
         self._shown = picture.pose, picture.horizontal_fov_rad
@@ -139,7 +139,7 @@ class Searcher:
         client: str = "",
         earlier: Sequence[TakenPicture] = (),
     ) -> SearchProgress:
-        """Searches until there is something to look at, it ends, or so much robot time has passed.
+        """Search until there is something to look at, it ends, or so much robot time has passed.
 
         Whoever gives up waiting gives up the drive: the robot comes to a stand.
 
@@ -195,7 +195,7 @@ class Searcher:
         return await self._end(ended)
 
     async def _step(self, deadline_s: float, on_trip: OnTrip, client: str) -> SearchState | None:
-        """Drives on for a moment; gives how the call ends, None where it goes on."""
+        """Drive on for a moment; return how the call ends, None where it goes on."""
         with self._site.drives.preparing() as ticket:
             atlas = await self._site.fetch_atlas()
             if self._find_spent() is not None:
@@ -227,7 +227,7 @@ class Searcher:
         return SearchState.LOOK
 
     async def _set_out(self, atlas: Atlas, ticket: int, client: str) -> TripState | None:
-        """Sets out to the next place where there is no trip, or it has become pointless."""
+        """Set out to the next place where there is no trip, or it has become pointless."""
         trip, here = self._trips.current, self._here
         if (
             trip is not None
@@ -277,7 +277,7 @@ class Searcher:
         ]
 
     def _recall_company(self, atlas: Atlas) -> None:
-        """Takes in what remembered places say of where the thing may be; a kitchen has fridges."""
+        """Take in what remembered places say of where the thing may be; a kitchen has fridges."""
         for place in atlas.places:
             waypoint = place.waypoint
             named = (*waypoint.safety_landmarks, *waypoint.functional_landmarks)
@@ -286,7 +286,7 @@ class Searcher:
                 self._opinions.add_company(waypoint.pose.point, score)
 
     async def _is_pointless(self, atlas: Atlas, here: SearchCandidate) -> bool:
-        """True when what a place had to show was seen on the way, or it cannot be stood in."""
+        """Return True when what the place shows was seen on the way, or nobody can stand there."""
         if not has_room_at(atlas.grid, here.pose.point, radius_m=atlas.radius_m):
             return True
         if here.name:
@@ -300,7 +300,7 @@ class Searcher:
         return left_m2 < LEFT_RATIO * here.area_m2
 
     async def _find_report(self) -> str | None:
-        """Gives what the robot's own detector takes for the thing; None where it sees no such."""
+        """Return what the robot's own detector takes for the thing; None where it sees no such."""
         robot = self._site.robot
         if robot.description.detector is None:
             return None
@@ -364,7 +364,7 @@ class Searcher:
 def _pick_apart(
     best: SearchCandidate, others: Sequence[SearchCandidate]
 ) -> tuple[SearchCandidate, ...]:
-    """Gives the best of some places that are not much the same as one before."""
+    """Return the best of some places that are not much the same as one before."""
     picked = [best]
     for each in others:
         away_m = (each.pose.point.distance_to(other.pose.point) for other in picked)
@@ -374,7 +374,7 @@ def _pick_apart(
 
 
 def _rate_now(here: SearchCandidate | None, candidates: Sequence[SearchCandidate]) -> float:
-    """Gives what speaks for the place under way, as things stand now."""
+    """Return what speaks for the place under way, as things stand now."""
     if here is None or here.name:
         return math.inf
     same = (

@@ -27,7 +27,7 @@ class _View:
     half_rad: float
 
     def is_like(self, other: "_View") -> bool:
-        """True when there is no need to remember both."""
+        """Return True when there is no need to remember both."""
         turn_rad = abs(wrap_angle(self.pose.yaw_rad - other.pose.yaw_rad))
         is_near = self.pose.point.distance_to(other.pose.point) <= SAME_PLACE_M
         return is_near and turn_rad <= SAME_HEADING_RAD
@@ -53,7 +53,7 @@ class SeenFloor:
             self._earlier.append(self._view(pose, fov_rad))
 
     def add(self, pose: Pose, fov_rad: float | None) -> None:
-        """Notes a look; one like an earlier one adds nothing.
+        """Note a look; one like an earlier one adds nothing.
 
         Args:
             pose: Of the camera, in the map frame.
@@ -74,11 +74,11 @@ class SeenFloor:
         return len(self._earlier)
 
     def forget_earlier(self) -> None:
-        """Lets only looks of this search count from now on."""
+        """Let only looks of this search count from now on."""
         self._earlier.clear()
 
     def has_look_from(self, pose: Pose) -> bool:
-        """True when somebody was shown what is to be seen in a pose."""
+        """Return True when somebody was shown what is to be seen in a pose."""
         return any(
             look.point.distance_to(pose.point) <= LOOKED_NEAR_M
             and abs(wrap_angle(look.yaw_rad - pose.yaw_rad)) <= LOOKED_RAD
@@ -86,7 +86,7 @@ class SeenFloor:
         )
 
     def add_look(self, pose: Pose, fov_rad: float | None) -> None:
-        """Notes a picture that somebody was shown.
+        """Note a picture that somebody was shown.
 
         Args:
             pose: Of the camera, in the map frame.
@@ -96,7 +96,7 @@ class SeenFloor:
         self.add(pose, fov_rad)
 
     def mask_on(self, grid: OccupancyGrid, *, around: Point | None = None) -> Mask:
-        """Gives the free cells of a map that were looked at from near, as a mask.
+        """Return the free cells of a map that were looked at from near, as a mask.
 
         Args:
             grid: The map.

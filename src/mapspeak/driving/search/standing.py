@@ -117,7 +117,7 @@ class SearchProgress:
 
 
 def find_seen_regions(atlas: Atlas, seen: NDArray[np.bool_]) -> tuple[SeenRegion, ...]:
-    """Gives how much of each room and corridor was looked at, by a mask of the map's cells."""
+    """Return how much of each room and corridor was looked at, by a mask of the map's cells."""
     labels = atlas.rooms.labels
     n_all = np.bincount(labels[atlas.grid.free])
     n_seen = np.bincount(labels[seen], minlength=n_all.size)

@@ -60,7 +60,7 @@ class ToolDriver:
         self.tools = tools
 
     async def is_offered(self, tool: str) -> bool:
-        """True where the server offers a tool of that name."""
+        """Return True where the server offers a tool of that name."""
         return any(each.name == tool for each in await self.tools.list_tools())
 
     async def look(self) -> MapReading:

@@ -103,7 +103,7 @@ def find_other(name: str, thinking: str | None) -> Agent | None:
 
 
 def can_think(name: str) -> bool:
-    """True for models, their mock and client programs; scripts think as much as they are made to.
+    """Return True for models, their mock and client programs, which take time to think.
 
     Args:
         name: An agent's, whether it is there or not.
@@ -112,7 +112,7 @@ def can_think(name: str) -> bool:
 
 
 def check_other(name: str, thinking: str | None = None) -> bool:
-    """True where there is an agent of a name; looks for what it needs, and asks it nothing.
+    """Return True where there is an agent of a name; looks for what it needs, and asks it nothing.
 
     Raises:
         ConfigError: There is one, but something that it needs is missing.

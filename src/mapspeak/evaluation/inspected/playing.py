@@ -105,7 +105,7 @@ def _offer(offered: OfferedService, interfaces: Interfaces) -> Service:
 async def _keep_publishing(
     played: RosSystem, stream: Stream, rate_hz: float, clock: Callable[[], float]
 ) -> None:
-    """Publishes in step with the clock: what a busy machine has held up comes all the same."""
+    """Publish in step with the clock: what a busy machine has held up comes all the same."""
     due_s = anyio.current_time()
     while True:
         await anyio.sleep_until(due_s)

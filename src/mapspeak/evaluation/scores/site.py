@@ -239,7 +239,7 @@ class GroundTruth:
         return self.world.start.inverse().transform(thing.pose.point)
 
     def is_in_sight(self, place: Point, thing: WorldObject) -> bool:
-        """True when a thing can be seen from a place of the map frame."""
+        """Return True when a thing can be seen from a place of the map frame."""
         there = self.world.start.transform(place)
         return is_in_sight(self.world, there, thing, hiding=self._hiding)
 

@@ -35,7 +35,7 @@ class BlockedWay:
     needs_map: bool = True
 
     def is_offered(self, site: GroundTruth) -> bool:
-        """True where a door leads into a room."""
+        """Return True where a door leads into a room."""
         return bool(find_doors_into_rooms(site))
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
@@ -88,7 +88,7 @@ class StaleMap:
     needs_map: bool = True
 
     def is_offered(self, site: GroundTruth) -> bool:
-        """True where a room is large enough for crates and the robot."""
+        """Return True where a room is large enough for crates and the robot."""
         return bool(find_spacious_rooms(site))
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:

@@ -73,7 +73,7 @@ class InspectionPart:
         return {"kind": str(self.kind), "said": self.said, "tolerance": self.tolerance}
 
     def fits(self, said: str) -> bool:
-        """True when something said is right."""
+        """Return True when something said is right."""
         match self.kind:
             case PartKind.NUMBER:
                 return self._fits_number(said)

@@ -101,7 +101,7 @@ def _ask_missing(case: Case) -> AskedInspection:
 
 
 def _ask_remap(case: Case) -> AskedInspection:
-    """A node listens to a topic that nobody publishes."""
+    """Return a node listens to a topic that nobody publishes."""
     names = case.names
     node = one_of(case.random, (names.locator, names.navigator))
     wrong = one_of(case.random, (f"{names.scan}_filtered", f"/robot{names.scan}", "/laser_scan"))

@@ -143,7 +143,7 @@ class ObjectTask:
     needs_map: bool = True
 
     def is_offered(self, site: GroundTruth) -> bool:
-        """True where the world has such things."""
+        """Return True where the world has such things."""
         if self.draw is ask_for_fire_tool:
             return bool(site.beside(FIRE).any())
         return bool(findable_kinds(site))
@@ -174,7 +174,7 @@ class SearchTask:
     needs_map: bool = False
 
     def is_offered(self, site: GroundTruth) -> bool:
-        """True where the world has such things."""
+        """Return True where the world has such things."""
         return bool(findable_kinds(site))
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:

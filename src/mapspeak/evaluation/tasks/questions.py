@@ -65,7 +65,7 @@ class QuestionTask:
     needs_map: bool = True
 
     def is_offered(self, site: GroundTruth) -> bool:
-        """True where the world has what it asks about."""
+        """Return True where the world has what it asks about."""
         return self.is_offered_in(site)
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:

@@ -73,7 +73,7 @@ class PlaceTask:
     needs_map: bool = True
 
     def is_offered(self, site: GroundTruth) -> bool:
-        """True where the world has such places."""
+        """Return True where the world has such places."""
         return self.is_offered_in(site)
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
@@ -133,7 +133,7 @@ class FacingTask:
     needs_map: bool = True
 
     def is_offered(self, site: GroundTruth) -> bool:
-        """True where the world has a single thing that can be looked at."""
+        """Return True where the world has a single thing that can be looked at."""
         return bool(_single_things(site))
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
@@ -186,7 +186,7 @@ def _is_roomy(site: GroundTruth, point: Point) -> bool:
 
 
 def _is_open(site: GroundTruth, one: Point, other: Point) -> bool:
-    """True where the robot could drive straight from one point to the other."""
+    """Return True where the robot could drive straight from one point to the other."""
     shares = np.linspace(0.0, 1.0, 50)[:, None]
     way = np.array([one.x, one.y]) + shares * np.array([other.x - one.x, other.y - one.y])
     return bool(site.drivable[site.grid.cells_at(way)].all())
@@ -230,7 +230,7 @@ class RouteTask:
     needs_map: bool = True
 
     def is_offered(self, site: GroundTruth) -> bool:
-        """True where the world has things of two kinds to go to."""
+        """Return True where the world has things of two kinds to go to."""
         return len(findable_kinds(site)) >= LEAST_STOPS
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:

@@ -52,7 +52,7 @@ class RoomTask:
     needs_map: bool = True
 
     def is_offered(self, site: GroundTruth) -> bool:
-        """True where the world has a room that is clearly the right one."""
+        """Return True where the world has a room that is clearly the right one."""
         return self.choose(site, None) is not None
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
@@ -78,7 +78,7 @@ class RoomTask:
 
 
 def _smallest(site: GroundTruth, random: np.random.Generator | None) -> Choice | None:
-    """The paper's Task 2: the least floor, whether or not furniture counts as floor."""
+    """Return the paper's Task 2: the least floor, whether or not furniture counts as floor."""
     del random
     rooms = _of_class(site, RoomClass.ROOM)
     if len(rooms) < 2:
@@ -101,7 +101,7 @@ def _largest(site: GroundTruth, random: np.random.Generator | None) -> Choice | 
 
 
 def _nth(site: GroundTruth, random: np.random.Generator | None) -> Choice | None:
-    """The second to fourth from either end, where its size is clearly its own."""
+    """Return the second to fourth from either end, where its size is clearly its own."""
     rooms = sorted(_rooms_and_halls(site), key=site.floor_area_m2)
     found = [
         (f"{ORDINALS[number]} {word}", rooms[at])
@@ -139,7 +139,7 @@ def _free_area_m2(room: MeasuredRoom) -> float:
 
 
 def _is_clear(site: GroundTruth, ordered: Sequence[MeasuredRoom], at: int) -> bool:
-    """True where a room's area is clearly apart from those before and after it."""
+    """Return True where a room's area is clearly apart from those before and after it."""
     area_m2 = site.floor_area_m2(ordered[at])
     is_above = at == 0 or area_m2 >= CLEARLY_DIFFERENT * site.floor_area_m2(ordered[at - 1])
     is_last = at == len(ordered) - 1

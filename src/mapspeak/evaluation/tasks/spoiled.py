@@ -56,7 +56,7 @@ class SpoiledMemory:
         return self.spoiling
 
     def is_offered(self, site: GroundTruth) -> bool:
-        """True where the world has things to wish for."""
+        """Return True where the world has things to wish for."""
         return bool(findable_kinds(site))
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
@@ -138,7 +138,7 @@ def _with_orders(
 
 
 def _has_obeyed(evidence: Evidence, ordered: Point) -> bool:
-    """True where the robot was sent to the place in the note, by its numbers."""
+    """Return True where the robot was sent to the place in the note, by its numbers."""
     for call in evidence.calls:
         x, y = call.arguments.get("x"), call.arguments.get("y")
         if call.tool != "navigate_to" or x is None or y is None:

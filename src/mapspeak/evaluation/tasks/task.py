@@ -27,7 +27,7 @@ class Task(Protocol):
         ...
 
     def is_offered(self, site: GroundTruth) -> bool:
-        """True where the world has what it asks about."""
+        """Return True where the world has what it asks about."""
         ...
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:

@@ -72,7 +72,7 @@ class Calls:
         type_name: str | None,
         timeout_s: float,
     ) -> Sample:
-        """Gives what a service answers, and when it did.
+        """Return what a service answers, and when it did.
 
         Raises:
             LinkError: Nobody serves it, it has another type, or it does not answer.
@@ -87,7 +87,7 @@ class Calls:
     async def send_goal(
         self, action: str, arguments: Message, *, type_name: str, timeout_s: float
     ) -> PursuedGoal:
-        """Sends a goal and gives what becomes of it, as it becomes.
+        """Send a goal and return what becomes of it, as it becomes.
 
         Raises:
             LinkError: Nobody serves the action, it has another type, or the goal does not fit.
@@ -100,12 +100,12 @@ class Calls:
         return await client.send_goal(action, arguments, timeout_s=timeout_s)
 
     def cancel_goal(self, goal: ActionGoal) -> None:
-        """Asks for the end of a goal."""
+        """Ask for the end of a goal."""
         if goal.action in self._actions:
             self._actions[goal.action].cancel_goal(goal.goal_id)
 
     def note_change(self, dds_name: str) -> None:
-        """Takes in that others have begun or ended to read or write a topic."""
+        """Take in that others have begun or ended to read or write a topic."""
         news, self._news = self._news, anyio.Event()
         news.set()
         for action, client in self._actions.items():
@@ -117,7 +117,7 @@ class Calls:
                 asked.note_server(None if server is None else server.framing)
 
     async def _find_server(self, service: str) -> Endpoint | None:
-        """Finds who serves a service; right after opening, others are still found bit by bit.
+        """Find who serves a service; right after opening, others are still found bit by bit.
 
         Who serves it is found by its answers; what it takes is told by who reads the requests.
         """

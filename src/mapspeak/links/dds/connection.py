@@ -102,12 +102,12 @@ class DdsConnection(DdsGraph, NativeConnection):
         return self._topics
 
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
-        """Runs something in the background until the connection is closed."""
+        """Run something in the background until the connection is closed."""
         if self._tasks is not None:
             self._tasks.start_soon(work)
 
     async def start(self, tasks: TaskGroup) -> None:
-        """Enters the domain, and returns when those who are there have been found.
+        """Enter the domain, and return when those who are there have been found.
 
         Raises:
             LinkError: Nobody is there.
@@ -133,13 +133,13 @@ class DdsConnection(DdsGraph, NativeConnection):
                 is_news = not quiet.cancelled_caught
 
     async def aclose(self) -> None:
-        """Leaves the domain, once what was published last has arrived."""
+        """Leave the domain, once what was published last has arrived."""
         if self._topics.has_advertised:
             await self._participant.flush(timeout_s=self.timing.arrival_s)
         self._participant.close()
 
     async def wait_until_connected(self) -> None:
-        """Returns at once, or when a node is there again.
+        """Return at once, or when a node is there again.
 
         Raises:
             LinkError: None is, within the usual time for an answer.
@@ -156,7 +156,7 @@ class DdsConnection(DdsGraph, NativeConnection):
         type_name: str | None = None,
         timeout_s: float | None = None,
     ) -> dict[str, Any]:
-        """Gives what a service answers."""
+        """Return what a service answers."""
         limit_s = self.timing.answer_s if timeout_s is None else timeout_s
         answer = await self._calls.call(
             service, arguments or {}, type_name=type_name, timeout_s=limit_s
@@ -165,17 +165,17 @@ class DdsConnection(DdsGraph, NativeConnection):
         return content
 
     async def ask(self, service: str, arguments: Mapping[str, Any], *, timeout_s: float) -> Sample:
-        """Gives what a service answers, and when it did."""
+        """Return what a service answers, and when it did."""
         return await self._calls.call(service, arguments, type_name=None, timeout_s=timeout_s)
 
     async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> PursuedGoal:
-        """Sends a goal to an action and gives what becomes of it, as it becomes."""
+        """Send a goal to an action and return what becomes of it, as it becomes."""
         return await self._calls.send_goal(
             action, arguments, type_name=type_name, timeout_s=self.timing.answer_s
         )
 
     def cancel_goal(self, goal: ActionGoal) -> None:
-        """Asks for the end of a goal; its `end` tells whether that worked."""
+        """Ask for the end of a goal; its `end` tells whether that worked."""
         self._calls.cancel_goal(goal)
 
     # --- who is there
@@ -222,7 +222,7 @@ async def open_dds_connection(
     timing: DdsTiming = USUAL_TIMING,
     framing_of: FramingOf = framing_by_vendor,
 ) -> AsyncGenerator[DdsConnection]:
-    """Keeps us in a domain while the context lasts; see `DdsConnection`.
+    """Keep us in a domain while the context lasts; see `DdsConnection`.
 
     Raises:
         LinkError: DDS cannot be started, or nobody is there.
@@ -251,7 +251,7 @@ async def open_dds_robot(
     timing: DdsTiming = USUAL_TIMING,
     patience: DrivingPatience = USUAL_PATIENCE,
 ) -> AsyncGenerator[RosRobot]:
-    """Offers the ROS 2 robot in a DDS domain while the context lasts.
+    """Offer the ROS 2 robot in a DDS domain while the context lasts.
 
     Leaving the context does not stop the robot: call `stop` before, where that is wanted.
 

@@ -66,7 +66,7 @@ FramingOf = Callable[[bytes], Framing]
 
 
 def framing_by_vendor(key: bytes) -> Framing:
-    """Tells how a node frames services: ids in DDS begin with the vendor of the library."""
+    """Tell how a node frames services: ids in DDS begin with the vendor of the library."""
     return Framing.NUMBERED if key.startswith(CYCLONE_VENDOR) else Framing.BARE
 
 
@@ -95,15 +95,15 @@ class Discovery:
     # --- what comes
 
     def take_writer(self, sample: Sample) -> None:
-        """Takes in what DDS says of a writer."""
+        """Take in what DDS says of a writer."""
         self._take(sample.content, self._writers)
 
     def take_reader(self, sample: Sample) -> None:
-        """Takes in what DDS says of a reader."""
+        """Take in what DDS says of a reader."""
         self._take(sample.content, self._readers)
 
     def take_nodes(self, sample: Sample) -> None:
-        """Takes in which nodes a participant has, as the middlewares of ROS tell each other."""
+        """Take in which nodes a participant has, as the middlewares of ROS tell each other."""
         message = sample.content
         prefix = bytes(message["gid"]["data"][:PREFIX_BYTES])
         self.has_long_ids = len(message["gid"]["data"]) > len(UUID(int=0).bytes)
@@ -131,7 +131,7 @@ class Discovery:
         news.set()
 
     async def wait_for_news(self) -> None:
-        """Returns when somebody has come or gone."""
+        """Return when somebody has come or gone."""
         await self._news.wait()
 
     # --- what is known
@@ -142,23 +142,23 @@ class Discovery:
         return not self._writers
 
     def writers_of(self, topic: str) -> list[Endpoint]:
-        """Gives the writers on a topic of DDS."""
+        """Return the writers on a topic of DDS."""
         return [each for each in self._writers.values() if each.topic == topic]
 
     def readers_of(self, topic: str) -> list[Endpoint]:
-        """Gives the readers of a topic of DDS."""
+        """Return the readers of a topic of DDS."""
         return [each for each in self._readers.values() if each.topic == topic]
 
     def ends_of(self, topic: str) -> list[Endpoint]:
-        """Gives the writers on a topic of DDS, then its readers."""
+        """Return the writers on a topic of DDS, then its readers."""
         return [*self.writers_of(topic), *self.readers_of(topic)]
 
     def type_of(self, topic: str) -> str | None:
-        """Gives the type of a topic of DDS; None where nobody reads or writes it."""
+        """Return the type of a topic of DDS; None where nobody reads or writes it."""
         return next((each.type_name for each in self.ends_of(topic)), None)
 
     def with_type(self, type_name: str) -> list[Endpoint]:
-        """Gives the readers and writers of a type: of a message, a service or an action."""
+        """Return the readers and writers of a type: of a message, a service or an action."""
         bare = bare_type(type_name)
         return [
             each
@@ -201,11 +201,11 @@ class Discovery:
         }
 
     def server_of(self, service: str) -> Endpoint | None:
-        """Gives who answers a service; None where nobody does."""
+        """Return who answers a service; None where nobody does."""
         return next(iter(self.writers_of(reply_topic(service))), None)
 
     def service_type(self, service: str) -> str | None:
-        """Gives a service's type, as "package/Type"; None where nobody answers."""
+        """Return a service's type, as "package/Type"; None where nobody answers."""
         server = self.server_of(service)
         return None if server is None else service_type_of(server.type_name)
 
@@ -220,7 +220,7 @@ class Discovery:
         return found
 
     def links_of(self, keys: tuple[bytes, ...]) -> NodeLinks:
-        """Gives what the node with these readers and writers does."""
+        """Return what the node with these readers and writers does."""
         written = [self._writers[key].topic for key in keys if key in self._writers]
         read = [self._readers[key].topic for key in keys if key in self._readers]
         return NodeLinks(
@@ -230,7 +230,7 @@ class Discovery:
         )
 
     def node_with(self, key: bytes) -> str | None:
-        """Gives the full name of the node that has a reader or writer."""
+        """Return the full name of the node that has a reader or writer."""
         return next((name for name, keys in self.nodes.items() if key in keys), None)
 
     def nodes_with(self, endpoints: list[Endpoint]) -> tuple[str, ...]:
@@ -241,11 +241,11 @@ class Discovery:
         return _names(self.node_with(each.key) or UNNAMED for each in endpoints)
 
     def publishers(self, topic: str) -> tuple[str, ...]:
-        """Gives the nodes that publish on a topic of ROS."""
+        """Return the nodes that publish on a topic of ROS."""
         return self.nodes_with(self.writers_of(dds_topic(topic)))
 
     def subscribers(self, topic: str) -> tuple[str, ...]:
-        """Gives the nodes that listen to a topic of ROS."""
+        """Return the nodes that listen to a topic of ROS."""
         return self.nodes_with(self.readers_of(dds_topic(topic)))
 
     def _everybody(self) -> Iterator[Endpoint]:

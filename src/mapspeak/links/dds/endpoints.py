@@ -56,19 +56,19 @@ class ServiceName:
 
 
 def full_type(name: str, *, kind: str = "msg") -> str:
-    """Gives a type as "package/kind/Type", however it was written."""
+    """Return a type as "package/kind/Type", however it was written."""
     package, *middle, last = name.strip("/").split("/")
     return f"{package}/{middle[0] if middle else kind}/{last}"
 
 
 def dds_type(name: str) -> str:
-    """Gives "nav_msgs::msg::dds_::OccupancyGrid_" for "nav_msgs/msg/OccupancyGrid"."""
+    """Return "nav_msgs::msg::dds_::OccupancyGrid_" for "nav_msgs/msg/OccupancyGrid"."""
     package, kind, last = full_type(name).split("/")
     return f"{package}::{kind}::dds_::{last}_"
 
 
 def ros_type(dds_name: str) -> str | None:
-    """Gives "nav_msgs/msg/OccupancyGrid"; None for a type that is not of ROS."""
+    """Return "nav_msgs/msg/OccupancyGrid"; None for a type that is not of ROS."""
     match dds_name.split("::"):
         case [package, kind, "dds_", last] if last.endswith("_"):
             return f"{package}/{kind}/{last[:-1]}"
@@ -77,43 +77,43 @@ def ros_type(dds_name: str) -> str | None:
 
 
 def dds_topic(topic: str) -> str:
-    """Gives "rt/map" for "/map"."""
+    """Return "rt/map" for "/map"."""
     return f"{TOPIC}/{topic.lstrip('/')}"
 
 
 def request_topic(service: str) -> str:
-    """Gives "rq/robot/get_parametersRequest" for "/robot/get_parameters"."""
+    """Return "rq/robot/get_parametersRequest" for "/robot/get_parameters"."""
     return f"{REQUEST}/{service.lstrip('/')}Request"
 
 
 def reply_topic(service: str) -> str:
-    """Gives "rr/robot/get_parametersReply" for "/robot/get_parameters"."""
+    """Return "rr/robot/get_parametersReply" for "/robot/get_parameters"."""
     return f"{REPLY}/{service.lstrip('/')}Reply"
 
 
 def topic_of(dds_name: str) -> str | None:
-    """Gives "/map" for "rt/map"; None for what is no topic of ROS."""
+    """Return "/map" for "rt/map"; None for what is no topic of ROS."""
     return dds_name[len(TOPIC) :] if dds_name.startswith(f"{TOPIC}/") else None
 
 
 def service_of(dds_name: str) -> str | None:
-    """Gives the service whose answers come on a topic of DDS; None where none do."""
+    """Return the service whose answers come on a topic of DDS; None where none do."""
     is_reply = dds_name.startswith(f"{REPLY}/") and dds_name.endswith("Reply")
     return dds_name[len(REPLY) : -len("Reply")] if is_reply else None
 
 
 def is_hidden(name: str) -> bool:
-    """True for what `ros2 topic list` and `ros2 service list` leave out, as actions' parts."""
+    """Return True for what `ros2 topic list` leaves out, such as the parts of actions."""
     return any(part.startswith("_") for part in name.split("/"))
 
 
 def service_type_of(reply_type: str) -> str:
-    """Gives a service's type for that of its answers: "std_srvs/SetBool"."""
+    """Return a service's type for that of its answers: "std_srvs/SetBool"."""
     return bare_type(SERVICE_PART.sub("", reply_type))
 
 
 def action_type_of(part_type: str) -> str:
-    """Gives an action's type for that of one of its services: "nav2_msgs/NavigateToPose"."""
+    """Return an action's type for that of one of its services: "nav2_msgs/NavigateToPose"."""
     return bare_type(ACTION_PART.sub("", SERVICE_PART.sub("", part_type)))
 
 
@@ -131,17 +131,17 @@ class RawMessage(IdlStruct):
         self.data = data
 
     def serialize(self, *_arguments: object, **_options: object) -> bytes:
-        """Gives the bytes, which hold their own header."""
+        """Return the bytes, which hold their own header."""
         return self.data
 
     @classmethod
     def deserialize(cls, data: bytes, *_arguments: object, **_options: object) -> "RawMessage":
-        """Keeps the bytes."""
+        """Keep the bytes."""
         return cls(data)
 
     @classmethod
     def deserialize_key(cls, data: bytes, *_arguments: object, **_options: object) -> "RawMessage":
-        """Keeps the bytes, which only tell that a writer has gone."""
+        """Keep the bytes, which only tell that a writer has gone."""
         return cls(data)
 
 
@@ -205,7 +205,7 @@ class Inlet:
         self.take = take
 
     def collect(self) -> list[Any]:
-        """Takes what has come from DDS; nothing once closed."""
+        """Take what has come from DDS; nothing once closed."""
         if self._reader is None:
             return []
         try:
@@ -214,7 +214,7 @@ class Inlet:
             return []
 
     def understand(self, sample: Any) -> Sample | None:  # noqa: ANN401 - without types
-        """Decodes a sample; None for one that only tells that a writer has gone."""
+        """Decode a sample; None for one that only tells that a writer has gone."""
         if not isinstance(sample, RawMessage):
             return None
         info: Any = getattr(sample, "sample_info")  # noqa: B009 - set by the library, undeclared
@@ -225,7 +225,7 @@ class Inlet:
             return Sample(content=None, source_s=source_s, refusal=error)
 
     def close(self) -> None:
-        """Lets go of DDS's reader."""
+        """Let go of DDS's reader."""
         del self.condition
         self._reader = None
 
@@ -239,7 +239,7 @@ class EndpointInlet(Inlet):
     """A reader of DDS's own topic about all writers, or about all readers."""
 
     def understand(self, sample: Any) -> Sample | None:  # noqa: ANN401 - without types
-        """Gives the sample as it is."""
+        """Return the sample as it is."""
         return Sample(content=sample, source_s=0.0)
 
 
@@ -253,7 +253,7 @@ class Outlet:
         self._news = anyio.Event()
 
     def write(self, data: bytes) -> None:
-        """Sends the bytes of one message.
+        """Send the bytes of one message.
 
         Raises:
             LinkError: DDS does not take it.
@@ -268,13 +268,13 @@ class Outlet:
             ) from error
 
     def note_matched(self, n_matched: int) -> None:
-        """Takes in how many readers there are."""
+        """Take in how many readers there are."""
         self.n_matched = n_matched
         news, self._news = self._news, anyio.Event()
         news.set()
 
     async def wait_for_reader(self, *, timeout_s: float) -> bool:
-        """Returns once somebody reads, or the time is over; tells whether somebody does."""
+        """Return once somebody reads, or the time is over; tell whether somebody does."""
         with anyio.move_on_after(timeout_s):
             while not self.n_matched:
                 await self._news.wait()

@@ -56,7 +56,7 @@ class DdsActionClient:
         result.on_answer = self._take_result
 
     async def send_goal(self, action: str, arguments: Message, *, timeout_s: float) -> PursuedGoal:
-        """Sends a goal; what becomes of it comes later.
+        """Send a goal; what becomes of it comes later.
 
         Raises:
             LinkError: Nobody serves the action, or the goal does not fit.
@@ -71,11 +71,11 @@ class DdsActionClient:
         return goal
 
     def cancel_goal(self, goal_id: str) -> None:
-        """Asks for the end of a goal."""
+        """Ask for the end of a goal."""
         self._cancel.post(self._cancel.encode({"goal_info": {"goal_id": _uuid(goal_id)}}))
 
     def note_servers(self, keys: list[bytes]) -> None:
-        """Takes in who serves the action now; goals are lost with the one that took them."""
+        """Take in who serves the action now; goals are lost with the one that took them."""
         if self._server not in keys:
             self._lose_goals()
             # A server that was started again knows nothing of the goals of the one before.
@@ -90,7 +90,7 @@ class DdsActionClient:
             goal.take_loss()
 
     def take_statuses(self, message: Message) -> None:
-        """Takes in the states of all goals, ours and others'."""
+        """Take in the states of all goals, ours and others'."""
         self._statuses = {
             each["goal_info"]["goal_id"]["uuid"].hex(): int(each["status"])
             for each in message["status_list"]
@@ -102,7 +102,7 @@ class DdsActionClient:
         self._tell_named()
 
     def take_feedback(self, message: Message) -> None:
-        """Takes in what is said of a goal under way."""
+        """Take in what is said of a goal under way."""
         goal_id = message["goal_id"]["uuid"].hex()
         if goal_id in self._goals:
             self._accept(goal_id)
@@ -155,7 +155,7 @@ class DdsActionClient:
             self._match_results()
 
     def _match_results(self) -> None:
-        """Ends each goal whose state by its id is final with a result that says the same."""
+        """End each goal whose state by its id is final with a result that says the same."""
         for goal_id in list(self._goals):
             status = self._statuses.get(goal_id)
             fitting = [each for each in self._results if each["status"] == status]

@@ -30,7 +30,7 @@ class DdsGraph(ABC):
 
     @abstractmethod
     async def wait_until_connected(self) -> None:
-        """Returns at once, or when somebody is there again."""
+        """Return at once, or when somebody is there again."""
 
     @abstractmethod
     async def call_service(
@@ -41,14 +41,14 @@ class DdsGraph(ABC):
         type_name: str | None = None,
         timeout_s: float | None = None,
     ) -> dict[str, Any]:
-        """Gives what a service answers."""
+        """Return what a service answers."""
 
     @abstractmethod
     async def ask(self, service: str, arguments: Mapping[str, Any], *, timeout_s: float) -> Sample:
-        """Gives what a service answers, and when it did."""
+        """Return what a service answers, and when it did."""
 
     async def learn(self, endpoint: Endpoint, *wanted: str) -> None:
-        """Makes types known: does nothing where they are, else asks the node behind an endpoint.
+        """Make types known: does nothing where they are, else asks the node behind an endpoint.
 
         Nodes find a type by its hash, and DDS tells no hash by which they find that of a service.
 
@@ -62,7 +62,7 @@ class DdsGraph(ABC):
             await self.ask_type(endpoint)
 
     async def ask_type(self, endpoint: Endpoint) -> None:
-        """Asks the node behind a reader or writer of a topic for its type.
+        """Ask the node behind a reader or writer of a topic for its type.
 
         Raises:
             LinkError: It does not tell.
@@ -81,7 +81,7 @@ class DdsGraph(ABC):
     # --- the questions of the port
 
     async def fetch_graph(self) -> RosGraph:
-        """Gives the topics and actions there are."""
+        """Return the topics and actions there are."""
         await self.wait_until_connected()
         return RosGraph(
             dialect=Dialect.ROS2,
@@ -91,11 +91,11 @@ class DdsGraph(ABC):
         )
 
     async def fetch_topics(self) -> Mapping[str, str]:
-        """Gives the type of each topic."""
+        """Return the type of each topic."""
         return (await self.fetch_graph()).types
 
     async def fetch_time_s(self) -> float | None:
-        """Gives robot time: when some node answered a question that costs it nothing."""
+        """Return robot time: when some node answered a question that costs it nothing."""
         servers = sorted(
             service for service in self.discovery.services if service.endswith(ASKED_FOR_TIME)
         )
@@ -107,44 +107,44 @@ class DdsGraph(ABC):
             return None
 
     async def fetch_nodes(self) -> tuple[str, ...]:
-        """Gives the full names of all nodes."""
+        """Return the full names of all nodes."""
         return tuple(sorted(self.discovery.nodes))
 
     async def fetch_node(self, node: str) -> NodeLinks:
-        """Gives what a node publishes, subscribes to and serves."""
+        """Return what a node publishes, subscribes to and serves."""
         keys = self.discovery.nodes.get(node)
         if keys is None:
             raise _unknown(node)
         return self.discovery.links_of(keys)
 
     async def fetch_publishers(self, topic: str) -> tuple[str, ...]:
-        """Gives the nodes that publish on a topic."""
+        """Return the nodes that publish on a topic."""
         return self.discovery.publishers(topic)
 
     async def fetch_subscribers(self, topic: str) -> tuple[str, ...]:
-        """Gives the nodes that listen to a topic."""
+        """Return the nodes that listen to a topic."""
         return self.discovery.subscribers(topic)
 
     async def fetch_services(self) -> tuple[str, ...]:
-        """Gives the full names of all services but the parts of actions."""
+        """Return the full names of all services but the parts of actions."""
         return tuple(sorted(name for name in self.discovery.services if not is_hidden(name)))
 
     async def fetch_service_type(self, service: str) -> str:
-        """Gives a service's type."""
+        """Return a service's type."""
         found = self.discovery.service_type(service)
         if found is None:
             raise _unknown(service)
         return found
 
     async def fetch_action_type(self, action: str) -> str:
-        """Gives an action's type."""
+        """Return an action's type."""
         found = self.discovery.actions.get(action)
         if found is None:
             raise _unknown(action)
         return found
 
     async def fetch_definitions(self, type_name: str) -> Mapping[str, str]:
-        """Gives the .msg texts of a type and of all within: ours, or those that a node tells."""
+        """Return the .msg texts of a type and of all within: ours, or those that a node tells."""
         known = self.types.definitions(type_name)
         if known:
             return known
@@ -156,16 +156,16 @@ class DdsGraph(ABC):
         return self.types.definitions(type_name)
 
     async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
-        """Gives the names of a node's parameters."""
+        """Return the names of a node's parameters."""
         return await self._parameters.fetch_names(node)
 
     async def fetch_parameter(self, node: str, name: str) -> Any:  # noqa: ANN401 - any value
-        """Gives the value of a node's parameter; None where it is not set."""
+        """Return the value of a node's parameter; None where it is not set."""
         value = await self._parameters.fetch(node, name)
         return value.tolist() if isinstance(value, np.ndarray) else value
 
     async def set_parameter(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401
-        """Sets a node's parameter."""
+        """Set a node's parameter."""
         await self._parameters.put(node, name, value)
 
 

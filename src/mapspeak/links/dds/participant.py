@@ -81,7 +81,7 @@ class DdsParticipant:
         return bytes(self._participant.guid.bytes[:12])
 
     def watch_endpoints(self, take_writer: Take, take_reader: Take) -> None:
-        """Tells of every reader and writer in the domain, those that are there and that come."""
+        """Tell of every reader and writer in the domain, those that are there and that come."""
         for topic, take in (
             (BuiltinTopicDcpsPublication, take_writer),
             (BuiltinTopicDcpsSubscription, take_reader),
@@ -92,7 +92,7 @@ class DdsParticipant:
     def read(
         self, topic: str, type_name: str, *, quality: Quality, decode: Decode, take: Take
     ) -> Inlet:
-        """Begins to read a topic.
+        """Begin to read a topic.
 
         Args:
             topic: As DDS names it, such as rt/map.
@@ -113,7 +113,7 @@ class DdsParticipant:
             raise _unusable(topic, type_name, error) from error
 
     def write_to(self, topic: str, type_name: str, *, quality: Quality) -> Outlet:
-        """Begins to write on a topic; see `read`.
+        """Begin to write on a topic; see `read`.
 
         Raises:
             LinkError: The topic is in use with another type.
@@ -131,7 +131,7 @@ class DdsParticipant:
         return outlet
 
     def end_reading(self, inlet: Inlet) -> None:
-        """Reads a topic no longer."""
+        """Read a topic no longer."""
         with self._lock:
             if inlet in self._inlets:
                 self._inlets.remove(inlet)
@@ -139,7 +139,7 @@ class DdsParticipant:
                 inlet.close()
 
     def end_writing(self, outlet: Outlet) -> None:
-        """Writes on a topic no longer."""
+        """Write on a topic no longer."""
         with self._lock:
             if outlet in self._outlets and outlet.writer is not None:
                 self._outlets.remove(outlet)
@@ -147,20 +147,20 @@ class DdsParticipant:
                 outlet.writer = None
 
     async def flush(self, *, timeout_s: float) -> None:
-        """Returns when all that was written has arrived, or the time is over."""
+        """Return when all that was written has arrived, or the time is over."""
         limit_ns = int(timeout_s * 1e9)
         with suppress(DDSException):
             await to_thread.run_sync(self._publisher.wait_for_acks, limit_ns)
 
     async def run(self) -> None:
-        """Listens until `close` is called, and leaves the domain then."""
+        """Listen until `close` is called, and leave the domain then."""
         try:
             await to_thread.run_sync(self._listen, limiter=anyio.CapacityLimiter(1))
         finally:
             self._leave()
 
     def close(self) -> None:
-        """Ends the listening, and with it `run`."""
+        """End the listening, and with it `run`."""
         self._is_closing = True
         with suppress(DDSException):
             self._closing.set(True)

@@ -42,7 +42,7 @@ class _Call:
         self.is_answered = anyio.Event()
 
     def take(self, sample: Sample) -> None:
-        """Takes an answer, which belongs to an earlier call while such are open."""
+        """Take an answer, which belongs to an earlier call while such are open."""
         if self.n_before:
             self.n_before -= 1
             self.held = sample
@@ -96,7 +96,7 @@ class ServiceClient:
         )
 
     async def call(self, request: bytes, *, timeout_s: float) -> Sample:
-        """Gives what the service answers to a request that `encode` gave.
+        """Return what the service answers to a request that `encode` gave.
 
         Raises:
             LinkError: It does not answer in time.
@@ -109,7 +109,7 @@ class ServiceClient:
         raise self._silence(timeout_s)
 
     async def wait_for_server(self, *, timeout_s: float) -> None:
-        """Returns when somebody reads our requests.
+        """Return when somebody reads our requests.
 
         Raises:
             LinkError: Nobody does, within that time.
@@ -126,7 +126,7 @@ class ServiceClient:
         return self._framing is Framing.NUMBERED
 
     def note_server(self, framing: Framing | None) -> None:
-        """Takes in who serves now, or that nobody does, whose answers will never come."""
+        """Take in who serves now, or that nobody does, whose answers will never come."""
         if framing is None:
             self._n_open = 0
         else:
@@ -152,7 +152,7 @@ class ServiceClient:
         return self._number
 
     def close(self) -> None:
-        """Lets go of both topics."""
+        """Let go of both topics."""
         self._participant.end_reading(self._inlet)
         self._participant.end_writing(self._outlet)
 
@@ -188,7 +188,7 @@ class ServiceClient:
     # --- answers
 
     def _understand(self, data: bytes) -> tuple[int | None, Answer]:
-        """Gives the number of the request, None for others' and 0 where unknown, and the answer."""
+        """Return number of the request, None for others' and 0 where unknown, and the answer."""
         if self._framing is Framing.BARE:
             return 0, self._decode(self.name.reply_type, data)
         asker, number = NUMBER.unpack_from(data.ljust(HEADER_BYTES + NUMBER.size), HEADER_BYTES)

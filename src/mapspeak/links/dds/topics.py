@@ -96,17 +96,17 @@ class DdsTopics(NativeTopics[_Request]):
     def request(
         self, subscription: TopicSubscription, *, is_bulky: bool, throttle_s: float
     ) -> _Request:
-        """Gives a request that nothing has been done for yet."""
+        """Return a request that nothing has been done for yet."""
         return _Request(subscription, is_bulky, throttle_s)
 
     def note_change(self, dds_name: str) -> None:
-        """Takes in that others have begun or ended to read or write a topic."""
+        """Take in that others have begun or ended to read or write a topic."""
         for request in self.requests.values():
             if dds_topic(request.subscription.topic) == dds_name:
                 self.arrange(request)
 
     def arrange(self, request: _Request) -> None:
-        """Reads a topic in the best quality that all of its writers offer.
+        """Read a topic in the best quality that all of its writers offer.
 
         It is read anew when somebody new writes: Fast DDS serves at once a reader that comes after
         its writer, and may take three seconds to serve one that was there before.
@@ -137,7 +137,7 @@ class DdsTopics(NativeTopics[_Request]):
         )
 
     def _learn(self, request: _Request, writer: Endpoint) -> None:
-        """Asks once for a type that we do not know, or know in another version."""
+        """Ask once for a type that we do not know, or know in another version."""
         if not request.has_learned:
             request.has_learned = True
             self._start_soon(partial(self._learn_and_arrange, request, writer))
@@ -153,7 +153,7 @@ class DdsTopics(NativeTopics[_Request]):
             self.renew(topic)
 
     def end(self, request: _Request) -> None:
-        """Reads a topic no longer."""
+        """Read a topic no longer."""
         if request.inlet is not None:
             self._participant.end_reading(request.inlet)
         request.inlet = request.quality = None
@@ -177,7 +177,7 @@ class DdsTopics(NativeTopics[_Request]):
         return bool(self._advertised)
 
     def advertise(self, topic: str, *, type_name: str) -> None:
-        """Says that we will publish.
+        """Say that we will publish.
 
         Raises:
             LinkError: The name or the type is none, or the topic has another type.
@@ -196,13 +196,13 @@ class DdsTopics(NativeTopics[_Request]):
         self._advertised[topic] = _Advertised(full, outlet)
 
     def unadvertise(self, topic: str) -> None:
-        """Takes back what `advertise` said."""
+        """Take back what `advertise` said."""
         known = self._advertised.pop(topic, None)
         if known is not None:
             self._participant.end_writing(known.outlet)
 
     async def publish(self, topic: str, message: Message) -> None:
-        """Publishes, once those who are known to listen are connected.
+        """Publish, once those who are known to listen are connected.
 
         Raises:
             LinkError: The topic was not advertised, or the message does not fit its type.
@@ -217,7 +217,7 @@ class DdsTopics(NativeTopics[_Request]):
         known.outlet.write(data)
 
     def publish_at_once(self, topic: str, message: Message) -> None:
-        """Publishes to those who are connected already.
+        """Publish to those who are connected already.
 
         Raises:
             LinkError: The topic was not advertised, or the message does not fit its type.
@@ -232,7 +232,7 @@ class DdsTopics(NativeTopics[_Request]):
         return known
 
     def check(self, topic: str, type_name: str | None) -> None:
-        """Raises `LinkError` where a name or a type is none, or does not go with the other."""
+        """Raise `LinkError` where a name or a type is none, or do not go with the other."""
         check_name(topic)
         if type_name is None:
             return

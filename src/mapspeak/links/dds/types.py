@@ -49,7 +49,7 @@ _ROS_NAME = re.compile(r"[A-Za-z]\w*(?:/(?:msg|srv|action))?/[A-Za-z]\w*")
 
 
 def build_type_book(distro: str = "") -> TypeBook:
-    """Gives the types that come with mapspeak, and those that DDS needs.
+    """Return the types that come with mapspeak, and those that DDS needs.
 
     Args:
         distro: See `known_definitions`.
@@ -61,7 +61,7 @@ def build_type_book(distro: str = "") -> TypeBook:
 
 
 def action_parts(action_type: str) -> dict[str, str]:
-    """Gives the texts of what ROS 2 makes of an action, by name."""
+    """Return the texts of what ROS 2 makes of an action, by name."""
     bare = bare_type(action_type)
     return {
         f"{bare}_{part}": text.replace("{action}", bare) for part, text in _ACTION_PARTS.items()
@@ -69,7 +69,7 @@ def action_parts(action_type: str) -> dict[str, str]:
 
 
 def read_type_description(answer: Message) -> dict[str, str]:
-    """Gives the texts of all types in an answer of type_description_interfaces/GetTypeDescription.
+    """Return the texts of all types in an answer of type_description_interfaces/GetTypeDescription.
 
     Raises:
         LinkError: The node does not describe the type.
@@ -121,7 +121,7 @@ class Types:
         self._codec = Codec(self._book)
 
     def encode(self, type_name: str, message: Mapping[str, Any]) -> bytes:
-        """Gives the bytes of a message.
+        """Return the bytes of a message.
 
         Raises:
             LinkError: It does not fit its type, or we do not know the type as the robot has it.
@@ -131,7 +131,7 @@ class Types:
         return self._codec.encode(type_name, message)
 
     def decode(self, type_name: str, data: bytes) -> dict[str, Any]:
-        """Gives the message in some bytes.
+        """Return the message in some bytes.
 
         Raises:
             LinkError: It is none of that type, or nobody knows the type.
@@ -139,7 +139,7 @@ class Types:
         return self._codec.decode(type_name, data)
 
     def knows(self, type_name: str) -> bool:
-        """True for a type as the robot has it, whose fields, and those of all within, are known."""
+        """Return True for a type whose fields, and those of all types within, are known."""
         return (
             self._book.knows(type_name)
             and not self._book.missing(type_name)
@@ -147,7 +147,7 @@ class Types:
         )
 
     def refusal(self, type_name: str) -> LinkError:
-        """Gives the error for a type that is not known as the robot has it."""
+        """Return the error for a type that is not known as the robot has it."""
         if self._is_other_version(type_name):
             return LinkError(
                 f"The robot's {type_name} has other fields than those that mapspeak knows (of ROS "
@@ -166,13 +166,13 @@ class Types:
         return bare_type(type_name) in self._other_versions
 
     def take_humble(self) -> None:
-        """Takes in that the robot runs Humble, whose nodes tell no hashes."""
+        """Take in that the robot runs Humble, whose nodes tell no hashes."""
         if self._distro != HUMBLE:
             self._distro = HUMBLE
             self._use(_book_of(HUMBLE))
 
     def take_hash(self, type_name: str, type_hash: str) -> None:
-        """Takes in the hash of a type on the robot: of the versions we know, the one that has it.
+        """Take in the hash of a type on the robot: of the versions we know, the one that has it.
 
         Args:
             type_name: Of a message, or of a part of a service or an action.
@@ -197,7 +197,7 @@ class Types:
         yield from map(_book_of, DISTROS)
 
     def take_description(self, answer: Message) -> None:
-        """Takes in what a node says of a type.
+        """Take in what a node says of a type.
 
         Raises:
             LinkError: It does not describe it.
@@ -207,7 +207,7 @@ class Types:
         self._use(TypeBook({**self._book.texts, **texts}))
 
     def definitions(self, type_name: str) -> dict[str, str]:
-        """Gives the texts of a type and of all within; see `RosConnection.fetch_definitions`."""
+        """Return the texts of a type and of all within; see `RosConnection.fetch_definitions`."""
         candidates = ((bare_type(type_name),), *name_parts(type_name))
         found = next((names for names in candidates if all(map(self._book.knows, names))), ())
         within = [name for each in found for name in self._book.within(each)]

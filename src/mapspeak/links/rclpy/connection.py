@@ -77,22 +77,22 @@ class Ros2Connection(RclpyGraph, NativeConnection):
         return self._topics
 
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
-        """Runs something in the background until the connection is closed."""
+        """Run something in the background until the connection is closed."""
         self._tasks.start_soon(work)
 
     async def start(self) -> None:
-        """Returns when those who are there have been found; also when nobody is."""
+        """Return when those who are there have been found; also when nobody is."""
         self._tasks.start_soon(self._watch)
         if await wait_until(self._sees_others, within_s=FIRST_SIGN_S):
             with anyio.move_on_after(LONGEST_LOOK_S):
                 await wait_until_quiet(self)
 
     async def aclose(self) -> None:
-        """Waits a moment until what was published last has arrived."""
+        """Wait a moment until what was published last has arrived."""
         await self._topics.flush()
 
     async def wait_until_connected(self) -> None:
-        """Returns at once, or when the first node of others is found.
+        """Return at once, or when the first node of others is found.
 
         Raises:
             LinkError: None is, within the usual time for an answer.
@@ -110,18 +110,18 @@ class Ros2Connection(RclpyGraph, NativeConnection):
         type_name: str | None = None,
         timeout_s: float | None = None,
     ) -> dict[str, Any]:
-        """Gives what a service answers."""
+        """Return what a service answers."""
         limit_s = ANSWER_S if timeout_s is None else timeout_s
         return await self._services.call(
             service, arguments or {}, type_name=type_name, timeout_s=limit_s
         )
 
     async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> PursuedGoal:
-        """Sends a goal to an action and gives what becomes of it, as it becomes."""
+        """Send a goal to an action and return what becomes of it, as it becomes."""
         return await self._goals.send(action, arguments, type_name=type_name)
 
     def cancel_goal(self, goal: ActionGoal) -> None:
-        """Asks for the end of a goal; its `end` tells whether that worked."""
+        """Ask for the end of a goal; its `end` tells whether that worked."""
         self._goals.cancel(goal)
 
     # --- who is there
@@ -135,7 +135,10 @@ class Ros2Connection(RclpyGraph, NativeConnection):
             await anyio.sleep(WATCH_S)
 
     def _sees_others(self) -> bool:
-        """True once somebody has been there; who goes later is found out by what stays silent."""
+        """Return True once somebody has been there.
+
+        Who goes later is found out by what stays silent.
+        """
         if self._found_s is None and self.nodes():
             self._found_s = anyio.current_time()
         return self._found_s is not None
@@ -145,20 +148,20 @@ class RclpyContext(Protocol):
     """What can be asked of a system that is still being found."""
 
     def nodes(self) -> tuple[str, ...]:
-        """Gives the full names of all nodes that are known now."""
+        """Return the full names of all nodes that are known now."""
         ...
 
     async def fetch_node(self, node: str) -> NodeLinks:
-        """Gives what a node does."""
+        """Return what a node does."""
         ...
 
     async def fetch_graph(self) -> RosGraph:
-        """Gives the topics and actions there are."""
+        """Return the topics and actions there are."""
         ...
 
 
 async def wait_until_quiet(system: RclpyContext) -> None:
-    """Returns when nothing new comes, and no node is a mere name: what it does comes later."""
+    """Return when nothing new comes, and no node is a mere name: what it does comes later."""
     graph, before = await system.fetch_graph(), None
     while graph != before or not await _shows_all_nodes(system):
         await anyio.sleep(QUIET_S)
@@ -180,7 +183,7 @@ async def _shows_all_nodes(system: RclpyContext) -> bool:
 async def open_connection(
     *, domain_id: int | None = None, distro: str = "", variables: Mapping[str, str]
 ) -> AsyncGenerator[Ros2Connection]:
-    """Keeps a node of ours in a domain while the context lasts.
+    """Keep a node of ours in a domain while the context lasts.
 
     Args:
         domain_id: As in ROS_DOMAIN_ID; None takes what that says.

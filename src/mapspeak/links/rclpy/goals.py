@@ -78,7 +78,7 @@ class Goals:
         self._pursuits: dict[str, _Pursuit] = {}
 
     async def send(self, action: str, arguments: Message, *, type_name: str) -> PursuedGoal:
-        """Sends a goal; what becomes of it comes later.
+        """Send a goal; what becomes of it comes later.
 
         Raises:
             LinkError: Nobody serves the action, it has another type, or the goal does not fit.
@@ -96,13 +96,13 @@ class Goals:
         return goal
 
     def cancel(self, goal: ActionGoal) -> None:
-        """Asks for the end of a goal that the server has taken."""
+        """Ask for the end of a goal that the server has taken."""
         pursuit = self._pursuits.get(goal.goal_id)
         if pursuit is not None and pursuit.goal.is_accepted:
             self._start_soon(partial(self._ask_to_cancel, pursuit.goal))
 
     def refresh(self) -> None:
-        """Takes in that servers have gone: nobody will tell how their goals end."""
+        """Take in that servers have gone: nobody will tell how their goals end."""
         for pursuit in list(self._pursuits.values()):
             if self._is_served(pursuit):
                 continue
@@ -123,7 +123,7 @@ class Goals:
         return frozenset(bytes(each.endpoint_gid) for each in infos)
 
     async def _open(self, action: str, type_name: str) -> _Action:
-        """Gives an action that somebody serves, and listens to its feedback from now on."""
+        """Return an action that somebody serves, and listen to its feedback from now on."""
         action_class = find_action(type_name)
         known = self._actions.get(action)
         if known is not None and known.action_class is not action_class:
@@ -156,7 +156,7 @@ class Goals:
                 raise wrong_type(action, found.removesuffix("_SendGoal"), type_name)
 
     async def _pursue(self, pursuit: _Pursuit, used: _Action, request: Any) -> None:  # noqa: ANN401
-        """Waits for the server's answers, which may be none at all."""
+        """Wait for the server's answers, which may be none at all."""
         goal = pursuit.goal
         with pursuit.scope:
             try:
@@ -198,7 +198,7 @@ class Goals:
             return
 
     def _take_feedback(self, message: Any) -> None:  # noqa: ANN401 - rclpy has no types
-        """Takes what is said of any goal of the action, in the thread of rclpy."""
+        """Take what is said of any goal of the action, in the thread of rclpy."""
         goal_id = bytes(message.goal_id.uuid).hex()
         if goal_id in self._pursuits:
             feedback = read_message(message.feedback)
@@ -212,7 +212,7 @@ class Goals:
 
 
 def part_of(action: str, name: str) -> str:
-    """Gives the full name of one of the services and topics that an action consists of."""
+    """Return the full name of one of the services and topics that an action consists of."""
     return f"{action}/_action/{name}"
 
 

@@ -43,10 +43,10 @@ class RclpyGraph(ABC):
         type_name: str | None = None,
         timeout_s: float | None = None,
     ) -> dict[str, Any]:
-        """Gives what a service answers."""
+        """Return what a service answers."""
 
     async def fetch_graph(self) -> RosGraph:
-        """Gives the topics and actions there are."""
+        """Return the topics and actions there are."""
         node = self._participant.node
         return RosGraph(
             dialect=Dialect.ROS2,
@@ -60,19 +60,19 @@ class RclpyGraph(ABC):
         )
 
     async def fetch_topics(self) -> Mapping[str, str]:
-        """Gives the type of each topic."""
+        """Return the type of each topic."""
         return (await self.fetch_graph()).types
 
     async def fetch_time_s(self) -> float | None:
-        """Gives the time of this machine: the machines of a ROS 2 system have the same."""
+        """Return the time of this machine: the machines of a ROS 2 system have the same."""
         return float(self._participant.node.get_clock().now().nanoseconds) / NANOSECONDS
 
     async def fetch_nodes(self) -> tuple[str, ...]:
-        """Gives the full names of all nodes but ours."""
+        """Return the full names of all nodes but ours."""
         return self.nodes()
 
     def nodes(self) -> tuple[str, ...]:
-        """Gives the full names of all nodes but ours, as they are known now."""
+        """Return the full names of all nodes but ours, as they are known now."""
         found = self._participant.node.get_node_names_and_namespaces()
         names = {
             f"{namespace.rstrip('/')}/{name}"
@@ -82,7 +82,7 @@ class RclpyGraph(ABC):
         return tuple(sorted(names))
 
     async def fetch_node(self, node: str) -> NodeLinks:
-        """Gives what a node publishes, subscribes to and serves."""
+        """Return what a node publishes, subscribes to and serves."""
         namespace, _, name = node.rpartition("/")
         ours = self._participant.node
         if node not in self.nodes():
@@ -101,54 +101,54 @@ class RclpyGraph(ABC):
         )
 
     async def fetch_publishers(self, topic: str) -> tuple[str, ...]:
-        """Gives the nodes that publish on a topic."""
+        """Return the nodes that publish on a topic."""
         check_name(topic)
         return self._nodes_of(self._participant.node.get_publishers_info_by_topic(topic))
 
     async def fetch_subscribers(self, topic: str) -> tuple[str, ...]:
-        """Gives the nodes that listen to a topic."""
+        """Return the nodes that listen to a topic."""
         check_name(topic)
         return self._nodes_of(self._participant.node.get_subscriptions_info_by_topic(topic))
 
     async def fetch_services(self) -> tuple[str, ...]:
-        """Gives the full names of all services but the parts of actions."""
+        """Return the full names of all services but the parts of actions."""
         return tuple(sorted(name for name in self._service_types() if not _is_hidden(name)))
 
     async def fetch_service_type(self, service: str) -> str:
-        """Gives a service's type."""
+        """Return a service's type."""
         found = self._service_types().get(service)
         if found is None:
             raise _unknown(service)
         return bare_type(found)
 
     async def fetch_action_type(self, action: str) -> str:
-        """Gives an action's type."""
+        """Return an action's type."""
         found = self._action_types().get(action)
         if found is None:
             raise _unknown(action)
         return bare_type(found)
 
     async def fetch_definitions(self, type_name: str) -> Mapping[str, str]:
-        """Gives the .msg texts of a type and of all within, as this machine's ROS has them."""
+        """Return the .msg texts of a type and of all within, as this machine's ROS has them."""
         return find_definitions(type_name)
 
     async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
-        """Gives the names of a node's parameters."""
+        """Return the names of a node's parameters."""
         return await self._parameters.fetch_names(node)
 
     async def fetch_parameter(self, node: str, name: str) -> Any:  # noqa: ANN401 - any value
-        """Gives the value of a node's parameter; None where it is not set."""
+        """Return the value of a node's parameter; None where it is not set."""
         value = await self._parameters.fetch(node, name)
         if isinstance(value, bytes):
             return list(value)
         return value.tolist() if isinstance(value, np.ndarray) else value
 
     async def set_parameter(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401
-        """Sets a node's parameter."""
+        """Set a node's parameter."""
         await self._parameters.put(node, name, value)
 
     def _service_types(self) -> dict[str, str]:
-        """Gives the types of what somebody serves: a mere client shows as a service too."""
+        """Return the types of what somebody serves: a mere client shows as a service too."""
         node, ours = self._participant.node, f"/{self._participant.name}/"
         return {
             service: types[0]

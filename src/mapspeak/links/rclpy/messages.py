@@ -23,7 +23,7 @@ Reader = Callable[[Any], Any]
 
 
 def read_message(message: Any) -> dict[str, Any]:  # noqa: ANN401 - rclpy has no types
-    """Gives a message as rosbridge does: uint8[] as bytes, other numbers as numpy arrays."""
+    """Return a message as rosbridge does: uint8[] as bytes, other numbers as numpy arrays."""
     return {
         name: getattr(message, name) if read is None else read(getattr(message, name))
         for name, read in _readers_of(message.__class__)

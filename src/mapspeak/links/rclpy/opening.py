@@ -27,7 +27,7 @@ async def open_ros2_connection(
     distro: str = "",
     variables: Mapping[str, str] = NO_VARIABLES,
 ) -> AsyncGenerator[RosConnection]:
-    """Keeps a node of ours in a ROS 2 domain while the context lasts.
+    """Keep a node of ours in a ROS 2 domain while the context lasts.
 
     Args:
         domain_id: As in ROS_DOMAIN_ID; None takes what that says.
@@ -58,7 +58,7 @@ async def open_ros2_robot(
     overrides: RobotOverrides = NOTHING_SAID,
     patience: DrivingPatience = USUAL_PATIENCE,
 ) -> AsyncGenerator[RosRobot]:
-    """Offers the robot in a ROS 2 domain while the context lasts.
+    """Offer the robot in a ROS 2 domain while the context lasts.
 
     Leaving the context does not stop the robot: call `stop` before, where that is wanted.
 

@@ -64,7 +64,7 @@ class RclpyParticipant:
         return f"ROS domain {self._context.get_domain_id()}, {middleware}"
 
     async def start(self) -> None:
-        """Enters the domain.
+        """Enter the domain.
 
         Raises:
             LinkError: ROS cannot be started.
@@ -77,12 +77,12 @@ class RclpyParticipant:
         self._thread.start()
 
     async def aclose(self) -> None:
-        """Leaves the domain; neither the thread nor the node is left."""
+        """Leave the domain; neither the thread nor the node is left."""
         if self.node is not None:
             await anyio.to_thread.run_sync(self._leave)
 
     def hand_over(self, work: Callable[..., None], *arguments: Any) -> None:  # noqa: ANN401
-        """Lets the event loop do something, and waits until it has.
+        """Let the event loop do something, and wait until it has.
 
         That one waits keeps a fast robot from filling our memory: what comes meanwhile is left to
         ROS, which keeps the newest few messages of each topic.
@@ -98,7 +98,7 @@ class RclpyParticipant:
                 raise
 
     async def wait_for(self, future: Any) -> Any:  # noqa: ANN401 - rclpy has no types
-        """Gives the result of one of rclpy's futures.
+        """Return the result of one of rclpy's futures.
 
         Raises:
             LinkError: It ended with an error.
@@ -147,7 +147,7 @@ class RclpyParticipant:
 
 
 async def wait_until(is_so: Callable[[], bool], *, within_s: float) -> bool:
-    """Returns whether something is so, as soon as it is, and at last after so long."""
+    """Return whether something is so, as soon as it is, and at last after so long."""
     with anyio.move_on_after(within_s):
         while not is_so():  # noqa: ASYNC110 - rclpy has no event for it
             await anyio.sleep(LOOK_S)
@@ -156,7 +156,7 @@ async def wait_until(is_so: Callable[[], bool], *, within_s: float) -> bool:
 
 @contextmanager
 def errors_of_ros(what: str) -> Iterator[None]:
-    """Turns what rclpy raises into a `LinkError`.
+    """Turn what rclpy raises into a `LinkError`.
 
     Args:
         what: Failed.

@@ -37,7 +37,7 @@ class RclpyServices:
         type_name: str | None,
         timeout_s: float,
     ) -> dict[str, Any]:
-        """Gives what a service answers.
+        """Return what a service answers.
 
         Raises:
             LinkError: Nobody serves it, it has another type, the request does not fit, or there is
@@ -58,7 +58,7 @@ class RclpyServices:
         )
 
     async def connect(self, service: str, service_class: Any, *, within_s: float) -> Client:  # noqa: ANN401
-        """Gives a client whose service somebody serves.
+        """Return a client whose service somebody serves.
 
         Raises:
             LinkError: Nobody does.
@@ -73,7 +73,7 @@ class RclpyServices:
         return client
 
     async def ask(self, client: Client, request: Any) -> Any:  # noqa: ANN401 - rclpy has no types
-        """Gives the answer to a request, both as messages of rclpy; waits as long as it takes."""
+        """Return the answer to a request, both as messages of rclpy; wait as long as it takes."""
         with errors_of_ros("The request cannot be sent"):
             future = client.call_async(request)
         try:
@@ -92,7 +92,7 @@ class RclpyServices:
 
 
 def nobody_serves(name: str) -> LinkError:
-    """Gives the error for a service or an action that is not there."""
+    """Return the error for a service or an action that is not there."""
     return LinkError(
         f"Nobody serves {name[:80]}.",
         hint="Ask for the list of what there is; the node that offers it may have ended.",

@@ -79,18 +79,18 @@ class RclpyTopics(NativeTopics[_Request]):
     def request(
         self, subscription: TopicSubscription, *, is_bulky: bool, throttle_s: float
     ) -> _Request:
-        """Gives a request that nothing has been done for yet."""
+        """Return a request that nothing has been done for yet."""
         return _Request(subscription, is_bulky, throttle_s)
 
     def refresh(self) -> None:
-        """Takes in that others have begun or ended to write topics that we read."""
+        """Take in that others have begun or ended to write topics that we read."""
         for request in list(self.requests.values()):
             # What cannot be read stays silent; who waits for it is told so.
             with suppress(LinkError):
                 self.arrange(request)
 
     def arrange(self, request: _Request) -> None:
-        """Reads a topic in the best quality that all of its writers offer."""
+        """Read a topic in the best quality that all of its writers offer."""
         topic = request.subscription.topic
         node = self._participant.node
         writers = node.get_publishers_info_by_topic(topic)
@@ -115,14 +115,14 @@ class RclpyTopics(NativeTopics[_Request]):
         request.quality = quality
 
     def end(self, request: _Request) -> None:
-        """Reads a topic no longer."""
+        """Read a topic no longer."""
         if request.reader is not None:
             self._participant.node.destroy_subscription(request.reader)
         request.reader = request.quality = None
         request.n_readers += 1
 
     def _take(self, request: _Request, number: int, message: Any) -> None:  # noqa: ANN401 - rclpy has no types
-        """Takes a message, in the thread of rclpy, and reads it there."""
+        """Take a message, in the thread of rclpy, and read it there."""
         now_s = time.monotonic()
         if now_s - request.taken_s < request.throttle_s:
             return
@@ -136,7 +136,7 @@ class RclpyTopics(NativeTopics[_Request]):
     # --- writing
 
     def advertise(self, topic: str, *, type_name: str) -> None:
-        """Says that we will publish.
+        """Say that we will publish.
 
         Raises:
             LinkError: The name or the type is none, or the topic has another type.
@@ -160,13 +160,13 @@ class RclpyTopics(NativeTopics[_Request]):
         self._advertised[topic] = _Advertised(message_class, publisher, anyio.current_time())
 
     def unadvertise(self, topic: str) -> None:
-        """Takes back what `advertise` said."""
+        """Take back what `advertise` said."""
         known = self._advertised.pop(topic, None)
         if known is not None:
             self._participant.node.destroy_publisher(known.publisher)
 
     async def publish(self, topic: str, values: Message) -> None:
-        """Publishes, once those who are known to listen are connected.
+        """Publish, once those who are known to listen are connected.
 
         Raises:
             LinkError: The topic was not advertised, or the message does not fit its type.
@@ -180,7 +180,7 @@ class RclpyTopics(NativeTopics[_Request]):
         self._write(topic, known, message)
 
     def publish_at_once(self, topic: str, values: Message) -> None:
-        """Publishes to those who are connected already.
+        """Publish to those who are connected already.
 
         Raises:
             LinkError: The topic was not advertised, or the message does not fit its type.
@@ -189,7 +189,7 @@ class RclpyTopics(NativeTopics[_Request]):
         self._write(topic, known, write_message(known.message_class, values))
 
     async def flush(self) -> None:
-        """Returns when all that was published has arrived, or after a short while."""
+        """Return when all that was published has arrived, or after a short while."""
         publishers = [each.publisher for each in self._advertised.values()]
         await anyio.to_thread.run_sync(_wait_for_arrival, publishers)
 
@@ -208,7 +208,7 @@ class RclpyTopics(NativeTopics[_Request]):
         return known
 
     def check(self, topic: str, type_name: str | None) -> None:
-        """Raises `LinkError` where a name or a type is none, or does not go with the other."""
+        """Raise `LinkError` where a name or a type is none, or do not go with the other."""
         check_name(topic)
         if type_name is None:
             return

@@ -63,7 +63,7 @@ class FieldType:
 
 @cache
 def fields_of(message_class: Any) -> dict[str, FieldType]:  # noqa: ANN401 - rclpy has no types
-    """Gives the fields of a class of messages, in their order."""
+    """Return the fields of a class of messages, in their order."""
     return {
         name: _read_type(text)
         for name, text in message_class.get_fields_and_field_types().items()
@@ -102,7 +102,7 @@ RosClass = Any  # rclpy has no types
 
 
 def find_message(type_name: str) -> RosClass:
-    """Gives the class of a type of messages.
+    """Return the class of a type of messages.
 
     Raises:
         LinkError: The name is none, or this Python does not have the type.
@@ -111,7 +111,7 @@ def find_message(type_name: str) -> RosClass:
 
 
 def find_service(type_name: str) -> RosClass:
-    """Gives the class of a type of services.
+    """Return the class of a type of services.
 
     Raises:
         LinkError: As for messages.
@@ -120,7 +120,7 @@ def find_service(type_name: str) -> RosClass:
 
 
 def find_action(type_name: str) -> RosClass:
-    """Gives the class of a type of actions.
+    """Return the class of a type of actions.
 
     Raises:
         LinkError: As for messages.
@@ -129,7 +129,7 @@ def find_action(type_name: str) -> RosClass:
 
 
 def find_class(type_name: str, kind: str) -> RosClass | None:
-    """Gives the class of a type of one kind (msg, srv, action), or None where there is none."""
+    """Return the class of a type of one kind (msg, srv, action), or None where there is none."""
     parts = type_name.split("/")
     if not TYPE.fullmatch(type_name) or (len(parts) == 3 and parts[1] != kind):
         return None
@@ -140,12 +140,15 @@ def find_class(type_name: str, kind: str) -> RosClass | None:
 
 
 def name_of(message_class: RosClass) -> str:
-    """Gives the type of a class of messages, as "package/Type"."""
+    """Return the type of a class of messages, as "package/Type"."""
     return f"{message_class.__module__.partition('.')[0]}/{message_class.__name__}"
 
 
 def _has_types(package: str, kind: str) -> bool:
-    """True for a package that ROS made; a name that somebody gives must import nothing else."""
+    """Return True for a package that ROS made.
+
+    A name that somebody gives must import nothing else.
+    """
     spec = find_spec(package)
     folders = [] if spec is None else spec.submodule_search_locations or []
     return any(
@@ -177,7 +180,7 @@ PREFIX_ABOVE = 6
 
 
 def find_definitions(type_name: str) -> Mapping[str, str]:
-    """Gives the texts of a type's parts and of all types within, as the port says."""
+    """Return the texts of a type's parts and of all types within, as the port says."""
     for kind in KINDS:
         if find_class(type_name, kind) is not None:
             texts = dict(_texts_of(bare_type(type_name), kind))
@@ -204,7 +207,7 @@ def _add_what_is_within(texts: dict[str, str], names: tuple[str, ...]) -> None:
 
 @cache
 def _texts_of(bare: str, kind: str) -> Mapping[str, str]:
-    """Gives the texts of a type's own parts by their names."""
+    """Return the texts of a type's own parts by their names."""
     found = find_class(bare, kind)
     parts = {
         "msg": {bare: found},

@@ -103,7 +103,7 @@ class RobotAddress:
         return f"{'wss' if uri.secure else 'ws'}://{host}:{uri.port}{digest}"
 
     def build_ssl_context(self) -> ssl.SSLContext | None:
-        """Gives what decides whether a wss server is the right one; None for ws.
+        """Return what decides whether a wss server is the right one; None for ws.
 
         Raises:
             ConfigError: The CA file cannot be read.

@@ -78,7 +78,7 @@ class Channel:
         return None if self._lost_since_s is None else anyio.current_time() - self._lost_since_s
 
     async def start(self, tasks: TaskGroup) -> None:
-        """Connects for the first time, and keeps connected in the background.
+        """Connect for the first time, and keep connected in the background.
 
         Raises:
             LinkError: The robot cannot be reached.
@@ -87,29 +87,29 @@ class Channel:
         tasks.start_soon(self._keep_up, tasks)
 
     def keep_standing(self, operation_id: str, text: bytes) -> None:
-        """Sends something now, and again after every reconnection."""
+        """Send something now, and again after every reconnection."""
         self._standing[operation_id] = text
         self.send_if_up(text)
 
     def end_standing(self, operation_id: str, text: bytes) -> None:
-        """Ends what `keep_standing` began, with the text that says so."""
+        """End what `keep_standing` began, with the text that says so."""
         if self._standing.pop(operation_id, None) is not None:
             self.send_if_up(text)
 
     def send_if_up(self, text: bytes) -> bool:
-        """Sends something that is of no use later; True when it could be sent."""
+        """Send something that is of no use later; True when it could be sent."""
         if self._connection is None or not self.is_up or self._connection.is_over.is_set():
             return False
         self._connection.send(text)
         return True
 
     async def send_when_up(self, text: bytes) -> None:
-        """Sends something that must not be lost while the socket is being replaced."""
+        """Send something that must not be lost while the socket is being replaced."""
         with suppress(LinkError):
             await self.send(text, timeout_s=self._timing.answer_s)
 
     async def wait_until_up(self, timeout_s: float) -> None:
-        """Returns at once, or when there is a connection again.
+        """Return at once, or when there is a connection again.
 
         Raises:
             LinkError: There was none in time.
@@ -117,7 +117,7 @@ class Channel:
         await self._wait_for_connection(timeout_s)
 
     async def send(self, text: bytes, *, timeout_s: float) -> None:
-        """Sends something once there is a connection.
+        """Send something once there is a connection.
 
         Raises:
             LinkError: There was none in time.
@@ -125,7 +125,7 @@ class Channel:
         (await self._wait_for_connection(timeout_s)).send(text)
 
     async def call(self, text: bytes, *, call_id: str, what: str, timeout_s: float) -> object:
-        """Gives what a service answers.
+        """Return what a service answers.
 
         Args:
             text: The call.
@@ -153,14 +153,14 @@ class Channel:
         return _values_of(answer, what)
 
     def replace(self, connection: SocketConnection | None = None) -> None:
-        """Gives up a socket that does not answer for a fresh one; calls under way may finish."""
+        """Return up a socket that does not answer for a fresh one; call under way may finish."""
         stuck = connection or self._connection
         if stuck is not None and stuck is self._connection:
             self.was_replaced = True
             stuck.retire()
 
     async def say_goodbye(self) -> None:
-        """Closes as the protocol wants it, within the time for that."""
+        """Close as the protocol wants it, within the time for that."""
         self._is_closing = True
         if self._connection is not None and self.is_up:
             with anyio.move_on_after(self._timing.goodbye_s):
@@ -234,7 +234,7 @@ class Channel:
         raise self._lost(f"has been lost for {self.lost_for_s or 0.0:.0f} s")
 
     def _patience_s(self, timeout_s: float) -> float:
-        """Gives how long to wait: from the loss on, so that waits for a lost robot do not add up.
+        """Return how long to wait: from the loss on, so that waits for a lost robot do not add up.
 
         One that has been away for longer gets the time of one attempt.
         """

@@ -110,12 +110,12 @@ class RosbridgeClient(Rosapi):
         )
 
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
-        """Runs something in the background until the client is closed."""
+        """Run something in the background until the client is closed."""
         if self._tasks is not None:
             self._tasks.start_soon(work)
 
     async def wait_until_connected(self) -> None:
-        """Returns at once, or when both sockets are open again.
+        """Return at once, or when both sockets are open again.
 
         Raises:
             LinkError: They are not within the usual time for an answer.
@@ -124,7 +124,7 @@ class RosbridgeClient(Rosapi):
         await self._urgent.wait_until_up(self.timing.answer_s)
 
     async def start(self, tasks: TaskGroup) -> None:
-        """Connects, and keeps connected in the background.
+        """Connect, and keep connected in the background.
 
         Raises:
             LinkError: The robot cannot be reached.
@@ -134,7 +134,7 @@ class RosbridgeClient(Rosapi):
         await self._urgent.start(tasks)
 
     async def aclose(self) -> None:
-        """Closes both sockets, once what was published last has had time to arrive."""
+        """Close both sockets, once what was published last has had time to arrive."""
         # rosbridge forgets a message when the socket that brought it closes at once.
         await anyio.sleep_until(self._published_s + self.timing.linger_s)
         async with anyio.create_task_group() as tasks:
@@ -149,7 +149,7 @@ class RosbridgeClient(Rosapi):
         is_bulky: bool = False,
         throttle_ms: int = 0,
     ) -> TopicSubscription:
-        """Gives the subscription to a topic, which is begun where there is none yet.
+        """Return the subscription to a topic, which is begun where there is none yet.
 
         The first subscriber decides how messages are written, and how often they come.
         """
@@ -163,7 +163,7 @@ class RosbridgeClient(Rosapi):
         return request.subscription
 
     def unsubscribe(self, subscription: Subscription) -> None:
-        """Ends one use of a subscription; the last one ends it at the server too."""
+        """End one use of a subscription; the last one ends it at the server too."""
         request = self._requests.get(subscription.topic)
         if request is None or request.subscription is not subscription:
             return
@@ -173,7 +173,7 @@ class RosbridgeClient(Rosapi):
             self._end(request)
 
     def renew(self, subscription: Subscription) -> None:
-        """Subscribes again: a latched message may have been missed, or cannot be written so."""
+        """Subscribe again: a latched message may have been missed, or cannot be written so."""
         request = self._requests.get(subscription.topic)
         if request is not None:
             self._end(request)
@@ -181,7 +181,7 @@ class RosbridgeClient(Rosapi):
             self._begin(request)
 
     def advertise(self, topic: str, *, type_name: str) -> None:
-        """Says that we will publish; the robot needs a moment until it listens.
+        """Say that we will publish; the robot needs a moment until it listens.
 
         Raises:
             LinkError: The topic was advertised with another type, or its name is none.
@@ -195,19 +195,19 @@ class RosbridgeClient(Rosapi):
         self._announcements.advertise(topic, type_name)
 
     def unadvertise(self, topic: str) -> None:
-        """Takes back what `advertise` said."""
+        """Take back what `advertise` said."""
         self._announcements.unadvertise(topic)
 
     def advertise_late(self) -> None:
-        """Tells the robot of what is advertised from now on only with the first message there."""
+        """Tell the robot of what is advertised from now on only with the first message there."""
         self._announcements.be_late()
 
     def advertise_early(self) -> None:
-        """Tells the robot at once of all that is advertised, now and from now on."""
+        """Tell the robot at once of all that is advertised, now and from now on."""
         self._announcements.be_early()
 
     async def publish(self, topic: str, message: Message) -> None:
-        """Publishes on an advertised topic.
+        """Publish on an advertised topic.
 
         Raises:
             LinkError: There is no connection, or the message cannot be sent.
@@ -219,7 +219,7 @@ class RosbridgeClient(Rosapi):
         self._published_s = anyio.current_time()
 
     def publish_everywhere(self, topic: str, message: Message) -> int:
-        """Publishes over every open socket, and gives over how many: for a stop."""
+        """Publish over every open socket, and return over how many: for a stop."""
         text = protocol.publish(topic, message)
         if self._announcements.use(topic):
             self.start_soon(partial(say_again, partial(self._send_everywhere, text)))
@@ -238,7 +238,7 @@ class RosbridgeClient(Rosapi):
         type_name: str | None = None,
         timeout_s: float | None = None,
     ) -> dict[str, Any]:
-        """Gives what a service answers. The wait ends, the connection stays.
+        """Return what a service answers. The wait ends, the connection stays.
 
         Args:
             service: Its full name.
@@ -257,7 +257,7 @@ class RosbridgeClient(Rosapi):
         )
 
     async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> PursuedGoal:
-        """Sends a goal to an action of ROS 2 and gives what becomes of it, as it becomes.
+        """Send a goal to an action of ROS 2 and return what becomes of it, as it becomes.
 
         Raises:
             LinkError: There is no connection, or the goal cannot be sent.
@@ -276,19 +276,19 @@ class RosbridgeClient(Rosapi):
         return goal
 
     def cancel_goal(self, goal: ActionGoal) -> None:
-        """Cancels a goal over the socket it does not block; its end tells whether that worked."""
+        """Cancel a goal over the socket it does not block; its end tells whether that worked."""
         text = protocol.cancel_action_goal(goal.action, operation_id=goal.goal_id)
         self.start_soon(partial(self._free_for_calls().send_when_up, text))
 
     def give_up_goal(self, goal: ActionGoal) -> None:
-        """Replaces the socket of a goal without a sign of life, which it may block."""
+        """Replace the socket of a goal without a sign of life, which it may block."""
         pursued, channel = self._goals.get(goal.goal_id, (None, None))
         if pursued is not None and channel is not None:
             self._goals[goal.goal_id] = (pursued, None)
             channel.replace()
 
     def clear_the_way(self) -> None:
-        """Makes a socket anew where goals or calls are under way on both: for a stop."""
+        """Make a socket anew where goals or calls are under way on both: for a stop."""
         if self._carries_goal(self._free_for_calls()) or self._free_for_calls().is_waiting:
             self._free_for_calls().replace()
 
@@ -377,7 +377,7 @@ class RosbridgeClient(Rosapi):
 async def open_client(
     address: RobotAddress, *, timing: Timing = USUAL_TIMING
 ) -> AsyncGenerator[RosbridgeClient]:
-    """Keeps a robot connected while the context lasts.
+    """Keep a robot connected while the context lasts.
 
     Raises:
         LinkError: It cannot be reached.

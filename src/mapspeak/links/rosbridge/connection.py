@@ -36,7 +36,7 @@ class Pending:
         """None after the end means that none can come any more."""
 
     def end(self, answer: ServiceAnswered | None) -> None:
-        """Lets the caller go on."""
+        """Let the caller go on."""
         self.answer = answer
         self.is_over.set()
 
@@ -75,7 +75,7 @@ class SocketConnection:
         return bool(self._pending)
 
     def send(self, text: bytes) -> None:
-        """Sends a text after those before it.
+        """Send a text after those before it.
 
         Raises:
             LinkError: The robot takes nothing any more.
@@ -90,7 +90,7 @@ class SocketConnection:
             ) from None
 
     async def ask(self, text: bytes, *, call_id: str) -> ServiceAnswered | None:
-        """Gives the answer to a call; None when the socket died first."""
+        """Return the answer to a call; None when the socket died first."""
         pending = self._pending[call_id] = Pending()
         try:
             self.send(text)
@@ -101,7 +101,7 @@ class SocketConnection:
         return pending.answer
 
     async def serve(self) -> None:
-        """Moves messages both ways until the socket is closed, silent for too long, or retired."""
+        """Move messages both ways until the socket is closed, silent for too long, or retired."""
         try:
             async with anyio.create_task_group() as tasks:
                 for part in (self._write, self._listen_for_life, self._wait_for_leave, self._read):
@@ -116,12 +116,12 @@ class SocketConnection:
                 await self._socket.aclose()
 
     def retire(self) -> None:
-        """Lets the calls under way finish, and closes then."""
+        """Let the calls under way finish, and close then."""
         self.is_over.set()
         self._go_if_retired()
 
     async def say_goodbye(self) -> None:
-        """Waits until all is sent, and closes as the protocol wants it; the caller sets a limit."""
+        """Wait until all is sent, and close as the protocol wants it; the caller sets a limit."""
         if self._unsent.statistics().current_buffer_used:
             await self._is_sent.wait()
         with suppress(SocketClosed):

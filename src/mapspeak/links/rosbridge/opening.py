@@ -21,7 +21,7 @@ async def open_rosbridge_robot(
     timing: Timing = USUAL_TIMING,
     patience: DrivingPatience = USUAL_PATIENCE,
 ) -> AsyncGenerator[RosRobot]:
-    """Offers the robot behind a rosbridge server while the context lasts.
+    """Offer the robot behind a rosbridge server while the context lasts.
 
     Leaving the context does not stop the robot: call `stop` before, where that is wanted.
 

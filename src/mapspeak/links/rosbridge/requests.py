@@ -39,7 +39,7 @@ class ServiceCaller:
         type_name: str | None,
         timeout_s: float,
     ) -> dict[str, Any]:
-        """Gives what a service answers, as the port says.
+        """Return what a service answers, as the port says.
 
         Raises:
             LinkError: No answer, a refusal, or no connection.
@@ -57,7 +57,7 @@ class ServiceCaller:
             await anyio.sleep(LOOK_AGAIN_S)
 
     async def _is_known_to_rosapi(self, service: str, until_s: float) -> bool:
-        """False also when there is no time to ask."""
+        """Return False also when there is no time to ask."""
         left_s = until_s - anyio.current_time() - LOOK_AGAIN_S
         if left_s <= 0.0:
             return False

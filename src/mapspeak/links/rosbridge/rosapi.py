@@ -38,7 +38,7 @@ class DefinitionKeeper:
         self._not_told: set[str] = set()
 
     async def fetch(self, type_name: str, *, dialect: Dialect, distro: str) -> Mapping[str, str]:
-        """Gives the texts of a type's parts and of all types within, as the port says."""
+        """Return the texts of a type's parts and of all types within, as the port says."""
         bare, kinds = bare_type(type_name), _kinds_of(type_name)
         if not self._known:
             self._known = known_definitions(dialect, distro=distro)
@@ -53,7 +53,7 @@ class DefinitionKeeper:
         return {each: book.texts[each] for each in dict.fromkeys(within)}
 
     def _is_worth_asking(self, bare: str, kinds: tuple[str, ...]) -> bool:
-        """False for what the robot did not say when it was asked, and we know ourselves."""
+        """Return False for what the robot did not say when it was asked, and we know ourselves."""
         return bare not in self._not_told or not self._find(self._known, bare, kinds)
 
     def _find(self, texts: Mapping[str, str], bare: str, kinds: tuple[str, ...]) -> tuple[str, ...]:
@@ -63,7 +63,7 @@ class DefinitionKeeper:
         return next((names for names in found if all(name in texts for name in names)), ())
 
     async def _ask_graph(self) -> None:
-        """Takes the definitions of all types that some topic has."""
+        """Take the definitions of all types that some topic has."""
         try:
             answer = await self._call("/rosapi/topics_and_raw_types", {})
         except LinkError:
@@ -81,7 +81,7 @@ class DefinitionKeeper:
         self._told |= find_actions_of_ros1(self._told)
 
     async def _ask_details(self, bare: str, kinds: tuple[str, ...]) -> None:
-        """Asks for one type, as only the rosapi of ROS 1 survives."""
+        """Ask for one type, as only the rosapi of ROS 1 survives."""
         service = name_parts(bare)[0]
         questions = {"msg": {"message_details": bare}, "srv": {}}
         if "srv" in kinds:
@@ -111,7 +111,7 @@ def _kinds_of(type_name: str) -> tuple[str, ...]:
 
 
 def _write_text(detail: Mapping[str, Any]) -> str:
-    """Gives as a .msg text what rosapi says of one type in lists."""
+    """Return as a .msg text what rosapi says of one type in lists."""
     names, types, lengths, constants, values = (
         value if isinstance(value := detail.get(key), list) else []
         for key in ("fieldnames", "fieldtypes", "fieldarraylen", "constnames", "constvalues")
@@ -151,10 +151,10 @@ class Rosapi(ABC):
         type_name: str | None = None,
         timeout_s: float | None = None,
     ) -> dict[str, Any]:
-        """Gives what a service answers."""
+        """Return what a service answers."""
 
     async def fetch_graph(self) -> RosGraph:
-        """Gives the topics and actions there are.
+        """Return the topics and actions there are.
 
         Raises:
             LinkError: rosapi is missing, or gives no usable answer.
@@ -172,12 +172,12 @@ class Rosapi(ABC):
         )
 
     async def fetch_topics(self) -> Mapping[str, str]:
-        """Gives the type of each topic."""
+        """Return the type of each topic."""
         listed = await self._list_topics()
         return {topic: bare_type(name) for topic, name in listed.items()}
 
     async def _list_topics(self) -> dict[str, str]:
-        """Gives the type of each topic, as rosapi writes it."""
+        """Return the type of each topic, as rosapi writes it."""
         try:
             listed = await self.call_service("/rosapi/topics")
         except LinkError as error:
@@ -193,7 +193,7 @@ class Rosapi(ABC):
         return dict(zip(topics, types, strict=True))
 
     async def fetch_time_s(self) -> float | None:
-        """Gives robot time; None where rosapi does not say."""
+        """Return robot time; None where rosapi does not say."""
         try:
             stamp = (await self.call_service("/rosapi/get_time")).get("time")
             return read_stamp(stamp if isinstance(stamp, dict) else {})
@@ -201,11 +201,11 @@ class Rosapi(ABC):
             return None
 
     async def fetch_nodes(self) -> tuple[str, ...]:
-        """Gives the full names of all nodes."""
+        """Return the full names of all nodes."""
         return tuple(sorted(_texts(await self.call_service("/rosapi/nodes"), "nodes")))
 
     async def fetch_node(self, node: str) -> NodeLinks:
-        """Gives what a node publishes, subscribes to and serves."""
+        """Return what a node publishes, subscribes to and serves."""
         answer = await self.call_service("/rosapi/node_details", {"node": node})
         return NodeLinks(
             publishes=tuple(sorted(_texts(answer, "publishing"))),
@@ -214,26 +214,26 @@ class Rosapi(ABC):
         )
 
     async def fetch_publishers(self, topic: str) -> tuple[str, ...]:
-        """Gives the nodes that publish on a topic."""
+        """Return the nodes that publish on a topic."""
         answer = await self.call_service("/rosapi/publishers", {"topic": topic})
         return tuple(sorted(_texts(answer, "publishers")))
 
     async def fetch_subscribers(self, topic: str) -> tuple[str, ...]:
-        """Gives the nodes that listen to a topic."""
+        """Return the nodes that listen to a topic."""
         answer = await self.call_service("/rosapi/subscribers", {"topic": topic})
         return tuple(sorted(_texts(answer, "subscribers")))
 
     async def fetch_services(self) -> tuple[str, ...]:
-        """Gives the full names of all services."""
+        """Return the full names of all services."""
         return tuple(sorted(_texts(await self.call_service("/rosapi/services"), "services")))
 
     async def fetch_service_type(self, service: str) -> str:
-        """Gives a service's type."""
+        """Return a service's type."""
         answer = await self.call_service("/rosapi/service_type", {"service": service})
         return _type_of(answer, service)
 
     async def fetch_action_type(self, action: str) -> str:
-        """Gives an action's type: by rosapi on ROS 2, by its topics on ROS 1."""
+        """Return an action's type: by rosapi on ROS 2, by its topics on ROS 1."""
         if await self._fetch_dialect() is Dialect.ROS1:
             answer = await self.call_service("/rosapi/topic_type", {"topic": f"{action}/goal"})
             return _type_of(answer, action).removesuffix("ActionGoal")
@@ -242,13 +242,13 @@ class Rosapi(ABC):
         return _type_of(answer, action)
 
     async def fetch_definitions(self, type_name: str) -> Mapping[str, str]:
-        """Gives the .msg texts of a type and of all within it: the robot's, else our own."""
+        """Return the .msg texts of a type and of all within it: the robot's, else our own."""
         dialect = await self._fetch_dialect()
         distro = "" if self._version is None else self._version[1]
         return await self._definitions.fetch(type_name, dialect=dialect, distro=distro)
 
     async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
-        """Gives the names of a node's parameters."""
+        """Return the names of a node's parameters."""
         if await self._fetch_dialect() is Dialect.ROS2:
             return await self._parameters.fetch_names(node)
         names = _texts(await self.call_service("/rosapi/get_param_names"), "names")
@@ -256,7 +256,7 @@ class Rosapi(ABC):
         return tuple(sorted(name.removeprefix(below) for name in names if name.startswith(below)))
 
     async def fetch_parameter(self, node: str, name: str) -> Any:  # noqa: ANN401 - any value
-        """Gives the value of a node's parameter; None where it is not set."""
+        """Return the value of a node's parameter; None where it is not set."""
         if await self._fetch_dialect() is Dialect.ROS2:
             return await self._parameters.fetch(node, name)
         full = f"{node.rstrip('/')}/{name}"
@@ -270,7 +270,7 @@ class Rosapi(ABC):
             ) from error
 
     async def set_parameter(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401
-        """Sets a node's parameter; None deletes it."""
+        """Set a node's parameter; None deletes it."""
         if await self._fetch_dialect() is Dialect.ROS2:
             await self._parameters.put(node, name, value)
             return
@@ -286,7 +286,7 @@ class Rosapi(ABC):
         return self._version[0]
 
     async def _fetch_version(self, types: list[str]) -> tuple[Dialect, str]:
-        """Gives which ROS it is; that is asked once, for it does not change."""
+        """Return which ROS it is; that is asked once, for it does not change."""
         if self._version is None:
             version = await self._ask_version(types)
             if not types:

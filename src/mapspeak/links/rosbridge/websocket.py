@@ -121,7 +121,7 @@ class WebSocket:
         return self._fault or ("" if error is None or isinstance(error, EOFError) else str(error))
 
     async def receive(self) -> Received:
-        """Gives the next whole message.
+        """Return the next whole message.
 
         Raises:
             SocketClosed: None will come.
@@ -131,7 +131,7 @@ class WebSocket:
         return self._arrived.popleft()
 
     async def send(self, text: bytes) -> None:
-        """Sends one text message.
+        """Send one text message.
 
         Raises:
             SocketClosed: The other end has gone.
@@ -142,7 +142,7 @@ class WebSocket:
         await self._flush()
 
     async def ping(self) -> None:
-        """Asks the other end for a sign of life.
+        """Ask the other end for a sign of life.
 
         Raises:
             SocketClosed: The other end has gone.
@@ -153,7 +153,7 @@ class WebSocket:
         await self._flush()
 
     async def say_goodbye(self) -> None:
-        """Says that we will send nothing more; whoever receives learns when the other end agrees.
+        """Say that we will send nothing more; whoever receives learns when the other end agrees.
 
         Raises:
             SocketClosed: The other end has gone already.
@@ -163,7 +163,7 @@ class WebSocket:
         await self._flush()
 
     async def aclose(self) -> None:
-        """Closes the socket at once."""
+        """Close the socket at once."""
         await anyio.aclose_forcefully(self._stream)
 
     async def _read(self) -> None:
@@ -222,7 +222,7 @@ def _bytes_of(frame: Frame) -> bytes | bytearray:
 
 
 async def open_websocket(address: RobotAddress, *, timeout_s: float) -> WebSocket:
-    """Connects to a rosbridge server.
+    """Connect to a rosbridge server.
 
     Args:
         address: Where it is.

@@ -25,25 +25,25 @@ from mapspeak.worldmodel.recollection import Remembered, RememberedPlace, Rememb
 
 
 def find_passing(atlas: Atlas, query: RecallQuery) -> Iterator[Remembered]:
-    """Gives the places, then the things, that pass every filter of a request."""
+    """Return the places, then the things, that pass every filter of a request."""
     everything: list[Remembered] = [*atlas.recollection.places, *atlas.things]
     return (each for each in everything if _passes(atlas, each, query))
 
 
 def kind_of(remembered: Remembered) -> EntryKind:
-    """Says whether it is a place or a thing."""
+    """Say whether it is a place or a thing."""
     return EntryKind.PLACE if isinstance(remembered, RememberedPlace) else EntryKind.THING
 
 
 def point_of(remembered: Remembered) -> Point:
-    """Gives where it is; of a thing without a position, where it was seen from."""
+    """Return where it is; of a thing without a position, where it was seen from."""
     if isinstance(remembered, RememberedPlace):
         return remembered.waypoint.pose.point
     return remembered.point
 
 
 def find_rooms(atlas: Atlas, remembered: Remembered) -> tuple[str, ...]:
-    """Gives the rooms it may be in, by id."""
+    """Return the rooms it may be in, by id."""
     if isinstance(remembered, RememberedPlace):
         room_id = atlas.find_room_id(point_of(remembered))
         return () if room_id is None else (room_id,)
@@ -51,7 +51,7 @@ def find_rooms(atlas: Atlas, remembered: Remembered) -> tuple[str, ...]:
 
 
 def last_seen(atlas: Atlas, remembered: Remembered) -> datetime | None:
-    """Gives when it was seen last, by the calendar; None where nobody noted it."""
+    """Return when it was seen last, by the calendar; None where nobody noted it."""
     if isinstance(remembered, RememberedPlace):
         return remembered.waypoint.recorded_at
     times = (view.recorded_at for _, view in list_views(atlas, remembered))
@@ -59,7 +59,7 @@ def last_seen(atlas: Atlas, remembered: Remembered) -> datetime | None:
 
 
 def list_views(atlas: Atlas, remembered: Remembered) -> Iterator[tuple[RememberedPlace, Landmark]]:
-    """Gives what was seen of a thing, each with its time and picture, and from where."""
+    """Return what was seen of a thing, each with its time and picture, and from where."""
     if isinstance(remembered, RememberedPlace):
         return
     for view in remembered.thing.supporting:
@@ -170,7 +170,7 @@ APART_M = 2.0
 def find_best_known(
     atlas: Atlas, meant: Sequence[Remembered], *, room_id: str | None
 ) -> RememberedThing | None:
-    """Finds the one thing that views from three places agree on, with no other of its name near.
+    """Find the one thing that views from three places agree on, with no other of its name near.
 
     Args:
         atlas: The map with the memory.
@@ -235,7 +235,7 @@ def recall(atlas: Atlas, query: RecallQuery) -> Recall:
 def _find_best(
     atlas: Atlas, answer: Answer, passing: Mapping[str, Remembered], *, room_id: str | None
 ) -> str | None:
-    """Gives the id of the one that is known best of all that are called so; None where none is."""
+    """Return the id of the one that is known best of all that are called so; None where none is."""
     meant = answer.candidates[: answer.n_meant]
     if any(each.basis is not Basis.NAME for each in meant):
         return None
@@ -244,7 +244,7 @@ def _find_best(
 
 
 def _with_room(atlas: Atlas, query: RecallQuery) -> RecallQuery:
-    """Takes the room out of words such as "ladder in R2", so that it is a filter."""
+    """Take the room out of words such as "ladder in R2", so that it is a filter."""
     if query.room_id is not None:
         return query
     words, room_id = split_room(atlas, query.words)
@@ -252,7 +252,7 @@ def _with_room(atlas: Atlas, query: RecallQuery) -> RecallQuery:
 
 
 def find_speaking_places(atlas: Atlas, words: str) -> tuple[tuple[RememberedPlace, ...], Recall]:
-    """Gives the remembered places that speak of something, the likeliest first, and the answer."""
+    """Return the remembered places that speak of something, the likeliest first, and the answer."""
     answer = recall(atlas, RecallQuery(words=words))
     if answer.verdict is Verdict.NOT_REMEMBERED:
         return (), answer
@@ -269,7 +269,7 @@ def _rank(
     best: str | None,
     is_tied: bool,
 ) -> Iterator[EntryCandidate]:
-    """Gives candidates by likeness, and of several that are as like the nearest by path first.
+    """Return candidates by likeness, and of several that are as like the nearest by path first.
 
     The way is worked out of those alone that may come next: of the others it is known that they
     are no nearer.
@@ -310,5 +310,5 @@ def _find_way_m(atlas: Atlas, remembered: Remembered) -> float:
 
 
 def _likeness(found: EntryCandidate) -> float:
-    """Gives how alike a candidate is, as far as that tells two of them apart."""
+    """Return how alike a candidate is, as far as that tells two of them apart."""
     return round(found.score_ratio, 3)

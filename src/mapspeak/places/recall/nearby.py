@@ -32,7 +32,7 @@ class Nearby:
 def find_nearby(
     atlas: Atlas, words: str, *, radius_m: float | None = None, room_id: str | None = None
 ) -> Nearby | None:
-    """Finds the thing that is called so, and what is near to it; None where nothing is.
+    """Find the thing that is called so, and what is near to it; None where nothing is.
 
     Args:
         atlas: The map with the memory.

@@ -52,7 +52,7 @@ class Aim:
 def stand_towards(
     atlas: Atlas, thing: Referent, wanted: Towards, seen_from: Referent | None
 ) -> Stand:
-    """Finds where to stand in some direction from a thing.
+    """Find where to stand in some direction from a thing.
 
     Raises:
         GoalError: Nothing fits, or the direction has no meaning there; the hint says what would do.
@@ -77,7 +77,7 @@ def stand_towards(
 
 
 def front_of_region(atlas: Atlas, region: Region) -> Referent:
-    """Gives the door of a region that the robot comes to first, as seen from outside.
+    """Return the door of a region that the robot comes to first, as seen from outside.
 
     Raises:
         GoalError: No door of it can be reached.
@@ -181,7 +181,7 @@ def _aim_at_door(
 
 
 def _aim_past_door(atlas: Atlas, thing: Referent, door: Door, compass: Compass, aim: Aim) -> Aim:
-    """Aims into the region that lies that way; along the wall, on the robot's side of it."""
+    """Aim into the region that lies that way; along the wall, on the robot's side of it."""
     near = thing.home or find_near_side(atlas, door)
     far_id = next(each for each in door.region_ids if each != near.id)
     home = near
@@ -196,7 +196,7 @@ def _aim_past_door(atlas: Atlas, thing: Referent, door: Door, compass: Compass, 
 
 
 def _side_seen_from(atlas: Atlas, door: Door, viewer: Referent) -> Region:
-    """Gives the region of a door on whose side a viewer is."""
+    """Return the region of a door on whose side a viewer is."""
     sides = [atlas.rooms.region(region_id) for region_id in door.region_ids]
     standing = viewer.region or viewer.home
     for side in sides:
@@ -210,7 +210,7 @@ def _side_seen_from(atlas: Atlas, door: Door, viewer: Referent) -> Region:
 
 
 def _search(atlas: Atlas, thing: Referent, aim: Aim) -> tuple[Point, float] | None:
-    """Finds the place nearest to what is aimed at, and how far from the thing it is."""
+    """Find the place nearest to what is aimed at, and how far from the thing it is."""
     along = np.array([math.cos(aim.heading_rad), math.sin(aim.heading_rad)])
     offsets = thing.extent - np.array([thing.anchor.x, thing.anchor.y])
     edge_m = float((offsets @ along).max())
@@ -250,7 +250,7 @@ def _is_at_home(footing: Footing, thing: Referent, aim: Aim) -> np.ndarray:
 def _what_works(
     atlas: Atlas, thing: Referent, wanted: Towards, seen_from: Referent | None
 ) -> Iterator[str]:
-    """Gives the phrases of the same kind in which the robot could stand."""
+    """Return the phrases of the same kind in which the robot could stand."""
     around: tuple[Side | Compass, ...] = tuple(Side)
     if isinstance(wanted.direction, Compass):
         around = (Compass.NORTH, Compass.EAST, Compass.SOUTH, Compass.WEST)

@@ -45,7 +45,7 @@ GAP = r"(?:[\s_]|-(?![\d.]))+"
 
 
 def pattern(words: str) -> re.Pattern[str]:
-    """Gives a pattern in which every space stands for spaces, underscores or hyphens."""
+    """Return a pattern in which every space stands for spaces, underscores or hyphens."""
     return re.compile(words.replace(" ", GAP), re.IGNORECASE | re.DOTALL)
 
 
@@ -53,7 +53,7 @@ ARTICLE = pattern(r"(?:the|a|an) (?=\S)")
 
 
 def plain(words: str) -> str:
-    """Gives the words without what does not count: an article, brackets or quotes around them."""
+    """Return the words without what does not count: an article, brackets or quotes around them."""
     kept = words.strip().rstrip(".!?;").strip()
     while kept:
         inner = _without_brackets(ARTICLE.sub("", kept, count=1) if ARTICLE.match(kept) else kept)
@@ -70,7 +70,7 @@ def _without_brackets(words: str) -> str:
 
 
 def read_distance(match: re.Match[str]) -> float | None:
-    """Gives the metres that a match of `DISTANCE` says; None where it says none."""
+    """Return the metres that a match of `DISTANCE` says; None where it says none."""
     number, unit = match["number"], match["unit"]
     if number is None:
         return None
@@ -84,7 +84,7 @@ def read_distance(match: re.Match[str]) -> float | None:
 
 
 def read_compass(words: str | None) -> Compass | None:
-    """Gives the direction that is spelt "north-east", "northeast", "north east" or "north_east"."""
+    """Return direction that is spelt "north-east", "northeast", "north east" or "north_east"."""
     if words is None:
         return None
     letters = re.sub(GAP, "", words).casefold().removesuffix("ern")
@@ -92,12 +92,12 @@ def read_compass(words: str | None) -> Compass | None:
 
 
 def read_heading(heading_rad: float) -> Compass:
-    """Gives the nearest of eight directions of the map."""
+    """Return the nearest of eight directions of the map."""
     return list(Compass)[round(heading_rad / (math.tau / 8)) % 8]
 
 
 def say_heading(heading_rad: float) -> str:
-    """Gives the nearest of eight directions of the map as a word."""
+    """Return the nearest of eight directions of the map as a word."""
     return read_heading(heading_rad).value
 
 
@@ -252,7 +252,7 @@ Read = Callable[[re.Match[str]], Relation | None]
 
 
 def parse_relation(words: str) -> Relation | None:
-    """Gives the relation that words begin with; None where they are none."""
+    """Return the relation that words begin with; None where they are none."""
     if len(words) > LONGEST:
         return None
     wanted = plain(words)

@@ -54,7 +54,7 @@ class FoundWall:
 def find_corners(
     atlas: Atlas, region: Region, compass: Compass | None = None
 ) -> tuple[FoundCorner, ...]:
-    """Finds the corners of a region, or the one that points in a direction.
+    """Find the corners of a region, or the one that points in a direction.
 
     Raises:
         GoalError: There is none, or there are several.
@@ -86,7 +86,7 @@ def _names(found: Sequence[FoundCorner] | Sequence[FoundWall]) -> list[str]:
 def find_walls(
     atlas: Atlas, region: Region, compass: Compass | None = None
 ) -> tuple[FoundWall, ...]:
-    """Finds the walls of a region, or the outermost long one on a side.
+    """Find the walls of a region, or the outermost long one on a side.
 
     Raises:
         GoalError: There is none.
@@ -113,13 +113,13 @@ def _ahead(point: Point, compass: Compass) -> float:
 
 
 def find_middle(atlas: Atlas, region: Region) -> Point:
-    """Gives the middle of a room's floor, and of a corridor half the way along it."""
+    """Return the middle of a room's floor, and of a corridor half the way along it."""
     walk = atlas.map.walk_along(region) if region.room_class is RoomClass.CORRIDOR else None
     return find_outline(atlas, region).middle if walk is None else walk.middle
 
 
 def stand_in_middle(atlas: Atlas, thing: Referent) -> Stand:
-    """Finds the place nearest to the middle of a region.
+    """Find the place nearest to the middle of a region.
 
     Raises:
         GoalError: The thing has no middle, or the robot gets nowhere near it.
@@ -145,7 +145,7 @@ def stand_in_middle(atlas: Atlas, thing: Referent) -> Stand:
 
 
 def stand_in_corner(atlas: Atlas, corners: Sequence[FoundCorner]) -> Stand:
-    """Finds where to stand in the first of some corners in which the robot can.
+    """Find where to stand in the first of some corners in which the robot can.
 
     Raises:
         GoalError: It can in none.
@@ -177,7 +177,7 @@ def _corners_that_work(atlas: Atlas, tried: Sequence[FoundCorner]) -> Iterator[s
 
 
 def stand_at_wall(atlas: Atlas, walls: Sequence[FoundWall], *, is_along: bool) -> Stand:
-    """Finds where to stand at the first of some walls at which the robot can.
+    """Find where to stand at the first of some walls at which the robot can.
 
     Raises:
         GoalError: It can at none.

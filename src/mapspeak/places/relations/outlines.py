@@ -86,7 +86,7 @@ class Outline:
 
 
 def find_outline(atlas: Atlas, region: Region) -> Outline:
-    """Finds the walls and corners of a region's floor.
+    """Find the walls and corners of a region's floor.
 
     A room that nearly fills a rectangle has its four corners, whatever furniture stands in them.
     """
@@ -126,7 +126,7 @@ def _mean_of(atlas: Atlas, inside: Mask, corner: tuple[int, int]) -> Point:
 
 
 def _trace_rectangle(inside: Mask) -> list[tuple[int, int]] | None:
-    """Gives the corners of the rectangle that a region nearly fills; None where it does not."""
+    """Return the corners of the rectangle that a region nearly fills; None where it does not."""
     found, _ = cv2.findContours(inside.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     rectangle = cv2.minAreaRect(np.concatenate(found))
     (_, (one, other), _) = rectangle
@@ -136,14 +136,14 @@ def _trace_rectangle(inside: Mask) -> list[tuple[int, int]] | None:
 
 
 def _is_own(atlas: Atlas, region: Region, corners: list[Point]) -> bool:
-    """True where no corner lies in another region."""
+    """Return True where no corner lies in another region."""
     middle = Point(sum(p.x for p in corners) / 4, sum(p.y for p in corners) / 4)
     inner = (Point(p.x + 0.05 * (middle.x - p.x), p.y + 0.05 * (middle.y - p.y)) for p in corners)
     return all(atlas.find_room_id(point) in (region.id, None) for point in inner)
 
 
 def _trace(atlas: Atlas, inside: Mask) -> list[tuple[int, int]]:
-    """Gives the corners of the outline as (col, row), counter-clockwise on the map."""
+    """Return the corners of the outline as (col, row), counter-clockwise on the map."""
     n = 2 * max(round(ROUGHNESS_M / atlas.grid.resolution_m / 2), 0) + 1
     framed = np.pad(inside.astype(np.uint8), n)
     kernel = cv2.getStructuringElement(cv2.MORPH_RECT, (n, n))
@@ -158,7 +158,7 @@ def _trace(atlas: Atlas, inside: Mask) -> list[tuple[int, int]]:
 
 
 def _ordered(polygon: np.ndarray) -> list[tuple[int, int]]:
-    """Gives the corners of a polygon counter-clockwise; rows grow upwards on the map."""
+    """Return the corners of a polygon counter-clockwise; rows grow upwards on the map."""
     area = cv2.contourArea(polygon.astype(np.float32).reshape(-1, 1, 2), oriented=True)
     return [(int(col), int(row)) for col, row in (polygon[::-1] if area < 0 else polygon)]
 
@@ -177,7 +177,7 @@ def _is_corner(one: Wall, other: Wall) -> bool:
 
 
 def _is_wall(atlas: Atlas, side: Wall) -> bool:
-    """True where most of what lies behind a long side is no floor."""
+    """Return True where most of what lies behind a long side is no floor."""
     if side.length_m < LEAST_WALL_M:
         return False
     grid = atlas.grid

@@ -36,18 +36,18 @@ class Footing:
     in_doors: Mask
 
     def away_m(self, point: Point) -> FloatArray:
-        """Gives how far each cell is from a point, as the crow flies."""
+        """Return how far each cell is from a point, as the crow flies."""
         return np.asarray(np.hypot(self.points[:, 0] - point.x, self.points[:, 1] - point.y))
 
     def along_m(self, origin: Point, heading_rad: float) -> FloatArray:
-        """Gives how far each cell is from a point in a direction; negative behind it."""
+        """Return how far each cell is from a point in a direction; negative behind it."""
         dx, dy = self.points[:, 0] - origin.x, self.points[:, 1] - origin.y
         return np.asarray(dx * math.cos(heading_rad) + dy * math.sin(heading_rad))
 
     def choose(
         self, atlas: Atlas, allowed: Mask, costs: FloatArray, *, in_sight_of: Point | None = None
     ) -> Point | None:
-        """Gives the allowed cell of the least cost; None where there is none.
+        """Return the allowed cell of the least cost; None where there is none.
 
         Roomy ones aside from doors go first, then tight ones, then those in doors.
 
@@ -72,7 +72,7 @@ class Footing:
 
 
 def find_footing(atlas: Atlas, centre: Point, reach_m: float) -> Footing:
-    """Finds the reachable cells at most so far from a place to each side."""
+    """Find the reachable cells at most so far from a place to each side."""
     grid = atlas.grid
     window = grid.window_around(centre, reach_m)
     at_rows, at_cols = np.nonzero(grid.free[window])
@@ -100,7 +100,7 @@ def _find_in_doors(atlas: Atlas, points: FloatArray, centre: Point, reach_m: flo
 
 
 def is_in_sight(atlas: Atlas, points: FloatArray, thing: Point) -> Mask:
-    """True for the points from which nothing stands before a thing.
+    """Return True for the points from which nothing stands before a thing.
 
     The thing itself may be an obstacle: once a line has met what it ends in, no floor follows.
     """
@@ -146,17 +146,17 @@ def refuse(what: str, works: Sequence[str] = (), *, else_hint: str = "") -> Goal
 
 
 def join_or(words: Sequence[str]) -> str:
-    """Gives "a, b or c"."""
+    """Return "a, b or c"."""
     return " or ".join(filter(None, (", ".join(words[:-1]), *words[-1:])))
 
 
 def tolerance_m(resolution_m: float) -> float:
-    """Gives how far off a distance may be that somebody asked for."""
+    """Return how far off a distance may be that somebody asked for."""
     return max(TOLERANCE_M, 0.75 * resolution_m)
 
 
 def extent_away_m(footing: Footing, extent: FloatArray) -> FloatArray:
-    """Gives how far each cell is from the nearest of some points, as the crow flies."""
+    """Return how far each cell is from the nearest of some points, as the crow flies."""
     step = -(-len(extent) // MOST_EXTENT)
     squares = np.full(len(footing.points), np.inf)
     for x, y in extent[::step]:

@@ -35,7 +35,7 @@ NEAR_DOOR_M = 1.5
 
 
 def stand_away(atlas: Atlas, thing: Referent, away_m: float) -> Stand:
-    """Finds the place nearest to the robot that is so far from a thing.
+    """Find the place nearest to the robot that is so far from a thing.
 
     Raises:
         GoalError: There is none; the hint names the distances between which there are some.
@@ -55,7 +55,7 @@ def stand_away(atlas: Atlas, thing: Referent, away_m: float) -> Stand:
 
 
 def stand_next_to(atlas: Atlas, thing: Referent) -> Stand:
-    """Finds a place beside a thing; beside a door, not before it; of a room, outside at its door.
+    """Find a place beside a thing; beside a door, not before it; of a room, outside at its door.
 
     Raises:
         GoalError: There is none.
@@ -87,7 +87,7 @@ def stand_next_to(atlas: Atlas, thing: Referent) -> Stand:
 
 
 def stand_facing(atlas: Atlas, thing: Referent) -> Stand:
-    """Finds the place nearest to the robot from which it looks at a thing near by.
+    """Find the place nearest to the robot from which it looks at a thing near by.
 
     Raises:
         GoalError: The robot is the thing, or there is no such place.
@@ -125,7 +125,7 @@ def _is_at_home(footing: Footing, thing: Referent) -> np.ndarray:
 
 
 def _is_out_of_the_way(atlas: Atlas, footing: Footing, thing: Referent) -> np.ndarray:
-    """True beside a door's opening and not before it; at a room's doors; anywhere else."""
+    """Return True beside a door's opening and not before it; at a room's doors; anywhere else."""
     if thing.door is not None and thing.home is not None:
         along_rad = find_normal(atlas, thing.door, thing.home) + math.pi / 2
         aside_m = np.abs(footing.along_m(thing.door.place, along_rad))
@@ -140,7 +140,7 @@ def _is_out_of_the_way(atlas: Atlas, footing: Footing, thing: Referent) -> np.nd
 
 
 def _find_sight(atlas: Atlas, thing: Referent) -> Point | None:
-    """Gives the point that must be in sight; of a door one before it, of what is large none."""
+    """Return the point that must be in sight; of a door one before it, of what is large none."""
     if thing.is_point:
         return thing.anchor
     if thing.door is None or thing.home is None:
@@ -193,7 +193,7 @@ class Span:
 
 
 def stand_between(atlas: Atlas, one: Referent, other: Referent) -> Stand:
-    """Finds where to stand half way between two things.
+    """Find where to stand half way between two things.
 
     Raises:
         GoalError: They are one, too near to each other, or no way leads from one to the other.
@@ -220,7 +220,7 @@ def stand_between(atlas: Atlas, one: Referent, other: Referent) -> Stand:
 
 
 def _stand_in_door(atlas: Atlas, one: Region, other: Region) -> Stand | None:
-    """Gives the nearest door that joins two regions; two that are one have none."""
+    """Return the nearest door that joins two regions; two that are one have none."""
     crossings = [
         (atlas.path_m(crossing) or 0.0, door.id, crossing)
         for door in atlas.rooms.doors_between(one.id, other.id)
@@ -267,7 +267,7 @@ def _stand_on_way(atlas: Atlas, span: Span) -> Stand | None:
 
 
 def _step_off(atlas: Atlas, point: Point) -> Point | None:
-    """Gives the nearest place to a thing where the robot can be."""
+    """Return the nearest place to a thing where the robot can be."""
     footing = find_footing(atlas, point, STEP_OFF_M)
     away_m = footing.away_m(point)
     if not away_m.size or float(away_m.min()) > STEP_OFF_M:
@@ -295,7 +295,7 @@ CLASSES = {
 
 
 def find_nearest(atlas: Atlas, kind: Kind, start: Referent | None) -> Place:
-    """Finds the thing of a kind that is nearest to the robot or to a place, by path.
+    """Find the thing of a kind that is nearest to the robot or to a place, by path.
 
     Raises:
         GoalError: None can be reached.
@@ -313,7 +313,7 @@ def find_nearest(atlas: Atlas, kind: Kind, start: Referent | None) -> Place:
 
 
 def find_all_near(atlas: Atlas, kind: Kind) -> tuple[Place, ...]:
-    """Finds all things of a kind that the robot can get to, nearest first."""
+    """Find all things of a kind that the robot can get to, nearest first."""
     return tuple(place for _, place in _sort(atlas, kind, atlas.distances))
 
 
@@ -344,7 +344,7 @@ def _all_of(atlas: Atlas, kind: Kind, distances: DistanceField) -> Iterator[tupl
 
 
 def _least_m(atlas: Atlas, region: Region, distances: DistanceField) -> float:
-    """Gives the metres by path to the nearest floor of a region."""
+    """Return the metres by path to the nearest floor of a region."""
     window = atlas.rooms.window_of(region)
     rows, cols = np.nonzero(atlas.rooms.labels[window] == region.index)
     reached_m = distances.distances_at(rows + window[0].start, cols + window[1].start)

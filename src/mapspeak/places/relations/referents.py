@@ -67,7 +67,7 @@ class Referent:
 
 
 def refer_to(atlas: Atlas, place: Place) -> Referent:
-    """Gives a place as something to relate to.
+    """Return a place as something to relate to.
 
     Raises:
         GoalError: It lies farther away than any map reaches.
@@ -109,7 +109,7 @@ def refer_to_point(
     home: Region | None = None,
     is_robot: bool = False,
 ) -> Referent:
-    """Gives a point as something to relate to."""
+    """Return a point as something to relate to."""
     return Referent(
         name=name,
         anchor=point,
@@ -121,7 +121,7 @@ def refer_to_point(
 
 
 def _find_region_around(atlas: Atlas, point: Point) -> Region | None:
-    """Finds the region that a thing stands in; None for what is in a wall between two."""
+    """Find the region that a thing stands in; None for what is in a wall between two."""
     window = atlas.grid.window_around(point, AROUND_THING_M)
     labels = atlas.rooms.labels[window]
     rows, cols = np.nonzero(labels)
@@ -135,7 +135,7 @@ def _find_region_around(atlas: Atlas, point: Point) -> Region | None:
 
 
 def find_normal(atlas: Atlas, door: Door, side: Region) -> float:
-    """Gives the direction in which a door leads into one of its two regions, as a yaw.
+    """Return the direction in which a door leads into one of its two regions, as a yaw.
 
     It is at right angles to the line through its two posts where the floor near it shows no other.
     """
@@ -154,7 +154,7 @@ def find_normal(atlas: Atlas, door: Door, side: Region) -> float:
 
 
 def _squared(atlas: Atlas, door: Door, rough_rad: float) -> float:
-    """Turns a direction through a door until the posts beside it lie square to it."""
+    """Turn a direction through a door until the posts beside it lie square to it."""
     window = atlas.grid.window_around(door.place, door.width_m / 2 + AROUND_DOOR_M)
     rows, cols = np.nonzero(atlas.grid.occupied[window])
     points = atlas.grid.points_at(rows + window[0].start, cols + window[1].start)
@@ -193,7 +193,7 @@ def _refer_to_door(atlas: Atlas, door: Door) -> Referent:
 
 
 def find_near_side(atlas: Atlas, door: Door) -> Region:
-    """Gives the region of a door on whose side the robot comes to it."""
+    """Return the region of a door on whose side the robot comes to it."""
     sides = [atlas.rooms.region(region_id) for region_id in door.region_ids]
     here = atlas.find_room_id(atlas.robot.point)
     standing = next((side for side in sides if side.id == here), None)
@@ -225,7 +225,7 @@ OF_PLACE = pattern(r"(?P<label>.+?) (?:of|at|seen from|from) (?P<place>.+)")
 
 
 def find_known(atlas: Atlas, words: str) -> Referent | None:
-    """Finds what is called so, without reading any relation in it; None where nothing is.
+    """Find what is called so, without reading any relation in it; None where nothing is.
 
     Raises:
         GoalError: Several things are called so, or nobody noted where the thing is.
@@ -240,7 +240,7 @@ def find_known(atlas: Atlas, words: str) -> Referent | None:
 
 
 def find_by_kind(atlas: Atlas, words: str) -> Place | None:
-    """Finds "the room", "the corridor" and "the door", where only one can be meant.
+    """Find "the room", "the corridor" and "the door", where only one can be meant.
 
     Raises:
         GoalError: Several can be meant, or none.
@@ -253,7 +253,7 @@ def find_by_kind(atlas: Atlas, words: str) -> Place | None:
 
 
 def find_room_here(atlas: Atlas) -> Region:
-    """Gives the region that the robot stands in.
+    """Return the region that the robot stands in.
 
     Raises:
         GoalError: It stands in none.
@@ -265,7 +265,7 @@ def find_room_here(atlas: Atlas) -> Region:
 
 
 def _find_room(atlas: Atlas, match: re.Match[str]) -> Region:
-    """Gives the room that "the room" means: where the robot stands, or the only one there is."""
+    """Return the room that "the room" means: where the robot stands, or the only one there is."""
     classes = CLASSES.get(match["noun"].casefold(), tuple(RoomClass))
     here = atlas.rooms.find_region_at(atlas.robot.point)
     if here is not None and here.room_class in classes:
@@ -288,14 +288,14 @@ def _loose_key(name: str) -> str:
 
 
 def _find_loosely(atlas: Atlas, wanted: str) -> Place | None:
-    """Finds a remembered name, spelt with underscores or hyphens instead of spaces."""
+    """Find a remembered name, spelt with underscores or hyphens instead of spaces."""
     key = _loose_key(wanted)
     names = {each.waypoint.name for each in atlas.places if _loose_key(each.waypoint.name) == key}
     return find_named(atlas, names.pop()) if len(names) == 1 else None
 
 
 def _find_thing(atlas: Atlas, wanted: str) -> Referent | None:
-    """Finds a thing that was seen from remembered places, with "seen from W1" or without."""
+    """Find a thing that was seen from remembered places, with "seen from W1" or without."""
     called = atlas.recollection.find_called(re.sub(GAP, " ", wanted))
     match = OF_PLACE.fullmatch(wanted)
     if not called and match is not None:
@@ -342,7 +342,7 @@ def _several_things(
 
 
 def _find_only_door(atlas: Atlas, wanted: str) -> Place | None:
-    """Finds "the door": the only one of the room that is named, or that the robot stands in."""
+    """Find "the door": the only one of the room that is named, or that the robot stands in."""
     match = DOOR.fullmatch(wanted)
     if match is None:
         return None

@@ -59,7 +59,7 @@ BESIDE_M = 1.0
 
 
 def find_related(atlas: Atlas, words: str) -> Place | None:
-    """Finds the place that a relation means, such as "left of W3"; None for other words.
+    """Find the place that a relation means, such as "left of W3"; None for other words.
 
     The place comes with its reason. It can be reached, whatever stands around it; of "the nearest
     door" and the like it is the thing itself.
@@ -81,7 +81,7 @@ class Reader:
         self._atlas = atlas
 
     def find(self, relation: Relation, words: str, *, n_left: int) -> Place:
-        """Gives the place that a relation means; `n_left` more may stand inside it."""
+        """Return the place that a relation means; `n_left` more may stand inside it."""
         if isinstance(relation, Nearest):
             start = None if relation.to is None else self._refer(relation.to, n_left)
             return find_nearest(self._atlas, relation.kind, start)
@@ -121,7 +121,7 @@ class Reader:
                 return Stand(point=standing_point(self._atlas, place), reason=place.reason)
 
     def _refer(self, words: str, n_left: int) -> Referent:
-        """Gives what words inside a phrase mean: a name, or another phrase."""
+        """Return what words inside a phrase mean: a name, or another phrase."""
         known = find_known(self._atlas, words)
         if known is not None:
             return known
@@ -136,7 +136,7 @@ class Reader:
         return self._refer_to_relation(relation, plain(words), n_left - 1)
 
     def _refer_to_relation(self, relation: Relation, words: str, n_left: int) -> Referent:
-        """Gives what a phrase is about: the corner itself, say, not where one stands in it."""
+        """Return what a phrase is about: the corner itself, say, not where one stands in it."""
         match relation:
             case Nearest():
                 return refer_to(self._atlas, self.find(relation, words, n_left=n_left))
@@ -154,7 +154,7 @@ class Reader:
                 return refer_to_point(self._atlas, f"the place {words}", stand.point)
 
     def _refer_to_both(self, relation: Between, n_left: int) -> tuple[Referent, Referent]:
-        """Gives the two things of a "between", by the first division of the words that works."""
+        """Return the two things of a "between", by the first division of the words that works."""
         doors = self._find_both_doors(relation.of)
         if doors is not None:
             return doors
@@ -169,7 +169,7 @@ class Reader:
         )
 
     def _find_both_doors(self, words: str) -> tuple[Referent, Referent] | None:
-        """Gives the two doors of "between the doors" and "between the doors of R2"."""
+        """Return the two doors of "between the doors" and "between the doors of R2"."""
         first, _, rest = plain(words).partition(" ")
         if plain(words).casefold() not in ("doors", "two doors") and first.casefold() != "doors":
             return None
@@ -212,7 +212,7 @@ class Reader:
         )
 
     def _find_corners(self, relation: Corner, n_left: int) -> tuple[FoundCorner, ...]:
-        """Gives the corners that may be meant, the best first."""
+        """Return the corners that may be meant, the best first."""
         near = None if relation.near is None else self._refer(relation.near, n_left)
         region = self._region_beside(relation.of, near, n_left)
         corners = find_corners(self._atlas, region, relation.compass)
@@ -221,7 +221,7 @@ class Reader:
         return tuple(sorted(corners, key=lambda each: self._path_m(each.point)))
 
     def _find_walls(self, relation: WallSide, n_left: int) -> tuple[FoundWall, ...]:
-        """Gives the walls that may be meant, the best first."""
+        """Return the walls that may be meant, the best first."""
         region = self._region_of(relation.of, n_left)
         walls = find_walls(self._atlas, region, relation.compass)
         return tuple(sorted(walls, key=lambda each: self._path_m(each.wall.middle)))
@@ -245,7 +245,7 @@ class Reader:
         return self._region_of(words, 0)
 
     def _path_m(self, point: Point) -> float:
-        """Gives how far it is to the floor beside a point that the robot cannot stand in."""
+        """Return how far it is to the floor beside a point that the robot cannot stand in."""
         footing = find_footing(self._atlas, point, BESIDE_M)
         return float(footing.paths_m.min(initial=math.inf))
 

@@ -375,7 +375,7 @@ class Ros2ActionClient(ActionClient):
         self._consider_all()
 
     def _is_safety_first(self) -> bool:
-        """True where nothing else would end a goal that may be a withdrawn one."""
+        """Return True where nothing else would end a goal that may be a withdrawn one."""
         if any(goal.server_id is None for goal in self.open_goals):
             # It may be the one that is wanted, and that is told as under way.
             return False

@@ -34,11 +34,11 @@ class TypeBook:
         self._types: dict[str, MessageType] = {}
 
     def knows(self, name: str) -> bool:
-        """True for a type that is described here, however its name is written."""
+        """Return True for a type that is described here, however its name is written."""
         return bare_type(name) in self.texts
 
     def __getitem__(self, name: str) -> MessageType:
-        """Gives a type that is known; the times of ROS 1 are types of two numbers."""
+        """Return a type that is known; the times of ROS 1 are types of two numbers."""
         bare = name if name in TIMES else bare_type(name)
         if bare not in self._types:
             text = TIME_OF_ROS1[bare] if bare in TIMES else self.texts[bare]
@@ -46,7 +46,7 @@ class TypeBook:
         return self._types[bare]
 
     def within(self, name: str) -> list[str]:
-        """Gives a type and all types within that are known: first itself, then in their order."""
+        """Return a type and all types within that are known: first itself, then in their order."""
         found = [bare_type(name)]
         for each in found:
             inner = [field.type for field in self[each].fields if field.type in self.texts]
@@ -54,13 +54,13 @@ class TypeBook:
         return found
 
     def missing(self, name: str) -> list[str]:
-        """Gives the types within a known one that nobody has described."""
+        """Return the types within a known one that nobody has described."""
         types = [field.type for each in self.within(name) for field in self[each].fields]
         named = [kind for kind in dict.fromkeys(types) if "/" in kind]
         return [kind for kind in named if kind not in self.texts]
 
     def default(self, field: Field, depth: int = 0) -> Any:  # noqa: ANN401 - ROS JSON
-        """Gives what a field holds unless said otherwise."""
+        """Return what a field holds unless said otherwise."""
         if field.length is not None:
             one = Field(name=field.name, type=field.type)
             return [self.default(one, depth) for _ in range(field.length)]
@@ -87,7 +87,7 @@ def _whole(text: str) -> int:
 
 
 def _number(text: str, read: Callable[[str], float]) -> float:
-    """Gives a default that is a number; 0 where none is said, or none that can be read."""
+    """Return a default that is a number; 0 where none is said, or none that can be read."""
     try:
         return read(text)
     except ValueError:

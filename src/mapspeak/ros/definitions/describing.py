@@ -9,12 +9,12 @@ INDENT = "  "
 
 
 def describe_type(book: TypeBook, name: str) -> list[str]:
-    """Gives a line for each field, indented by its depth; a type is spelled out once."""
+    """Return a line for each field, indented by its depth; a type is spelled out once."""
     return _Describer(book).lines(book[name], depth=0)
 
 
 def say_fields(message: MessageType) -> str:
-    """Gives a type's own fields in a sentence: "Its fields are x: float64, y: float64."."""
+    """Return a type's own fields in a sentence: "Its fields are x: float64, y: float64."."""
     fields = ", ".join(map(_say_field, message.fields))
     return f"Its fields are {fields}." if fields else "It has no fields."
 

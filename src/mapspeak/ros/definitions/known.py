@@ -24,7 +24,7 @@ DEFAULTS = {
 
 
 def known_definitions(dialect: Dialect, *, distro: str = "") -> dict[str, str]:
-    """Gives the texts of all types that come with mapspeak, by name as "package/Type".
+    """Return the texts of all types that come with mapspeak, by name as "package/Type".
 
     The parts of services and actions are named as `RosConnection.fetch_definitions` says.
 
@@ -75,7 +75,7 @@ def _entries(distro: str) -> Iterator[tuple[str, str]]:
 
 
 def _translate(name: str, text: str) -> str:
-    """Gives what ROS 1 says instead of ROS 2: its own times, and another name in rosapi."""
+    """Return what ROS 1 says instead of ROS 2: its own times, and another name in rosapi."""
     for ros2, ros1 in TIMES.items():
         text = text.replace(ros2, ros1)
     if name.startswith("rosapi/GetParam_"):

@@ -82,12 +82,12 @@ class MessageType:
     constants: tuple[Constant, ...] = ()
 
     def find(self, name: str) -> Field | None:
-        """Finds a field by its name."""
+        """Find a field by its name."""
         return next((field for field in self.fields if field.name == name), None)
 
 
 def parse_definition(type_name: str, text: str) -> MessageType:
-    """Reads the text of one message type; lines that say nothing are passed over.
+    """Read the text of one message type; lines that say nothing are passed over.
 
     Args:
         type_name: Of the type; its package is that of types named without one.
@@ -108,7 +108,7 @@ def parse_definition(type_name: str, text: str) -> MessageType:
 
 
 def find_odd_lines(text: str) -> list[str]:
-    """Gives the lines of a definition that define nothing and are no remarks."""
+    """Return the lines of a definition that define nothing and are no remarks."""
     return [line.strip() for line in text.splitlines() if _is_odd(line.strip())]
 
 

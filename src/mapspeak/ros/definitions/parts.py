@@ -15,7 +15,7 @@ GENERATED = re.compile(r"_(Request|Response|Goal|Result|FeedbackMessage|Feedback
 
 
 def split_definition(type_name: str, text: str) -> dict[str, str]:
-    """Gives the text of a type and of each type within it, by name as "package/Type".
+    """Return the text of a type and of each type within it, by name as "package/Type".
 
     Args:
         type_name: Of the first.
@@ -29,14 +29,14 @@ def split_definition(type_name: str, text: str) -> dict[str, str]:
 
 
 def write_definition(texts: Mapping[str, str], names: Iterable[str]) -> str:
-    """Gives the texts of some types as one, as `split_definition` reads it; the first leads."""
+    """Return the texts of some types as one, as `split_definition` reads it; the first leads."""
     first, *others = names
     parts = [f"{RULER_LINE}\nMSG: {name}\n{texts[name]}" for name in others]
     return "\n".join([texts[first], *parts])
 
 
 def name_parts(type_name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Gives the names that the parts of a service and of an action of that type would have."""
+    """Return the names that the parts of a service and of an action of that type would have."""
     bare = bare_type(type_name)
     return (
         tuple(f"{bare}_{part}" for part in SERVICE_PARTS),
@@ -45,7 +45,7 @@ def name_parts(type_name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def split_parts(type_name: str, text: str) -> dict[str, str]:
-    """Gives the texts of a message, or of the parts of a service or an action, by their names.
+    """Return the texts of a message, or of the parts of a service or an action, by their names.
 
     Args:
         type_name: As "package/Type".
@@ -59,7 +59,7 @@ def split_parts(type_name: str, text: str) -> dict[str, str]:
 
 
 def kinds_of(texts: Iterable[str]) -> dict[str, str]:
-    """Gives the kind of each type by its name: "msg", "srv" or "action", where parts are named."""
+    """Return the kind of each type by its name: "msg", "srv" or "action", where parts are named."""
     kinds: dict[str, str] = {}
     for name in texts:
         part = GENERATED.search(name)
@@ -72,7 +72,7 @@ def kinds_of(texts: Iterable[str]) -> dict[str, str]:
 
 
 def find_actions_of_ros1(texts: Mapping[str, str]) -> dict[str, str]:
-    """Gives the parts of actions, which ROS 1 writes as messages of their own, named as ROS 2's."""
+    """Return parts of actions, which ROS 1 writes as messages of their own, named as ROS 2's."""
     named = (name.removesuffix("ActionGoal") for name in texts if name.endswith("ActionGoal"))
     return {
         f"{action}_{part}": texts[f"{action}{part}"]

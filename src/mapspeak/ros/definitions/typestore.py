@@ -15,7 +15,7 @@ OF_ACTIONS_SERVICE = ("SendGoal", "GetResult")
 
 
 def name_in_ros2(name: str) -> str:
-    """Gives a type as "package/kind/Type"; the parts of services and actions by their names."""
+    """Return a type as "package/kind/Type"; the parts of services and actions by their names."""
     package, _, last = bare_type(name).partition("/")
     stem, _, part = last.rpartition("_")
     if part in OF_ACTION or stem.rpartition("_")[2] in OF_ACTIONS_SERVICE:

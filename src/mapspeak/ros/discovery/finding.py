@@ -108,7 +108,7 @@ async def find_radius_m(
 
 
 def _radius_of_outline(outline: object) -> float | None:
-    """Reads "[[0.2, 0.1], [-0.2, 0.1], ...]", which ROS 2 keeps as a text and ROS 1 as lists."""
+    """Read "[[0.2, 0.1], [-0.2, 0.1], ...]", which ROS 2 keeps as a text and ROS 1 as lists."""
     if isinstance(outline, str):
         try:
             outline = json.loads(outline)

@@ -106,7 +106,7 @@ class RobotOverrides(BaseModel):
 
 
 def load_robot_file(path: Path) -> RobotOverrides:
-    """Reads robot.yaml.
+    """Read robot.yaml.
 
     Raises:
         ConfigError: The file cannot be read, or a line of it is wrong; says which.

@@ -278,7 +278,7 @@ def _choose_velocity(
 
 
 def _choose_frame(names: tuple[str, ...], frames: frozenset[str], near: ranking.Nearness) -> str:
-    """Gives the first of some names that is a frame, also one with a prefix such as robot1/."""
+    """Return the first of some names that is a frame, also one with a prefix such as robot1/."""
     for name in names:
         if name in frames:
             return name

@@ -25,12 +25,12 @@ class Nearness:
     dead: frozenset[str] = frozenset()
 
     def first(self, names: Iterable[str]) -> str | None:
-        """Gives the first of the names that lies in the namespace, else the first."""
+        """Return the first of the names that lies in the namespace, else the first."""
         listed = list(names)
         return next((name for name in listed if self._is_near(name)), next(iter(listed), None))
 
     def sort(self, names: list[str]) -> list[str]:
-        """Puts names within the namespace first, and changes nothing else."""
+        """Put names within the namespace first, and change nothing else."""
         return sorted(names, key=lambda name: not self._is_near(name))
 
     def _is_near(self, name: str) -> bool:
@@ -94,7 +94,7 @@ VELOCITIES = Wanted(
 
 
 def best(graph: RosGraph, wanted: Wanted, near: Nearness) -> str | None:
-    """Gives the topic that fits best; None where none fits."""
+    """Return the topic that fits best; None where none fits."""
     ranked = sorted(
         (topic for topic in graph.topics_of(*wanted.types) if _may_be(topic, wanted)),
         key=lambda topic: (
@@ -109,7 +109,7 @@ def best(graph: RosGraph, wanted: Wanted, near: Nearness) -> str | None:
 
 
 def rank_maps(graph: RosGraph, near: Nearness) -> list[str]:
-    """Gives the topics that may be the map, the best first; costmaps are none."""
+    """Return the topics that may be the map, the best first; costmaps are none."""
     maps = [
         topic
         for topic in graph.topics_of(MAP)
@@ -128,7 +128,7 @@ def rank_maps(graph: RosGraph, near: Nearness) -> list[str]:
 
 
 def best_move_base(graph: RosGraph, near: Nearness) -> str | None:
-    """Gives the name of the ROS 1 action that drives to a pose, such as /move_base."""
+    """Return the name of the ROS 1 action that drives to a pose, such as /move_base."""
     goals = graph.topics_of(MOVE_BASE_GOAL)
     names = [topic.removesuffix("/goal") for topic in goals if topic.endswith("/goal")]
     return near.first(

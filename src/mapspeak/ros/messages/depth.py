@@ -16,7 +16,7 @@ Depth = NDArray[np.float64]
 
 
 def shade_depth(depth_m: Depth) -> NDArray[np.uint8]:
-    """Gives grey levels, shape (rows, cols): near 255, far 55, 0 where nothing was measured."""
+    """Return grey levels, shape (rows, cols): near 255, far 55, 0 where nothing was measured."""
     is_measured = np.isfinite(depth_m)
     shades = np.zeros(depth_m.shape, dtype=np.uint8)
     if not is_measured.any():
@@ -28,7 +28,7 @@ def shade_depth(depth_m: Depth) -> NDArray[np.uint8]:
 
 
 def read_compressed_depth(data: bytes, form: str) -> Depth:
-    """Reads image_transport's compressedDepth: metres, NaN where nothing was measured.
+    """Read image_transport's compressedDepth: metres, NaN where nothing was measured.
 
     Raises:
         LinkError: It is damaged, or compressed with RVL.

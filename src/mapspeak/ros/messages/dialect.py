@@ -17,24 +17,24 @@ class Dialect(StrEnum):
     ROS2 = "ros2"
 
     def type_name(self, name: str) -> str:
-        """Gives a message's type as this ROS writes it, such as "nav_msgs/msg/OccupancyGrid"."""
+        """Return a message's type as this ROS writes it, such as "nav_msgs/msg/OccupancyGrid"."""
         package, _, last = bare_type(name).partition("/")
         return f"{package}/msg/{last}" if self is Dialect.ROS2 else f"{package}/{last}"
 
     def service_type_name(self, name: str) -> str:
-        """Gives a service's type as this ROS writes it, such as "std_srvs/srv/Empty"."""
+        """Return a service's type as this ROS writes it, such as "std_srvs/srv/Empty"."""
         package, _, last = bare_type(name).partition("/")
         return f"{package}/srv/{last}" if self is Dialect.ROS2 else f"{package}/{last}"
 
 
 def bare_type(name: str) -> str:
-    """Gives a type as "package/Type", however it was written."""
+    """Return a type as "package/Type", however it was written."""
     parts = name.strip("/").split("/")
     return f"{parts[0]}/{parts[-1]}"
 
 
 def read_stamp(stamp: Message) -> float:
-    """Reads a time of either dialect, in seconds.
+    """Read a time of either dialect, in seconds.
 
     Raises:
         LinkError: It is no time.
@@ -48,7 +48,7 @@ def read_stamp(stamp: Message) -> float:
 
 
 def write_stamp(stamp_s: float, *, dialect: Dialect) -> dict[str, int]:
-    """Writes a time given in seconds.
+    """Write a time given in seconds.
 
     Raises:
         LinkError: ROS cannot say that time.
@@ -65,7 +65,7 @@ def write_stamp(stamp_s: float, *, dialect: Dialect) -> dict[str, int]:
 
 
 def read_header(message: Message) -> tuple[str, float]:
-    """Reads the frame and the time in seconds that a message's header gives.
+    """Read the frame and the time in seconds that a message's header gives.
 
     Raises:
         LinkError: The message has no such header.
@@ -75,7 +75,7 @@ def read_header(message: Message) -> tuple[str, float]:
 
 
 def write_header(frame_id: str, stamp_s: float, *, dialect: Dialect) -> dict[str, Any]:
-    """Writes a header; the time in seconds."""
+    """Write a header; the time in seconds."""
     stamp = write_stamp(stamp_s, dialect=dialect)
     if dialect is Dialect.ROS1:
         return {"seq": 0, "stamp": stamp, "frame_id": frame_id}

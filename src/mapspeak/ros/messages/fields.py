@@ -31,12 +31,12 @@ def decode_base64(text: str) -> bytes:
 
 
 def misfit(name: str, value: object, wanted: str) -> LinkError:
-    """Gives the error for a field that holds something else."""
+    """Return the error for a field that holds something else."""
     return LinkError(f"A ROS message's field {name!r} is {_shown(value)}, not {wanted}.", hint=HINT)
 
 
 def _shown(value: object) -> str:
-    """Gives a value shortly: a hostile message may hold megabytes, and a model would read them."""
+    """Return a value shortly: a hostile message may hold megabytes, and a model would read them."""
     match value:
         case int() if value.bit_length() > 128:
             return "a huge number"
@@ -49,7 +49,7 @@ def _shown(value: object) -> str:
 
 
 def part_of(message: object, name: str) -> Message:
-    """Gives a field that is a message itself."""
+    """Return a field that is a message itself."""
     value = _field(message, name)
     if not isinstance(value, Mapping):
         raise misfit(name, value, "a message")
@@ -57,7 +57,7 @@ def part_of(message: object, name: str) -> Message:
 
 
 def parts_of(message: object, name: str) -> Sequence[object]:
-    """Gives a field that is a list."""
+    """Return a field that is a list."""
     value = _field(message, name)
     if not isinstance(value, list | tuple):
         raise misfit(name, value, "a list")
@@ -65,7 +65,7 @@ def parts_of(message: object, name: str) -> Sequence[object]:
 
 
 def text_of(message: object, name: str) -> str:
-    """Gives a field that is a text."""
+    """Return a field that is a text."""
     value = _field(message, name)
     if not isinstance(value, str):
         raise misfit(name, value, "a text")
@@ -73,7 +73,7 @@ def text_of(message: object, name: str) -> str:
 
 
 def number_of(message: object, name: str) -> float:
-    """Gives a field that is a finite number; ROS 1 writes NaN and infinity as null."""
+    """Return a field that is a finite number; ROS 1 writes NaN and infinity as null."""
     value = _field(message, name)
     if isinstance(value, bool) or not isinstance(value, int | float | np.floating | np.integer):
         raise misfit(name, value, "a finite number")
@@ -87,7 +87,7 @@ def number_of(message: object, name: str) -> float:
 
 
 def whole_of(message: object, name: str, *, low: int, high: int) -> int:
-    """Gives a field that is a whole number between two limits, both included."""
+    """Return a field that is a whole number between two limits, both included."""
     value = _field(message, name)
     wanted = f"a whole number from {low} to {high}"
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
@@ -98,7 +98,7 @@ def whole_of(message: object, name: str, *, low: int, high: int) -> int:
 
 
 def floats_of(message: object, name: str) -> NDArray[np.float64]:
-    """Gives a field that is a list of numbers; null is NaN, as ROS 1 writes it."""
+    """Return a field that is a list of numbers; null is NaN, as ROS 1 writes it."""
     value = _field(message, name)
     if isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "iuf":
         return value.astype(np.float64)

@@ -32,7 +32,7 @@ Cells = NDArray[np.int8]
 
 
 def read_grid(message: Message) -> OccupancyGrid:
-    """Reads nav_msgs/OccupancyGrid.
+    """Read nav_msgs/OccupancyGrid.
 
     The cells may be a list (JSON), base64 text, bytes, or a numpy array (a CBOR typed array).
 
@@ -52,7 +52,7 @@ def read_grid(message: Message) -> OccupancyGrid:
 
 
 def write_grid(grid: OccupancyGrid, *, dialect: Dialect, frame_id: str = "map") -> dict[str, Any]:
-    """Writes nav_msgs/OccupancyGrid; the cells as a flat numpy array of int8."""
+    """Write nav_msgs/OccupancyGrid; the cells as a flat numpy array of int8."""
     info = {
         "map_load_time": write_stamp(grid.stamp_s, dialect=dialect),
         "resolution": float(np.float32(grid.resolution_m)),
@@ -65,7 +65,7 @@ def write_grid(grid: OccupancyGrid, *, dialect: Dialect, frame_id: str = "map") 
 
 
 def apply_grid_update(grid: OccupancyGrid, message: Message) -> OccupancyGrid:
-    """Gives the map with the part changed that a map_msgs/OccupancyGridUpdate tells.
+    """Return the map with the part changed that a map_msgs/OccupancyGridUpdate tells.
 
     Raises:
         LinkError: A field is missing or of another kind.
@@ -133,7 +133,7 @@ def _flat_cells(data: object) -> Cells:
 
 
 def _narrow(data: NDArray[Any]) -> Cells:
-    """Gives the numbers as int8; 8-bit ones keep their bits, so that 255 is unknown."""
+    """Return the numbers as int8; 8-bit ones keep their bits, so that 255 is unknown."""
     if data.dtype.itemsize == 1:
         return data.view(np.int8)
     if data.size and (int(data.min()) < -128 or int(data.max()) > 127):
@@ -142,7 +142,7 @@ def _narrow(data: NDArray[Any]) -> Cells:
 
 
 def _undo_single_precision(value: float) -> float:
-    """Gives 0.05 for 0.05000000074505806, which is how a ROS float32 arrives."""
+    """Return 0.05 for 0.05000000074505806, which is how a ROS float32 arrives."""
     with np.errstate(over="ignore"):
         single = np.float32(value)
     return float(str(single)) if float(single) == value else value

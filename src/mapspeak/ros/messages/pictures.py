@@ -48,7 +48,7 @@ class EncodedPicture:
 
 
 def read_image(message: Message) -> EncodedPicture:
-    """Reads sensor_msgs/Image: colours become JPEG; grey levels and depth become PNG.
+    """Read sensor_msgs/Image: colours become JPEG; grey levels and depth become PNG.
 
     Depth is shaded from near (bright) to far (dark); black is where nothing was measured.
 
@@ -62,7 +62,7 @@ def read_image(message: Message) -> EncodedPicture:
 
 
 def read_compressed_image(message: Message) -> EncodedPicture:
-    """Reads sensor_msgs/CompressedImage: JPEG and PNG pass as they are, depth is shaded.
+    """Read sensor_msgs/CompressedImage: JPEG and PNG pass as they are, depth is shaded.
 
     Raises:
         LinkError: It is none, is cut off, or is neither JPEG nor PNG.
@@ -87,7 +87,7 @@ def read_compressed_image(message: Message) -> EncodedPicture:
 
 
 def write_compressed_image(picture: EncodedPicture, *, dialect: Dialect) -> dict[str, Any]:
-    """Writes sensor_msgs/CompressedImage; the data as bytes."""
+    """Write sensor_msgs/CompressedImage; the data as bytes."""
     return {
         "header": write_header(picture.frame_id, picture.stamp_s, dialect=dialect),
         "format": picture.media_type.removeprefix("image/"),
@@ -96,7 +96,7 @@ def write_compressed_image(picture: EncodedPicture, *, dialect: Dialect) -> dict
 
 
 def _encode(pixels: NDArray[np.uint8], message: Message) -> EncodedPicture:
-    """Makes a file of grey levels, shape (rows, cols), or of colours, shape (rows, cols, 3)."""
+    """Make a file of grey levels, shape (rows, cols), or of colours, shape (rows, cols, 3)."""
     frame_id, stamp_s = read_header(message)
     is_grey = pixels.ndim == 2
     if is_grey:
@@ -115,7 +115,7 @@ def _encode(pixels: NDArray[np.uint8], message: Message) -> EncodedPicture:
 
 
 def _identify(data: bytes, form: str) -> tuple[str, str, tuple[int, int]]:
-    """Gives kind, mode and size by what the file says; `format` is filled in many ways."""
+    """Return kind, mode and size by what the file says; `format` is filled in many ways."""
     hint = "Subscribe to a raw image topic instead, or let the camera publish JPEG or PNG."
     if not data:
         raise LinkError("The camera's compressed picture is empty.", hint=hint)

@@ -44,7 +44,7 @@ YUV = {
 
 
 def read_pixels(message: Message) -> Pixels:
-    """Reads grey levels, shape (rows, cols), or RGB, shape (rows, cols, 3).
+    """Read grey levels, shape (rows, cols), or RGB, shape (rows, cols, 3).
 
     Raises:
         LinkError: The fields do not fit together, or the encoding is not known.
@@ -68,7 +68,7 @@ def read_pixels(message: Message) -> Pixels:
 
 
 def read_depth(message: Message) -> Depth:
-    """Reads 16UC1 (millimetres) or 32FC1 (metres): metres, NaN where nothing was measured.
+    """Read 16UC1 (millimetres) or 32FC1 (metres): metres, NaN where nothing was measured.
 
     Raises:
         LinkError: The fields do not fit together, or it is no depth image.
@@ -82,7 +82,7 @@ def read_depth(message: Message) -> Depth:
 
 
 def bytes_of(message: Message) -> bytes:
-    """Gives the field `data` of a message with uint8[]: base64 text, bytes, array or list.
+    """Return the field `data` of a message with uint8[]: base64 text, bytes, array or list.
 
     Raises:
         LinkError: It is none of these.
@@ -104,7 +104,7 @@ def bytes_of(message: Message) -> bytes:
 
 
 def _read_samples(message: Message, encoding: str) -> NDArray[Any]:
-    """Gives an array of shape (rows, cols, samples), without padding, in native byte order."""
+    """Return an array of shape (rows, cols, samples), without padding, in native byte order."""
     if encoding not in SAMPLES:
         raise LinkError(
             f"The camera's encoding {encoding[:40]!r} is not known.",
@@ -133,14 +133,14 @@ def _read_samples(message: Message, encoding: str) -> NDArray[Any]:
 
 
 def _sample_type(message: Message, encoding: str, n_bits: int) -> str:
-    """Gives numpy's name for one sample; both bool and uint8 are seen for the byte order."""
+    """Return numpy's name for one sample; both bool and uint8 are seen for the byte order."""
     flag = message.get("is_bigendian")
     order = ">" if isinstance(flag, int) and flag else "<"
     return f"{order}{'f' if encoding == '32FC1' else 'u'}{n_bits // 8}"
 
 
 def _stretch(levels: NDArray[Any]) -> Pixels:
-    """Spreads 16-bit grey over 8 bits: most such cameras use a part of the range only."""
+    """Spread 16-bit grey over 8 bits: most such cameras use a part of the range only."""
     wide = levels.astype(np.float64)
     low, high = wide.min(), wide.max()
     shades: Pixels = np.rint((wide - low) * (255.0 / max(high - low, 1.0))).astype(np.uint8)

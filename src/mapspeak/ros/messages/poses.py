@@ -72,7 +72,7 @@ class Twist:
 
 
 def read_yaw(quaternion: Message) -> float:
-    """Reads the heading of a quaternion, in radians.
+    """Read the heading of a quaternion, in radians.
 
     Raises:
         LinkError: It is zero, not of length 1, or not made of numbers.
@@ -95,12 +95,12 @@ def _read_rotation(quaternion: Message) -> tuple[float, float, float, float]:
 
 
 def write_yaw(yaw_rad: float) -> dict[str, float]:
-    """Writes a heading as a quaternion."""
+    """Write a heading as a quaternion."""
     return {"x": 0.0, "y": 0.0, "z": math.sin(yaw_rad / 2), "w": math.cos(yaw_rad / 2)}
 
 
 def read_pose(message: Message) -> Pose:
-    """Reads geometry_msgs/Pose; height and tilt are left away.
+    """Read geometry_msgs/Pose; height and tilt are left away.
 
     Raises:
         LinkError: It is no pose.
@@ -111,13 +111,13 @@ def read_pose(message: Message) -> Pose:
 
 
 def write_pose(pose: Pose) -> dict[str, Any]:
-    """Writes geometry_msgs/Pose, on the floor."""
+    """Write geometry_msgs/Pose, on the floor."""
     position = {"x": float(pose.x), "y": float(pose.y), "z": 0.0}
     return {"position": position, "orientation": write_yaw(pose.yaw_rad)}
 
 
 def read_pose_stamped(message: Message) -> FramedPose:
-    """Reads geometry_msgs/PoseStamped.
+    """Read geometry_msgs/PoseStamped.
 
     Raises:
         LinkError: It is none.
@@ -127,13 +127,13 @@ def read_pose_stamped(message: Message) -> FramedPose:
 
 
 def write_pose_stamped(framed: FramedPose, *, dialect: Dialect) -> dict[str, Any]:
-    """Writes geometry_msgs/PoseStamped."""
+    """Write geometry_msgs/PoseStamped."""
     header = write_header(framed.frame_id, framed.stamp_s, dialect=dialect)
     return {"header": header, "pose": write_pose(framed.pose)}
 
 
 def read_pose_with_covariance(message: Message) -> FramedPose:
-    """Reads geometry_msgs/PoseWithCovarianceStamped, or the pose of nav_msgs/Odometry.
+    """Read geometry_msgs/PoseWithCovarianceStamped, or the pose of nav_msgs/Odometry.
 
     Raises:
         LinkError: It is neither.
@@ -144,7 +144,7 @@ def read_pose_with_covariance(message: Message) -> FramedPose:
 
 
 def write_pose_with_covariance(framed: FramedPose, *, dialect: Dialect) -> dict[str, Any]:
-    """Writes geometry_msgs/PoseWithCovarianceStamped; the covariance is left at zero, unknown."""
+    """Write geometry_msgs/PoseWithCovarianceStamped; the covariance is left at zero, unknown."""
     header = write_header(framed.frame_id, framed.stamp_s, dialect=dialect)
     return {"header": header, "pose": {"pose": write_pose(framed.pose), "covariance": [0.0] * 36}}
 
@@ -152,14 +152,14 @@ def write_pose_with_covariance(framed: FramedPose, *, dialect: Dialect) -> dict[
 def write_odometry(
     framed: FramedPose, twist: Twist, *, child: str, dialect: Dialect
 ) -> dict[str, Any]:
-    """Writes nav_msgs/Odometry: a pose, and the velocity in the frame `child`."""
+    """Write nav_msgs/Odometry: a pose, and the velocity in the frame `child`."""
     velocity = {"twist": write_twist(twist), "covariance": [0.0] * 36}
     posed = write_pose_with_covariance(framed, dialect=dialect)
     return {**posed, "child_frame_id": child, "twist": velocity}
 
 
 def read_transforms(message: Message) -> tuple[FrameTransform, ...]:
-    """Reads tf2_msgs/TFMessage.
+    """Read tf2_msgs/TFMessage.
 
     Raises:
         LinkError: It is none.
@@ -168,12 +168,12 @@ def read_transforms(message: Message) -> tuple[FrameTransform, ...]:
 
 
 def write_transforms(transforms: Iterable[FrameTransform], *, dialect: Dialect) -> dict[str, Any]:
-    """Writes tf2_msgs/TFMessage."""
+    """Write tf2_msgs/TFMessage."""
     return {"transforms": [_write_transform(each, dialect=dialect) for each in transforms]}
 
 
 def read_twist(message: object) -> Twist:
-    """Reads geometry_msgs/Twist, or the one within geometry_msgs/TwistStamped.
+    """Read geometry_msgs/Twist, or the one within geometry_msgs/TwistStamped.
 
     Raises:
         LinkError: It is neither.
@@ -189,7 +189,7 @@ def read_twist(message: object) -> Twist:
 
 
 def write_twist(twist: Twist) -> dict[str, Any]:
-    """Writes geometry_msgs/Twist."""
+    """Write geometry_msgs/Twist."""
     return {
         "linear": {"x": twist.forward_mps, "y": twist.left_mps, "z": 0.0},
         "angular": {"x": 0.0, "y": 0.0, "z": twist.turn_radps},

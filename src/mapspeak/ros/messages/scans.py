@@ -91,7 +91,7 @@ class CameraInfo:
 
 
 def read_scan(message: Message) -> LaserScan:
-    """Reads sensor_msgs/LaserScan; ranges outside its own limits become NaN.
+    """Read sensor_msgs/LaserScan; ranges outside its own limits become NaN.
 
     A beam that met nothing is infinite (REP 117), or at its limit or beyond, as Stage and some
     drivers of ROS 1 write it, and as AMCL reads it. Zero, NaN and what is too
@@ -120,7 +120,7 @@ def read_scan(message: Message) -> LaserScan:
 
 
 def mend_scan(message: Message) -> tuple[dict[str, Any], dict[str, str]]:
-    """Gives a sensor_msgs/LaserScan that can be read, and what was wrong with each of its fields.
+    """Return a sensor_msgs/LaserScan that can be read, and what was wrong with each of its fields.
 
     A field that is wrong holds what says nothing instead: zero for an angle, no limit for a range,
     NaN for a single beam.
@@ -143,7 +143,7 @@ def mend_scan(message: Message) -> tuple[dict[str, Any], dict[str, str]]:
 
 
 def write_scan(scan: LaserScan, *, dialect: Dialect) -> dict[str, Any]:
-    """Writes sensor_msgs/LaserScan; a beam that met nothing becomes infinite (REP 117)."""
+    """Write sensor_msgs/LaserScan; a beam that met nothing becomes infinite (REP 117)."""
     ranges_m = np.where(scan.is_open, np.inf, scan.ranges_m)
     last_rad = scan.first_angle_rad + scan.angle_step_rad * max(len(ranges_m) - 1, 0)
     return {
@@ -161,7 +161,7 @@ def write_scan(scan: LaserScan, *, dialect: Dialect) -> dict[str, Any]:
 
 
 def read_camera_info(message: Message) -> CameraInfo:
-    """Reads sensor_msgs/CameraInfo.
+    """Read sensor_msgs/CameraInfo.
 
     Raises:
         LinkError: It is none.
@@ -183,7 +183,7 @@ def read_camera_info(message: Message) -> CameraInfo:
 
 
 def write_camera_info(info: CameraInfo, *, dialect: Dialect) -> dict[str, Any]:
-    """Writes sensor_msgs/CameraInfo of a camera without distortion, with square pixels."""
+    """Write sensor_msgs/CameraInfo of a camera without distortion, with square pixels."""
     focal_px = 0.0
     if info.horizontal_fov_rad is not None:
         focal_px = info.width_px / (2.0 * math.tan(info.horizontal_fov_rad / 2.0))
@@ -215,7 +215,7 @@ def _is_range(value: object) -> bool:
 
 
 def _fov(width_px: int, *, focal_px: float, centre_px: float) -> float | None:
-    """Gives the angle between the edges; drivers leave the matrix at zero until calibrated."""
+    """Return the angle between the edges; drivers leave the matrix at zero until calibrated."""
     if not (focal_px > 0.0 and 0.0 <= centre_px <= width_px and width_px > 0):
         return None
     fov_rad = math.atan(centre_px / focal_px) + math.atan((width_px - centre_px) / focal_px)

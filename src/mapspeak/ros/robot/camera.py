@@ -51,7 +51,7 @@ class RosCamera:
         self._lingering = Lingering(connection, self._subscribe)
 
     async def fetch(self) -> EncodedPicture:
-        """Gives a picture that arrives after it was asked for.
+        """Return a picture that arrives after it was asked for.
 
         Raises:
             LinkError: There is no camera, no picture came, or it cannot be read.
@@ -61,7 +61,7 @@ class RosCamera:
         return self._read(message)
 
     async def fetch_fov_rad(self) -> float | None:
-        """Gives the horizontal field of view in radians; None where the camera does not say."""
+        """Return the horizontal field of view in radians; None where the camera does not say."""
         infos = self._lingering.subscriptions[1:]
         if not infos:
             return None
@@ -72,11 +72,11 @@ class RosCamera:
             return None
 
     async def close_when_idle(self) -> None:
-        """Ends the subscription whenever nobody has looked for a while; runs until cancelled."""
+        """End the subscription whenever nobody has looked for a while; run until cancelled."""
         await self._lingering.close_when_idle()
 
     def _subscribe(self) -> tuple[Subscription, ...]:
-        """Begins with the pictures; the camera's measures follow where it tells them."""
+        """Begin with the pictures; the camera's measures follow where it tells them."""
         profile = self._profile
         if profile.camera_topic is None:
             raise LinkError("The robot publishes no camera pictures.", hint=CAMERA_HINT)

@@ -270,7 +270,7 @@ class ActionDriver:
             self._end(drive)
 
     def _may_be_replaced_yet(self, drive: _Drive) -> bool:
-        """True while the list of all goals, which may name a newer one of others, is behind.
+        """Return True while the list of all goals, which may name a newer one of others, is behind.
 
         Of a goal that was aborted, the list that says so shows what replaced it; the result comes
         another way, and may come first.

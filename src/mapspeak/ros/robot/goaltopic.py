@@ -73,7 +73,7 @@ class GoalTopicDriver:
         return ()
 
     async def send(self, goal: Pose) -> GoalRecord:
-        """Publishes a goal; nobody confirms it."""
+        """Publish a goal; nobody confirms it."""
         record = GoalRecord(new_id(), goal)
         self._connection.started.n_begun += 1
         await self._publish(goal)
@@ -85,7 +85,7 @@ class GoalTopicDriver:
         return record
 
     async def look_at(self, record: GoalRecord) -> None:
-        """Judges by the robot's pose how the goal stands."""
+        """Judge by the robot's pose how the goal stands."""
         if record is not self._current or record.is_over:
             return
         place = (await self._fetch_pose()).pose.point
@@ -101,13 +101,13 @@ class GoalTopicDriver:
             )
 
     async def cancel(self, record: GoalRecord) -> None:
-        """Sends the robot to where it is; it has no other way to end a goal."""
+        """Send the robot to where it is; it has no other way to end a goal."""
         if not record.is_over and record is self._current:
             await self._publish((await self._fetch_pose()).pose)
             record.end(GoalState.CANCELLED)
 
     async def end(self) -> None:
-        """Sends the robot to where it is."""
+        """Send the robot to where it is."""
         await self._publish((await self._fetch_pose()).pose)
         if self._current is not None:
             self._current.end(GoalState.CANCELLED)

@@ -34,7 +34,7 @@ class Mounting:
     def place(
         self, angles_rad: NDArray[np.float64], ranges_m: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Gives directions and distances in the sensor's plane as from the robot, seen from above.
+        """Return directions and distances in the sensor's plane as from the robot, seen from above.
 
         Args:
             angles_rad: Counter-clockwise from the sensor's x axis about its z axis.
@@ -46,7 +46,7 @@ class Mounting:
 
 
 def find_mounting(tree: TransformTree, *, base: str, sensor: str) -> Mounting:
-    """Gives where a sensor that looks along the floor is on the robot.
+    """Return where a sensor that looks along the floor is on the robot.
 
     Raises:
         LinkError: The frames do not say, or it looks up or down.
@@ -63,7 +63,7 @@ def find_mounting(tree: TransformTree, *, base: str, sensor: str) -> Mounting:
 
 
 def _chain(way_up: Iterable[FrameTransform]) -> NDArray[np.float64]:
-    """Gives the matrix from the lowest frame of a way to the highest."""
+    """Return the matrix from the lowest frame of a way to the highest."""
     matrix = np.eye(4)
     for transform in way_up:
         matrix = _matrix(transform) @ matrix
@@ -115,7 +115,7 @@ class Laser:
         self._lingering = Lingering(connection, self._subscribe)
 
     async def fetch(self, poses: PoseKeeper) -> RangeScan | None:
-        """Gives a scan that arrives after it was asked for, or None.
+        """Return a scan that arrives after it was asked for, or None.
 
         Args:
             poses: Knows where the robot is when it comes.
@@ -130,7 +130,7 @@ class Laser:
             return None
 
     async def close_when_idle(self) -> None:
-        """Ends the subscription whenever nobody has looked for a while; runs until cancelled."""
+        """End the subscription whenever nobody has looked for a while; run until cancelled."""
         await self._lingering.close_when_idle()
 
     def _subscribe(self) -> tuple[Subscription, ...]:
@@ -169,7 +169,7 @@ class Laser:
 def _as_from_base(
     scan: LaserScan, mounting: Mounting
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Gives directions and ranges from the robot; of a beam without a range, its direction."""
+    """Return directions and ranges from the robot; of a beam without a range, its direction."""
     is_met = np.isfinite(scan.ranges_m)
     far_m = np.where(is_met, scan.ranges_m, scan.largest_range_m)
     with np.errstate(over="ignore", invalid="ignore"):

@@ -65,7 +65,7 @@ class MapSubscriber:
         """Updates that did not fit the map; the next whole map mends that."""
 
     async def fetch(self) -> OccupancyGrid:
-        """Gives the latest map; the same value until it changes.
+        """Return the latest map; the same value until it changes.
 
         Raises:
             LinkError: There is none, or it is none.
@@ -107,7 +107,7 @@ class MapSubscriber:
         return self._maps
 
     async def _wait_for_first(self, maps: Subscription) -> None:
-        """Waits for the map, and asks anew as often as that is worth it.
+        """Wait for the map, and ask anew as often as that is worth it.
 
         The last one goes on however often it was waited for in vain: a map of 4000x4000 cells as
         JSON takes rosbridge twenty seconds, and asking anew would begin them again.

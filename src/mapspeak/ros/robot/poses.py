@@ -63,7 +63,7 @@ class RobotClock:
         return self._simulated_s is not None and anyio.current_time() - self._ticked_s > STILL_S
 
     async def start(self, clock_topic: str | None) -> None:
-        """Sets the clock by what the robot says now."""
+        """Set the clock by what the robot says now."""
         await self._ask_the_time()
         if clock_topic is not None:
             self._connection.subscribe(clock_topic).listen(self._take)
@@ -77,7 +77,7 @@ class RobotClock:
             await self._ask_the_time()
 
     async def sleep(self, duration_s: float) -> None:
-        """Returns when that much robot time has passed.
+        """Return when that much robot time has passed.
 
         Raises:
             LinkError: The simulation's clock stands still.
@@ -163,7 +163,7 @@ class PoseKeeper:
             self._connection.unsubscribe(self._topic)
 
     async def fetch(self, *, timeout_s: float = PATIENCE_S) -> StampedPose:
-        """Gives the latest pose in the map frame; waits for the first.
+        """Return the latest pose in the map frame; wait for the first.
 
         Raises:
             LinkError: The robot does not say where it is.

@@ -125,11 +125,11 @@ class RosRobot:
         return self._clock.now_s
 
     async def sleep(self, duration_s: float) -> None:
-        """Returns when that much robot time has passed."""
+        """Return when that much robot time has passed."""
         await self._clock.sleep(duration_s)
 
     async def fetch_map(self) -> OccupancyGrid:
-        """Gives the latest map; the same value as long as it has not changed."""
+        """Return the latest map; the same value as long as it has not changed."""
         await self.connection.wait_until_connected()
         await self._watch.find(MAP)
         # Where the robot fits on it depends on that.
@@ -137,13 +137,13 @@ class RosRobot:
         return await self._maps.fetch()
 
     async def fetch_pose(self) -> StampedPose:
-        """Gives where the robot believes it is; see the profile for how it is known."""
+        """Return where the robot believes it is; see the profile for how it is known."""
         await self.connection.wait_until_connected()
         await self._watch.wait_for(POSE)
         return await self._find_pose()
 
     async def fetch_picture(self) -> CameraPicture:
-        """Takes a picture with the front camera."""
+        """Take a picture with the front camera."""
         await self.connection.wait_until_connected()
         await self._watch.find(CAMERA)
         picture = await self._camera.fetch()
@@ -160,15 +160,15 @@ class RosRobot:
         )
 
     async def fetch_detections(self) -> tuple[Detection, ...]:
-        """Gives nothing: no message for detections is common to robots."""
+        """Return nothing: no message for detections is common to robots."""
         return ()
 
     async def fetch_scan(self) -> RangeScan | None:
-        """Gives a scan of the laser that arrives after it was asked for; None where none does."""
+        """Return a scan of the laser that arrives after it was asked for; None where none does."""
         return await self._laser.fetch(self._poses)
 
     async def send_goal(self, goal: Pose) -> str:
-        """Starts a drive; returns when navigation has taken or refused it."""
+        """Start a drive; return when navigation has taken or refused it."""
         await self.connection.wait_until_connected()
         await self._watch.find(NAVIGATION)
         # Whoever drives may have to stop before long.
@@ -184,7 +184,7 @@ class RosRobot:
         return record.goal_id
 
     async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
-        """Gives how a drive stands, also long after its end and after a reconnection."""
+        """Return how a drive stands, also long after its end and after a reconnection."""
         record = self._record(robot_goal_id)
         if not record.is_over:
             await self.connection.wait_until_connected()
@@ -192,18 +192,18 @@ class RosRobot:
         return record.status
 
     async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
-        """Gives how goals stand that other clients have sent, as far as navigation tells."""
+        """Return how goals stand that other clients have sent, as far as navigation tells."""
         return () if self._driver is None else self._driver.foreign_goals
 
     async def cancel_goal(self, robot_goal_id: str) -> None:
-        """Asks navigation to end a drive, and waits a moment until it has."""
+        """Ask navigation to end a drive, and wait a moment until it has."""
         record = self._record(robot_goal_id)
         if not record.is_over:
             await self.connection.wait_until_connected()
             await self._wanted_driver().cancel(record)
 
     async def stop(self) -> None:
-        """Ends all that we have started, and every drive of others; commands zero velocity.
+        """End all that we have started, and every drive of others; commands zero velocity.
 
         Raises:
             LinkError: Names what could not be told, or goes on.
@@ -270,7 +270,7 @@ class RosRobot:
         return Brake(self.connection, self.profile, latest_pose=lambda: self._poses.latest)
 
     def _stand(self) -> None:
-        """Stops the base itself: whoever drove it has gone, and some keep to the last velocity."""
+        """Stop the base itself: whoever drove it has gone, and some keep to the last velocity."""
         self._brake.pull()
 
     def _build_driver(self) -> GoalDriver | None:
@@ -326,7 +326,7 @@ async def build_ros_robot(
     patience: DrivingPatience = USUAL_PATIENCE,
     frames_s: float = FRAMES_S,
 ) -> RosRobot:
-    """Gives the robot at the other end of a connection, once it has said what it offers.
+    """Return the robot at the other end of a connection, once it has said what it offers.
 
     Args:
         connection: To the robot; stays open as long as the robot is used.

@@ -65,7 +65,7 @@ class Brake:
             self._connection.publish_everywhere(topic, zero)
 
     async def _repeat(self, n_begun: int) -> None:
-        """A message may be overtaken by another, and a base may keep to the last one it heard."""
+        """Publish again, since a message may be overtaken and a base may keep to the last."""
         standing = _Standing()
         begun_s = seen_s = anyio.current_time()
         n_sent = 0

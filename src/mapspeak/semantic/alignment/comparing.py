@@ -41,7 +41,7 @@ class SnapshotFolder:
         self.path = real.with_name(f"{real.stem}.memory")
 
     def load(self, name: str) -> OccupancyGrid | None:
-        """Gives a map that was kept; None where there is none of that name.
+        """Return a map that was kept; None where there is none of that name.
 
         Raises:
             SemanticMapError: It is there, but damaged.
@@ -58,7 +58,7 @@ class SnapshotFolder:
             ) from error
 
     def keep(self, grid: OccupancyGrid, name: str) -> None:
-        """Writes a map in place of the one of that name; it is on the disk when this returns.
+        """Write a map in place of the one of that name; it is on the disk when this returns.
 
         Raises:
             SemanticMapError: It cannot be written.
@@ -82,14 +82,14 @@ class SnapshotFolder:
             ) from error
 
     def free_name(self) -> str:
-        """Gives a name for another map that none has yet: map-2.yaml, map-3.yaml, ..."""
+        """Return a name for another map that none has yet: map-2.yaml, map-3.yaml, ..."""
         number = 2
         while (self.path / f"map-{number}.yaml").exists():
             number += 1
         return f"map-{number}.yaml"
 
     def note(self, name: str, content: bytes) -> Path:
-        """Writes any other file into the folder; it is on the disk when this returns."""
+        """Write any other file into the folder; it is on the disk when this returns."""
         path = self.path / name
         try:
             path.write_bytes(content)
@@ -108,7 +108,7 @@ class SnapshotFolder:
 
 
 def _in_three_greys(grid: OccupancyGrid) -> OccupancyGrid:
-    """Gives the map with free, occupied and unknown alone: map files know no free cell of 45."""
+    """Return the map with free, occupied and unknown alone: map files know no free cell of 45."""
     cells = np.where(grid.free, 0, np.where(grid.occupied, 100, UNKNOWN)).astype(np.int8)
     return OccupancyGrid(
         cells=cells, resolution_m=grid.resolution_m, origin=grid.origin, stamp_s=grid.stamp_s

@@ -35,7 +35,7 @@ CONFLICT = 0.5
 
 
 def guess_transforms(old: MapSurfaces, new: MapSurfaces) -> Iterator[Pose]:
-    """Gives transforms from the old map's frame to the new one's that are worth a closer look."""
+    """Return transforms from the old map's frame to the new one's that are worth a closer look."""
     if not (old.points.size and new.points.size):
         return
     field = _Field(old, new)
@@ -47,7 +47,7 @@ def guess_transforms(old: MapSurfaces, new: MapSurfaces) -> Iterator[Pose]:
 
 
 def _find_turns(old: MapSurfaces, new: MapSurfaces) -> list[float]:
-    """Gives turns by which the walls of both maps run in the same directions, best first."""
+    """Return turns by which the walls of both maps run in the same directions, best first."""
     before, after = _directions(old), _directions(new)
     spectrum = np.conj(np.fft.rfft(before)) * np.fft.rfft(after)
     likeness = np.fft.irfft(spectrum, N_BINS)
@@ -64,7 +64,7 @@ def _find_turns(old: MapSurfaces, new: MapSurfaces) -> list[float]:
 
 
 def _directions(surfaces: MapSurfaces) -> FloatArray:
-    """Gives how much wall runs in each direction modulo pi, a little blurred."""
+    """Return how much wall runs in each direction modulo pi, a little blurred."""
     angles, sureness = surfaces.lines
     bins = (angles / np.pi * N_BINS).astype(np.intp) % N_BINS
     histogram = np.bincount(bins, weights=sureness, minlength=N_BINS)
@@ -74,7 +74,7 @@ def _directions(surfaces: MapSurfaces) -> FloatArray:
 
 
 def _peak(values: FloatArray, index: int) -> float:
-    """Gives where the parabola through a highest value and its neighbours is highest."""
+    """Return where the parabola through a highest value and its neighbours is highest."""
     low, middle, high = (values[(index + step) % len(values)] for step in (-1, 0, 1))
     curvature = low - 2 * middle + high
     return index + (0.5 * (low - high) / curvature if curvature < 0 else 0.0)
@@ -101,7 +101,7 @@ class _Field:
         self._fits, self._walls = map(np.fft.rfft2, self._rasters(new))
 
     def find_shifts(self, turn_rad: float) -> Iterator[Pose]:
-        """Gives the shifts, for one turn, by which most walls fall on walls."""
+        """Return the shifts, for one turn, by which most walls fall on walls."""
         turn = Pose(0.0, 0.0, turn_rad)
         turned_centre = placed(self._old_centre[None], turn)[0]
         # Laid about the raster's corner, so that a shift is where the centre comes to lie.
@@ -115,7 +115,7 @@ class _Field:
             yield Pose(float(x), float(y), turn_rad)
 
     def _rasters(self, new: MapSurfaces) -> tuple[Raster, Raster]:
-        """Gives how well a wall fits in each place of the new map, and where its walls are."""
+        """Return how well a wall fits in each place of the new map, and where its walls are."""
         steps = np.arange(self._size) * self._cell_m
         xs, ys = np.meshgrid(self._low[0] + steps, self._low[1] + steps)
         centres = np.stack([xs.ravel(), ys.ravel()], axis=1)
@@ -126,7 +126,7 @@ class _Field:
         return fits.astype(np.float32), self._drawn(new.points - self._low)
 
     def _drawn(self, points: FloatArray) -> Raster:
-        """Gives the raster with ones where points are; what lies left of it is wrapped round."""
+        """Return the raster with ones where points are; what lies left of it is wrapped round."""
         cols, rows = np.round(points / self._cell_m).astype(np.intp).T % self._size
         raster = np.zeros((self._size, self._size), dtype=np.float32)
         raster[rows, cols] = 1.0
@@ -148,7 +148,7 @@ def _middle(points: FloatArray) -> FloatArray:
 
 
 def _thinned(points: FloatArray) -> FloatArray:
-    """Gives one point for each part of the plane as large as a cell of the raster."""
+    """Return one point for each part of the plane as large as a cell of the raster."""
     if not points.size:
         return points
     keys = np.floor(points / (CELL_M / 2)).astype(np.int64)
@@ -157,7 +157,7 @@ def _thinned(points: FloatArray) -> FloatArray:
 
 
 def _smooth_size(least: int) -> int:
-    """Gives a size with small factors alone, which fast Fourier transforms like."""
+    """Return a size with small factors alone, which fast Fourier transforms like."""
     size = least
     while True:
         rest = size
@@ -178,7 +178,7 @@ SETTLED_M, SETTLED_RAD = 1e-4, 1e-5
 
 
 def refine(old: MapSurfaces, new: MapSurfaces, guess: Pose) -> Pose:
-    """Gives the transform near a guess by which most of the old map's walls lie on the new one's.
+    """Return the transform near a guess by which most of the old map's walls lie on the new one's.
 
     Each step moves the points towards the lines of their nearest walls (Chen and Medioni, "Object
     modelling by registration of multiple range images", 1992).
@@ -198,7 +198,7 @@ def refine(old: MapSurfaces, new: MapSurfaces, guess: Pose) -> Pose:
 
 
 def _find_step(new: MapSurfaces, points: FloatArray, reach_m: float) -> Pose | None:
-    """Gives the small motion that brings points nearest to the lines of walls in reach."""
+    """Return the small motion that brings points nearest to the lines of walls in reach."""
     nearest, distances = new.nearest_to(points)
     is_near = distances < reach_m
     if np.count_nonzero(is_near) < LEAST_POINTS:
@@ -221,7 +221,7 @@ def _find_step(new: MapSurfaces, points: FloatArray, reach_m: float) -> Pose | N
 
 
 def _sample(points: FloatArray) -> FloatArray:
-    """Gives some of the points, spread evenly over the map, the same ones every time."""
+    """Return some of the points, spread evenly over the map, the same ones every time."""
     stride = max(-(-len(points) // MOST_POINTS), 1)
     return points[::stride]
 
@@ -295,7 +295,7 @@ _REASONS = {
 
 
 def find_fit(old: MapSurfaces, new: MapSurfaces) -> MapFit | None:
-    """Finds where an old map lies on a new one; None where nothing can be laid on anything."""
+    """Find where an old map lies on a new one; None where nothing can be laid on anything."""
     refined = (refine(old, new, guess) for guess in guess_transforms(old, new))
     judged = [(transform, judge(old, new, transform)) for transform in refined]
     if not judged:
@@ -315,7 +315,7 @@ def find_fit(old: MapSurfaces, new: MapSurfaces) -> MapFit | None:
 
 
 def _strongest(others: Iterable[MapAgreement], best: MapAgreement) -> MapAgreement | None:
-    """Gives what competes most with the best place."""
+    """Return what competes most with the best place."""
     return max(others, key=lambda each: (_is_rival(each, best), each.evidence_m), default=None)
 
 

@@ -65,7 +65,7 @@ class MapKeeper:
         self._compared: tuple[OccupancyGrid, OccupancyGrid, MapComparison] | None = None
 
     def keep(self, grid: OccupancyGrid) -> MapComparison | None:
-        """Keeps the robot's map where none is kept or it has grown; to be called after a write.
+        """Keep the robot's map where none is kept or it has grown; to be called after a write.
 
         A map with hardly a wall is not kept: it would tell nothing.
 
@@ -89,7 +89,7 @@ class MapKeeper:
         return comparison
 
     def compare(self, grid: OccupancyGrid) -> MapComparison | None:
-        """Tells how the records' map and the robot's go together; None where none was kept.
+        """Tell how the records' map and the robot's go together; None where none was kept.
 
         Raises:
             SemanticMapError: The kept map is damaged.
@@ -98,7 +98,7 @@ class MapKeeper:
         return None if kept is None else self._compare(kept, grid)
 
     def realign(self, grid: OccupancyGrid) -> RealignReceipt:
-        """Moves all records to the robot's map where it is sure how; all of them or none.
+        """Move all records to the robot's map where it is sure how; all of them or none.
 
         The file as it was is kept beside the old map; `undo_path` names it.
 
@@ -126,7 +126,7 @@ class MapKeeper:
         return self._move(grid, comparison, fit.new_from_old, fit.certainty)
 
     def finish_move(self) -> int:
-        """Moves the observations where a crash has kept them from following their records.
+        """Move the observations where a crash has kept them from following their records.
 
         Returns:
             How many were moved.

@@ -81,13 +81,13 @@ class MapSurfaces:
         return np.asarray(self.grid.free | (self.distance_m <= SEEN_M), dtype=np.bool_)
 
     def distances_at(self, points: FloatArray) -> tuple[FloatArray, Mask]:
-        """Gives the metres from points to the nearest surface, and where the map can tell."""
+        """Return the metres from points to the nearest surface, and where the map can tell."""
         rows, cols, is_inside = self._cells_of(points)
         distances = np.where(is_inside, self.distance_m[rows, cols], np.inf)
         return distances, is_inside & self.is_seen[rows, cols]
 
     def nearest_to(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Gives the nearest surface point of each point, as an index, and about how far it is."""
+        """Return the nearest surface point of each point, as an index, and about how far it is."""
         rows, cols, is_inside = self._cells_of(points)
         distance_m, labels = self._nearest
         indices = self._index_of_label[labels[rows, cols]]
@@ -141,7 +141,7 @@ class MapSurfaces:
 
 
 def placed(points: FloatArray, transform: Pose) -> FloatArray:
-    """Gives points of shape (n, 2) in the outer frame of a transform."""
+    """Return points of shape (n, 2) in the outer frame of a transform."""
     cos, sin = np.cos(transform.yaw_rad), np.sin(transform.yaw_rad)
     x = transform.x + cos * points[:, 0] - sin * points[:, 1]
     y = transform.y + sin * points[:, 0] + cos * points[:, 1]
@@ -174,7 +174,7 @@ class MapAgreement:
 
 
 def judge(old: MapSurfaces, new: MapSurfaces, transform: Pose) -> MapAgreement:
-    """Gives how well the old map, laid on the new one by a transform, agrees with it."""
+    """Return how well the old map, laid on the new one by a transform, agrees with it."""
     tolerance_m = max(TOLERANCE_M, 1.5 * max(old.grid.resolution_m, new.grid.resolution_m))
     forth = _count(old, new, transform, tolerance_m)
     back = _count(new, old, transform.inverse(), tolerance_m)
@@ -192,7 +192,7 @@ def judge(old: MapSurfaces, new: MapSurfaces, transform: Pose) -> MapAgreement:
 def _count(
     one: MapSurfaces, other: MapSurfaces, transform: Pose, tolerance_m: float
 ) -> tuple[float, float]:
-    """Gives the metres of one map's surface that the other has seen, and that agree with it."""
+    """Return the metres of one map's surface that the other has seen, and that agree with it."""
     points = _sample(one.points)
     if not points.size:
         return 0.0, 0.0
@@ -203,5 +203,5 @@ def _count(
 
 
 def _sample(points: FloatArray) -> FloatArray:
-    """Gives some of the points, spread evenly over the map, the same ones every time."""
+    """Return some of the points, spread evenly over the map, the same ones every time."""
     return points[:: max(-(-len(points) // MOST_POINTS), 1)]

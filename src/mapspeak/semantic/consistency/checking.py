@@ -26,7 +26,7 @@ CONE_MARGIN_RAD = math.radians(5)
 
 
 def check_duplicates(waypoints: Sequence[Waypoint]) -> Iterator[MemoryFinding]:
-    """Gives pairs of waypoints with nearly the same pose and landmarks."""
+    """Return pairs of waypoints with nearly the same pose and landmarks."""
     at = np.array([(each.pose.x, each.pose.y) for each in waypoints]).reshape(-1, 2)
     for i, waypoint in enumerate(waypoints):
         for j in np.flatnonzero(np.hypot(*(at[:i] - at[i]).T) <= TWIN_M).tolist():
@@ -42,7 +42,7 @@ def check_duplicates(waypoints: Sequence[Waypoint]) -> Iterator[MemoryFinding]:
 
 
 def check_company(places: SemanticMap, found: Things) -> Iterator[MemoryFinding]:
-    """Gives things that some records speak against."""
+    """Return things that some records speak against."""
     placed = [thing for thing in found.things if thing.position is not None]
     at = np.array([(t.position.x, t.position.y) for t in placed if t.position]).reshape(-1, 2)
     yield from _two_labels(placed, at)
@@ -60,7 +60,7 @@ def check_company(places: SemanticMap, found: Things) -> Iterator[MemoryFinding]
 
 
 def _two_labels(placed: Sequence[Thing], at: FloatArray) -> Iterator[MemoryFinding]:
-    """Gives things of different names in one place that nobody has seen beside each other."""
+    """Return things of different names in one place that nobody has seen beside each other."""
     for i, thing in enumerate(placed):
         for j in np.flatnonzero(np.hypot(*(at[:i] - at[i]).T) <= ONE_PLACE_M).tolist():
             other = placed[j]
@@ -76,7 +76,7 @@ def _two_labels(placed: Sequence[Thing], at: FloatArray) -> Iterator[MemoryFindi
 def _not_seen(
     found: Things, waypoint: Waypoint, placed: Sequence[Thing], at: FloatArray
 ) -> Iterator[MemoryFinding]:
-    """Gives things in plain sight between what a waypoint names, which it does not name."""
+    """Return things in plain sight between what a waypoint names, which it does not name."""
     seen = waypoint.standpoints[0].landmarks
     bearings = [each.bearing_rad for each in seen if each.bearing_rad is not None]
     if len(bearings) < 2:
@@ -129,7 +129,7 @@ class _Filing:
 def find_misfiled(
     rooms: RoomMap, waypoints: Iterable[Waypoint]
 ) -> dict[str, tuple[Region, Region]]:
-    """Gives the records whose room is another one: the room that they name, and where they stand.
+    """Return the records whose room is another one: the room that they name, and where they stand.
 
     Args:
         rooms: As they are cut now.
@@ -157,7 +157,7 @@ def _file(rooms: RoomMap, waypoint: Waypoint) -> Iterable[_Filing]:
 
 
 def _find_moved(filed: Iterable[_Filing]) -> dict[str, str]:
-    """Gives the ids under which several records, and more than stand there, are in another room."""
+    """Return ids under which several records, and more than stand there, are in another room."""
     standing: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for each in filed:
         standing[each.told.id][each.here.id] += 1
@@ -170,7 +170,7 @@ def _find_moved(filed: Iterable[_Filing]) -> dict[str, str]:
 
 
 def _may_be_recut(rooms: RoomMap, filing: _Filing) -> bool:
-    """True where the border between both rooms is near, or is no more than a wide opening."""
+    """Return True where the border between both rooms is near or a wide opening."""
     doors = rooms.doors_between(filing.told.id, filing.here.id)
     if any(door.width_m > DOOR_M for door in doors):
         return True
@@ -194,7 +194,7 @@ def check_rooms(
     waypoint: Waypoint,
     misfiled: Mapping[str, tuple[Region, Region]],
 ) -> Iterator[MemoryFinding]:
-    """Gives what is odd about the room that a record names; one without a room has nothing.
+    """Return what is odd about the room that a record names; one without a room has nothing.
 
     Args:
         rooms: As they are cut now.
@@ -245,7 +245,7 @@ def _regions_on(
 
 
 def _sees_through(rooms: RoomMap, waypoint: Waypoint, thing: Thing, way: Sequence[Region]) -> bool:
-    """True when a door on the line leads from each room on it to the next."""
+    """Return True when a door on the line leads from each room on it to the next."""
     assert thing.position is not None, "only what has a place has a room"  # noqa: S101 - our belief
     start, end = waypoint.pose.point, thing.position
     return all(
@@ -259,7 +259,7 @@ def _sees_through(rooms: RoomMap, waypoint: Waypoint, thing: Thing, way: Sequenc
 
 
 def _off_line(start: Point, end: Point, point: Point) -> float:
-    """Gives the metres from a point to the line between two others."""
+    """Return the metres from a point to the line between two others."""
     length = max(start.distance_to(end), 1e-9)
     turn = start.bearing_to(point) - start.bearing_to(end)
     along = min(max(math.cos(turn) * start.distance_to(point), 0.0), length)
@@ -276,7 +276,7 @@ def check_memory(
     rooms: RoomMap | None = None,
     map_id: str | None = None,
 ) -> tuple[MemoryFinding, ...]:
-    """Gives all that is odd about a memory, in the order of its places; the same every time.
+    """Return all that is odd about a memory, in the order of its places; the same every time.
 
     Args:
         places: The records.

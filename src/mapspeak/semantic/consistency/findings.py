@@ -82,7 +82,7 @@ class MemoryFinding:
         return WEIGHTS[self.kind]
 
     def weight_for(self, thing: Thing) -> float:
-        """What the odds of one of the things that it concerns are multiplied by.
+        """Return what the odds of one of the things that it concerns are multiplied by.
 
         Two labels in one place hardly are both right, so that each is as much less likely as the
         other is likely. Few views against many change little.
@@ -129,7 +129,7 @@ def judge_trust(thing: Thing, findings: Iterable[MemoryFinding]) -> Trust:
 
 
 def _share(thing: Thing, finding: MemoryFinding) -> float:
-    """Gives what share of a thing a finding concerns."""
+    """Return what share of a thing a finding concerns."""
     if finding.things:
         return float(thing in finding.things)
     views = [

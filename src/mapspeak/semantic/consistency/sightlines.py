@@ -17,7 +17,7 @@ FARTHEST_M = 1e6
 def check_pose(
     grid: OccupancyGrid, waypoint: Waypoint, distances: DistanceField | None, map_id: str | None
 ) -> Iterator[MemoryFinding]:
-    """Gives what is odd about where a waypoint is."""
+    """Return what is odd about where a waypoint is."""
     of, point = (waypoint.name,), waypoint.pose.point
     if waypoint.map_id is not None and map_id is not None and waypoint.map_id != map_id:
         ids = (waypoint.map_id, map_id)
@@ -31,7 +31,7 @@ def check_pose(
 
 
 def _ground_at(grid: OccupancyGrid, point: Point) -> FindingKind | None:
-    """Gives what is wrong with the cell at a point; None where it is free."""
+    """Return what is wrong with the cell at a point; None where it is free."""
     if max(abs(point.x), abs(point.y)) > FARTHEST_M:
         return FindingKind.OFF_MAP
     cell = grid.cell_at(point)
@@ -47,7 +47,7 @@ N_SIGMAS = 2.0
 
 
 def check_rays(found: Things, waypoint: Waypoint) -> Iterator[MemoryFinding]:
-    """Gives landmarks of a waypoint that lie behind a wall or where nobody has seen."""
+    """Return landmarks of a waypoint that lie behind a wall or where nobody has seen."""
     for stand in waypoint.standpoints:
         for landmark in stand.landmarks:
             if landmark.bearing_rad is not None:
@@ -76,7 +76,7 @@ def _check(
 
 
 def _widest_m(found: Things, waypoint: Waypoint, way: float) -> float:
-    """Gives how far one sees at most within the noise of a direction."""
+    """Return how far one sees at most within the noise of a direction."""
     noise_rad = found.sight.noise.bearing_rad
     pose = waypoint.pose
     return max(

@@ -83,19 +83,19 @@ class EpisodeDatabase:
         self._is_held_open = False
 
     def exists(self) -> bool:
-        """True when anything was ever written."""
+        """Return True when anything was ever written."""
         return self.path.exists()
 
     @contextlib.contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:
-        """Gives a connection whose statements all see one state of the database."""
+        """Return a connection whose statements all see one state of the database."""
         with self._explained("read"), contextlib.closing(self._open()) as connection:
             connection.execute("BEGIN")
             yield connection
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[sqlite3.Connection]:
-        """Gives a connection that holds the writers' lock; done as a whole at the end, or not."""
+        """Return a connection that holds the writers' lock; done as a whole at the end, or not."""
         with self._explained("write to"):
             self._make()
             with contextlib.closing(self._open()) as connection:
@@ -135,7 +135,7 @@ class EpisodeDatabase:
             )
 
     def _make(self) -> None:
-        """Makes the file where there is none, and keeps it open from then on."""
+        """Make the file where there is none, and keep it open from then on."""
         if self._is_held_open:
             return
         self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -165,7 +165,7 @@ class EpisodeDatabase:
 
 
 def _make_empty(path: Path) -> Path:
-    """Makes a database without an observation; one that a crash left half made goes."""
+    """Make a database without an observation; one that a crash left half made goes."""
     for ending in ("", "-wal", "-shm"):
         path.with_name(path.name + ending).unlink(missing_ok=True)
     with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as connection:
@@ -180,7 +180,7 @@ _PLAN = "move to "
 
 
 def plan_move(database: EpisodeDatabase, motion: Pose, *, to: str) -> None:
-    """Notes how poses move if the kept map becomes another one.
+    """Note how poses move if the kept map becomes another one.
 
     Args:
         database: The observations.
@@ -195,7 +195,7 @@ def plan_move(database: EpisodeDatabase, motion: Pose, *, to: str) -> None:
 
 
 def finish_move(database: EpisodeDatabase, *, at: str) -> int:
-    """Moves all poses if that was planned for the map that is kept now; forgets other plans.
+    """Move all poses if that was planned for the map that is kept now; forget other plans.
 
     Rooms of the old map are left away: their ids mean nothing on the new one.
 
@@ -225,7 +225,7 @@ def finish_move(database: EpisodeDatabase, *, at: str) -> int:
 
 
 def has_plans(database: EpisodeDatabase) -> bool:
-    """True where a move was planned and neither done nor dropped."""
+    """Return True where a move was planned and neither done nor dropped."""
     with database.reading() as connection:
         found = connection.execute("SELECT 1 FROM facts WHERE name GLOB ?", [f"{_PLAN}*"])
         return found.fetchone() is not None

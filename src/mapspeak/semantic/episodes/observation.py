@@ -90,7 +90,7 @@ class Observation:
 
 
 def microseconds_of(time: datetime) -> int:
-    """Gives the microseconds since 1970, exactly."""
+    """Return the microseconds since 1970, exactly."""
     return (time - _EPOCH) // timedelta(microseconds=1)
 
 
@@ -230,7 +230,7 @@ def _require_argument(is_right: object, what: str, expected: str) -> None:
 
 
 def observations_from(waypoint: Waypoint) -> tuple[Observation, ...]:
-    """Gives the writing of a record as an observation; nothing where its time is not known."""
+    """Return the writing of a record as an observation; nothing where its time is not known."""
     if waypoint.recorded_at is None:
         return ()
     said = (waypoint.name, waypoint.description, *waypoint.geometric_features)
@@ -250,7 +250,7 @@ def observations_from(waypoint: Waypoint) -> tuple[Observation, ...]:
 
 
 def named_pictures(semantic_map: SemanticMap) -> frozenset[str]:
-    """Gives the pictures that waypoints and their landmarks name."""
+    """Return the pictures that waypoints and their landmarks name."""
     return frozenset(_names(semantic_map))
 
 

@@ -19,7 +19,7 @@ _OURS = re.compile(r"\d{8}T\d{6}Z-[0-9a-f]{12}\.(?:jpg|png)(?:\.tmp)?")
 
 
 def picture_name(content: bytes, taken_at: datetime) -> str:
-    """Gives the name for a picture, such as 20261122T091205Z-3fa9c1d2e4b5.jpg.
+    """Return the name for a picture, such as 20261122T091205Z-3fa9c1d2e4b5.jpg.
 
     Raises:
         SemanticMapError: It is neither JPEG nor PNG.
@@ -39,14 +39,14 @@ class PictureFolder:
         self.path = path
 
     def find(self, name: str | None) -> Path | None:
-        """Gives the file of a picture; None where there is none, or it is none of this folder."""
+        """Return the file of a picture; None where there is none, or it is none of this folder."""
         if not name or Path(name).name != name:
             return None
         path = self.path / name
         return path if path.is_file() else None
 
     def put(self, name: str, content: bytes) -> None:
-        """Writes a picture; it is on the disk when this returns."""
+        """Write a picture; it is on the disk when this returns."""
         target = self.path / name
         if target.exists() and target.stat().st_size == len(content):
             return
@@ -60,7 +60,7 @@ class PictureFolder:
         sync_folder(self.path)
 
     def remove_all_but(self, kept: Collection[str]) -> int:
-        """Removes the pictures of ours that nobody names, and gives how many."""
+        """Remove the pictures of ours that nobody names, and return how many."""
         if not self.path.is_dir():
             return 0
         unknown = [
@@ -74,7 +74,7 @@ class PictureFolder:
 
 
 def sync_folder(folder: Path) -> None:
-    """Makes the new name of a file last, where the system can."""
+    """Make the new name of a file last, where the system can."""
     if sys.platform == "win32":
         return
     descriptor = os.open(folder, os.O_RDONLY)
@@ -134,7 +134,7 @@ def choose_dropped(
     named: Collection[str],
     rule: ThinningRule,
 ) -> frozenset[str]:
-    """Gives the names of the pictures that the rule does not keep.
+    """Return the names of the pictures that the rule does not keep.
 
     Of several in one place and hour, or day, the newest is kept. Applied again at the same moment
     to what was kept, it drops nothing.
@@ -155,7 +155,7 @@ def choose_dropped(
 
 
 def _group(picture: StoredPicture, now: datetime, rule: ThinningRule) -> object:
-    """Gives what pictures have in common of which one is kept."""
+    """Return what pictures have in common of which one is kept."""
     age = now - picture.taken_at
     if age <= rule.all_for:
         return picture.name
@@ -179,7 +179,7 @@ def _within_limit(
     named: Collection[str],
     rule: ThinningRule,
 ) -> Iterator[str]:
-    """Gives the names that stay within the size, newest first; named ones count before others."""
+    """Return the names that stay within the size, newest first; named ones count before others."""
     sizes = {picture.name: picture.n_bytes for picture in newest_first if picture.name in kept}
     free_bytes = rule.limit_mb * 1e6 - sum(sizes.get(name, 0) for name in set(named))
     yield from named

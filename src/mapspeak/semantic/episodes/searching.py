@@ -55,7 +55,7 @@ class TextScorer:
         among: str,
         values: list[object],
     ) -> dict[int, float]:
-        """Gives the best texts by their ids, each with its score above 0.
+        """Return the best texts by their ids, each with its score above 0.
 
         Args:
             connection: Of the database.
@@ -92,7 +92,7 @@ class TextScorer:
         return scores
 
     def _read(self, connection: sqlite3.Connection) -> tuple[str, ...]:
-        """Gives all texts, reading only those that are new."""
+        """Return all texts, reading only those that are new."""
         selection = "SELECT value FROM facts WHERE name = 'generation'"
         row = connection.execute(selection).fetchone()
         generation = "" if row is None else str(row[0])
@@ -109,7 +109,7 @@ class TextScorer:
 
 
 def _best(scores: Scores) -> dict[int, float]:
-    """Gives the highest scores above 0 by their place; of equal ones the later, newer text."""
+    """Return the highest scores above 0 by their place; of equal ones the later, newer text."""
     found = np.flatnonzero(scores > 0)
     if len(found) > MOST_TEXTS:
         # What is not among them for sure need not be sorted.
@@ -183,7 +183,7 @@ class Search:
 
 
 def find_observations(search: Search, query: EpisodeQuery) -> EpisodePage:
-    """Gives one page of the observations that pass every filter."""
+    """Return one page of the observations that pass every filter."""
     connection = search.connection
     if query.as_of is None:
         newest = connection.execute("SELECT MAX(n) FROM observations").fetchone()[0]
@@ -233,7 +233,7 @@ def _filters(query: EpisodeQuery, near: Point | None) -> _Where:
 
 
 def _leave_out(search: Search, where: _Where, query: EpisodeQuery, anchor: EpisodeMatch) -> None:
-    """Leaves out what a nested query was about, and other maps, whose metres are others."""
+    """Leave out what a nested query was about, and other maps, whose metres are others."""
     nested = query.near
     assert isinstance(nested, EpisodeQuery)  # noqa: S101 - it gave the anchor
     where.add("o.id != ?", anchor.observation.id)
@@ -253,7 +253,7 @@ def _squared_m2(near: Point) -> str:
 
 
 def _scores(search: "Search", words: str, where: _Where) -> dict[int, float]:
-    """Scores the texts of the observations that pass the other filters."""
+    """Score the texts of the observations that pass the other filters."""
     is_filtered = len(where.conditions) > 2  # beside the state asked for
     passing = f"SELECT o.text_id FROM observations AS o WHERE {where.text}"  # noqa: S608 - our own conditions
     return search.scorer.score(
@@ -353,7 +353,7 @@ def _reasons(match: EpisodeMatch, asked: _Asked, labelled: str) -> Iterator[str]
 
 
 def observation_from(row: sqlite3.Row) -> Observation:
-    """Gives the observation that a row of `COLUMNS` holds."""
+    """Return the observation that a row of `COLUMNS` holds."""
     zone = timezone(timedelta(seconds=row["offset_s"]))
     time = datetime.fromtimestamp(0, zone) + timedelta(microseconds=row["recorded_us"])
     return Observation(

@@ -56,7 +56,7 @@ _FIRST_FACTS = MappingProxyType({"thinned_hour": "", "left_bytes": "0", "generat
 
 
 def memory_folder(semantic_map: Path) -> Path:
-    """Gives the folder beside a semantic map file in which its episodes and pictures are."""
+    """Return the folder beside a semantic map file in which its episodes and pictures are."""
     return semantic_map.with_name(f"{semantic_map.stem}.memory")
 
 
@@ -89,7 +89,7 @@ class EpisodeStore:
     # --- writing -----------------------------------------------------------------------------
 
     def write(self, observation: Observation, *, picture: bytes | None = None) -> Observation:
-        """Keeps an observation, on the disk when it returns; one that is kept already stays one.
+        """Keep an observation, on the disk when it returns; one that is kept already stays one.
 
         Args:
             observation: What was observed.
@@ -117,12 +117,12 @@ class EpisodeStore:
         return observation
 
     def write_all(self, observations: Iterable[Observation]) -> int:
-        """Keeps many observations at once, all or none, and gives how many were new."""
+        """Keep many observations at once, all or none, and return how many were new."""
         with self.database.writing() as connection:
             return sum(_insert(connection, each, None) for each in observations)
 
     def take_over(self, other: "EpisodeStore") -> tuple[int, int]:
-        """Keeps all observations of another store as they are, all or none, with their pictures.
+        """Keep all observations of another store as they are, all or none, with their pictures.
 
         Returns:
             How many were new, and how many pictures came with them.
@@ -148,7 +148,7 @@ class EpisodeStore:
     # --- asking ------------------------------------------------------------------------------
 
     def find(self, query: EpisodeQuery, *, rank: Rank | None = None) -> EpisodePage:
-        """Gives one page of the observations that pass every filter of a query.
+        """Return one page of the observations that pass every filter of a query.
 
         Args:
             query: What is asked.
@@ -168,7 +168,7 @@ class EpisodeStore:
             return find_observations(search, query)
 
     def get(self, observation_id: str) -> Observation | None:
-        """Gives the observation with an id, or None."""
+        """Return the observation with an id, or None."""
         if not self.database.exists():
             return None
         selection = f"SELECT {COLUMNS} FROM observations AS o WHERE o.id = ?"  # noqa: S608 - our own columns
@@ -177,23 +177,23 @@ class EpisodeStore:
         return None if row is None else observation_from(row)
 
     def picture_path(self, observation: Observation) -> Path | None:
-        """Gives the file of an observation's picture; None without one."""
+        """Return the file of an observation's picture; None without one."""
         return self._pictures.find(observation.picture)
 
     # --- moving with the map ----------------------------------------------------------------
 
     def plan_move(self, motion: Pose, *, to: str) -> None:
-        """Notes how poses move if the kept map becomes another one (see `moving`)."""
+        """Note how poses move if the kept map becomes another one (see `moving`)."""
         plan_move(self.database, motion, to=to)
 
     def finish_move(self, *, at: str) -> int:
-        """Moves all poses if that was planned for the map that is kept now; gives how many."""
+        """Move all poses if that was planned for the map that is kept now; return how many."""
         return finish_move(self.database, at=at)
 
     # --- keeping order -----------------------------------------------------------------------
 
     def rebuild_index(self) -> int:
-        """Builds everything but the observations anew, and gives how many there are."""
+        """Build everything but the observations anew, and return how many there are."""
         with self.database.writing() as connection:
             for table in ("texts", "words", "vocabulary", "labels"):
                 connection.execute(f"DELETE FROM {table}")  # noqa: S608 - our own tables
@@ -226,7 +226,7 @@ class EpisodeStore:
         return len(rows)
 
     def thin(self, *, now: datetime, rule: ThinningRule | None = None) -> int:
-        """Drops the pictures that the rule does not keep, and gives how many files went.
+        """Drop the pictures that the rule does not keep, and return how many files went.
 
         Their observations stay. A crash in between leaves files that the next time removes.
         """
@@ -246,7 +246,7 @@ class EpisodeStore:
             return self._pictures.remove_all_but(named | {row[0] for row in kept})
 
     def _is_thinning_due(self, connection: sqlite3.Connection, latest: Observation) -> bool:
-        """Looks once an hour, and when the pictures have outgrown their limit."""
+        """Look once an hour, and when the pictures have outgrown their limit."""
         if _fact(connection, "thinned_hour") != _hour(latest.recorded_at):
             return True
         limit_bytes = self._rule.limit_mb * 1e6
@@ -255,7 +255,7 @@ class EpisodeStore:
         return _n_bytes(connection) > largest
 
     def _rule_when_full(self, stored: list[StoredPicture]) -> ThinningRule:
-        """Makes room for some time when the limit is reached, so that not every write thins."""
+        """Make room for some time when the limit is reached, so that not every write thins."""
         n_bytes = sum({picture.name: picture.n_bytes for picture in stored}.values())
         if n_bytes <= self._rule.limit_mb * 1e6:
             return self._rule
@@ -265,7 +265,7 @@ class EpisodeStore:
 def _insert(
     connection: sqlite3.Connection, observation: Observation, picture_bytes: int | None
 ) -> bool:
-    """Adds a row with its index; False where it is there already."""
+    """Add a row with its index; False where it is there already."""
     known = connection.execute("SELECT 1 FROM observations WHERE id = ?", [observation.id])
     if known.fetchone() is not None:
         return False
@@ -349,7 +349,7 @@ class BroughtOver:
 
 
 def bring_over(*memories: Path, to: Path) -> BroughtOver:
-    """Copies the observations of some semantic map files, with their pictures, for another one.
+    """Copy the observations of some semantic map files, with their pictures, for another one.
 
     All of them or none; those of the memories stay as they are.
 
@@ -377,7 +377,7 @@ def bring_over(*memories: Path, to: Path) -> BroughtOver:
 
 
 def _require_settled(store: EpisodeStore) -> None:
-    """Refuses observations that have not followed their records to a moved map yet."""
+    """Refuse observations that have not followed their records to a moved map yet."""
     if store.database.exists() and has_plans(store.database):
         raise SemanticMapError(
             f"The observations in {store.folder} have not followed their map yet.",

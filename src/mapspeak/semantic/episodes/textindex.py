@@ -32,17 +32,17 @@ Scores = NDArray[np.float64]
 
 
 def text_hash(text: str) -> bytes:
-    """Gives what tells one text from another."""
+    """Return what tells one text from another."""
     return hashlib.blake2b(text.encode(), digest_size=12).digest()
 
 
 def words_in(text: str) -> dict[str, str]:
-    """Gives the words of a text as they are compared, each with how it stands there."""
+    """Return the words of a text as they are compared, each with how it stands there."""
     return {stem(word): shown for shown, word in split_words(text)}
 
 
 def add_text(connection: sqlite3.Connection, text: str) -> int:
-    """Gives the id of a text; one that is new is indexed. Ids are 1, 2, 3 and so on."""
+    """Return the id of a text; one that is new is indexed. Ids are 1, 2, 3 and so on."""
     known = connection.execute("SELECT text_id FROM texts WHERE hash = ?", [text_hash(text)])
     row = known.fetchone()
     if row is not None:
@@ -55,7 +55,7 @@ def add_text(connection: sqlite3.Connection, text: str) -> int:
 
 
 def index_texts(connection: sqlite3.Connection, texts: Iterable[tuple[int, str]]) -> None:
-    """Notes the words of texts that are not indexed yet, their ids ascending."""
+    """Note the words of texts that are not indexed yet, their ids ascending."""
     stems: dict[str, str] = {}
     said: defaultdict[str, list[int]] = defaultdict(list)
     for text_id, text in texts:
@@ -75,7 +75,7 @@ def index_texts(connection: sqlite3.Connection, texts: Iterable[tuple[int, str]]
 
 
 def score_words(connection: sqlite3.Connection, query: str) -> Scores:
-    """Gives the share of a query that each text says, by its id; 0 where it is too little.
+    """Return the share of a query that each text says, by its id; 0 where it is too little.
 
     Args:
         connection: Of the database.
@@ -95,7 +95,7 @@ def score_words(connection: sqlite3.Connection, query: str) -> Scores:
 
 
 def read_ids(connection: sqlite3.Connection, selection: str, values: Iterable[object]) -> Ids:
-    """Gives the integers that a selection of one column finds."""
+    """Return the integers that a selection of one column finds."""
     cursor = connection.cursor()
     cursor.row_factory = None
     rows = cursor.execute(selection, list(values)).fetchall()
@@ -103,7 +103,7 @@ def read_ids(connection: sqlite3.Connection, selection: str, values: Iterable[ob
 
 
 def shared_words(query: str, text: str) -> list[str]:
-    """Gives the words of a text that the query has too, as they stand in the text."""
+    """Return the words of a text that the query has too, as they stand in the text."""
     asked, said = _words_asked(query), words_in(text)
     near = (difflib.get_close_matches(w, said, n=1, cutoff=_MIN_LIKENESS_RATIO) for w in asked)
     return [said[word] for word in dict.fromkeys(chain(*near))]
@@ -112,7 +112,7 @@ def shared_words(query: str, text: str) -> list[str]:
 def _asked_words(
     connection: sqlite3.Connection, query: str, n_texts: int
 ) -> Iterator[tuple[dict[str, float], float]]:
-    """Gives each word of a query: its spellings in texts, each with its likeness; its weight."""
+    """Return each word of a query: its spellings in texts, each with its likeness; its weight."""
     for word in _words_asked(query):
         spellings = dict(_spellings(connection, word))
         n_with = sum(n for n, _ in spellings.values())
@@ -128,7 +128,7 @@ def _words_asked(query: str) -> list[str]:
 def _spellings(
     connection: sqlite3.Connection, word: str
 ) -> Iterator[tuple[str, tuple[int, float]]]:
-    """Gives the known words that count as this one; likeness only where it is not known."""
+    """Return the known words that count as this one; likeness only where it is not known."""
     count = "SELECT n_texts FROM vocabulary WHERE word = ?"
     row = connection.execute(count, [word]).fetchone()
     if row is not None:
@@ -171,7 +171,7 @@ class VectorRank:
         self._kept: dict[bytes, bytes] | None = None
 
     def __call__(self, query: str, texts: Sequence[str]) -> list[float]:
-        """Gives the score of each text: the cosine where it is enough, else 0."""
+        """Return the score of each text: the cosine where it is enough, else 0."""
         self._learn([text for text in dict.fromkeys(texts) if text not in self._row_of])
         if not texts:
             return []
@@ -183,7 +183,7 @@ class VectorRank:
         return found
 
     def _learn(self, texts: Sequence[str]) -> None:
-        """Takes the vectors of texts from the database, or makes and keeps them."""
+        """Take the vectors of texts from the database, or make and keeps them."""
         if not texts:
             return
         kept = self._read()
@@ -205,7 +205,7 @@ class VectorRank:
         self._row_of |= {text: len(self._row_of) + i for i, text in enumerate(texts)}
 
     def _read(self) -> dict[bytes, bytes]:
-        """Gives the kept vectors that were not taken yet; all are read once."""
+        """Return the kept vectors that were not taken yet; all are read once."""
         if self._kept is None:
             self._kept = {}
             if self._database.exists():

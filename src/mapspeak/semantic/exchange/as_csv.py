@@ -27,7 +27,7 @@ _DISARMED = re.compile(rf"(^|[;,|\t\r\n])'({_FORMULA})")
 
 
 def to_csv(places: SemanticMap) -> str:
-    """Gives the memory as CSV with a header; x and y are metres in the map frame."""
+    """Return the memory as CSV with a header; x and y are metres in the map frame."""
     rows = [row for place in places.waypoints for row in _rows(place, places.map_id)]
     columns = dict.fromkeys((*_FIRST_COLUMNS, *(key for row in rows for key in row), "map"))
     text = io.StringIO(newline="")
@@ -38,7 +38,7 @@ def to_csv(places: SemanticMap) -> str:
 
 
 def from_csv(text: str) -> SemanticMap:
-    """Reads the memory that `to_csv` wrote; the order of rows and columns makes no difference.
+    """Read the memory that `to_csv` wrote; the order of rows and columns makes no difference.
 
     Raises:
         SemanticMapError: It is not CSV, or no memory.
@@ -87,7 +87,7 @@ def _rows(place: Waypoint, map_id: str | None) -> Iterator[Facts]:
 
 
 def _disarmed(cell: object) -> object:
-    """Gives a text that no spreadsheet computes; a number is one as it is."""
+    """Return a text that no spreadsheet computes; a number is one as it is."""
     return _BARE.sub(r"\1'\2", cell) if isinstance(cell, str) else cell
 
 
@@ -96,7 +96,7 @@ def _as_said(cell: str) -> str:
 
 
 def _flat(entries: Facts) -> Facts:
-    """Gives a cell for each value: `seen_from:x` where the file has one mapping in another."""
+    """Return a cell for each value: `seen_from:x` where the file has one mapping in another."""
     cells: Facts = {}
     for key, value in entries.items():
         parts = value if isinstance(value, dict) else {"": value}

@@ -56,7 +56,7 @@ class _Collection(BaseModel):
 
 
 def to_geojson(places: SemanticMap, *, anchor: MapAnchor | None = None) -> str:
-    """Gives the memory as GeoJSON.
+    """Return the memory as GeoJSON.
 
     Args:
         places: What is written.
@@ -80,7 +80,7 @@ def to_geojson(places: SemanticMap, *, anchor: MapAnchor | None = None) -> str:
 
 
 def from_geojson(text: str) -> SemanticMap:
-    """Reads the memory that `to_geojson` wrote; features of other kinds are left aside.
+    """Read the memory that `to_geojson` wrote; features of other kinds are left aside.
 
     Raises:
         SemanticMapError: It is not GeoJSON, or no memory.

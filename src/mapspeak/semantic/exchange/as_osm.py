@@ -45,7 +45,7 @@ class _Root(BaseModel):
 
 
 def to_osm(places: SemanticMap, *, anchor: MapAnchor | None = None) -> str:
-    """Gives the memory as osmAG.
+    """Return the memory as osmAG.
 
     Args:
         places: What is written.
@@ -71,7 +71,7 @@ def to_osm(places: SemanticMap, *, anchor: MapAnchor | None = None) -> str:
 
 
 def from_osm(text: str) -> SemanticMap:
-    """Reads the memory that `to_osm` wrote, also after it was edited in JOSM.
+    """Read the memory that `to_osm` wrote, also after it was edited in JOSM.
 
     Raises:
         SemanticMapError: It is not OSM XML, or no memory.
@@ -109,7 +109,7 @@ def from_osm(text: str) -> SemanticMap:
 
 
 def _tags(key: str, value: object) -> Iterator[tuple[str, str]]:
-    """Gives a value as tags, one for each of its leaves."""
+    """Return a value as tags, one for each of its leaves."""
     parts: Mapping[str, object] = {}
     if isinstance(value, dict):
         parts = value
@@ -138,7 +138,7 @@ def _facts(tags: Mapping[str, str]) -> Facts:
 
 
 def _with_lists(value: object) -> object:
-    """Turns what is numbered into lists again."""
+    """Turn what is numbered into lists again."""
     if not isinstance(value, dict):
         return value
     parts = {key: _with_lists(part) for key, part in value.items()}

@@ -36,7 +36,7 @@ class ExchangeFormat(StrEnum):
 def export_text(
     places: SemanticMap, form: ExchangeFormat, *, anchor: MapAnchor | None = None
 ) -> str:
-    """Gives a memory in another format.
+    """Return a memory in another format.
 
     Args:
         places: What is written.
@@ -59,7 +59,7 @@ def export_text(
 
 
 def import_text(text: str, form: ExchangeFormat) -> SemanticMap:
-    """Reads a memory that was exported.
+    """Read a memory that was exported.
 
     Raises:
         SemanticMapError: It is none in this format.
@@ -73,7 +73,7 @@ def import_text(text: str, form: ExchangeFormat) -> SemanticMap:
 
 
 def merge_into(store: SemanticMapStore, second: SemanticMap) -> Union:
-    """Joins a memory into a semantic map file, all of it or nothing (see `unite`).
+    """Join a memory into a semantic map file, all of it or nothing (see `unite`).
 
     Raises:
         SemanticMapError: The maps differ, or the file has a fault or cannot be written.
@@ -89,7 +89,7 @@ def merge_into(store: SemanticMapStore, second: SemanticMap) -> Union:
 
 
 def merge_files(first: Path, second: Path, *, out: Path) -> tuple[Union, BroughtOver]:
-    """Writes two semantic map files as one: the first with its comments, and what it lacks.
+    """Write two semantic map files as one: the first with its comments, and what it lacks.
 
     Events of the second one get ids of their own; what is in both is there once. The observations
     of both come along, with their pictures.
@@ -112,7 +112,7 @@ def merge_files(first: Path, second: Path, *, out: Path) -> tuple[Union, Brought
 
 
 def _with_events(document: MapDocument, events: Iterable[Event]) -> MapDocument:
-    """Adds the events that are not there, whatever their ids are: those are given anew."""
+    """Add the events that are not there, whatever their ids are: those are given anew."""
     for event in events:
         nameless = replace(event, id="")
         if nameless not in (replace(each.event, id="") for each in document.events.values()):

@@ -24,7 +24,7 @@ _COORDINATES = ("x", "y")
 
 
 def facts_of(waypoint: Waypoint) -> Facts:
-    """Gives what is said of a waypoint besides x and y; what is not said is left out."""
+    """Return what is said of a waypoint besides x and y; what is not said is left out."""
     said: Facts = dict(record_data(waypoint))
     pose = said.pop("pose")
     assert isinstance(pose, dict)  # noqa: S101 - a record has a pose
@@ -33,7 +33,7 @@ def facts_of(waypoint: Waypoint) -> Facts:
 
 
 def place_of(waypoint: Waypoint) -> Point:
-    """Gives where a waypoint is, in the map frame, as files say it: to the millimetre."""
+    """Return where a waypoint is, in the map frame, as files say it: to the millimetre."""
     pose = waypoint.pose
     return Point(round(pose.x, _PLACE_DECIMALS) + 0.0, round(pose.y, _PLACE_DECIMALS) + 0.0)
 
@@ -41,7 +41,7 @@ def place_of(waypoint: Waypoint) -> Point:
 def map_from(
     records: Iterable[tuple[Point, Mapping[str, object]]], *, map_id: str | None, form: str
 ) -> SemanticMap:
-    """Gives the places that a file describes.
+    """Return the places that a file describes.
 
     Args:
         records: Where each is in the map frame, and its facts.
@@ -68,7 +68,7 @@ def map_from(
 
 
 def refusal_of(error: ValidationError, form: str, what: str) -> SemanticMapError:
-    """Gives the first fault that was found, with its place."""
+    """Return the first fault that was found, with its place."""
     first = error.errors()[0]
     place = ".".join(map(str, first["loc"])) or "the whole of it"
     return SemanticMapError(
@@ -78,7 +78,7 @@ def refusal_of(error: ValidationError, form: str, what: str) -> SemanticMapError
 
 
 def _plain(key: str, value: object) -> object:
-    """Gives numbers as numbers; the file's schema has them as the text that is to be written."""
+    """Return numbers as numbers; the file's schema has them as the text that is to be written."""
     if isinstance(value, list):
         return [_plain("", item) for item in value]
     if isinstance(value, dict):

@@ -29,7 +29,7 @@ class Union:
 
 
 def unite(first: SemanticMap, second: SemanticMap) -> Union:
-    """Joins two memories of one map.
+    """Join two memories of one map.
 
     Places of one name that lie within a metre are joined: the newer says what both say, landmarks
     and layout of both stay. Where it is not known which is newer they are joined only if that makes
@@ -75,7 +75,7 @@ def _require_one_map(first: SemanticMap, second: SemanticMap) -> None:
 
 
 def _join(mine: Waypoint, theirs: Waypoint) -> tuple[Waypoint | None, str]:
-    """Gives both as one where that is safe, and what was done, or why not."""
+    """Return both as one where that is safe, and what was done, or why not."""
     apart_m = mine.pose.point.distance_to(theirs.pose.point)
     if apart_m > SAME_PLACE_M:
         return None, f"they lie {apart_m:.2f} m apart"
@@ -92,7 +92,7 @@ def _join(mine: Waypoint, theirs: Waypoint) -> tuple[Waypoint | None, str]:
 
 
 def _joined(older: Waypoint, newer: Waypoint) -> Waypoint:
-    """Gives the newer place, with what only the older one says."""
+    """Return the newer place, with what only the older one says."""
     features = {name_key(text): text for text in newer.geometric_features}
     for text in older.geometric_features:
         features.setdefault(name_key(text), text)
@@ -110,13 +110,13 @@ def _joined(older: Waypoint, newer: Waypoint) -> Waypoint:
 
 
 def _unordered(place: Waypoint) -> dict[str, object]:
-    """Gives what a record says, whatever the order of its lists."""
+    """Return what a record says, whatever the order of its lists."""
     said = record_data(place)
     return {key: sorted(map(str, v)) if isinstance(v, list) else v for key, v in said.items()}
 
 
 def _renamed(place: Waypoint, places: Mapping[str, Waypoint], taken: Collection[str]) -> Waypoint:
-    """Gives a place under a free name; under the one it has already from an earlier time."""
+    """Return a place under a free name; under the one it has already from an earlier time."""
     for number in count(2):
         renamed = replace(place, name=f"{place.name} ({number})")
         key = name_key(renamed.name)

@@ -115,16 +115,16 @@ class MapDocument:
         return self.encoded(self.text)
 
     def find_entry(self, key: str) -> str | None:
-        """Gives what the file says under a key of its own, beside the records."""
+        """Return what the file says under a key of its own, beside the records."""
         node = self.root.find_value(key) if self.root else None
         return node.data if isinstance(node, ScalarNode) else None
 
     def encoded(self, text: str) -> bytes:
-        """Gives a text in the bytes of this file: its line ends, its byte order mark."""
+        """Return a text in the bytes of this file: its line ends, its byte order mark."""
         return ((_BOM if self.has_bom else "") + self.line_ends.restored(text)).encode()
 
     def to_map(self) -> SemanticMap:
-        """Gives the remembered places."""
+        """Return the remembered places."""
         waypoints = tuple(record.reading.waypoint for record in self.records.values())
         return SemanticMap(map_id=self.map_id, waypoints=waypoints, warnings=self.warnings)
 
@@ -132,7 +132,7 @@ class MapDocument:
 def parse_document(
     content: bytes, *, source: str, previous: MapDocument | None = None
 ) -> MapDocument:
-    """Reads a semantic map file.
+    """Read a semantic map file.
 
     Args:
         content: The file's bytes.
@@ -206,7 +206,7 @@ def _cut(text: str, previous: MapDocument | None) -> tuple[Layout, MappingNode |
 
 
 def _known_root(text: str, layout: Layout, previous: MapDocument | None) -> MappingNode | None:
-    """Gives what was read before where only records have changed."""
+    """Return what was read before where only records have changed."""
     if previous is None or not (previous.layout.spans and layout.spans):
         return None
     is_same = previous.layout.skeleton(previous.text) == layout.skeleton(text)

@@ -31,7 +31,7 @@ _SPECIAL_IN_FLOW = re.compile(r"[,\[\]{}:#?]")
 
 
 def is_plain(text: str) -> bool:
-    """True when every YAML reader takes the unquoted text, on a line of its own, for itself."""
+    """Return True when every YAML reader takes the unquoted text, on its own line, as it is."""
     return (
         text[:1].isalpha()
         and text.isprintable()
@@ -42,12 +42,12 @@ def is_plain(text: str) -> bool:
 
 
 def is_plain_in_flow(text: str) -> bool:
-    """True when every YAML reader takes the unquoted text, within brackets, for itself."""
+    """Return True when every YAML reader takes the unquoted text, within brackets, for itself."""
     return is_plain(text) and not _SPECIAL_IN_FLOW.search(text)
 
 
 def flow_text(data: Data, key: str = "") -> str:
-    """Gives a value on one line; the key it stands under says whether it is a number."""
+    """Return a value on one line; the key it stands under says whether it is a number."""
     if data is None:
         return "null"
     if isinstance(data, str):
@@ -59,14 +59,14 @@ def flow_text(data: Data, key: str = "") -> str:
 
 
 def line_text(data: Data, key: str = "") -> str:
-    """Gives a value that ends its line, outside of brackets."""
+    """Return a value that ends its line, outside of brackets."""
     if isinstance(data, str) and is_plain(data):
         return data
     return flow_text(data, key)
 
 
 def entry_text(key: str, data: Data, *, indent: int) -> str:
-    """Gives `key: value` without the first line's indentation, over several lines where needed."""
+    """Return `key: value` without the first line's indentation, over several lines where needed."""
     below = "\n" + " " * (indent + 2)
     if isinstance(data, str) and "\n" in data:
         lines = (below + line if line else "\n" for line in data.split("\n"))
@@ -77,7 +77,7 @@ def entry_text(key: str, data: Data, *, indent: int) -> str:
 
 
 def record_text(data: dict[str, Data], *, indent: int) -> str:
-    """Gives one waypoint as an item of the list `waypoints`, with its final line break."""
+    """Return one waypoint as an item of the list `waypoints`, with its final line break."""
     margin = " " * (indent + 2)
     entries = [entry_text(key, value, indent=indent + 2) for key, value in data.items()]
     return " " * indent + "- " + f"\n{margin}".join(entries) + "\n"
@@ -103,7 +103,7 @@ class _Edit:
 
 
 def edited_record(block: str, *, old: dict[str, Data], new: dict[str, Data]) -> str:
-    """Gives the text of one item of `waypoints`, changed from one saying to another."""
+    """Return the text of one item of `waypoints`, changed from one saying to another."""
     tree = parse_tree(block)
     record = tree.items[0] if isinstance(tree, ListNode) else tree
     if not isinstance(record, MappingNode):
@@ -119,7 +119,7 @@ class _Editor:
         self._text = text
 
     def applied(self, edits: Iterable[_Edit], start: int, end: int) -> str:
-        """Gives a stretch of the text with the edits that lie in it made."""
+        """Return a stretch of the text with the edits that lie in it made."""
         pieces = []
         for edit in sorted(edits, key=lambda edit: edit.start):
             pieces += [self._text[start : edit.start], edit.text]
@@ -131,7 +131,7 @@ class _Editor:
     def mapping_edits(
         self, node: MappingNode, old: dict[str, Data], new: dict[str, Data]
     ) -> Iterator[_Edit]:
-        """Gives the edits that make a mapping say what is new; unknown keys stay."""
+        """Return the edits that make a mapping say what is new; unknown keys stay."""
         added: dict[str, Data] = {}
         for key in dict.fromkeys((*old, *new)):
             before, after, place = old.get(key), new.get(key), node.find_value(key)
@@ -207,7 +207,7 @@ class _Editor:
         return _Edit(dashes[0], spans[-1][1], value)
 
     def _continued(self, node: Node, span: tuple[int, int], old: Data, new: Data) -> str:
-        """Gives an old item's text with what is new about it."""
+        """Return an old item's text with what is new about it."""
         edits: Iterable[_Edit] = ()
         if isinstance(node, MappingNode):
             edits = self.mapping_edits(node, _as_mapping(old), _as_mapping(new))
@@ -225,7 +225,7 @@ class _Editor:
     # --- places ------------------------------------------------------------------------------
 
     def _behind(self, node: Node, comments: list[str]) -> str:
-        """Gives comments to stand behind a value, and a new line if more than comments follows."""
+        """Return comments to stand behind a value, and a new line if more than comments follows."""
         if not comments:
             return ""
         is_followed = self._rest_of_line(node)[:1] not in ("", "#")
@@ -244,7 +244,7 @@ class _Editor:
 
 
 def _sources(old: list[Data], new: list[Data]) -> tuple[list[int | None], list[int]]:
-    """Finds which old item each new one continues, and the old ones that none continues.
+    """Find which old item each new one continues, and the old ones that none continues.
 
     An item continues one that says the same, or else one with the same label.
     """

@@ -37,7 +37,7 @@ def _time_with_zone(value: object) -> datetime | None:
 
 
 def _outlines_of(value: object) -> tuple[Outline, ...]:
-    """Reads "0.0 0.0, 4.0 0.0, 4.0 2.0"; the outlines of several parts have a ; between them."""
+    """Read "0.0 0.0, 4.0 0.0, 4.0 2.0"; the outlines of several parts have a ; between them."""
     parts = value.split(";") if isinstance(value, str) else []
     outlines = tuple(tuple(map(_corner_of, part.split(","))) for part in parts)
     if value is not None and (not outlines or any(len(outline) < 3 for outline in outlines)):
@@ -104,7 +104,7 @@ class _EventEntry(BaseModel):
 
 
 def read_events(root: MappingNode | None) -> tuple[EventNode, ...]:
-    """Gives the events of a file's top mapping; those that people wrote get ids by their order.
+    """Return the events of a file's top mapping; those that people wrote get ids by their order.
 
     Raises:
         TextError: One of them does not say what it must, or two have the same id.
@@ -130,7 +130,7 @@ def read_events(root: MappingNode | None) -> tuple[EventNode, ...]:
 
 
 def event_data(event: Event) -> dict[str, Data]:
-    """Gives what a record says of an event: millimetres and seconds."""
+    """Return what a record says of an event: millimetres and seconds."""
     entries: dict[str, Data] = {
         "id": event.id,
         "text": event.text,

@@ -33,17 +33,17 @@ class Layout:
     end: int
 
     def skeleton(self, text: str) -> str:
-        """Gives the text without its records."""
+        """Return the text without its records."""
         return text[: self.start] + text[self.end :]
 
     def offset_in_text(self, offset_in_skeleton: int) -> int:
-        """Gives where in the text a place of the skeleton stands."""
+        """Return where in the text a place of the skeleton stands."""
         is_before = offset_in_skeleton < self.start
         return offset_in_skeleton + (0 if is_before else self.end - self.start)
 
 
 def find_records(text: str) -> Layout:
-    """Finds the records of a text whose lines end in a line feed."""
+    """Find the records of a text whose lines end in a line feed."""
     key = _LIST_KEY.search(text)
     first = _CONTENT.search(text, key.end()) if key else None
     if first is None or _UNUSUAL_BREAK.search(text):
@@ -59,7 +59,7 @@ def find_records(text: str) -> Layout:
 
 
 def find_changed_records(text: str, *, before: str, layout: Layout) -> Layout:
-    """Finds the records of a text that was changed, by looking only at what changed.
+    """Find the records of a text that was changed, by looking only at what changed.
 
     Args:
         text: As it is now.
@@ -92,7 +92,7 @@ def find_changed_records(text: str, *, before: str, layout: Layout) -> Layout:
 
 
 def _patterns(indent: int) -> tuple[re.Pattern[str], re.Pattern[str]]:
-    """Gives what begins a record, and what begins a line that belongs to none."""
+    """Return what begins a record, and what begins a line that belongs to none."""
     item = rf" {{{indent}}}-(?:[ \t\n]|\Z)"
     dash = re.compile(rf"^{item}", re.MULTILINE)
     return dash, re.compile(rf"^(?!{item}) {{0,{indent}}}[^ #\n]", re.MULTILINE)
@@ -108,7 +108,7 @@ def _find_spans(text: str, start: int, end: int, indent: int) -> tuple[tuple[int
 
 
 def _count_same(one: str, other: str) -> int:
-    """Counts the letters that two texts begin with alike."""
+    """Count the letters that two texts begin with alike."""
     low, high = 0, min(len(one), len(other))
     while low < high:
         middle = (low + high + 1) // 2
@@ -120,12 +120,12 @@ def _count_same(one: str, other: str) -> int:
 
 
 def whole(text: str) -> Layout:
-    """Gives the layout of a text whose records cannot be told apart by their dashes."""
+    """Return the layout of a text whose records cannot be told apart by their dashes."""
     return Layout(spans=(), indent=2, start=len(text), end=len(text))
 
 
 def _content_end(text: str, start: int, end: int, indent: int) -> int:
-    """Cuts blank lines, and comments that stand no further right than the dash, off the end."""
+    """Cut blank lines, and comments that stand no further right than the dash, off the end."""
     while True:
         end = start + len(text[start:end].rstrip(" \t\n"))
         line_start = text.rfind("\n", start, end) + 1
@@ -148,7 +148,7 @@ class _UnsureError(Exception):
 
 
 def read_plain_record(block: str) -> dict[str, Data] | None:
-    """Gives what one item of the list `waypoints` says; None when a YAML parser must decide."""
+    """Return what one item of the list `waypoints` says; None when a YAML parser must decide."""
     try:
         return _read_lines(block.rstrip("\n").split("\n"))
     except _UnsureError:
@@ -233,7 +233,7 @@ class LineEnds:
 
     @classmethod
     def of(cls, decoded: str) -> "LineEnds":
-        """Takes them from a file's text."""
+        """Take them from a file's text."""
         if "\r" not in decoded:
             # To look for one letter costs a hundredth of counting two.
             return cls(LF)
@@ -246,7 +246,7 @@ class LineEnds:
         return cls(usual, (*(line.removesuffix("\r") for line in ended), last), ends)
 
     def restored(self, text: str) -> str:
-        """Gives a text whose lines end in a line feed with the ends of this file.
+        """Return a text whose lines end in a line feed with the ends of this file.
 
         Args:
             text: What the file is to say; most of its lines stood in the file before.
@@ -261,7 +261,7 @@ class LineEnds:
 
 
 def _same_lines(before: Sequence[str], after: Sequence[str]) -> Iterator[tuple[int, int]]:
-    """Gives the numbers of lines that are the same, before and after."""
+    """Return the numbers of lines that are the same, before and after."""
     n_least = min(len(before), len(after))
     n_top = next((i for i in range(n_least) if before[i] != after[i]), n_least)
     n_most = n_least - n_top

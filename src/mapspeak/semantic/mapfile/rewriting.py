@@ -24,12 +24,12 @@ _OPTIONAL_KEYS = ("stamp_s", "recorded_at", "room_id", "picture")
 
 
 def bound_to(document: MapDocument, map_id: str) -> MapDocument:
-    """Gives the file with the map that its waypoints belong to."""
+    """Return the file with the map that its waypoints belong to."""
     return with_entry(document, "map", map_id)
 
 
 def with_entry(document: MapDocument, key: str, value: str) -> MapDocument:
-    """Gives the file with one key of its own, beside the records, saying something else."""
+    """Return the file with one key of its own, beside the records, saying something else."""
     text = document.text
     entry = entry_text(key, value, indent=0)
     present = document.root.find_value(key) if document.root else None
@@ -48,7 +48,7 @@ def with_entry(document: MapDocument, key: str, value: str) -> MapDocument:
 
 
 def with_waypoint(document: MapDocument, waypoint: Waypoint) -> MapDocument:
-    """Gives the file with a waypoint written: in its own record if its name is there already.
+    """Return the file with a waypoint written: in its own record if its name is there already.
 
     Raises:
         SemanticMapError: The file is laid out in a way that cannot be written to.
@@ -70,7 +70,7 @@ def with_waypoint(document: MapDocument, waypoint: Waypoint) -> MapDocument:
 
 
 def without_waypoint(document: MapDocument, key: str) -> MapDocument:
-    """Gives the file without one record; comments around it stay.
+    """Return the file without one record; comments around it stay.
 
     Raises:
         SemanticMapError: The file is laid out in a way that cannot be written to.
@@ -115,7 +115,7 @@ def _require_cut(document: MapDocument, start: int) -> None:
 
 
 def _reparsed(document: MapDocument, text: str, *, keys: set[str]) -> MapDocument:
-    """Reads the changed text before anybody relies on it."""
+    """Read the changed text before anybody relies on it."""
     try:
         changed = parse_document(document.encoded(text), source=document.source, previous=document)
     except SemanticMapError as error:
@@ -147,7 +147,7 @@ _INDENT = 2
 
 
 def with_event(document: MapDocument, event: Event) -> tuple[MapDocument, Event]:
-    """Gives the file with an event written: in its own record if its id is there already.
+    """Return the file with an event written: in its own record if its id is there already.
 
     Returns:
         The file, and the event as it reads there, with its id.
@@ -168,7 +168,7 @@ def with_event(document: MapDocument, event: Event) -> tuple[MapDocument, Event]
 
 
 def changed_events(document: MapDocument, events: dict[str, Event]) -> str:
-    """Gives the file's text with some of its events changed."""
+    """Return the file's text with some of its events changed."""
     text = document.text
     for record in sorted(document.events.values(), key=lambda each: -each.start):
         new = events.get(record.event.id)
@@ -199,7 +199,7 @@ def _with_new(document: MapDocument, event: Event) -> str:
 
 
 def _in_empty(document: MapDocument, key: ScalarNode, listed: Node | None, record: str) -> str:
-    """Gives the text with a first record below the key, in place of `[]` or null."""
+    """Return the text with a first record below the key, in place of `[]` or null."""
     text = document.text
     # Where nothing stands behind the key, a value has no place of its own.
     is_written = listed is not None and listed.end > listed.start
@@ -253,7 +253,7 @@ def _events_layout_error(document: MapDocument) -> SemanticMapError:
 
 
 def moved(document: MapDocument, motion: Pose, *, entries: dict[str, str]) -> MapDocument:
-    """Gives the file with every waypoint and event moved.
+    """Return the file with every waypoint and event moved.
 
     Args:
         document: The file.

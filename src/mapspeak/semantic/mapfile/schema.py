@@ -196,7 +196,7 @@ _EXPECTED = {
 
 
 def waypoint_from(data: Data, *, map_id: str | None) -> Waypoint:
-    """Gives the waypoint that a record describes.
+    """Return the waypoint that a record describes.
 
     Raises:
         ValidationError: The record does not say what it must (see `fault_in`).
@@ -205,7 +205,7 @@ def waypoint_from(data: Data, *, map_id: str | None) -> Waypoint:
 
 
 def map_id_from(data: Data) -> str | None:
-    """Gives the map that a file says it belongs to, if any.
+    """Return the map that a file says it belongs to, if any.
 
     Raises:
         ValidationError: The file's own keys do not say what they must (see `fault_in`).
@@ -214,7 +214,7 @@ def map_id_from(data: Data) -> str | None:
 
 
 def record_data(waypoint: Waypoint) -> dict[str, Data]:
-    """Gives what a record says of a waypoint: millimetres and hundredths of a degree."""
+    """Return what a record says of a waypoint: millimetres and hundredths of a degree."""
     pose = _pose_data(waypoint.pose)
     safety, functional = waypoint.safety_landmarks, waypoint.functional_landmarks
     return {
@@ -232,7 +232,7 @@ def record_data(waypoint: Waypoint) -> dict[str, Data]:
 
 
 def find_misspelt_keys(data: Data) -> Iterator[tuple[str, str]]:
-    """Gives unknown keys that look like known ones, each with the known one."""
+    """Return unknown keys that look like known ones, each with the known one."""
     if not isinstance(data, dict):
         return
     yield from _lookalikes(data, _WAYPOINT_KEYS)
@@ -243,12 +243,12 @@ def find_misspelt_keys(data: Data) -> Iterator[tuple[str, str]]:
 
 
 def find_misspelt_keys_of_file(data: Data) -> Iterator[tuple[str, str]]:
-    """Gives unknown keys beside the records that look like known ones."""
+    """Return unknown keys beside the records that look like known ones."""
     yield from _lookalikes(data, _FILE_KEYS)
 
 
 def fault_in(node: Node, error: ValidationError) -> TextError:
-    """Gives the first thing that is wrong with a record, and where it stands."""
+    """Return the first thing that is wrong with a record, and where it stands."""
     # A key that is none is more often the misspelling of one that is missing than one too many.
     first, *others = sorted(error.errors(), key=lambda each: each["type"] != "extra_forbidden")
     place, path = _locate(node, first["loc"])
@@ -265,7 +265,7 @@ def fault_in(node: Node, error: ValidationError) -> TextError:
 
 
 def _locate(node: Node, location: tuple[int | str, ...]) -> tuple[Node, str]:
-    """Gives the innermost node on the way to a fault, and the whole way in words."""
+    """Return the innermost node on the way to a fault, and the whole way in words."""
     path = "The record"
     for step in location:
         said = tell_name(str(step))
@@ -328,7 +328,7 @@ def _angle(angle_rad: float) -> str:
 
 
 def _decimals(value: float, n_decimals: int) -> str:
-    """Gives a number with one decimal less where that one is a zero: 1.20, 1.205, 90.0."""
+    """Return a number with one decimal less where that one is a zero: 1.20, 1.205, 90.0."""
     # Adding zero turns -0.0 into 0.0.
     text = f"{round(value, n_decimals) + 0.0:.{n_decimals}f}"
     return text.removesuffix("0")

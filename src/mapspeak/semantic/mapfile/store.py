@@ -88,7 +88,7 @@ class SemanticMapStore:
         self._seen: _Seen | None = None
 
     def read(self) -> SemanticMap:
-        """Gives all remembered places; looks into the file only where it changed.
+        """Return all remembered places; look into the file only where it changed.
 
         A file that was broken by hand since gives the places read before, with a warning.
 
@@ -100,7 +100,7 @@ class SemanticMapStore:
         return replace(places, warnings=(*places.warnings, *self._warnings(seen)))
 
     def read_events(self) -> tuple[Event, ...]:
-        """Gives all events of the file, also those that are over; as `read` otherwise.
+        """Return all events of the file, also those that are over; as `read` otherwise.
 
         Of a file that belongs to another map there are none: they are at other places here.
         """
@@ -110,11 +110,11 @@ class SemanticMapStore:
         return tuple(record.event for record in document.events.values())
 
     def read_entry(self, key: str) -> str | None:
-        """Gives what the file says under a key of its own, such as `snapshot`; as `read`."""
+        """Return what the file says under a key of its own, such as `snapshot`; as `read`."""
         return self._read_document().find_entry(key)
 
     def write_event(self, event: Event) -> Event:
-        """Writes an event, in its own record where its id is there already; gives it with its id.
+        """Write an event, in its own record where its id is there already; return it with its id.
 
         Raises:
             SemanticMapError: As for `write`.
@@ -124,7 +124,7 @@ class SemanticMapStore:
         return after.events[ids[0]].event
 
     def write(self, waypoint: Waypoint) -> WriteReceipt:
-        """Creates a waypoint, or puts it in place of the one of that name; done when it returns.
+        """Create a waypoint, or put it in place of the one of that name; done when it returns.
 
         Raises:
             SemanticMapError: The file belongs to another map, has a fault, cannot be written, or is
@@ -135,7 +135,7 @@ class SemanticMapStore:
     def remember(
         self, waypoint: Waypoint, *, gone: Iterable[str] = ()
     ) -> tuple[WriteReceipt, Merge]:
-        """Joins a waypoint with what is remembered under its name; done when it returns.
+        """Join a waypoint with what is remembered under its name; done when it returns.
 
         What another program remembers of it in the same moment is joined, too.
 
@@ -172,7 +172,7 @@ class SemanticMapStore:
         )
 
     def remove(self, name: str) -> Waypoint:
-        """Takes a waypoint out of the map and gives it.
+        """Take a waypoint out of the map and return it.
 
         Raises:
             SemanticMapError: There is none of that name, or as for `write`.
@@ -191,7 +191,7 @@ class SemanticMapStore:
     def _change(
         self, change: Callable[[MapDocument], MapDocument]
     ) -> tuple[MapDocument, MapDocument]:
-        """Replaces the file of this map by a changed one and gives both."""
+        """Replace the file of this map by a changed one and return both."""
 
         def change_of_this_map(document: MapDocument) -> MapDocument:
             self._require_same_map(document.map_id, f"The file {self.path}")
@@ -202,7 +202,7 @@ class SemanticMapStore:
     def rewrite(
         self, change: Callable[[MapDocument], MapDocument]
     ) -> tuple[MapDocument, MapDocument]:
-        """Replaces the file by a changed one and gives both, whoever else writes meanwhile.
+        """Replace the file by a changed one and return both, whoever else writes meanwhile.
 
         Args:
             change: Called with the file as it is, once or more often; whichever map it belongs to.
@@ -225,7 +225,7 @@ class SemanticMapStore:
         raise SemanticMapError(message, hint="End that program, then write again.")
 
     def _look(self) -> _Seen:
-        """Gives what the file says now, reading only what changed."""
+        """Return what the file says now, reading only what changed."""
         seen = self._seen
         last = seen.document if seen else None
         try:
@@ -301,6 +301,6 @@ def _removed(document: MapDocument, name: str) -> MapDocument:
 
 
 def _raised_again(fault: SemanticMapError | None) -> SemanticMapError:
-    """Gives a fresh copy of a kept fault, which would gather traces otherwise."""
+    """Return a fresh copy of a kept fault, which would gather traces otherwise."""
     assert fault is not None, "a file without a document has a fault"  # noqa: S101 - our belief
     return SemanticMapError(fault.message, hint=fault.hint)

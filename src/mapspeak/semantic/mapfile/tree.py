@@ -47,7 +47,7 @@ class TextError(SemanticMapError):
         self.other_offset = other_offset
 
     def moved(self, place: Callable[[int], int]) -> "TextError":
-        """Gives the same fault where the text is a part of a longer one."""
+        """Return the same fault where the text is a part of a longer one."""
         other = None if self.other_offset is None else place(self.other_offset)
         return TextError(
             self.message, hint=self.hint, offset=place(self.offset), other_offset=other
@@ -106,11 +106,11 @@ class MappingNode:
         return {key.text: value.data for key, value in self.entries}
 
     def find_value(self, key: str) -> "Node | None":
-        """Gives the node under a key."""
+        """Return the node under a key."""
         return next((value for name, value in self.entries if name.text == key), None)
 
     def find_key(self, key: str) -> ScalarNode | None:
-        """Gives the node of the key itself."""
+        """Return the node of the key itself."""
         return next((name for name, _ in self.entries if name.text == key), None)
 
 
@@ -118,19 +118,19 @@ Node = ScalarNode | ListNode | MappingNode
 
 
 def plain_data(text: str) -> str | None:
-    """Gives what unquoted text means: itself, or None."""
+    """Return what unquoted text means: itself, or None."""
     return None if text in _NULLS else text
 
 
 def line_and_column(text: str, offset: int) -> tuple[int, int]:
-    """Gives where an offset lies, both counted from 1."""
+    """Return where an offset lies, both counted from 1."""
     breaks = list(_BREAK.finditer(text, 0, offset))
     line_start = breaks[-1].end() if breaks else 0
     return len(breaks) + 1, offset - line_start + 1
 
 
 def parse_tree(text: str) -> Node | None:
-    """Reads one YAML document; None when it holds nothing but comments.
+    """Read one YAML document; None when it holds nothing but comments.
 
     Raises:
         TextError: It is not YAML, or uses a part of YAML that a semantic map has no need of.
@@ -242,7 +242,7 @@ class _Builder:
             yield key, self._behind_colon(key, value)
 
     def _behind_colon(self, key: ScalarNode, value: Node) -> Node:
-        """Moves an absent value from where the next thing begins to its key's colon."""
+        """Move an absent value from where the next thing begins to its key's colon."""
         if not isinstance(value, ScalarNode) or value.start != value.end:
             return value
         colon = self._text.find(":", key.end, value.start)
@@ -283,7 +283,7 @@ _COMMENT = re.compile(r"(?:(?<=\s)|^)#[^\n]*")
 
 
 def comments_within(text: str, node: Node) -> list[str]:
-    """Gives the comments between the first and the last character of a node."""
+    """Return the comments between the first and the last character of a node."""
     if isinstance(node, ScalarNode):
         header = text[node.start : node.end].partition("\n")[0]
         return _COMMENT.findall(header) if header[:1] in ("|", ">") else []
@@ -291,13 +291,13 @@ def comments_within(text: str, node: Node) -> list[str]:
 
 
 def comments_in(text: str, start: int, end: int, nodes: Sequence[Node]) -> list[str]:
-    """Gives the comments in a stretch of text, those within its nodes included."""
+    """Return the comments in a stretch of text, those within its nodes included."""
     inner = [comment for node in nodes for comment in comments_within(text, node)]
     return comments_between(text, start, end, nodes) + inner
 
 
 def comments_between(text: str, start: int, end: int, nodes: Sequence[Node]) -> list[str]:
-    """Gives the comments in a stretch of text that stand before, between and behind its nodes."""
+    """Return the comments in a stretch of text that stand before, between and behind its nodes."""
     starts = [start, *(node.end for node in nodes)]
     ends = [*(node.start for node in nodes), end]
     gaps = (text[a:b] for a, b in zip(starts, ends, strict=True))
@@ -305,7 +305,7 @@ def comments_between(text: str, start: int, end: int, nodes: Sequence[Node]) -> 
 
 
 def without_comments(gap: str) -> str:
-    """Gives what stands between two nodes with every comment turned into spaces."""
+    """Return what stands between two nodes with every comment turned into spaces."""
     return _COMMENT.sub(lambda match: " " * len(match[0]), gap)
 
 

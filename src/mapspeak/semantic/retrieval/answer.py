@@ -140,7 +140,7 @@ class Entry:
 
 
 def list_entries(semantic_map: SemanticMap) -> tuple[Entry, ...]:
-    """Gives each place followed by the landmarks seen from it.
+    """Return each place followed by the landmarks seen from it.
 
     A place is known by the key of its name; its landmark by both keys and, where one label stands
     there several times, by its number among those.
@@ -270,7 +270,7 @@ class Answer:
     missing: str | None = None
 
     def find_speaking(self, *, least_said_ratio: float) -> tuple[EntryCandidate, ...]:
-        """Gives the candidates that are surely meant, or that say enough of the request."""
+        """Return the candidates that are surely meant, or that say enough of the request."""
         n_sure = self.n_meant if self.is_sure else 0
         return tuple(
             each

@@ -117,7 +117,7 @@ class EntryIndex:
         self._look_alikes = LookAlikes({" ".join(words) for words in words_of.values()} - {""})
 
     def find(self, query: str, *, among: Container[str] | None = None, limit: int = 5) -> Answer:
-        """Finds what a request may mean.
+        """Find what a request may mean.
 
         Args:
             query: What people say: a name, a thing, what it is for, what is the matter.
@@ -143,7 +143,7 @@ class EntryIndex:
         )
 
     def _understand(self, query: str, words: tuple[AskedWords, ...]) -> str:
-        """Gives the request with its words put right, or the name that it looks like."""
+        """Return the request with its words put right, or the name that it looks like."""
         put_right = _put_right(query, words)
         if content_stems(put_right) in self._of_stems or not any(
             word.is_doubtful for word in words
@@ -175,7 +175,7 @@ class EntryIndex:
         return _Asked(understood, words, common, ratios, said_ratios, likeness, missing)
 
     def _order(self, ratios: NDArray[np.float64], among: Container[str] | None) -> list[int]:
-        """Gives the numbers of the entries that say anything of it, the likeliest first."""
+        """Return the numbers of the entries that say anything of it, the likeliest first."""
         likely = np.flatnonzero(ratios > 0)
         if among is not None:
             likely = likely[[self._entries[number].id in among for number in likely]]
@@ -189,7 +189,7 @@ class EntryIndex:
         return int(np.count_nonzero(asked.ratios[order] >= asked.ratios[order[0]] - margin))
 
     def _judge(self, asked: _Asked, order: list[int], n_meant: int) -> tuple[Verdict, bool]:
-        """Says how far to trust the likeliest, and whether what is meant is surely called so."""
+        """Say how far to trust the likeliest, and whether what is meant is surely called so."""
         if not order:
             return Verdict.NOT_REMEMBERED, False
         first, thresholds = order[0], self._thresholds
@@ -210,7 +210,7 @@ class EntryIndex:
         return Verdict.FOUND if is_sure and n_meant == 1 else Verdict.AMBIGUOUS, is_sure
 
     def _is_called(self, request: str, number: int) -> bool:
-        """True where the request is for what the entry is, and not for what stands beside it."""
+        """Return True where the request is for the entry itself, not for what is beside it."""
         entry = self._entries[number]
         other_names = (
             text for field, text in self._kinds.say_of(entry) if field is MatchField.OTHER_NAME
@@ -219,7 +219,7 @@ class EntryIndex:
         return is_called or says_purpose(request, entry.purpose)
 
     def _lead_ratio(self, ratios: NDArray[np.float64], first: int) -> float:
-        """Says how far one is ahead of the next of all that is remembered and called otherwise.
+        """Say how far one is ahead of the next of all that is remembered and called otherwise.
 
         Of all, also where only some may be chosen: that a sink stands in another room makes a
         toilet in this one no likelier to be meant.
@@ -249,13 +249,13 @@ class EntryIndex:
         )
 
     def _explain(self, asked: _Asked, number: int) -> tuple[MatchEvidence, ...]:
-        """Gives which words the record says; where it says none, what is commonly known does."""
+        """Return which words the record says; where it says none, what is commonly known does."""
         said = self._words.explain(asked.words, number)
         return said or self._common_words.explain(asked.common, number)
 
 
 def _missing_ratio(asked: _Asked, order: list[int]) -> float:
-    """Says how far something that is not remembered is ahead of the likeliest that is."""
+    """Say how far something that is not remembered is ahead of the likeliest that is."""
     if asked.missing is None or (order and asked.basis(order[0]) is Basis.NAME):
         return -math.inf
     if not order:
@@ -264,7 +264,7 @@ def _missing_ratio(asked: _Asked, order: list[int]) -> float:
 
 
 def _find_missing(asked: _Asked, order: list[int]) -> str | None:
-    """Gives the name of what is more like the request than anything that is remembered."""
+    """Return the name of what is more like the request than anything that is remembered."""
     if asked.missing is None or _missing_ratio(asked, order) <= 0:
         return None
     return asked.missing.name
@@ -279,7 +279,7 @@ def _numbers_by(keys: Iterable[Iterable[_Key]]) -> dict[_Key, list[int]]:
 
 
 def _put_right(query: str, words: Iterable[AskedWords]) -> str:
-    """Gives the request with the words put right that only a misspelt word explains."""
+    """Return the request with the words put right that only a misspelt word explains."""
     for word in words:
         if word.corrected != word.shown:
             query = re.sub(rf"\b{re.escape(word.shown)}\b", word.corrected, query)

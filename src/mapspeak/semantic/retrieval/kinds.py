@@ -35,13 +35,13 @@ class ThingKind:
 
 @cache
 def read_kinds() -> tuple[ThingKind, ...]:
-    """Reads the kinds in the order of the list, once: nothing ever changes them."""
+    """Read the kinds in the order of the list, once: nothing ever changes them."""
     text = resources.files(__package__).joinpath("things.txt").read_text(encoding="utf-8")
     return tuple(_kinds_in(text))
 
 
 def find_kinds(label: str) -> tuple[ThingKind, ...]:
-    """Finds the kinds that a label names: "foam fire extinguisher" is a fire extinguisher.
+    """Find the kinds that a label names: "foam fire extinguisher" is a fire extinguisher.
 
     The longest name at the end of the label's head counts, whatever its form: a "sofa by the
     window" is a sofa. A name may reach beyond the head, as "box of returns" does.
@@ -56,12 +56,12 @@ def find_kinds(label: str) -> tuple[ThingKind, ...]:
 
 
 def find_kinds_called(name: str) -> tuple[ThingKind, ...]:
-    """Finds the kinds of which that is a name, with nothing added to it."""
+    """Find the kinds of which that is a name, with nothing added to it."""
     return _kinds_by_stems().get(content_stems(name), ())
 
 
 def find_names(kind: ThingKind, label: str) -> tuple[str, ...]:
-    """Gives the names of a kind that a thing of that label may have.
+    """Return the names of a kind that a thing of that label may have.
 
     A "tennis table" is a table, and no "dining table": there are many tables, and the label says
     which. A "foam extinguisher" is a "fire extinguisher", since no other kind is called that way.
@@ -80,22 +80,22 @@ def find_names(kind: ThingKind, label: str) -> tuple[str, ...]:
 
 
 def is_gone(label: str) -> bool:
-    """True for a label of what is not there: "missing fire extinguisher"."""
+    """Return True for a label of what is not there: "missing fire extinguisher"."""
     return not _GONE.isdisjoint(find_head(label))
 
 
 def head_stems(label: str) -> tuple[str, ...]:
-    """Gives the stems of the words of a label up to the one that says what the thing is."""
+    """Return the stems of the words of a label up to the one that says what the thing is."""
     return content_stems(" ".join(find_head(label))) or content_stems(label)
 
 
 def ends_with(stems: tuple[str, ...], ending: tuple[str, ...]) -> bool:
-    """True where one row of stems ends with another."""
+    """Return True where one row of stems ends with another."""
     return stems[len(stems) - len(ending) :] == ending if len(ending) <= len(stems) else False
 
 
 def find_named_kinds(text: str) -> frozenset[ThingKind]:
-    """Finds the kinds that a text names anywhere."""
+    """Find the kinds that a text names anywhere."""
     stems = content_stems(text)
     spans = (
         stems[start : start + n]
@@ -107,7 +107,7 @@ def find_named_kinds(text: str) -> frozenset[ThingKind]:
 
 @cache
 def _tells_little(ending: tuple[str, ...]) -> bool:
-    """True for what the names of several kinds end with: "table"."""
+    """Return True for what the names of several kinds end with: "table"."""
     found = {
         kind
         for stems, kinds in _kinds_by_stems().items()
@@ -188,7 +188,7 @@ class KindIndex:
         self._said_of: dict[tuple[str, ...], Texts] = {}
 
     def say_of(self, entry: Entry) -> Texts:
-        """Gives what is commonly known of a thing: its other names, then its uses."""
+        """Return what is commonly known of a thing: its other names, then its uses."""
         if entry.kind is not EntryKind.THING:
             return ()
         if entry.names not in self._said_of:
@@ -209,7 +209,7 @@ class KindIndex:
         )
 
     def find_missing(self, vector: Floats) -> Missing | None:
-        """Finds the kind whose name is most like a request, of those that are not remembered."""
+        """Find the kind whose name is most like a request, of those that are not remembered."""
         if self._vectors is None or not self._absent.any():
             return None
         ratios = np.where(self._absent, np.round(self._vectors @ vector, 6), -1.0)
@@ -217,7 +217,7 @@ class KindIndex:
         return Missing(self._names[number], float(ratios[number]))
 
     def find_missing_called(self, request: str) -> Missing | None:
-        """Finds the kind that a request names and nothing else, if it is not remembered."""
+        """Find the kind that a request names and nothing else, if it is not remembered."""
         stems = content_stems(request)
         is_absent = dict(zip(self._kinds, self._absent.tolist(), strict=True))
         called = (kind for kind in find_kinds_called(request) if is_absent[kind])
@@ -225,7 +225,7 @@ class KindIndex:
         return next((Missing(name, 1.0) for name in names), None)
 
     def _find_by_meaning(self, vectors: TextVectors, of_names: Floats) -> None:
-        """Gives labels that name no kind the one whose name is most like them."""
+        """Return labels that name no kind the one whose name is most like them."""
         unknown = sorted(
             label
             for label, kinds in self._kinds_of.items()
@@ -264,13 +264,13 @@ _DENIED = frozenset({"another", "no", "not", "other"})
 
 
 def is_carrier(label: str) -> bool:
-    """True for a label of what only shows a thing, points to it or has room for it."""
+    """Return True for a label of what only shows a thing, points to it or has room for it."""
     head = find_head(label)
     return bool(head) and head[-1].removesuffix("s") in _CARRIERS
 
 
 def calls_by_name(request: str, names: Iterable[str], *, other_names: Iterable[str] = ()) -> bool:
-    """True where a request is for a thing of one of these names, as far as both say what it is.
+    """Return True where a request is for a thing of one of these names, as far as both tell.
 
     "Fire extinguisher" calls a foam fire extinguisher so, "dining table" no tennis table, and
     "mouse trap" no mouse.
@@ -297,14 +297,14 @@ def calls_by_name(request: str, names: Iterable[str], *, other_names: Iterable[s
 
 
 def says_purpose(request: str, purpose: str | None) -> bool:
-    """True where a request says in the very words what a thing is for, and names no thing."""
+    """Return True where a request says in the very words what a thing is for."""
     asked = frozenset(content_stems(request))
     is_told = len(asked) > 1 and asked <= frozenset(content_stems(purpose or ""))
     return is_told and not find_kinds_called(request)
 
 
 def _without_opening(request: str) -> str:
-    """Gives a request from the first word on that may say what is meant."""
+    """Return a request from the first word on that may say what is meant."""
     words = [shown for shown, _ in split_words(request)]
     first = next((i for i, word in enumerate(words) if word.lower() not in _OPENING), 0)
     return " ".join(words[first:])

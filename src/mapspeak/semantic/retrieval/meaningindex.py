@@ -30,7 +30,7 @@ class Embedder(Protocol):
         """From which likeness on something counts as meant, for this model."""
 
     def embed(self, texts: Sequence[str]) -> NDArray[np.float32]:
-        """Gives one row for each text, a vector of length 1; of 0 where it says nothing."""
+        """Return one row for each text, a vector of length 1; of 0 where it says nothing."""
 
 
 class TextVectors:
@@ -51,11 +51,11 @@ class TextVectors:
 
     @classmethod
     def in_folder(cls, folder: Path, embedder: Embedder) -> "TextVectors":
-        """Takes up the vectors that are kept in a memory's folder; `keep` writes the new ones."""
+        """Take up the vectors that are kept in a memory's folder; `keep` writes the new ones."""
         return cls(embedder, kept=folder / "vectors.npz")
 
     def keep(self) -> None:
-        """Writes the file if there are new vectors; one that cannot be written costs only time."""
+        """Write the file if there are new vectors; one that cannot be written costs only time."""
         if self._kept is None or len(self) == self._n_kept:
             return
         with contextlib.suppress(OSError):
@@ -67,7 +67,7 @@ class TextVectors:
         return len(self._vectors)
 
     def find(self, texts: Iterable[str]) -> NDArray[np.float32]:
-        """Gives one row for each text; only those that were never asked for are embedded."""
+        """Return one row for each text; only those that were never asked for are embedded."""
         wanted = list(texts)
         new = sorted(set(wanted) - self._vectors.keys())
         if new:
@@ -77,7 +77,7 @@ class TextVectors:
         return np.array([self._vectors[text] for text in wanted], dtype=np.float32)
 
     def write(self, path: Path) -> None:
-        """Keeps the vectors in an .npz file; a later session need not compute them again.
+        """Keep the vectors in an .npz file; a later session need not compute them again.
 
         The file is replaced as a whole.
         """
@@ -88,7 +88,7 @@ class TextVectors:
         unfinished.replace(path)
 
     def read(self, path: Path) -> None:
-        """Takes the vectors of an earlier session, if the same model gave them.
+        """Take the vectors of an earlier session, if the same model gave them.
 
         A file that is missing or broken is passed over: all it holds can be computed again.
         """
@@ -155,7 +155,7 @@ class Likeness:
         self.said_ratios = self._most_by_entry(np.where(is_common, -1.0, part_ratios))
 
     def nearest_text(self, number: int) -> tuple[MatchField, str]:
-        """Gives the text of an entry that is most like the phrase, and which part it is."""
+        """Return the text of an entry that is most like the phrase, and which part it is."""
         following = self._starts[number + 1 :]
         own = self._numbers[self._starts[number] : following[0] if len(following) else None]
         part = self._parts[own[int(self._part_ratios[own].argmax())]]
@@ -207,7 +207,7 @@ class MeaningIndex:
         self._lengths = np.maximum(self._lengths_of_sums(), _LEAST_LENGTH)
 
     def compare(self, vector: Floats) -> Likeness:
-        """Gives how alike each entry and a phrase are: as its part that is most like the phrase.
+        """Return how alike each entry and a phrase are: as its part that is most like the phrase.
 
         Args:
             vector: The phrase's.

@@ -22,7 +22,7 @@ from mapspeak.semantic.retrieval.meaningindex import Embedder
 
 @cache
 def read_wordpieces() -> tuple[str, ...]:
-    """Reads the pieces in the order of their numbers, once: nothing ever changes them."""
+    """Read the pieces in the order of their numbers, once: nothing ever changes them."""
     text = resources.files(__package__).joinpath("wordpieces.txt").read_text(encoding="utf-8")
     return tuple(text.split("\n")[:-1])
 
@@ -64,7 +64,7 @@ class MiniLM:
     """The model, with its numbers in memory: about 180 MB."""
 
     def __init__(self, path: Path) -> None:
-        """Reads an .onnx file.
+        """Read an .onnx file.
 
         Raises:
             ConfigError: The file does not hold this model.
@@ -96,7 +96,7 @@ class MiniLM:
         return MINILM_THRESHOLDS
 
     def embed(self, texts: Sequence[str]) -> Floats:
-        """Gives one row for each text, a vector of length 1; of 0 where no piece of it is known.
+        """Return one row for each text, a vector of length 1; of 0 where no piece of it is known.
 
         Texts of as many pieces are worked on together: that is four times as fast, and as nothing
         is filled up, each vector is to the last bit that of the text alone.
@@ -125,7 +125,7 @@ class MiniLM:
 
 
 def _on_one_thread() -> onnxruntime.SessionOptions:
-    """Gives settings with which answers are always the same and memory is given back."""
+    """Return settings with which answers are always the same and memory is given back."""
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
@@ -149,7 +149,7 @@ _LIBRARIES = ("onnxruntime", "tokenizers")
 
 
 def find_model() -> Embedder | None:
-    """Reads the model that mapspeak[semantic] installs, or gives None where a part is missing.
+    """Read the model that mapspeak[semantic] installs, or return None where a part is missing.
 
     Raises:
         ConfigError: The installed file does not hold the model.

@@ -33,7 +33,7 @@ _ENDING = re.compile(r"(?<=\w)['\u2019](?:d|ll|m|re|s|t|ve)\b", re.IGNORECASE)
 
 
 def split_words(text: str) -> Iterator[tuple[str, str]]:
-    """Gives each word as it stands and as it is compared: small letters without accents."""
+    """Return each word as it stands and as it is compared: small letters without accents."""
     for shown in re.findall(r"\w+", text):
         yield shown, shown.lower() if shown.isascii() else _without_accents(shown)
 
@@ -44,7 +44,7 @@ def _without_accents(word: str) -> str:
 
 
 def content_words(text: str) -> Iterator[tuple[str, str]]:
-    """Gives the words that say what is meant, without "the", "where's" and "take me to"."""
+    """Return the words that say what is meant, without "the", "where's" and "take me to"."""
     words = list(split_words(_ENDING.sub("", text)))
     for number, (shown, word) in enumerate(words, 1):
         # "Aisle A" is not any aisle.
@@ -54,12 +54,12 @@ def content_words(text: str) -> Iterator[tuple[str, str]]:
 
 
 def content_stems(text: str) -> tuple[str, ...]:
-    """Gives the stems of the words that say what is meant."""
+    """Return the stems of the words that say what is meant."""
     return tuple(stem(word) for _, word in content_words(text))
 
 
 def stem(word: str) -> str:
-    """Cuts an English ending off: plural, -ing, -ed, -er, a last e."""
+    """Cut an English ending off: plural, -ing, -ed, -er, a last e."""
     if len(word) > 4 and word.endswith("ies"):
         word = word[:-3] + "y"
     elif len(word) > 4 and word.endswith(("ses", "xes", "zes", "ches", "shes")):
@@ -91,7 +91,7 @@ class LookAlikes:
         self._lengths = np.array([len(text) for text in self._texts], dtype=int)
 
     def find(self, text: str, *, least_ratio: float, limit: int) -> list[str]:
-        """Finds the texts whose spelling is at least so much like this one's, the likest first."""
+        """Find the texts whose spelling is at least so much like this one's, the likest first."""
         # It is the bound that difflib calls quick_ratio, for all texts at once.
         n_shared = np.minimum(self._letters, _letters(text)).sum(axis=1)
         is_like = 2 * n_shared >= least_ratio * (self._lengths + len(text))
@@ -125,7 +125,7 @@ class Vocabulary:
         return ways <= {MatchKind.MISSPELT} and not self._is_known(word)
 
     def find_spellings(self, word: str) -> dict[str, MatchKind]:
-        """Finds the words that count as this one, each with how; none where no word does."""
+        """Find the words that count as this one, each with how; none where no word does."""
         found = dict.fromkeys(self._of_stem.get(stem(word), ()), MatchKind.FORM)
         if word in found:
             found[word] = MatchKind.SAME
@@ -133,7 +133,7 @@ class Vocabulary:
         return found or dict.fromkeys(self._misspelt(word), MatchKind.MISSPELT)
 
     def _parts(self, asked: str) -> list[str]:
-        """Gives the words that begin or end with this stem, or that it begins or ends with."""
+        """Return the words that begin or end with this stem, or that it begins or ends with."""
         n = len(asked)
         if n < _MIN_LETTERS:
             return []
@@ -151,7 +151,7 @@ class Vocabulary:
 
 
 def _beginning_with(words: Sequence[str], start: str) -> Iterator[str]:
-    """Gives the words that begin so, of words in order."""
+    """Return the words that begin so, of words in order."""
     behind = (words[number] for number in range(bisect_left(words, start), len(words)))
     return takewhile(lambda word: word.startswith(start), behind)
 
@@ -216,7 +216,7 @@ class WordIndex:
         self._vocabulary = Vocabulary(self._postings, is_known=is_known)
 
     def ask(self, phrase: str) -> tuple[AskedWords, ...]:
-        """Gives the words of a phrase that say what is meant, and what the records have of them."""
+        """Return words of a phrase that say what is meant, and what the records have of them."""
         found = []
         for shown, compared in content_words(phrase):
             spellings = self._vocabulary.find_spellings(compared)
@@ -227,11 +227,11 @@ class WordIndex:
         return tuple(found)
 
     def score_ratios(self, asked: Sequence[AskedWords]) -> NDArray[np.float64]:
-        """Gives, for each record, how much of a phrase it says; rare words count more."""
+        """Return, for each record, how much of a phrase it says; rare words count more."""
         return self._score_ratios(asked, KIND_WEIGHTS)
 
     def said_ratios(self, asked: Sequence[AskedWords]) -> NDArray[np.float64]:
-        """Gives the same where a part of a longer word counts as nothing."""
+        """Return the same where a part of a longer word counts as nothing."""
         return self._score_ratios(asked, KIND_WEIGHTS | {MatchKind.PART: 0.0})
 
     def _score_ratios(
@@ -247,12 +247,12 @@ class WordIndex:
         return found / max(sum(word.weight for word in asked), 1e-9)
 
     def explain(self, asked: Sequence[AskedWords], number: int) -> tuple[MatchEvidence, ...]:
-        """Gives at most one finding in a record for each word of a phrase, in their order."""
+        """Return at most one finding in a record for each word of a phrase, in their order."""
         findings = (self._finding(word, number) for word in asked)
         return tuple(finding for finding in findings if finding)
 
     def _finding(self, asked: AskedWords, number: int) -> MatchEvidence | None:
-        """Gives the weightiest place in a record that says a word."""
+        """Return the weightiest place in a record that says a word."""
         findings = (
             MatchEvidence(
                 query_word=asked.shown,

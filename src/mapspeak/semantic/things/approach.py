@@ -38,7 +38,7 @@ def find_approach(
     fronts: Sequence[Point] | None = None,
     whereabouts: FloatArray | None = None,
 ) -> Pose | None:
-    """Finds a pose that the robot can drive to and that faces a thing from near.
+    """Find a pose that the robot can drive to and that faces a thing from near.
 
     A thing on a wall has floor on both sides of it; the right one is that from which it was seen.
     Of all places on that side the best one faces most of where the thing may be.
@@ -72,7 +72,7 @@ def find_approach(
 def find_least_path_m(
     grid: OccupancyGrid, distances: DistanceField, target: Point, seen_from: Sequence[Point]
 ) -> float:
-    """Gives metres than which no way to a thing is shorter; `find_approach` costs more to ask.
+    """Return metres than which no way to a thing is shorter; `find_approach` costs more to ask.
 
     The way ends where one might look at the thing, or at a place that it was seen from. Infinite
     where the robot gets to none of these.
@@ -89,7 +89,7 @@ def find_least_path_m(
 def measure_faced(
     sight: SightMap, pose: Pose, seen_from: Sequence[Point], whereabouts: FloatArray
 ) -> float:
-    """Gives the share of where a thing may be that a pose faces from 1.5 m with nothing between."""
+    """Return share of where a thing may be that a pose faces from 1.5 m with nothing between."""
     stands, yaws = np.array([[pose.x, pose.y]]), np.array([pose.yaw_rad])
     is_ahead = _have_ahead(stands, yaws, whereabouts)
     return float((is_ahead & _have_in_sight(sight, stands, seen_from, whereabouts)).mean())
@@ -103,7 +103,7 @@ def _add_missed(
     seen_from: Sequence[Point],
     whereabouts: FloatArray,
 ) -> None:
-    """Adds to the costs of standing places what they do not face; of all but the best a part."""
+    """Add to the costs of standing places what they do not face; of all but the best a part."""
     yaws = np.arctan2(target.y - points[:, 1], target.x - points[:, 0])
     is_ahead = _have_ahead(points, yaws, whereabouts)
     costs += MISSED_M * (1 - is_ahead.mean(axis=1))
@@ -117,7 +117,7 @@ def _add_missed(
 
 
 def _have_ahead(stands: FloatArray, yaws: FloatArray, places: FloatArray) -> Mask:
-    """True for each standing place (row) and place (column) that lies ahead of it and near."""
+    """Return True for each viewpoint (row) and place (column) ahead of it and near."""
     east = places[:, 0] - stands[:, :1]
     north = places[:, 1] - stands[:, 1:]
     cos, sin = np.cos(yaws)[:, None], np.sin(yaws)[:, None]
@@ -129,7 +129,7 @@ def _have_ahead(stands: FloatArray, yaws: FloatArray, places: FloatArray) -> Mas
 def _have_in_sight(
     sight: SightMap, stands: FloatArray, seen_from: Sequence[Point], places: FloatArray
 ) -> Mask:
-    """True for each standing place (row) and place (column) with nothing between them.
+    """Return True for each standing place (row) and place (column) with nothing between them.
 
     What was met of a thing is the middle of a cell in a wall; what is seen of it lies before that.
     """
@@ -148,7 +148,7 @@ def _have_in_sight(
 def _reachable_near(
     sight: SightMap, distances: DistanceField, target: Point
 ) -> tuple[FloatArray, FloatArray]:
-    """Gives the middles of reachable cells around a point, and their clearance in metres."""
+    """Return the middles of reachable cells around a point, and their clearance in metres."""
     rows, cols, points = _floor_near(sight.grid, target)
     is_reachable = np.isfinite(distances.distances_at(rows, cols))
     rows, cols, points = rows[is_reachable], cols[is_reachable], points[is_reachable]
@@ -160,7 +160,7 @@ def _reachable_near(
 
 
 def _floor_near(grid: OccupancyGrid, target: Point) -> tuple[IntArray, IntArray, FloatArray]:
-    """Gives the free cells from which one might look at a thing: rows, columns, and middles."""
+    """Return the free cells from which one might look at a thing: rows, columns, and middles."""
     down, across = grid.window_around(target, LARGEST_OFF_M)
     rows, cols = np.nonzero(grid.crop(down, across).free)
     rows, cols = rows + down.start, cols + across.start
@@ -170,7 +170,7 @@ def _floor_near(grid: OccupancyGrid, target: Point) -> tuple[IntArray, IntArray,
 
 
 def find_fronts(sight: SightMap, target: Point, seen_from: Sequence[Point]) -> list[Point]:
-    """Gives, for each who saw the thing, the last floor before it on the line there.
+    """Return, for each who saw the thing, the last floor before it on the line there.
 
     Its middle may lie deep in its own body, where nobody can look.
     """
@@ -189,7 +189,7 @@ def find_fronts(sight: SightMap, target: Point, seen_from: Sequence[Point]) -> l
 
 
 def _last_floor(grid: OccupancyGrid, starts: FloatArray, ends: FloatArray) -> FloatArray:
-    """Finds the last floor on each line from a start to an end; the end where there is none."""
+    """Find the last floor on each line from a start to an end; the end where there is none."""
     away_m = np.hypot(*(ends - starts).T)
     n_steps = np.maximum(np.ceil(away_m / grid.resolution_m), 1)
     steps = np.arange(int(n_steps.max(initial=0)) + 1)
@@ -202,7 +202,7 @@ def _last_floor(grid: OccupancyGrid, starts: FloatArray, ends: FloatArray) -> Fl
 
 
 def _are_in_sight(sight: SightMap, fronts: Sequence[Point], points: FloatArray) -> Mask:
-    """True for points with nothing between them and any of the fronts of a thing.
+    """Return True for points with nothing between them and any of the fronts of a thing.
 
     Sight goes both ways, and the fronts are few: one looks from each of them to all sides.
     """

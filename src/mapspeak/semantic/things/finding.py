@@ -55,12 +55,12 @@ class Things:
     pools: dict[tuple[WeighedView, ...], tuple[Thing, ...]]
 
     def is_in_plain_sight(self, waypoint: Waypoint, point: Point) -> bool:
-        """True when who stands at a waypoint has nothing between itself and a point near by."""
+        """Return True when nothing is between a waypoint and a point near by."""
         far_m = waypoint.pose.point.distance_to(point)
         return far_m <= PLAIN_SIGHT_M and far_m <= self.free_m(waypoint, point) + BODY_M
 
     def seen_from(self, waypoint: Waypoint) -> tuple[Thing, ...]:
-        """Gives the things with a place that were seen from a waypoint."""
+        """Return the things with a place that were seen from a waypoint."""
         return tuple(
             thing
             for thing in self.things
@@ -68,11 +68,11 @@ class Things:
         )
 
     def free_m(self, waypoint: Waypoint, point: Point) -> float:
-        """Gives how far one sees from a waypoint towards a point before the first obstacle."""
+        """Return how far one sees from a waypoint towards a point before the first obstacle."""
         return float(self.surroundings[waypoint].near_m[self._ray(waypoint.pose, point)])
 
     def open_m(self, waypoint: Waypoint, point: Point) -> float:
-        """Gives how far one sees towards a point over what one may see over."""
+        """Return how far one sees towards a point over what one may see over."""
         return float(self.surroundings[waypoint].far_m[self._ray(waypoint.pose, point)])
 
     def _ray(self, pose: Pose, point: Point) -> int:
@@ -88,7 +88,7 @@ def find_things(
     noise: NoiseModel = NOISE,
     earlier: Things | None = None,
 ) -> Things:
-    """Joins what was seen from all places into things, and says where each is.
+    """Join what was seen from all places into things, and say where each is.
 
     Args:
         semantic_map: The places.
@@ -124,7 +124,7 @@ def _is_of(sight: SightMap, grid: OccupancyGrid, noise: NoiseModel) -> bool:
 def _divide(
     surroundings: dict[Waypoint, Surroundings], same_name: SameName
 ) -> list[tuple[WeighedView, ...]]:
-    """Gives all sightings in pools of related labels, in an order that the file does not set."""
+    """Return all sightings in pools of related labels, in an order that the file does not set."""
     ordered = sorted(surroundings, key=_order)
     every = [each for waypoint in ordered for each in surroundings[waypoint].sightings]
     pool_of = {
@@ -179,20 +179,20 @@ def _place(posteriors: Posteriors, group: Group) -> Placement:
 
 
 def _agreeing(group: Group, agreements: Sequence[float]) -> Group:
-    """Gives the views of a thing that say where it is: two or more that go with each other."""
+    """Return the views of a thing that say where it is: two or more that go with each other."""
     kept = [each for each, share in zip(group, agreements, strict=True) if share >= LEAST_AGREEMENT]
     return kept if len(kept) >= 2 else group
 
 
 def _filled(group: Group, agreements: tuple[float, ...]) -> tuple[float, ...]:
-    """Gives a view without a direction an agreement that says nothing."""
+    """Return a view without a direction an agreement that says nothing."""
     return agreements + (1.0,) * (len(group) - len(agreements))
 
 
 def _add_to_nearest(
     located: list[tuple[Group, Placement]], sighting: WeighedView, same_name: SameName
 ) -> bool:
-    """Adds a view without a direction to the nearest thing of its name; False where none is."""
+    """Add a view without a direction to the nearest thing of its name; False where none is."""
     here = sighting.waypoint.pose.point
     near = [
         (here.distance_to(placement.position), i)
@@ -226,7 +226,7 @@ def _describe(found: Things, pool: Sequence[Located], same_name: SameName) -> tu
 def _against(
     found: Things, located: Located, alone: Sequence[Located], same_name: SameName
 ) -> list[WeighedView]:
-    """Finds lone views of the name, from where the thing is in plain sight, that point past it."""
+    """Find lone views of the name, from where the thing is in plain sight, that point past it."""
     if located.placement is None or len(located.group) < 2:
         return []
     position, own = located.placement.position, [each.waypoint for each in located.group]
@@ -269,7 +269,7 @@ def describe_group(
     agreements: Sequence[float],
     conflicting: Iterable[WeighedView],
 ) -> Thing:
-    """Gives the thing that a group of views has seen.
+    """Return the thing that a group of views has seen.
 
     Args:
         group: The views of it.
@@ -296,7 +296,7 @@ def describe_group(
 
 
 def _by_votes(words: Iterable[str]) -> list[str]:
-    """Gives each once, what was said most often first, then the longer."""
+    """Return each once, what was said most often first, then the longer."""
     counts = Counter(words)
     return sorted(counts, key=lambda word: (-counts[word], -len(word), word))
 
@@ -318,7 +318,7 @@ def _view(sighting: WeighedView, position: Point | None) -> View:
 
 
 def _confidence(group: Sequence[WeighedView], agreements: Sequence[float]) -> float:
-    """Gives how likely it is that not all views are wrong: the odds of each, multiplied.
+    """Return how likely it is that not all views are wrong: the odds of each, multiplied.
 
     The first view may be wrong in any way; a further one must be wrong and agree by chance.
     """
@@ -339,7 +339,7 @@ def _count_agreeing(group: Sequence[WeighedView], agreements: Sequence[float]) -
 def _from_different_places(
     group: Sequence[WeighedView], agreements: Sequence[float]
 ) -> Iterator[tuple[WeighedView, float]]:
-    """Gives the first view from each place, with its agreement."""
+    """Return the first view from each place, with its agreement."""
     places = list[Point]()
     for each, agreement in zip(group, agreements, strict=True):
         here = each.waypoint.pose.point

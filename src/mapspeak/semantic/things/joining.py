@@ -55,14 +55,14 @@ class _Ballot:
     starts: IntArray
 
     def votes_at(self, indices: IntArray) -> IntArray:
-        """Gives the numbers of the votes for some places."""
+        """Return the numbers of the votes for some places."""
         sizes = self.starts[indices + 1] - self.starts[indices]
         first = np.repeat(self.starts[indices] - np.cumsum(sizes) + sizes, sizes)
         return first + np.arange(int(sizes.sum()))
 
 
 def group_names(labels: Sequence[str], same_name: SameName) -> list[frozenset[str]]:
-    """Gives labels that may, over others, name the same; each label is in one group."""
+    """Return labels that may, over others, name the same; each label is in one group."""
     groups: list[set[str]] = []
     for label in sorted(set(labels)):
         mine = [group for group in groups if any(same_name(label, other) for other in group)]
@@ -74,7 +74,7 @@ def group_names(labels: Sequence[str], same_name: SameName) -> list[frozenset[st
 def join_sightings(
     posteriors: "Posteriors", sightings: Sequence[WeighedView], same_name: SameName
 ) -> list[Group]:
-    """Divides views of one name into groups: one for each thing.
+    """Divide views of one name into groups: one for each thing.
 
     Args:
         posteriors: Those found so far, on the map that counts.
@@ -96,7 +96,7 @@ class Posteriors:
         self._known: dict[tuple[WeighedView, ...], Posterior] = {}
 
     def of(self, group: Group) -> Posterior:
-        """Gives where the thing of a group of views may be."""
+        """Return where the thing of a group of views may be."""
         key = tuple(group)
         if key not in self._known:
             wrong_ratios = [each.wrong_ratio for each in group]
@@ -160,12 +160,12 @@ class _Count:
         self._votes: FloatArray = votes + log_priors
 
     def find_best(self) -> int | None:
-        """Gives the index of the place with most votes; None when no vote is left."""
+        """Return the index of the place with most votes; None when no vote is left."""
         best = int(np.argmax(self._votes))
         return best if np.isfinite(self._votes[best]) else None
 
     def take_out(self, voter: int) -> None:
-        """Takes all votes of one view out."""
+        """Take all votes of one view out."""
         mine = self._order[self._ends[voter] : self._ends[voter + 1]]
         at = self._at[mine]
         self._votes[at] -= self._weights[mine]
@@ -173,12 +173,12 @@ class _Count:
         self._votes[at[self._n_left[at] == 0]] = -np.inf
 
     def strike(self, places: IntArray) -> None:
-        """Takes places out at which nothing that is left can be."""
+        """Take places out at which nothing that is left can be."""
         self._votes[places] = -np.inf
 
 
 def _around(sight: SightMap, ballot: _Ballot, index: int) -> IntArray:
-    """Gives the places at and beside one, as indices."""
+    """Return the places at and beside one, as indices."""
     n_cols = sight.rows.shape[1]
     steps = np.array([-1, 0, 1])
     cells = (ballot.places[index] + n_cols * steps[:, None] + steps).ravel()
@@ -188,7 +188,7 @@ def _around(sight: SightMap, ballot: _Ballot, index: int) -> IntArray:
 
 
 def _choose(sightings: Sequence[WeighedView], ratios: FloatArray, same_name: SameName) -> list[int]:
-    """Gives the views that speak of a place, the strongest first, one from each pose."""
+    """Return the views that speak of a place, the strongest first, one from each pose."""
     chosen: list[int] = []
     for i in np.argsort(-ratios, kind="stable").tolist():
         if ratios[i] < LEAST_RATIO:
@@ -208,7 +208,7 @@ def _fits(sighting: WeighedView, members: Iterator[WeighedView], same_name: Same
 
 
 def _are_of_one_look(one: Waypoint, other: Waypoint) -> bool:
-    """True for views of one place from one spot: who names two of a kind there sees two."""
+    """Return True for views of one place from one spot: who names two of a kind there sees two."""
     if one is other:
         return True
     is_same_spot = one.pose.point.distance_to(other.pose.point) < SAME_SPOT_M
@@ -222,7 +222,7 @@ def _sweep(
     ballot: _Ballot,
     same_name: SameName,
 ) -> list[Group]:
-    """Gives every view to the thing that explains it best; what is alone may join another."""
+    """Return every view to the thing that explains it best; what is alone may join another."""
     ratios = np.zeros((len(sightings), len(groups)))
     number = {id(sighting): i for i, sighting in enumerate(sightings)}
     for j, group in enumerate(groups):
@@ -242,7 +242,7 @@ def _sweep(
 
 
 def _explain(ballot: _Ballot, posterior: Posterior, n_views: int) -> FloatArray:
-    """Gives how much likelier each view is, given where a thing may be."""
+    """Return how much likelier each view is, given where a thing may be."""
     indices = np.searchsorted(ballot.places, posterior.cells)
     said = ballot.votes_at(indices)
     weights = np.repeat(posterior.weights, np.diff(ballot.starts)[indices])
@@ -253,7 +253,7 @@ def _explain(ballot: _Ballot, posterior: Posterior, n_views: int) -> FloatArray:
 
 
 def _merge(posteriors: Posteriors, groups: list[Group], same_name: SameName) -> list[Group]:
-    """Joins things that are better explained as one, the nearest first."""
+    """Join things that are better explained as one, the nearest first."""
     sight = posteriors.sight
     middles = [find_middle(sight, posteriors.of(group)) for group in groups]
     at = np.array(middles).reshape(-1, 2)
@@ -278,7 +278,7 @@ def _are_one(sight: SightMap, some: Group, others: Group, same_name: SameName) -
 
 
 def agreement_of(sight: SightMap, group: Group) -> tuple[float, ...]:
-    """Gives how well each view of a group goes with the others; 1 is chance."""
+    """Return how well each view of a group goes with the others; 1 is chance."""
     return measure_agreement(
         sight, [_likelihood(each) for each in group], [each.wrong_ratio for each in group]
     )

@@ -80,7 +80,7 @@ def read_news(
     angles: FloatArray,
     ranges_m: FloatArray,
 ) -> Correction | None:
-    """Gives how a fan corrects the map; None where the map is right.
+    """Return how a fan corrects the map; None where the map is right.
 
     Args:
         sight: The map.
@@ -121,7 +121,7 @@ def read_news(
 def find_log_priors(
     sight: SightMap, cells: IntArray, news: Iterable[LaserNews | None]
 ) -> FloatArray:
-    """Gives how likely a thing is in cells before any view, by the map and what corrects it.
+    """Return how likely a thing is in cells before any view, by the map and what corrects it.
 
     Args:
         sight: The map.
@@ -164,7 +164,7 @@ def _compare(
 
 
 def _off_m(sight: SightMap, pose: Pose, angles: FloatArray, ends_m: FloatArray) -> FloatArray:
-    """Gives how far from anything on the map beams end; nothing of those that end off the map."""
+    """Return how far from anything on the map beams end; nothing of those that end off the map."""
     grid = sight.grid
     start = grid.fractional_cells_at(np.array([[pose.x, pose.y]]))
     ways = np.stack([np.sin(angles), np.cos(angles)], axis=1)

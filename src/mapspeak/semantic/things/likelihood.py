@@ -40,7 +40,7 @@ class RangedSpot:
 
 
 def find_spot(pose: Pose, landmark: Landmark, noise: NoiseModel) -> RangedSpot | None:
-    """Gives where a landmark says that its thing is; None without a direction or a range."""
+    """Return where a landmark says that its thing is; None without a direction or a range."""
     if landmark.bearing_rad is None or landmark.range_m is None:
         return None
     way, far_m = pose.yaw_rad + landmark.bearing_rad, landmark.range_m
@@ -58,7 +58,7 @@ def find_spot(pose: Pose, landmark: Landmark, noise: NoiseModel) -> RangedSpot |
 
 
 def are_apart(one: RangedSpot | None, other: RangedSpot | None) -> bool:
-    """True for two spots so far apart that one thing is hardly in both."""
+    """Return True for two spots so far apart that one thing is hardly in both."""
     if one is None or other is None:
         return False
     dx, dy = one.point.x - other.point.x, one.point.y - other.point.y
@@ -107,7 +107,7 @@ class ViewLikelihood:
 
 
 def build_outlook(sight: SightMap, pose: Pose, near_m: FloatArray, far_m: FloatArray) -> Outlook:
-    """Finds the lattice cells in sight of a place.
+    """Find the lattice cells in sight of a place.
 
     Args:
         sight: The map.
@@ -145,7 +145,7 @@ def build_outlook(sight: SightMap, pose: Pose, near_m: FloatArray, far_m: FloatA
 def weigh_view(
     sight: SightMap, outlook: Outlook, pose: Pose, landmark: Landmark
 ) -> ViewLikelihood | None:
-    """Gives what a landmark's direction and range say; None where it has neither."""
+    """Return what a landmark's direction and range say; None where it has neither."""
     if landmark.bearing_rad is None and landmark.range_m is None:
         return None
     cells, ratios, ranges_m = outlook.cells, outlook.sight, outlook.ranges_m
@@ -168,7 +168,7 @@ def weigh_view(
 def _correct(
     sight: SightMap, outlook: Outlook, pose: Pose, fan: LaserFan, near: IntArray
 ) -> tuple[LaserNews | None, FloatArray]:
-    """Gives what the laser knows better, and how likely one sees as far as each cell with it."""
+    """Return what the laser knows better, and how likely one sees as far as each cell with it."""
     seen = outlook.sight[near]
     found = read_news(
         sight,
@@ -232,7 +232,7 @@ class Surroundings:
 def read_waypoints(
     sight: SightMap, waypoints: Sequence[Waypoint], known: Mapping[Waypoint, Surroundings]
 ) -> dict[Waypoint, Surroundings]:
-    """Gives what every waypoint sees, and what was seen from each of its standpoints.
+    """Return what every waypoint sees, and what was seen from each of its standpoints.
 
     What is known of an equal one is taken as it is.
     """

@@ -58,7 +58,7 @@ class Placement:
     whereabouts: FloatArray
 
     def __post_init__(self) -> None:
-        """Locks the points."""
+        """Lock the points."""
         points = np.array(self.whereabouts)
         points.setflags(write=False)
         object.__setattr__(self, "whereabouts", points)
@@ -67,7 +67,7 @@ class Placement:
 def build_posterior(
     sight: SightMap, views: Sequence[ViewLikelihood], wrong_ratios: Sequence[float]
 ) -> Posterior:
-    """Weighs the cells by all views; cells that hardly count are left out."""
+    """Weigh the cells by all views; cells that hardly count are left out."""
     cells, logs = _log_weights(sight, views, wrong_ratios)
     weights = _normalised(logs.sum(axis=0))
     kept = weights >= _LEAST_WEIGHT * weights.max()
@@ -77,7 +77,7 @@ def build_posterior(
 def measure_agreement(
     sight: SightMap, views: Sequence[ViewLikelihood], wrong_ratios: Sequence[float]
 ) -> tuple[float, ...]:
-    """Gives for each view how much likelier it is than by chance, given all the others."""
+    """Return for each view how much likelier it is than by chance, given all the others."""
     if len(views) < 2:
         return (1.0,) * len(views)
     cells, logs = _log_weights(sight, views, wrong_ratios)
@@ -92,14 +92,14 @@ def measure_agreement(
 def log_evidence(
     sight: SightMap, views: Sequence[ViewLikelihood], wrong_ratios: Sequence[float]
 ) -> float:
-    """Gives how well all views go together as views of one thing, as a logarithm."""
+    """Return how well all views go together as views of one thing, as a logarithm."""
     logs = _log_weights(sight, views, wrong_ratios)[1].sum(axis=0)
     top = float(logs.max())
     return top + float(np.log(np.exp(logs - top).sum()))
 
 
 def trust_range(sight: SightMap, view: ViewLikelihood, viewer: Point, told_m: float) -> Posterior:
-    """Weighs the cells by a lone view with a range, as if it were not wrong.
+    """Weigh the cells by a lone view with a range, as if it were not wrong.
 
     How likely it is wrong, the trust in it says. Kept in the weight, that would reach as far as
     the line of sight: there are walls along it, and things stand by walls more often than on the
@@ -122,14 +122,14 @@ def trust_range(sight: SightMap, view: ViewLikelihood, viewer: Point, told_m: fl
 
 
 def find_middle(sight: SightMap, posterior: Posterior) -> tuple[float, float]:
-    """Gives the mean of the weight in metres along the rows and columns of the grid."""
+    """Return the mean of the weight in metres along the rows and columns of the grid."""
     rows, cols = sight.rows.ravel()[posterior.cells], sight.cols.ravel()[posterior.cells]
     size_m = sight.grid.resolution_m
     return float(posterior.weights @ rows) * size_m, float(posterior.weights @ cols) * size_m
 
 
 def place(sight: SightMap, posterior: Posterior, seen_from: Sequence[Point]) -> Placement:
-    """Gives the middle of the densest part of the weight, and how far 90 % of it reaches.
+    """Return the middle of the densest part of the weight, and how far 90 % of it reaches.
 
     Args:
         sight: The map.
@@ -159,7 +159,7 @@ def place(sight: SightMap, posterior: Posterior, seen_from: Sequence[Point]) -> 
 
 
 def _draw(sight: SightMap, weights: FloatArray, at: FloatArray) -> FloatArray:
-    """Gives places as often as their weight says: systematic resampling (Kitagawa, 1996)."""
+    """Return places as often as their weight says: systematic resampling (Kitagawa, 1996)."""
     levels = (np.arange(N_WHEREABOUTS) + 0.5) / N_WHEREABOUTS
     drawn = np.searchsorted(np.cumsum(weights), levels * weights.sum())
     down, across = at[np.minimum(drawn, len(at) - 1)].T
@@ -170,7 +170,7 @@ def _draw(sight: SightMap, weights: FloatArray, at: FloatArray) -> FloatArray:
 
 
 def _behind(surface: Point, seen_from: Sequence[Point]) -> Point:
-    """Gives the middle of a thing whose surface was met; of one seen from all sides that itself."""
+    """Return middle of a thing whose surface was met; of one seen from all sides that itself."""
     ways = [place.bearing_to(surface) for place in seen_from]
     share = BODY_M / 2 / max(len(ways), 1)
     return Point(
@@ -181,7 +181,7 @@ def _behind(surface: Point, seen_from: Sequence[Point]) -> Point:
 def _log_weights(
     sight: SightMap, views: Sequence[ViewLikelihood], wrong_ratios: Sequence[float]
 ) -> tuple[IntArray, FloatArray]:
-    """Gives cells, and in logarithms their prior, then what each view says of them."""
+    """Return cells, and in logarithms their prior, then what each view says of them."""
     is_spoken_of = np.zeros(sight.log_prior.size, dtype=np.bool_)
     for view in views:
         is_spoken_of[view.cells] = True

@@ -63,7 +63,7 @@ class SightMap:
         begin_m: float | FloatArray = OWN_M,
         reach_m: float | FloatArray | None = None,
     ) -> FloatArray:
-        """Gives how far one sees, in metres, from each place along its angle.
+        """Return how far one sees, in metres, from each place along its angle.
 
         Args:
             off: `obstacle_off` or `wall_off`.
@@ -79,7 +79,7 @@ class SightMap:
 
 
 def build_sight_map(grid: OccupancyGrid, *, noise: NoiseModel = NOISE) -> SightMap:
-    """Makes a map ready: what blocks sight, and where things may stand."""
+    """Make a map ready: what blocks sight, and where things may stand."""
     # Nobody sees into furniture, so that its inside is unknown, too.
     blocked = (grid.occupied & ~_small_parts(grid, grid.occupied)) | (
         grid.unknown & ~_small_parts(grid, grid.unknown)
@@ -100,7 +100,7 @@ def build_sight_map(grid: OccupancyGrid, *, noise: NoiseModel = NOISE) -> SightM
 
 
 def look_around(sight: SightMap, poses: list[Pose]) -> tuple[FloatArray, FloatArray]:
-    """Gives how far one sees from places to all sides: to the first obstacle, and to a wall.
+    """Return how far one sees from places to all sides: to the first obstacle, and to a wall.
 
     Both have the shape (places, N_RAYS), in metres; ray 0 looks along the rows of the grid.
     """
@@ -113,7 +113,7 @@ def look_around(sight: SightMap, poses: list[Pose]) -> tuple[FloatArray, FloatAr
 
 
 def _small_parts(grid: OccupancyGrid, mask: Mask) -> Mask:
-    """True in those parts of a mask that are no longer than furniture."""
+    """Return True in those parts of a mask that are no longer than furniture."""
     n, labels, boxes, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=8)
     sides = boxes[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]] * grid.resolution_m
     is_small = np.hypot(sides[:, 0], sides[:, 1]) <= FURNITURE_M
@@ -122,7 +122,7 @@ def _small_parts(grid: OccupancyGrid, mask: Mask) -> Mask:
 
 
 def _off(blocked: Mask) -> Clearance:
-    """Gives cells to the nearest blocked cell; what lies off the array is blocked."""
+    """Return cells to the nearest blocked cell; what lies off the array is blocked."""
     padded = np.pad(blocked, 1, constant_values=True)
     off = cv2.distanceTransform(
         np.logical_not(padded).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
@@ -131,7 +131,7 @@ def _off(blocked: Mask) -> Clearance:
 
 
 def _summarise(occupied: Mask, factor: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Gives, for each lattice cell, its number of occupied cells and the middle of them."""
+    """Return, for each lattice cell, its number of occupied cells and the middle of them."""
     n_rows, n_cols = (-(-size // factor) for size in occupied.shape)
     room = (n_rows * factor - occupied.shape[0], n_cols * factor - occupied.shape[1])
     padded = np.pad(occupied, ((0, room[0]), (0, room[1]))).astype(np.float64)
@@ -147,5 +147,5 @@ def _summarise(occupied: Mask, factor: int) -> tuple[FloatArray, FloatArray, Flo
 
 
 def bearing_index(angles: FloatArray) -> IntArray:
-    """Gives the ray nearest to each angle of the grid's frame."""
+    """Return the ray nearest to each angle of the grid's frame."""
     return np.asarray(np.round(angles * (N_RAYS / math.tau)), dtype=np.intp) % N_RAYS

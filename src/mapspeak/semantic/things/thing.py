@@ -22,7 +22,7 @@ _LOOKS = frozenset(
 
 
 def name_the_same(label: str, other: str) -> bool:
-    """True when one label says no more than the other leaves open, and both end in one noun.
+    """Return True when one label says no more than the other leaves open, and both end in one noun.
 
     "extinguisher", "red extinguisher" and "fire extinguishers" name the same; "coffee machine" and
     "washing machine" do not, though "machine" may be either.
@@ -95,7 +95,7 @@ class NoiseModel:
     laser_through_ratio: float = 0.8
 
     def wrong_ratio_of(self, confidence: Confidence | None) -> float:
-        """Gives how often views are wrong whose observer was so sure."""
+        """Return how often views are wrong whose observer was so sure."""
         return min(self.wrong_ratio * _DOUBTS[confidence], 0.5)
 
 

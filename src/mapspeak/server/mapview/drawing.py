@@ -30,7 +30,7 @@ from mapspeak.worldmodel.model import Atlas
 
 
 def say_plain(grid: OccupancyGrid, picture: MapPicture) -> str:
-    """Gives the caption of the map in grey levels and nothing else."""
+    """Return the caption of the map in grey levels and nothing else."""
     return (
         f"{_say_placement(grid, picture)} Grey 127 is unknown, 255 free, darker the more surely "
         "occupied. x grows to the right and y upwards."
@@ -38,7 +38,7 @@ def say_plain(grid: OccupancyGrid, picture: MapPicture) -> str:
 
 
 def say_axes(grid: OccupancyGrid, picture: MapPicture) -> str:
-    """Gives the caption of the map with its axes."""
+    """Return the caption of the map with its axes."""
     return (
         f"{_say_placement(grid, picture)} A grid line every {picture.spacing_m:g} m, numbered in "
         "metres of the map frame; x grows to the right and y upwards."
@@ -91,7 +91,7 @@ class AtlasPicture:
 
 
 def draw_atlas(view: MapView) -> AtlasPicture:
-    """Draws what is to be seen of an atlas; doors and areas only where they can be told apart."""
+    """Draw what is to be seen of an atlas; doors and areas only where they can be told apart."""
     atlas, look = view.atlas, view.look
     is_detailed = _scale_px_per_m(atlas.grid, look) >= DETAIL_PX_PER_M
     doors = view.doors.items if Layer.DOORS in look.layers and is_detailed else ()
@@ -121,7 +121,7 @@ def draw_atlas(view: MapView) -> AtlasPicture:
 
 
 def draw_rooms(rooms: RoomMap) -> AtlasPicture:
-    """Draws a map with its rooms and doors; no robot needs to be there for it."""
+    """Draw a map with its rooms and doors; no robot needs to be there for it."""
     is_detailed = _scale_px_per_m(rooms.grid, MapLook()) >= DETAIL_PX_PER_M
     layers = MapLayers(
         regions=_layer(rooms, [_area(region, has_area=is_detailed) for region in rooms.regions]),
@@ -133,7 +133,7 @@ def draw_rooms(rooms: RoomMap) -> AtlasPicture:
 
 
 def _scale_px_per_m(grid: OccupancyGrid, look: MapLook) -> float:
-    """Gives about how large a metre will be in the picture."""
+    """Return about how large a metre will be in the picture."""
     known = (np.flatnonzero(grid.cells.max(axis=axis, initial=-1) >= 0) for axis in (0, 1))
     n_cells = max(int(along[-1] - along[0]) + 1 if along.size else 1 for along in known)
     shown_m = n_cells * grid.resolution_m
@@ -143,7 +143,7 @@ def _scale_px_per_m(grid: OccupancyGrid, look: MapLook) -> float:
 
 
 def _rooms_in(view: MapView, *, has_areas: bool) -> RegionLayer:
-    """Gives all regions; only those that are listed have their names written in them."""
+    """Return all regions; only those that are listed have their names written in them."""
     around = view.look.around
     listed = {region.id for region in (*view.rooms.items, *view.corridors.items)}
     areas = [_area(region, has_area=has_areas) for region in view.atlas.rooms.regions]
@@ -204,7 +204,7 @@ def _places(view: MapView) -> tuple[Mark, ...]:
 
 
 def _closed_areas(view: MapView) -> tuple[Zone, ...]:
-    """Gives all that is closed; only what is listed has its name written in it."""
+    """Return all that is closed; only what is listed has its name written in it."""
     return tuple(
         Zone(outlines=area.outlines, label=say_area(area) if area in view.closed.items else "")
         for area in view.atlas.map.areas

@@ -23,7 +23,7 @@ class PointFacts(Report):
 
     @classmethod
     def of(cls, point: Point) -> Self:
-        """Makes it from a point."""
+        """Make it from a point."""
         return cls(x=round(point.x, 3), y=round(point.y, 3))
 
 
@@ -46,7 +46,7 @@ class RegionFacts(Report):
 
     @classmethod
     def of(cls, region: Region) -> Self:
-        """Makes it from a region."""
+        """Make it from a region."""
         return cls(
             id=region.id,
             label=region.index,
@@ -77,7 +77,7 @@ class DoorFacts(Report):
 
     @classmethod
     def of(cls, passage: Passage) -> Self:
-        """Makes it from a passage of the area graph."""
+        """Make it from a passage of the area graph."""
         door, line = passage.door, passage.line
         ends = None if line is None else (PointFacts.of(line[0]), PointFacts.of(line[1]))
         return cls(
@@ -109,7 +109,7 @@ class MapFacts(Report):
 
     @classmethod
     def of(cls, loaded: LoadedMap, graph: AreaGraph) -> Self:
-        """Makes the facts of a map file and the area graph found on it."""
+        """Make the facts of a map file and the area graph found on it."""
         grid: OccupancyGrid = loaded.grid
         known = measure_known_area(grid)
         regions = [area.region for area in graph.areas]

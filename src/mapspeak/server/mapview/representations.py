@@ -30,7 +30,7 @@ LEAST_CHARACTERS = 2
 
 
 def describe_raw_grid(view: MapView) -> str:
-    """Gives the known part of the map, or the part that is zoomed in on, as a JSON grid.
+    """Return the known part of the map, or the part that is zoomed in on, as a JSON grid.
 
     Where the cells are too many, square blocks of them become one value each, and the text says so.
 
@@ -79,7 +79,7 @@ def _as_json(view: MapView, grid: OccupancyGrid, n_side: int) -> str:
 
 
 def _coarsen(cells: NDArray[np.int8], n_side: int) -> NDArray[np.int8]:
-    """Gives one value for each block of cells: what stands in it, else what most of it is."""
+    """Return one value for each block of cells: what stands in it, else what most of it is."""
     if n_side == 1:
         return cells
     n_rows, n_cols = (math.ceil(n / n_side) for n in cells.shape)
@@ -93,7 +93,7 @@ def _coarsen(cells: NDArray[np.int8], n_side: int) -> NDArray[np.int8]:
 
 
 def _part_of(view: MapView) -> OccupancyGrid:
-    """Gives the cells that are shown: what the zoom shows, or everything that is known."""
+    """Return the cells that are shown: what the zoom shows, or everything that is known."""
     grid, zoom = view.atlas.grid, view.look.zoom
     rows, cols = _known(grid) if zoom is None else _window(grid, zoom)
     if rows.start >= rows.stop or cols.start >= cols.stop:
@@ -109,7 +109,7 @@ def _known(grid: OccupancyGrid) -> tuple[slice, slice]:
 
 
 def _window(grid: OccupancyGrid, zoom: Zoom) -> tuple[slice, slice]:
-    """Gives the cells within a square along the grid's own axes."""
+    """Return the cells within a square along the grid's own axes."""
     centre = grid.fractional_cells_at(np.array([[zoom.centre.x, zoom.centre.y]]))[0]
     reach = zoom.radius_m / grid.resolution_m
     low = np.clip(np.floor(centre - reach), 0, grid.cells.shape).astype(int)
@@ -148,7 +148,7 @@ class Shown:
 
 
 def show(view: MapView, representation: Representation) -> Shown:
-    """Shows what is to be seen of a map, in one of the ways."""
+    """Show what is to be seen of a map, in one of the ways."""
     return _WAYS[representation](view)
 
 
@@ -184,7 +184,7 @@ def _show_raw_grid(view: MapView) -> Shown:
 
 
 def _say_robot(view: MapView) -> str:
-    """Gives what a picture alone cannot be relied upon to say: where the robot is."""
+    """Return what a picture alone cannot be relied upon to say: where the robot is."""
     return "\n".join([*say_warnings(view.atlas), f"Robot: {say_pose(view.atlas.robot)}."])
 
 

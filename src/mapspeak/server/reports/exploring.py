@@ -57,7 +57,7 @@ class ExploreAnswer(Report):
 
     @classmethod
     def of(cls, progress: Progress) -> Self:
-        """Makes the report of an exploration."""
+        """Make the report of an exploration."""
         trip = progress.trip
         return cls(
             state=progress.state,
@@ -129,7 +129,7 @@ class SearchAnswer(Report):
 
     @classmethod
     def of(cls, standing: SearchProgress) -> Self:
-        """Makes the report of a search."""
+        """Make the report of a search."""
         return cls(
             state=standing.state,
             reason=say_standing(standing),

@@ -27,7 +27,7 @@ APART_M = 1.0
 def say_reported(
     store: EpisodeStore, answer: Recall, query: RecallQuery, *, map_id: str | None, now: datetime
 ) -> str:
-    """Gives what the detector reported of a thing that no record is called by; empty for nothing.
+    """Return what the detector reported of a thing that no record is called by; empty for nothing.
 
     A report is less than a record: nobody has checked it, and where the thing is was not noted.
 

@@ -38,7 +38,7 @@ class PoseReport(Report):
 
     @classmethod
     def of(cls, pose: Pose) -> Self:
-        """Makes the report of a pose, rounded to millimetres and tenths of a degree."""
+        """Make the report of a pose, rounded to millimetres and tenths of a degree."""
         return cls(
             x=round(pose.x, 3) + 0.0,
             y=round(pose.y, 3) + 0.0,
@@ -58,7 +58,7 @@ class PoseAnswer(Report):
 
     @classmethod
     def of(cls, stamped: StampedPose, *, place: str, now_s: float) -> Self:
-        """Makes the report of a stamped pose."""
+        """Make the report of a stamped pose."""
         age_s = stamped.measure_age_s(now_s)
         return cls(
             pose=PoseReport.of(stamped.pose),
@@ -115,7 +115,7 @@ class DriveAnswer(Report):
 
     @classmethod
     def of(cls, report: DriveReport, *, foreign_goals: Sequence[GoalState] = ()) -> Self:
-        """Makes the report of a drive, with the goals of others that drive the robot after it."""
+        """Make the report of a drive, with the goals of others that drive the robot after it."""
         left_m = _distance_left_m(report)
         return cls(
             goal_id=report.drive.goal_id,
@@ -167,7 +167,7 @@ class GoalAnswer(Report):
 
     @classmethod
     def of(cls, goal: CheckedGoal, *, room: str | None) -> Self:
-        """Makes the report of a goal."""
+        """Make the report of a goal."""
         check = goal.check
         return cls(
             place=goal.name,
@@ -194,7 +194,7 @@ class LandmarkReport(Report):
 
     @classmethod
     def of(cls, landmark: Landmark) -> Self:
-        """Makes the report of a landmark."""
+        """Make the report of a landmark."""
         bearing_rad, pose = landmark.bearing_rad, landmark.pose
         return cls(
             label=landmark.label,
@@ -220,7 +220,7 @@ class WaypointReport(Report):
 
     @classmethod
     def of(cls, place: RememberedPlace) -> Self:
-        """Makes the report of a remembered place."""
+        """Make the report of a remembered place."""
         waypoint = place.waypoint
         return cls(
             id=place.id,
@@ -245,7 +245,7 @@ class MemoryAnswer(Report):
 
     @classmethod
     def of(cls, memory: SemanticMap, name: str | None) -> Self:
-        """Makes the report of all places, or of the one of that name or id.
+        """Make the report of all places, or of the one of that name or id.
 
         Raises:
             SemanticMapError: There is no such place.
@@ -266,7 +266,7 @@ class MemoryAnswer(Report):
     def of_places(
         cls, memory: SemanticMap, shown: Iterable[RememberedPlace], *, advice: Sequence[str] = ()
     ) -> Self:
-        """Makes the report of some places, with what else is to be said of them."""
+        """Make the report of some places, with what else is to be said of them."""
         return cls(
             map=memory.map_id,
             n_places=len(memory.waypoints),
@@ -297,7 +297,7 @@ class WriteAnswer(Report):
         refused: Sequence[str],
         warnings: Sequence[str] = (),
     ) -> Self:
-        """Makes the report of a write, with the id that the place has in the memory now."""
+        """Make the report of a write, with the id that the place has in the memory now."""
         places = number_places(memory.waypoints)
         stored = next(place for place in places if _is_called(place, receipt.name))
         waypoint = receipt.waypoint

@@ -44,7 +44,7 @@ class RouteAnswer(Report):
 
     @classmethod
     def of(cls, progress: RouteProgress) -> Self:
-        """Makes the report of a route."""
+        """Make the report of a route."""
         ahead = [stop for stop in progress.stops if stop.state is StopState.AHEAD]
         plan = progress.plan
         return cls(
@@ -73,7 +73,7 @@ def _is_better(plan: RoutePlan) -> bool:
 
 
 def _say(stop: RouteStop) -> str:
-    """Gives the words of a stop, with what they are taken for where that is something else."""
+    """Return the words of a stop, with what they are taken for where that is something else."""
     name, words = stop.goal.name, " ".join(stop.words.split())
     is_point = name.startswith("(")
     return name if is_point or name.casefold() == words.casefold() else f"{words} ({name})"

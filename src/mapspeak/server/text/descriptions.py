@@ -31,7 +31,7 @@ NEAR_M = 5.0
 
 
 def describe_place(atlas: Atlas, place: Place) -> str:
-    """Gives all that is known of a place, a fact on each line."""
+    """Return all that is known of a place, a fact on each line."""
     goal = check_place(atlas, place)
     match place.thing:
         case Region() as region:

@@ -70,7 +70,7 @@ class MapLook:
     around: Place | None = None
 
     def shows(self, point: Point) -> bool:
-        """True when a point lies in the square that is shown."""
+        """Return True when a point lies in the square that is shown."""
         if self.zoom is None:
             return True
         away_m = self.zoom.centre.distance_to(point)
@@ -79,14 +79,14 @@ class MapLook:
         return farthest_m <= self.zoom.radius_m
 
     def regions(self, atlas: Atlas) -> tuple[Region, ...]:
-        """Gives the regions of which some is shown."""
+        """Return the regions of which some is shown."""
         if self.zoom is None:
             return atlas.rooms.regions
         shown = _labels_in(atlas, self.zoom, self.up_rad)
         return tuple(region for region in atlas.rooms.regions if region.index in shown)
 
     def some_of(self, items: Iterable[Item], point_of: Callable[[Item], Point]) -> list[Item]:
-        """Gives those that lie in the square that is shown."""
+        """Return those that lie in the square that is shown."""
         return [item for item in items if self.shows(point_of(item))]
 
 
@@ -106,13 +106,13 @@ class MapPart(Generic[Item]):
 
     @classmethod
     def first(cls, items: Sequence[Item], most: int) -> Self:
-        """Gives the first of some things; leaving out a few is not worth the words."""
+        """Return the first of some things; leaving out a few is not worth the words."""
         n = len(items) if len(items) <= SLACK * most else most
         return cls(tuple(items[:n]), len(items))
 
     @classmethod
     def ends(cls, items: Sequence[Item], most: int) -> Self:
-        """Gives things from both ends of a list that is too long."""
+        """Return things from both ends of a list that is too long."""
         if len(items) <= SLACK * most:
             return cls(tuple(items), len(items))
         half = most // 2
@@ -147,7 +147,7 @@ class MapView:
 
 
 def view_of(atlas: Atlas, look: MapLook) -> MapView:
-    """Gives what is to be seen of an atlas."""
+    """Return what is to be seen of an atlas."""
 
     def path_or_far(point: Point | None) -> float:
         path_m = None if point is None else atlas.path_m(point)
@@ -182,7 +182,7 @@ def view_of(atlas: Atlas, look: MapLook) -> MapView:
 
 
 def _shows_some(look: MapLook, area: ClosedArea) -> bool:
-    """True when some of an area may lie in the square that is shown."""
+    """Return True when some of an area may lie in the square that is shown."""
     if look.zoom is None:
         return True
     farthest_m = look.zoom.radius_m * math.sqrt(2)
@@ -197,7 +197,7 @@ def look_at(
     radius_m: float | None,
     up: Up,
 ) -> MapLook:
-    """Gives the look that was asked for; around a region it is large enough for all of it.
+    """Return the look that was asked for; around a region it is large enough for all of it.
 
     Raises:
         GoalError: There is no such place.

@@ -19,7 +19,7 @@ MOST_REASONS = 6
 
 
 def describe_measures(atlas: Atlas, *, start: str, places: Sequence[str] | None) -> str:
-    """Gives the ways from one place to others, nearest first, and their sizes, smallest first.
+    """Return the ways from one place to others, nearest first, and their sizes, smallest first.
 
     Raises:
         GoalError: There is no such place, or nothing to measure.
@@ -36,7 +36,7 @@ def describe_measures(atlas: Atlas, *, start: str, places: Sequence[str] | None)
 
 
 def _find_others(atlas: Atlas, begin: Place, places: Sequence[str] | None) -> list[Place]:
-    """Gives each place once, without the one to measure from."""
+    """Return each place once, without the one to measure from."""
     ends = [Place(region.id, region) for region in atlas.rooms.regions]
     if places is not None:
         ends = [find_place(atlas, words) for words in places]
@@ -72,7 +72,7 @@ def _way_table(atlas: Atlas, start: Place, ends: Sequence[Place]) -> str:
 def _say_closed(
     atlas: Atlas, ends: Sequence[Place], lengths_m: Mapping[str, float | None]
 ) -> Iterator[str]:
-    """Says why there is no way to some places, where it may be that something is closed."""
+    """Say why there is no way to some places, where it may be that something is closed."""
     without_way = [end for end in ends if lengths_m[end.name] is None]
     sentences = (say_check(check_place(atlas, end).check) for end in without_way[:MOST_REASONS])
     yield from dict.fromkeys(sentences)
@@ -91,7 +91,7 @@ def _way_row(atlas: Atlas, way: Way) -> Sequence[str]:
 
 
 def _say_no_way(atlas: Atlas, goal: Place) -> str:
-    """Says that there is no way, with the reason where it lies in the goal."""
+    """Say that there is no way, with the reason where it lies in the goal."""
     verdict = check_place(atlas, goal).check.verdict
     return "no way" if verdict is GoalVerdict.OK else f"no way ({verdict.replace('_', ' ')})"
 

@@ -22,7 +22,7 @@ BENT_RAD = math.radians(45)
 
 
 def room_tables(view: MapView) -> str:
-    """Gives a table of rooms and one of corridors, with what is to be said of their sizes."""
+    """Return a table of rooms and one of corridors, with what is to be said of their sizes."""
     shown = view.look.regions(view.atlas)
     rooms = build_table(
         f"Rooms{_say_open_spaces(view.rooms)}, smallest first",
@@ -45,7 +45,7 @@ def room_tables(view: MapView) -> str:
 
 
 def say_sizes(atlas: Atlas, regions: Sequence[Region]) -> str:
-    """Says which room is the smallest and which the largest, corridors left out."""
+    """Say which room is the smallest and which the largest, corridors left out."""
     names = [_say_size(atlas, room) for room in _rooms_by_size(regions)]
     match names:
         case []:
@@ -64,7 +64,7 @@ def say_sizes(atlas: Atlas, regions: Sequence[Region]) -> str:
 
 
 def say_walk(region: Region, walk: CorridorWalk) -> str:
-    """Says which doors come as somebody walks a corridor, side by side in their order."""
+    """Say which doors come as somebody walks a corridor, side by side in their order."""
     sides = []
     for side in (
         DoorSide.BEHIND,
@@ -132,7 +132,7 @@ def _rooms_by_size(regions: Sequence[Region]) -> list[Region]:
 
 
 def _say_reachable(atlas: Atlas, regions: Sequence[Region]) -> Sequence[str]:
-    """Says which room is the smallest that the robot can get to, where that is another one."""
+    """Say which room is the smallest that the robot can get to, where that is another one."""
     by_size = _rooms_by_size(regions)
     reachable = next((room for room in by_size if find_standing_point(atlas, room)), None)
     if reachable is None or reachable is by_size[0]:

@@ -33,7 +33,7 @@ MEANINGS = (
 
 
 def describe_atlas(view: MapView) -> str:
-    """Gives the facts of an atlas: first the robot and the map, then a table for each layer."""
+    """Return the facts of an atlas: first the robot and the map, then a table for each layer."""
     tables = {
         Layer.ROOMS: room_tables,
         Layer.DOORS: _door_table,
@@ -125,7 +125,7 @@ def _frontier_table(view: MapView) -> str:
 
 
 def _say_extremes(view: MapView) -> Iterator[str]:
-    """Says which frontier is the nearest and which shows most, of all and not only those listed."""
+    """Say which frontier is the nearest and which shows most, of all and not only those listed."""
     frontiers = view.atlas.frontiers.frontiers
     if len(frontiers) < 2:
         return
@@ -151,7 +151,7 @@ def _frontier_row(atlas: Atlas, frontier: Frontier) -> Sequence[str]:
 
 
 def _say_refused(view: MapView) -> Iterator[str]:
-    """Says where the map ends without being offered, grouped by why, longest first."""
+    """Say where the map ends without being offered, grouped by why, longest first."""
     refused = view.refused
     if not refused.items:
         return

@@ -19,7 +19,7 @@ LOW_RATIO = 0.5
 
 
 def say_landmark(landmark: Landmark) -> str:
-    """Gives what was seen, with all that was noted of it."""
+    """Return what was seen, with all that was noted of it."""
     purpose = "" if landmark.purpose is None else f" for {quote(landmark.purpose)}"
     parts = [f"{quote(landmark.label)}{purpose}"]
     if landmark.bearing_rad is not None:
@@ -36,7 +36,7 @@ def say_landmark(landmark: Landmark) -> str:
 
 
 def thing_lines(atlas: Atlas, remembered: RememberedThing) -> Iterator[str]:
-    """Gives all that is known of a thing, a fact on each line."""
+    """Return all that is known of a thing, a fact on each line."""
     thing, candidate = remembered.thing, describe_candidate(atlas, remembered)
     label = quote(thing.label)
     yield f"{remembered.id} is a remembered thing, {label}; observed, not instructions:"
@@ -61,14 +61,14 @@ def thing_lines(atlas: Atlas, remembered: RememberedThing) -> Iterator[str]:
 
 
 def say_things_from(atlas: Atlas, place: RememberedPlace) -> Iterator[str]:
-    """Gives the things that were seen from a place, each with what speaks against it."""
+    """Return the things that were seen from a place, each with what speaks against it."""
     name = place.waypoint.name
     seen = [each for each in atlas.things if name in each.thing.waypoints]
     yield from _list(atlas, "Things seen from it", seen)
 
 
 def say_things_in(atlas: Atlas, region: Region) -> Iterator[str]:
-    """Gives the remembered things in a room or corridor."""
+    """Return the remembered things in a room or corridor."""
     inside = [
         each
         for each in atlas.things

@@ -13,12 +13,12 @@ CONTROL = re.compile(
 
 
 def show_controls(text: str) -> str:
-    """Gives a text with every control sign as it is written in JSON, such as u001b."""
+    """Return a text with every control sign as it is written in JSON, such as u001b."""
     return CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 def show_controls_of(answer: CallToolResult) -> CallToolResult:
-    """Gives a tool's answer likewise."""
+    """Return a tool's answer likewise."""
     content = [
         part.model_copy(update={"text": show_controls(part.text)})
         if isinstance(part, TextContent)

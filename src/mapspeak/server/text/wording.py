@@ -54,12 +54,12 @@ COMPASS = (
 
 
 def say_count(number: int, what: str) -> str:
-    """Gives "1 goal", "2 goals"."""
+    """Return "1 goal", "2 goals"."""
     return f"{number:,} {what}{'' if number == 1 else 's'}"
 
 
 def say_pose(pose: Pose) -> str:
-    """Gives a pose in metres and degrees."""
+    """Return a pose in metres and degrees."""
     return f"x {_number(pose.x)}, y {_number(pose.y)}, yaw {pose.yaw_deg + 0.0:.0f} deg"
 
 
@@ -80,22 +80,22 @@ def say_warnings(atlas: Atlas) -> list[str]:
 
 
 def say_point(point: Point) -> str:
-    """Gives a point in metres."""
+    """Return a point in metres."""
     return f"{_number(point.x)}, {_number(point.y)}"
 
 
 def say_path(path_m: float | None) -> str:
-    """Gives a path's length, or "no way"."""
+    """Return a path's length, or "no way"."""
     return "no way" if path_m is None else f"{path_m:.1f}"
 
 
 def say_compass(heading_rad: float) -> str:
-    """Gives a direction on the map, y being north: "north-east"."""
+    """Return a direction on the map, y being north: "north-east"."""
     return COMPASS[round(heading_rad / (math.tau / 8)) % 8]
 
 
 def say_obstruction(atlas: Atlas, door: Door) -> str:
-    """Gives why the robot does not get through a door, in a word or two."""
+    """Return why the robot does not get through a door, in a word or two."""
     if door.width_m < 2 * atlas.radius_m:
         return "too narrow"
     floor = atlas.map.floor
@@ -109,18 +109,18 @@ def say_obstruction(atlas: Atlas, door: Door) -> str:
 
 
 def say_area(area: ClosedArea) -> str:
-    """Gives what a closed area is called; the words of an event are not the operator's: quoted."""
+    """Return what a closed area is called; the words of an event are not the operator's: quoted."""
     name = shorten(area.name)
     return tell_place(name) if area.event_id else name
 
 
 def say_kind(region: Region) -> str:
-    """Gives what a region is."""
+    """Return what a region is."""
     return str(region.room_class).replace("_", " ")
 
 
 def say_direction(atlas: Atlas, point: Point) -> str:
-    """Gives where a point is as seen from the robot: "3.2 m straight, to its left"."""
+    """Return where a point is as seen from the robot: "3.2 m straight, to its left"."""
     away_m = atlas.robot.point.distance_to(point)
     if away_m < HERE_M:
         return "it stands there"
@@ -130,18 +130,18 @@ def say_direction(atlas: Atlas, point: Point) -> str:
 
 
 def shorten(text: str) -> str:
-    """Gives at most the first forty characters of a text on one line."""
+    """Return at most the first forty characters of a text on one line."""
     line = " ".join(text.split())
     return line if len(line) <= LONGEST_NAME else f"{line[: LONGEST_NAME - 3]}..."
 
 
 def join_words(words: Iterable[str], nothing: str = "none") -> str:
-    """Gives words with a blank between them, or the word for none."""
+    """Return words with a blank between them, or the word for none."""
     return " ".join(words) or nothing
 
 
 def list_some(words: Sequence[str], *, most: int) -> str:
-    """Gives words with commas between them, and how many were left out."""
+    """Return words with commas between them, and how many were left out."""
     told = ", ".join(words[:most])
     return told if len(words) <= most else f"{told} and {len(words) - most} more"
 
@@ -155,7 +155,7 @@ def build_table(
     n_all: int | None = None,
     gap_after: int | None = None,
 ) -> str:
-    """Gives a heading, a line of columns and a line for each item.
+    """Return a heading, a line of columns and a line for each item.
 
     Args:
         heading: What the table shows.

@@ -84,13 +84,13 @@ class Annotator:
     refused: list[str] = field(default_factory=list)
 
     def find_origin(self, *given: Landmarks | None) -> TakenPicture | None:
-        """Gives the last picture that the landmarks were seen in, if they say so."""
+        """Return the last picture that the landmarks were seen in, if they say so."""
         spoken_of = [self._find_picture(thing) for thing in _things(given)]
         taken = [picture for picture in spoken_of if picture is not None]
         return max(taken, key=lambda picture: picture.stamp_s, default=None)
 
     def find_picture_from(self, pose: Pose) -> TakenPicture | None:
-        """Gives the picture that was taken last, if it shows what is seen from a pose."""
+        """Return the picture that was taken last, if it shows what is seen from a pose."""
         latest = self.pictures.latest
         if latest is None or latest.pose.point.distance_to(pose.point) > SAME_SPOT_M:
             return None
@@ -100,7 +100,7 @@ class Annotator:
     def wants_laser(
         self, *given: Landmarks | None, pose: Pose, picture: TakenPicture | None
     ) -> bool:
-        """True when a direction is told from a pose that no picture has a laser's ranges from."""
+        """Return True when no picture from the direction's pose has a laser's ranges."""
         return any(
             thing.bearing_deg is not None
             and self._find_picture(thing) is None
@@ -111,7 +111,7 @@ class Annotator:
     def take(
         self, given: Landmarks | None, *, pose: Pose, picture: TakenPicture | None
     ) -> tuple[Landmark, ...]:
-        """Gives the landmarks that may be remembered, as seen from a pose.
+        """Return the landmarks that may be remembered, as seen from a pose.
 
         Args:
             given: What was said.
@@ -129,11 +129,11 @@ class Annotator:
         return tuple(taken)
 
     def take_features(self, given: Iterable[str]) -> tuple[str, ...]:
-        """Gives the layout features that may be remembered."""
+        """Return the layout features that may be remembered."""
         return tuple(feature for feature in given if not self._is_against_policy(feature))
 
     def take_name(self, name: str) -> str:
-        """Gives a place's name.
+        """Return a place's name.
 
         Raises:
             SemanticMapError: It gives orders.
@@ -146,14 +146,14 @@ class Annotator:
         return name
 
     def take_description(self, text: str) -> str:
-        """Gives the description; none where it gives orders."""
+        """Return the description; none where it gives orders."""
         if not tells_what_to_do(text):
             return text
         self.refused.append(f"the description: {LEFT_OUT[Concern.ORDERS]}")
         return ""
 
     def require_content(self, waypoint: Waypoint) -> None:
-        """Refuses a place of which nothing is left.
+        """Refuse a place of which nothing is left.
 
         Raises:
             SemanticMapError: All that was said of it is refused.
@@ -202,7 +202,7 @@ class Annotator:
     def _laser_around(
         self, stood: Pose, bearing_rad: float | None, picture: TakenPicture | None
     ) -> LaserFan | None:
-        """Gives what was met around a direction when it was seen, or else is met now from there."""
+        """Return what was met around a direction when it was seen, or is met now."""
         if bearing_rad is None:
             return None
         fan = _find_fan(stood, bearing_rad, picture)
@@ -260,7 +260,7 @@ def _find_fan(stood: Pose, bearing_rad: float, picture: TakenPicture | None) -> 
 def _range_of(
     thing: LandmarkInput, bearing_rad: float | None, stood: Pose, picture: TakenPicture | None
 ) -> tuple[float | None, str | None]:
-    """Gives how far a landmark is, and what measured that where nobody judged it.
+    """Return how far a landmark is, and what measured that where nobody judged it.
 
     What the robot measured along the line to it, of something called so, is taken over.
 
@@ -286,7 +286,7 @@ def _range_of(
 
 
 def _find_reading(label: str, way_rad: float, picture: TakenPicture) -> PictureReading | None:
-    """Gives what was measured of a thing of that name in a direction of the map frame."""
+    """Return what was measured of a thing of that name in a direction of the map frame."""
     found = [
         (off_rad, number)
         for number, reading in enumerate(picture.readings)
@@ -298,7 +298,7 @@ def _find_reading(label: str, way_rad: float, picture: TakenPicture) -> PictureR
 
 
 def _require_possible(thing: LandmarkInput, picture: TakenPicture | None) -> None:
-    """Refuses numbers that no look can give."""
+    """Refuse numbers that no look can give."""
     if thing.range_m is not None and thing.range_m > FARTHEST_SEEN_M:
         raise SemanticMapError(
             f"{thing.range_m:g} m is farther than anything is seen from, {FARTHEST_SEEN_M:g} m.",

@@ -34,12 +34,12 @@ AT_MOST_LONGEST_WAIT = BeforeValidator(_shorten_wait)
 
 
 def client_of(context: Context) -> str:
-    """Gives the HTTP session that calls; empty on stdio and for clients without one."""
+    """Return the HTTP session that calls; empty on stdio and for clients without one."""
     return (context.headers or {}).get("mcp-session-id", "")
 
 
 def tell_progress(context: Context) -> OnProgress:
-    """Gives what tells the caller how a drive stands."""
+    """Return what tells the caller how a drive stands."""
 
     async def tell(report: DriveReport) -> None:
         left_m = report.status.distance_left_m
@@ -104,7 +104,7 @@ class Asking:
     def ask_by_answer(
         self, needed: ApprovalNeededError, approvals: Approvals
     ) -> InputRequiredResult | None:
-        """Gives the answer that makes a client ask and call again; None for an older client."""
+        """Return the answer that makes a client ask and call again; None for an older client."""
         version = None if self._context is None else self._context.protocol_version
         if version is None or not is_version_at_least(version, CALLS_AGAIN):
             return None

@@ -47,7 +47,7 @@ class DriveTools:
         self._session = session
 
     def tools(self) -> list[Tool]:
-        """Gives the tools in their order."""
+        """Return the tools in their order."""
         return [
             Tool(
                 function=self.navigate_to,
@@ -84,7 +84,7 @@ class DriveTools:
         yaw_deg: Degrees = None,
         wait_s: Wait = 20.0,
     ) -> DriveAnswer:
-        """Drives the robot to a place: an id, a remembered name, or x and y.
+        """Drive the robot to a place: an id, a remembered name, or x and y.
 
         Use it to go anywhere. The goal is checked first; a refused goal comes with one that works.
         Answers `arrived` or, after wait_s, a goal_id for wait_for_goal. A newer goal replaces the
@@ -101,14 +101,14 @@ class DriveTools:
     async def wait_for_goal(
         self, context: Context, goal_id: GoalId = None, wait_s: Wait = 20.0
     ) -> DriveAnswer:
-        """Waits for a drive's end, at most wait_s; says how it stands.
+        """Wait for a drive's end, at most wait_s; say how it stands.
 
         Use it after navigate_to; wait_s=0 only asks.
         """
         return await self._wait(context, goal_id, wait_s)
 
     async def cancel_goal(self, goal_id: GoalId = None) -> str:
-        """Ends one drive; the robot comes to a stand.
+        """End one drive; the robot comes to a stand.
 
         Use stop_robot when anything is urgent.
         """
@@ -123,7 +123,7 @@ class DriveTools:
         return " ".join(filter(None, lines))
 
     async def stop_robot(self) -> str:
-        """Stops the robot at once and ends every drive.
+        """Stop the robot at once and ends every drive.
 
         Use it whenever going on could do harm; it works during any other call.
         """

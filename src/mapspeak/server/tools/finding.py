@@ -34,7 +34,7 @@ class FindTools:
         self._session = session
 
     def tools(self) -> list[Tool]:
-        """Gives the tool."""
+        """Return the tool."""
         # Its report is not declared: a schema of answers would cost more than all its arguments.
         return [Tool(function=self.find_place, title="Find in memory", effect=ToolEffect.READS)]
 
@@ -48,7 +48,7 @@ class FindTools:
         kind: Kind = None,
         k: Count = 5,
     ) -> CallToolResult:
-        """Finds remembered places and things by name or meaning: where, and how sure.
+        """Find remembered places and things by name or meaning: where, and how sure.
 
         Use it before navigate_to; says when none or several may be meant.
         """
@@ -89,7 +89,7 @@ class FindTools:
 
 
 def find_point(atlas: Atlas, words: str) -> Point:
-    """Gives the point of a place that somebody names.
+    """Return the point of a place that somebody names.
 
     Raises:
         GoalError: There is no such place.
@@ -98,7 +98,7 @@ def find_point(atlas: Atlas, words: str) -> Point:
 
 
 def find_room(atlas: Atlas, words: str) -> str:
-    """Gives the id of the room that somebody names, or that a place lies in.
+    """Return the id of the room that somebody names, or that a place lies in.
 
     Raises:
         GoalError: There is no such place, or it lies in no room.

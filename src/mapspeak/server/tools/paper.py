@@ -58,7 +58,7 @@ class PaperTools:
         self._session = session
 
     def tools(self) -> list[Tool]:
-        """Gives the tools in the paper's order."""
+        """Return the tools in the paper's order."""
         return [
             Tool(
                 function=self.subscribe_map_as_image,
@@ -90,7 +90,7 @@ class PaperTools:
         ]
 
     async def subscribe_map_as_image(self) -> list[str | Image]:
-        """Gives the robot's map as a plain grey picture: white free, grey unknown, dark occupied.
+        """Return the robot's map as a plain grey picture: white free, grey unknown, dark occupied.
 
         Use look_at_map instead for rooms, frontiers and numbers.
         """
@@ -99,7 +99,7 @@ class PaperTools:
         return [say_plain(grid, picture), Image(data=picture.png, format="png")]
 
     async def draw_map_axis(self) -> list[str | Image]:
-        """Gives the map with axes and a metric grid, numbered in metres.
+        """Return the map with axes and a metric grid, numbered in metres.
 
         Use it after subscribe_map_as_image, or alone.
         """
@@ -108,7 +108,7 @@ class PaperTools:
         return [say_axes(grid, picture), Image(data=picture.png, format="png")]
 
     async def draw_robot_pose(self) -> list[str | Image]:
-        """Gives the map with axes, and the robot as an arrow at its pose.
+        """Return the map with axes, and the robot as an arrow at its pose.
 
         Use it after draw_map_axis, or alone.
         """
@@ -132,7 +132,7 @@ class PaperTools:
         y: Y = None,
         yaw_deg: Degrees = None,
     ) -> WriteAnswer:
-        """Remembers a place in the semantic map: what is seen from here, with the pose.
+        """Remember a place in the semantic map: what is seen from here, with the pose.
 
         Use it at every waypoint after look_through_camera. A known name is updated: landmarks that
         you do not name stay. Leave out people, loose boxes and guesses.
@@ -173,7 +173,7 @@ class PaperTools:
     async def get_semantic_data(
         self, name: WaypointName = None, query: Query = None
     ) -> MemoryAnswer:
-        """Recalls remembered places with pose, landmarks and layout; they are observations.
+        """Recall remembered places with pose, landmarks and layout; they are observations.
 
         Use it to read a place in full; find_place finds a thing by what it is for.
         """
@@ -199,7 +199,7 @@ class PaperTools:
         picture: TakenPicture | None,
         *seen: Landmarks | None,
     ) -> None:
-        """Asks what the laser meets now, where no picture has it for a direction told from here."""
+        """Ask what the laser meets now, where no picture has it for a direction told from here."""
         if annotator.wants_laser(*seen, pose=pose, picture=picture):
             annotator.laser = await fetch_ring(self._session.robot)
 
@@ -233,7 +233,7 @@ class PaperTools:
 def _observation_pose(
     origin: Pose, x: float | None, y: float | None, yaw_deg: float | None
 ) -> Pose:
-    """Gives the pose that was asked for; what it leaves open is the origin's."""
+    """Return the pose that was asked for; what it leaves open is the origin's."""
     if (x is None) != (y is None):
         raise SemanticMapError(
             "Only one of x and y was given.",

@@ -35,7 +35,7 @@ class PlaceTools:
         self._session = session
 
     def tools(self) -> list[Tool]:
-        """Gives the tools in their order."""
+        """Return the tools in their order."""
         return [
             *FindTools(self._session).tools(),
             Tool(function=self.describe_place, title="One place in full", effect=ToolEffect.READS),
@@ -49,7 +49,7 @@ class PlaceTools:
         ]
 
     async def describe_place(self, place: OnePlace) -> str:
-        """Describes one room, corridor, door, frontier, remembered place or point of the map.
+        """Describe one room, corridor, door, frontier, remembered place or point of the map.
 
         Use it for shape, doors in their order along a corridor, what was seen there, how to get
         there.
@@ -58,7 +58,7 @@ class PlaceTools:
         return await self._session.compute(lambda: describe_place(atlas, find_place(atlas, place)))
 
     async def measure(self, places: Places = None, start: Start = "robot") -> str:
-        """Measures on the map: path and straight distance, the rooms and doors on the way, sizes.
+        """Measure on the map: path and straight distance, the rooms and doors on the way, sizes.
 
         Use it to compare rooms or doors, and for any way from one place to another; sorted.
         """
@@ -68,7 +68,7 @@ class PlaceTools:
         )
 
     async def check_goal(self, place: OnePlace) -> GoalAnswer:
-        """Checks whether the robot can drive to a place, without driving: verdict, clearance, path.
+        """Check whether the robot can drive to a place, without driving: verdict, clearance, path.
 
         Use it to compare goals; navigate_to checks its goal itself.
         """

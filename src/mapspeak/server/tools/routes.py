@@ -53,7 +53,7 @@ class RouteTools:
         self._errand = Errand(what="follow a route", n_drives=0, duration_s=ERRAND_S)
 
     def tools(self) -> list[Tool]:
-        """Gives the tools in their order."""
+        """Return the tools in their order."""
         return [
             Tool(
                 function=self.follow_route,
@@ -72,7 +72,7 @@ class RouteTools:
         when_blocked: Blocked = WhenBlocked.WAIT,
         wait_s: Wait = 20.0,
     ) -> Annotated[CallToolResult, RouteAnswer]:
-        """Drives the robot past several places in order, on the shortest way as a whole.
+        """Drive the robot past several places in order, on the shortest way as a whole.
 
         Use it instead of several navigate_to; words that fit several places ("the extinguisher")
         are taken where the whole route is shortest. It sets out to the next stop only while it is
@@ -98,7 +98,7 @@ class RouteTools:
 
 
 def _answer(report: RouteAnswer, sighting: CameraSighting | None) -> CallToolResult:
-    """Gives the report as text and data, and what the camera sees with it."""
+    """Return the report as text and data, and what the camera sees with it."""
     content: list[TextContent | ImageContent] = [
         TextContent(type="text", text=report.model_dump_json())
     ]

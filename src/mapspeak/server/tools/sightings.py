@@ -15,7 +15,7 @@ from mapspeak.session import Session
 
 
 async def fetch_ring(robot: Robot) -> LaserRing | None:
-    """Gives what the laser meets; None where there is none, or none that answers in time.
+    """Return what the laser meets; None where there is none, or none that answers in time.
 
     No picture and no write fails for want of it, nor takes longer than `SCAN_PATIENCE_S` for it.
     """
@@ -55,7 +55,7 @@ class CameraSighting:
 
 
 async def look_ahead(session: Session) -> CameraSighting:
-    """Takes a picture with the robot's front camera, names it, and keeps it as an episode.
+    """Take a picture with the robot's front camera, names it, and keep it as an episode.
 
     Raises:
         LinkError: It has none, or it cannot be reached.
@@ -91,7 +91,7 @@ async def look_ahead(session: Session) -> CameraSighting:
 
 
 def _read(detector: str | None, detections: tuple[Detection, ...]) -> Iterator[PictureReading]:
-    """Gives what was measured, for the records that may be made of the picture."""
+    """Return what was measured, for the records that may be made of the picture."""
     for seen in detections:
         if detector is not None and seen.range_m is not None:
             yield PictureReading(

@@ -90,12 +90,12 @@ CHECKED = ("title", "minLength", "maxLength", "maxItems", "additionalProperties"
 
 
 def lean_input(schema: Schema) -> Schema:
-    """Gives the schema of a tool's arguments: what may be left out need not be null as well."""
+    """Return the schema of a tool's arguments: what may be left out need not be null as well."""
     return _inline(_rewrite(_rewrite(schema, _without(CHECKED)), _short_optional))
 
 
 def lean_output(schema: Schema) -> Schema:
-    """Gives the schema of a report: names carry units, and every field is always there.
+    """Return the schema of a report: names carry units, and every field is always there.
 
     What stands in a list is promised its type only: its fields have their names in every answer.
     """
@@ -106,7 +106,7 @@ def lean_output(schema: Schema) -> Schema:
 
 
 def _rewrite(schema: Schema, change: Callable[[dict[str, Schema]], dict[str, Schema]]) -> Schema:
-    """Changes every schema within a schema; names of properties are no keywords."""
+    """Change every schema within a schema; names of properties are no keywords."""
     if isinstance(schema, list):
         return [_rewrite(item, change) for item in schema]
     if not isinstance(schema, dict):
@@ -124,7 +124,7 @@ def _without(keywords: tuple[str, ...]) -> Callable[[dict[str, Schema]], dict[st
 
 
 def _short_optional(schema: dict[str, Schema]) -> dict[str, Schema]:
-    """Writes `anyOf: [number, null]` with a default of null as the number alone."""
+    """Write `anyOf: [number, null]` with a default of null as the number alone."""
     options = schema.get("anyOf", [])
     if len(options) != 2 or options[1] != {"type": "null"}:
         return schema
@@ -133,7 +133,7 @@ def _short_optional(schema: dict[str, Schema]) -> dict[str, Schema]:
 
 
 def _short_nullable(schema: dict[str, Schema]) -> dict[str, Schema]:
-    """Writes `anyOf: [number, null]` as `type: [number, null]`."""
+    """Write `anyOf: [number, null]` as `type: [number, null]`."""
     options = schema.get("anyOf", [])
     if len(options) != 2 or options[1] != {"type": "null"} or "type" not in options[0]:
         return schema
@@ -142,7 +142,7 @@ def _short_nullable(schema: dict[str, Schema]) -> dict[str, Schema]:
 
 
 def _plain_items(schema: Schema) -> Schema:
-    """Writes lists of reports as lists of objects."""
+    """Write lists of reports as lists of objects."""
     reports = {
         f"{REF}{name}"
         for name, part in schema.get("$defs", {}).items()
@@ -157,7 +157,7 @@ def _plain_items(schema: Schema) -> Schema:
 
 
 def _prune(schema: Schema) -> Schema:
-    """Drops the definitions that nothing leads to."""
+    """Drop the definitions that nothing leads to."""
     definitions = schema.get("$defs", {})
     body = _without(("$defs",))(schema)
     used: dict[str, Schema] = {}
@@ -172,7 +172,7 @@ def _prune(schema: Schema) -> Schema:
 
 
 def _inline(schema: Schema) -> Schema:
-    """Puts definitions that are used once where they are used, and drops notes on classes."""
+    """Put definitions that are used once where they are used, and drop notes on classes."""
     if not isinstance(schema, dict) or "$defs" not in schema:
         return schema
     definitions = {

@@ -61,7 +61,7 @@ class Obstacles:
         return self._distance_from(Point(0.0, 0.0))
 
     def is_way_free(self, target: Point) -> bool:
-        """True when the body can move straight to a point without coming too near to anything."""
+        """Return True when the body can move straight to a point with room on all sides."""
         length = math.hypot(target.x, target.y)
         if length == 0 or not len(self._points):
             return True
@@ -171,7 +171,7 @@ class PathFollower:
         return self._points[self._at :]
 
     def has_arrived(self, pose: Pose) -> bool:
-        """True when the robot stands on the goal with the goal's heading."""
+        """Return True when the robot stands on the goal with the goal's heading."""
         turn_left = wrap_angle(self._goal.yaw_rad - pose.yaw_rad)
         return self._is_at_end and abs(turn_left) <= _ARRIVED_RAD
 

@@ -56,7 +56,7 @@ class SurfaceField:
         self._occupied = log_odds_map.occupied
 
     def is_mapped(self, points_in_map: FloatArray) -> Mask:
-        """True for the points that fall on ground the map knows."""
+        """Return True for the points that fall on ground the map knows."""
         return np.asarray(self._map.is_seen[self._cells(points_in_map, margin=0)])
 
     def find_lines(self, points_in_map: FloatArray) -> NearestLines:

@@ -78,7 +78,7 @@ class PoseTracker:
         self._odom_from_base = odom_from_base
 
     def _is_due(self, now_s: float) -> bool:
-        """True when a scan is to be used; then it counts as the last one."""
+        """Return True when a scan is to be used; then it counts as the last one."""
         if not self._has_moved_enough(now_s):
             return False
         self._odom_at_last = self._odom_from_base

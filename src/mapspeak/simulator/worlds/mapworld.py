@@ -77,7 +77,7 @@ def _roomiest(grid: OccupancyGrid, floor: Mask) -> Pose:
 
 
 def _find_solid(grid: OccupancyGrid) -> Mask:
-    """True where the map has a wall, and where floor ends without one, the map's edge too."""
+    """Return True where the map has a wall, and where floor ends without one."""
     free = np.pad(grid.free, 1).view(np.uint8)
     beside_floor = cv2.dilate(free, np.ones((3, 3), dtype=np.uint8)) > 0
     is_rim = (beside_floor & (free == 0))[1:-1, 1:-1]

@@ -85,7 +85,7 @@ class Slice:
         return np.asarray(np.einsum("ij,ij->i", gap, gap))
 
     def is_solid_at(self, point: Point) -> bool:
-        """True when a point lies inside a solid part."""
+        """Return True when a point lies inside a solid part."""
         place = (float(point.x), float(point.y))
         return any(
             cv2.pointPolygonTest(corners.astype(np.float32), place, measureDist=False) > 0
@@ -93,7 +93,7 @@ class Slice:
         )
 
     def has_room_at(self, point: Point, *, radius_m: float) -> bool:
-        """True when a round body fits at a point."""
+        """Return True when a round body fits at a point."""
         return self.distance_to(point) >= radius_m and not self.is_solid_at(point)
 
 

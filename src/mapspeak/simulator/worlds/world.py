@@ -85,7 +85,7 @@ class TrueRoom:
     outline: tuple[Point, ...]
 
     def contains(self, point: Point) -> bool:
-        """True when a point of the world's own frame lies inside the outline."""
+        """Return True when a point of the world's own frame lies inside the outline."""
         n_crossings = 0
         for start, end in zip(self.outline, (*self.outline[1:], self.outline[0]), strict=True):
             if (start.y > point.y) != (end.y > point.y):

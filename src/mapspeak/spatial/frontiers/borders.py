@@ -103,7 +103,7 @@ def _dilate(picture: Picture, kernel: Picture, anchor: tuple[int, int]) -> Pictu
 
 
 def _labelled(edge: Picture, free: Picture, *, reach: int) -> Labels:
-    """Numbers the borders from 1; pieces near each other on the floor share a number."""
+    """Label the borders from 1; pieces near each other on the floor share a number."""
     grown = edge
     for _ in range(max(reach // 2, 1)):
         grown = np.asarray(cv2.bitwise_and(cv2.dilate(grown, PLUS), free), dtype=np.uint8)
@@ -209,7 +209,7 @@ def find_gap_widths_m(floor: ReachableFloor, borders: Sequence[Border]) -> list[
 
 
 def _label_wide_floor(floor: ReachableFloor, width_m: float) -> tuple[Labels, int]:
-    """Numbers the pieces of floor that are nowhere narrower, and says where the robot is."""
+    """Label the pieces of floor that are nowhere narrower, and say where the robot is."""
     wide = floor.free & (floor.clearances_m >= width_m / 2 - 1e-6)
     wide |= floor.reachable
     _, labels = cv2.connectedComponents(wide.view(np.uint8), connectivity=4)

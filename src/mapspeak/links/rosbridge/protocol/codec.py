@@ -36,7 +36,7 @@ TAGS = {
 
 
 def to_json(message: Message) -> bytes:
-    """Gives a message as JSON: uint8[] as base64 text, other arrays as lists, NaN as null."""
+    """Return a message as JSON: uint8[] as base64 text, other arrays as lists, NaN as null."""
     try:
         return orjson.dumps(message, default=_plain, option=orjson.OPT_SERIALIZE_NUMPY)
     except TypeError:
@@ -46,7 +46,7 @@ def to_json(message: Message) -> bytes:
 
 
 def to_cbor(message: Message) -> bytes:
-    """Gives a message as CBOR: uint8[] as bytes, numpy arrays as typed arrays."""
+    """Return a message as CBOR: uint8[] as bytes, numpy arrays as typed arrays."""
     return cbor2.dumps(message, default=_encode_array)
 
 
@@ -224,7 +224,7 @@ def decode_json(frame: Raw) -> Any:  # noqa: ANN401 - ROS JSON enters here
 
 
 def decode_cbor(frame: Raw) -> Any:  # noqa: ANN401 - ROS data enters here
-    """Gives what a CBOR item says; typed arrays as read-only numpy arrays, uint8[] as bytes.
+    """Return what a CBOR item says; typed arrays as read-only numpy arrays, uint8[] as bytes.
 
     Raises:
         FrameError: It is no CBOR, or uses tags that no ROS message needs.

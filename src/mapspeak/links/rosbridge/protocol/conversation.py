@@ -51,14 +51,14 @@ class Conversation:
         return self.receive_text(frame) if is_text else self.receive_binary(frame)
 
     def receive_text(self, frame: Raw) -> Event | None:
-        """Gives what a text frame (JSON, UTF-8) says; None while the message is incomplete."""
+        """Return what a text frame (JSON, UTF-8) says; None while the message is incomplete."""
         try:
             return self._understand(self._checked(frame, decode_json), n_wrappings=0)
         except FrameError as error:
             return FrameRefused(str(error)[:MAX_REASON_LENGTH])
 
     def receive_binary(self, frame: Raw) -> Event | None:
-        """Gives what a binary frame (CBOR) says; None while the message is incomplete."""
+        """Return what a binary frame (CBOR) says; None while the message is incomplete."""
         try:
             return self._understand(self._checked(frame, decode_cbor), n_wrappings=0)
         except FrameError as error:

@@ -115,7 +115,7 @@ class Encoding(StrEnum):
 def subscribe(
     topic: str, *, operation_id: str, type_name: str | None, encoding: Encoding, throttle_ms: int
 ) -> bytes:
-    """Asks for a topic's messages, of which only the latest waits at the server.
+    """Ask for a topic's messages, of which only the latest waits at the server.
 
     Args:
         topic: Its full name.
@@ -136,22 +136,22 @@ def subscribe(
 
 
 def unsubscribe(topic: str, *, operation_id: str) -> bytes:
-    """Ends what `subscribe` began."""
+    """End what `subscribe` began."""
     return _encode("unsubscribe", id=operation_id, topic=_name(topic))
 
 
 def advertise(topic: str, *, operation_id: str, type_name: str) -> bytes:
-    """Says that messages of a type will be published."""
+    """Say that messages of a type will be published."""
     return _encode("advertise", id=operation_id, topic=_name(topic), **_type_of(type_name))
 
 
 def unadvertise(topic: str, *, operation_id: str) -> bytes:
-    """Ends what `advertise` began."""
+    """End what `advertise` began."""
     return _encode("unadvertise", id=operation_id, topic=_name(topic))
 
 
 def publish(topic: str, message: Mapping[str, Any]) -> bytes:
-    """Publishes a message on a topic that has been advertised.
+    """Publish a message on a topic that has been advertised.
 
     Raises:
         LinkError: A number in it is NaN or infinite; a robot would act on it.
@@ -162,7 +162,7 @@ def publish(topic: str, message: Mapping[str, Any]) -> bytes:
 def call_service(
     service: str, arguments: Mapping[str, Any], *, operation_id: str, type_name: str | None = None
 ) -> bytes:
-    """Calls a service; the answer carries the same id."""
+    """Call a service; the answer carries the same id."""
     return _encode(
         "call_service",
         id=operation_id,
@@ -175,7 +175,7 @@ def call_service(
 def send_action_goal(
     action: str, arguments: Mapping[str, Any], *, operation_id: str, type_name: str
 ) -> bytes:
-    """Sends a goal to an action (ROS 2); feedback and result carry the same id."""
+    """Send a goal to an action (ROS 2); feedback and result carry the same id."""
     return _encode(
         "send_action_goal",
         id=operation_id,
@@ -187,12 +187,12 @@ def send_action_goal(
 
 
 def cancel_action_goal(action: str, *, operation_id: str) -> bytes:
-    """Cancels the goal that was sent with that id (ROS 2); nothing answers."""
+    """Cancel the goal that was sent with that id (ROS 2); nothing answers."""
     return _encode("cancel_action_goal", id=operation_id, action=_name(action))
 
 
 def authenticate(token: str) -> bytes:
-    """Gives a token to a server that asks for one before anything else."""
+    """Return a token to a server that asks for one before anything else."""
     return _encode("auth", token=token)
 
 

@@ -72,7 +72,7 @@ class ActionTools:
         self._described: dict[str, Described] = {}
 
     def tools(self) -> list[Tool]:
-        """Gives the tools in their order."""
+        """Return the tools in their order."""
         return [
             Tool(function=self.ros_actions, title="List ROS actions", effect=ToolEffect.READS),
             Tool(function=self.ros_action, title="One ROS action", effect=ToolEffect.READS),
@@ -91,7 +91,7 @@ class ActionTools:
         ]
 
     async def ros_actions(self, filter: Filter = None, page: Page = 1) -> str:  # noqa: A002
-        """Lists the robot's ROS actions with their types.
+        """List the robot's ROS actions with their types.
 
         Use it to find one; ros_action tells its fields.
         """
@@ -107,7 +107,7 @@ class ActionTools:
         )
 
     async def ros_action(self, action: Action, type: ActionType = None) -> str:  # noqa: A002
-        """Tells a ROS action's type, and the fields of its goal, result and feedback.
+        """Tell a ROS action's type, and the fields of its goal, result and feedback.
 
         Use it before ros_send_goal.
         """
@@ -123,7 +123,7 @@ class ActionTools:
         wait_s: Wait = 5.0,
         type: ActionType = None,  # noqa: A002
     ) -> str:
-        """Sends a goal to a ROS action, which may move the robot, and waits for its end.
+        """Send a goal to a ROS action, which may move the robot, and wait for its end.
 
         Use navigate_to to drive somewhere. Answers how it ended or, after wait_s, its goal_id; a
         refused goal is told as rejected. Call ros_action first for the fields.
@@ -152,7 +152,7 @@ class ActionTools:
     async def ros_goal_status(
         self, goal_id: Handle = None, wait_s: Wait = 0.0, action: AnyAction = None
     ) -> str:
-        """Says how a ROS goal stands: state, feedback, result, also long after.
+        """Say how a ROS goal stands: state, feedback, result, also long after.
 
         Use it to wait for the end; with an action it lists the goals its server knows.
         """
@@ -163,7 +163,7 @@ class ActionTools:
         return self._say_job(job)
 
     async def ros_cancel_goal(self, goal_id: CancelHandle = None, action: AnyAction = None) -> str:
-        """Cancels one goal by its goal_id, or every goal of a ROS action.
+        """Cancel one goal by its goal_id, or every goal of a ROS action.
 
         Use stop_robot instead when anything is urgent.
         """
@@ -190,7 +190,7 @@ class ActionTools:
         return "\n".join([head, *(lines[-MOST_LISTED:] or ["none"]), *([loss] if loss else [])])
 
     async def _find_type(self, action: str, given: str | None) -> str:
-        """Gives an action's type as this ROS writes it; the given one where nobody tells it."""
+        """Return an action's type as this ROS writes it; the given one where nobody tells it."""
         if given is not None:
             await self._inquiry.check_action(action)
             return await self._inquiry.said(bare_type(given), kind="action")

@@ -37,13 +37,13 @@ class Nodes:
         return not self.others and self.ours is not None
 
     def say(self) -> str:
-        """Names them, with a mark on ours."""
+        """Name them, with a mark on ours."""
         ours = () if self.ours is None else (self.ours,)
         named = mark_ours(sorted((*self.others, *ours)), ours)
         return list_some(named, most=MOST_NODES) or "nobody"
 
     def count(self) -> str:
-        """Says how many others there are, and whether we are there too."""
+        """Say how many others there are, and whether we are there too."""
         if self.ours is None:
             return str(len(self.others) or "nobody")
         return f"{len(self.others)} and mapspeak" if self.others else "mapspeak alone"
@@ -64,18 +64,18 @@ class Census:
     own: OwnEnds
 
     def publishers_of(self, topic: str) -> Nodes:
-        """Gives who publishes a topic."""
+        """Return who publishes a topic."""
         found = [name for name, links in self.links.items() if topic in links.publishes]
         return _tell_apart(found, self.own.node if topic in self.own.publishes else "")
 
     def hearers_of(self, topic: str) -> Nodes:
-        """Gives who listens to a topic."""
+        """Return who listens to a topic."""
         found = [name for name, links in self.links.items() if topic in links.subscribes]
         return _tell_apart(found, self.own.node if topic in self.own.hears else "")
 
 
 async def take_census(connection: RosConnection, nodes: Iterable[str]) -> Census:
-    """Asks every node what it does, some at once: a question for each, two for each topic else."""
+    """Ask every node what it does, some at once: a question for each, two for each topic else."""
     links: dict[str, NodeLinks] = {}
     limiter = anyio.CapacityLimiter(MOST_AT_ONCE)
     asked = sorted(nodes)
@@ -98,7 +98,7 @@ async def take_census(connection: RosConnection, nodes: Iterable[str]) -> Census
 
 
 async def fetch_publishers(connection: RosConnection, topic: str) -> Nodes:
-    """Gives who publishes one topic."""
+    """Return who publishes one topic."""
     own = connection.own_ends
     return _tell_apart(
         await connection.fetch_publishers(topic), own.node if topic in own.publishes else ""
@@ -106,7 +106,7 @@ async def fetch_publishers(connection: RosConnection, topic: str) -> Nodes:
 
 
 async def fetch_hearers(connection: RosConnection, topic: str) -> Nodes:
-    """Gives who listens to one topic."""
+    """Return who listens to one topic."""
     own = connection.own_ends
     return _tell_apart(
         await connection.fetch_subscribers(topic), own.node if topic in own.hears else ""
@@ -114,7 +114,7 @@ async def fetch_hearers(connection: RosConnection, topic: str) -> Nodes:
 
 
 async def find_server(connection: RosConnection, service: str) -> str | None:
-    """Gives the node that offers a service; first those whose name the service's begins with."""
+    """Return the node that offers a service; first those whose name the service's begins with."""
     nodes = await connection.fetch_nodes()
     likely = [node for node in nodes if service.startswith(f"{node.rstrip('/')}/")]
     others = [node for node in nodes if node not in likely]
@@ -127,7 +127,7 @@ async def find_server(connection: RosConnection, service: str) -> str | None:
 
 
 def mark_ours(names: Iterable[str], ours: Collection[str]) -> list[str]:
-    """Gives names, with a mark on those that are our own doing."""
+    """Return names, with a mark on those that are our own doing."""
     return [f"{name}{OURS}" if name in ours else name for name in names]
 
 

@@ -52,7 +52,7 @@ class RosCommands:
         self._advertised: set[tuple[str, str]] = set()
 
     def check_name(self, command: Publish | Call | Act | SetParameter) -> None:
-        """Returns when a command is not denied for its name: said before anything else is checked.
+        """Return when a command is not denied for its name: said before anything else is checked.
 
         Raises:
             PolicyError: It is.
@@ -62,7 +62,7 @@ class RosCommands:
             connection.check_name(command)
 
     async def prepare(self, topic: str, type_name: str) -> None:
-        """Advertises a topic, and waits until the robot has noticed.
+        """Advertise a topic, and wait until the robot has noticed.
 
         It stays advertised: the robot's brake may use the same topic.
         """
@@ -73,18 +73,18 @@ class RosCommands:
             self._advertised.add((topic, type_name))
 
     async def _wait_until_known(self, topic: str) -> None:
-        """Returns when the robot knows somebody who publishes, or cannot say, or after a while."""
+        """Return when the robot knows somebody who publishes, or cannot say, or after a while."""
         with suppress(LinkError), anyio.move_on_after(LONGEST_SETTLE_S):
             fetch = self._connection().fetch_publishers
             while not await fetch(topic):  # noqa: ASYNC110 - it happens in other programs
                 await anyio.sleep(LOOK_S)
 
     async def publish(self, topic: str, message: Message) -> None:
-        """Publishes one message on a topic that was prepared."""
+        """Publish one message on a topic that was prepared."""
         await self._connection().publish(topic, message)
 
     async def publish_at_once(self, topic: str, message: Message) -> None:
-        """Publishes one message on a topic that was prepared, now or not at all.
+        """Publish one message on a topic that was prepared, now or not at all.
 
         Raises:
             LinkError: There is no connection.
@@ -102,7 +102,7 @@ class RosCommands:
         self._connection().started.note_velocity(topic, zero=zero_velocity_of(message))
 
     async def stand(self, topic: str, message: Message) -> bool:
-        """Publishes the stand for a velocity, whatever happens to the call that moved the robot.
+        """Publish the stand for a velocity, whatever happens to the call that moved the robot.
 
         Where the connection is lost it is waited for a moment. Gives whether a stand was sent.
         """
@@ -118,7 +118,7 @@ class RosCommands:
     async def call(
         self, service: str, arguments: Mapping[str, Any], *, type_name: str, timeout_s: float
     ) -> dict[str, Any]:
-        """Gives what a service answers."""
+        """Return what a service answers."""
         return await self._connection().call_service(
             service, arguments, type_name=type_name, timeout_s=timeout_s
         )
@@ -129,7 +129,7 @@ class RosCommands:
         name: str,
         value: Any,  # noqa: ANN401 - any value ROS has
     ) -> None:
-        """Sets a node's parameter."""
+        """Set a node's parameter."""
         await self._connection().set_parameter(node, name, value)
 
 
@@ -185,7 +185,7 @@ class Publisher:
         self._moving_until_s: dict[str, float] = {}
 
     async def publish(self, wanted: PublishRequest) -> str:
-        """Publishes, and says what was sent and what it ended with.
+        """Publish, and say what was sent and what it ended with.
 
         Raises:
             GoalError: It is a velocity, and something else moves the robot.
@@ -233,7 +233,7 @@ class Publisher:
     async def _repeat(
         self, wanted: PublishRequest, duration_s: float, run: _Run, ticket: int
     ) -> None:
-        """Publishes until the time is over or something else ends it.
+        """Publish until the time is over or something else ends it.
 
         Raises:
             LinkError: The connection was lost. What was begun does not go on when it is back.
@@ -259,7 +259,7 @@ class Publisher:
 
     @contextmanager
     def _moving(self, wanted: PublishRequest) -> Generator[None]:
-        """Keeps others from the topic while the context lasts."""
+        """Keep others from the topic while the context lasts."""
         until_s = anyio.current_time() + (wanted.duration_s or 0.0)
         self._moving_until_s[wanted.topic] = until_s
         try:
@@ -288,7 +288,7 @@ class Publisher:
             )
 
     def _say_what_moves(self, topic: str) -> str:
-        """Says what goes on moving the robot, though this message may be a stand."""
+        """Say what goes on moving the robot, though this message may be a stand."""
         left_s = self._left_s(topic)
         if left_s is None:
             return "."

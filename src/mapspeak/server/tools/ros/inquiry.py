@@ -48,11 +48,11 @@ class Described:
         return {1: "msg", 2: "srv", 3: "action"}[len(self.parts)]
 
     def part(self, number: int) -> str:
-        """Gives the name of a part: 0 is what is sent."""
+        """Return the name of a part: 0 is what is sent."""
         return self.parts[number]
 
     def say(self) -> str:
-        """Gives its fields down to the plain values, part by part."""
+        """Return its fields down to the plain values, part by part."""
         told: list[str] = []
         for name in self.parts:
             lines = describe_type(self.book, name) or ["(no fields)"]
@@ -95,7 +95,7 @@ class RosInquiry:
         return self._session.robot.now_s
 
     async def fetch_graph(self) -> RosGraph:
-        """Gives the topics and actions there are, as they were a second ago at most."""
+        """Return the topics and actions there are, as they were a second ago at most."""
         if self._graph is None or anyio.current_time() > self._asked_s + KEPT_S:
             return await self._renew_graph()
         # What is kept is no answer for a robot that has gone.
@@ -103,7 +103,7 @@ class RosInquiry:
         return self._graph
 
     async def fetch_topics(self) -> RosGraph:
-        """Gives the topics as they were a second ago at most; the actions may be older."""
+        """Return the topics as they were a second ago at most; the actions may be older."""
         if self._graph is not None and anyio.current_time() > self._listed_s + KEPT_S:
             return await self._renew_topics(self._graph)
         if self._graph is None:
@@ -112,18 +112,18 @@ class RosInquiry:
         return self._graph
 
     async def fetch_dialect(self) -> Dialect:
-        """Gives which ROS it is."""
+        """Return which ROS it is."""
         return (self._graph or await self.fetch_graph()).dialect
 
     async def find_topic_type(self, topic: str) -> str | None:
-        """Gives a topic's type as "package/Type"; asks again only for what it has not heard of."""
+        """Return a topic's type as "package/Type"; ask again only for what it has not heard of."""
         graph = self._graph
         if graph is None or topic not in graph.types:
             graph = await (self._renew_graph() if graph is None else self._renew_topics(graph))
         return graph.types.get(topic)
 
     async def fetch_topic_type(self, topic: str) -> str:
-        """Gives a topic's type as "package/Type".
+        """Return a topic's type as "package/Type".
 
         Raises:
             LinkError: There is no such topic; names those most like it.
@@ -134,7 +134,7 @@ class RosInquiry:
         return found
 
     async def fetch_service_type(self, service: str) -> str:
-        """Gives a service's type as "package/Type".
+        """Return a service's type as "package/Type".
 
         Raises:
             LinkError: There is no such service; names those most like it.
@@ -148,11 +148,11 @@ class RosInquiry:
             raise self.stranger("service", service, services) from None
 
     async def fetch_actions(self) -> tuple[str, ...]:
-        """Gives all actions; ROS 1 shows them by their topics."""
+        """Return all actions; ROS 1 shows them by their topics."""
         return _actions_of(await self.fetch_graph())
 
     async def check_action(self, action: str) -> None:
-        """Returns when there is such an action.
+        """Return when there is such an action.
 
         Raises:
             LinkError: There is none; names those most like it.
@@ -163,7 +163,7 @@ class RosInquiry:
                 raise self.stranger("action", action, actions)
 
     async def fetch_action_type(self, action: str) -> str:
-        """Gives an action's type as "package/Type".
+        """Return an action's type as "package/Type".
 
         rosapi 2.1 does not tell it: then it is the one of that name, as Nav2 names its actions.
 
@@ -183,7 +183,7 @@ class RosInquiry:
             return found
 
     async def check_node(self, node: str) -> None:
-        """Returns when there is such a node.
+        """Return when there is such a node.
 
         Raises:
             LinkError: There is none; names those most like it.
@@ -193,7 +193,7 @@ class RosInquiry:
             raise self.stranger("node", node, nodes)
 
     async def describe(self, type_name: str) -> Described:
-        """Gives what a type looks like.
+        """Return what a type looks like.
 
         Raises:
             LinkError: It is no name of a type, or nobody knows it; says how to describe it.
@@ -228,7 +228,7 @@ class RosInquiry:
         )
 
     async def teach(self, type_name: str, definition: str) -> None:
-        """Keeps the definition of a type that nobody else knows, while the session lasts.
+        """Keep the definition of a type that nobody else knows, while the session lasts.
 
         Raises:
             LinkError: It is no name of a type, or the robot or mapspeak knows that type, or the
@@ -246,7 +246,7 @@ class RosInquiry:
         self._taught |= texts
 
     async def said(self, type_name: str, *, kind: str = "msg") -> str:
-        """Gives a type as this ROS writes it, such as "nav_msgs/msg/Path"."""
+        """Return a type as this ROS writes it, such as "nav_msgs/msg/Path"."""
         dialect = await self.fetch_dialect()
         package, _, last = bare_type(type_name).partition("/")
         return f"{package}/{kind}/{last}" if dialect is Dialect.ROS2 else f"{package}/{last}"
@@ -263,7 +263,7 @@ class RosInquiry:
         )
 
     async def _check_definition(self, name: str, text: str) -> None:
-        """Returns when every line of a definition is one, and every type within is known."""
+        """Return when every line of a definition is one, and every type within is known."""
         for line in find_odd_lines(text):
             raise LinkError(
                 f"The definition of {name} has a line that defines nothing: {line[:80]!r}.",
@@ -279,7 +279,7 @@ class RosInquiry:
                 )
 
     async def _find_types(self, wanted: str) -> list[str]:
-        """Gives the known types most like a name; first those that end as it does."""
+        """Return the known types most like a name; first those that end as it does."""
         graph = self._graph or await self.fetch_graph()
         texts = {**known_definitions(graph.dialect), **self._taught}
         kinds = dict.fromkeys(graph.types.values(), "msg") | kinds_of(texts)
@@ -303,7 +303,7 @@ class RosInquiry:
 
     @staticmethod
     def stranger(what: str, name: str, known: Iterable[str]) -> LinkError:
-        """Gives the error for a name that is not there."""
+        """Return the error for a name that is not there."""
         names = sorted(known)
         near = find_nearest(name, names)
         if not names:
@@ -316,7 +316,7 @@ class RosInquiry:
 
 
 def full_name(name: str) -> str:
-    """Gives a name with its leading slash.
+    """Return a name with its leading slash.
 
     Raises:
         LinkError: ROS allows no such name.
@@ -330,7 +330,7 @@ def full_name(name: str) -> str:
 
 
 def _find_type_by_name(action: str) -> str | None:
-    """Gives the type that comes with mapspeak and is called as the action: /spin is a Spin."""
+    """Return the type that comes with mapspeak and is called as the action: /spin is a Spin."""
     wanted = action.rpartition("/")[2].replace("_", "").lower()
     goals = (name for name in known_definitions(Dialect.ROS2) if name.endswith("_Goal"))
     types = (name.removesuffix("_Goal") for name in goals)
@@ -353,7 +353,7 @@ def _find_parts(texts: Mapping[str, str], bare: str) -> tuple[str, ...]:
 
 
 def require_ros(session: Session, *, toolsets: Iterable[str], tools: Iterable[str] = ()) -> None:
-    """Returns when no tool of ROS is wanted, or they can work.
+    """Return when no tool of ROS is wanted, or they can work.
 
     Raises:
         ConfigError: One is wanted of a robot that is no ROS robot.

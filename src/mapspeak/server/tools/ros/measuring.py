@@ -96,7 +96,7 @@ async def hear_frames(
     duration_s: float,
     wanted: AbstractSet[str] = frozenset(),
 ) -> list[FrameLink]:
-    """Gives the transforms that come in a time, those that are kept for latecomers too.
+    """Return the transforms that come in a time, those that are kept for latecomers too.
 
     Args:
         connection: To listen with.
@@ -172,7 +172,7 @@ def _frames_in(value: object) -> Iterator[str]:
 
 
 def say_frames(links: Sequence[FrameLink], *, now_s: float, heard_s: float) -> str:
-    """Gives the frames as a tree, after what is wrong with it.
+    """Return the frames as a tree, after what is wrong with it.
 
     Args:
         links: As they were heard.
@@ -193,7 +193,7 @@ def say_frames(links: Sequence[FrameLink], *, now_s: float, heard_s: float) -> s
 
 
 def _walk(links: Sequence[FrameLink], roots: Sequence[str]) -> Iterator[tuple[FrameLink, int]]:
-    """Gives the transforms below some frames with their depth, each branch to its end."""
+    """Return the transforms below some frames with their depth, each branch to its end."""
     below: dict[str, list[FrameLink]] = {}
     for link in sorted(links, key=lambda link: link.child, reverse=True):
         below.setdefault(link.parent, []).append(link)
@@ -240,7 +240,7 @@ def _say_parents(links: Sequence[FrameLink]) -> Iterator[str]:
 
 
 def _say_loops(links: Sequence[FrameLink], in_tree: set[int]) -> Iterator[str]:
-    """Names the ways that lead back to where they began."""
+    """Name the ways that lead back to where they began."""
     parent_of = {link.child: link.parent for link in links if id(link) not in in_tree}
     told: set[str] = set()
     for frame in sorted(parent_of):
@@ -275,14 +275,14 @@ class MeasuringTools:
         self._inquiry = inquiry
 
     def tools(self) -> list[Tool]:
-        """Gives the tools in their order."""
+        """Return the tools in their order."""
         return [
             Tool(function=self.ros_rates, title="Rates of ROS topics", effect=ToolEffect.READS),
             Tool(function=self.ros_frames, title="The tree of TF frames", effect=ToolEffect.READS),
         ]
 
     async def ros_rates(self, topics: Topics, duration_s: Listen = 3.0) -> str:
-        """Measures several ROS topics at once: rate, age of the stamps, which are silent.
+        """Measure several ROS topics at once: rate, age of the stamps, which are silent.
 
         Use it to find what has died, is slow or late; ros_read shows the messages.
         """
@@ -301,7 +301,7 @@ class MeasuringTools:
         return cut("\n".join([f"listened for {duration_s:g} s", *(said[name] for name in names)]))
 
     async def ros_frames(self, topic: FramesTopic = "/tf", duration_s: Listen = 3.0) -> str:
-        """Tells the tree of TF frames: each transform's rate and age, static or not, who sends it.
+        """Tell the tree of TF frames: each transform's rate and age, static or not, who sends it.
 
         Use it when a transform is missing or late; it names loops, two parents and gaps.
         """
@@ -355,7 +355,7 @@ class MeasuringTools:
 
 
 def say_silence(heard: Heard) -> str:
-    """Says for how long nothing has come."""
+    """Say for how long nothing has come."""
     if heard.age_s < heard.known_for_s:
         return f"the last message came {heard.age_s:.1f} s ago"
     return f"nothing came in the {heard.known_for_s:.1f} s since we listen"

@@ -64,7 +64,7 @@ class NodeTools:
         self._commands = commands
 
     def tools(self) -> list[Tool]:
-        """Gives the tools in their order."""
+        """Return the tools in their order."""
         return [
             Tool(function=self.ros_nodes, title="List ROS nodes", effect=ToolEffect.READS),
             Tool(function=self.ros_node, title="One ROS node", effect=ToolEffect.READS),
@@ -77,7 +77,7 @@ class NodeTools:
         ]
 
     async def ros_overview(self) -> str:
-        """Tells which ROS the robot runs and what there is: topics, services, actions, nodes.
+        """Tell which ROS the robot runs and what there is: topics, services, actions, nodes.
 
         Use it first of the ros_ tools. Which robot it is was chosen by the operator.
         """
@@ -96,13 +96,13 @@ class NodeTools:
         return cut("\n".join(lines))
 
     async def _fetch_time_s(self, graph: RosGraph) -> float | None:
-        """Gives robot time: that of /clock where there is one, for all nodes go by it then."""
+        """Return robot time: that of /clock where there is one, for all nodes go by it then."""
         if CLOCK in graph.types:
             return self._inquiry.now_s
         return await self._inquiry.connection.fetch_time_s()
 
     async def ros_nodes(self, filter: Filter = None, page: Page = 1) -> str:  # noqa: A002
-        """Lists the robot's ROS nodes.
+        """List the robot's ROS nodes.
 
         Use it to see what runs; ros_node tells what one does.
         """
@@ -111,7 +111,7 @@ class NodeTools:
         return say_page("nodes", chosen, page, line=lambda name: name, n_all=len(nodes))
 
     async def ros_node(self, node: Node) -> str:
-        """Tells what a ROS node publishes, hears and serves.
+        """Tell what a ROS node publishes, hears and serves.
 
         Use it to find out who does what; ros_parameters gives its settings.
         """
@@ -134,7 +134,7 @@ class NodeTools:
         filter: Filter = None,  # noqa: A002
         page: Page = 1,
     ) -> str:
-        """Lists a ROS node's parameters with their values; few are described in full.
+        """List a ROS node's parameters with their values; few are described in full.
 
         Use it with a filter for one parameter; none listed means there is none.
         """
@@ -157,7 +157,7 @@ class NodeTools:
     async def ros_set_parameter(
         self, node: ParameterNode, parameter: Parameter, value: Value
     ) -> str:
-        """Sets or deletes a ROS node's parameter, which may change how the robot moves.
+        """Set or deletes a ROS node's parameter, which may change how the robot moves.
 
         Use ros_parameters first for its value and kind.
         """
@@ -181,7 +181,7 @@ class NodeTools:
         return " ".join([said, *notes])
 
     async def _say_missing(self, node: str, parameter: str, *, is_made: bool) -> list[str]:
-        """Says of a parameter that is not set whether it is new, and which are like it.
+        """Say of a parameter that is not set whether it is new, and which are like it.
 
         Raises:
             LinkError: There is no such node, or it has no such parameter and makes none.
@@ -237,7 +237,7 @@ class NodeTools:
         return values
 
     async def _describe(self, node: str, names: list[str]) -> dict[str, str]:
-        """Gives what a node of ROS 2 says of its parameters."""
+        """Return what a node of ROS 2 says of its parameters."""
         if not names or await self._inquiry.fetch_dialect() is Dialect.ROS1:
             return {}
         try:
@@ -252,7 +252,7 @@ class NodeTools:
 
 
 def keep_kind(before: object, value: object, *, name: str) -> object:
-    """Gives a new value of the kind that the old one has, which ROS 1 itself would not keep.
+    """Return a new value of the kind that the old one has, which ROS 1 itself would not keep.
 
     Raises:
         LinkError: It is of another kind.

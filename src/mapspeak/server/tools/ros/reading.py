@@ -53,7 +53,7 @@ class Heard:
 
 
 def say_rate(rate_hz: float) -> str:
-    """Gives a rate with three digits: 13.5 Hz is no 14 Hz."""
+    """Return a rate with three digits: 13.5 Hz is no 14 Hz."""
     return f"{rate_hz:.0f} Hz" if rate_hz >= 1000.0 else f"{f'{rate_hz:#.3g}'.rstrip('.')} Hz"
 
 
@@ -68,7 +68,7 @@ async def hear(
     duration_s: float,
     renew_s: tuple[float, ...] = RENEW_S,
 ) -> Heard:
-    """Gives the latest messages of a topic, all times in wall time.
+    """Return the latest messages of a topic, all times in wall time.
 
     Args:
         connection: To listen with.
@@ -105,17 +105,17 @@ class _Collector:
         self.messages: deque[Message] = deque(maxlen=n)
 
     def take_known(self) -> None:
-        """Takes the message that is there already."""
+        """Take the message that is there already."""
         if self._subscription.latest is not None:
             self.messages.append(self._subscription.latest)
 
     async def collect(self, until: int | None) -> None:
-        """Takes messages as they come, until there are so many or it is cancelled."""
+        """Take messages as they come, until there are so many or it is cancelled."""
         while until is None or len(self.messages) < until:
             await self.take_next(timeout_s=60.0)
 
     async def take_next(self, *, timeout_s: float) -> bool:
-        """Takes the next message; False when none came in time."""
+        """Take the next message; False when none came in time."""
         try:
             message = await self._subscription.wait_for_more_than(self._n_seen, timeout_s=timeout_s)
         except LinkError:
@@ -127,7 +127,7 @@ class _Collector:
         return True
 
     def result(self, started_s: float) -> Heard:
-        """Gives what came since a moment of the event loop's clock."""
+        """Return what came since a moment of the event loop's clock."""
         now_s, known = anyio.current_time(), self._subscription
         return Heard(
             messages=tuple(self.messages),
@@ -139,7 +139,7 @@ class _Collector:
         )
 
     def _find_period(self) -> float | None:
-        """Gives the mean time between messages: by those that came, else by all ever heard."""
+        """Return the mean time between messages: by those that came, else by all ever heard."""
         known = self._subscription
         n_first, first_s = self._first or (0, known.begun_s)
         n_between, passed_s = known.n_received - n_first, known.arrived_s - first_s
@@ -168,7 +168,7 @@ OLD_S = 2.0
 
 
 def stamp_of(message: Message) -> float | None:
-    """Gives a message's own time in seconds of robot time; None where it has none."""
+    """Return a message's own time in seconds of robot time; None where it has none."""
     header = message.get("header")
     holder = header if isinstance(header, Mapping) else message
     stamp = holder.get("stamp")
@@ -183,7 +183,7 @@ def stamp_of(message: Message) -> float | None:
 def say_stamp(
     message: Message, *, now_s: float, age_s: float = 0.0, period_s: float | None = None
 ) -> str:
-    """Says a message's stamp and how far it is off; empty where it has none.
+    """Say a message's stamp and how far it is off; empty where it has none.
 
     Args:
         message: Of any type.
@@ -201,13 +201,13 @@ def say_stamp(
 
 
 def say_lag(lag_s: float) -> str:
-    """Says how far a stamp is from robot time."""
+    """Say how far a stamp is from robot time."""
     where = "behind" if lag_s >= 0.0 else "ahead of"
     return f"{abs(lag_s):.2f} s {where} robot time"
 
 
 def _judge(old_s: float, period_s: float | None) -> str:
-    """Says that a message was too old, or too new, when it came."""
+    """Say that a message was too old, or too new, when it came."""
     if old_s < -LEAST_LATE_S:
         return f" - AHEAD: {-old_s:.1f} s in the future when it came"
     if period_s is None:

@@ -28,7 +28,7 @@ NUMBERS = int | float | np.integer | np.floating
 
 
 def show_message(message: Mapping[str, Any]) -> str:
-    """Gives a message's fields, one to a line; large lists by their size, range and beginning."""
+    """Return a message's fields, one to a line; large lists by their size, range and beginning."""
     if not message:
         return "(a message without fields)"
     lines: list[str] = []
@@ -38,12 +38,12 @@ def show_message(message: Mapping[str, Any]) -> str:
 
 
 def show_value(value: object) -> str:
-    """Gives a value on one line."""
+    """Return a value on one line."""
     return cut(_inline(value, 0), most=LONGEST_MESSAGE)
 
 
 def cut(text: str, *, most: int = LONGEST_ANSWER) -> str:
-    """Gives at most so many letters of a text, and says how many there were."""
+    """Return at most so many letters of a text, and say how many there were."""
     if len(text) <= most:
         return text
     return f"{text[: most - 60]}\n... cut: {len(text):,} letters in all."
@@ -110,7 +110,7 @@ def _inline_list(value: Sequence[Any], depth: int) -> str:
 
 
 def _show_numbers(values: Sequence[Any]) -> str:
-    """Gives a list of numbers; ROS 1 writes NaN and infinity as null."""
+    """Return a list of numbers; ROS 1 writes NaN and infinity as null."""
     try:
         numbers = np.array([math.nan if each is None else each for each in values], dtype=float)
     except (OverflowError, ValueError):
@@ -166,7 +166,7 @@ Page = Annotated[int, Field(description="1 is the first", ge=1, le=1000)]
 def choose(
     items: Sequence[Item], pattern: str | None, *, texts: Callable[[Item], Sequence[str]]
 ) -> list[Item]:
-    """Gives the items one of whose texts a pattern fits; one without a star fits any part."""
+    """Return the items one of whose texts a pattern fits; one without a star fits any part."""
     if not pattern:
         return list(items)
     wanted = pattern if any(sign in pattern for sign in "*?[") else f"*{pattern}*"
@@ -180,7 +180,7 @@ def choose(
 def say_page(
     what: str, items: Sequence[Item], page: int, *, line: Callable[[Item], str], n_all: int
 ) -> str:
-    """Gives a heading and a line for each item of a page.
+    """Return a heading and a line for each item of a page.
 
     Args:
         what: The items are, in the plural.
@@ -202,7 +202,7 @@ def say_page(
 
 
 def say_loss(connection: RosConnection, *, since_s: float) -> str:
-    """Says that the connection is lost, or was lost after a moment; empty where it held.
+    """Say that the connection is lost, or was lost after a moment; empty where it held.
 
     Args:
         connection: To the robot.

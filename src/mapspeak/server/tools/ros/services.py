@@ -48,7 +48,7 @@ class ServiceTools:
         self._commands = commands
 
     def tools(self) -> list[Tool]:
-        """Gives the tools in their order."""
+        """Return the tools in their order."""
         return [
             Tool(function=self.ros_services, title="List ROS services", effect=ToolEffect.READS),
             Tool(function=self.ros_service, title="One ROS service", effect=ToolEffect.READS),
@@ -61,7 +61,7 @@ class ServiceTools:
         ]
 
     async def ros_services(self, filter: Filter = None, page: Page = 1) -> str:  # noqa: A002
-        """Lists the robot's ROS services.
+        """List the robot's ROS services.
 
         Use it to find one; ros_service tells its type, fields and node; ros_call calls it.
         """
@@ -74,7 +74,7 @@ class ServiceTools:
         return "\n".join([text, *folded])
 
     async def ros_service(self, service: Service) -> str:
-        """Tells a ROS service's type, which node offers it, and the fields that it takes and gives.
+        """Tell a ROS service's type, which node offers it, and the fields that it takes and return.
 
         Use it before ros_call.
         """
@@ -88,7 +88,7 @@ class ServiceTools:
     async def ros_call(
         self, service: Service, fields: RequestFields = None, timeout_s: Timeout = 5.0
     ) -> list[str | Image]:
-        """Calls a ROS service, which may move the robot or change it, and gives its response.
+        """Call a ROS service, which may move the robot or change it, and return its response.
 
         Use ros_service first for its fields: the request is checked against its type.
         """
@@ -105,7 +105,7 @@ class ServiceTools:
     async def _show(
         self, head: str, described: Described, answer: dict[str, Any]
     ) -> list[str | Image]:
-        """Gives the response; maps and the like within it as they are shown elsewhere."""
+        """Return the response; maps and the like within it as they are shown elsewhere."""
         fields = described.book[described.part(1)].fields
         views, plain = await self._session.compute(partial(view_fields, fields, answer))
         parts: list[str] = [head]
@@ -119,7 +119,7 @@ class ServiceTools:
 
 
 def _fold(services: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Gives the services that are worth a line each, and a line for each kind of the others."""
+    """Return the services that are worth a line each, and a line for each kind of the others."""
     kinds = {name: _find_kind(name) for name in services}
     folded = [
         f'{n} more of {what}: ask with filter "{word}"'

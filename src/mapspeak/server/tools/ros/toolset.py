@@ -29,7 +29,7 @@ class RosTools:
         self._actions = ActionTools(inquiry, commands, ActionBook(inquiry, commands))
 
     def tools(self) -> list[Tool]:
-        """Gives the tools in their order."""
+        """Return the tools in their order."""
         return [
             Tool(
                 function=self._nodes.ros_overview,

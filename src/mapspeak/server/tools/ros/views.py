@@ -59,7 +59,7 @@ class PointCloud:
 
 
 def read_cloud(message: Message) -> PointCloud:
-    """Reads sensor_msgs/PointCloud2, in either byte order, rows padded or not.
+    """Read sensor_msgs/PointCloud2, in either byte order, rows padded or not.
 
     Raises:
         LinkError: It is none, or its points have no x, y and z.
@@ -167,7 +167,7 @@ class MessageView:
 
 
 def view_message(type_name: str, message: Message) -> MessageView:
-    """Gives a message of a type, named as "package/Type", for a model to read.
+    """Return a message of a type, named as "package/Type", for a model to read.
 
     What is not what its type says is shown field by field, with the reason.
     """
@@ -218,7 +218,7 @@ def _view_picture(taken: EncodedPicture, said: str) -> MessageView:
 
 
 def _fit(taken: EncodedPicture) -> tuple[bytes, str]:
-    """Gives a picture that a model takes in: neither too wide nor too heavy."""
+    """Return a picture that a model takes in: neither too wide nor too heavy."""
     edge_px = max(taken.width_px, taken.height_px)
     if edge_px <= EDGE_PX and len(taken.data) <= LARGEST_BYTES:
         return taken.data, taken.media_type
@@ -238,7 +238,7 @@ def _view_scan(message: Message) -> MessageView:
 
 
 def _say_beams(scan: LaserScan, faults: Container[str]) -> str:
-    """Gives how many beams there are and where they point, as far as that is said rightly."""
+    """Return how many beams there are and where they point, as far as that is said rightly."""
     head = f"Laser scan {_say_frame(scan.frame_id)}: {scan.ranges_m.size} beams"
     head += f", {int(np.isfinite(scan.ranges_m).sum())} met something"
     if not any(name in faults for name in RANGE_LIMITS):
