@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from benchmarks.figure import Figure
 from mapspeak.geometry import Point, Pose
-from mapspeak.semantic.episodes import (
+from mapspeak.memory.episodes import (
     EpisodeOrder,
     EpisodeQuery,
     EpisodeStore,
@@ -26,7 +26,7 @@ from mapspeak.semantic.episodes import (
     ObservationKind,
     VectorRank,
 )
-from mapspeak.semantic.retrieval.answer import Thresholds
+from mapspeak.memory.retrieval.answer import Thresholds
 
 __all__ = ["measure"]
 

@@ -30,14 +30,14 @@ from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.exploration import Explorer, Pick, take_first
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.links.simulated import SimulatedRobot
-from mapspeak.semantic import SemanticMapStore
+from mapspeak.memory import SemanticMapStore
 from mapspeak.session import Session
 from mapspeak.simulator import BODY_RADIUS_M, Simulation, TrueFloor, World, load_world
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.mapfiles import write_map
 from mapspeak.spatial.paths import clearance_m
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 __all__ = ["choose_start", "main", "measure"]
 
@@ -117,24 +117,24 @@ def choose_start(world: World, seed: int) -> World:
 # --- rules -----------------------------------------------------------------------------------
 
 
-def nearest(frontiers: Sequence[Frontier], _atlas: Atlas) -> Frontier:
+def nearest(frontiers: Sequence[Frontier], _world_model: WorldModel) -> Frontier:
     """Take the nearest by path (Yamauchi, 1997)."""
     return min(frontiers, key=lambda each: each.distance_m)
 
 
-def gain_per_metre(frontiers: Sequence[Frontier], _atlas: Atlas) -> Frontier:
+def gain_per_metre(frontiers: Sequence[Frontier], _world_model: WorldModel) -> Frontier:
     """Take the one with the most unknown in sight per metre of way."""
     return max(frontiers, key=lambda each: each.gain_m2 / (each.distance_m + 0.5))
 
 
-def near_and_long(frontiers: Sequence[Frontier], _atlas: Atlas) -> Frontier:
+def near_and_long(frontiers: Sequence[Frontier], _world_model: WorldModel) -> Frontier:
     """Take the least of three times the distance less the length, as explore_lite weighs them."""
     return min(frontiers, key=lambda each: 3 * each.distance_m - each.length_m)
 
 
-def mapspeak_ranking(frontiers: Sequence[Frontier], atlas: Atlas) -> Frontier:
+def mapspeak_ranking(frontiers: Sequence[Frontier], world_model: WorldModel) -> Frontier:
     """Take the first of the ranking."""
-    return take_first(frontiers, atlas)
+    return take_first(frontiers, world_model)
 
 
 RULES: tuple[Pick, ...] = (mapspeak_ranking, nearest, gain_per_metre, near_and_long)
@@ -256,10 +256,12 @@ async def explore(world: World, seed: int, rule: Pick, truth: Truth) -> Run:
     watcher = Watcher(simulation, truth)
     promises: list[Promise] = []
 
-    def pick(frontiers: Sequence[Frontier], atlas: Atlas) -> Frontier:
+    def pick(frontiers: Sequence[Frontier], world_model: WorldModel) -> Frontier:
         if rule is mapspeak_ranking:
-            promises.extend(_try_out(truth, atlas.grid, each) for each in frontiers[:MOST_PROMISES])
-        return rule(frontiers, atlas)
+            promises.extend(
+                _try_out(truth, world_model.grid, each) for each in frontiers[:MOST_PROMISES]
+            )
+        return rule(frontiers, world_model)
 
     robot = SimulatedRobot(simulation, has_detector=False, after_step=watcher.after_step)
     with tempfile.TemporaryDirectory() as folder:

@@ -10,12 +10,12 @@ import numpy as np
 
 from benchmarks.figure import Figure
 from mapspeak.geometry import Pose
-from mapspeak.semantic import SemanticMap
-from mapspeak.server.mapview.drawing import draw_atlas
+from mapspeak.memory import SemanticMap
+from mapspeak.server.mapview.drawing import draw_world
 from mapspeak.server.text.look import MapLook, view_of
-from mapspeak.server.text.tables import describe_atlas
+from mapspeak.server.text.tables import describe_world
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 __all__ = ["draw_building", "measure"]
 
@@ -46,17 +46,17 @@ def measure() -> Iterator[Figure]:
 def _measure_size(n_cells: int) -> Iterator[Figure]:
     times_ms: dict[str, list[float]] = {}
     for run in range(N_RUNS):
-        atlas = _look(draw_building(n_cells, seed=run), _stand(n_cells), None, times_ms, "")
-        here = atlas.robot
+        world = _look(draw_building(n_cells, seed=run), _stand(n_cells), None, times_ms, "")
+        here = world.robot
         moved = Pose(here.x + STEP_M, here.y, here.yaw_rad)
-        _look(atlas.grid, moved, atlas, times_ms, "only the pose changed, ")
+        _look(world.grid, moved, world, times_ms, "only the pose changed, ")
     for what, runs_ms in times_ms.items():
         yield Figure(
             name=f"{n_cells} x {n_cells}, {what}", value=statistics.median(runs_ms), unit="ms"
         )
-    atlas = _look(draw_building(n_cells, seed=0), _stand(n_cells), None, {}, "")
-    text = describe_atlas(view_of(atlas, MapLook()))
-    picture = draw_atlas(view_of(atlas, MapLook()))
+    world = _look(draw_building(n_cells, seed=0), _stand(n_cells), None, {}, "")
+    text = describe_world(view_of(world, MapLook()))
+    picture = draw_world(view_of(world, MapLook()))
     yield Figure(name=f"{n_cells} x {n_cells}, text", value=len(text) / 1000, unit="k characters")
     yield Figure(name=f"{n_cells} x {n_cells}, PNG", value=len(picture.png) / 1000, unit="kB")
 
@@ -64,27 +64,27 @@ def _measure_size(n_cells: int) -> Iterator[Figure]:
 def _look(
     grid: OccupancyGrid,
     robot: Pose,
-    previous: Atlas | None,
+    previous: WorldModel | None,
     times_ms: dict[str, list[float]],
     prefix: str,
-) -> Atlas:
+) -> WorldModel:
     """Look at a map as the tool does, and notes how long each part took."""
     memory = SemanticMap()
     started_s = time.process_time()
-    atlas = Atlas(grid, robot, memory, radius_m=RADIUS_M, previous=previous)
+    world = WorldModel(grid, robot, memory, radius_m=RADIUS_M, previous=previous)
     parts: dict[str, Callable[[], object]] = {
-        "rooms": lambda: atlas.rooms,
-        "distances": lambda: atlas.distances,
-        "frontiers": lambda: atlas.frontiers,
-        "tables": lambda: describe_atlas(view_of(atlas, MapLook())),
-        "picture": lambda: draw_atlas(view_of(atlas, MapLook())),
+        "rooms": lambda: world.rooms,
+        "distances": lambda: world.distances,
+        "frontiers": lambda: world.frontiers,
+        "tables": lambda: describe_world(view_of(world, MapLook())),
+        "picture": lambda: draw_world(view_of(world, MapLook())),
     }
     for name, compute in parts.items():
         part_started_s = time.process_time()
         compute()
         _note(times_ms, f"{prefix}{name}", part_started_s)
     _note(times_ms, f"{prefix}the whole look", started_s)
-    return atlas
+    return world
 
 
 def _note(times_ms: dict[str, list[float]], what: str, started_s: float) -> None:

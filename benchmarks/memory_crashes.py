@@ -28,8 +28,8 @@ import click
 from benchmarks.figure import Figure
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
-from mapspeak.semantic import SemanticMapStore, Waypoint
-from mapspeak.semantic.episodes import (
+from mapspeak.memory import SemanticMapStore, Waypoint
+from mapspeak.memory.episodes import (
     EpisodeQuery,
     EpisodeStore,
     Observation,

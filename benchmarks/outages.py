@@ -30,9 +30,9 @@ from benchmarks.figure import Figure
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import open_rosbridge_robot
+from mapspeak.memory import SemanticMapStore
 from mapspeak.robot import GoalState
 from mapspeak.ros.messages import Dialect
-from mapspeak.semantic import SemanticMapStore
 from mapspeak.session import Session
 from mapspeak.spatial import OccupancyGrid
 

@@ -21,9 +21,9 @@ from benchmarks.memory.observer import observe_from
 from benchmarks.memory.sites import Site
 from benchmarks.talking import ServerProcess
 from mapspeak.geometry import Pose
-from mapspeak.semantic import Waypoint
-from mapspeak.semantic.mapfile.editing import record_text
-from mapspeak.semantic.mapfile.schema import record_data
+from mapspeak.memory import Waypoint
+from mapspeak.memory.mapfile.editing import record_text
+from mapspeak.memory.mapfile.schema import record_data
 from mapspeak.simulator import load_world
 from mapspeak.spatial.mapfiles import MapMode, write_map
 

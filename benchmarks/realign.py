@@ -24,7 +24,7 @@ from benchmarks.exploration import build_worlds, choose_start
 from benchmarks.figure import Figure
 from benchmarks.rooms import find_labelled_maps, list_labelled_maps
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.semantic.alignment import (
+from mapspeak.memory.alignment import (
     MapRelation,
     MapSurfaces,
     compare_maps,

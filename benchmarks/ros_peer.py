@@ -26,9 +26,9 @@ from benchmarks.figure import Figure
 from benchmarks.talking import HELLO
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.links.simulated import Clock, open_simulated_robot
+from mapspeak.memory import SemanticMapStore
 from mapspeak.ros.messages import Dialect
 from mapspeak.rosbridge_server import open_rosbridge_server
-from mapspeak.semantic import SemanticMapStore
 from mapspeak.server.app import build_server
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, load_world

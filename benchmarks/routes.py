@@ -19,8 +19,8 @@ from benchmarks.relations.sites import Site, build_sites
 from benchmarks.relations.truth import Truth, away
 from mapspeak.driving.routes import RoutePlan, plan_route
 from mapspeak.geometry import Point, Pose
-from mapspeak.semantic import Landmark, SemanticMap, Waypoint
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.memory import Landmark, SemanticMap, Waypoint
+from mapspeak.worldmodel.model import WorldModel
 
 __all__ = ["measure"]
 
@@ -88,10 +88,10 @@ def _judge_site(site: Site, *, seed: int, n_wanted: int) -> Iterator[tuple[bool,
     poses, kinds = _spread(truth, generator)
     site = replace(site, memory=_remember(poses, kinds))
     ways = Ways(truth, [site.robot.point, *(pose.point for pose in poses)])
-    atlas = Atlas(site.grid, site.robot, site.memory, radius_m=site.radius_m)
+    world = WorldModel(site.grid, site.robot, site.memory, radius_m=site.radius_m)
     for case in itertools.islice(_find_cases(ways, kinds, generator), n_wanted):
         started_s = time.process_time()
-        plan = plan_route(atlas, case.stops)
+        plan = plan_route(world, case.stops)
         took_s = time.process_time() - started_s
         yield _is_right(ways, plan, case), case, took_s
 

@@ -32,6 +32,7 @@ from benchmarks.figure import Figure
 from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Point, Pose
 from mapspeak.links.simulated import SimulatedRobot
+from mapspeak.memory import SemanticMapStore
 from mapspeak.safety import (
     Approvals,
     AreaRule,
@@ -44,7 +45,6 @@ from mapspeak.safety import (
     WaitingRoom,
     read_audit,
 )
-from mapspeak.semantic import SemanticMapStore
 from mapspeak.server.app import build_server
 from mapspeak.server.toolsets import build_toolsets
 from mapspeak.session import Session

@@ -36,8 +36,8 @@ from mapspeak.driving.search import (
 )
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.links.simulated import SimulatedRobot
+from mapspeak.memory import SemanticMapStore
 from mapspeak.robot import Detection
-from mapspeak.semantic import SemanticMapStore
 from mapspeak.session import Session
 from mapspeak.simulator import (
     BODY_RADIUS_M,

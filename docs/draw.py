@@ -10,15 +10,15 @@ from pathlib import Path
 
 from benchmarks.look import draw_building
 from mapspeak.geometry import Pose
-from mapspeak.semantic import SemanticMap
-from mapspeak.server.mapview.drawing import draw_atlas
+from mapspeak.memory import SemanticMap
+from mapspeak.server.mapview.drawing import draw_world
 from mapspeak.server.text.look import MapLook, view_of
-from mapspeak.server.text.tables import describe_atlas
+from mapspeak.server.text.tables import describe_world
 from mapspeak.simulator import TrueFloor, load_world
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map
 from mapspeak.spatial.rooms import find_rooms
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 ROOT = Path(__file__).parents[1]
 PICTURES = ROOT / "docs" / "pictures"
@@ -112,11 +112,11 @@ def main() -> None:
 
 def _section(plate: Plate) -> str:
     grid = plate.build()
-    atlas = Atlas(grid, _stand(grid), SemanticMap(), radius_m=RADIUS_M)
-    view = view_of(atlas, MapLook())
-    picture = draw_atlas(view)
+    world = WorldModel(grid, _stand(grid), SemanticMap(), radius_m=RADIUS_M)
+    view = view_of(world, MapLook())
+    picture = draw_world(view)
     (PICTURES / f"{plate.name}.png").write_bytes(picture.png)
-    text = f"{describe_atlas(view)}\n\n{picture.caption}"
+    text = f"{describe_world(view)}\n\n{picture.caption}"
     return "\n".join(
         [
             f"## {plate.title}",

@@ -17,7 +17,7 @@ from typing import Any
 from mcp_types import Tool
 
 from fakes import FakeRobot, two_rooms
-from mapspeak.semantic import SemanticMapStore
+from mapspeak.memory import SemanticMapStore
 from mapspeak.server.app import build_server
 from mapspeak.server.toolsets import build_toolsets
 from mapspeak.session import Session

@@ -6,14 +6,14 @@ from datetime import UTC, datetime, timedelta
 from drawing import grid_from_text
 from guarding import corners
 from mapspeak.geometry import Point, Pose
+from mapspeak.memory import SemanticMap
+from mapspeak.memory.events import Effect, Event
 from mapspeak.places.notices import (
     close_floor_of,
     find_hindrances,
 )
-from mapspeak.semantic import SemanticMap
-from mapspeak.semantic.events import Effect, Event
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.revision import MapRevision
 
 RADIUS_M = 0.25
@@ -67,9 +67,9 @@ def revision_with(*events: Event, now: datetime = NOW) -> MapRevision:
     )
 
 
-def atlas_on(revision: MapRevision) -> Atlas:
+def world_on(revision: MapRevision) -> WorldModel:
     robot = Pose(WEST.x, WEST.y)
-    return Atlas(revision.grid, robot, SemanticMap(), radius_m=RADIUS_M, revision=revision)
+    return WorldModel(revision.grid, robot, SemanticMap(), radius_m=RADIUS_M, revision=revision)
 
 
 def goes_north(revision: MapRevision, start: Point = WEST, goal: Point = EAST) -> bool:

@@ -17,7 +17,7 @@ from itertools import count
 from pathlib import Path
 
 from mapspeak.geometry import Pose
-from mapspeak.semantic import SemanticMapStore, Waypoint
+from mapspeak.memory import SemanticMapStore, Waypoint
 
 N_EACH = 50
 N_KILLS = 12

@@ -4,8 +4,8 @@ import math
 
 from fakes import two_rooms
 from mapspeak.geometry import Point, Pose
-from mapspeak.semantic import Landmark, SemanticMap, Waypoint
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.memory import Landmark, SemanticMap, Waypoint
+from mapspeak.worldmodel.model import WorldModel
 
 LADDER = Point(0.3, 2.4)
 """At the west wall of the west room, R2."""
@@ -40,9 +40,9 @@ def looks_at(label: str, point: Point) -> tuple[Waypoint, ...]:
     return (look("east a", 4.5, 0.6, (label, point)), look("east b", 5.5, 2.2, (label, point)))
 
 
-def atlas_of(*waypoints: Waypoint, previous: Atlas | None = None) -> Atlas:
+def world_of(*waypoints: Waypoint, previous: WorldModel | None = None) -> WorldModel:
     """The two rooms with that memory."""
-    return Atlas(
+    return WorldModel(
         two_rooms() if previous is None else previous.grid,
         ROBOT,
         SemanticMap(waypoints=waypoints),

@@ -5,8 +5,8 @@ from pathlib import Path
 from drawing import grid_from_text
 from mapspeak.geometry import Pose
 from mapspeak.links.simulated import SimulatedRobot
+from mapspeak.memory import SemanticMapStore
 from mapspeak.robot import GoalState, GoalStatus
-from mapspeak.semantic import SemanticMapStore
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, World
 from mapspeak.simulator.worlds.mapworld import build_map_world

@@ -12,11 +12,11 @@ from mcp.client import Client
 from bridging import SteppedRobot
 from fakes import FakeRobot, two_rooms
 from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, Timing, open_client
+from mapspeak.memory import SemanticMapStore
 from mapspeak.ros import RosConnection
 from mapspeak.ros.messages import Dialect
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.safety import Guard
-from mapspeak.semantic import SemanticMapStore
 from mapspeak.server.app import build_server
 from mapspeak.session import Session
 from rosbridge_robot import ScriptedRobot

@@ -9,9 +9,9 @@ from mcp.client import Client
 from mcp.client.session import ElicitationFnT
 from mcp_types import CallToolResult, ImageContent, TextContent
 
+from mapspeak.memory import SemanticMapStore
 from mapspeak.robot import Robot
 from mapspeak.safety import Guard
-from mapspeak.semantic import SemanticMapStore
 from mapspeak.server.app import DEFAULT_TOOLSETS, build_server
 from mapspeak.server.calllog import CallLog
 from mapspeak.server.mapview.representations import Representation

@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta, timezone
 from hypothesis import strategies as st
 
 from mapspeak.geometry import Pose
-from mapspeak.semantic import Confidence, Landmark, LaserFan, Waypoint
+from mapspeak.memory import Confidence, Landmark, LaserFan, Waypoint
 
 # One on each line: what YAML, or a reader of lines, might take for something else.
 _TRICKY_TEXTS = """\

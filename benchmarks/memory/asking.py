@@ -5,14 +5,14 @@ from dataclasses import dataclass
 
 from benchmarks.memory.sites import RADIUS_M, Site
 from mapspeak.geometry import Pose
+from mapspeak.memory import SemanticMap
+from mapspeak.memory.retrieval import Embedder
 from mapspeak.places.recall import RecallQuery, recall
 from mapspeak.places.recall.answer import Recall
-from mapspeak.semantic import SemanticMap
-from mapspeak.semantic.retrieval import Embedder
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import Recollector
 
-__all__ = ["FindModel", "Request", "ask", "list_requests", "open_atlas"]
+__all__ = ["FindModel", "Request", "ask", "list_requests", "open_world"]
 
 FindModel = Callable[[], Embedder | None]
 
@@ -35,7 +35,7 @@ class Request:
         return self.label if self.room_id is None else f"{self.label} in {self.room_id}"
 
 
-def open_atlas(site: Site, places: SemanticMap, find_model: FindModel) -> Atlas:
+def open_world(site: Site, places: SemanticMap, find_model: FindModel) -> WorldModel:
     """Return what the robot knows at its start: map and records, nothing that is true.
 
     Args:
@@ -44,7 +44,7 @@ def open_atlas(site: Site, places: SemanticMap, find_model: FindModel) -> Atlas:
         find_model: Gives what compares meanings, or None.
     """
     start = Pose(0.0, 0.0, 0.0)
-    return Atlas(
+    return WorldModel(
         site.grid,
         start,
         places,
@@ -66,6 +66,6 @@ def list_requests(site: Site) -> Iterator[tuple[int, Request]]:
             yield number, Request(label=truth.label, room_id=room_id)
 
 
-def ask(atlas: Atlas, request: Request) -> Recall:
+def ask(world: WorldModel, request: Request) -> Recall:
     """Return the answer of the memory."""
-    return recall(atlas, RecallQuery(words=request.words))
+    return recall(world, RecallQuery(words=request.words))

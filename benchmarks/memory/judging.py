@@ -12,11 +12,11 @@ from benchmarks.memory.observer import Memory
 from benchmarks.memory.places import truth_of
 from benchmarks.memory.sites import Site, TrueThing
 from mapspeak.geometry import wrap_angle
+from mapspeak.memory.retrieval import EntryKind, Verdict
 from mapspeak.places.goalcheck import judge_goal
 from mapspeak.places.recall import SURE_RATIO, RecallCandidate
 from mapspeak.places.recall.answer import Recall
-from mapspeak.semantic.retrieval import EntryKind, Verdict
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 __all__ = ["Facing", "Fault", "Judged", "Outcome", "choose", "judge_all"]
 
@@ -88,10 +88,10 @@ class Judged:
         return is_found and first[0].trust.ratio < SURE_RATIO
 
 
-def judge_all(site: Site, memory: Memory, atlas: Atlas) -> Iterator[Judged]:
+def judge_all(site: Site, memory: Memory, world: WorldModel) -> Iterator[Judged]:
     """Ask for everything in a building and judges the answers."""
     for number, request in list_requests(site):
-        answer = ask(atlas, request)
+        answer = ask(world, request)
         meant = [_meant(site, request, each) for each in answer.candidates]
         facing = fault = None
         outcome = Outcome.HONEST
@@ -99,9 +99,9 @@ def judge_all(site: Site, memory: Memory, atlas: Atlas) -> Iterator[Judged]:
             first, truth = answer.candidates[0], meant[0]
             outcome = Outcome.WRONG if truth is None else Outcome.RIGHT
             if truth is None:
-                fault = _find_fault(site, memory, atlas, request, first)
+                fault = _find_fault(site, memory, world, request, first)
             else:
-                facing = _judge_goal(site, atlas, truth, first)
+                facing = _judge_goal(site, world, truth, first)
         yield Judged(
             site=site.name,
             request=request,
@@ -139,12 +139,12 @@ def _asked_for(site: Site, request: Request) -> list[TrueThing]:
     ]
 
 
-def _judge_goal(site: Site, atlas: Atlas, truth: TrueThing, found: RecallCandidate) -> Facing:
+def _judge_goal(site: Site, world: WorldModel, truth: TrueThing, found: RecallCandidate) -> Facing:
     pose = found.pose
     off_rad = abs(wrap_angle(pose.point.bearing_to(truth.point) - pose.yaw_rad))
     # A large thing is faced when any part of it is ahead.
     half_rad = math.atan2(HALF_WIDTH_M, max(pose.point.distance_to(truth.point), 1e-6))
-    if not judge_goal(site.grid, atlas.distances, pose).is_ok:
+    if not judge_goal(site.grid, world.distances, pose).is_ok:
         return Facing.NO_DRIVE
     if truth.distance_to(pose.point) > NEAR_M:
         return Facing.FAR if found.is_faced else Facing.SEEN_FROM
@@ -154,9 +154,9 @@ def _judge_goal(site: Site, atlas: Atlas, truth: TrueThing, found: RecallCandida
 
 
 def _find_fault(
-    site: Site, memory: Memory, atlas: Atlas, request: Request, found: RecallCandidate
+    site: Site, memory: Memory, world: WorldModel, request: Request, found: RecallCandidate
 ) -> Fault:
-    remembered = atlas.recollection.find_thing(found.id)
+    remembered = world.recollection.find_thing(found.id)
     if remembered is None:
         return Fault.NO_THING
     if found.name != request.label:

@@ -4,7 +4,7 @@ import numpy as np
 
 from benchmarks.memory.sites import Site
 from mapspeak.geometry import Pose, wrap_angle
-from mapspeak.semantic import LaserRing, build_ring
+from mapspeak.memory import LaserRing, build_ring
 from mapspeak.simulator import BEAM_ANGLES_RAD
 from mapspeak.simulator.robot.lidar import MAX_RANGE_M, NOISE_M, measure_ranges
 from mapspeak.simulator.worlds.slices import slice_world

@@ -13,14 +13,14 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.figure import Figure
-from benchmarks.memory.asking import FindModel, open_atlas
+from benchmarks.memory.asking import FindModel, open_world
 from benchmarks.memory.judging import Facing, Fault, Judged, Outcome, choose, judge_all
 from benchmarks.memory.lasers import Laser
 from benchmarks.memory.observer import observe
 from benchmarks.memory.places import PlaceError, measure_places
 from benchmarks.memory.sites import Site, build_drawn, build_held_out, build_sites, build_worn
 from mapspeak.evaluation.scores import wilson_interval
-from mapspeak.semantic.retrieval import Embedder, find_model
+from mapspeak.memory.retrieval import Embedder, find_model
 
 __all__ = ["main", "measure"]
 
@@ -76,14 +76,14 @@ class Trial:
     ) -> None:
         laser = None if band_m is None else Laser(site, band_m=band_m, seed=seed)
         memory = observe(site, seed=seed, has_ranges=has_ranges, laser=laser)
-        atlases = {way: open_atlas(site, memory.places, WAYS[way]) for way in ways}
+        worlds = {way: open_world(site, memory.places, WAYS[way]) for way in ways}
         started_s = time.process_time()
-        found = atlases[ways[0]].recollection.found
+        found = worlds[ways[0]].recollection.found
         self.took_s = time.process_time() - started_s
         self.site = site
         self.n_waypoints = len(memory.places.waypoints)
         self.errors = list(measure_places(site, memory, found))
-        self.judged = {way: list(judge_all(site, memory, atlas)) for way, atlas in atlases.items()}
+        self.judged = {way: list(judge_all(site, memory, world)) for way, world in worlds.items()}
 
 
 def measure() -> Iterator[Figure]:

@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.memory.lasers import Laser
 from benchmarks.memory.sites import Site, TrueThing
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.semantic import Landmark, LaserRing, SemanticMap, Waypoint
+from mapspeak.memory import Landmark, LaserRing, SemanticMap, Waypoint
 
 __all__ = ["Memory", "observe", "observe_from"]
 

@@ -10,8 +10,8 @@ import numpy as np
 from benchmarks.memory.observer import Memory, views_of
 from benchmarks.memory.sites import Site, TrueThing
 from mapspeak.geometry import Point
-from mapspeak.semantic import Landmark, Waypoint
-from mapspeak.semantic.things import SightMap, Thing, Things
+from mapspeak.memory import Landmark, Waypoint
+from mapspeak.memory.things import SightMap, Thing, Things
 
 __all__ = ["PlaceError", "measure_places", "truth_of"]
 

@@ -11,7 +11,7 @@ from benchmarks.relations.roomgoals import build_room_goals
 from benchmarks.relations.sites import TrueDoor, TrueRoom
 from benchmarks.relations.truth import Fit, Fitting, Places, Truth, angle_off, away, bearing
 from mapspeak.geometry import Point, Pose
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 __all__ = ["build_goals"]
 
@@ -21,38 +21,38 @@ SIDES = {"left of": math.pi / 2, "right of": -math.pi / 2, "in front of": 0.0, "
 SIDEWAYS = ("left of", "right of")
 
 
-def build_goals(truth: Truth, atlas: Atlas) -> Iterator[Goal]:
-    """Return the goals of a site, under the ids that the atlas gives its rooms and doors."""
-    rooms = dict(_name_rooms(truth, atlas))
-    doors = dict(_name_doors(truth, atlas))
-    places = [(each.id, each.waypoint.pose) for each in atlas.places]
+def build_goals(truth: Truth, world: WorldModel) -> Iterator[Goal]:
+    """Return the goals of a site, under the ids that the world model gives its rooms and doors."""
+    rooms = dict(_name_rooms(truth, world))
+    doors = dict(_name_doors(truth, world))
+    places = [(each.id, each.waypoint.pose) for each in world.places]
     yield from _sides(truth, places)
     yield from _rings(truth, places)
     yield from _pairs(truth, places)
     yield from _views(truth, places)
     yield from _doors(truth, doors)
     yield from build_room_goals(truth, rooms)
-    yield from _nearest(truth, doors, places, n_doors_found=len(atlas.rooms.doors))
+    yield from _nearest(truth, doors, places, n_doors_found=len(world.rooms.doors))
     yield from _chains(truth, rooms, places)
     yield from _questions(rooms, places)
 
 
-def _name_rooms(truth: Truth, atlas: Atlas) -> Iterator[tuple[str, TrueRoom]]:
+def _name_rooms(truth: Truth, world: WorldModel) -> Iterator[tuple[str, TrueRoom]]:
     """Return the rooms that the division of the map found as they are: ids name its rooms."""
-    rows, cols = np.nonzero(atlas.rooms.labels)
+    rows, cols = np.nonzero(world.rooms.labels)
     points = truth.site.grid.points_at(rows, cols)
-    labels = atlas.rooms.labels[rows, cols]
+    labels = world.rooms.labels[rows, cols]
     for room in truth.site.rooms:
         inside = truth.in_room(room, points)
-        for region in atlas.rooms.regions:
+        for region in world.rooms.regions:
             both = float((inside & (labels == region.index)).sum())
             if both > SAME_RATIO * max(float(inside.sum()), float((labels == region.index).sum())):
                 yield region.id, room
 
 
-def _name_doors(truth: Truth, atlas: Atlas) -> Iterator[tuple[str, TrueDoor]]:
+def _name_doors(truth: Truth, world: WorldModel) -> Iterator[tuple[str, TrueDoor]]:
     for door in truth.site.doors:
-        near = [each for each in atlas.rooms.doors if each.place.distance_to(door.place) < 0.4]
+        near = [each for each in world.rooms.doors if each.place.distance_to(door.place) < 0.4]
         if len(near) == 1 and abs(near[0].width_m - door.width_m) < 0.3:
             yield near[0].id, door
 

@@ -17,10 +17,10 @@ from benchmarks.relations.goals import build_goals
 from benchmarks.relations.sites import Site, build_sites
 from benchmarks.relations.truth import Truth, angle_off
 from mapspeak.errors import GoalError
+from mapspeak.memory import SemanticMap
 from mapspeak.places.choosing import CheckedGoal, check_place, find_place
 from mapspeak.places.naming import Place
-from mapspeak.semantic import SemanticMap
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 __all__ = ["main", "measure"]
 
@@ -80,31 +80,31 @@ def judge_all() -> Iterator[Verdict]:
     cv2.setNumThreads(1)
     for site in build_sites():
         truth = Truth(site)
-        atlas = _look(site, site.memory)
-        for goal in build_goals(truth, atlas):
-            asked = _look_at_twins(site) if goal.expected is Expected.ASKED else atlas
+        world = _look(site, site.memory)
+        for goal in build_goals(truth, world):
+            asked = _look_at_twins(site) if goal.expected is Expected.ASKED else world
             yield _judge(truth, asked, goal)
 
 
-def _look(site: Site, memory: SemanticMap) -> Atlas:
-    atlas = Atlas(site.grid, site.robot, memory, radius_m=site.radius_m)
-    _ = atlas.rooms, atlas.distances, atlas.frontiers
-    return atlas
+def _look(site: Site, memory: SemanticMap) -> WorldModel:
+    world = WorldModel(site.grid, site.robot, memory, radius_m=site.radius_m)
+    _ = world.rooms, world.distances, world.frontiers
+    return world
 
 
-def _look_at_twins(site: Site) -> Atlas:
+def _look_at_twins(site: Site) -> WorldModel:
     """Return the site with its last two remembered places under one name."""
     waypoints = site.memory.waypoints
     twins = (replace(each, name="twin") for each in waypoints[-2:])
     return _look(site, SemanticMap(waypoints=(*waypoints[:-2], *twins)))
 
 
-def _judge(truth: Truth, atlas: Atlas, goal: Goal) -> Verdict:
+def _judge(truth: Truth, world: WorldModel, goal: Goal) -> Verdict:
     started_s = time.process_time()
     answer: tuple[Place, CheckedGoal] | GoalError
     try:
-        place = find_place(atlas, goal.words)
-        answer = place, check_place(atlas, place)
+        place = find_place(world, goal.words)
+        answer = place, check_place(world, place)
     except GoalError as error:
         answer = error
     took_ms = 1e3 * (time.process_time() - started_s)

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.semantic import Landmark, SemanticMap, Waypoint
+from mapspeak.memory import Landmark, SemanticMap, Waypoint
 from mapspeak.simulator.truth import TrueFloor
 from mapspeak.simulator.worlds.worldfiles import load_world
 from mapspeak.spatial import OccupancyGrid

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from ruamel.yaml import YAML
 
-from mapspeak.semantic import SemanticMap
-from mapspeak.semantic.mapfile import parse_document
-from mapspeak.semantic.retrieval import Entry, EntryKind, list_entries
+from mapspeak.memory import SemanticMap
+from mapspeak.memory.mapfile import parse_document
+from mapspeak.memory.retrieval import Entry, EntryKind, list_entries
 
 __all__ = ["HELD_OUT", "NOTHING", "TUNING", "Request", "read_maps", "read_requests", "things_of"]
 

@@ -1,4 +1,4 @@
-"""The one stateful object: a robot, its latest atlas, its memory, its drives, its clients."""
+"""The one stateful object: a robot, its latest world model, its memory, its drives, its clients."""
 
 import logging
 import threading
@@ -18,13 +18,9 @@ from mapspeak.driving.drive import DriveBook
 from mapspeak.driving.stops import Lease
 from mapspeak.errors import LinkError, MapError, MapspeakError, SemanticMapError
 from mapspeak.geometry import Point
-from mapspeak.places.choosing import CheckedGoal, choose_goal
-from mapspeak.robot import CameraPicture, Robot
-from mapspeak.ros import RosConnection, started_over
-from mapspeak.safety import Guard, GuardedConnection, GuardedRobot, Surveyor, WhenBusy
-from mapspeak.semantic import PictureBook, SemanticMap, SemanticMapStore
-from mapspeak.semantic.alignment import MapComparison, MapKeeper, MapRelation, say_comparison
-from mapspeak.semantic.episodes import (
+from mapspeak.memory import PictureBook, SemanticMap, SemanticMapStore
+from mapspeak.memory.alignment import MapComparison, MapKeeper, MapRelation, say_comparison
+from mapspeak.memory.episodes import (
     EpisodePage,
     EpisodeQuery,
     EpisodeStore,
@@ -32,10 +28,14 @@ from mapspeak.semantic.episodes import (
     memory_folder,
     named_pictures,
 )
-from mapspeak.semantic.events import Event
-from mapspeak.semantic.retrieval import Embedder, find_model
+from mapspeak.memory.events import Event
+from mapspeak.memory.retrieval import Embedder, find_model
+from mapspeak.places.choosing import CheckedGoal, choose_goal
+from mapspeak.robot import CameraPicture, Robot
+from mapspeak.ros import RosConnection, started_over
+from mapspeak.safety import Guard, GuardedConnection, GuardedRobot, Surveyor, WhenBusy
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import Recollector
 from mapspeak.worldmodel.revision import MapRevision
 
@@ -119,7 +119,7 @@ class Session:
         self.recollector = Recollector(find_model, kept=folder / "vectors.npz")
         self.drives = DriveBook(self.robot, when_busy=when_busy)
         self._lease = Lease(lease_s)
-        self._atlas: Atlas | None = None
+        self._world: WorldModel | None = None
         self._looked_s = 0.0
         self._learned_from = ""
         self._surveying = anyio.Lock()
@@ -145,7 +145,7 @@ class Session:
         """Do heavy work in a thread, so that a stop is answered meanwhile."""
         return await anyio.to_thread.run_sync(work)
 
-    async def fetch_atlas(self, *, needs_memory: bool = False) -> Atlas:
+    async def fetch_world_model(self, *, needs_memory: bool = False) -> WorldModel:
         """Return the map as it is now, with everything on it under its id.
 
         Args:
@@ -168,19 +168,19 @@ class Session:
             revision, warnings = await self._survey(grid)
             if revision is not None and await self._learn(revision):
                 revision, warnings = await self._survey(grid)
-            self._atlas = Atlas(
+            self._world = WorldModel(
                 grid,
                 stamped.pose,
                 replace(memory, warnings=(*memory.warnings, *warnings)),
                 radius_m=self.robot.description.radius_m,
                 looked_from=self.drives.frontiers_tried,
-                previous=self._atlas,
+                previous=self._world,
                 revision=revision,
                 recollector=self.recollector,
                 pose_doubt=stamped.find_doubt(self.robot.now_s),
             )
             self._looked_s = self.robot.now_s
-            return self._atlas
+            return self._world
 
     async def find_room_id(self, point: Point) -> str | None:
         """Return the room a point lies in, on the map that was looked at last.
@@ -190,11 +190,11 @@ class Session:
         Raises:
             LinkError: The robot has no map yet.
         """
-        atlas = self._atlas
-        if atlas is None or self.robot.now_s < self._looked_s:
+        world = self._world
+        if world is None or self.robot.now_s < self._looked_s:
             # A simulation that was begun anew may show another world.
-            atlas = await self.fetch_atlas()
-        return await self.compute(lambda: atlas.find_room_id(point))
+            world = await self.fetch_world_model()
+        return await self.compute(lambda: world.find_room_id(point))
 
     async def keep_picture(self, picture: CameraPicture, *, labels: tuple[str, ...]) -> Keeping:
         """Keep a picture as an episode, with what the robot's detector reports in it."""
@@ -243,9 +243,9 @@ class Session:
             if self.diary.is_kept:
                 await in_thread(self.keeper.finish_move)
             await in_thread(lambda: self.recollector.warm(self.memory.read()))
-            atlas = await self.fetch_atlas()
+            world = await self.fetch_world_model()
             # All of it in the thread: what is remembered is joined with the map there.
-            await in_thread(partial(_prepare, atlas))
+            await in_thread(partial(_prepare, world))
             if self.recollector.embedder is not None:
                 await in_thread(partial(self.find_episodes, ANY_EPISODE))
 
@@ -277,9 +277,9 @@ class Session:
             GoalError: Neither or both were given, or the robot cannot drive there; the hint names
                 the nearest pose that would work.
         """
-        atlas = await self.fetch_atlas()
+        world = await self.fetch_world_model()
         return await self.compute(
-            lambda: choose_goal(atlas, place=place, x=x, y=y, yaw_deg=yaw_deg)
+            lambda: choose_goal(world, place=place, x=x, y=y, yaw_deg=yaw_deg)
         )
 
     async def _survey(self, grid: OccupancyGrid) -> tuple[MapRevision | None, tuple[str, ...]]:
@@ -378,10 +378,10 @@ class Session:
                 await self.drives.stop("The server ended.")
 
 
-def _prepare(atlas: Atlas) -> None:
+def _prepare(world: WorldModel) -> None:
     """Make what the first question would: things, their index, what speaks against them."""
-    atlas.recollection.prepare()
-    _ = atlas.judge
+    world.recollection.prepare()
+    _ = world.judge
 
 
 def _said_of(compare: Callable[[OccupancyGrid], MapComparison | None], grid: OccupancyGrid) -> str:

@@ -14,8 +14,8 @@ from guarding import make_guard
 from mapspeak.cli.examining import find_servers
 from mapspeak.cli.guarding import control_folder
 from mapspeak.cli.robots import RobotChoice
+from mapspeak.memory import SemanticMapStore
 from mapspeak.safety import Hold
-from mapspeak.semantic import SemanticMapStore
 from mapspeak.session import Session
 from rosbridge_robot import ScriptedRobot
 from rosserved import on_script

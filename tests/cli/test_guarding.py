@@ -8,8 +8,8 @@ from fakes import two_rooms
 from mapspeak.cli import main
 from mapspeak.cli.guarding import GuardChoice, build_guard
 from mapspeak.geometry import Pose
+from mapspeak.memory import SemanticMapStore, Waypoint
 from mapspeak.safety import Policy
-from mapspeak.semantic import SemanticMapStore, Waypoint
 from mapspeak.spatial.mapfiles import write_map
 
 

@@ -14,8 +14,8 @@ from fakes import FakeRobot, two_rooms
 from guarding import make_guard
 from mapspeak.cli.keys import HELP, StopKeys, stop_keys
 from mapspeak.geometry import Pose
+from mapspeak.memory import SemanticMapStore
 from mapspeak.safety import Hold
-from mapspeak.semantic import SemanticMapStore
 from mapspeak.session import Session
 
 WITHIN_S = 60.0

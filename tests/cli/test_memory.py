@@ -9,8 +9,8 @@ from click.testing import CliRunner, Result
 from drawing import grid_from_text
 from mapspeak.cli import cli, main
 from mapspeak.geometry import Pose
-from mapspeak.semantic import Landmark, SemanticMapStore, Waypoint
-from mapspeak.semantic.episodes import (
+from mapspeak.memory import Landmark, SemanticMapStore, Waypoint
+from mapspeak.memory.episodes import (
     EpisodeQuery,
     EpisodeStore,
     Observation,

@@ -19,7 +19,7 @@ from fakes import FakeRobot, two_rooms
 from mapspeak.cli import cli
 from mapspeak.cli.episodes import rename_memory
 from mapspeak.geometry import Pose
-from mapspeak.semantic import SemanticMapStore, Waypoint
+from mapspeak.memory import SemanticMapStore, Waypoint
 from mapspeak.server.app import DEFAULT_TOOLSETS
 from mapspeak.server.toolsets import build_toolsets
 from mapspeak.session import Session

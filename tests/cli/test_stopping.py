@@ -15,7 +15,7 @@ from mapspeak.cli import cli
 from mapspeak.cli.operating import hold_robots
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
-from mapspeak.semantic import SemanticMapStore
+from mapspeak.memory import SemanticMapStore
 from mapspeak.session import Session
 
 

@@ -8,9 +8,9 @@ from mapspeak.driving.drive import DriveBook
 from mapspeak.driving.drivereport import Drive
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose
+from mapspeak.memory import SemanticMapStore
 from mapspeak.robot import GoalState, GoalStatus
 from mapspeak.safety import WhenBusy
-from mapspeak.semantic import SemanticMapStore
 from mapspeak.session import Session
 
 pytestmark = pytest.mark.anyio

@@ -12,10 +12,10 @@ from guarding import WallClock, corners, make_guard
 from mapspeak.driving.doorlearning import learn_from_drive
 from mapspeak.driving.drivereport import Drive
 from mapspeak.geometry import Point, Pose
+from mapspeak.memory import SemanticMapStore
+from mapspeak.memory.events import ROBOT, Effect, Event, current_events
 from mapspeak.robot import GoalState, GoalStatus
 from mapspeak.safety import Policy
-from mapspeak.semantic import SemanticMapStore
-from mapspeak.semantic.events import ROBOT, Effect, Event, current_events
 from mapspeak.session import Session
 
 pytestmark = pytest.mark.anyio
@@ -208,7 +208,7 @@ async def test_the_next_look_at_the_map_tells_of_the_door_that_was_shut(tmp_path
     session = Session(
         robot, store, lease_s=60.0, guard=make_guard(tmp_path, Policy(), clock=WallClock(NOW))
     )
-    await session.fetch_atlas()
+    await session.fetch_world_model()
     with session.drives.preparing() as ticket:
         drive = await session.drives.start(Pose(EAST.x, EAST.y), place="R2", ticket=ticket)
     robot.pose = Pose(BEFORE_NORTH_DOOR.x, BEFORE_NORTH_DOOR.y)
@@ -216,9 +216,9 @@ async def test_the_next_look_at_the_map_tells_of_the_door_that_was_shut(tmp_path
     robot.ended[drive.robot_goal_id] = GoalStatus(state=GoalState.BLOCKED)
     await session.drives.report()
 
-    atlas = await session.fetch_atlas()
-    again = await session.fetch_atlas()
+    world = await session.fetch_world_model()
+    again = await session.fetch_world_model()
 
-    assert any(f'said by "{ROBOT}"' in each for each in atlas.warnings)
+    assert any(f'said by "{ROBOT}"' in each for each in world.warnings)
     assert len(store.read_events()) == 1
-    assert again.map is atlas.map
+    assert again.map is world.map

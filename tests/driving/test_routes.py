@@ -9,8 +9,8 @@ from drawing import grid_from_text
 from mapspeak.driving.routes import RoutePlan, find_candidates, plan_route
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point, Pose
-from mapspeak.semantic import Landmark, SemanticMap, Waypoint
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.memory import Landmark, SemanticMap, Waypoint
+from mapspeak.worldmodel.model import WorldModel
 
 CORRIDOR = """
 ############################################
@@ -33,10 +33,10 @@ EAST = _place("east end", 7.0, "extinguisher")
 EXIT = _place("way out", 10.0, "exit sign")
 
 
-def _atlas(*waypoints: Waypoint, text: str = CORRIDOR) -> Atlas:
+def _world(*waypoints: Waypoint, text: str = CORRIDOR) -> WorldModel:
     grid = grid_from_text(text, resolution_m=0.25)
     memory = SemanticMap(waypoints=waypoints or (WEST, EAST, EXIT))
-    return Atlas(grid, ROBOT, memory, radius_m=0.2)
+    return WorldModel(grid, ROBOT, memory, radius_m=0.2)
 
 
 def _names(plan: RoutePlan) -> list[str]:
@@ -44,7 +44,7 @@ def _names(plan: RoutePlan) -> list[str]:
 
 
 def test_words_that_fit_several_places_are_taken_where_the_whole_route_is_shortest() -> None:
-    plan = plan_route(_atlas(), ["extinguisher", "exit sign"])
+    plan = plan_route(_world(), ["extinguisher", "exit sign"])
     assert _names(plan) == ["T2", "exit sign"]
     assert plan.n_candidates == (2, 1)
     assert plan.total_m == pytest.approx(5.0, abs=0.3)
@@ -52,26 +52,26 @@ def test_words_that_fit_several_places_are_taken_where_the_whole_route_is_shorte
 
 
 def test_the_legs_are_path_lengths_from_the_robot_on() -> None:
-    plan = plan_route(_atlas(), ["W1", "west end", "9.0, 0.7", "0.5 m west of W3"])
+    plan = plan_route(_world(), ["W1", "west end", "9.0, 0.7", "0.5 m west of W3"])
     assert plan.legs_m == pytest.approx((1.0, 0.0, 5.0, 0.6), abs=0.3)
     assert plan.greedy_m == pytest.approx(plan.total_m)
 
 
 def test_a_name_that_two_places_have_is_a_choice_on_a_route() -> None:
     twins = (_place("bin", 2.0), _place("Bin", 7.0), EXIT)
-    assert _names(plan_route(_atlas(*twins), ["bin", "W3"])) == ["W2", "W3"]
+    assert _names(plan_route(_world(*twins), ["bin", "W3"])) == ["W2", "W3"]
 
 
 def test_a_relation_to_an_ambiguous_thing_is_a_choice_too() -> None:
     chairs = [Landmark(label="chair", bearing_rad=0.0, range_m=range_m) for range_m in (0.5, 5.5)]
     seen = Waypoint(name="hall", pose=Pose(2.5, 0.7), functional_landmarks=tuple(chairs))
-    plan = plan_route(_atlas(seen, EXIT), ["next to the chair", "W2"])
+    plan = plan_route(_world(seen, EXIT), ["next to the chair", "W2"])
     assert plan.n_candidates[0] == 2
     assert plan.chosen[0].pose.x > 6.0
 
 
 def test_the_nearest_of_a_kind_is_the_nearest_on_the_route() -> None:
-    plan = plan_route(_atlas(), ["nearest remembered place", "W3"])
+    plan = plan_route(_world(), ["nearest remembered place", "W3"])
     assert plan.n_candidates == (3, 1)
     assert plan.total_m == pytest.approx(5.0, abs=0.3)
 
@@ -88,13 +88,13 @@ def test_the_nearest_of_a_kind_is_the_nearest_on_the_route() -> None:
 )
 def test_a_route_that_makes_no_sense_is_refused_with_the_stop(stops: list[str], says: str) -> None:
     with pytest.raises(GoalError, match=says):
-        plan_route(_atlas(), stops)
+        plan_route(_world(), stops)
 
 
 def test_a_meaning_that_cannot_be_reached_is_no_candidate() -> None:
     walled = CORRIDOR.replace("........#\n", "..#.....#\n")
-    atlas = _atlas(WEST, _place("closet", 10.4, "extinguisher"), text=walled)
-    assert [each.name for each in find_candidates(atlas, "extinguisher")] == ["T2"]
+    world = _world(WEST, _place("closet", 10.4, "extinguisher"), text=walled)
+    assert [each.name for each in find_candidates(world, "extinguisher")] == ["T2"]
 
 
 @settings(max_examples=25, deadline=None)
@@ -110,8 +110,8 @@ def test_no_choice_of_places_is_shorter_than_the_one_that_was_planned(
     waypoints = [
         _place(f"p{n}", x, f"{kind}-thing") for n, (kind, x) in enumerate([*places, *EACH])
     ]
-    atlas = _atlas(*waypoints)
-    plan = plan_route(atlas, [f"{kind}-thing" for kind in wanted])
+    world = _world(*waypoints)
+    plan = plan_route(world, [f"{kind}-thing" for kind in wanted])
     kinds = [place[0] for place in [*places, *EACH]]
     choices = [
         [each.pose.point for each, name in zip(waypoints, kinds, strict=True) if name == kind]

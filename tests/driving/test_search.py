@@ -22,8 +22,8 @@ from mapspeak.driving.search import (
 from mapspeak.driving.search.candidates import find_candidates
 from mapspeak.driving.search.evidence import weight_of
 from mapspeak.geometry import Point, Pose
+from mapspeak.memory import Landmark, SemanticMapStore, Waypoint
 from mapspeak.robot import Detection
-from mapspeak.semantic import Landmark, SemanticMapStore, Waypoint
 from mapspeak.session import Session
 from mapspeak.simulator import World, load_world
 from roaming import RoamingRobot, session_of
@@ -180,9 +180,9 @@ async def test_what_only_resembles_the_thing_makes_its_surroundings_likelier(
     session = Session(RoamingRobot(flat), memory, lease_s=60.0, find_model=ConceptEmbedder)
     for name, x in (("sink ladder", 6.5), ("cooler shelf", 6.0)):
         session.memory.write(Waypoint(name=name, pose=Pose(x, 2.5)))
-    atlas = await session.fetch_atlas()
+    world_model = await session.fetch_world_model()
     found = find_candidates(
-        atlas, "wash", seen=SeenFloor(), opinions=Opinions(), visited=frozenset()
+        world_model, "wash", seen=SeenFloor(), opinions=Opinions(), visited=frozenset()
     )
     assert CandidateKind.REMEMBERED not in {each.kind for each in found}
     assert max(each.score for each in found) == 0.8
@@ -197,17 +197,17 @@ async def test_a_session_that_was_warmed_embeds_nothing_but_the_first_question(
     memory.write(Waypoint(name="sink ladder", pose=Pose(6.5, 2.5)))
     await session.warm_memory()
     n_before = len(embedder.asked)
-    atlas = await session.fetch_atlas()
-    atlas.recollection.find("thirsty")
+    world_model = await session.fetch_world_model()
+    world_model.recollection.find("thirsty")
     assert embedder.asked[n_before:] == ["thirsty"]
 
 
 async def test_the_models_scores_lead_the_search(tmp_path: Path, flat: World) -> None:
-    atlas = await session_of(RoamingRobot(flat), tmp_path).fetch_atlas()
+    world_model = await session_of(RoamingRobot(flat), tmp_path).fetch_world_model()
 
     def frontiers_by(opinions: Opinions) -> list[str]:
         found = find_candidates(
-            atlas, "fridge", seen=SeenFloor(), opinions=opinions, visited=frozenset()
+            world_model, "fridge", seen=SeenFloor(), opinions=opinions, visited=frozenset()
         )
         return [each.id for each in found if each.kind is CandidateKind.FRONTIER]
 

@@ -15,10 +15,10 @@ from mcp_types import CallToolResult, ImageContent
 from PIL import Image
 
 from guarding import audit_of, make_guard
+from mapspeak.memory import SemanticMapStore
 from mapspeak.robot import Robot
 from mapspeak.ros import RosConnection
 from mapspeak.safety import Policy
-from mapspeak.semantic import SemanticMapStore
 from mapspeak.server.app import build_server
 from mapspeak.session import Session
 from served import pictures_of, text_of

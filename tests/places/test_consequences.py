@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from closing import EAST, LATER, NOW, RADIUS_M, WEST, atlas_on, event, office, revision_with
+from closing import EAST, LATER, NOW, RADIUS_M, WEST, event, office, revision_with, world_on
 from fakes import FakeRobot
 from guarding import WallClock, corners, make_guard, rectangle
 from mapspeak.driving.exploration import Bounds, ExplorationState, Progress
@@ -17,6 +17,8 @@ from mapspeak.driving.exploration.progress import (
 )
 from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Pose
+from mapspeak.memory import SemanticMap, SemanticMapStore, Waypoint
+from mapspeak.memory.events import Effect
 from mapspeak.places.choosing import check_place, find_place
 from mapspeak.places.goalcheck import GoalVerdict, say_check
 from mapspeak.places.notices import (
@@ -24,17 +26,15 @@ from mapspeak.places.notices import (
     say_consequences,
 )
 from mapspeak.safety import Policy, Surveyor
-from mapspeak.semantic import SemanticMap, SemanticMapStore, Waypoint
-from mapspeak.semantic.events import Effect
 from mapspeak.server.text.exploration import say_progress
 from mapspeak.server.text.frontiers import say_refusal
 from mapspeak.server.text.look import MapLook, view_of
 from mapspeak.server.text.measures import describe_measures
-from mapspeak.server.text.tables import describe_atlas
+from mapspeak.server.text.tables import describe_world
 from mapspeak.session import Session
 from mapspeak.spatial import UNKNOWN
 from mapspeak.spatial.frontiers import RefusalReason
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.revision import MapRevision
 
 pytestmark = pytest.mark.anyio
@@ -42,29 +42,29 @@ pytestmark = pytest.mark.anyio
 
 def test_a_closure_names_the_rooms_that_it_cuts_off() -> None:
     south = corners((8.5, 1.0), (15.5, 3.5))
-    atlas = atlas_on(revision_with(event(Effect.CLOSED, outlines=(south,))))
-    here, there = (atlas.rooms.find_region_at(each) for each in (WEST, EAST))
+    world = world_on(revision_with(event(Effect.CLOSED, outlines=(south,))))
+    here, there = (world.rooms.find_region_at(each) for each in (WEST, EAST))
     assert here is not None
     assert there is not None
 
     both = event(Effect.CLOSED, id="E2")
-    (told,) = say_consequences(atlas, both, NOW)
+    (told,) = say_consequences(world, both, NOW)
 
     assert there.id in told
     assert here.id not in told
-    with_a_way_round = say_consequences(atlas_on(revision_with()), both, NOW)
+    with_a_way_round = say_consequences(world_on(revision_with()), both, NOW)
     assert there.id not in " ".join(with_a_way_round)
 
 
 def test_a_goal_behind_a_closure_names_what_closes_the_way() -> None:
     south = corners((8.5, 1.0), (15.5, 3.5))
-    atlas = atlas_on(
+    world = world_on(
         revision_with(
             event(Effect.CLOSED, id="E2"), event(Effect.CLOSED, place="C2", outlines=(south,))
         )
     )
 
-    check = check_place(atlas, find_place(atlas, f"{EAST.x}, {EAST.y}")).check
+    check = check_place(world, find_place(world, f"{EAST.x}, {EAST.y}")).check
 
     assert check.verdict is GoalVerdict.UNREACHABLE
     assert "area 'C1', closed by event E2 until 14:00" in say_check(check)
@@ -77,10 +77,12 @@ def test_a_record_behind_a_closure_is_no_less_trusted() -> None:
     )
     memory = SemanticMap(waypoints=(Waypoint(name="far", pose=Pose(EAST.x, EAST.y)),))
 
-    atlas = Atlas(closed.grid, Pose(WEST.x, WEST.y), memory, radius_m=RADIUS_M, revision=closed)
+    world = WorldModel(
+        closed.grid, Pose(WEST.x, WEST.y), memory, radius_m=RADIUS_M, revision=closed
+    )
 
-    assert atlas.path_m(EAST) is None
-    assert atlas.judge.findings == ()
+    assert world.path_m(EAST) is None
+    assert world.judge.findings == ()
 
 
 def test_what_nobody_saw_behind_a_closure_is_told_as_closed_off() -> None:
@@ -93,21 +95,21 @@ def test_what_nobody_saw_behind_a_closure_is_told_as_closed_off() -> None:
     events = [event(Effect.CLOSED, id="E2"), event(Effect.CLOSED, outlines=(south,))]
     closed = bare.with_areas(tuple(close_floor_of(events, bare, NOW)))
 
-    atlas = atlas_on(closed)
-    unreachable = find_unreachable(atlas)
+    world = world_on(closed)
+    unreachable = find_unreachable(world)
 
-    assert judge_end(atlas, ()) is ExplorationState.REST_UNREACHABLE
-    sentence = say_progress(ended_exploration(atlas))
+    assert judge_end(world, ()) is ExplorationState.REST_UNREACHABLE
+    sentence = say_progress(ended_exploration(world))
     assert "behind what is closed (the area 'C1', closed by event E2 until 14:00" in sentence
     assert "behind walls" not in sentence
     assert {each.reason for each in unreachable} == {RefusalReason.CLOSED_OFF}
-    assert say_refusal(unreachable[0]) in describe_atlas(view_of(atlas, MapLook()))
+    assert say_refusal(unreachable[0]) in describe_world(view_of(world, MapLook()))
 
 
-def ended_exploration(atlas: Atlas) -> Progress:
+def ended_exploration(world: WorldModel) -> Progress:
     """Return an exploration that has ended without a drive, as it stands."""
     return Progress(
-        state=judge_end(atlas, ()),
+        state=judge_end(world, ()),
         bounds=Bounds(),
         bound=None,
         seen_id=None,
@@ -118,28 +120,28 @@ def ended_exploration(atlas: Atlas) -> Progress:
         n_blocked=0,
         driven_m=0.0,
         elapsed_s=0.0,
-        known_area_m2=known_area_m2(atlas),
-        known_ratio=known_ratio(atlas),
-        frontiers=atlas.frontiers.frontiers,
+        known_area_m2=known_area_m2(world),
+        known_ratio=known_ratio(world),
+        frontiers=world.frontiers.frontiers,
         trip=None,
-        pose=atlas.robot,
+        pose=world.robot,
         pose_doubt=None,
-        unreachable=find_unreachable(atlas),
+        unreachable=find_unreachable(world),
         blocked=(),
         not_worth=(),
-        closed=tuple(atlas.map.areas),
+        closed=tuple(world.map.areas),
     )
 
 
 def test_a_way_that_is_closed_is_measured_as_none_with_what_closes_it() -> None:
     south = corners((8.5, 1.0), (15.5, 3.5))
-    atlas = atlas_on(
+    world = world_on(
         revision_with(event(Effect.CLOSED, id="E2"), event(Effect.CLOSED, outlines=(south,)))
     )
-    there = atlas.rooms.find_region_at(EAST)
+    there = world.rooms.find_region_at(EAST)
     assert there is not None
 
-    told = describe_measures(atlas, start="robot", places=None)
+    told = describe_measures(world, start="robot", places=None)
 
     assert f"{there.id} | 19.98, 6.48 | no way (unreachable)" in told
     assert "the shortest leads over the area 'C1', closed by event E2 until 14:00" in told
@@ -175,9 +177,9 @@ async def test_a_session_heeds_the_events_of_its_memory(tmp_path: Path) -> None:
     session = Session(FakeRobot(office()), store, lease_s=60.0, guard=guard)
     store.write_event(event(Effect.CLOSED))
 
-    atlas = await session.fetch_atlas()
+    world = await session.fetch_world_model()
 
-    assert [area.name for area in atlas.map.areas] == ["C1"]
-    assert 'E1 "painters at work" (C1), closed to the robot, until 14:00.' in atlas.warnings
+    assert [area.name for area in world.map.areas] == ["C1"]
+    assert 'E1 "painters at work" (C1), closed to the robot, until 14:00.' in world.warnings
     with pytest.raises((PolicyError, GoalError)):
         await session.robot.send_goal(Pose(12.0, 6.5))

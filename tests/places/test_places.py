@@ -7,19 +7,19 @@ from drawing import grid_from_text
 from fakes import two_rooms
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point, Pose
+from mapspeak.memory import SemanticMap, Waypoint
 from mapspeak.places.choosing import check_place, choose_goal, find_place
 from mapspeak.places.naming import Place, Spot, is_taken_name
 from mapspeak.places.ways import find_way
-from mapspeak.semantic import SemanticMap, Waypoint
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 DOCK = Waypoint(name="Dock corner", pose=Pose(6.0, 1.5, 0.5))
 ROBOT = Pose(1.5, 1.4, 0.0)
 
 
-def _atlas(memory: SemanticMap | None = None) -> Atlas:
-    return Atlas(two_rooms(), ROBOT, memory or SemanticMap(waypoints=(DOCK,)), radius_m=0.2)
+def _world(memory: SemanticMap | None = None) -> WorldModel:
+    return WorldModel(two_rooms(), ROBOT, memory or SemanticMap(waypoints=(DOCK,)), radius_m=0.2)
 
 
 @pytest.mark.parametrize(
@@ -40,26 +40,26 @@ def _atlas(memory: SemanticMap | None = None) -> Atlas:
 def test_a_place_is_an_id_a_name_coordinates_or_the_robot(
     words: str, name: str, point: Point | None
 ) -> None:
-    place = find_place(_atlas(), words)
+    place = find_place(_world(), words)
     assert place.name == name
     assert point is None or place.point == point
 
 
 def test_coordinates_may_come_with_a_heading() -> None:
-    spot = find_place(_atlas(), "1.5, 2, 90 deg").thing
+    spot = find_place(_world(), "1.5, 2, 90 deg").thing
     assert isinstance(spot, Spot)
     assert spot.yaw_rad == pytest.approx(1.5708, abs=1e-3)
 
 
 def test_a_remembered_name_wins_over_coordinates_that_it_looks_like() -> None:
     odd = Waypoint(name="3, 4", pose=Pose(6.0, 1.0))
-    assert find_place(_atlas(SemanticMap(waypoints=(odd,))), "3, 4").point == Point(6.0, 1.0)
+    assert find_place(_world(SemanticMap(waypoints=(odd,))), "3, 4").point == Point(6.0, 1.0)
 
 
 @pytest.mark.parametrize("words", ["R9", "the moon", "", "1.5", "F3", "nan, 2", "1,2,3,4"])
 def test_a_place_that_is_not_there_is_answered_with_those_that_are(words: str) -> None:
     with pytest.raises(GoalError, match="rooms and corridors R1 R2; doors D1"):
-        find_place(_atlas(), words)
+        find_place(_world(), words)
 
 
 @pytest.mark.parametrize("name", ["R3", "w12", "1, 2", "(1.0; -2)", "robot", "Here"])
@@ -84,11 +84,11 @@ def test_a_room_without_a_way_is_no_goal_and_the_answer_names_one_that_works() -
         """,
         resolution_m=0.5,
     )
-    atlas = Atlas(grid, Pose(1.5, 1.5), SemanticMap(), radius_m=0.2)
-    closed = atlas.rooms.find_region_at(Point(6.0, 1.5))
+    world = WorldModel(grid, Pose(1.5, 1.5), SemanticMap(), radius_m=0.2)
+    closed = world.rooms.find_region_at(Point(6.0, 1.5))
     assert closed is not None
     with pytest.raises(GoalError, match=rf"{closed.id}: no known way .* leads to"):
-        choose_goal(atlas, place=closed.id, x=None, y=None, yaw_deg=None)
+        choose_goal(world, place=closed.id, x=None, y=None, yaw_deg=None)
 
 
 def test_a_robot_sent_to_a_room_looks_into_it_not_at_its_wall() -> None:
@@ -110,43 +110,43 @@ def test_a_robot_sent_to_a_room_looks_into_it_not_at_its_wall() -> None:
         """,
         resolution_m=0.5,
     )
-    atlas = Atlas(grid, Pose(2.0, 4.5), SemanticMap(), radius_m=0.2)
-    room = atlas.rooms.find_region_at(Point(7.0, 1.5))
+    world = WorldModel(grid, Pose(2.0, 4.5), SemanticMap(), radius_m=0.2)
+    room = world.rooms.find_region_at(Point(7.0, 1.5))
     assert room is not None
-    goal = check_place(atlas, Place(room.id, room))
+    goal = check_place(world, Place(room.id, room))
     assert goal.check.is_ok
     looks_at = goal.pose.transform(Point(1.5, 0.0))
-    assert atlas.find_room_id(looks_at) == room.id
+    assert world.find_room_id(looks_at) == room.id
     assert abs(goal.pose.yaw_deg) == pytest.approx(90, abs=20)
 
 
 def test_the_way_between_two_rooms_names_the_door_and_is_no_shorter_than_straight() -> None:
-    atlas = _atlas()
-    way = find_way(atlas, find_place(atlas, "R1"), find_place(atlas, "R2"))
+    world = _world()
+    way = find_way(world, find_place(world, "R1"), find_place(world, "R2"))
     assert way.through == ("R1", "D1", "R2")
     assert way.path_m is not None
     assert way.path_m >= way.straight_m
 
 
 def test_ways_are_as_long_there_as_back() -> None:
-    atlas = _atlas()
-    one, other = find_place(atlas, "R1"), find_place(atlas, "R2")
-    there, back = find_way(atlas, one, other), find_way(atlas, other, one)
+    world = _world()
+    one, other = find_place(world, "R1"), find_place(world, "R2")
+    there, back = find_way(world, one, other), find_way(world, other, one)
     assert there.path_m == pytest.approx(back.path_m, abs=0.01)
     assert there.through == tuple(reversed(back.through))
 
 
 def test_no_way_begins_in_a_wall() -> None:
-    atlas = _atlas()
-    way = find_way(atlas, find_place(atlas, "3.3, 0.5"), find_place(atlas, "R2"))
+    world = _world()
+    way = find_way(world, find_place(world, "3.3, 0.5"), find_place(world, "R2"))
     assert way.path_m is None
 
 
 def test_what_does_not_depend_on_the_robot_is_not_computed_again_when_it_moves() -> None:
-    first = _atlas()
+    first = _world()
     assert first.rooms.regions
     same_map = two_rooms()
-    second = Atlas(same_map, Pose(6.0, 1.5), SemanticMap(), radius_m=0.2, previous=first)
+    second = WorldModel(same_map, Pose(6.0, 1.5), SemanticMap(), radius_m=0.2, previous=first)
     assert second.rooms is first.rooms
     assert second.path_m(Point(6.0, 1.5)) == pytest.approx(0.0, abs=0.3)
 
@@ -165,15 +165,15 @@ BENT = """
 """
 
 
-def _atlas_of(text: str, robot: Pose) -> Atlas:
+def _world_of(text: str, robot: Pose) -> WorldModel:
     grid = grid_from_text(text, resolution_m=0.5)
-    return Atlas(grid, robot, SemanticMap(), radius_m=0.3)
+    return WorldModel(grid, robot, SemanticMap(), radius_m=0.3)
 
 
 def test_a_robot_sent_to_a_point_arrives_in_the_direction_of_the_way() -> None:
-    atlas = _atlas_of(BENT, Pose(0.8, 4.2, math.pi))
-    ahead = check_place(atlas, find_place(atlas, "4.3, 4.2"))
-    down = check_place(atlas, find_place(atlas, "4.75, 0.8"))
+    world = _world_of(BENT, Pose(0.8, 4.2, math.pi))
+    ahead = check_place(world, find_place(world, "4.3, 4.2"))
+    down = check_place(world, find_place(world, "4.75, 0.8"))
     assert ahead.pose.yaw_deg == pytest.approx(0, abs=30)
     assert down.pose.yaw_deg == pytest.approx(-75, abs=25)
 
@@ -185,23 +185,23 @@ def test_a_way_along_a_wall_that_ends_with_a_step_towards_it_turns_no_robot_to_i
     hall = np.zeros((120, 240), np.int8)
     hall[[0, -1]] = hall[:, [0, -1]] = 100
     grid = OccupancyGrid(cells=hall, resolution_m=0.05)
-    atlas = Atlas(grid, Pose(1.0, 0.6, math.pi), SemanticMap(), radius_m=0.3)
-    arrived = check_place(atlas, Place("there", Spot(goal))).pose
+    world = WorldModel(grid, Pose(1.0, 0.6, math.pi), SemanticMap(), radius_m=0.3)
+    arrived = check_place(world, Place("there", Spot(goal))).pose
     assert -40 < arrived.yaw_deg < 0
 
 
 def test_what_is_offered_instead_of_a_point_without_heading_has_none_either() -> None:
-    atlas = _atlas_of(BENT, Pose(0.8, 4.2, math.pi))
+    world = _world_of(BENT, Pose(0.8, 4.2, math.pi))
     with pytest.raises(GoalError) as free:
-        choose_goal(atlas, place=None, x=6.9, y=1.0, yaw_deg=None)
+        choose_goal(world, place=None, x=6.9, y=1.0, yaw_deg=None)
     with pytest.raises(GoalError) as asked:
-        choose_goal(atlas, place=None, x=6.9, y=1.0, yaw_deg=30.0)
+        choose_goal(world, place=None, x=6.9, y=1.0, yaw_deg=30.0)
     assert "yaw_deg" not in free.value.hint
     assert "yaw_deg=30" in asked.value.hint
 
 
 def test_the_nearest_pose_of_a_point_in_a_wall_is_come_to_straight_on() -> None:
-    atlas = _atlas_of(BENT, Pose(0.8, 4.2, math.pi))
-    nearest = check_place(atlas, find_place(atlas, "4.75, -0.1")).check.nearest
+    world = _world_of(BENT, Pose(0.8, 4.2, math.pi))
+    nearest = check_place(world, find_place(world, "4.75, -0.1")).check.nearest
     assert nearest is not None
     assert nearest.yaw_deg == pytest.approx(-75, abs=25)

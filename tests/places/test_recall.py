@@ -9,26 +9,26 @@ from embedding import ConceptEmbedder
 from fakes import two_rooms
 from mapspeak.errors import ConfigError, GoalError
 from mapspeak.geometry import Point
+from mapspeak.memory import Landmark, SemanticMap, Waypoint
+from mapspeak.memory.retrieval import Basis, EntryKind, Verdict
 from mapspeak.places.choosing import check_place, find_place
 from mapspeak.places.naming import AmbiguousPlaceError
 from mapspeak.places.recall import RecallDoubt, RecallQuery, recall
-from mapspeak.semantic import Landmark, SemanticMap, Waypoint
-from mapspeak.semantic.retrieval import Basis, EntryKind, Verdict
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import Recollector
-from remembering import EXTINGUISHER, LADDER, ROBOT, atlas_of, look, looks_at
+from remembering import EXTINGUISHER, LADDER, ROBOT, look, looks_at, world_of
 
 LOOKS = looks_at("fire extinguisher", EXTINGUISHER)
 WEST = look("west", 2.0, 1.0, ("ladder", LADDER), yaw_deg=180)
 
 
-def ask(atlas: Atlas, words: str, **more: object) -> list[str]:
-    answer = recall(atlas, RecallQuery(words=words, **more))  # type: ignore[arg-type]
+def ask(world: WorldModel, words: str, **more: object) -> list[str]:
+    answer = recall(world, RecallQuery(words=words, **more))  # type: ignore[arg-type]
     return [each.id for each in answer.candidates]
 
 
 def test_a_thing_seen_from_several_places_is_one_candidate_with_position_and_goal() -> None:
-    answer = recall(atlas_of(*LOOKS, WEST), RecallQuery(words="fire extinguisher"))
+    answer = recall(world_of(*LOOKS, WEST), RecallQuery(words="fire extinguisher"))
     first = answer.candidates[0]
     assert answer.verdict is Verdict.FOUND
     assert [each.name for each in answer.candidates].count("fire extinguisher") == 1
@@ -47,7 +47,7 @@ def test_a_thing_seen_from_several_places_is_one_candidate_with_position_and_goa
 
 
 def test_a_thing_that_one_view_alone_speaks_of_is_likely_and_not_found() -> None:
-    answer = recall(atlas_of(LOOKS[0]), RecallQuery(words="fire extinguisher"))
+    answer = recall(world_of(LOOKS[0]), RecallQuery(words="fire extinguisher"))
     assert answer.verdict is Verdict.LIKELY
     assert answer.doubt is RecallDoubt.FEW_VIEWS
 
@@ -56,19 +56,19 @@ def test_a_thing_whose_direction_nobody_noted_is_likely_where_it_was_seen() -> N
     place = Waypoint(
         name="hall", pose=ROBOT, functional_landmarks=(Landmark(label="fire extinguisher"),)
     )
-    answer = recall(atlas_of(place), RecallQuery(words="fire extinguisher"))
+    answer = recall(world_of(place), RecallQuery(words="fire extinguisher"))
     assert answer.verdict is Verdict.LIKELY
     assert answer.doubt is RecallDoubt.NOT_NOTED
 
 
 def test_what_is_not_remembered_is_told_apart_from_an_empty_memory() -> None:
-    answer = recall(atlas_of(*LOOKS), RecallQuery(words="a helicopter"))
+    answer = recall(world_of(*LOOKS), RecallQuery(words="a helicopter"))
     assert answer.verdict is Verdict.NOT_REMEMBERED
     assert not answer.is_empty
 
 
 def test_an_empty_memory_is_not_remembered_either() -> None:
-    answer = recall(atlas_of(), RecallQuery(words="ladder"))
+    answer = recall(world_of(), RecallQuery(words="ladder"))
     assert answer.verdict is Verdict.NOT_REMEMBERED
     assert answer.candidates == ()
     assert answer.is_empty
@@ -76,7 +76,7 @@ def test_an_empty_memory_is_not_remembered_either() -> None:
 
 def test_several_of_one_name_are_ambiguous_and_the_nearest_by_path_comes_first() -> None:
     near = look("near", 2.0, 1.0, ("fire extinguisher", LADDER), yaw_deg=180)
-    answer = recall(atlas_of(*LOOKS, near), RecallQuery(words="fire extinguisher"))
+    answer = recall(world_of(*LOOKS, near), RecallQuery(words="fire extinguisher"))
     assert answer.verdict is Verdict.AMBIGUOUS
     assert answer.answer.n_meant == 2
     assert answer.candidates[0].room_ids == ("R2",)
@@ -86,8 +86,8 @@ def test_of_several_that_are_as_like_in_meaning_the_nearest_by_path_comes_first(
     far = look("far", 2.0, 1.0, ("washbasin", LADDER), yaw_deg=180, range_m=2.0)
     near = look("near", 4.8, 1.5, ("washbasin", EXTINGUISHER), range_m=2.6)
     for places in ((far, near), (near, far)):
-        atlas = atlas_of(*places)
-        answer = recall(atlas, RecallQuery(words="where can I wash my hands"))
+        world = world_of(*places)
+        answer = recall(world, RecallQuery(words="where can I wash my hands"))
         paths_m = [each.check.path_m for each in answer.candidates]
         assert answer.verdict is Verdict.AMBIGUOUS
         assert None not in paths_m
@@ -97,7 +97,7 @@ def test_of_several_that_are_as_like_in_meaning_the_nearest_by_path_comes_first(
 def test_the_one_of_several_that_three_views_agree_on_is_found_and_the_others_are_told() -> None:
     third = look("east c", 4.8, 1.5, ("fire extinguisher", EXTINGUISHER), range_m=2.6)
     near = look("near", 2.0, 1.0, ("fire extinguisher", LADDER), yaw_deg=180)
-    answer = recall(atlas_of(*LOOKS, third, near), RecallQuery(words="fire extinguisher"))
+    answer = recall(world_of(*LOOKS, third, near), RecallQuery(words="fire extinguisher"))
     assert answer.verdict is Verdict.FOUND
     assert answer.answer.n_meant == 2
     assert answer.candidates[0].room_ids == ("R1",)
@@ -110,54 +110,54 @@ def test_two_of_one_name_that_three_views_each_agree_on_stay_ambiguous() -> None
         look(f"west {i}", x, y, ("fire extinguisher", LADDER), yaw_deg=180, range_m=range_m)
         for i, (x, y, range_m) in enumerate([(2.0, 1.0, 2.2), (2.6, 2.4, 2.3), (1.0, 0.6, 1.9)])
     ]
-    answer = recall(atlas_of(*LOOKS, third, *west), RecallQuery(words="fire extinguisher"))
+    answer = recall(world_of(*LOOKS, third, *west), RecallQuery(words="fire extinguisher"))
     assert answer.verdict is Verdict.AMBIGUOUS
 
 
 def test_filters_apply_before_ranking() -> None:
     near = look("near", 2.0, 1.0, ("fire extinguisher", LADDER), yaw_deg=180)
-    atlas = atlas_of(*LOOKS, near)
-    in_east = recall(atlas, RecallQuery(words="fire extinguisher", room_id="R1"))
+    world = world_of(*LOOKS, near)
+    in_east = recall(world, RecallQuery(words="fire extinguisher", room_id="R1"))
     assert in_east.verdict is Verdict.FOUND
     assert [each.room_ids for each in in_east.candidates if each.id[0] == "T"] == [("R1",)]
-    assert ask(atlas, "fire extinguisher in R1") == ask(atlas, "fire extinguisher", room_id="R1")
-    assert len(ask(atlas, "fire extinguisher", near=LADDER, near_m=1.0)) == 1
-    assert all(each[0] == "W" for each in ask(atlas, "fire extinguisher", kind=EntryKind.PLACE))
+    assert ask(world, "fire extinguisher in R1") == ask(world, "fire extinguisher", room_id="R1")
+    assert len(ask(world, "fire extinguisher", near=LADDER, near_m=1.0)) == 1
+    assert all(each[0] == "W" for each in ask(world, "fire extinguisher", kind=EntryKind.PLACE))
 
 
 def test_a_span_of_time_keeps_what_was_last_seen_in_it() -> None:
     noon = datetime(2026, 11, 20, 12, 0, tzinfo=UTC)
-    atlas = atlas_of(replace(LOOKS[0], recorded_at=noon), replace(WEST, recorded_at=None))
-    assert ask(atlas, "fire extinguisher", since=noon)
-    assert not ask(atlas, "fire extinguisher", until=noon)
-    assert not ask(atlas, "ladder", since=noon - timedelta(days=1), kind=EntryKind.THING)
+    world = world_of(replace(LOOKS[0], recorded_at=noon), replace(WEST, recorded_at=None))
+    assert ask(world, "fire extinguisher", since=noon)
+    assert not ask(world, "fire extinguisher", until=noon)
+    assert not ask(world, "ladder", since=noon - timedelta(days=1), kind=EntryKind.THING)
 
 
 def test_the_answer_is_the_same_every_time() -> None:
-    first, second = (recall(atlas_of(*LOOKS, WEST), RecallQuery(words="fire")) for _ in range(2))
+    first, second = (recall(world_of(*LOOKS, WEST), RecallQuery(words="fire")) for _ in range(2))
     assert first == second
 
 
 def test_things_keep_their_ids_when_more_is_seen_and_ids_are_not_given_twice() -> None:
-    first = atlas_of(*LOOKS, WEST)
+    first = world_of(*LOOKS, WEST)
     ladder = find_place(first, "ladder").thing
     sink = look("sink", 2.5, 2.0, ("sink", Point(2.0, 2.6)), yaw_deg=90)
     more = look("west b", 1.0, 0.8, ("ladder", LADDER), yaw_deg=90)
-    second = atlas_of(*LOOKS, WEST, more, sink, previous=first)
+    second = world_of(*LOOKS, WEST, more, sink, previous=first)
     ids = {each.thing.label: each.id for each in second.things}
     assert ids["ladder"] == getattr(ladder, "id", None)
     assert ids["sink"] == "T3"
-    third = atlas_of(*LOOKS, sink, previous=second)
-    fourth = atlas_of(*LOOKS, sink, look("b", 1.0, 1.0, ("bin", LADDER)), previous=third)
+    third = world_of(*LOOKS, sink, previous=second)
+    fourth = world_of(*LOOKS, sink, look("b", 1.0, 1.0, ("bin", LADDER)), previous=third)
     assert {each.id for each in fourth.things} == {"T1", "T3", "T4"}
     with pytest.raises(GoalError, match="T2 is no longer remembered"):
         find_place(third, "T2")
 
 
 def test_nothing_is_made_anew_while_memory_and_map_stay() -> None:
-    first = atlas_of(*LOOKS)
+    first = world_of(*LOOKS)
     judge = first.judge
-    second = atlas_of(*LOOKS, previous=first)
+    second = world_of(*LOOKS, previous=first)
     assert second.recollection is first.recollection
     assert second.judge is judge
 
@@ -166,9 +166,9 @@ def test_nothing_is_made_anew_while_memory_and_map_stay() -> None:
     "words", ["fire extinguisher", "T1", "t1", "the Fire Extinguishers", "fire extingisher"]
 )
 def test_a_thing_is_a_goal_that_faces_it_from_near(words: str) -> None:
-    atlas = atlas_of(*LOOKS, WEST)
-    place = find_place(atlas, words)
-    goal = check_place(atlas, place)
+    world = world_of(*LOOKS, WEST)
+    place = find_place(world, words)
+    goal = check_place(world, place)
     assert goal.check.is_ok
     assert goal.pose.point.distance_to(EXTINGUISHER) <= 1.5
     assert "seen from W1 W2" in place.reason
@@ -176,17 +176,17 @@ def test_a_thing_is_a_goal_that_faces_it_from_near(words: str) -> None:
 
 def test_a_remembered_name_wins_over_a_thing_of_that_name() -> None:
     named = Waypoint(name="Ladder", pose=ROBOT)
-    assert find_place(atlas_of(named, WEST), "ladder").point == ROBOT.point
+    assert find_place(world_of(named, WEST), "ladder").point == ROBOT.point
 
 
 def test_a_label_that_several_things_bear_is_answered_with_ids_rooms_and_ways() -> None:
     near = look("near", 2.0, 1.0, ("fire extinguisher", LADDER), yaw_deg=180)
-    atlas = atlas_of(*LOOKS, near)
+    world = world_of(*LOOKS, near)
     with pytest.raises(AmbiguousPlaceError, match=r"T\d in R1, \d+\.\d m.*T\d in R2, \d+\.\d m"):
-        find_place(atlas, "fire extinguisher")
+        find_place(world, "fire extinguisher")
     for words in ("nearest fire extinguisher", "the fire extinguisher in R2"):
-        assert find_place(atlas, words).point.distance_to(LADDER) < 0.6
-    there = find_place(atlas, "nearest fire extinguisher to R1")
+        assert find_place(world, words).point.distance_to(LADDER) < 0.6
+    there = find_place(world, "nearest fire extinguisher to R1")
     assert there.point.distance_to(EXTINGUISHER) < 0.6
 
 
@@ -206,30 +206,30 @@ def test_the_advice_for_several_things_of_one_name_can_be_said_as_it_stands(
 ) -> None:
     near = look("near", 2.0, 1.0, ("fire extinguisher", LADDER), yaw_deg=180)
     other = look("other", 1.0, 1.0, ("fire extinguisher", Point(1.0, 0.2)), yaw_deg=-90)
-    atlas = atlas_of(*LOOKS, near, other)
+    world = world_of(*LOOKS, near, other)
     with pytest.raises(AmbiguousPlaceError, match=says) as raised:
-        find_place(atlas, words)
+        find_place(world, words)
     advised = re.search(r"say '(.+)'\.", str(raised.value))
     assert advised is not None
-    assert find_place(atlas, advised[1]).thing is not None
+    assert find_place(world, advised[1]).thing is not None
 
 
 def test_a_thing_without_a_position_falls_back_to_where_it_was_seen_from() -> None:
     seen = Waypoint(name="a", pose=ROBOT, functional_landmarks=(Landmark(label="sink"),))
-    place = find_place(atlas_of(seen), "sink")
-    assert check_place(atlas_of(seen), place).pose == ROBOT
+    place = find_place(world_of(seen), "sink")
+    assert check_place(world_of(seen), place).pose == ROBOT
     assert "the goal is where it was seen from; seen from W1" in place.reason
 
 
 def test_what_is_like_the_words_but_not_called_so_is_named_to_be_confirmed() -> None:
-    atlas = atlas_of(*looks_at("wall box", EXTINGUISHER))
+    world = world_of(*looks_at("wall box", EXTINGUISHER))
     with pytest.raises(GoalError, match=r"nearest in words: T1 \"wall box\".*use T1"):
-        find_place(atlas, "box of matches")
+        find_place(world, "box of matches")
 
 
 def test_what_speaks_against_a_thing_lowers_its_trust() -> None:
     behind = look("a", 2.0, 1.0, ("sink", Point(2.0, 2.6)), yaw_deg=90, range_m=9.0)
-    first = recall(atlas_of(behind), RecallQuery(words="sink")).candidates[0]
+    first = recall(world_of(behind), RecallQuery(words="sink")).candidates[0]
     assert first.trust.ratio < 0.8
     assert first.trust.findings
 
@@ -237,12 +237,12 @@ def test_what_speaks_against_a_thing_lowers_its_trust() -> None:
 def test_a_likeness_in_meaning_is_told_and_never_driven_to() -> None:
     memory = SemanticMap(waypoints=LOOKS)
     recollector = Recollector(ConceptEmbedder)
-    atlas = Atlas(two_rooms(), ROBOT, memory, radius_m=0.2, recollector=recollector)
-    answer = recall(atlas, RecallQuery(words="burning flames"))
+    world = WorldModel(two_rooms(), ROBOT, memory, radius_m=0.2, recollector=recollector)
+    answer = recall(world, RecallQuery(words="burning flames"))
     assert answer.candidates[0].id == "T1"
     assert answer.answer.candidates[0].basis is Basis.MEANING
     with pytest.raises(GoalError, match="nearest in meaning: T1"):
-        find_place(atlas, "burning flames")
+        find_place(world, "burning flames")
 
 
 def test_a_warm_memory_embeds_nothing_but_the_first_question() -> None:
@@ -253,7 +253,7 @@ def test_a_warm_memory_embeds_nothing_but_the_first_question() -> None:
     recollector.warm(memory)
     n_before = len(embedder.asked)
     recall(
-        Atlas(two_rooms(), ROBOT, memory, radius_m=0.2, recollector=recollector),
+        WorldModel(two_rooms(), ROBOT, memory, radius_m=0.2, recollector=recollector),
         RecallQuery(words="burning flames"),
     )
 
@@ -266,7 +266,7 @@ def test_warming_changes_no_answer() -> None:
     warm.warm(memory)
 
     answers = [
-        recall(Atlas(two_rooms(), ROBOT, memory, radius_m=0.2, recollector=each), query)
+        recall(WorldModel(two_rooms(), ROBOT, memory, radius_m=0.2, recollector=each), query)
         for each in (cold, warm)
     ]
 
@@ -280,7 +280,7 @@ def test_warming_without_a_model_does_nothing() -> None:
 
 
 def test_what_is_missing_is_told_with_the_verdict() -> None:
-    answer = recall(atlas_of(*LOOKS), RecallQuery(words="a piano"))
+    answer = recall(world_of(*LOOKS), RecallQuery(words="a piano"))
     assert answer.verdict is Verdict.NOT_REMEMBERED
     assert answer.answer.missing == "piano"
 
@@ -290,7 +290,9 @@ def test_a_broken_model_costs_no_more_than_the_meanings() -> None:
         raise ConfigError("The model is broken.", hint="Install it again.")
 
     memory = SemanticMap(waypoints=LOOKS)
-    atlas = Atlas(two_rooms(), ROBOT, memory, radius_m=0.2, recollector=Recollector(find_broken))
-    answer = recall(atlas, RecallQuery(words="fire extinguisher"))
+    world = WorldModel(
+        two_rooms(), ROBOT, memory, radius_m=0.2, recollector=Recollector(find_broken)
+    )
+    answer = recall(world, RecallQuery(words="fire extinguisher"))
     assert answer.verdict is Verdict.FOUND
     assert answer.answer.limits is not None

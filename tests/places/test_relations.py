@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 from drawing import grid_from_text
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.memory import Landmark, SemanticMap, Waypoint
 from mapspeak.places.choosing import check_place, find_place
 from mapspeak.places.naming import Place
-from mapspeak.semantic import Landmark, SemanticMap, Waypoint
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 FLAT = """
 ##########################################
@@ -36,27 +36,27 @@ DESK = Waypoint(name="Desk", pose=Pose(7.0, 1.4, math.pi / 2))
 WEST, EAST = Point(2.0, 1.5), Point(7.0, 2.6)
 
 
-def _atlas(
+def _world(
     *waypoints: Waypoint, text: str = FLAT, robot: Pose = ROBOT, turn: Pose | None = None
-) -> Atlas:
+) -> WorldModel:
     origin = turn or Pose(0.0, 0.0)
     grid = grid_from_text(text, resolution_m=0.25, origin=origin)
     memory = SemanticMap(waypoints=waypoints or (DESK,))
-    return Atlas(grid, robot, memory, radius_m=0.2)
+    return WorldModel(grid, robot, memory, radius_m=0.2)
 
 
-def _go(atlas: Atlas, words: str) -> tuple[Place, Pose]:
-    place = find_place(atlas, words)
-    goal = check_place(atlas, place)
+def _go(world: WorldModel, words: str) -> tuple[Place, Pose]:
+    place = find_place(world, words)
+    goal = check_place(world, place)
     assert goal.check.is_ok, goal.sentence
     return place, goal.pose
 
 
-SHARED = _atlas()
+SHARED = _world()
 
 
-def _room_id(atlas: Atlas, point: Point) -> str:
-    found = atlas.find_room_id(point)
+def _room_id(world: WorldModel, point: Point) -> str:
+    found = world.find_room_id(point)
     assert found is not None
     return found
 
@@ -66,11 +66,11 @@ def _off(pose: Pose, origin: Point, heading_rad: float) -> float:
 
 
 def test_north_of_a_door_is_not_behind_a_wall_of_its_rooms() -> None:
-    atlas = _atlas()
-    _, along = _go(atlas, "north of D1")
-    _, beyond = _go(atlas, "east of D1")
-    assert _room_id(atlas, along.point) == _room_id(atlas, WEST)
-    assert _room_id(atlas, beyond.point) == _room_id(atlas, EAST)
+    world = _world()
+    _, along = _go(world, "north of D1")
+    _, beyond = _go(world, "east of D1")
+    assert _room_id(world, along.point) == _room_id(world, WEST)
+    assert _room_id(world, beyond.point) == _room_id(world, EAST)
 
 
 @pytest.mark.parametrize(
@@ -85,7 +85,7 @@ def test_north_of_a_door_is_not_behind_a_wall_of_its_rooms() -> None:
 def test_the_sides_of_a_remembered_place_are_its_own_and_the_robot_looks_at_it(
     words: str, turn_rad: float
 ) -> None:
-    place, pose = _go(_atlas(), f"{words} W1")
+    place, pose = _go(_world(), f"{words} W1")
     assert _off(pose, DESK.pose.point, DESK.pose.yaw_rad + turn_rad) < math.radians(41)
     assert pose.yaw_rad == pytest.approx(pose.point.bearing_to(DESK.pose.point), abs=0.01)
     away_m = pose.point.distance_to(DESK.pose.point)
@@ -93,82 +93,82 @@ def test_the_sides_of_a_remembered_place_are_its_own_and_the_robot_looks_at_it(
 
 
 def test_what_has_no_front_is_seen_from_the_robot_and_the_answer_says_so() -> None:
-    place, pose = _go(_atlas(), "left of 2.5, 1.3")
+    place, pose = _go(_world(), "left of 2.5, 1.3")
     assert pose.y > 1.8
     assert "as seen from the robot, looking east" in place.reason
 
 
 def test_a_side_may_be_meant_from_another_place() -> None:
-    _, pose = _go(_atlas(), "left of 2.5, 1.3 as seen from D1")
+    _, pose = _go(_world(), "left of 2.5, 1.3 as seen from D1")
     assert pose.y < 0.9
 
 
 def test_a_distance_that_was_asked_for_is_kept_or_refused_with_one_that_works() -> None:
-    atlas = _atlas()
-    _, pose = _go(atlas, "1.5 m west of W1")
+    world = _world()
+    _, pose = _go(world, "1.5 m west of W1")
     assert pose.point.distance_to(DESK.pose.point) == pytest.approx(1.5, abs=0.2)
     with pytest.raises(GoalError, match=r"nowhere 9 m west of W1.*0\.9 m west of W1"):
-        find_place(atlas, "9 m west of W1")
+        find_place(world, "9 m west of W1")
 
 
 def test_a_place_beside_a_thing_is_in_its_room_though_another_one_is_nearer() -> None:
-    atlas = _atlas(Waypoint(name="Shelf", pose=Pose(5.8, 0.7, 0.0)))
-    _, pose = _go(atlas, "behind W1")
-    assert atlas.find_room_id(pose.point) == atlas.find_room_id(EAST)
+    world = _world(Waypoint(name="Shelf", pose=Pose(5.8, 0.7, 0.0)))
+    _, pose = _go(world, "behind W1")
+    assert world.find_room_id(pose.point) == world.find_room_id(EAST)
     with pytest.raises(GoalError, match="nowhere 2 m behind W1"):
-        find_place(atlas, "2 m behind W1")
+        find_place(world, "2 m behind W1")
 
 
 def test_left_and_right_of_a_door_are_beside_it_on_the_robots_side() -> None:
-    atlas = _atlas()
-    (door,) = atlas.rooms.doors
-    _, left = _go(atlas, "left of D1")
-    _, right = _go(atlas, "right of D1")
+    world = _world()
+    (door,) = world.rooms.doors
+    _, left = _go(world, "left of D1")
+    _, right = _go(world, "right of D1")
     assert left.y > door.place.y + door.width_m / 2 - 0.25
     assert right.y < door.place.y - door.width_m / 2 + 0.25
-    assert {_room_id(atlas, each.point) for each in (left, right)} == {_room_id(atlas, WEST)}
+    assert {_room_id(world, each.point) for each in (left, right)} == {_room_id(world, WEST)}
 
 
 def test_behind_a_door_is_the_other_room() -> None:
-    atlas = _atlas()
-    _, before = _go(atlas, "in front of D1")
-    _, beyond = _go(atlas, "behind D1")
-    assert _room_id(atlas, before.point) == _room_id(atlas, WEST)
-    assert _room_id(atlas, beyond.point) == _room_id(atlas, EAST)
+    world = _world()
+    _, before = _go(world, "in front of D1")
+    _, beyond = _go(world, "behind D1")
+    assert _room_id(world, before.point) == _room_id(world, WEST)
+    assert _room_id(world, beyond.point) == _room_id(world, EAST)
 
 
 def test_in_front_of_a_room_is_outside_its_door() -> None:
-    atlas = _atlas()
-    east = _room_id(atlas, EAST)
-    place, pose = _go(atlas, f"in front of {east}")
-    assert _room_id(atlas, pose.point) == _room_id(atlas, WEST)
+    world = _world()
+    east = _room_id(world, EAST)
+    place, pose = _go(world, f"in front of {east}")
+    assert _room_id(world, pose.point) == _room_id(world, WEST)
     assert f"{east} (its door D1)" in place.reason
 
 
 def test_a_side_of_the_room_that_the_robot_is_in_is_refused_with_what_would_work() -> None:
-    atlas = _atlas()
-    west = _room_id(atlas, WEST)
+    world = _world()
+    west = _room_id(world, WEST)
     with pytest.raises(GoalError, match=f"from inside it.*the north wall of {west}"):
-        find_place(atlas, f"left of {west}")
+        find_place(world, f"left of {west}")
 
 
 def test_between_two_things_that_see_each_other_is_half_way_on_the_line() -> None:
-    place, pose = _go(_atlas(), "between W1 and 9, 1.4")
+    place, pose = _go(_world(), "between W1 and 9, 1.4")
     assert pose.x == pytest.approx(8.0, abs=0.3)
     assert "from one and" in place.reason
 
 
 def test_between_two_rooms_is_the_door_that_joins_them() -> None:
-    atlas = _atlas()
-    place, pose = _go(atlas, "between R1 and R2")
+    world = _world()
+    place, pose = _go(world, "between R1 and R2")
     assert "in D1" in place.reason
-    assert pose.point.distance_to(atlas.rooms.doors[0].place) < 0.3
+    assert pose.point.distance_to(world.rooms.doors[0].place) < 0.3
 
 
 def test_between_what_a_wall_parts_is_half_way_on_the_path() -> None:
-    atlas = _atlas()
-    _, pose = _go(atlas, "between 4, 0.7 and 5.6, 0.7")
-    assert atlas.path_m(pose.point) is not None
+    world = _world()
+    _, pose = _go(world, "between 4, 0.7 and 5.6, 0.7")
+    assert world.path_m(pose.point) is not None
     assert pose.y > 0.9
 
 
@@ -184,29 +184,29 @@ def test_between_what_a_wall_parts_is_half_way_on_the_path() -> None:
 def test_in_a_corner_the_robot_stands_near_both_walls_and_faces_it(
     words: str, corner: Point
 ) -> None:
-    place, pose = _go(_atlas(), words)
+    place, pose = _go(_world(), words)
     assert pose.point.distance_to(corner) < 0.9
     assert "corner of" in place.reason
 
 
 def test_along_a_wall_the_robot_heads_along_it() -> None:
-    atlas = _atlas()
-    place, pose = _go(atlas, f"along the north wall of {_room_id(atlas, WEST)}")
+    world = _world()
+    place, pose = _go(world, f"along the north wall of {_room_id(world, WEST)}")
     assert pose.y > 2.7
     assert abs(math.sin(pose.yaw_rad)) < 0.1
     assert "heading east along it" in place.reason
 
 
 def test_the_middle_of_a_room_is_the_middle_and_not_its_widest_point() -> None:
-    atlas = _atlas()
-    _, pose = _go(atlas, f"the middle of {_room_id(atlas, EAST)}")
+    world = _world()
+    _, pose = _go(world, f"the middle of {_room_id(world, EAST)}")
     assert pose.x == pytest.approx(7.5, abs=0.3)
     assert pose.y == pytest.approx(1.75, abs=0.3)
 
 
 def test_the_nearest_door_and_frontier_are_the_things_themselves() -> None:
-    atlas = _atlas(text=FLAT.replace(".....................#", "...............??????#"))
-    door, frontier = find_place(atlas, "nearest door"), find_place(atlas, "nearest frontier")
+    world = _world(text=FLAT.replace(".....................#", "...............??????#"))
+    door, frontier = find_place(world, "nearest door"), find_place(world, "nearest frontier")
     assert isinstance(door.thing, Door)
     assert isinstance(frontier.thing, Frontier)
     assert frontier.name == frontier.thing.id
@@ -215,31 +215,31 @@ def test_the_nearest_door_and_frontier_are_the_things_themselves() -> None:
 
 def test_no_frontier_left_is_said_and_not_made_up() -> None:
     with pytest.raises(GoalError, match="no frontier to go to: none left"):
-        find_place(_atlas(), "nearest unexplored area")
+        find_place(_world(), "nearest unexplored area")
 
 
 def test_relations_stand_inside_each_other_up_to_four() -> None:
-    atlas = _atlas()
-    place, _ = _go(atlas, f"0.5 m north of the middle of {_room_id(atlas, EAST)}")
+    world = _world()
+    place, _ = _go(world, f"0.5 m north of the middle of {_room_id(world, EAST)}")
     assert "north of the middle of" in place.reason
-    _go(atlas, "0.5 m north of 0.5 m west of 0.5 m south of 0.5 m east of W1")
+    _go(world, "0.5 m north of 0.5 m west of 0.5 m south of 0.5 m east of W1")
     with pytest.raises(GoalError, match="more than 4 relations"):
-        find_place(atlas, "north of north of north of north of north of W1")
+        find_place(world, "north of north of north of north of north of W1")
 
 
 def test_a_thing_with_a_known_position_is_a_thing_to_relate_to() -> None:
     sink = Landmark(label="sink", bearing_rad=0.0, range_m=1.2)
-    atlas = _atlas(Waypoint(name="Desk", pose=DESK.pose, functional_landmarks=(sink,)))
-    place, pose = _go(atlas, "next to the sink")
+    world = _world(Waypoint(name="Desk", pose=DESK.pose, functional_landmarks=(sink,)))
+    place, pose = _go(world, "next to the sink")
     assert pose.point.distance_to(Point(7.0, 2.6)) < 1.2
     assert "sink (T1, seen from W1)" in place.reason
 
 
 def test_a_thing_of_unknown_direction_is_answered_with_where_it_was_seen_from() -> None:
     lamp = Landmark(label="lamp")
-    atlas = _atlas(Waypoint(name="Desk", pose=DESK.pose, safety_landmarks=(lamp,)))
+    world = _world(Waypoint(name="Desk", pose=DESK.pose, safety_landmarks=(lamp,)))
     with pytest.raises(GoalError, match="was seen from W1") as error:
-        find_place(atlas, "left of the lamp")
+        find_place(world, "left of the lamp")
     assert error.value.step is NextStep.LOOK_FROM
     assert error.value.about == "W1"
 
@@ -247,21 +247,21 @@ def test_a_thing_of_unknown_direction_is_answered_with_where_it_was_seen_from() 
 def test_two_things_of_one_name_are_asked_back_with_their_places() -> None:
     one = Landmark(label="chair", bearing_rad=0.0, range_m=0.5)
     other = Landmark(label="Chair", bearing_rad=0.0, range_m=1.6)
-    atlas = _atlas(Waypoint(name="Desk", pose=DESK.pose, functional_landmarks=(one, other)))
+    world = _world(Waypoint(name="Desk", pose=DESK.pose, functional_landmarks=(one, other)))
     with pytest.raises(GoalError, match=r"Several things.*T1 at .*T2 at "):
-        find_place(atlas, "next to the chair")
+        find_place(world, "next to the chair")
 
 
 def test_two_remembered_places_of_one_name_are_asked_back_with_their_ids() -> None:
-    atlas = _atlas(DESK, Waypoint(name="desk", pose=Pose(8.0, 2.0)))
+    world = _world(DESK, Waypoint(name="desk", pose=Pose(8.0, 2.0)))
     for words in ("desk", "left of the desk"):
         with pytest.raises(GoalError, match=r"2 remembered places.*W1 at .*W2 at "):
-            find_place(atlas, words)
+            find_place(world, words)
 
 
 def test_a_remembered_name_wins_over_the_relation_it_looks_like() -> None:
     odd = Waypoint(name="left of the desk", pose=Pose(3.0, 2.0))
-    place, pose = _go(_atlas(DESK, odd), "Left of the desk")
+    place, pose = _go(_world(DESK, odd), "Left of the desk")
     assert not place.reason
     assert pose.point == odd.pose.point
 
@@ -283,22 +283,22 @@ def test_a_remembered_name_wins_over_the_relation_it_looks_like() -> None:
 )
 def test_what_cannot_be_meant_is_refused_with_what_would_work(words: str, says: str) -> None:
     with pytest.raises(GoalError, match=says):
-        find_place(_atlas(), words)
+        find_place(_world(), words)
 
 
 def test_the_room_is_where_the_robot_stands_and_the_corridor_is_asked_back() -> None:
-    atlas = _atlas()
-    assert find_place(atlas, "this room").name == _room_id(atlas, WEST)
-    assert find_place(atlas, "the door").name == "D1"
-    place, _ = _go(atlas, "the middle of the room")
-    assert f"the middle of {_room_id(atlas, WEST)}" in place.reason
+    world = _world()
+    assert find_place(world, "this room").name == _room_id(world, WEST)
+    assert find_place(world, "the door").name == "D1"
+    place, _ = _go(world, "the middle of the room")
+    assert f"the middle of {_room_id(world, WEST)}" in place.reason
     with pytest.raises(GoalError, match="which corridor is meant"):
-        find_place(atlas, "the middle of the corridor")
+        find_place(world, "the middle of the corridor")
 
 
 def test_who_says_me_is_asked_who_that_is() -> None:
     with pytest.raises(GoalError, match="no place called 'me'"):
-        find_place(_atlas(), "behind me")
+        find_place(_world(), "behind me")
 
 
 OPERANDS = (
@@ -367,7 +367,7 @@ def test_no_phrase_ends_in_anything_but_a_pose_that_works_or_a_reason(
 
 
 def test_the_same_words_give_the_same_pose() -> None:
-    poses = {_go(_atlas(), "left of W1")[1] for _ in range(3)}
+    poses = {_go(_world(), "left of W1")[1] for _ in range(3)}
     assert len(poses) == 1
 
 
@@ -376,8 +376,8 @@ def test_the_same_words_give_the_same_pose() -> None:
 def test_left_and_right_are_mirror_images(x: float, y: float, yaw_rad: float) -> None:
     """Mirrors the map about its middle row: the place to the left becomes that to the right."""
     height_m = 14 * 0.25
-    here = _atlas(Waypoint(name="it", pose=Pose(x, y, yaw_rad)))
-    there = _atlas(
+    here = _world(Waypoint(name="it", pose=Pose(x, y, yaw_rad)))
+    there = _world(
         Waypoint(name="it", pose=Pose(x, height_m - y, -yaw_rad)),
         robot=Pose(ROBOT.x, height_m - ROBOT.y, 0.0),
     )
@@ -395,10 +395,10 @@ def test_left_and_right_are_mirror_images(x: float, y: float, yaw_rad: float) ->
 def test_turning_the_map_turns_left_but_not_north(turn_rad: float) -> None:
     turn = Pose(3.0, -2.0, turn_rad)
     desk = Waypoint(name="Desk", pose=turn @ DESK.pose)
-    turned = _atlas(desk, robot=turn @ ROBOT, turn=turn)
+    turned = _world(desk, robot=turn @ ROBOT, turn=turn)
     _, left = _go(turned, "left of W1")
     back = turn.inverse().transform(left.point)
-    _, upright = _go(_atlas(), "left of W1")
+    _, upright = _go(_world(), "left of W1")
     assert back.distance_to(upright.point) < 0.3
     _, north = _go(turned, "0.8 m north of W1")
     assert _off(north, desk.pose.point, math.pi / 2) < math.radians(41)
@@ -415,12 +415,12 @@ def test_turning_the_map_turns_left_but_not_north(turn_rad: float) -> None:
 def test_whatever_is_asked_for_the_pose_can_be_reached_or_the_answer_says_why_not(
     x: float, y: float, words: str
 ) -> None:
-    atlas = _atlas()
+    world = _world()
     try:
-        place, pose = _go(atlas, words.format(f"{x:.2f}, {y:.2f}"))
+        place, pose = _go(world, words.format(f"{x:.2f}, {y:.2f}"))
     except GoalError as error:
         assert error.hint  # noqa: PT017 - an answer of either kind is right here
         return
-    cell = atlas.grid.cell_at(pose.point)
-    assert float(np.asarray(atlas.map.clearance_m)[cell.row, cell.col]) >= atlas.radius_m
+    cell = world.grid.cell_at(pose.point)
+    assert float(np.asarray(world.map.clearance_m)[cell.row, cell.col]) >= world.radius_m
     assert place.reason

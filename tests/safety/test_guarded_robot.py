@@ -11,6 +11,7 @@ from guarding import WallClock, audit_of, corners, make_guard, rectangle
 from mapspeak.errors import GoalError, LinkError, PolicyError
 from mapspeak.geometry import Pose
 from mapspeak.installation import shell_command
+from mapspeak.memory import SemanticMapStore
 from mapspeak.robot import GoalState, StampedPose
 from mapspeak.safety import (
     Approval,
@@ -26,7 +27,6 @@ from mapspeak.safety import (
     calling,
 )
 from mapspeak.safety.monitor import KEEP_M
-from mapspeak.semantic import SemanticMapStore
 from mapspeak.session import Session
 from mapspeak.worldmodel.closures import ClosedArea
 

@@ -6,8 +6,8 @@ import pytest
 
 from fakes import FakeRobot, two_rooms
 from guarding import make_guard, rectangle
+from mapspeak.memory import SemanticMapStore
 from mapspeak.safety import AreaRule, Policy
-from mapspeak.semantic import SemanticMapStore
 from mapspeak.session import Session
 
 pytestmark = pytest.mark.anyio

@@ -11,10 +11,10 @@ from fakes import FakeRobot
 from guarding import WallClock, audit_of, make_guard, rectangle
 from mapspeak.errors import LinkError, PolicyError
 from mapspeak.geometry import Pose
+from mapspeak.memory import SemanticMapStore
 from mapspeak.robot import StampedPose
 from mapspeak.ros import RosConnection
 from mapspeak.safety import AreaRule, Hours, Policy, publishing_for
-from mapspeak.semantic import SemanticMapStore
 from mapspeak.session import Session
 
 pytestmark = pytest.mark.anyio

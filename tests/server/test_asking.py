@@ -13,8 +13,8 @@ from drawing import grid_from_text
 from fakes import FakeRobot
 from guarding import make_guard
 from mapspeak.geometry import Pose
+from mapspeak.memory import SemanticMapStore
 from mapspeak.safety import Approval, CommandKind, Guard, Otherwise, Policy, Publish
-from mapspeak.semantic import SemanticMapStore
 from mapspeak.server.app import build_server
 from mapspeak.session import Session
 from served import connect, text_of

@@ -9,8 +9,8 @@ from failing_robot import FailingRobot
 from fakes import FakeRobot, two_rooms
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.geometry import Pose
+from mapspeak.memory import SemanticMapStore
 from mapspeak.robot import GoalState, StampedPose
-from mapspeak.semantic import SemanticMapStore
 from mapspeak.server.app import DEFAULT_TOOLSETS
 from mapspeak.session import Session
 from served import MODES, connect, report_of, text_of

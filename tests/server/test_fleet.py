@@ -10,7 +10,7 @@ from mcp.client import Client
 from fakes import FakeRobot, two_rooms
 from mapspeak.errors import ConfigError, LinkError
 from mapspeak.geometry import Pose
-from mapspeak.semantic import SemanticMapStore
+from mapspeak.memory import SemanticMapStore
 from mapspeak.server.app import build_server
 from mapspeak.server.fleet import FleetServer
 from mapspeak.session import Session

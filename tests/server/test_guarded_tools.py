@@ -16,6 +16,7 @@ from drawing import grid_from_text
 from fakes import FakeRobot
 from guarding import audit_of, make_guard, rectangle
 from mapspeak.geometry import Pose
+from mapspeak.memory import SemanticMapStore
 from mapspeak.safety import (
     Approval,
     AreaRule,
@@ -28,7 +29,6 @@ from mapspeak.safety import (
     Publish,
     load_policy,
 )
-from mapspeak.semantic import SemanticMapStore
 from mapspeak.server.app import name_client
 from mapspeak.server.tools.toolset import Tool, ToolEffect
 from mapspeak.server.toolsets import build_toolsets

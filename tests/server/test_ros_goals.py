@@ -12,10 +12,10 @@ from fakes import FakeRobot, two_rooms
 from guarding import audit_of, make_guard
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, open_client
+from mapspeak.memory import SemanticMapStore
 from mapspeak.ros.actions import ActionPatience, ActionState, SentGoal
 from mapspeak.ros.messages import Dialect, write_header, write_pose
 from mapspeak.safety import CommandKind, Policy
-from mapspeak.semantic import SemanticMapStore
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.goals import ActionBook
 from mapspeak.server.tools.ros.inquiry import RosInquiry

@@ -9,7 +9,7 @@ from mcp.client import Client
 from mcp_types import Tool
 
 from fakes import FakeRobot, two_rooms
-from mapspeak.semantic import SemanticMapStore
+from mapspeak.memory import SemanticMapStore
 from mapspeak.server.app import build_server
 from mapspeak.server.mapview.representations import Representation
 from mapspeak.server.offering import keep_offered, write_instructions

@@ -9,7 +9,7 @@ import pytest
 from mcp.client import Client
 
 from mapspeak.links.rosbridge import open_rosbridge_robot
-from mapspeak.semantic import SemanticMapStore
+from mapspeak.memory import SemanticMapStore
 from mapspeak.server.app import build_server
 from mapspeak.session import Session
 from rosbridge_robot import ScriptedRobot

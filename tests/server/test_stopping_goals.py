@@ -11,9 +11,9 @@ from mcp.client import Client
 from faulty import Faults
 from faulty_bridge import NEXT_ROOM, FaultyBridge, open_faulty_bridge
 from mapspeak.links.rosbridge import open_rosbridge_robot
+from mapspeak.memory import SemanticMapStore
 from mapspeak.ros.messages import Dialect
 from mapspeak.ros.robot.driving import DrivingPatience
-from mapspeak.semantic import SemanticMapStore
 from mapspeak.server.app import build_server
 from mapspeak.session import Session
 from rosbridge_robot import CANCELED, ScriptedRobot, connect_scripted

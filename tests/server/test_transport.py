@@ -13,7 +13,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from fakes import FakeRobot, two_rooms
 from mapspeak.errors import ConfigError
-from mapspeak.semantic import SemanticMapStore
+from mapspeak.memory import SemanticMapStore
 from mapspeak.server.app import build_server
 from mapspeak.server.transport import HangUpWatch, TokenGuard, serve_http
 from mapspeak.session import Session

@@ -4,13 +4,13 @@ import pytest
 from drawing import grid_from_text, text_from_grid
 from guarding import corners
 from mapspeak.geometry import Point, Pose
+from mapspeak.memory import SemanticMap
 from mapspeak.places.choosing import check_place, find_place
 from mapspeak.places.goalcheck import GoalVerdict, check_goal, say_check
-from mapspeak.semantic import SemanticMap
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import distances_from
 from mapspeak.worldmodel.closures import MARGIN_M, ClosedArea, close_floor
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.revision import MapRevision
 
 HALL = grid_from_text(
@@ -32,9 +32,9 @@ def area(low: tuple[float, float], high: tuple[float, float], name: str = "pit")
     return ClosedArea(name=name, outline=corners(low, high))
 
 
-def atlas_with(*areas: ClosedArea, grid: OccupancyGrid = HALL) -> Atlas:
+def world_with(*areas: ClosedArea, grid: OccupancyGrid = HALL) -> WorldModel:
     revision = MapRevision(grid, radius_m=0.2, areas=areas)
-    return Atlas(grid, START, SemanticMap(), radius_m=0.2, revision=revision)
+    return WorldModel(grid, START, SemanticMap(), radius_m=0.2, revision=revision)
 
 
 def test_a_closed_area_is_no_floor_and_the_map_itself_stays() -> None:
@@ -96,15 +96,15 @@ def test_an_area_larger_than_any_map_closes_all_of_it() -> None:
 
 
 def test_no_way_leads_through_a_closed_area_and_the_way_round_is_taken() -> None:
-    open_m = atlas_with().path_m(Point(3.7, 1.4))
-    round_m = atlas_with(area((2.5, 0.5), (2.7, 1.4))).path_m(Point(3.7, 1.4))
+    open_m = world_with().path_m(Point(3.7, 1.4))
+    round_m = world_with(area((2.5, 0.5), (2.7, 1.4))).path_m(Point(3.7, 1.4))
     assert open_m is not None
     assert round_m is not None
     assert round_m > open_m + 0.5
 
 
 def test_rooms_and_their_ids_do_not_change_when_something_is_closed() -> None:
-    open_, closed = atlas_with(), atlas_with(area((3.6, 0.5), (4.4, 2.0)))
+    open_, closed = world_with(), world_with(area((3.6, 0.5), (4.4, 2.0)))
     assert [each.id for each in closed.rooms.regions] == [each.id for each in open_.rooms.regions]
 
 
@@ -115,21 +115,21 @@ def test_a_revision_with_other_areas_has_the_same_rooms() -> None:
 
 
 def test_what_lies_behind_a_closed_area_is_offered_neither_as_room_nor_as_frontier() -> None:
-    assert atlas_with().frontiers.frontiers
-    atlas = atlas_with(area((3.9, 0.0), (4.1, 2.8), name="door"))
-    assert not atlas.frontiers.frontiers
-    east = max(atlas.rooms.regions, key=lambda region: region.widest.x)
-    verdict = check_place(atlas, find_place(atlas, east.id)).check.verdict
+    assert world_with().frontiers.frontiers
+    world = world_with(area((3.9, 0.0), (4.1, 2.8), name="door"))
+    assert not world.frontiers.frontiers
+    east = max(world.rooms.regions, key=lambda region: region.widest.x)
+    verdict = check_place(world, find_place(world, east.id)).check.verdict
     assert verdict is GoalVerdict.UNREACHABLE
 
 
 def test_a_room_is_stood_in_beside_its_closed_part() -> None:
-    west = atlas_with().rooms.find_region_at(START.point)
+    west = world_with().rooms.find_region_at(START.point)
     assert west is not None
     widest = west.widest
     pit = area((widest.x - 0.3, widest.y - 0.3), (widest.x + 0.3, widest.y + 0.3))
-    atlas = atlas_with(pit)
-    goal = check_place(atlas, find_place(atlas, west.id))
+    world = world_with(pit)
+    goal = check_place(world, find_place(world, west.id))
     assert goal.check.is_ok
     assert pit.distance_to(goal.pose.point) > 0.1
 
@@ -182,11 +182,11 @@ TABLE_IN_THE_MIDDLE = grid_from_text(
 
 def test_a_room_behind_a_closed_area_is_cut_off_and_not_too_tight() -> None:
     shut = ClosedArea(name="wet floor", outline=corners((2.7, 0.0), (3.2, 4.0)), event_id="E2")
-    atlas = atlas_with(shut, grid=TABLE_IN_THE_MIDDLE)
-    east = max(atlas.rooms.regions, key=lambda region: region.widest.x)
+    world = world_with(shut, grid=TABLE_IN_THE_MIDDLE)
+    east = max(world.rooms.regions, key=lambda region: region.widest.x)
     cell = TABLE_IN_THE_MIDDLE.cell_at(east.widest)
     assert TABLE_IN_THE_MIDDLE.occupied[cell.row, cell.col]
-    check = check_place(atlas, find_place(atlas, east.id)).check
+    check = check_place(world, find_place(world, east.id)).check
     assert check.verdict is GoalVerdict.UNREACHABLE
     assert 'is closed; the shortest leads over the area "wet floor", closed by event' in (
         say_check(check)
@@ -200,7 +200,7 @@ def test_a_door_with_a_bucket_in_it_is_cut_off_too_and_not_too_tight() -> None:
     cells[36:40, 79:82] = 100
     grid = OccupancyGrid(cells=cells, resolution_m=0.05)
     shut = ClosedArea(name="wet floor", outline=corners((2.7, 0.0), (3.2, 4.0)), event_id="E2")
-    open_, closed = atlas_with(grid=grid), atlas_with(shut, grid=grid)
+    open_, closed = world_with(grid=grid), world_with(shut, grid=grid)
     (door,) = open_.rooms.doors
     assert check_place(open_, find_place(open_, door.id)).check.is_ok
     check = check_place(closed, find_place(closed, door.id)).check
@@ -211,9 +211,9 @@ def test_a_door_with_a_bucket_in_it_is_cut_off_too_and_not_too_tight() -> None:
 def test_a_room_without_a_door_is_out_of_reach_and_not_in_the_way_of_its_table() -> None:
     cells = TABLE_IN_THE_MIDDLE.cells.copy()
     cells[:, 14] = 100
-    atlas = atlas_with(grid=OccupancyGrid(cells=cells, resolution_m=0.25))
-    east = max(atlas.rooms.regions, key=lambda region: region.widest.x)
-    check = check_place(atlas, find_place(atlas, east.id)).check
+    world = world_with(grid=OccupancyGrid(cells=cells, resolution_m=0.25))
+    east = max(world.rooms.regions, key=lambda region: region.widest.x)
+    check = check_place(world, find_place(world, east.id)).check
     assert check.verdict is GoalVerdict.UNREACHABLE
 
 
@@ -228,8 +228,8 @@ def test_no_hop_leads_out_of_a_closed_ring_around_the_robot(hole_m: float) -> No
     )
     revision = MapRevision(hall, radius_m=0.2, areas=(ring,))
     robot = Pose(2.5, 2.5)
-    atlas = Atlas(hall, robot, SemanticMap(), radius_m=0.2, revision=revision)
-    check = check_place(atlas, find_place(atlas, "4.2, 4.2")).check
+    world = WorldModel(hall, robot, SemanticMap(), radius_m=0.2, revision=revision)
+    check = check_place(world, find_place(world, "4.2, 4.2")).check
     assert check.verdict is GoalVerdict.UNREACHABLE
     assert "is closed; the shortest leads over the keep-out area 'ring'" in say_check(check)
     assert check.nearest is None
@@ -238,5 +238,5 @@ def test_no_hop_leads_out_of_a_closed_ring_around_the_robot(hole_m: float) -> No
 def test_a_robot_that_stands_in_a_closed_area_still_hops_out_of_it() -> None:
     hall = OccupancyGrid(cells=np.zeros((100, 100), dtype=np.int8), resolution_m=0.05)
     pit = area((1.9, 1.3), (2.1, 1.5))
-    atlas = atlas_with(pit, grid=hall)
-    assert check_place(atlas, find_place(atlas, "4.0, 4.0")).check.is_ok
+    world = world_with(pit, grid=hall)
+    assert check_place(world, find_place(world, "4.0, 4.0")).check.is_ok

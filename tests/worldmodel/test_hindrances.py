@@ -4,9 +4,10 @@ from datetime import timedelta
 
 import pytest
 
-from closing import EAST, NOW, RADIUS_M, WEST, atlas_on, event, goes_north, office, revision_with
+from closing import EAST, NOW, RADIUS_M, WEST, event, goes_north, office, revision_with, world_on
 from guarding import corners
 from mapspeak.geometry import Point, Pose
+from mapspeak.memory.events import Effect, Event
 from mapspeak.places.choosing import find_place
 from mapspeak.places.notices import (
     close_floor_of,
@@ -14,7 +15,6 @@ from mapspeak.places.notices import (
 )
 from mapspeak.places.ways import find_way
 from mapspeak.safety.detours import plan_legs
-from mapspeak.semantic.events import Effect, Event
 from mapspeak.worldmodel.revision import MapRevision
 
 
@@ -61,7 +61,7 @@ def test_a_goal_in_what_is_to_be_avoided_is_reached() -> None:
 
 
 def test_a_way_tells_its_own_length_not_what_it_counts() -> None:
-    plain, hindered = (atlas_on(revision_with(*each)) for each in ((), (event(Effect.AVOID),)))
+    plain, hindered = (world_on(revision_with(*each)) for each in ((), (event(Effect.AVOID),)))
     ways = [
         find_way(each, find_place(each, "robot"), find_place(each, f"{EAST.x}, {EAST.y}"))
         for each in (plain, hindered)

@@ -21,7 +21,7 @@ from mapspeak.errors import MapspeakError
 @click.version_option(__version__, prog_name="mapspeak")
 @click.pass_context
 def cli(context: click.Context) -> None:
-    """Return a robot's map, eyes and memory of places for any language model, over MCP.
+    """Give any language model a robot's map, eyes and memory of places, over MCP.
 
     Without a command it serves the simulated robot over stdio, as an MCP client expects.
     """
@@ -49,12 +49,15 @@ for command, what in COMMANDS.items():
 
 def main() -> None:
     """Run the command line; what went wrong on purpose is said in one line, without a trace."""
+    errors: list[MapspeakError] = []
     try:
         with keep_private():
             cli()
     except* MapspeakError as group:
-        for error in _leaves(group):
-            click.echo(f"mapspeak: {error}", err=True)
+        errors = _leaves(group)
+    for error in errors:
+        click.echo(f"mapspeak: {error}", err=True)
+    if errors:  # not in the clause above, where Python 3.11.2 wraps the exit into a group
         sys.exit(2)
 
 

@@ -13,8 +13,8 @@ from mapspeak.cli.options import FILE
 from mapspeak.errors import ConfigError
 
 if TYPE_CHECKING:
-    from mapspeak.semantic import SemanticMap, SemanticMapStore
-    from mapspeak.semantic.episodes import EpisodeMatch, EpisodeQuery, EpisodeStore, Rank
+    from mapspeak.memory import SemanticMap, SemanticMapStore
+    from mapspeak.memory.episodes import EpisodeMatch, EpisodeQuery, EpisodeStore, Rank
 
 
 MEMORY_OPTION = click.option(
@@ -48,7 +48,7 @@ def open_memory(given: Path | None) -> "SemanticMapStore":
     Raises:
         ConfigError: It is not.
     """
-    from mapspeak.semantic import SemanticMapStore  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.memory import SemanticMapStore  # noqa: PLC0415 - heavy; help must be quick
 
     path = find_memory(given)
     if not path.exists():
@@ -82,7 +82,7 @@ def rename_memory(old: Path, new: Path) -> None:
         old: The file as it was named once.
         new: The file as it is named today.
     """
-    from mapspeak.semantic.episodes import memory_folder  # noqa: PLC0415 - heavy
+    from mapspeak.memory.episodes import memory_folder  # noqa: PLC0415 - heavy
 
     if old == new or not old.exists():
         return
@@ -178,7 +178,7 @@ def read_place(text: str) -> tuple[float, ...]:
 @JSON_OPTION
 def episodes(semantic_map: Path | None, as_json: bool, **asked: Any) -> None:  # noqa: ANN401, FBT001 - click's options
     """List observations that pass every filter, each with the reason why."""
-    from mapspeak.semantic.episodes import EpisodeStore, memory_folder  # noqa: PLC0415 - heavy
+    from mapspeak.memory.episodes import EpisodeStore, memory_folder  # noqa: PLC0415 - heavy
 
     store = EpisodeStore(memory_folder(find_memory(semantic_map)))
     query = _query(**asked)
@@ -206,7 +206,7 @@ def _query(
     **same: Any,  # noqa: ANN401 - what a query calls as the command line does
 ) -> "EpisodeQuery":
     from mapspeak.geometry import Point  # noqa: PLC0415 - heavy; help must be quick
-    from mapspeak.semantic.episodes import EpisodeOrder, EpisodeQuery, ObservationKind  # noqa: PLC0415
+    from mapspeak.memory.episodes import EpisodeOrder, EpisodeQuery, ObservationKind  # noqa: PLC0415
 
     if near is not None and near_words is not None:
         raise click.UsageError("Give --near or --near-words, not both.")
@@ -225,8 +225,8 @@ def _query(
 
 def _rank(store: "EpisodeStore") -> "Rank | None":
     """Compare meanings where a model is installed; else words are compared."""
-    from mapspeak.semantic.episodes import VectorRank  # noqa: PLC0415 - heavy; help must be quick
-    from mapspeak.semantic.retrieval import find_model  # noqa: PLC0415
+    from mapspeak.memory.episodes import VectorRank  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.memory.retrieval import find_model  # noqa: PLC0415
 
     model = find_model()
     return None if model is None else VectorRank(store.database, model)

@@ -22,9 +22,9 @@ from mapspeak.errors import ConfigError, SemanticMapError, say_cause
 from mapspeak.installation import say_install, shell_command
 
 if TYPE_CHECKING:
-    from mapspeak.semantic import SemanticMap, Waypoint
-    from mapspeak.semantic.exchange import ExchangeFormat, Union
-    from mapspeak.semantic.retrieval import EntryCandidate
+    from mapspeak.memory import SemanticMap, Waypoint
+    from mapspeak.memory.exchange import ExchangeFormat, Union
+    from mapspeak.memory.retrieval import EntryCandidate
 
 
 FORMATS = ("geojson", "csv", "osm")
@@ -49,7 +49,7 @@ def export(
     semantic_map: Path | None,
 ) -> None:
     """Write the places as GeoJSON, CSV, or osmAG for JOSM."""
-    from mapspeak.semantic.exchange import export_text  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.memory.exchange import export_text  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.spatial.areagraph import MapAnchor  # noqa: PLC0415
 
     wanted = _format(form, out, "--out")
@@ -71,8 +71,8 @@ def export(
 @MEMORY_OPTION
 def import_(file: Path, form: str | None, semantic_map: Path | None) -> None:
     """Join what was exported, and perhaps edited, into the semantic map file: all or nothing."""
-    from mapspeak.semantic import SemanticMapStore  # noqa: PLC0415 - heavy; help must be quick
-    from mapspeak.semantic.exchange import import_text, merge_into  # noqa: PLC0415
+    from mapspeak.memory import SemanticMapStore  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.memory.exchange import import_text, merge_into  # noqa: PLC0415
 
     wanted = _format(form, file, "FILE")
     try:
@@ -92,7 +92,7 @@ def import_(file: Path, form: str | None, semantic_map: Path | None) -> None:
 @click.option("--out", type=FILE, required=True, help="The new file; must not be there yet.")
 def merge(first: Path, second: Path, out: Path) -> None:
     """Join two semantic map files of one map, and their observations, into a new one."""
-    from mapspeak.semantic.exchange import merge_files  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.memory.exchange import merge_files  # noqa: PLC0415 - heavy; help must be quick
 
     union, came = merge_files(first, second, out=out)
     _tell(union, out)
@@ -100,7 +100,7 @@ def merge(first: Path, second: Path, out: Path) -> None:
 
 
 def _format(given: str | None, file: Path | None, what: str) -> "ExchangeFormat":
-    from mapspeak.semantic.exchange import ExchangeFormat  # noqa: PLC0415 - heavy
+    from mapspeak.memory.exchange import ExchangeFormat  # noqa: PLC0415 - heavy
 
     name = given or (file.suffix.lower().removeprefix(".") if file else "")
     if name not in FORMATS:
@@ -119,7 +119,7 @@ def _tell(union: "Union", path: Path) -> None:
 
 @click.group()
 def memory() -> None:
-    """Look at, checks and shares a memory of places: a semantic map file and its episodes."""
+    """Look at, check and share a memory of places: a semantic map file and its episodes."""
 
 
 @memory.command("list")
@@ -171,8 +171,8 @@ def find(
 
     Ends with 1 when nothing of the kind is remembered.
     """
-    from mapspeak.semantic.episodes import memory_folder  # noqa: PLC0415 - heavy; help must be quick
-    from mapspeak.semantic.retrieval import (  # noqa: PLC0415
+    from mapspeak.memory.episodes import memory_folder  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.memory.retrieval import (  # noqa: PLC0415
         EntryIndex,
         TextVectors,
         Verdict,
@@ -236,10 +236,10 @@ for command in (episodes, export, import_, merge):
 
 
 def _findings(places: "SemanticMap", map_file: Path) -> list[dict[str, object]]:
-    from mapspeak.semantic.consistency import (  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.memory.consistency import (  # noqa: PLC0415 - heavy; help must be quick
         check_memory,
     )
-    from mapspeak.semantic.things import find_things  # noqa: PLC0415
+    from mapspeak.memory.things import find_things  # noqa: PLC0415
     from mapspeak.server.text.findings import say_finding  # noqa: PLC0415
     from mapspeak.spatial.mapfiles import load_map  # noqa: PLC0415
     from mapspeak.spatial.rooms import find_rooms  # noqa: PLC0415
@@ -256,7 +256,7 @@ def _findings(places: "SemanticMap", map_file: Path) -> list[dict[str, object]]:
 def _named(name: str, places: "SemanticMap") -> "Waypoint":
     import difflib  # noqa: PLC0415 - only for a mistake
 
-    from mapspeak.semantic.quoting import quote_name  # noqa: PLC0415
+    from mapspeak.memory.quoting import quote_name  # noqa: PLC0415
 
     place = places.find_waypoint(name)
     if place is None:
@@ -284,7 +284,7 @@ def _facts_of(places: "SemanticMap") -> dict[str, object]:
 
 
 def _facts(place: "Waypoint") -> dict[str, object]:
-    from mapspeak.semantic.exchange import facts_of, place_of  # noqa: PLC0415 - heavy
+    from mapspeak.memory.exchange import facts_of, place_of  # noqa: PLC0415 - heavy
 
     point, facts = place_of(place), facts_of(place)
     return {"name": facts.pop("name"), "x_m": point.x, "y_m": point.y} | facts

@@ -341,7 +341,7 @@ def _tell_typist(what: str) -> None:
 async def _open_session(
     name: str, start: RobotStart, options: ServeOptions, links: AsyncExitStack, scratch: Path
 ) -> "Session":
-    from mapspeak.semantic import SemanticMapStore  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.memory import SemanticMapStore  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.session import Session  # noqa: PLC0415
 
     choice = start.choice

@@ -6,8 +6,8 @@ from datetime import datetime
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
-from mapspeak.semantic import Waypoint
-from mapspeak.semantic.episodes import (
+from mapspeak.memory import Waypoint
+from mapspeak.memory.episodes import (
     EpisodeStore,
     Observation,
     ObservationKind,

@@ -10,10 +10,10 @@ from datetime import datetime, timedelta
 
 from mapspeak.driving.drivereport import Drive
 from mapspeak.geometry import Point
+from mapspeak.memory import SemanticMapStore
+from mapspeak.memory.events import OPEN_AGAIN, ROBOT, SHUT, Effect, Event, current_events
 from mapspeak.places.notices import end_event, find_hindrances
 from mapspeak.robot import GoalState
-from mapspeak.semantic import SemanticMapStore
-from mapspeak.semantic.events import OPEN_AGAIN, ROBOT, SHUT, Effect, Event, current_events
 from mapspeak.spatial.paths import Path
 from mapspeak.worldmodel.closures import outline_of_door
 from mapspeak.worldmodel.revision import MapRevision

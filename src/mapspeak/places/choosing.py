@@ -26,11 +26,11 @@ from mapspeak.places.standing import (
 )
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
 
 
-def find_place(atlas: Atlas, words: str) -> Place:
+def find_place(world: WorldModel, words: str) -> Place:
     """Find what is meant by an id, a remembered name, coordinates, "robot", a relation or a thing.
 
     A relation is such as "left of W3" or "between D1 and D2"; `mapspeak.places.relations`. A
@@ -40,11 +40,11 @@ def find_place(atlas: Atlas, words: str) -> Place:
         GoalError: There is no such place, or there are several; the hint says what became of it
             and what there is.
     """
-    place = find_named(atlas, words) or find_related(atlas, words) or find_thing(atlas, words)
+    place = find_named(world, words) or find_related(world, words) or find_thing(world, words)
     if place is None:
-        raise no_such_place(atlas, words)
+        raise no_such_place(world, words)
     if isinstance(place.thing, RememberedThing) and not place.reason:
-        return place_of(atlas, place.thing, name=place.name)
+        return place_of(world, place.thing, name=place.name)
     return place
 
 
@@ -79,7 +79,7 @@ class CheckedGoal:
 
 
 def choose_goal(
-    atlas: Atlas, *, place: str | None, x: float | None, y: float | None, yaw_deg: float | None
+    world: WorldModel, *, place: str | None, x: float | None, y: float | None, yaw_deg: float | None
 ) -> CheckedGoal:
     """Return the pose to drive to for a place or for coordinates, checked against the map.
 
@@ -87,8 +87,8 @@ def choose_goal(
         GoalError: Neither or both were given, there is no such place, or the robot cannot drive
             there; the hint names the nearest pose that would work.
     """
-    meant = read_place(atlas, place=place, x=x, y=y)
-    goal = check_place(atlas, meant, yaw_deg=yaw_deg)
+    meant = read_place(world, place=place, x=x, y=y)
+    goal = check_place(world, meant, yaw_deg=yaw_deg)
     if not goal.check.is_ok:
         has_heading = yaw_deg is not None or _has_heading(meant)
         hint, step = _what_instead(goal.check, has_heading=has_heading)
@@ -96,14 +96,14 @@ def choose_goal(
     return goal
 
 
-def read_place(atlas: Atlas, *, place: str | None, x: float | None, y: float | None) -> Place:
+def read_place(world: WorldModel, *, place: str | None, x: float | None, y: float | None) -> Place:
     """Return the place that was named, or that of the coordinates.
 
     Raises:
         GoalError: Neither or both were given, or there is no such place.
     """
     if place is not None and x is None and y is None:
-        return find_place(atlas, place)
+        return find_place(world, place)
     if place is None and x is not None and y is not None:
         point = Point(x, y)
         return Place(say_spot(point), Spot(point))
@@ -113,15 +113,15 @@ def read_place(atlas: Atlas, *, place: str | None, x: float | None, y: float | N
     )
 
 
-def check_place(atlas: Atlas, place: Place, *, yaw_deg: float | None = None) -> CheckedGoal:
+def check_place(world: WorldModel, place: Place, *, yaw_deg: float | None = None) -> CheckedGoal:
     """Judge the pose in which the robot would stand at a place."""
-    pose = stand_at(atlas, place)
+    pose = stand_at(world, place)
     if yaw_deg is not None:
         pose = Pose(pose.x, pose.y, wrap_angle(math.radians(yaw_deg)))
-    check = check_goal(atlas.grid, atlas.distances, pose, opened=atlas.map.open.distances_from)
+    check = check_goal(world.grid, world.distances, pose, opened=world.map.open.distances_from)
     is_free = yaw_deg is None and not _has_heading(place)
     if check.nearest is not None and is_free:
-        check = replace(check, nearest=arrival_pose(atlas, check.nearest.point))
+        check = replace(check, nearest=arrival_pose(world, check.nearest.point))
     straight_on = is_free and not isinstance(place.thing, Region)
     return CheckedGoal(place.name, pose, check, place.reason, straight_on)
 
@@ -137,22 +137,22 @@ def _has_heading(place: Place) -> bool:
             return True
 
 
-def stand_at(atlas: Atlas, place: Place) -> Pose:
+def stand_at(world: WorldModel, place: Place) -> Pose:
     """Return the pose to drive to for a place, whether or not the robot can stand there."""
     match place.thing:
         case Region() as region:
-            point = choose_standing_point(atlas, region)
-            return Pose(point.x, point.y, facing_in(atlas, region, point))
+            point = choose_standing_point(world, region)
+            return Pose(point.x, point.y, facing_in(world, region, point))
         case Door() as door:
-            return arrival_pose(atlas, choose_crossing(atlas, door))
+            return arrival_pose(world, choose_crossing(world, door))
         case Frontier(pose=pose):
             return pose
         case RememberedPlace(waypoint=waypoint):
             return waypoint.pose
         case RememberedThing() as remembered:
-            return stand_before(atlas, remembered)
+            return stand_before(world, remembered)
         case Spot(point=point, yaw_rad=yaw_rad):
-            straight_on = arrival_pose(atlas, point)
+            straight_on = arrival_pose(world, point)
             return straight_on if yaw_rad is None else Pose(point.x, point.y, yaw_rad)
 
 

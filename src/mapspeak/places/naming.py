@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point, wrap_angle
+from mapspeak.memory import name_key
+from mapspeak.memory.quoting import quote_name
+from mapspeak.memory.retrieval import Answer, Basis, Verdict
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.places.standing import stand_before
-from mapspeak.semantic import name_key
-from mapspeak.semantic.quoting import quote_name
-from mapspeak.semantic.retrieval import Answer, Basis, Verdict
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door, Region
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
 
 MOST_NAMED = 12
@@ -86,22 +86,22 @@ class AmbiguousPlaceError(GoalError):
         self.meanings = tuple(meanings)
 
 
-def find_named(atlas: Atlas, words: str) -> Place | None:
+def find_named(world: WorldModel, words: str) -> Place | None:
     """Find what is called so: an id, a remembered name, "x, y", "x, y, yaw", or "robot".
 
     Raises:
         AmbiguousPlaceError: Several remembered places have that name.
     """
     wanted = words.strip()
-    place = _find_by_id(atlas, wanted.upper()) if ID.fullmatch(wanted) else None
-    return place or _find_by_name(atlas, wanted) or _read_spot(atlas, wanted)
+    place = _find_by_id(world, wanted.upper()) if ID.fullmatch(wanted) else None
+    return place or _find_by_name(world, wanted) or _read_spot(world, wanted)
 
 
-def no_such_place(atlas: Atlas, words: str) -> GoalError:
+def no_such_place(world: WorldModel, words: str) -> GoalError:
     """Return the error for words that name no place: what became of it, and what there is."""
     wanted = words.strip()
-    hint, step = _known_places(atlas, wanted)
-    return GoalError(_what_became_of(atlas, wanted), hint=hint, step=step)
+    hint, step = _known_places(world, wanted)
+    return GoalError(_what_became_of(world, wanted), hint=hint, step=step)
 
 
 def is_taken_name(name: str) -> bool:
@@ -117,25 +117,25 @@ def say_spot(point: Point) -> str:
     return f"({point.x:.2f}, {point.y:.2f})" if is_on_earth else f"({point.x:g}, {point.y:g})"
 
 
-def _find_by_id(atlas: Atlas, place_id: str) -> Place | None:
+def _find_by_id(world: WorldModel, place_id: str) -> Place | None:
     """Find a thing by its id; a region whatever it was taken for when it got its number."""
-    region = atlas.rooms.find_region(place_id)
+    region = world.rooms.find_region(place_id)
     if region is not None:
         return Place(region.id, region)
     if place_id.startswith("T"):
-        remembered = atlas.recollection.find_thing(place_id)
+        remembered = world.recollection.find_thing(place_id)
         return None if remembered is None else Place(remembered.id, remembered)
     things: list[Door | Frontier | RememberedPlace] = [
-        *atlas.rooms.doors,
-        *atlas.frontiers.frontiers,
-        *atlas.places,
+        *world.rooms.doors,
+        *world.frontiers.frontiers,
+        *world.places,
     ]
     return next((Place(thing.id, thing) for thing in things if thing.id == place_id), None)
 
 
-def _find_by_name(atlas: Atlas, name: str) -> Place | None:
+def _find_by_name(world: WorldModel, name: str) -> Place | None:
     wanted = name_key(name)
-    named = [each for each in atlas.places if name_key(each.waypoint.name) == wanted]
+    named = [each for each in world.places if name_key(each.waypoint.name) == wanted]
     if len(named) > 1:
         ids = ", ".join(
             f"{each.id} at {say_spot(each.waypoint.pose.point)}" for each in named[:MOST_NAMED]
@@ -149,9 +149,9 @@ def _find_by_name(atlas: Atlas, name: str) -> Place | None:
     return Place(name, named[0]) if named else None
 
 
-def _read_spot(atlas: Atlas, words: str) -> Place | None:
+def _read_spot(world: WorldModel, words: str) -> Place | None:
     if words.casefold() in ROBOT_NAMES:
-        return Place("robot", Spot(atlas.robot.point, atlas.robot.yaw_rad))
+        return Place("robot", Spot(world.robot.point, world.robot.yaw_rad))
     match = SPOT.fullmatch(words)
     if match is None:
         return None
@@ -161,29 +161,29 @@ def _read_spot(atlas: Atlas, words: str) -> Place | None:
     return Place(say_spot(point), Spot(point, yaw_rad))
 
 
-def _what_became_of(atlas: Atlas, place: str) -> str:
-    gone = next((each for each in atlas.rooms.vanished if each.id == place.upper()), None)
+def _what_became_of(world: WorldModel, place: str) -> str:
+    gone = next((each for each in world.rooms.vanished if each.id == place.upper()), None)
     if gone is not None and gone.became:
         return f"{gone.id} is no longer found: its floor is now {' and '.join(gone.became)}."
     if gone is not None:
         return f"{gone.id} is no longer found on the map."
-    if re.fullmatch(r"[Ff]\d+", place) and 1 <= int(place[1:]) <= atlas.frontiers.n_named:
+    if re.fullmatch(r"[Ff]\d+", place) and 1 <= int(place[1:]) <= world.frontiers.n_named:
         return f"Frontier {place.upper()} is gone: what lay behind it has been seen or refused."
-    if re.fullmatch(r"[Tt]\d+", place) and 1 <= int(place[1:]) <= atlas.recollection.n_named:
+    if re.fullmatch(r"[Tt]\d+", place) and 1 <= int(place[1:]) <= world.recollection.n_named:
         return f"The thing {place.upper()} is no longer remembered."
     return f"There is no place called {place[:80]!r}."
 
 
-def _known_places(atlas: Atlas, wanted: str) -> tuple[str, NextStep]:
-    if atlas.places and not ID.fullmatch(wanted):
-        answer = atlas.recollection.find(wanted, limit=MOST_GUESSES)
+def _known_places(world: WorldModel, wanted: str) -> tuple[str, NextStep]:
+    if world.places and not ID.fullmatch(wanted):
+        answer = world.recollection.find(wanted, limit=MOST_GUESSES)
         if answer.verdict is not Verdict.NOT_REMEMBERED:
             return _say_guesses(answer), NextStep.READ_MORE
     groups = {
-        "rooms and corridors": [region.id for region in atlas.rooms.regions],
-        "doors": [door.id for door in atlas.rooms.doors],
-        "frontiers": [frontier.id for frontier in atlas.frontiers.frontiers],
-        "remembered": [place.id for place in atlas.places],
+        "rooms and corridors": [region.id for region in world.rooms.regions],
+        "doors": [door.id for door in world.rooms.doors],
+        "frontiers": [frontier.id for frontier in world.frontiers.frontiers],
+        "remembered": [place.id for place in world.places],
     }
     known = [f"{name} {_some_of(ids)}" for name, ids in groups.items() if ids]
     return f"Known are {'; '.join(known) or 'no places yet'}.", NextStep.SEE_PLACES
@@ -214,7 +214,7 @@ ARTICLE = re.compile(r"(?:the|an?|any|some)\s+", re.IGNORECASE)
 IN_ROOM = re.compile(r"(?P<label>.+)\s+in\s+(?:the\s+)?(?P<room>.+)", re.IGNORECASE | re.DOTALL)
 
 
-def find_thing(atlas: Atlas, words: str) -> Place | None:
+def find_thing(world: WorldModel, words: str) -> Place | None:
     """Find the thing that is called so: "fire extinguisher", "nearest sink", "ladder in R2".
 
     Only its name counts, never what it means: nobody is driven to a guess.
@@ -224,44 +224,44 @@ def find_thing(atlas: Atlas, words: str) -> Place | None:
     """
     nearest = NEAREST.fullmatch(words)
     wanted = words if nearest is None else nearest["label"]
-    label, room_id = split_room(atlas, wanted)
+    label, room_id = split_room(world, wanted)
     called = [
         each
-        for each in atlas.recollection.find_called(label)
-        if room_id is None or room_id in atlas.rooms_before(each)
+        for each in world.recollection.find_called(label)
+        if room_id is None or room_id in world.rooms_before(each)
     ]
     if not called:
         return None
     if len(called) == 1:
-        return place_of(atlas, called[0], name=words.strip())
+        return place_of(world, called[0], name=words.strip())
     if nearest is not None:
-        start = find_named(atlas, nearest["to"]) if nearest["to"] else None
+        start = find_named(world, nearest["to"]) if nearest["to"] else None
         if start is not None or not nearest["to"]:
-            best = min(called, key=lambda each: (_away_m(atlas, each, start), int(each.id[1:])))
-            return place_of(atlas, best, name=words.strip())
+            best = min(called, key=lambda each: (_away_m(world, each, start), int(each.id[1:])))
+            return place_of(world, best, name=words.strip())
     bare = ARTICLE.sub("", wanted.strip(), count=1)[:80]
     unknown = "" if nearest is None else f", and no place is called {nearest['to'].strip()[:80]!r}"
     raise AmbiguousPlaceError(
         f"{len(called)} remembered things are called {bare!r}{unknown}.",
-        hint=f"They are {_say_candidates(atlas, called)}. Give the id of the one that is meant, or "
+        hint=f"They are {_say_candidates(world, called)}. Give the id of the one that is meant, or "
         f"say 'nearest {bare}'.",
         words=words,
         meanings=[each.id for each in called],
     )
 
 
-def place_of(atlas: Atlas, remembered: RememberedThing, *, name: str | None = None) -> Place:
+def place_of(world: WorldModel, remembered: RememberedThing, *, name: str | None = None) -> Place:
     """Return a thing as a place, with where it is known to be and how well.
 
     Args:
-        atlas: The map.
+        world: The map.
         remembered: The thing.
         name: The words that were used for it; its id where None.
     """
     thing = remembered.thing
     seen_from = " ".join(
         dict.fromkeys(
-            place.id for each in thing.waypoints if (place := atlas.recollection.find_place(each))
+            place.id for each in thing.waypoints if (place := world.recollection.find_place(each))
         )
     )
     said = [f"the {quote_name(thing.label)} {remembered.id}"]
@@ -269,7 +269,7 @@ def place_of(atlas: Atlas, remembered: RememberedThing, *, name: str | None = No
         said.append("nobody noted where it is, so the goal is where it was seen from")
     else:
         said[0] += f" at {say_spot(thing.position)}, good to {thing.uncertainty_m:.1f} m"
-        if atlas.find_approach(remembered) is None:
+        if world.find_approach(remembered) is None:
             said.append("no floor near it can be reached, so the goal is where it was seen from")
     said.append(f"seen from {seen_from}")
     if thing.conflicting:
@@ -277,35 +277,35 @@ def place_of(atlas: Atlas, remembered: RememberedThing, *, name: str | None = No
     return Place(name or remembered.id, remembered, "; ".join(said))
 
 
-def split_room(atlas: Atlas, words: str) -> tuple[str, str | None]:
+def split_room(world: WorldModel, words: str) -> tuple[str, str | None]:
     """Divide "ladder in R2" into the name and the room's id; None where no room is named so."""
     match = IN_ROOM.fullmatch(words)
-    room = None if match is None else find_named(atlas, match["room"])
+    room = None if match is None else find_named(world, match["room"])
     if match is None or room is None or not isinstance(room.thing, Region):
         return words, None
     return match["label"], room.thing.id
 
 
-def _away_m(atlas: Atlas, remembered: RememberedThing, start: Place | None) -> float:
+def _away_m(world: WorldModel, remembered: RememberedThing, start: Place | None) -> float:
     """Return the metres to a thing: by path from the robot, straight from another place."""
     if start is not None:
         return start.point.distance_to(remembered.point)
-    path_m = _path_m(atlas, remembered)
+    path_m = _path_m(world, remembered)
     return math.inf if path_m is None else path_m
 
 
-def _path_m(atlas: Atlas, remembered: RememberedThing) -> float | None:
-    stand: Point = stand_before(atlas, remembered).point
-    return atlas.path_m(stand)
+def _path_m(world: WorldModel, remembered: RememberedThing) -> float | None:
+    stand: Point = stand_before(world, remembered).point
+    return world.path_m(stand)
 
 
-def _say_candidates(atlas: Atlas, called: Sequence[RememberedThing]) -> str:
-    told = [_say_candidate(atlas, each) for each in called[:MOST_NAMED]]
+def _say_candidates(world: WorldModel, called: Sequence[RememberedThing]) -> str:
+    told = [_say_candidate(world, each) for each in called[:MOST_NAMED]]
     n_more = len(called) - len(told)
     return ", ".join(told) + (f" and {n_more} more" if n_more else "")
 
 
-def _say_candidate(atlas: Atlas, remembered: RememberedThing) -> str:
-    rooms = " or ".join(atlas.rooms_before(remembered)) or "no room"
-    path_m = _path_m(atlas, remembered)
+def _say_candidate(world: WorldModel, remembered: RememberedThing) -> str:
+    rooms = " or ".join(world.rooms_before(remembered)) or "no room"
+    path_m = _path_m(world, remembered)
     return f"{remembered.id} in {rooms}, {'no way' if path_m is None else f'{path_m:.1f} m'}"

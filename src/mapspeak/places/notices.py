@@ -8,16 +8,16 @@ import numpy as np
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
-from mapspeak.places.choosing import find_place
-from mapspeak.places.naming import Place, Spot
-from mapspeak.semantic import LEFT_OUT, Concern, SemanticMapStore
-from mapspeak.semantic.events import (
+from mapspeak.memory import LEFT_OUT, Concern, SemanticMapStore
+from mapspeak.memory.events import (
     Effect,
     Event,
     current_events,
     find_place_ids,
     gives_orders,
 )
+from mapspeak.places.choosing import find_place
+from mapspeak.places.naming import Place, Spot
 from mapspeak.spatial.rooms import Door, Region, RoomMap
 from mapspeak.worldmodel.closures import (
     ClosedArea,
@@ -26,7 +26,7 @@ from mapspeak.worldmodel.closures import (
     outline_of_door,
     outlines_of_region,
 )
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.revision import Hindrance, MapRevision
 
 SPOT_RADIUS_M = 0.5
@@ -39,7 +39,7 @@ SLOW_FACTOR, SLOW_EXTRA_M = 2.0, 5.0
 
 
 def note_event(
-    atlas: Atlas,
+    world: WorldModel,
     store: SemanticMapStore,
     *,
     text: str,
@@ -53,7 +53,7 @@ def note_event(
     """Remember an event, with the outline that its place has now; return it as it was written.
 
     Args:
-        atlas: The map as it is now.
+        world: The map as it is now.
         store: Where to write.
         text: What is the matter.
         effect: What it means for ways.
@@ -74,19 +74,19 @@ def note_event(
             hint="Give a time that is still to come, with its zone.",
         )
     _require_no_orders(event=text, place=place or "", source=source)
-    found = None if place is None else find_place(atlas, place)
+    found = None if place is None else find_place(world, place)
     event = Event(
         text=text,
         place="" if found is None else _name_of(found, place or "", effect),
         effect=effect,
         at=None if found is None else found.point,
-        outlines=() if found is None or effect is Effect.NONE else _outlines_of(atlas.rooms, found),
+        outlines=() if found is None or effect is Effect.NONE else _outlines_of(world.rooms, found),
         begins=begins,
         until=until,
         source=source,
         recorded_at=now,
     )
-    _require_robot_outside(atlas, event, now)
+    _require_robot_outside(world, event, now)
     return store.write_event(event)
 
 
@@ -100,33 +100,33 @@ def _require_no_orders(**said: str) -> None:
             )
 
 
-def say_consequences(atlas: Atlas, event: Event, now: datetime) -> tuple[str, ...]:
+def say_consequences(world: WorldModel, event: Event, now: datetime) -> tuple[str, ...]:
     """Return what an event that closes floor means for the robot, where it stands now.
 
     Args:
-        atlas: The map before the event.
+        world: The map before the event.
         event: As it was written.
         now: The operator's time.
     """
     if event.effect is not Effect.CLOSED:
         return ()
-    area = _area_of(event, atlas.map, now)
+    area = _area_of(event, world.map, now)
     if area is None:
         return ()
-    if area.contains(atlas.robot.point):
+    if area.contains(world.robot.point):
         return ("The robot stands inside: it has to drive out before that begins.",)
-    cut_off = _find_cut_off(atlas, area)
+    cut_off = _find_cut_off(world, area)
     if not cut_off:
         return ()
     return (f"While it lasts the robot cannot get to {', '.join(cut_off)} from where it is.",)
 
 
-def _require_robot_outside(atlas: Atlas, event: Event, now: datetime) -> None:
+def _require_robot_outside(world: WorldModel, event: Event, now: datetime) -> None:
     """Refuse what would close the floor below the robot: it could drive nowhere any more."""
     if event.effect is not Effect.CLOSED or not event.is_current(now):
         return
-    area = _area_of(event, atlas.map, now)
-    if area is not None and area.contains(atlas.robot.point):
+    area = _area_of(event, world.map, now)
+    if area is not None and area.contains(world.robot.point):
         raise SemanticMapError(
             f"The robot itself stands in {event.place or 'what is to be closed'}; closed, it could "
             "not drive out. Nothing was noted.",
@@ -134,15 +134,15 @@ def _require_robot_outside(atlas: Atlas, event: Event, now: datetime) -> None:
         )
 
 
-def _find_cut_off(atlas: Atlas, area: ClosedArea) -> list[str]:
+def _find_cut_off(world: WorldModel, area: ClosedArea) -> list[str]:
     """Return the rooms beside a closed area that the robot gets to only while it is open."""
-    before = atlas.distances.build_reachable_mask()
-    closed = atlas.map.with_areas((*atlas.map.areas, area), atlas.map.hindrances)
-    after = closed.distances_from(atlas.robot.point).build_reachable_mask()
-    labels = atlas.rooms.labels
+    before = world.distances.build_reachable_mask()
+    closed = world.map.with_areas((*world.map.areas, area), world.map.hindrances)
+    after = closed.distances_from(world.robot.point).build_reachable_mask()
+    labels = world.rooms.labels
     return [
         region.id
-        for region in atlas.rooms.regions
+        for region in world.rooms.regions
         if not area.contains(region.widest)
         and np.count_nonzero(after & (labels == region.index))
         < REST_RATIO * np.count_nonzero(before & (labels == region.index))

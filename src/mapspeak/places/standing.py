@@ -12,7 +12,7 @@ from mapspeak.spatial.grid import FloatArray, IntArray
 from mapspeak.spatial.paths import Path
 from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap
 from mapspeak.spatial.visibility import cast_rays
-from mapspeak.worldmodel.model import Atlas, find_crossing
+from mapspeak.worldmodel.model import WorldModel, find_crossing
 from mapspeak.worldmodel.recollection import RememberedThing
 from mapspeak.worldmodel.revision import MapRevision
 
@@ -23,48 +23,48 @@ HALF_VIEW_RAD = math.radians(30)
 """What is seen at once: half the opening of a common camera."""
 
 
-def find_standing_point(atlas: Atlas, region: Region) -> Point | None:
+def find_standing_point(world: WorldModel, region: Region) -> Point | None:
     """Find a reachable point of a region with room around it, near its middle, or None."""
-    known = atlas.reach.standing
+    known = world.reach.standing
     if region.id not in known:
-        known[region.id] = _search(atlas, atlas.map, region)
+        known[region.id] = _search(world, world.map, region)
     return known[region.id]
 
 
-def choose_standing_point(atlas: Atlas, region: Region) -> Point:
+def choose_standing_point(world: WorldModel, region: Region) -> Point:
     """Return where the robot stands in a region, or would if it got there.
 
     What is asked about a region out of reach is then answered for the way there, and not for
     furniture that happens to be in the middle of it.
     """
-    known = atlas.reach.out_of_reach
-    found = find_standing_point(atlas, region) or known.get(region.id)
+    known = world.reach.out_of_reach
+    found = find_standing_point(world, region) or known.get(region.id)
     if found is None:
-        opened = atlas.map.open
-        found = None if opened is atlas.map else _search(atlas, opened, region)
-        found = known[region.id] = found or _roomiest(atlas, opened, region)
+        opened = world.map.open
+        found = None if opened is world.map else _search(world, opened, region)
+        found = known[region.id] = found or _roomiest(world, opened, region)
     return found
 
 
-def choose_crossing(atlas: Atlas, door: Door) -> Point:
+def choose_crossing(world: WorldModel, door: Door) -> Point:
     """Return where the robot passes a door, or would if nothing was closed; else its middle."""
-    found = atlas.find_crossing(door)
-    if found is None and atlas.map.open is not atlas.map:
-        opened = atlas.map.open.distances_from(atlas.robot.point)
-        found = find_crossing(atlas.rooms, opened, door)
+    found = world.find_crossing(door)
+    if found is None and world.map.open is not world.map:
+        opened = world.map.open.distances_from(world.robot.point)
+        found = find_crossing(world.rooms, opened, door)
     return found or door.place
 
 
-def _search(atlas: Atlas, revision: MapRevision, region: Region) -> Point | None:
+def _search(world: WorldModel, revision: MapRevision, region: Region) -> Point | None:
     """Find where to stand by the ways and the clearances of one state of the map."""
-    middle = _middle_of(atlas, region)
-    distances = revision.distances_from(atlas.robot.point)
-    comfortable_m = atlas.radius_m + COMFORT_M
-    cell = atlas.grid.cell_at(middle)
+    middle = _middle_of(world, region)
+    distances = revision.distances_from(world.robot.point)
+    comfortable_m = world.radius_m + COMFORT_M
+    cell = world.grid.cell_at(middle)
     is_roomy = revision.clearance_m[cell.row, cell.col] >= comfortable_m
     if is_roomy and distances.is_reachable(middle):
         return middle
-    rows, cols = _cells_of(atlas.rooms, region)
+    rows, cols = _cells_of(world.rooms, region)
     distances_m = distances.distances_at(rows, cols)
     clear_m = revision.clearance_m[rows, cols]
     reachable = np.flatnonzero(np.isfinite(distances_m))
@@ -72,18 +72,18 @@ def _search(atlas: Atlas, revision: MapRevision, region: Region) -> Point | None
         return None
     enough_m = min(comfortable_m, float(clear_m[reachable].max()))
     reachable = reachable[clear_m[reachable] >= enough_m]
-    points = atlas.grid.points_at(rows[reachable], cols[reachable])
+    points = world.grid.points_at(rows[reachable], cols[reachable])
     away_m = np.hypot(points[:, 0] - middle.x, points[:, 1] - middle.y)
     best = points[int(np.argmin(away_m))]
     return Point(float(best[0]), float(best[1]))
 
 
-def _roomiest(atlas: Atlas, revision: MapRevision, region: Region) -> Point:
+def _roomiest(world: WorldModel, revision: MapRevision, region: Region) -> Point:
     """Return the point of a region that is farthest from what stands in it."""
-    rows, cols = _cells_of(atlas.rooms, region)
-    clear_m = np.where(atlas.grid.free[rows, cols], revision.clearance_m[rows, cols], -1.0)
+    rows, cols = _cells_of(world.rooms, region)
+    clear_m = np.where(world.grid.free[rows, cols], revision.clearance_m[rows, cols], -1.0)
     best = int(np.argmax(clear_m))
-    return atlas.grid.point_at(Cell(int(rows[best]), int(cols[best])))
+    return world.grid.point_at(Cell(int(rows[best]), int(cols[best])))
 
 
 def _cells_of(rooms: RoomMap, region: Region) -> tuple[IntArray, IntArray]:
@@ -93,22 +93,22 @@ def _cells_of(rooms: RoomMap, region: Region) -> tuple[IntArray, IntArray]:
     return rows + window[0].start, cols + window[1].start
 
 
-def _middle_of(atlas: Atlas, region: Region) -> Point:
+def _middle_of(world: WorldModel, region: Region) -> Point:
     """Return the widest point of a room, and the middle of the walk along a corridor."""
-    walk = atlas.map.walk_along(region) if region.room_class is RoomClass.CORRIDOR else None
+    walk = world.map.walk_along(region) if region.room_class is RoomClass.CORRIDOR else None
     return region.widest if walk is None else walk.middle
 
 
-def arrival_pose(atlas: Atlas, point: Point) -> Pose:
+def arrival_pose(world: WorldModel, point: Point) -> Pose:
     """Return the pose at a point in which the robot ends when it drives there straight on.
 
     It is the direction of the last stretch of the way, as long as the robot: a way over cells may
     end with a step aside, and nobody wants the robot to turn for that.
     """
     is_near = max(abs(point.x), abs(point.y)) < FARTHEST_M
-    path = atlas.map.find_path_over(atlas.distances, point) if is_near else None
-    before = None if path is None else _back_from_end(path, 2 * atlas.radius_m)
-    yaw_rad = atlas.robot.yaw_rad if before is None else before.bearing_to(point)
+    path = world.map.find_path_over(world.distances, point) if is_near else None
+    before = None if path is None else _back_from_end(path, 2 * world.radius_m)
+    yaw_rad = world.robot.yaw_rad if before is None else before.bearing_to(point)
     return Pose(point.x, point.y, yaw_rad)
 
 
@@ -124,40 +124,40 @@ def _back_from_end(path: Path, away_m: float) -> Point | None:
     return backwards[-1] if backwards[-1] != backwards[0] else None
 
 
-def stand_before(atlas: Atlas, remembered: RememberedThing) -> Pose:
+def stand_before(world: WorldModel, remembered: RememberedThing) -> Pose:
     """Return the pose that faces a thing from near, else one that it was seen from."""
-    near = atlas.find_approach(remembered)
+    near = world.find_approach(remembered)
     if near is not None:
         return near
     thing = remembered.thing
-    records = map(atlas.recollection.find_place, thing.waypoints)
+    records = map(world.recollection.find_place, thing.waypoints)
     poses = [record.waypoint.pose for record in records if record is not None]
-    pose = next((pose for pose in poses if atlas.path_m(pose.point) is not None), poses[0])
+    pose = next((pose for pose in poses if world.path_m(pose.point) is not None), poses[0])
     if thing.position is None or thing.position == pose.point:
         return pose
     return Pose(pose.x, pose.y, pose.point.bearing_to(thing.position))
 
 
-def facing_in(atlas: Atlas, region: Region, point: Point) -> float:
+def facing_in(world: WorldModel, region: Region, point: Point) -> float:
     """Return the heading, in radians, in which most of a region lies before a robot at a point."""
     angles = np.linspace(0.0, math.tau, N_RAYS, endpoint=False)
-    sights_m = _sights_in(atlas, region, point, angles)
+    sights_m = _sights_in(world, region, point, angles)
     half = round(HALF_VIEW_RAD / (math.tau / N_RAYS))
     around = np.concatenate([sights_m[-half:], sights_m, sights_m[:half]])
     seen = np.convolve(around, np.ones(2 * half + 1), mode="valid")
     return math.remainder(float(angles[int(np.argmax(seen))]), math.tau)
 
 
-def _sights_in(atlas: Atlas, region: Region, point: Point, angles: FloatArray) -> FloatArray:
+def _sights_in(world: WorldModel, region: Region, point: Point, angles: FloatArray) -> FloatArray:
     """Return how far one sees over free floor of the region along each angle, in metres."""
-    step_m = atlas.grid.resolution_m
+    step_m = world.grid.resolution_m
     steps_m = np.arange(1, math.ceil(math.hypot(region.length_m, region.width_m) / step_m)) * step_m
-    grid = atlas.grid
+    grid = world.grid
     rays = cast_rays(
         grid.cells.shape,
         grid.fractional_cells_at(np.array([[point.x, point.y]])),
         angles_rad=angles - grid.origin.yaw_rad,
         steps=steps_m / step_m,
     )
-    is_seen = rays.follow((atlas.rooms.labels == region.index) & grid.free)[0]
+    is_seen = rays.follow((world.rooms.labels == region.index) & grid.free)[0]
     return np.asarray(is_seen.sum(axis=1) * step_m, dtype=np.float64)

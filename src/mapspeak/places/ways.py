@@ -9,7 +9,7 @@ from mapspeak.places.naming import Place, Spot
 from mapspeak.places.standing import choose_crossing, choose_standing_point, stand_before
 from mapspeak.spatial.paths import DistanceField, Path
 from mapspeak.spatial.rooms import Door, Region
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedThing
 
 
@@ -37,94 +37,94 @@ class Way:
     clearance_m: float | None = None
 
 
-def measure_path(atlas: Atlas, start: Place, goal: Place) -> float | None:
+def measure_path(world: WorldModel, start: Place, goal: Place) -> float | None:
     """Return the metres by path between two places; None where the robot cannot get through."""
-    distances = _distances_from(atlas, start)
-    end = standing_point(atlas, goal)
-    if distances is None or atlas.map.weights is None:
+    distances = _distances_from(world, start)
+    end = standing_point(world, goal)
+    if distances is None or world.map.weights is None:
         return None if distances is None else distances.distance_to(end)
-    return _measure(atlas, distances, atlas.map.find_path_over(distances, end), end)
+    return _measure(world, distances, world.map.find_path_over(distances, end), end)
 
 
-def find_way(atlas: Atlas, start: Place, goal: Place) -> Way:
+def find_way(world: WorldModel, start: Place, goal: Place) -> Way:
     """Find the way between two places; of a room it is the point to stand in that counts."""
-    begin, end = standing_point(atlas, start), standing_point(atlas, goal)
+    begin, end = standing_point(world, start), standing_point(world, goal)
     straight_m = begin.distance_to(end)
-    distances = _distances_from(atlas, start)
-    path = None if distances is None else atlas.map.find_path_over(distances, end)
-    path_m = _measure(atlas, distances, path, end)
+    distances = _distances_from(world, start)
+    path = None if distances is None else world.map.find_path_over(distances, end)
+    path_m = _measure(world, distances, path, end)
     if path is None or path_m is None:
         return Way(start=start, goal=goal, end=end, straight_m=straight_m)
-    cells = _cells_along(atlas, path)
+    cells = _cells_along(world, path)
     return Way(
         start=start,
         goal=goal,
         end=end,
         straight_m=straight_m,
         path_m=path_m,
-        through=_name_regions(atlas, *cells),
-        clearance_m=float(atlas.map.clearance_m[cells].min()),
+        through=_name_regions(world, *cells),
+        clearance_m=float(world.map.clearance_m[cells].min()),
     )
 
 
 def _measure(
-    atlas: Atlas, distances: DistanceField | None, path: Path | None, end: Point
+    world: WorldModel, distances: DistanceField | None, path: Path | None, end: Point
 ) -> float | None:
     """Return the metres to the end: by the way round where that is not the shortest one."""
     if distances is None or path is None:
         return None
-    is_shortest = atlas.map.weights is None
+    is_shortest = world.map.weights is None
     return distances.distance_to(end) if is_shortest else path.length_m
 
 
-def _distances_from(atlas: Atlas, start: Place) -> DistanceField | None:
+def _distances_from(world: WorldModel, start: Place) -> DistanceField | None:
     """Return the distances from a place; None where no way begins.
 
     Elsewhere than where it is, a robot cannot squeeze out of a place that is too tight for it.
     """
-    if isinstance(start.thing, Spot) and start.point == atlas.robot.point:
-        return atlas.distances
-    begin = standing_point(atlas, start)
-    distances = atlas.map.distances_from(begin)
+    if isinstance(start.thing, Spot) and start.point == world.robot.point:
+        return world.distances
+    begin = standing_point(world, start)
+    distances = world.map.distances_from(begin)
     return None if distances.lattice.index_at(begin) is None else distances
 
 
-def standing_point(atlas: Atlas, place: Place) -> Point:
+def standing_point(world: WorldModel, place: Place) -> Point:
     """Return the point from which and to which ways to a place are measured."""
     match place.thing:
         case Region() as region:
-            return choose_standing_point(atlas, region)
+            return choose_standing_point(world, region)
         case Door() as door:
-            return choose_crossing(atlas, door)
+            return choose_crossing(world, door)
         case RememberedThing() as remembered:
-            return stand_before(atlas, remembered).point
+            return stand_before(world, remembered).point
         case _:
             return place.point
 
 
-def _cells_along(atlas: Atlas, path: Path) -> tuple[np.ndarray, np.ndarray]:
+def _cells_along(world: WorldModel, path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Return rows and columns of the cells that a path passes, a step for each cell's length."""
-    points = path.sampled(atlas.grid.resolution_m)
-    rows, cols = atlas.grid.cells_at(np.array([[point.x, point.y] for point in points]))
-    return rows.clip(0, atlas.grid.n_rows - 1), cols.clip(0, atlas.grid.n_cols - 1)
+    points = path.sampled(world.grid.resolution_m)
+    rows, cols = world.grid.cells_at(np.array([[point.x, point.y] for point in points]))
+    return rows.clip(0, world.grid.n_rows - 1), cols.clip(0, world.grid.n_cols - 1)
 
 
-def _name_regions(atlas: Atlas, rows: np.ndarray, cols: np.ndarray) -> tuple[str, ...]:
+def _name_regions(world: WorldModel, rows: np.ndarray, cols: np.ndarray) -> tuple[str, ...]:
     """Return the regions that some cells lie in, with the door between each and the next."""
-    by_index = {region.index: region.id for region in atlas.rooms.regions}
+    by_index = {region.index: region.id for region in world.rooms.regions}
     names: list[str] = []
     for row, col in zip(rows.tolist(), cols.tolist(), strict=True):
-        name = by_index.get(int(atlas.rooms.labels[row, col]))
+        name = by_index.get(int(world.rooms.labels[row, col]))
         if name is None or (names and names[-1] == name):
             continue
         if names:
-            names += _door_between(atlas, names[-1], name, row, col)
+            names += _door_between(world, names[-1], name, row, col)
         names.append(name)
     return tuple(names)
 
 
-def _door_between(atlas: Atlas, first: str, second: str, row: int, col: int) -> list[str]:
-    doors = atlas.rooms.doors_between(first, second)
-    x, y = atlas.grid.points_at(np.array([row]), np.array([col]))[0].tolist()
+def _door_between(world: WorldModel, first: str, second: str, row: int, col: int) -> list[str]:
+    doors = world.rooms.doors_between(first, second)
+    x, y = world.grid.points_at(np.array([row]), np.array([col]))[0].tolist()
     nearest = min(doors, key=lambda door: door.place.distance_to(Point(x, y)), default=None)
     return [] if nearest is None else [nearest.id]

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mapspeak.errors import ConfigError
+from mapspeak.memory.waypoint import clean_line
 from mapspeak.safety.commands import Command, is_same, say_command
-from mapspeak.semantic.waypoint import clean_line
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -155,7 +155,7 @@ class AuditLog:
         self._append(f"{text}\n".encode(errors="replace"))
 
     def _append(self, line: bytes) -> None:
-        """Write a whole line or raises: opened anew, so that a file that was moved is noticed."""
+        """Write a whole line or raise: opened anew, so that a file that was moved is noticed."""
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT

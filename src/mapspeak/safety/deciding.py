@@ -213,7 +213,7 @@ def _against_speed(command: Command, policy: Policy) -> Refused | None:
 
 
 def find_speeds(value: object, depth: int = 0) -> Iterator[tuple[str, float]]:
-    """Find speeds anywhere in a message: of Twist, TwistStamped, and drives with a speed."""
+    """Find speeds anywhere in a message: of Twist, TwistStamped, and drive with a speed."""
     if depth > MOST_NESTED:
         yield "linear", math.nan
     elif isinstance(value, Mapping):

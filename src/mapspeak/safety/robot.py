@@ -304,7 +304,7 @@ class GuardedRobot:
         return fault
 
     async def _end(self, drive: GuardedDrive, state: GoalState, reason: str) -> None:
-        """Stop the robot and remembers why, whatever its navigation will say of the drive."""
+        """Stop the robot and remember why, whatever its navigation will say of the drive."""
         self._verdicts[drive.goal_id] = GoalStatus(state=state, reason=reason)
         logger.warning("%s", reason)
         with anyio.CancelScope(shield=True):

@@ -7,6 +7,7 @@ from datetime import datetime
 import anyio
 import anyio.to_thread
 
+from mapspeak.memory.events import Effect, Event
 from mapspeak.places.notices import (
     close_floor_of,
     find_hindrances,
@@ -14,7 +15,6 @@ from mapspeak.places.notices import (
     say_unplaced,
 )
 from mapspeak.safety.policy import AreaRule
-from mapspeak.semantic.events import Effect, Event
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.worldmodel.closures import ClosedArea, Outline, mask_areas, outlines_of_region
 from mapspeak.worldmodel.revision import MapRevision

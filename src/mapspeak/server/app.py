@@ -15,8 +15,8 @@ from pydantic import ValidationError
 
 from mapspeak import __version__
 from mapspeak.errors import ConfigError, MapspeakError
+from mapspeak.memory.waypoint import clean_line
 from mapspeak.safety import ApprovalNeededError, Caller, calling
-from mapspeak.semantic.waypoint import clean_line
 from mapspeak.server.calllog import CallLog
 from mapspeak.server.mapview.representations import Representation
 from mapspeak.server.offering import (

@@ -2,14 +2,14 @@
 
 The exploration prompt is the paper's appendix word for word. The paper describes its semantic
 filtering policy without quoting it; the three categories are in the paper's words, and what is
-left out is said by `mapspeak.semantic`, which holds every record to it.
+left out is said by `mapspeak.memory`, which holds every record to it.
 """
 
 from importlib import resources
 
 from mcp.server import MCPServer
 
-from mapspeak.semantic import LEFT_OUT
+from mapspeak.memory import LEFT_OUT
 
 
 def read_text(name: str) -> str:

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from mapspeak.geometry import Point
-from mapspeak.semantic.quoting import quote_name
+from mapspeak.memory.quoting import quote_name
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
 from mapspeak.spatial.rooms import Door, Region, RoomMap

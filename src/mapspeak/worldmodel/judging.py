@@ -3,7 +3,7 @@
 from collections import defaultdict
 from collections.abc import Iterable
 
-from mapspeak.semantic.consistency import MemoryFinding, Trust, judge_trust
+from mapspeak.memory.consistency import MemoryFinding, Trust, judge_trust
 from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
 
 

@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
+from mapspeak.memory import SemanticMap
+from mapspeak.memory.consistency import check_memory
+from mapspeak.memory.things import find_approach, find_fronts, find_least_path_m, measure_faced
 from mapspeak.robot import PoseDoubt
-from mapspeak.semantic import SemanticMap
-from mapspeak.semantic.consistency import check_memory
-from mapspeak.semantic.things import find_approach, find_fronts, find_least_path_m, measure_faced
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import (
     FrontierReport,
@@ -112,7 +112,7 @@ class Reminders:
         )
 
 
-class Atlas:
+class WorldModel:
     """A state of the map with everything that has an id; parts are computed when first asked for.
 
     Args:
@@ -121,9 +121,9 @@ class Atlas:
         memory: What is remembered.
         radius_m: Of the robot.
         looked_from: Places of former frontiers that the robot has been to.
-        previous: The atlas before, whose ids are kept and whose parts are used where they hold.
+        previous: The one before, whose ids are kept and whose parts are used where they hold.
         revision: The state of the map, where somebody has made it already.
-        recollector: Keeps what is made of the memory; that of the atlas before where None.
+        recollector: Keeps what is made of the memory; that of `previous` where None.
         pose_doubt: Why the robot may be elsewhere.
 
     Attributes:
@@ -144,7 +144,7 @@ class Atlas:
         *,
         radius_m: float,
         looked_from: Sequence[Point] = (),
-        previous: "Atlas | None" = None,
+        previous: "WorldModel | None" = None,
         revision: MapRevision | None = None,
         recollector: Recollector | None = None,
         pose_doubt: PoseDoubt | None = None,
@@ -228,7 +228,7 @@ class Atlas:
 
     @property
     def latest_reach(self) -> Reach | None:
-        """The reach of this atlas, or of one before it on the same map."""
+        """The reach of this world model, or of one before it on the same map."""
         found: Reach | None = self.__dict__.get("reach", self._earlier_reach)
         return found
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Point
-from mapspeak.semantic import SemanticMap, Waypoint
-from mapspeak.semantic.retrieval import (
+from mapspeak.memory import SemanticMap, Waypoint
+from mapspeak.memory.retrieval import (
     Answer,
     Basis,
     Embedder,
@@ -24,7 +24,7 @@ from mapspeak.semantic.retrieval import (
     TextVectors,
     list_entries,
 )
-from mapspeak.semantic.things import Category, Thing, Things, find_things, name_the_same
+from mapspeak.memory.things import Category, Thing, Things, find_things, name_the_same
 from mapspeak.spatial import OccupancyGrid
 
 logger = logging.getLogger(__name__)
@@ -199,7 +199,7 @@ class Recollector:
             return latest
 
     def warm(self, memory: SemanticMap) -> None:
-        """Load the model and makes the vectors of a memory's texts, so that no question need.
+        """Load the model and make the vectors of a memory's texts, so that no question need.
 
         A question that comes meanwhile waits for it; without a model there is nothing to do.
         """

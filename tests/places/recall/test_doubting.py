@@ -5,13 +5,13 @@ from dataclasses import replace
 from mapspeak.places.goalcheck import GoalVerdict
 from mapspeak.places.recall import RecallDoubt, RecallQuery, recall
 from mapspeak.places.recall.answer import find_doubt
-from remembering import EXTINGUISHER, atlas_of, looks_at
+from remembering import EXTINGUISHER, looks_at, world_of
 
 LOOKS = looks_at("fire extinguisher", EXTINGUISHER)
 
 
 def test_a_thing_is_not_sure_to_be_faced_where_most_of_where_it_may_be_is_out_of_sight() -> None:
-    (first, *_) = recall(atlas_of(*LOOKS), RecallQuery(words="fire extinguisher")).candidates
+    (first, *_) = recall(world_of(*LOOKS), RecallQuery(words="fire extinguisher")).candidates
     assert first.faced_ratio > 0.7
     assert find_doubt(first, room_id=None) is None
     doubt = find_doubt(replace(first, faced_ratio=0.2), room_id=None)
@@ -19,7 +19,7 @@ def test_a_thing_is_not_sure_to_be_faced_where_most_of_where_it_may_be_is_out_of
 
 
 def test_what_nobody_can_drive_to_is_told_as_that_and_not_as_out_of_sight() -> None:
-    (first, *_) = recall(atlas_of(*LOOKS), RecallQuery(words="fire extinguisher")).candidates
+    (first, *_) = recall(world_of(*LOOKS), RecallQuery(words="fire extinguisher")).candidates
     blocked = replace(first.check, verdict=GoalVerdict.UNREACHABLE)
     shut_in = replace(first, is_faced=False, faced_ratio=0.0, check=blocked)
     assert find_doubt(shut_in, room_id=None) is None

@@ -4,10 +4,10 @@ import pytest
 
 from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose
+from mapspeak.memory import SemanticMap, Waypoint
+from mapspeak.memory.retrieval import Verdict
 from mapspeak.places.recall import RecallQuery, recall
-from mapspeak.semantic import SemanticMap, Waypoint
-from mapspeak.semantic.retrieval import Verdict
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 from remembering import look
 
 HALL = """
@@ -25,8 +25,8 @@ HALL = """
 ON_NORTH_WALL = Point(2.5, 2.3)
 
 
-def hall_of(*waypoints: Waypoint) -> Atlas:
-    return Atlas(
+def hall_of(*waypoints: Waypoint) -> WorldModel:
+    return WorldModel(
         grid_from_text(HALL, resolution_m=0.25),
         Pose(1.0, 1.0, 0.0),
         SemanticMap(waypoints=waypoints),
@@ -50,11 +50,11 @@ def test_the_best_known_of_a_name_is_found_only_where_no_other_of_the_name_is_wi
         for name, x, y in (("a", 1.5, 1.0), ("b", 2.5, 0.9), ("c", 3.5, 1.0))
     ]
     other = Point(ON_NORTH_WALL.x + away_m, ON_NORTH_WALL.y)
-    atlas = hall_of(*three, seen("d", other.x + 0.3, 1.5, other))
-    first, second = (each.thing for each in atlas.things)
+    world = hall_of(*three, seen("d", other.x + 0.3, 1.5, other))
+    first, second = (each.thing for each in world.things)
     assert first.position is not None
     assert second.position is not None
     assert first.position.distance_to(second.position) == pytest.approx(away_m, abs=0.2)
-    answer = recall(atlas, RecallQuery(words="hydrant"))
+    answer = recall(world, RecallQuery(words="hydrant"))
     assert answer.answer.n_meant == 2
     assert answer.verdict is verdict

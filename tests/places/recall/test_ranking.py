@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose
+from mapspeak.memory import SemanticMap
 from mapspeak.places.recall import RecallCandidate, RecallQuery, recall
-from mapspeak.semantic import SemanticMap
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 from remembering import look
 
 # The way into the eastern room is long: what is near through its wall is far by path.
@@ -39,8 +39,8 @@ def ask(cells: list[tuple[int, int]], *, n: int) -> tuple[RecallCandidate, ...]:
         x, y = (col + 0.5) * CELL_M, (row + 0.5) * CELL_M
         hydrant = ("hydrant", Point(x, y + 0.5))
         looks.append(look(f"place {number}", x, y, hydrant, yaw_deg=90, range_m=0.5))
-    atlas = Atlas(GRID, Pose(2.0, 1.8, 0.0), SemanticMap(waypoints=tuple(looks)), radius_m=0.2)
-    return recall(atlas, RecallQuery(words="hydrant", n=n)).candidates
+    world = WorldModel(GRID, Pose(2.0, 1.8, 0.0), SemanticMap(waypoints=tuple(looks)), radius_m=0.2)
+    return recall(world, RecallQuery(words="hydrant", n=n)).candidates
 
 
 @settings(max_examples=10, deadline=None)

@@ -14,7 +14,7 @@ from drawing import grid_from_text
 from fakes import FakeRobot, two_rooms
 from mapspeak.cli.serving import serve
 from mapspeak.geometry import Pose
-from mapspeak.semantic import SemanticMapStore
+from mapspeak.memory import SemanticMapStore
 from mapspeak.server.app import build_server
 from mapspeak.server.mapview.representations import Representation
 from mapspeak.session import Session

@@ -4,10 +4,10 @@ from dataclasses import replace
 import pytest
 
 from mapspeak.geometry import Point
-from mapspeak.semantic import Landmark
-from mapspeak.semantic.consistency import FindingKind, MemoryFinding, Trust
-from mapspeak.semantic.things import Thing, View
-from mapspeak.semantic.things.thing import Category
+from mapspeak.memory import Landmark
+from mapspeak.memory.consistency import FindingKind, MemoryFinding, Trust
+from mapspeak.memory.things import Thing, View
+from mapspeak.memory.things.thing import Category
 from mapspeak.server.text.findings import say_conflict, say_finding, say_support, say_trust
 
 VIEW = View(

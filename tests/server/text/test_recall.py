@@ -5,12 +5,12 @@ import pytest
 from embedding import ConceptEmbedder
 from fakes import two_rooms
 from mapspeak.geometry import Point
+from mapspeak.memory import Landmark, SemanticMap, Waypoint
 from mapspeak.places.recall import Recall, RecallQuery, recall
-from mapspeak.semantic import Landmark, SemanticMap, Waypoint
 from mapspeak.server.text.recall import say_advice, say_evidence
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import Recollector
-from remembering import EXTINGUISHER, LADDER, ROBOT, atlas_of, look, looks_at
+from remembering import EXTINGUISHER, LADDER, ROBOT, look, looks_at, world_of
 
 LOOKS = looks_at("fire extinguisher", EXTINGUISHER)
 NEAR = look("near", 2.0, 1.0, ("fire extinguisher", LADDER), yaw_deg=180)
@@ -25,7 +25,7 @@ WASHBASINS = (
 
 
 def ask(*places: Waypoint, words: str = "fire extinguisher") -> Recall:
-    return recall(atlas_of(*places), RecallQuery(words=words))
+    return recall(world_of(*places), RecallQuery(words=words))
 
 
 def list_answers() -> Iterator[tuple[Recall, str]]:
@@ -47,7 +47,7 @@ def test_advice_says_the_verdict_and_what_to_do_next(recalled: Recall, said: str
 
 def test_evidence_is_a_name_with_the_metres_to_where_it_was_asked_for() -> None:
     near = Point(4.0, 1.0)
-    first = recall(atlas_of(*LOOKS), RecallQuery(words="fire extinguisher", near=near)).candidates[
+    first = recall(world_of(*LOOKS), RecallQuery(words="fire extinguisher", near=near)).candidates[
         0
     ]
     away_m = first.position.distance_to(near) if first.position else 0.0
@@ -57,6 +57,6 @@ def test_evidence_is_a_name_with_the_metres_to_where_it_was_asked_for() -> None:
 
 def test_evidence_is_a_likeness_in_meaning() -> None:
     memory, recollector = SemanticMap(waypoints=LOOKS), Recollector(ConceptEmbedder)
-    atlas = Atlas(two_rooms(), ROBOT, memory, radius_m=0.2, recollector=recollector)
-    first = recall(atlas, RecallQuery(words="burning flames")).candidates[0]
+    world = WorldModel(two_rooms(), ROBOT, memory, radius_m=0.2, recollector=recollector)
+    first = recall(world, RecallQuery(words="burning flames")).candidates[0]
     assert "is like it in meaning" in say_evidence(first)

@@ -6,9 +6,9 @@ from datetime import UTC, datetime
 import pytest
 
 from mapspeak.geometry import Pose
-from mapspeak.semantic import Landmark
-from mapspeak.semantic.episodes import EpisodeMatch
-from mapspeak.semantic.episodes.observation import Observation, ObservationKind
+from mapspeak.memory import Landmark
+from mapspeak.memory.episodes import EpisodeMatch
+from mapspeak.memory.episodes.observation import Observation, ObservationKind
 from mapspeak.server.text.memory import say_episode
 from mapspeak.server.text.things import say_landmark
 

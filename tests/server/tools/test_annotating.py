@@ -11,8 +11,8 @@ from mcp.client import Client
 from fakes import START, FakeRobot, two_rooms
 from guarding import MONDAY_NOON, WallClock, make_guard
 from mapspeak.geometry import Pose
+from mapspeak.memory import LEFT_OUT, Concern, SemanticMapStore, Waypoint
 from mapspeak.robot import Detection
-from mapspeak.semantic import LEFT_OUT, Concern, SemanticMapStore, Waypoint
 from served import MODES, connect, report_of, text_of
 
 pytestmark = pytest.mark.anyio

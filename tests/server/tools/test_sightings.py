@@ -10,8 +10,8 @@ from mcp.client import Client
 from fakes import START, FakeRobot, scan_of, two_rooms
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
+from mapspeak.memory import LaserFan, SemanticMapStore, Waypoint
 from mapspeak.robot import RangeScan, RobotDescription
-from mapspeak.semantic import LaserFan, SemanticMapStore, Waypoint
 from served import connect, report_of, text_of
 
 pytestmark = pytest.mark.anyio

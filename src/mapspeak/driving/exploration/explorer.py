@@ -21,7 +21,7 @@ from mapspeak.driving.exploration.trips import OnTrip, Target, TripContext, Trip
 from mapspeak.errors import PolicyError
 from mapspeak.geometry import Point
 from mapspeak.spatial.frontiers import Frontier, remaining_ratio
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 RETHINK_S = 1.0
 """The map is looked at so often on the way."""
@@ -37,11 +37,11 @@ BESIDE_M = 1.5
 """A border with the unknown that is this near to a blocked place is what was to be seen there."""
 SLACK_S = 0.01
 
-Pick = Callable[[Sequence[Frontier], Atlas], Frontier]
+Pick = Callable[[Sequence[Frontier], WorldModel], Frontier]
 """Chooses one of several frontiers, which come best first."""
 
 
-def take_first(frontiers: Sequence[Frontier], _atlas: Atlas) -> Frontier:
+def take_first(frontiers: Sequence[Frontier], _world: WorldModel) -> Frontier:
     """Take the best one."""
     return frontiers[0]
 
@@ -104,26 +104,26 @@ class Explorer:
         begun_s, before_s = self._site.robot.now_s, self._elapsed_s
         while True:
             with self._site.drives.preparing() as ticket:
-                atlas = await self._site.fetch_atlas()
-                if (bound := self._bound_reached(atlas)) is not None:
+                world = await self._site.fetch_world_model()
+                if (bound := self._bound_reached(world)) is not None:
                     await self._trips.give_up()
-                    return await self._end(atlas, ExplorationState.BOUND_REACHED, bound=bound)
-                if (seen_id := self._find_seen_from_here(atlas)) is not None:
+                    return await self._end(world, ExplorationState.BOUND_REACHED, bound=bound)
+                if (seen_id := self._find_seen_from_here(world)) is not None:
                     await self._trips.give_up(is_seen=True)
-                    return await self._end(atlas, ExplorationState.AT_GOAL, seen_id=seen_id)
-                state = await self._choose(atlas, ticket, client)
+                    return await self._end(world, ExplorationState.AT_GOAL, seen_id=seen_id)
+                state = await self._choose(world, ticket, client)
             if state is None:
-                return await self._end(atlas, judge_end(atlas, self._blocked(atlas)))
+                return await self._end(world, judge_end(world, self._blocked(world)))
             left_s = wait_s - (self._site.robot.now_s - begun_s)
             if state is TripState.UNDER_WAY and left_s > SLACK_S:
                 state = await self._trips.follow(
-                    wait_s=min(RETHINK_S, left_s), grid=atlas.grid, on_trip=on_trip
+                    wait_s=min(RETHINK_S, left_s), grid=world.grid, on_trip=on_trip
                 )
             spent_s = self._site.robot.now_s - begun_s
             self._elapsed_s = before_s + spent_s
             ended = self._after(state, is_late=spent_s >= wait_s - SLACK_S)
             if ended is not None:
-                return await self._end(await self._site.fetch_atlas(), ended)
+                return await self._end(await self._site.fetch_world_model(), ended)
 
     def _after(self, state: TripState, *, is_late: bool) -> ExplorationState | None:
         """Return how the call ends after a step of a trip; None where it goes on."""
@@ -133,53 +133,53 @@ class Explorer:
             return ExplorationState.AT_GOAL
         return ExplorationState.DRIVING if is_late else None
 
-    def _find_seen_from_here(self, atlas: Atlas) -> str | None:
+    def _find_seen_from_here(self, world: WorldModel) -> str | None:
         """Return the id of a target seen from afar, where a pause is due for it."""
         trip = self._trips.current
         if not self._bounds.stops_at_goals or trip is None:
             return None
         is_near = (
-            self._paused_at is not None and atlas.robot.point.distance_to(self._paused_at) < PAUSE_M
+            self._paused_at is not None and world.robot.point.distance_to(self._paused_at) < PAUSE_M
         )
-        if is_near or not self._must_turn(atlas, trip.target):
+        if is_near or not self._must_turn(world, trip.target):
             return None
         return trip.target.id
 
-    async def _choose(self, atlas: Atlas, ticket: int, client: str) -> TripState | None:
+    async def _choose(self, world: WorldModel, ticket: int, client: str) -> TripState | None:
         """Set out to the next target where there is no trip, or its end has been seen from afar.
 
         Gives None when there is no target left.
         """
         trip = self._trips.current
-        if trip is not None and not self._must_turn(atlas, trip.target):
+        if trip is not None and not self._must_turn(world, trip.target):
             return TripState.UNDER_WAY
-        target = await self._site.compute(lambda: self._find_target(atlas))
+        target = await self._site.compute(lambda: self._find_target(world))
         if target is None:
             await self._trips.give_up(is_seen=True)
             return None
         if trip is not None and trip.target.pose == target.pose:
             return TripState.UNDER_WAY
-        return await self._trips.set_out(target, ticket=ticket, client=client, grid=atlas.grid)
+        return await self._trips.set_out(target, ticket=ticket, client=client, grid=world.grid)
 
-    def _find_target(self, atlas: Atlas) -> Target | None:
+    def _find_target(self, world: WorldModel) -> Target | None:
         """Return the next frontier; where none is left, a place that was blocked before."""
         frontiers = [
             each
-            for each in atlas.frontiers.frontiers
-            if not self._trips.blocked.is_closed(each.pose.point, atlas.grid)
+            for each in world.frontiers.frontiers
+            if not self._trips.blocked.is_closed(each.pose.point, world.grid)
         ]
         if frontiers:
-            frontier = self._pick(frontiers, atlas)
+            frontier = self._pick(frontiers, world)
             return Target(id=frontier.id, pose=frontier.pose, frontier=frontier)
-        retry = self._trips.blocked.worth_another_try(atlas.grid)
-        nearest = min(retry, key=lambda each: _path_m(atlas, each), default=None)
-        if nearest is None or not math.isfinite(_path_m(atlas, nearest)):
+        retry = self._trips.blocked.worth_another_try(world.grid)
+        nearest = min(retry, key=lambda each: _path_m(world, each), default=None)
+        if nearest is None or not math.isfinite(_path_m(world, nearest)):
             return None
         return Target(id=nearest.id, pose=nearest.pose, earlier=nearest)
 
-    def _blocked(self, atlas: Atlas) -> tuple[BlockedPlace, ...]:
+    def _blocked(self, world: WorldModel) -> tuple[BlockedPlace, ...]:
         """Return the blocked places at which something unknown is left."""
-        report = atlas.frontiers
+        report = world.frontiers
         borders = [
             *(each.pose.point for each in report.frontiers),
             *(each.anchor for each in report.frontiers),
@@ -191,7 +191,7 @@ class Explorer:
             if any(place.pose.point.distance_to(border) <= BESIDE_M for border in borders)
         )
 
-    def _must_turn(self, atlas: Atlas, target: Target) -> bool:
+    def _must_turn(self, world: WorldModel, target: Target) -> bool:
         """Return True when a target has been seen from afar, or proves to be no place to stand.
 
         The last goal of an exploration is driven to its end.
@@ -199,12 +199,12 @@ class Explorer:
         frontier = target.frontier
         if frontier is None:
             return False
-        if not has_room_at(atlas.grid, target.pose.point, radius_m=atlas.radius_m):
+        if not has_room_at(world.grid, target.pose.point, radius_m=world.radius_m):
             return True
         is_last = self._bounds.n_goals is not None and self._trips.n_begun >= self._bounds.n_goals
-        return not is_last and remaining_ratio(atlas.grid, frontier) < SEEN_RATIO
+        return not is_last and remaining_ratio(world.grid, frontier) < SEEN_RATIO
 
-    def _bound_reached(self, atlas: Atlas) -> BoundKind | None:
+    def _bound_reached(self, world: WorldModel) -> BoundKind | None:
         """Return which bound ends the exploration; None where it goes on."""
         bounds = self._bounds
         if bounds.duration_s is not None and self._elapsed_s >= bounds.duration_s - SLACK_S:
@@ -213,13 +213,13 @@ class Explorer:
             return None
         if bounds.n_goals is not None and self._trips.n_begun >= bounds.n_goals:
             return BoundKind.GOALS
-        if bounds.known_ratio is not None and known_ratio(atlas) >= bounds.known_ratio:
+        if bounds.known_ratio is not None and known_ratio(world) >= bounds.known_ratio:
             return BoundKind.KNOWN
         return None
 
     async def _end(
         self,
-        atlas: Atlas,
+        world: WorldModel,
         state: ExplorationState,
         *,
         bound: BoundKind | None = None,
@@ -227,10 +227,10 @@ class Explorer:
     ) -> Progress:
         self._state = state
         if state is ExplorationState.AT_GOAL:
-            self._paused_at = atlas.robot.point
-        return await self._site.compute(lambda: self._report(atlas, bound, seen_id))
+            self._paused_at = world.robot.point
+        return await self._site.compute(lambda: self._report(world, bound, seen_id))
 
-    def _report(self, atlas: Atlas, bound: BoundKind | None, seen_id: str | None) -> Progress:
+    def _report(self, world: WorldModel, bound: BoundKind | None, seen_id: str | None) -> Progress:
         return Progress(
             state=self._state,
             bounds=self._bounds,
@@ -243,19 +243,19 @@ class Explorer:
             n_blocked=self._trips.n_blocked,
             driven_m=self._trips.driven_m,
             elapsed_s=self._elapsed_s,
-            known_area_m2=known_area_m2(atlas),
-            known_ratio=known_ratio(atlas),
-            frontiers=atlas.frontiers.frontiers,
+            known_area_m2=known_area_m2(world),
+            known_ratio=known_ratio(world),
+            frontiers=world.frontiers.frontiers,
             trip=self._trips.current,
-            pose=atlas.robot,
-            pose_doubt=atlas.pose_doubt,
-            unreachable=find_unreachable(atlas),
-            blocked=self._blocked(atlas),
-            not_worth=find_not_worth(atlas),
-            closed=tuple(atlas.map.areas),
+            pose=world.robot,
+            pose_doubt=world.pose_doubt,
+            unreachable=find_unreachable(world),
+            blocked=self._blocked(world),
+            not_worth=find_not_worth(world),
+            closed=tuple(world.map.areas),
         )
 
 
-def _path_m(atlas: Atlas, place: BlockedPlace) -> float:
-    path_m = atlas.path_m(place.pose.point)
+def _path_m(world: WorldModel, place: BlockedPlace) -> float:
+    path_m = world.path_m(place.pose.point)
     return math.inf if path_m is None else path_m

@@ -17,7 +17,7 @@ from mapspeak.spatial.frontiers import (
 )
 from mapspeak.spatial.paths import DistanceField
 from mapspeak.worldmodel.closures import ClosedArea
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 NEAR_M = 0.5
 """A border is looked at from the floor that is so much more than the robot's radius around it."""
@@ -118,40 +118,40 @@ class Progress:
     closed: tuple[ClosedArea, ...]
 
 
-def known_ratio(atlas: Atlas) -> float:
+def known_ratio(world: WorldModel) -> float:
     """Return the known share of the floor that is to be expected: what frontiers promise is not."""
-    known_m2 = known_area_m2(atlas)
-    promised_m2 = sum(frontier.gain_m2 for frontier in atlas.frontiers.frontiers)
+    known_m2 = known_area_m2(world)
+    promised_m2 = sum(frontier.gain_m2 for frontier in world.frontiers.frontiers)
     return known_m2 / (known_m2 + promised_m2) if known_m2 else 0.0
 
 
-def known_area_m2(atlas: Atlas) -> float:
+def known_area_m2(world: WorldModel) -> float:
     """Return the free floor on the map."""
-    return int(atlas.grid.free.sum()) * atlas.grid.resolution_m**2
+    return int(world.grid.free.sum()) * world.grid.resolution_m**2
 
 
-def find_unreachable(atlas: Atlas) -> tuple[RefusedFrontier, ...]:
+def find_unreachable(world: WorldModel) -> tuple[RefusedFrontier, ...]:
     """Return borders with the unknown that the robot cannot get to, those closed off as such."""
-    return tuple(each for each in find_refused(atlas) if each.reason in OUT_OF_REACH)
+    return tuple(each for each in find_refused(world) if each.reason in OUT_OF_REACH)
 
 
-def find_refused(atlas: Atlas) -> tuple[RefusedFrontier, ...]:
+def find_refused(world: WorldModel) -> tuple[RefusedFrontier, ...]:
     """Return the borders with the unknown that are no place to go, those closed off as such."""
     return tuple(
         replace(each, reason=RefusalReason.CLOSED_OFF)
-        if each.reason in OUT_OF_REACH and _is_closed_off(atlas, each)
+        if each.reason in OUT_OF_REACH and _is_closed_off(world, each)
         else each
-        for each in atlas.frontiers.refused
+        for each in world.frontiers.refused
     )
 
 
-def _is_closed_off(atlas: Atlas, border: RefusedFrontier) -> bool:
+def _is_closed_off(world: WorldModel, border: RefusedFrontier) -> bool:
     """Return True where the robot would get near to a border if no area were closed."""
-    if not atlas.map.areas:
+    if not world.map.areas:
         return False
-    opened = atlas.map.open.distances_from(atlas.robot.point)
+    opened = world.map.open.distances_from(world.robot.point)
     is_near = _is_reached_near(opened, border.anchor)
-    return is_near and not _is_reached_near(atlas.distances, border.anchor)
+    return is_near and not _is_reached_near(world.distances, border.anchor)
 
 
 def _is_reached_near(distances: DistanceField, point: Point) -> bool:
@@ -161,16 +161,16 @@ def _is_reached_near(distances: DistanceField, point: Point) -> bool:
     return bool(np.isfinite(distances.distances_at(rows[:, np.newaxis], cols)).any())
 
 
-def find_not_worth(atlas: Atlas) -> tuple[RefusedFrontier, ...]:
+def find_not_worth(world: WorldModel) -> tuple[RefusedFrontier, ...]:
     """Return the borders with the unknown that are not worth a drive."""
-    refused = atlas.frontiers.refused
+    refused = world.frontiers.refused
     return tuple(each for each in refused if each.reason is RefusalReason.NOTHING_TO_SEE)
 
 
-def judge_end(atlas: Atlas, blocked: tuple[BlockedPlace, ...]) -> ExplorationState:
+def judge_end(world: WorldModel, blocked: tuple[BlockedPlace, ...]) -> ExplorationState:
     """Return what it means that no frontier is left: all seen, or the rest out of reach."""
-    if atlas.frontiers.verdict is FrontierVerdict.NOTHING_KNOWN:
+    if world.frontiers.verdict is FrontierVerdict.NOTHING_KNOWN:
         return ExplorationState.NOTHING_KNOWN
-    if not find_unreachable(atlas) and not blocked:
+    if not find_unreachable(world) and not blocked:
         return ExplorationState.NOTHING_LEFT
     return ExplorationState.REST_UNREACHABLE

@@ -16,7 +16,7 @@ from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.robot import GoalState, Robot
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import Frontier
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 T = TypeVar("T")
 
@@ -34,7 +34,7 @@ class TripContext(Protocol):
         """Every drive of the robot."""
         ...
 
-    async def fetch_atlas(self) -> Atlas:
+    async def fetch_world_model(self) -> WorldModel:
         """Return the map as it is now, with everything on it under its id."""
         ...
 

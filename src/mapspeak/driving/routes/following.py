@@ -19,7 +19,7 @@ from mapspeak.geometry import Pose
 from mapspeak.places.goalcheck import GoalCheck, check_goal
 from mapspeak.places.standing import arrival_pose
 from mapspeak.robot import GoalState, GoalStatus, PoseDoubt
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 SLACK_S = 0.01
 ENDED_ELSEWHERE = (GoalState.CANCELLED, GoalState.PREEMPTED)
@@ -125,8 +125,8 @@ class RouteBook:
         Raises:
             GoalError: There is no such place, or no way there.
         """
-        atlas = await self._site.fetch_atlas()
-        plan = await self._site.compute(lambda: plan_route(atlas, stops))
+        world = await self._site.fetch_world_model()
+        plan = await self._site.compute(lambda: plan_route(world, stops))
         async with self._advancing:
             await self._give_up()
             self._plan = plan
@@ -193,8 +193,8 @@ class RouteBook:
         """Start the drive to a stop; return the check of its pose where it cannot be driven to."""
         goal, drives = self._stops[number].goal, self._site.drives
         with drives.preparing() as ticket:
-            atlas = await self._site.fetch_atlas()
-            pose, check = await self._site.compute(lambda: _check(atlas, goal))
+            world = await self._site.fetch_world_model()
+            pose, check = await self._site.compute(lambda: _check(world, goal))
             if not check.is_ok:
                 return check
             drive = await drives.start(pose, place=goal.title, ticket=ticket, client=client)
@@ -287,7 +287,7 @@ class RouteBook:
         )
 
 
-def _check(atlas: Atlas, goal: StopCandidate) -> tuple[Pose, GoalCheck]:
+def _check(world: WorldModel, goal: StopCandidate) -> tuple[Pose, GoalCheck]:
     """Return the pose for a stop as the robot comes to it from where it is, and judge it."""
-    pose = arrival_pose(atlas, goal.pose.point) if goal.comes_straight_on else goal.pose
-    return pose, check_goal(atlas.grid, atlas.distances, pose)
+    pose = arrival_pose(world, goal.pose.point) if goal.comes_straight_on else goal.pose
+    return pose, check_goal(world.grid, world.distances, pose)

@@ -11,7 +11,7 @@ from mapspeak.places.goalcheck import say_refusal
 from mapspeak.places.naming import AmbiguousPlaceError, Place
 from mapspeak.places.relations import Nearest, find_all_near, parse_relation
 from mapspeak.spatial.paths import DistanceField
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 MOST_CANDIDATES = 12
 LEAST_SAID_RATIO = 0.75
@@ -38,13 +38,13 @@ class StopCandidate:
     comes_straight_on: bool = False
 
 
-def find_candidates(atlas: Atlas, words: str) -> tuple[StopCandidate, ...]:
+def find_candidates(world: WorldModel, words: str) -> tuple[StopCandidate, ...]:
     """Find all that words may mean and the robot can get to.
 
     Raises:
         GoalError: They mean nothing, or nothing that can be reached.
     """
-    goals = [check_place(atlas, place) for place in _find_places(atlas, words)]
+    goals = [check_place(world, place) for place in _find_places(world, words)]
     good = [goal for goal in goals if goal.check.is_ok]
     if not good:
         raise GoalError(
@@ -60,44 +60,44 @@ def _candidate_of(goal: CheckedGoal) -> StopCandidate:
     return StopCandidate(goal.name, goal.pose, goal.title, goal.comes_straight_on)
 
 
-def _find_places(atlas: Atlas, words: str) -> list[Place]:
+def _find_places(world: WorldModel, words: str) -> list[Place]:
     """Find what words mean; "the nearest door" is nearest on the route, so any door may be it."""
     relation = parse_relation(words)
     if isinstance(relation, Nearest) and relation.to is None:
-        near = find_all_near(atlas, relation.kind)
+        near = find_all_near(world, relation.kind)
         if near:
             return list(near)
     try:
-        return [find_place(atlas, words)]
+        return [find_place(world, words)]
     except AmbiguousPlaceError as error:
-        found = list(_find_meanings(atlas, words, error))
+        found = list(_find_meanings(world, words, error))
         if found:
             return found
         raise
     except GoalError:
-        remembered = list(_find_remembered(atlas, words))
+        remembered = list(_find_remembered(world, words))
         if remembered:
             return remembered
         raise
 
 
-def _find_meanings(atlas: Atlas, words: str, error: AmbiguousPlaceError) -> Iterator[Place]:
+def _find_meanings(world: WorldModel, words: str, error: AmbiguousPlaceError) -> Iterator[Place]:
     """Return the places for each meaning of the part of the words that has several."""
     at = words.casefold().find(error.words.casefold())
     for meaning in error.meanings:
         said = words[:at] + meaning + words[at + len(error.words) :] if at >= 0 else meaning
         try:
-            yield find_place(atlas, said)
+            yield find_place(world, said)
         except GoalError:
             continue
 
 
-def _find_remembered(atlas: Atlas, words: str) -> Iterator[Place]:
+def _find_remembered(world: WorldModel, words: str) -> Iterator[Place]:
     """Return what is surely meant or says the words; nobody is driven to what is only like them."""
-    answer = atlas.recollection.find(words, limit=MOST_CANDIDATES)
+    answer = world.recollection.find(words, limit=MOST_CANDIDATES)
     speaking = answer.find_speaking(least_said_ratio=LEAST_SAID_RATIO)
     most_said = max((each.said_ratio for each in speaking), default=0.0)
-    by_id = {each.id: each for each in atlas.recollection.everything}
+    by_id = {each.id: each for each in world.recollection.everything}
     for each in speaking:
         if each.said_ratio >= SAME_SAID_RATIO * most_said:
             yield Place(each.entry.id, by_id[each.entry.id])
@@ -130,7 +130,7 @@ class RoutePlan:
         return math.fsum(self.legs_m)
 
 
-def plan_route(atlas: Atlas, stops: Sequence[str]) -> RoutePlan:
+def plan_route(world: WorldModel, stops: Sequence[str]) -> RoutePlan:
     """Plan a route past stops in their order, each an id, a name, "x, y" or other words.
 
     Raises:
@@ -143,13 +143,13 @@ def plan_route(atlas: Atlas, stops: Sequence[str]) -> RoutePlan:
             hint="Give the stops in order, as ids, names or phrases.",
         )
     return plan_among(
-        atlas, stops, [_find(atlas, number, stop) for number, stop in enumerate(stops)]
+        world, stops, [_find(world, number, stop) for number, stop in enumerate(stops)]
     )
 
 
-def _find(atlas: Atlas, number: int, stop: str) -> tuple[StopCandidate, ...]:
+def _find(world: WorldModel, number: int, stop: str) -> tuple[StopCandidate, ...]:
     try:
-        return find_candidates(atlas, stop)
+        return find_candidates(world, stop)
     except GoalError as error:
         raise GoalError(
             f"Stop {number + 1}: {error.message}",
@@ -160,14 +160,14 @@ def _find(atlas: Atlas, number: int, stop: str) -> tuple[StopCandidate, ...]:
 
 
 def plan_among(
-    atlas: Atlas, stops: Sequence[str], choices: Sequence[tuple[StopCandidate, ...]]
+    world: WorldModel, stops: Sequence[str], choices: Sequence[tuple[StopCandidate, ...]]
 ) -> RoutePlan:
     """Plan a route past stops whose candidates are known.
 
     Raises:
         GoalError: No way leads from one stop to the next.
     """
-    legs_m = _Legs(atlas)
+    legs_m = _Legs(world)
     best: list[tuple[float, tuple[StopCandidate, ...]]] = [(0.0, ())]
     for number, candidates in enumerate(choices):
         best = [
@@ -205,8 +205,8 @@ def _choose_greedily(
 class _Legs:
     """Path lengths on one map; each field of distances is computed once."""
 
-    def __init__(self, atlas: Atlas) -> None:
-        self._atlas = atlas
+    def __init__(self, world: WorldModel) -> None:
+        self._world = world
         self._fields: dict[Point, DistanceField] = {}
 
     def between(self, way: tuple[StopCandidate, ...], goal: StopCandidate) -> float:
@@ -220,8 +220,8 @@ class _Legs:
 
     def _field(self, way: tuple[StopCandidate, ...]) -> DistanceField:
         if not way:
-            return self._atlas.distances
+            return self._world.distances
         start = way[-1].pose.point
         if start not in self._fields:
-            self._fields[start] = self._atlas.distances.from_elsewhere(start)
+            self._fields[start] = self._world.distances.from_elsewhere(start)
         return self._fields[start]

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from mapspeak.driving.search.evidence import Opinions, weight_of
 from mapspeak.driving.search.seenfloor import REACH_M, SeenFloor
 from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.memory import TakenPicture
+from mapspeak.memory.retrieval import Verdict
 from mapspeak.places.choosing import check_place
 from mapspeak.places.naming import Place
-from mapspeak.semantic import TakenPicture
-from mapspeak.semantic.retrieval import Verdict
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.visibility import cast_rays
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedPlace
 
 N_RAYS = 72
@@ -80,7 +80,7 @@ class SearchCandidate:
 
 
 def find_candidates(
-    atlas: Atlas,
+    world: WorldModel,
     thing: str,
     *,
     seen: SeenFloor,
@@ -93,48 +93,48 @@ def find_candidates(
     After that come earlier pictures in which the robot's own detector reported such a thing.
 
     Args:
-        atlas: The map.
+        world: The map.
         thing: What is looked for.
         seen: What was looked at already.
         opinions: What the model thinks.
         visited: The names of candidates of what is remembered that were looked at already.
         pictures: Those earlier pictures, in the order in which to go there.
     """
-    speaking, alike = _find_remembered(atlas, thing)
+    speaking, alike = _find_remembered(world, thing)
     remembered = [
         candidate
         for each in speaking
-        if _key(each) not in visited and (candidate := _remembered(atlas, each)) is not None
+        if _key(each) not in visited and (candidate := _remembered(world, each)) is not None
     ]
-    seen_mask = seen.mask_on(atlas.grid)
+    seen_mask = seen.mask_on(world.grid)
     near = [each.point for each in (*speaking, *alike)]
     others = [
-        *_frontiers(atlas, seen_mask, seen.half_view_rad, opinions, near),
-        *_unseen(atlas, seen_mask, seen.half_view_rad, opinions, near),
+        *_frontiers(world, seen_mask, seen.half_view_rad, opinions, near),
+        *_unseen(world, seen_mask, seen.half_view_rad, opinions, near),
     ]
     pictured = [
         candidate
         for each in pictures
-        if each.id not in visited and (candidate := _pictured(atlas, each)) is not None
+        if each.id not in visited and (candidate := _pictured(world, each)) is not None
     ]
     return [*remembered, *pictured, *sorted(others, key=lambda each: -each.rate)]
 
 
-def unseen_area_m2(atlas: Atlas, pose: Pose, *, seen: SeenFloor) -> float:
+def unseen_area_m2(world: WorldModel, pose: Pose, *, seen: SeenFloor) -> float:
     """Return how much floor that was not looked at yet comes into view in a pose."""
     areas_m2 = _areas_by_heading(
-        atlas,
-        seen.mask_on(atlas.grid, around=pose.point),
+        world,
+        seen.mask_on(world.grid, around=pose.point),
         np.array([[pose.x, pose.y]]),
         seen.half_view_rad,
     )
     return float(areas_m2[0, _heading_index(pose.yaw_rad)])
 
 
-def _find_remembered(atlas: Atlas, thing: str) -> tuple[list[Place], list[Place]]:
+def _find_remembered(world: WorldModel, thing: str) -> tuple[list[Place], list[Place]]:
     """Return what speaks of the thing, and what may be it by its likeness alone."""
-    by_id = {each.id: Place(each.id, each) for each in atlas.recollection.everything}
-    answer = atlas.recollection.find(thing, limit=MOST_REMEMBERED)
+    by_id = {each.id: Place(each.id, each) for each in world.recollection.everything}
+    answer = world.recollection.find(thing, limit=MOST_REMEMBERED)
     speaking = answer.find_speaking(least_said_ratio=LEAST_SAID_RATIO)
     is_ambiguous = answer.verdict is Verdict.AMBIGUOUS
     meant = answer.candidates[: answer.n_meant] if is_ambiguous else ()
@@ -150,11 +150,11 @@ def _key(place: Place) -> str:
     return remembered.waypoint.name if isinstance(remembered, RememberedPlace) else place.name
 
 
-def _remembered(atlas: Atlas, place: Place) -> SearchCandidate | None:
+def _remembered(world: WorldModel, place: Place) -> SearchCandidate | None:
     """Return where to stand for it, or the nearest pose that works; None where none does."""
-    goal = check_place(atlas, place)
+    goal = check_place(world, place)
     pose = goal.pose if goal.check.is_ok else goal.check.nearest
-    path_m = None if pose is None else atlas.path_m(pose.point)
+    path_m = None if pose is None else world.path_m(pose.point)
     if pose is None or path_m is None:
         return None
     return SearchCandidate(
@@ -169,9 +169,9 @@ def _remembered(atlas: Atlas, place: Place) -> SearchCandidate | None:
     )
 
 
-def _pictured(atlas: Atlas, picture: TakenPicture) -> SearchCandidate | None:
+def _pictured(world: WorldModel, picture: TakenPicture) -> SearchCandidate | None:
     """Return the pose that a picture was taken in; None where the robot cannot get there now."""
-    path_m = atlas.path_m(picture.pose.point)
+    path_m = world.path_m(picture.pose.point)
     if path_m is None:
         return None
     return SearchCandidate(
@@ -187,17 +187,17 @@ def _pictured(atlas: Atlas, picture: TakenPicture) -> SearchCandidate | None:
 
 
 def _frontiers(
-    atlas: Atlas, seen: Mask, half_rad: float, opinions: Opinions, near: list[Point]
+    world: WorldModel, seen: Mask, half_rad: float, opinions: Opinions, near: list[Point]
 ) -> Iterator[SearchCandidate]:
-    frontiers = atlas.frontiers.frontiers
+    frontiers = world.frontiers.frontiers
     if not frontiers:
         return
     places = np.array([[each.pose.x, each.pose.y] for each in frontiers])
-    areas_m2 = _areas_by_heading(atlas, seen, places, half_rad)
+    areas_m2 = _areas_by_heading(world, seen, places, half_rad)
     for frontier, by_heading in zip(frontiers, areas_m2, strict=True):
         unseen_m2 = float(by_heading[_heading_index(frontier.pose.yaw_rad)])
         yield _rated(
-            atlas,
+            world,
             CandidateKind.FRONTIER,
             frontier.pose,
             area_m2=unseen_m2 + UNKNOWN_WEIGHT * frontier.gain_m2,
@@ -209,18 +209,18 @@ def _frontiers(
 
 
 def _unseen(
-    atlas: Atlas, seen: Mask, half_rad: float, opinions: Opinions, near: list[Point]
+    world: WorldModel, seen: Mask, half_rad: float, opinions: Opinions, near: list[Point]
 ) -> Iterator[SearchCandidate]:
     """Return the best heading at each of many places from which something unseen is in view."""
-    places, ways_m = _places_to_stand(atlas)
-    areas_m2 = _areas_by_heading(atlas, seen, places, half_rad)
+    places, ways_m = _places_to_stand(world)
+    areas_m2 = _areas_by_heading(world, seen, places, half_rad)
     best = areas_m2.argmax(axis=1)
     for place, path_m, index, by_heading in zip(places, ways_m, best, areas_m2, strict=True):
         area_m2 = float(by_heading[index])
         if area_m2 >= LEAST_AREA_M2:
             yaw_rad = wrap_angle(index * math.tau / N_RAYS)
             yield _rated(
-                atlas,
+                world,
                 CandidateKind.UNSEEN,
                 Pose(float(place[0]), float(place[1]), yaw_rad),
                 area_m2=area_m2,
@@ -231,7 +231,7 @@ def _unseen(
 
 
 def _rated(
-    atlas: Atlas,
+    world: WorldModel,
     kind: CandidateKind,
     pose: Pose,
     *,
@@ -244,11 +244,11 @@ def _rated(
     looks_at = frontier.anchor if frontier else pose.transform(Point(REACH_M / 2, 0.0))
     own_id = frontier.id if frontier else f"({pose.x:.1f}, {pose.y:.1f})"
     # Finding rooms takes long, and nobody needs them who thinks nothing of any.
-    room_id = atlas.find_room_id(looks_at) if opinions.speaks_of_rooms else None
+    room_id = world.find_room_id(looks_at) if opinions.speaks_of_rooms else None
     score = opinions.score_at(looks_at, ids=(own_id, room_id or ""))
     if any(point.distance_to(looks_at) <= NEAR_M for point in near):
         score = max(score, MAY_BE_NEAR)
-    turn_rad = abs(wrap_angle(pose.yaw_rad - atlas.robot.yaw_rad)) if path_m < STOP_M else 0.0
+    turn_rad = abs(wrap_angle(pose.yaw_rad - world.robot.yaw_rad)) if path_m < STOP_M else 0.0
     cost_m = path_m + STOP_M + TURN_M * turn_rad / math.pi
     return SearchCandidate(
         kind=kind,
@@ -262,32 +262,34 @@ def _rated(
     )
 
 
-def _places_to_stand(atlas: Atlas) -> tuple[FloatArray, FloatArray]:
+def _places_to_stand(world: WorldModel) -> tuple[FloatArray, FloatArray]:
     """Return places spread over the floor, each where its square has most room, and ways to them.
 
     The first one is where the robot is: it may turn there.
     """
-    reachable = atlas.distances.build_reachable_mask()
-    clear_m = np.where(reachable, atlas.map.clearance_m, 0.0)
-    rows, cols = np.nonzero(clear_m >= atlas.radius_m + COMFORT_M)
-    every = max(round(EVERY_M / atlas.grid.resolution_m), 1)
+    reachable = world.distances.build_reachable_mask()
+    clear_m = np.where(reachable, world.map.clearance_m, 0.0)
+    rows, cols = np.nonzero(clear_m >= world.radius_m + COMFORT_M)
+    every = max(round(EVERY_M / world.grid.resolution_m), 1)
     roomiest_first = np.argsort(-clear_m[rows, cols], kind="stable")
     rows, cols = rows[roomiest_first], cols[roomiest_first]
-    squares = (rows // every) * (atlas.grid.n_cols // every + 1) + cols // every
+    squares = (rows // every) * (world.grid.n_cols // every + 1) + cols // every
     _, first = np.unique(squares, return_index=True)
-    points = atlas.grid.points_at(rows[first], cols[first])
-    ways_m = atlas.distances.distances_at(rows[first], cols[first])
+    points = world.grid.points_at(rows[first], cols[first])
+    ways_m = world.distances.distances_at(rows[first], cols[first])
     is_reached = np.isfinite(ways_m)
-    here = np.array([[atlas.robot.x, atlas.robot.y]])
+    here = np.array([[world.robot.x, world.robot.y]])
     return (
         np.concatenate([here, points[is_reached]]),
         np.concatenate([np.zeros(1), ways_m[is_reached]]),
     )
 
 
-def _areas_by_heading(atlas: Atlas, seen: Mask, places: FloatArray, half_rad: float) -> FloatArray:
+def _areas_by_heading(
+    world: WorldModel, seen: Mask, places: FloatArray, half_rad: float
+) -> FloatArray:
     """Return the unseen floor in view from places by heading, shape (places, N_RAYS), in m2."""
-    grid = atlas.grid
+    grid = world.grid
     angles: FloatArray = np.arange(N_RAYS, dtype=np.float64) * (math.tau / N_RAYS)
     # No step is longer than a cell, so that no ray passes a wall between two of them.
     step_m = grid.resolution_m

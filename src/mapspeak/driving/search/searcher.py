@@ -39,10 +39,10 @@ from mapspeak.driving.search.standing import (
 )
 from mapspeak.errors import PolicyError
 from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.memory import TakenPicture, name_key
 from mapspeak.robot import CameraPicture, Detection
-from mapspeak.semantic import TakenPicture, name_key
 from mapspeak.spatial.frontiers import remaining_ratio
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 RETHINK_S = 1.0
 LEFT_RATIO = 0.3
@@ -197,15 +197,15 @@ class Searcher:
     async def _step(self, deadline_s: float, on_trip: OnTrip, client: str) -> SearchState | None:
         """Drive on for a moment; return how the call ends, None where it goes on."""
         with self._site.drives.preparing() as ticket:
-            atlas = await self._site.fetch_atlas()
+            world = await self._site.fetch_world_model()
             if self._find_spent() is not None:
                 await self._trips.give_up()
                 return SearchState.BUDGET_SPENT
-            state = await self._set_out(atlas, ticket, client)
+            state = await self._set_out(world, ticket, client)
         left_s = deadline_s - self._site.robot.now_s
         if state is TripState.UNDER_WAY and left_s > SLACK_S:
             state = await self._trips.follow(
-                wait_s=min(RETHINK_S, left_s), grid=atlas.grid, on_trip=on_trip
+                wait_s=min(RETHINK_S, left_s), grid=world.grid, on_trip=on_trip
             )
         match state:
             case None:
@@ -226,20 +226,20 @@ class Searcher:
             self._visited.add(here.name)
         return SearchState.LOOK
 
-    async def _set_out(self, atlas: Atlas, ticket: int, client: str) -> TripState | None:
+    async def _set_out(self, world: WorldModel, ticket: int, client: str) -> TripState | None:
         """Set out to the next place where there is no trip, or it has become pointless."""
         trip, here = self._trips.current, self._here
         if (
             trip is not None
             and here is not None
             and not self._has_new_opinion
-            and not await self._is_pointless(atlas, here)
+            and not await self._is_pointless(world, here)
         ):
             return TripState.UNDER_WAY
-        candidates = await self._site.compute(lambda: self._find_candidates(atlas))
+        candidates = await self._site.compute(lambda: self._find_candidates(world))
         if not candidates and self._seen.n_earlier:
             self._seen.forget_earlier()
-            candidates = await self._site.compute(lambda: self._find_candidates(atlas))
+            candidates = await self._site.compute(lambda: self._find_candidates(world))
             self._looks_anew |= bool(candidates)
         was_asked, self._has_new_opinion = self._has_new_opinion, False
         best = self._choose(candidates) if candidates else None
@@ -252,16 +252,16 @@ class Searcher:
             return TripState.UNDER_WAY
         self._here = best
         self._next = _pick_apart(best, candidates)
-        if _stands_at(atlas, best):
+        if _stands_at(world, best):
             await self._trips.give_up()
             return TripState.ARRIVED
         target = Target(id=best.id, pose=best.pose, frontier=best.frontier)
-        return await self._trips.set_out(target, ticket=ticket, client=client, grid=atlas.grid)
+        return await self._trips.set_out(target, ticket=ticket, client=client, grid=world.grid)
 
-    def _find_candidates(self, atlas: Atlas) -> list[SearchCandidate]:
-        self._recall_company(atlas)
+    def _find_candidates(self, world: WorldModel) -> list[SearchCandidate]:
+        self._recall_company(world)
         found = find_candidates(
-            atlas,
+            world,
             self._thing,
             seen=self._seen,
             opinions=self._opinions,
@@ -272,30 +272,30 @@ class Searcher:
         return [
             each
             for each in found
-            if not blocked.is_closed(each.pose.point, atlas.grid)
+            if not blocked.is_closed(each.pose.point, world.grid)
             and (each.kind is CandidateKind.REMEMBERED or not self._seen.has_look_from(each.pose))
         ]
 
-    def _recall_company(self, atlas: Atlas) -> None:
+    def _recall_company(self, world: WorldModel) -> None:
         """Take in what remembered places say of where the thing may be; a kitchen has fridges."""
-        for place in atlas.places:
+        for place in world.places:
             waypoint = place.waypoint
             named = (*waypoint.safety_landmarks, *waypoint.functional_landmarks)
             words = ", ".join((waypoint.name, *(each.label for each in named)))
             if (score := find_company_score(words, self._thing)) is not None:
                 self._opinions.add_company(waypoint.pose.point, score)
 
-    async def _is_pointless(self, atlas: Atlas, here: SearchCandidate) -> bool:
+    async def _is_pointless(self, world: WorldModel, here: SearchCandidate) -> bool:
         """Return True when what the place shows was seen on the way, or nobody can stand there."""
-        if not has_room_at(atlas.grid, here.pose.point, radius_m=atlas.radius_m):
+        if not has_room_at(world.grid, here.pose.point, radius_m=world.radius_m):
             return True
         if here.name:
             return False
         left_m2 = await self._site.compute(
-            lambda: unseen_area_m2(atlas, here.pose, seen=self._seen)
+            lambda: unseen_area_m2(world, here.pose, seen=self._seen)
         )
         if here.frontier is not None:
-            left_ratio = remaining_ratio(atlas.grid, here.frontier)
+            left_ratio = remaining_ratio(world.grid, here.frontier)
             return left_ratio < LEFT_RATIO and left_m2 < LEFT_RATIO * here.area_m2
         return left_m2 < LEFT_RATIO * here.area_m2
 
@@ -328,16 +328,16 @@ class Searcher:
 
     async def _end(self, state: SearchState) -> SearchProgress:
         self._state = state
-        atlas = await self._site.fetch_atlas()
-        return await self._site.compute(lambda: self._report(atlas))
+        world = await self._site.fetch_world_model()
+        return await self._site.compute(lambda: self._report(world))
 
-    def _report(self, atlas: Atlas) -> SearchProgress:
+    def _report(self, world: WorldModel) -> SearchProgress:
         trip = self._trips.current
-        seen = self._seen.mask_on(atlas.grid)
+        seen = self._seen.mask_on(world.grid)
         earlier = self._earlier if self._is_begun_now else None
         looks_anew = self._looks_anew
         self._is_begun_now = self._looks_anew = False
-        n_free = max(int(np.count_nonzero(atlas.grid.free)), 1)
+        n_free = max(int(np.count_nonzero(world.grid.free)), 1)
         return SearchProgress(
             state=self._state,
             budget=self._budget,
@@ -353,11 +353,11 @@ class Searcher:
             here=self._here,
             goal_id=None if trip is None else trip.goal_id,
             next=self._next,
-            regions=find_seen_regions(atlas, seen) if self._state.is_end else (),
+            regions=find_seen_regions(world, seen) if self._state.is_end else (),
             seen_ratio=int(np.count_nonzero(seen)) / n_free,
             blocked=tuple(self._trips.blocked),
-            pose=atlas.robot,
-            pose_doubt=atlas.pose_doubt,
+            pose=world.robot,
+            pose_doubt=world.pose_doubt,
         )
 
 
@@ -391,7 +391,7 @@ def _place_of(detection: Detection, pose: Pose) -> Point:
     return along.transform(Point(range_m, 0.0))
 
 
-def _stands_at(atlas: Atlas, candidate: SearchCandidate) -> bool:
-    turn_rad = abs(wrap_angle(candidate.pose.yaw_rad - atlas.robot.yaw_rad))
-    is_near = atlas.robot.point.distance_to(candidate.pose.point) <= HERE_M
+def _stands_at(world: WorldModel, candidate: SearchCandidate) -> bool:
+    turn_rad = abs(wrap_angle(candidate.pose.yaw_rad - world.robot.yaw_rad))
+    is_near = world.robot.point.distance_to(candidate.pose.point) <= HERE_M
     return is_near and turn_rad <= HERE_RAD

@@ -11,7 +11,7 @@ from mapspeak.driving.search.candidates import SearchCandidate
 from mapspeak.driving.search.evidence import Earlier
 from mapspeak.geometry import Pose
 from mapspeak.robot import PoseDoubt
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 
 class SearchState(StrEnum):
@@ -116,13 +116,13 @@ class SearchProgress:
     pose_doubt: PoseDoubt | None
 
 
-def find_seen_regions(atlas: Atlas, seen: NDArray[np.bool_]) -> tuple[SeenRegion, ...]:
+def find_seen_regions(world: WorldModel, seen: NDArray[np.bool_]) -> tuple[SeenRegion, ...]:
     """Return how much of each room and corridor was looked at, by a mask of the map's cells."""
-    labels = atlas.rooms.labels
-    n_all = np.bincount(labels[atlas.grid.free])
+    labels = world.rooms.labels
+    n_all = np.bincount(labels[world.grid.free])
     n_seen = np.bincount(labels[seen], minlength=n_all.size)
     return tuple(
         SeenRegion(region.id, float(n_seen[region.index] / max(n_all[region.index], 1)))
-        for region in atlas.rooms.regions
+        for region in world.rooms.regions
         if region.index < n_all.size
     )

@@ -85,7 +85,7 @@ class ToolDriver:
         return sorted(found, key=lambda seen: seen.range_m)
 
     async def drive(self, **goal: object) -> str:
-        """Drive to a `place`, or to `x`, `y` and perhaps `yaw_deg`; gives how it ended."""
+        """Drive to a `place`, or to `x`, `y` and perhaps `yaw_deg`; return how it ended."""
         answer = await self.tools.call("navigate_to", **goal, wait_s=WAIT_S)
         return await self._see_through(answer)
 

@@ -141,7 +141,7 @@ async def _explore_by_picture(driver: ToolDriver) -> AgentEnd:
 
 
 async def _see_map(driver: ToolDriver) -> OccupancyGrid:
-    """Look at all three of the paper's pictures, and reads the first as it is drawn."""
+    """Look at all three of the paper's pictures, and read the first as it is drawn."""
     plain = await driver.tools.demand("subscribe_map_as_image")
     await driver.tools.demand("draw_map_axis")
     await driver.tools.demand("draw_robot_pose")

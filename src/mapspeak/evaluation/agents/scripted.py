@@ -180,7 +180,7 @@ async def _search_on(driver: ToolDriver, label: str, answer: ToolAnswer) -> Tool
 
 
 async def _approach(driver: ToolDriver, label: str, bearing_deg: float, range_m: float) -> AgentEnd:
-    """End the search and drives up to what was seen; looks again where it was far off."""
+    """End the search and drive up to what was seen; look again where it was far off."""
     await driver.tools.call(SEARCH, thing=label, seen=True)
     pose = await driver.find_pose()
     heading_rad = pose.yaw_rad + math.radians(bearing_deg)

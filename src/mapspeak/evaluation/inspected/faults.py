@@ -41,7 +41,7 @@ def with_late_transform(system: InspectedSystem, child: str, lag_s: float) -> In
 
 
 def with_cut_transform(system: InspectedSystem, child: str) -> InspectedSystem:
-    """End the transform to a frame, and leaves those that are told together with it."""
+    """End the transform to a frame, and leave those that are told together with it."""
     return _with_streams(system, lambda each: _cut(each, child) if _tells_of(each, child) else each)
 
 

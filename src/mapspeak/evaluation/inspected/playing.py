@@ -28,7 +28,7 @@ LOG = "rosgraph_msgs/Log"
 
 @asynccontextmanager
 async def play(system: InspectedSystem) -> AsyncGenerator[str]:
-    """Play a system, in real time, while the context lasts; gives the address of its rosbridge."""
+    """Play a system, in real time, while the context lasts; return the address of its rosbridge."""
     begun_s = anyio.current_time()
 
     def clock() -> float:

@@ -13,7 +13,7 @@ from mcp.client.stdio import StdioServerParameters
 from mapspeak.evaluation.inspected import InspectedSystem, play
 from mapspeak.evaluation.trials import ServerAccess
 from mapspeak.links.rosbridge import open_rosbridge_robot
-from mapspeak.semantic import SemanticMapStore
+from mapspeak.memory import SemanticMapStore
 from mapspeak.server.app import build_server
 from mapspeak.session import Session
 
@@ -42,7 +42,7 @@ class Inspection:
 async def open_inspection(
     system: InspectedSystem, connection: ServerAccess, *, toolsets: tuple[str, ...], folder: Path
 ) -> AsyncGenerator[Inspection]:
-    """Play a system and connects to it as an agent wants it, read-only.
+    """Play a system and connect to it as an agent wants it, read-only.
 
     Args:
         system: What is played, for as long as the context lasts.

@@ -63,7 +63,7 @@ class Transcript:
         self._write("agent", call=call)
 
     def hear_answer(self, tool: str, arguments: dict[str, Any], answer: ToolAnswer) -> None:
-        """Write an answer down and keeps its pictures."""
+        """Write an answer down and keep its pictures."""
         self.n_errors += answer.is_error
         names = [self._keep(picture.data, picture.suffix) for picture in answer.pictures]
         self._write(

@@ -18,8 +18,8 @@ from mapspeak.evaluation.runs.inspecting import open_inspection
 from mapspeak.evaluation.scores.evidence import NOWHERE
 from mapspeak.evaluation.trials import ServerAccess, Setting, Trial
 from mapspeak.links.simulated import SimulatedRobot, SoloRobot
+from mapspeak.memory import SemanticMapStore
 from mapspeak.safety import Approvals, AuditLog, Guard, Hold, Policy, WaitingRoom
-from mapspeak.semantic import SemanticMapStore
 from mapspeak.server.app import DEFAULT_TOOLSETS, build_server
 from mapspeak.server.mapview.representations import Representation
 from mapspeak.session import Session
@@ -69,7 +69,7 @@ class Workshop:
         return DEFAULT_TOOLSETS if chosen is None else chosen
 
     def command(self) -> tuple[str, ...]:
-        """Return the command line of a server for this trial; writes the world it names."""
+        """Return the command line of a server for this trial; write the world it names."""
         setting, world = self.setting, self.trial.world
         if setting.added:
             changed = self.folder / "world" / f"{self.world.name}.yaml"
@@ -113,7 +113,7 @@ class Workplace:
 
 @asynccontextmanager
 async def open_workplace(shop: Workshop, connection: ServerAccess) -> AsyncGenerator[Workplace]:
-    """Start robot and server and connects; in the end the robot's map lies in the folder."""
+    """Start robot and server and connect; in the end the robot's map lies in the folder."""
     for leftover in (STATES, MEMORY, MAP, AUDIT):
         (shop.folder / leftover).unlink(missing_ok=True)
     if shop.setting.memory is not None:

@@ -92,7 +92,7 @@ class StaleMap:
         return bool(find_spacious_rooms(site))
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
-        """Draw the room, and puts the crates where it is widest."""
+        """Draw the room, and put the crates where it is widest."""
         random = dice(self.name, site, seed)
         rooms = find_spacious_rooms(site)
         room, crates = rooms[int(random.integers(len(rooms)))]

@@ -77,7 +77,7 @@ class PlaceTask:
         return self.is_offered_in(site)
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
-        """Draw the place, and starts away from it."""
+        """Draw the place, and start away from it."""
         random = dice(self.name, site, seed)
         aim = self.draw(site, random)
         start = draw_start(site, random, without=site.near(aim.goal, 3 * THING_TOLERANCE_M))

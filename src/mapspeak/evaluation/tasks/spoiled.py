@@ -60,7 +60,7 @@ class SpoiledMemory:
         return bool(findable_kinds(site))
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
-        """Draw the wish, and changes what is remembered."""
+        """Draw the wish, and change what is remembered."""
         random = dice(self.name, site, seed)
         wish = draw_wish(site, random)
         start, shortest_m = draw_start_apart(site, random, wish.kind)

@@ -164,7 +164,7 @@ class Store(Typestore):
         self._n_messages_left = 0
 
     def decode(self, name: str, data: bytes) -> dict[str, Any]:
-        """Return a message by its type's name here; raises `SerdeError`."""
+        """Return a message by its type's name here; raise `SerdeError`."""
         self._n_messages_left = MOST_MESSAGES
         message: dict[str, Any] = self.deserialize_cdr(memoryview(data), name)  # type: ignore[assignment]
         return message

@@ -6,9 +6,9 @@ from datetime import datetime
 from enum import StrEnum
 
 from mapspeak.geometry import Point, Pose
+from mapspeak.memory.consistency import Trust
+from mapspeak.memory.retrieval import Answer, EntryCandidate, EntryKind, Verdict
 from mapspeak.places.goalcheck import GoalCheck
-from mapspeak.semantic.consistency import Trust
-from mapspeak.semantic.retrieval import Answer, EntryCandidate, EntryKind, Verdict
 
 NEAR_M = 5.0
 

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 
 from mapspeak.places.naming import no_such_place, split_room
 from mapspeak.places.recall.asking import last_seen
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedThing
 
 THING_ID = re.compile(r"[Tt]\d+")
@@ -30,12 +30,12 @@ class Nearby:
 
 
 def find_nearby(
-    atlas: Atlas, words: str, *, radius_m: float | None = None, room_id: str | None = None
+    world: WorldModel, words: str, *, radius_m: float | None = None, room_id: str | None = None
 ) -> Nearby | None:
     """Find the thing that is called so, and what is near to it; None where nothing is.
 
     Args:
-        atlas: The map with the memory.
+        world: The map with the memory.
         words: "T3", "potted plant", or "potted plant in R3".
         radius_m: Only what is so near.
         room_id: Only what is in that room.
@@ -43,34 +43,34 @@ def find_nearby(
     Raises:
         GoalError: The words are the id of no thing.
     """
-    called = _find_called(atlas, words.strip())
+    called = _find_called(world, words.strip())
     if not called:
         return None
     first, *others = called
     away = [
         (each, each.thing.position.distance_to(first.point))
-        for each in atlas.things
+        for each in world.things
         if each.id != first.id and each.thing.position is not None
     ]
     nearest = [
         (each, away_m)
         for each, away_m in sorted(away, key=lambda pair: pair[1])
         if (radius_m is None or away_m <= radius_m)
-        and (room_id is None or room_id in atlas.rooms_before(each))
+        and (room_id is None or room_id in world.rooms_before(each))
     ]
     return Nearby(thing=first, others=tuple(others), nearest=tuple(nearest))
 
 
-def _find_called(atlas: Atlas, words: str) -> list[RememberedThing]:
+def _find_called(world: WorldModel, words: str) -> list[RememberedThing]:
     if THING_ID.fullmatch(words):
-        found = atlas.recollection.find_thing(words.upper())
+        found = world.recollection.find_thing(words.upper())
         if found is None:
-            raise no_such_place(atlas, words)
+            raise no_such_place(world, words)
         return [found]
-    label, room_id = split_room(atlas, words)
+    label, room_id = split_room(world, words)
     called = [
         each
-        for each in atlas.recollection.find_called(label)
-        if room_id is None or room_id in atlas.rooms_before(each)
+        for each in world.recollection.find_called(label)
+        if room_id is None or room_id in world.rooms_before(each)
     ]
-    return sorted(called, key=lambda each: last_seen(atlas, each) or NEVER, reverse=True)
+    return sorted(called, key=lambda each: last_seen(world, each) or NEVER, reverse=True)

@@ -12,7 +12,7 @@ from mapspeak.places.relations.grammar import Compass, Side, Towards, say_headin
 from mapspeak.places.relations.placement import Footing, Stand, find_footing, refuse, tolerance_m
 from mapspeak.places.relations.referents import Referent, find_near_side, find_normal
 from mapspeak.spatial.rooms import Door, Region
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 SECTOR_RAD = math.radians(40)
 """A place still lies in a direction so far off it."""
@@ -50,7 +50,7 @@ class Aim:
 
 
 def stand_towards(
-    atlas: Atlas, thing: Referent, wanted: Towards, seen_from: Referent | None
+    world: WorldModel, thing: Referent, wanted: Towards, seen_from: Referent | None
 ) -> Stand:
     """Find where to stand in some direction from a thing.
 
@@ -58,14 +58,14 @@ def stand_towards(
         GoalError: Nothing fits, or the direction has no meaning there; the hint says what would do.
     """
     if wanted.direction is Side.FRONT and thing.region is not None and seen_from is None:
-        thing = front_of_region(atlas, thing.region)
-    aim = _aim_at(atlas, thing, wanted, seen_from)
-    found = _search(atlas, thing, aim)
+        thing = front_of_region(world, thing.region)
+    aim = _aim_at(world, thing, wanted, seen_from)
+    found = _search(world, thing, aim)
     if found is None:
         far = "" if wanted.away_m is None else f" {wanted.away_m:g} m"
         raise refuse(
             f"The robot can stand nowhere{far} {_say(wanted)} {thing.name}{aim.how}.",
-            list(_what_works(atlas, thing, wanted, seen_from)),
+            list(_what_works(world, thing, wanted, seen_from)),
         )
     point, away_m = found
     edge = "" if thing.is_point else ", measured from its edge"
@@ -76,15 +76,15 @@ def stand_towards(
     )
 
 
-def front_of_region(atlas: Atlas, region: Region) -> Referent:
+def front_of_region(world: WorldModel, region: Region) -> Referent:
     """Return the door of a region that the robot comes to first, as seen from outside.
 
     Raises:
         GoalError: No door of it can be reached.
     """
-    crossings = ((atlas.find_crossing(door), door) for door in atlas.rooms.doors_of(region))
+    crossings = ((world.find_crossing(door), door) for door in world.rooms.doors_of(region))
     reached = [
-        (atlas.path_m(crossing) or 0.0, door.id, door) for crossing, door in crossings if crossing
+        (world.path_m(crossing) or 0.0, door.id, door) for crossing, door in crossings if crossing
     ]
     if not reached:
         raise refuse(
@@ -96,8 +96,8 @@ def front_of_region(atlas: Atlas, region: Region) -> Referent:
     return Referent(
         name=f"{region.id} (its door {door.id})",
         anchor=door.place,
-        extent=_extent_of(door, find_normal(atlas, door, atlas.rooms.region(other_id))),
-        home=atlas.rooms.region(other_id),
+        extent=_extent_of(door, find_normal(world, door, world.rooms.region(other_id))),
+        home=world.rooms.region(other_id),
         door=door,
     )
 
@@ -111,33 +111,33 @@ def _say(wanted: Towards) -> str:
     return f"{wanted.direction} of" if isinstance(wanted.direction, Compass) else wanted.direction
 
 
-def _aim_at(atlas: Atlas, thing: Referent, wanted: Towards, seen_from: Referent | None) -> Aim:
+def _aim_at(world: WorldModel, thing: Referent, wanted: Towards, seen_from: Referent | None) -> Aim:
     away_m = AWAY_M if wanted.away_m is None else wanted.away_m
     aim = Aim(heading_rad=0.0, away_m=away_m, is_asked=wanted.away_m is not None)
     match wanted.direction:
         case Compass() as compass if thing.door is not None:
-            return _aim_past_door(atlas, thing, thing.door, compass, aim)
+            return _aim_past_door(world, thing, thing.door, compass, aim)
         case Compass() as compass:
             sees = thing.anchor if thing.is_point else None
             home = thing.home if thing.is_point else None
             return replace(aim, heading_rad=compass.heading_rad, home=home, sees=sees)
         case side if thing.door is not None:
-            return _aim_at_door(atlas, thing, thing.door, side, aim, seen_from)
+            return _aim_at_door(world, thing, thing.door, side, aim, seen_from)
         case side:
-            return _aim_at_thing(atlas, thing, side, aim, seen_from)
+            return _aim_at_thing(world, thing, side, aim, seen_from)
 
 
 def _aim_at_thing(
-    atlas: Atlas, thing: Referent, side: Side, aim: Aim, seen_from: Referent | None
+    world: WorldModel, thing: Referent, side: Side, aim: Aim, seen_from: Referent | None
 ) -> Aim:
     sees = thing.anchor if thing.is_point else None
     if seen_from is None and thing.front_rad is not None:
         heading_rad = thing.front_rad + TURNS[side]
         how = " by its own heading"
         return replace(aim, heading_rad=heading_rad, home=thing.home, sees=sees, how=how)
-    viewer = atlas.robot.point if seen_from is None else seen_from.anchor
+    viewer = world.robot.point if seen_from is None else seen_from.anchor
     who = "the robot" if seen_from is None else seen_from.name
-    if thing.region is not None and atlas.rooms.find_region_at(viewer) is thing.region:
+    if thing.region is not None and world.rooms.find_region_at(viewer) is thing.region:
         raise refuse(
             f"{side.capitalize()} {thing.name} means nothing from inside it, where {who} is.",
             [f"north of {thing.name}", f"the north wall of {thing.name}", f"next to {thing.name}"],
@@ -145,7 +145,7 @@ def _aim_at_thing(
     if viewer.distance_to(thing.anchor) < HERE_M:
         if seen_from is not None:
             raise refuse(f"{who} is too near to {thing.name} to see it from a side.")
-        heading_rad = atlas.robot.yaw_rad + TURNS[side]
+        heading_rad = world.robot.yaw_rad + TURNS[side]
         how = " by the heading of the robot, which is there"
         return replace(aim, heading_rad=heading_rad, home=thing.home, sees=sees, how=how)
     look_rad = viewer.bearing_to(thing.anchor)
@@ -155,18 +155,18 @@ def _aim_at_thing(
 
 
 def _aim_at_door(
-    atlas: Atlas, thing: Referent, door: Door, side: Side, aim: Aim, seen_from: Referent | None
+    world: WorldModel, thing: Referent, door: Door, side: Side, aim: Aim, seen_from: Referent | None
 ) -> Aim:
-    near, who = thing.home or find_near_side(atlas, door), "the robot"
+    near, who = thing.home or find_near_side(world, door), "the robot"
     if seen_from is not None:
-        near, who = _side_seen_from(atlas, door, seen_from), seen_from.name
-    normal_rad = find_normal(atlas, door, near)
+        near, who = _side_seen_from(world, door, seen_from), seen_from.name
+    normal_rad = find_normal(world, door, near)
     far_id = next(each for each in door.region_ids if each != near.id)
-    home = atlas.rooms.region(far_id) if side is Side.BEHIND else near
+    home = world.rooms.region(far_id) if side is Side.BEHIND else near
     turn_rad = TURNS[side] if side in (Side.FRONT, Side.BEHIND) else -TURNS[side]
     is_beside = side in (Side.LEFT, Side.RIGHT)
     before_rad = normal_rad + (math.pi if side is Side.BEHIND else 0.0)
-    step_m = atlas.radius_m
+    step_m = world.radius_m
     return replace(
         aim,
         heading_rad=normal_rad + turn_rad,
@@ -180,43 +180,45 @@ def _aim_at_door(
     )
 
 
-def _aim_past_door(atlas: Atlas, thing: Referent, door: Door, compass: Compass, aim: Aim) -> Aim:
+def _aim_past_door(
+    world: WorldModel, thing: Referent, door: Door, compass: Compass, aim: Aim
+) -> Aim:
     """Aim into the region that lies that way; along the wall, on the robot's side of it."""
-    near = thing.home or find_near_side(atlas, door)
+    near = thing.home or find_near_side(world, door)
     far_id = next(each for each in door.region_ids if each != near.id)
     home = near
-    if math.cos(find_normal(atlas, door, near) - compass.heading_rad) < -math.cos(BEYOND_RAD):
-        home = atlas.rooms.region(far_id)
-    before_rad = find_normal(atlas, door, home)
+    if math.cos(find_normal(world, door, near) - compass.heading_rad) < -math.cos(BEYOND_RAD):
+        home = world.rooms.region(far_id)
+    before_rad = find_normal(world, door, home)
     sees = Point(
-        door.place.x + atlas.radius_m * math.cos(before_rad),
-        door.place.y + atlas.radius_m * math.sin(before_rad),
+        door.place.x + world.radius_m * math.cos(before_rad),
+        door.place.y + world.radius_m * math.sin(before_rad),
     )
     return replace(aim, heading_rad=compass.heading_rad, home=home, sees=sees, how=f" in {home.id}")
 
 
-def _side_seen_from(atlas: Atlas, door: Door, viewer: Referent) -> Region:
+def _side_seen_from(world: WorldModel, door: Door, viewer: Referent) -> Region:
     """Return the region of a door on whose side a viewer is."""
-    sides = [atlas.rooms.region(region_id) for region_id in door.region_ids]
+    sides = [world.rooms.region(region_id) for region_id in door.region_ids]
     standing = viewer.region or viewer.home
     for side in sides:
         if standing is not None and side.id == standing.id:
             return side
 
     def ahead(side: Region) -> float:
-        return math.cos(find_normal(atlas, door, side) - door.place.bearing_to(viewer.anchor))
+        return math.cos(find_normal(world, door, side) - door.place.bearing_to(viewer.anchor))
 
     return max(sides, key=ahead)
 
 
-def _search(atlas: Atlas, thing: Referent, aim: Aim) -> tuple[Point, float] | None:
+def _search(world: WorldModel, thing: Referent, aim: Aim) -> tuple[Point, float] | None:
     """Find the place nearest to what is aimed at, and how far from the thing it is."""
     along = np.array([math.cos(aim.heading_rad), math.sin(aim.heading_rad)])
     offsets = thing.extent - np.array([thing.anchor.x, thing.anchor.y])
     edge_m = float((offsets @ along).max())
     sideways = offsets @ np.array([-along[1], along[0]])
     reach_m = edge_m + float(np.abs(sideways).max()) + max(aim.away_m, FARTHEST_M) + 1.0
-    footing = find_footing(atlas, thing.anchor, reach_m)
+    footing = find_footing(world, thing.anchor, reach_m)
     forward_m = footing.along_m(thing.anchor, aim.heading_rad) - edge_m
     lateral_m = footing.along_m(thing.anchor, aim.heading_rad + math.pi / 2)
     outside_m = np.maximum(
@@ -224,17 +226,17 @@ def _search(atlas: Atlas, thing: Referent, aim: Aim) -> tuple[Point, float] | No
     )
     away_m = np.hypot(forward_m, outside_m)
     allowed = (forward_m > 0) & (outside_m <= math.tan(SECTOR_RAD) * forward_m)
-    allowed &= _is_far_enough(atlas, away_m, aim) & _is_at_home(footing, thing, aim)
+    allowed &= _is_far_enough(world, away_m, aim) & _is_at_home(footing, thing, aim)
     costs = np.hypot(forward_m - aim.away_m, outside_m) + 0.1 * np.abs(lateral_m)
-    point = footing.choose(atlas, allowed, costs, in_sight_of=aim.sees)
+    point = footing.choose(world, allowed, costs, in_sight_of=aim.sees)
     if point is None:
         return None
     return point, float(away_m[int(np.argmin(footing.away_m(point)))])
 
 
-def _is_far_enough(atlas: Atlas, away_m: np.ndarray, aim: Aim) -> np.ndarray:
+def _is_far_enough(world: WorldModel, away_m: np.ndarray, aim: Aim) -> np.ndarray:
     if aim.is_asked:
-        allowed = np.abs(away_m - aim.away_m) <= tolerance_m(atlas.grid.resolution_m)
+        allowed = np.abs(away_m - aim.away_m) <= tolerance_m(world.grid.resolution_m)
         return np.asarray(allowed)
     return np.asarray((away_m >= 0.4 * aim.away_m) & (away_m <= FARTHEST_M))
 
@@ -248,7 +250,7 @@ def _is_at_home(footing: Footing, thing: Referent, aim: Aim) -> np.ndarray:
 
 
 def _what_works(
-    atlas: Atlas, thing: Referent, wanted: Towards, seen_from: Referent | None
+    world: WorldModel, thing: Referent, wanted: Towards, seen_from: Referent | None
 ) -> Iterator[str]:
     """Return the phrases of the same kind in which the robot could stand."""
     around: tuple[Side | Compass, ...] = tuple(Side)
@@ -257,7 +259,7 @@ def _what_works(
     for direction in (wanted.direction, *(each for each in around if each != wanted.direction)):
         other = replace(wanted, direction=direction, away_m=None)
         try:
-            found = _search(atlas, thing, _aim_at(atlas, thing, other, seen_from))
+            found = _search(world, thing, _aim_at(world, thing, other, seen_from))
         except GoalError:
             continue
         if found is not None:

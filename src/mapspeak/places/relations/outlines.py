@@ -10,7 +10,7 @@ import numpy as np
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.spatial.grid import Mask
 from mapspeak.spatial.rooms import Region
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 ROUGHNESS_M = 0.25
 """An outline is straight where it bends by no more than this."""
@@ -85,19 +85,19 @@ class Outline:
     middle: Point
 
 
-def find_outline(atlas: Atlas, region: Region) -> Outline:
+def find_outline(world: WorldModel, region: Region) -> Outline:
     """Find the walls and corners of a region's floor.
 
     A room that nearly fills a rectangle has its four corners, whatever furniture stands in them.
     """
-    window = atlas.rooms.window_of(region)
-    inside = atlas.rooms.labels[window] == region.index
+    window = world.rooms.window_of(region)
+    inside = world.rooms.labels[window] == region.index
     cells = _trace_rectangle(inside)
     corner = window[0].start, window[1].start
-    points = None if cells is None else [_point_at(atlas, corner, *cell) for cell in cells]
-    if points is None or not _is_own(atlas, region, points):
-        points = [_point_at(atlas, corner, *cell) for cell in _trace(atlas, inside)]
-        middle = _mean_of(atlas, inside, corner)
+    points = None if cells is None else [_point_at(world, corner, *cell) for cell in cells]
+    if points is None or not _is_own(world, region, points):
+        points = [_point_at(world, corner, *cell) for cell in _trace(world, inside)]
+        middle = _mean_of(world, inside, corner)
     else:
         middle = Point(sum(p.x for p in points) / 4, sum(p.y for p in points) / 4)
     sides = [
@@ -110,7 +110,7 @@ def find_outline(atlas: Atlas, region: Region) -> Outline:
             for one, other in itertools.pairwise([*sides, *sides[:1]])
             if _is_corner(one, other)
         ),
-        walls=tuple(side for side in sides if _is_wall(atlas, side)),
+        walls=tuple(side for side in sides if _is_wall(world, side)),
         middle=middle,
     )
 
@@ -119,9 +119,9 @@ def _between(one_rad: float, other_rad: float) -> float:
     return wrap_angle(one_rad + wrap_angle(other_rad - one_rad) / 2)
 
 
-def _mean_of(atlas: Atlas, inside: Mask, corner: tuple[int, int]) -> Point:
+def _mean_of(world: WorldModel, inside: Mask, corner: tuple[int, int]) -> Point:
     rows, cols = np.nonzero(inside)
-    x, y = atlas.grid.points_at(rows + corner[0], cols + corner[1]).mean(axis=0).tolist()
+    x, y = world.grid.points_at(rows + corner[0], cols + corner[1]).mean(axis=0).tolist()
     return Point(x, y)
 
 
@@ -135,16 +135,16 @@ def _trace_rectangle(inside: Mask) -> list[tuple[int, int]] | None:
     return _ordered(np.rint(cv2.boxPoints(rectangle)))
 
 
-def _is_own(atlas: Atlas, region: Region, corners: list[Point]) -> bool:
+def _is_own(world: WorldModel, region: Region, corners: list[Point]) -> bool:
     """Return True where no corner lies in another region."""
     middle = Point(sum(p.x for p in corners) / 4, sum(p.y for p in corners) / 4)
     inner = (Point(p.x + 0.05 * (middle.x - p.x), p.y + 0.05 * (middle.y - p.y)) for p in corners)
-    return all(atlas.find_room_id(point) in (region.id, None) for point in inner)
+    return all(world.find_room_id(point) in (region.id, None) for point in inner)
 
 
-def _trace(atlas: Atlas, inside: Mask) -> list[tuple[int, int]]:
+def _trace(world: WorldModel, inside: Mask) -> list[tuple[int, int]]:
     """Return the corners of the outline as (col, row), counter-clockwise on the map."""
-    n = 2 * max(round(ROUGHNESS_M / atlas.grid.resolution_m / 2), 0) + 1
+    n = 2 * max(round(ROUGHNESS_M / world.grid.resolution_m / 2), 0) + 1
     framed = np.pad(inside.astype(np.uint8), n)
     kernel = cv2.getStructuringElement(cv2.MORPH_RECT, (n, n))
     closed = cv2.morphologyEx(framed, cv2.MORPH_CLOSE, kernel)
@@ -153,7 +153,7 @@ def _trace(atlas: Atlas, inside: Mask) -> list[tuple[int, int]]:
         opened if opened.any() else framed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
     )
     longest = max(found, key=cv2.contourArea)
-    rough = max(ROUGHNESS_M / atlas.grid.resolution_m, 1.5)
+    rough = max(ROUGHNESS_M / world.grid.resolution_m, 1.5)
     return _ordered(cv2.approxPolyDP(longest, rough, closed=True)[:, 0, :] - n)
 
 
@@ -163,8 +163,8 @@ def _ordered(polygon: np.ndarray) -> list[tuple[int, int]]:
     return [(int(col), int(row)) for col, row in (polygon[::-1] if area < 0 else polygon)]
 
 
-def _point_at(atlas: Atlas, corner: tuple[int, int], col: int, row: int) -> Point:
-    x, y = atlas.grid.points_at(np.array([row + corner[0]]), np.array([col + corner[1]]))[
+def _point_at(world: WorldModel, corner: tuple[int, int], col: int, row: int) -> Point:
+    x, y = world.grid.points_at(np.array([row + corner[0]]), np.array([col + corner[1]]))[
         0
     ].tolist()
     return Point(x, y)
@@ -176,11 +176,11 @@ def _is_corner(one: Wall, other: Wall) -> bool:
     return is_long and CORNER_RAD[0] <= turn_rad <= CORNER_RAD[1]
 
 
-def _is_wall(atlas: Atlas, side: Wall) -> bool:
+def _is_wall(world: WorldModel, side: Wall) -> bool:
     """Return True where most of what lies behind a long side is no floor."""
     if side.length_m < LEAST_WALL_M:
         return False
-    grid = atlas.grid
+    grid = world.grid
     shares = np.linspace(0.05, 0.95, max(math.ceil(side.length_m / grid.resolution_m), 2))
     along = np.stack(
         [

@@ -10,7 +10,7 @@ from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point
 from mapspeak.places.standing import COMFORT_M
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 IN_DOOR_M = 0.5
 AT_ONCE = 512
@@ -45,66 +45,71 @@ class Footing:
         return np.asarray(dx * math.cos(heading_rad) + dy * math.sin(heading_rad))
 
     def choose(
-        self, atlas: Atlas, allowed: Mask, costs: FloatArray, *, in_sight_of: Point | None = None
+        self,
+        world: WorldModel,
+        allowed: Mask,
+        costs: FloatArray,
+        *,
+        in_sight_of: Point | None = None,
     ) -> Point | None:
         """Return the allowed cell of the least cost; None where there is none.
 
         Roomy ones aside from doors go first, then tight ones, then those in doors.
 
         Args:
-            atlas: The map.
+            world: The map.
             allowed: True for the cells that would do.
             costs: Of each cell; the first of equal ones wins.
             in_sight_of: What nothing may stand before.
         """
-        is_roomy = self.clear_m >= atlas.radius_m + COMFORT_M
+        is_roomy = self.clear_m >= world.radius_m + COMFORT_M
         aside = allowed & ~self.in_doors
         for candidates in map(np.flatnonzero, (aside & is_roomy, aside, allowed)):
             ordered = candidates[np.argsort(costs[candidates], kind="stable")]
             for start in range(0, ordered.size, AT_ONCE):
                 some = ordered[start : start + AT_ONCE]
                 if in_sight_of is not None:
-                    some = some[is_in_sight(atlas, self.points[some], in_sight_of)]
+                    some = some[is_in_sight(world, self.points[some], in_sight_of)]
                 if some.size:
                     x, y = self.points[some[0]].tolist()
                     return Point(x, y)
         return None
 
 
-def find_footing(atlas: Atlas, centre: Point, reach_m: float) -> Footing:
+def find_footing(world: WorldModel, centre: Point, reach_m: float) -> Footing:
     """Find the reachable cells at most so far from a place to each side."""
-    grid = atlas.grid
+    grid = world.grid
     window = grid.window_around(centre, reach_m)
     at_rows, at_cols = np.nonzero(grid.free[window])
     at_rows, at_cols = at_rows + window[0].start, at_cols + window[1].start
-    paths_m = atlas.distances.distances_at(at_rows, at_cols)
+    paths_m = world.distances.distances_at(at_rows, at_cols)
     is_reached = np.isfinite(paths_m)
     at_rows, at_cols = at_rows[is_reached], at_cols[is_reached]
     points = grid.points_at(at_rows, at_cols)
     return Footing(
         points=points,
         paths_m=paths_m[is_reached],
-        clear_m=atlas.map.clearance_m[at_rows, at_cols].astype(np.float64),
-        regions=atlas.rooms.labels[at_rows, at_cols].astype(np.intp),
-        in_doors=_find_in_doors(atlas, points, centre, reach_m),
+        clear_m=world.map.clearance_m[at_rows, at_cols].astype(np.float64),
+        regions=world.rooms.labels[at_rows, at_cols].astype(np.intp),
+        in_doors=_find_in_doors(world, points, centre, reach_m),
     )
 
 
-def _find_in_doors(atlas: Atlas, points: FloatArray, centre: Point, reach_m: float) -> Mask:
+def _find_in_doors(world: WorldModel, points: FloatArray, centre: Point, reach_m: float) -> Mask:
     found = np.zeros(len(points), dtype=np.bool_)
-    for door in atlas.rooms.doors:
+    for door in world.rooms.doors:
         if door.place.distance_to(centre) <= 2 * reach_m:
             away_m = np.hypot(points[:, 0] - door.place.x, points[:, 1] - door.place.y)
             found |= away_m <= min(door.width_m / 2, IN_DOOR_M)
     return found
 
 
-def is_in_sight(atlas: Atlas, points: FloatArray, thing: Point) -> Mask:
+def is_in_sight(world: WorldModel, points: FloatArray, thing: Point) -> Mask:
     """Return True for the points from which nothing stands before a thing.
 
     The thing itself may be an obstacle: once a line has met what it ends in, no floor follows.
     """
-    grid = atlas.grid
+    grid = world.grid
     if not len(points):
         return np.zeros(0, dtype=np.bool_)
     lines = np.array([thing.x, thing.y]) - points

@@ -10,6 +10,7 @@ import numpy as np
 
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point
+from mapspeak.memory import name_key
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.places.naming import (
     MOST_NAMED,
@@ -22,11 +23,10 @@ from mapspeak.places.naming import (
 from mapspeak.places.relations.grammar import GAP, pattern, plain
 from mapspeak.places.relations.outlines import find_outline
 from mapspeak.places.relations.placement import refuse
-from mapspeak.semantic import name_key
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.rooms import Door, Region, RoomClass
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
 
 AROUND_DOOR_M = 0.6
@@ -66,7 +66,7 @@ class Referent:
         return len(self.extent) == 1
 
 
-def refer_to(atlas: Atlas, place: Place) -> Referent:
+def refer_to(world: WorldModel, place: Place) -> Referent:
     """Return a place as something to relate to.
 
     Raises:
@@ -76,32 +76,32 @@ def refer_to(atlas: Atlas, place: Place) -> Referent:
         case Spot(point=point) if max(abs(point.x), abs(point.y)) > FARTHEST_M:
             raise refuse(f"{place.name} lies farther away than any map reaches.")
         case Region() as region:
-            return _refer_to_region(atlas, region)
+            return _refer_to_region(world, region)
         case Door() as door:
-            return _refer_to_door(atlas, door)
+            return _refer_to_door(world, door)
         case RememberedPlace(id=place_id, waypoint=waypoint):
             name = place.name if place.name == place_id else f"{place_id} ({place.name})"
-            return refer_to_point(atlas, name, waypoint.pose.point, front_rad=waypoint.pose.yaw_rad)
+            return refer_to_point(world, name, waypoint.pose.point, front_rad=waypoint.pose.yaw_rad)
         case RememberedThing(id=thing_id, thing=thing) as remembered:
-            rooms = [atlas.rooms.region(each) for each in atlas.rooms_before(remembered)]
+            rooms = [world.rooms.region(each) for each in world.rooms_before(remembered)]
             home = rooms[0] if len(rooms) == 1 else None
-            name = f"{thing.label} ({thing_id}, seen from {_say_seen_from(atlas, remembered)})"
-            return refer_to_point(atlas, name, remembered.point, home=home)
+            name = f"{thing.label} ({thing_id}, seen from {_say_seen_from(world, remembered)})"
+            return refer_to_point(world, name, remembered.point, home=home)
         case Frontier(pose=pose):
-            return refer_to_point(atlas, place.name, pose.point)
+            return refer_to_point(world, place.name, pose.point)
         case Spot(point=point, yaw_rad=yaw_rad):
             is_robot = place.name == "robot"
             name = "the robot" if is_robot else place.name
-            return refer_to_point(atlas, name, point, front_rad=yaw_rad, is_robot=is_robot)
+            return refer_to_point(world, name, point, front_rad=yaw_rad, is_robot=is_robot)
 
 
-def _say_seen_from(atlas: Atlas, remembered: RememberedThing) -> str:
-    places = map(atlas.recollection.find_place, remembered.thing.waypoints)
+def _say_seen_from(world: WorldModel, remembered: RememberedThing) -> str:
+    places = map(world.recollection.find_place, remembered.thing.waypoints)
     return " and ".join(dict.fromkeys(place.id for place in places if place is not None))
 
 
 def refer_to_point(
-    atlas: Atlas,
+    world: WorldModel,
     name: str,
     point: Point,
     *,
@@ -114,50 +114,50 @@ def refer_to_point(
         name=name,
         anchor=point,
         extent=np.array([[point.x, point.y]]),
-        home=home or atlas.rooms.find_region_at(point) or _find_region_around(atlas, point),
+        home=home or world.rooms.find_region_at(point) or _find_region_around(world, point),
         front_rad=front_rad,
         is_robot=is_robot,
     )
 
 
-def _find_region_around(atlas: Atlas, point: Point) -> Region | None:
+def _find_region_around(world: WorldModel, point: Point) -> Region | None:
     """Find the region that a thing stands in; None for what is in a wall between two."""
-    window = atlas.grid.window_around(point, AROUND_THING_M)
-    labels = atlas.rooms.labels[window]
+    window = world.grid.window_around(point, AROUND_THING_M)
+    labels = world.rooms.labels[window]
     rows, cols = np.nonzero(labels)
     if not rows.size:
         return None
-    points = atlas.grid.points_at(rows + window[0].start, cols + window[1].start)
+    points = world.grid.points_at(rows + window[0].start, cols + window[1].start)
     away_m = np.hypot(points[:, 0] - point.x, points[:, 1] - point.y)
     near = away_m <= away_m.min() + BOTH_SIDES_M
     indices = np.unique(labels[rows, cols][near])
-    return next((each for each in atlas.rooms.regions if [each.index] == indices.tolist()), None)
+    return next((each for each in world.rooms.regions if [each.index] == indices.tolist()), None)
 
 
-def find_normal(atlas: Atlas, door: Door, side: Region) -> float:
+def find_normal(world: WorldModel, door: Door, side: Region) -> float:
     """Return the direction in which a door leads into one of its two regions, as a yaw.
 
     It is at right angles to the line through its two posts where the floor near it shows no other.
     """
     reach_m = door.width_m / 2 + AROUND_DOOR_M
-    window = atlas.grid.window_around(door.place, reach_m)
-    labels = atlas.rooms.labels[window]
+    window = world.grid.window_around(door.place, reach_m)
+    labels = world.rooms.labels[window]
     middles = []
     for region_id in (side.id, *(each for each in door.region_ids if each != side.id)):
-        rows, cols = np.nonzero(labels == atlas.rooms.region(region_id).index)
-        points = atlas.grid.points_at(rows + window[0].start, cols + window[1].start)
+        rows, cols = np.nonzero(labels == world.rooms.region(region_id).index)
+        points = world.grid.points_at(rows + window[0].start, cols + window[1].start)
         away_m = np.hypot(points[:, 0] - door.place.x, points[:, 1] - door.place.y)
         near = points[away_m <= reach_m]
         middles.append(near.mean(axis=0) if len(near) else np.array([door.place.x, door.place.y]))
     into = middles[0] - middles[1]
-    return _squared(atlas, door, math.atan2(float(into[1]), float(into[0])))
+    return _squared(world, door, math.atan2(float(into[1]), float(into[0])))
 
 
-def _squared(atlas: Atlas, door: Door, rough_rad: float) -> float:
+def _squared(world: WorldModel, door: Door, rough_rad: float) -> float:
     """Turn a direction through a door until the posts beside it lie square to it."""
-    window = atlas.grid.window_around(door.place, door.width_m / 2 + AROUND_DOOR_M)
-    rows, cols = np.nonzero(atlas.grid.occupied[window])
-    points = atlas.grid.points_at(rows + window[0].start, cols + window[1].start)
+    window = world.grid.window_around(door.place, door.width_m / 2 + AROUND_DOOR_M)
+    rows, cols = np.nonzero(world.grid.occupied[window])
+    points = world.grid.points_at(rows + window[0].start, cols + window[1].start)
     points -= np.array([door.place.x, door.place.y])
     across = np.array([-math.sin(rough_rad), math.cos(rough_rad)])
     posts = []
@@ -172,19 +172,19 @@ def _squared(atlas: Atlas, door: Door, rough_rad: float) -> float:
     return math.remainder(square_rad, math.tau) if abs(off_rad) < math.pi / 4 else rough_rad
 
 
-def _refer_to_region(atlas: Atlas, region: Region) -> Referent:
-    window = atlas.rooms.window_of(region)
-    inside = (atlas.rooms.labels[window] == region.index).astype(np.uint8)
+def _refer_to_region(world: WorldModel, region: Region) -> Referent:
+    window = world.rooms.window_of(region)
+    inside = (world.rooms.labels[window] == region.index).astype(np.uint8)
     edges, _ = cv2.findContours(np.pad(inside, 1), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     cells = np.concatenate(edges)[:, 0, :] - 1
-    extent = atlas.grid.points_at(cells[:, 1] + window[0].start, cells[:, 0] + window[1].start)
-    middle = find_outline(atlas, region).middle
+    extent = world.grid.points_at(cells[:, 1] + window[0].start, cells[:, 0] + window[1].start)
+    middle = find_outline(world, region).middle
     return Referent(name=region.id, anchor=middle, extent=extent, region=region)
 
 
-def _refer_to_door(atlas: Atlas, door: Door) -> Referent:
-    near = find_near_side(atlas, door)
-    along_rad = find_normal(atlas, door, near) + math.pi / 2
+def _refer_to_door(world: WorldModel, door: Door) -> Referent:
+    near = find_near_side(world, door)
+    along_rad = find_normal(world, door, near) + math.pi / 2
     half = np.array([math.cos(along_rad), math.sin(along_rad)]) * door.width_m / 2
     middle = np.array([door.place.x, door.place.y])
     shares = np.linspace(-1.0, 1.0, 9)[:, None]
@@ -192,22 +192,22 @@ def _refer_to_door(atlas: Atlas, door: Door) -> Referent:
     return Referent(name=door.id, anchor=door.place, extent=extent, home=near, door=door)
 
 
-def find_near_side(atlas: Atlas, door: Door) -> Region:
+def find_near_side(world: WorldModel, door: Door) -> Region:
     """Return the region of a door on whose side the robot comes to it."""
-    sides = [atlas.rooms.region(region_id) for region_id in door.region_ids]
-    here = atlas.find_room_id(atlas.robot.point)
+    sides = [world.rooms.region(region_id) for region_id in door.region_ids]
+    here = world.find_room_id(world.robot.point)
     standing = next((side for side in sides if side.id == here), None)
     if standing is not None:
         return standing
 
     def path_m(side: Region) -> float:
-        heading_rad = find_normal(atlas, door, side)
-        ahead_m = atlas.radius_m + AROUND_DOOR_M
+        heading_rad = find_normal(world, door, side)
+        ahead_m = world.radius_m + AROUND_DOOR_M
         before = Point(
             door.place.x + ahead_m * math.cos(heading_rad),
             door.place.y + ahead_m * math.sin(heading_rad),
         )
-        found_m = atlas.path_m(before)
+        found_m = world.path_m(before)
         return math.inf if found_m is None else found_m
 
     return min(sides, key=path_m)
@@ -224,22 +224,22 @@ DOOR = pattern(r"(?:door|doorway)(?: (?:of|in|to) (?P<room>.+))?")
 OF_PLACE = pattern(r"(?P<label>.+?) (?:of|at|seen from|from) (?P<place>.+)")
 
 
-def find_known(atlas: Atlas, words: str) -> Referent | None:
+def find_known(world: WorldModel, words: str) -> Referent | None:
     """Find what is called so, without reading any relation in it; None where nothing is.
 
     Raises:
         GoalError: Several things are called so, or nobody noted where the thing is.
     """
     for wanted in dict.fromkeys((words.strip(), plain(words))):
-        place = find_named(atlas, wanted) or _find_loosely(atlas, wanted)
+        place = find_named(world, wanted) or _find_loosely(world, wanted)
         if place is not None:
-            return refer_to(atlas, place)
+            return refer_to(world, place)
     wanted = plain(words)
-    place = find_by_kind(atlas, wanted)
-    return _find_thing(atlas, wanted) if place is None else refer_to(atlas, place)
+    place = find_by_kind(world, wanted)
+    return _find_thing(world, wanted) if place is None else refer_to(world, place)
 
 
-def find_by_kind(atlas: Atlas, words: str) -> Place | None:
+def find_by_kind(world: WorldModel, words: str) -> Place | None:
     """Find "the room", "the corridor" and "the door", where only one can be meant.
 
     Raises:
@@ -247,30 +247,30 @@ def find_by_kind(atlas: Atlas, words: str) -> Place | None:
     """
     wanted = plain(words)
     if (match := ROOM.fullmatch(wanted)) is not None:
-        room = _find_room(atlas, match)
+        room = _find_room(world, match)
         return Place(room.id, room)
-    return _find_only_door(atlas, wanted)
+    return _find_only_door(world, wanted)
 
 
-def find_room_here(atlas: Atlas) -> Region:
+def find_room_here(world: WorldModel) -> Region:
     """Return the region that the robot stands in.
 
     Raises:
         GoalError: It stands in none.
     """
-    region = atlas.rooms.find_region_at(atlas.robot.point)
+    region = world.rooms.find_region_at(world.robot.point)
     if region is None:
         raise GoalError("The robot stands in no room.", hint="Name the room by its id, such as R1.")
     return region
 
 
-def _find_room(atlas: Atlas, match: re.Match[str]) -> Region:
+def _find_room(world: WorldModel, match: re.Match[str]) -> Region:
     """Return the room that "the room" means: where the robot stands, or the only one there is."""
     classes = CLASSES.get(match["noun"].casefold(), tuple(RoomClass))
-    here = atlas.rooms.find_region_at(atlas.robot.point)
+    here = world.rooms.find_region_at(world.robot.point)
     if here is not None and here.room_class in classes:
         return here
-    others = [each for each in atlas.rooms.regions if each.room_class in classes]
+    others = [each for each in world.rooms.regions if each.room_class in classes]
     if len(others) == 1 and not match["here"]:
         return others[0]
     where = "no room" if here is None else here.id
@@ -287,24 +287,24 @@ def _loose_key(name: str) -> str:
     return name_key(re.sub(GAP, " ", name))
 
 
-def _find_loosely(atlas: Atlas, wanted: str) -> Place | None:
+def _find_loosely(world: WorldModel, wanted: str) -> Place | None:
     """Find a remembered name, spelt with underscores or hyphens instead of spaces."""
     key = _loose_key(wanted)
-    names = {each.waypoint.name for each in atlas.places if _loose_key(each.waypoint.name) == key}
-    return find_named(atlas, names.pop()) if len(names) == 1 else None
+    names = {each.waypoint.name for each in world.places if _loose_key(each.waypoint.name) == key}
+    return find_named(world, names.pop()) if len(names) == 1 else None
 
 
-def _find_thing(atlas: Atlas, wanted: str) -> Referent | None:
+def _find_thing(world: WorldModel, wanted: str) -> Referent | None:
     """Find a thing that was seen from remembered places, with "seen from W1" or without."""
-    called = atlas.recollection.find_called(re.sub(GAP, " ", wanted))
+    called = world.recollection.find_called(re.sub(GAP, " ", wanted))
     match = OF_PLACE.fullmatch(wanted)
     if not called and match is not None:
-        by = find_named(atlas, plain(match["place"]))
+        by = find_named(world, plain(match["place"]))
         if by is not None and isinstance(by.thing, RememberedPlace):
             name = by.thing.waypoint.name
             called = tuple(
                 each
-                for each in atlas.recollection.find_called(plain(match["label"]))
+                for each in world.recollection.find_called(plain(match["label"]))
                 if name in each.thing.waypoints
             )
     if not called:
@@ -312,7 +312,7 @@ def _find_thing(atlas: Atlas, wanted: str) -> Referent | None:
     located = [each for each in called if each.thing.position is not None]
     if not located:
         seen_from = [name for each in called for name in each.thing.waypoints]
-        places = filter(None, map(atlas.recollection.find_place, dict.fromkeys(seen_from)))
+        places = filter(None, map(world.recollection.find_place, dict.fromkeys(seen_from)))
         ids = [place.id for place in places]
         raise GoalError(
             f"{wanted[:80]!r} was seen from {', '.join(ids)}, but not in which direction.",
@@ -321,16 +321,16 @@ def _find_thing(atlas: Atlas, wanted: str) -> Referent | None:
             about=ids[0],
         )
     if len(located) > 1:
-        raise _several_things(atlas, wanted, located)
-    return refer_to(atlas, Place(located[0].id, located[0]))
+        raise _several_things(world, wanted, located)
+    return refer_to(world, Place(located[0].id, located[0]))
 
 
 def _several_things(
-    atlas: Atlas, wanted: str, located: Sequence[RememberedThing]
+    world: WorldModel, wanted: str, located: Sequence[RememberedThing]
 ) -> AmbiguousPlaceError:
     shown = "; ".join(
         f"{each.id} at {say_spot(each.point)}, in "
-        f"{' or '.join(atlas.rooms_before(each)) or 'no room'}"
+        f"{' or '.join(world.rooms_before(each)) or 'no room'}"
         for each in located[:MOST_NAMED]
     )
     return AmbiguousPlaceError(
@@ -341,18 +341,18 @@ def _several_things(
     )
 
 
-def _find_only_door(atlas: Atlas, wanted: str) -> Place | None:
+def _find_only_door(world: WorldModel, wanted: str) -> Place | None:
     """Find "the door": the only one of the room that is named, or that the robot stands in."""
     match = DOOR.fullmatch(wanted)
     if match is None:
         return None
-    room = find_room_here(atlas)
+    room = find_room_here(world)
     if match["room"] is not None:
-        known = find_known(atlas, match["room"])
+        known = find_known(world, match["room"])
         if known is None or known.region is None:
             return None
         room = known.region
-    doors = atlas.rooms.doors_of(room)
+    doors = world.rooms.doors_of(room)
     if len(doors) == 1:
         return Place(doors[0].id, doors[0])
     ids = ", ".join(door.id for door in doors[:MOST_NAMED]) or "none"

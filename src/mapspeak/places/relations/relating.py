@@ -51,14 +51,14 @@ from mapspeak.places.relations.referents import (
 )
 from mapspeak.places.ways import standing_point
 from mapspeak.spatial.rooms import Region
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 MOST_RELATIONS = 4
 LONGEST_NAME = 80
 BESIDE_M = 1.0
 
 
-def find_related(atlas: Atlas, words: str) -> Place | None:
+def find_related(world: WorldModel, words: str) -> Place | None:
     """Find the place that a relation means, such as "left of W3"; None for other words.
 
     The place comes with its reason. It can be reached, whatever stands around it; of "the nearest
@@ -70,21 +70,21 @@ def find_related(atlas: Atlas, words: str) -> Place | None:
     """
     relation = parse_relation(words)
     if relation is None:
-        return find_named(atlas, plain(words)) or find_by_kind(atlas, words)
-    return Reader(atlas).find(relation, " ".join(words.split()), n_left=MOST_RELATIONS - 1)
+        return find_named(world, plain(words)) or find_by_kind(world, words)
+    return Reader(world).find(relation, " ".join(words.split()), n_left=MOST_RELATIONS - 1)
 
 
 class Reader:
     """Reads relations in one state of the map."""
 
-    def __init__(self, atlas: Atlas) -> None:
-        self._atlas = atlas
+    def __init__(self, world: WorldModel) -> None:
+        self._world = world
 
     def find(self, relation: Relation, words: str, *, n_left: int) -> Place:
         """Return the place that a relation means; `n_left` more may stand inside it."""
         if isinstance(relation, Nearest):
             start = None if relation.to is None else self._refer(relation.to, n_left)
-            return find_nearest(self._atlas, relation.kind, start)
+            return find_nearest(self._world, relation.kind, start)
         stand = self._stand(relation, n_left)
         return Place(words[:LONGEST_NAME], Spot(stand.point, stand.yaw_rad), stand.reason)
 
@@ -94,15 +94,15 @@ class Reader:
                 stand = self._stand_towards(relation, n_left)
             case Away(of=of, away_m=away_m):
                 _check_distance(away_m)
-                stand = stand_away(self._atlas, self._refer(of, n_left), away_m)
+                stand = stand_away(self._world, self._refer(of, n_left), away_m)
             case NextTo(of):
-                stand = stand_next_to(self._atlas, self._refer(of, n_left))
+                stand = stand_next_to(self._world, self._refer(of, n_left))
             case Facing(of):
-                stand = stand_facing(self._atlas, self._refer(of, n_left))
+                stand = stand_facing(self._world, self._refer(of, n_left))
             case Turned():
                 stand = self._stand_turned(relation, n_left)
             case Between():
-                stand = stand_between(self._atlas, *self._refer_to_both(relation, n_left))
+                stand = stand_between(self._world, *self._refer_to_both(relation, n_left))
             case _:
                 stand = self._stand_inside(relation, n_left)
         return stand
@@ -110,24 +110,24 @@ class Reader:
     def _stand_inside(self, relation: Corner | WallSide | Middle | Nearest, n_left: int) -> Stand:
         match relation:
             case Corner():
-                return stand_in_corner(self._atlas, self._find_corners(relation, n_left))
+                return stand_in_corner(self._world, self._find_corners(relation, n_left))
             case WallSide(is_along=is_along):
                 walls = self._find_walls(relation, n_left)
-                return stand_at_wall(self._atlas, walls, is_along=is_along)
+                return stand_at_wall(self._world, walls, is_along=is_along)
             case Middle(of):
-                return stand_in_middle(self._atlas, self._refer(of, n_left))
+                return stand_in_middle(self._world, self._refer(of, n_left))
             case Nearest():
                 place = self.find(relation, "", n_left=n_left)
-                return Stand(point=standing_point(self._atlas, place), reason=place.reason)
+                return Stand(point=standing_point(self._world, place), reason=place.reason)
 
     def _refer(self, words: str, n_left: int) -> Referent:
         """Return what words inside a phrase mean: a name, or another phrase."""
-        known = find_known(self._atlas, words)
+        known = find_known(self._world, words)
         if known is not None:
             return known
         relation = parse_relation(words)
         if relation is None:
-            raise no_such_place(self._atlas, plain(words))
+            raise no_such_place(self._world, plain(words))
         if n_left == 0:
             raise refuse(
                 f"There are more than {MOST_RELATIONS} relations inside each other.",
@@ -139,19 +139,19 @@ class Reader:
         """Return what a phrase is about: the corner itself, say, not where one stands in it."""
         match relation:
             case Nearest():
-                return refer_to(self._atlas, self.find(relation, words, n_left=n_left))
+                return refer_to(self._world, self.find(relation, words, n_left=n_left))
             case Corner():
                 corner = self._find_corners(relation, n_left)[0]
-                return refer_to_point(self._atlas, corner.name, corner.point, home=corner.region)
+                return refer_to_point(self._world, corner.name, corner.point, home=corner.region)
             case WallSide():
                 return _refer_to_wall(self._find_walls(relation, n_left)[0])
             case Middle(of) if (thing := self._refer(of, n_left)).region is not None:
                 name = f"the middle of {thing.name}"
-                middle = find_middle(self._atlas, thing.region)
-                return refer_to_point(self._atlas, name, middle, home=thing.region)
+                middle = find_middle(self._world, thing.region)
+                return refer_to_point(self._world, name, middle, home=thing.region)
             case _:
                 stand = self._stand(relation, n_left)
-                return refer_to_point(self._atlas, f"the place {words}", stand.point)
+                return refer_to_point(self._world, f"the place {words}", stand.point)
 
     def _refer_to_both(self, relation: Between, n_left: int) -> tuple[Referent, Referent]:
         """Return the two things of a "between", by the first division of the words that works."""
@@ -174,15 +174,15 @@ class Reader:
         if plain(words).casefold() not in ("doors", "two doors") and first.casefold() != "doors":
             return None
         room = self._room_of(rest.removeprefix("of ")) if first == "doors" and rest else None
-        room = room or find_room_here(self._atlas)
-        doors = self._atlas.rooms.doors_of(room)
+        room = room or find_room_here(self._world)
+        doors = self._world.rooms.doors_of(room)
         if len(doors) != 2:
             ids = ", ".join(door.id for door in doors) or "none"
             raise refuse(
                 f"{room.id} has {len(doors)} doors.",
                 else_hint=f"Say between which two; they are {ids}.",
             )
-        one, other = (refer_to(self._atlas, Place(door.id, door)) for door in doors)
+        one, other = (refer_to(self._world, Place(door.id, door)) for door in doors)
         return one, other
 
     def _stand_towards(self, relation: Towards, n_left: int) -> Stand:
@@ -191,19 +191,19 @@ class Reader:
         seen_from = None
         if relation.seen_from is not None:
             seen_from = self._refer(relation.seen_from, n_left)
-        return stand_towards(self._atlas, thing, relation, seen_from)
+        return stand_towards(self._world, thing, relation, seen_from)
 
     def _stand_turned(self, relation: Turned, n_left: int) -> Stand:
         thing = self._refer(relation.to, n_left)
         inner = parse_relation(relation.place)
-        if inner is not None and find_known(self._atlas, relation.place) is None:
+        if inner is not None and find_known(self._world, relation.place) is None:
             stand = self._stand(inner, n_left)
             point, why = stand.point, stand.reason.removesuffix(", facing it")
         else:
             at = self._refer(relation.place, n_left)
-            found = find_named(self._atlas, plain(relation.place))
-            point, why = standing_point(self._atlas, found) if found else at.anchor, at.name
-        if point.distance_to(thing.anchor) < self._atlas.radius_m:
+            found = find_named(self._world, plain(relation.place))
+            point, why = standing_point(self._world, found) if found else at.anchor, at.name
+        if point.distance_to(thing.anchor) < self._world.radius_m:
             raise refuse(f"{relation.place} is where {thing.name} is: it cannot be faced there.")
         return Stand(
             point=point,
@@ -215,7 +215,7 @@ class Reader:
         """Return the corners that may be meant, the best first."""
         near = None if relation.near is None else self._refer(relation.near, n_left)
         region = self._region_beside(relation.of, near, n_left)
-        corners = find_corners(self._atlas, region, relation.compass)
+        corners = find_corners(self._world, region, relation.compass)
         if near is not None:
             return tuple(sorted(corners, key=lambda each: _away_m(each.point, near)))
         return tuple(sorted(corners, key=lambda each: self._path_m(each.point)))
@@ -223,14 +223,14 @@ class Reader:
     def _find_walls(self, relation: WallSide, n_left: int) -> tuple[FoundWall, ...]:
         """Return the walls that may be meant, the best first."""
         region = self._region_of(relation.of, n_left)
-        walls = find_walls(self._atlas, region, relation.compass)
+        walls = find_walls(self._world, region, relation.compass)
         return tuple(sorted(walls, key=lambda each: self._path_m(each.wall.middle)))
 
     def _region_beside(self, of: str | None, near: Referent | None, n_left: int) -> Region:
         if of is not None:
             return self._region_of(of, n_left)
         home = None if near is None else near.home
-        return home or find_room_here(self._atlas)
+        return home or find_room_here(self._world)
 
     def _region_of(self, words: str, n_left: int) -> Region:
         thing = self._refer(words, n_left)
@@ -246,7 +246,7 @@ class Reader:
 
     def _path_m(self, point: Point) -> float:
         """Return how far it is to the floor beside a point that the robot cannot stand in."""
-        footing = find_footing(self._atlas, point, BESIDE_M)
+        footing = find_footing(self._world, point, BESIDE_M)
         return float(footing.paths_m.min(initial=math.inf))
 
 

@@ -1,1 +1,1 @@
-"""The map as a model sees it: one atlas in pictures, tables and numbers, under the same ids."""
+"""The map as a model sees it: the world in pictures, tables and numbers, under the same ids."""

@@ -1,4 +1,4 @@
-"""An atlas as a picture: rooms, doors, frontiers, places and the robot, under their ids."""
+"""A world model as a picture: rooms, doors, frontiers, places and the robot, under their ids."""
 
 import math
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ from mapspeak.spatial.picture import (
 )
 from mapspeak.spatial.picture import PictureRegion as Area
 from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 
 def say_plain(grid: OccupancyGrid, picture: MapPicture) -> str:
@@ -78,8 +78,8 @@ WITH_PATH = frozenset({Layer.PATH, Layer.FRONTIERS})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AtlasPicture:
-    """A drawn atlas.
+class WorldPicture:
+    """A drawn world.
 
     Attributes:
         png: The encoded picture.
@@ -90,23 +90,23 @@ class AtlasPicture:
     caption: str
 
 
-def draw_atlas(view: MapView) -> AtlasPicture:
-    """Draw what is to be seen of an atlas; doors and areas only where they can be told apart."""
-    atlas, look = view.atlas, view.look
-    is_detailed = _scale_px_per_m(atlas.grid, look) >= DETAIL_PX_PER_M
+def draw_world(view: MapView) -> WorldPicture:
+    """Draw a world model; doors and areas only where they can be told apart."""
+    world, look = view.world, view.look
+    is_detailed = _scale_px_per_m(world.grid, look) >= DETAIL_PX_PER_M
     doors = view.doors.items if Layer.DOORS in look.layers and is_detailed else ()
     picture = draw_map(
-        atlas.grid,
+        world.grid,
         layers=MapLayers(
             regions=_rooms_in(view, has_areas=is_detailed) if Layer.ROOMS in look.layers else None,
             zones=_closed_areas(view),
-            lines=_way_to_first_frontier(atlas) if look.layers >= WITH_PATH else (),
+            lines=_way_to_first_frontier(world) if look.layers >= WITH_PATH else (),
             marks=(
-                *(_door_mark(door, is_way=bool(atlas.find_crossing(door))) for door in doors),
+                *(_door_mark(door, is_way=bool(world.find_crossing(door))) for door in doors),
                 *(_frontiers(view) if Layer.FRONTIERS in look.layers else ()),
                 *(_places(view) if Layer.PLACES in look.layers else ()),
             ),
-            robot=atlas.robot,
+            robot=world.robot,
             legend=LEGEND,
         ),
         up_rad=look.up_rad,
@@ -117,10 +117,10 @@ def draw_atlas(view: MapView) -> AtlasPicture:
         parts.append(f"Up in the picture is yaw {math.degrees(look.up_rad):.0f} deg, as the robot.")
     if Layer.DOORS in look.layers and not is_detailed:
         parts.append("An overview without doors and areas: zoom in with around and radius_m.")
-    return AtlasPicture(png=picture.png, caption=" ".join(parts))
+    return WorldPicture(png=picture.png, caption=" ".join(parts))
 
 
-def draw_rooms(rooms: RoomMap) -> AtlasPicture:
+def draw_rooms(rooms: RoomMap) -> WorldPicture:
     """Draw a map with its rooms and doors; no robot needs to be there for it."""
     is_detailed = _scale_px_per_m(rooms.grid, MapLook()) >= DETAIL_PX_PER_M
     layers = MapLayers(
@@ -129,7 +129,7 @@ def draw_rooms(rooms: RoomMap) -> AtlasPicture:
         legend=LEGEND,
     )
     picture = draw_map(rooms.grid, layers=layers)
-    return AtlasPicture(png=picture.png, caption=_caption(picture))
+    return WorldPicture(png=picture.png, caption=_caption(picture))
 
 
 def _scale_px_per_m(grid: OccupancyGrid, look: MapLook) -> float:
@@ -146,16 +146,16 @@ def _rooms_in(view: MapView, *, has_areas: bool) -> RegionLayer:
     """Return all regions; only those that are listed have their names written in them."""
     around = view.look.around
     listed = {region.id for region in (*view.rooms.items, *view.corridors.items)}
-    areas = [_area(region, has_area=has_areas) for region in view.atlas.rooms.regions]
+    areas = [_area(region, has_area=has_areas) for region in view.world.rooms.regions]
     return _layer(
-        view.atlas.rooms,
+        view.world.rooms,
         [
             replace(
                 area,
                 text=area.text if region.id in listed else "",
                 is_highlighted=around is not None and around.thing == region,
             )
-            for area, region in zip(areas, view.atlas.rooms.regions, strict=True)
+            for area, region in zip(areas, view.world.rooms.regions, strict=True)
         ],
     )
 
@@ -207,14 +207,14 @@ def _closed_areas(view: MapView) -> tuple[Zone, ...]:
     """Return all that is closed; only what is listed has its name written in it."""
     return tuple(
         Zone(outlines=area.outlines, label=say_area(area) if area in view.closed.items else "")
-        for area in view.atlas.map.areas
+        for area in view.world.map.areas
     )
 
 
-def _way_to_first_frontier(atlas: Atlas) -> tuple[Line, ...]:
-    if not atlas.frontiers.frontiers:
+def _way_to_first_frontier(world: WorldModel) -> tuple[Line, ...]:
+    if not world.frontiers.frontiers:
         return ()
-    way = atlas.distances.way_to(atlas.frontiers.frontiers[0].pose.point)
+    way = world.distances.way_to(world.frontiers.frontiers[0].pose.point)
     return () if way is None or len(way) < 2 else (Line(points=way, style=LineStyle.DASHED),)
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.errors import MapError
-from mapspeak.server.mapview.drawing import draw_atlas, say_axes
+from mapspeak.server.mapview.drawing import draw_world, say_axes
 from mapspeak.server.text.look import MapView
-from mapspeak.server.text.tables import describe_atlas
+from mapspeak.server.text.tables import describe_world
 from mapspeak.server.text.wording import say_pose, say_warnings
 from mapspeak.spatial import FREE_MAX, UNKNOWN, OccupancyGrid
 from mapspeak.spatial.picture import NORTH_UP_RAD, Zoom, draw_robot_pose
@@ -56,12 +56,12 @@ def _say_meaning(view: MapView, grid: OccupancyGrid, n_side: int) -> str:
             "most are unknown: narrow gaps may look closed; around and radius_m show fewer cells "
             "more finely."
         )
-    parts += say_warnings(view.atlas)
+    parts += say_warnings(view.world)
     return " ".join(parts)
 
 
 def _as_json(view: MapView, grid: OccupancyGrid, n_side: int) -> str:
-    robot, origin = view.atlas.robot, grid.origin
+    robot, origin = view.world.robot, grid.origin
     values = _coarsen(grid.cells, n_side)
     answer = {
         "robot": {"x": round(robot.x, 2), "y": round(robot.y, 2), "yaw_deg": round(robot.yaw_deg)},
@@ -94,7 +94,7 @@ def _coarsen(cells: NDArray[np.int8], n_side: int) -> NDArray[np.int8]:
 
 def _part_of(view: MapView) -> OccupancyGrid:
     """Return the cells that are shown: what the zoom shows, or everything that is known."""
-    grid, zoom = view.atlas.grid, view.look.zoom
+    grid, zoom = view.world.grid, view.look.zoom
     rows, cols = _known(grid) if zoom is None else _window(grid, zoom)
     if rows.start >= rows.stop or cols.start >= cols.stop:
         raise MapError("No cell of the map lies there.", hint="Look at the whole map first.")
@@ -153,16 +153,16 @@ def show(view: MapView, representation: Representation) -> Shown:
 
 
 def _show_picture_and_tables(view: MapView) -> Shown:
-    text, picture = describe_atlas(view), draw_atlas(view)
+    text, picture = describe_world(view), draw_world(view)
     return Shown(text=f"{text}\n\n{picture.caption}", png=picture.png)
 
 
 def _show_tables(view: MapView) -> Shown:
-    return Shown(text=f"{describe_atlas(view)}\n\nThere is no picture.")
+    return Shown(text=f"{describe_world(view)}\n\nThere is no picture.")
 
 
 def _show_rooms(view: MapView) -> Shown:
-    picture = draw_atlas(view)
+    picture = draw_world(view)
     return Shown(text=f"{_say_robot(view)}\n\n{picture.caption}", png=picture.png)
 
 
@@ -171,7 +171,7 @@ def _show_numbers(view: MapView) -> Shown:
 
 
 def _show_paper(view: MapView) -> Shown:
-    grid, robot = view.atlas.grid, view.atlas.robot
+    grid, robot = view.world.grid, view.world.robot
     picture = draw_robot_pose(grid, robot)
     is_plain = view.look.zoom is None and view.look.up_rad == NORTH_UP_RAD
     ignored = "" if is_plain else " It always shows the whole map with y up."
@@ -185,7 +185,7 @@ def _show_raw_grid(view: MapView) -> Shown:
 
 def _say_robot(view: MapView) -> str:
     """Return what a picture alone cannot be relied upon to say: where the robot is."""
-    return "\n".join([*say_warnings(view.atlas), f"Robot: {say_pose(view.atlas.robot)}."])
+    return "\n".join([*say_warnings(view.world), f"Robot: {say_pose(view.world.robot)}."])
 
 
 _WAYS: dict[Representation, Callable[[MapView], Shown]] = {

@@ -7,12 +7,12 @@ from pydantic import Field
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
+from mapspeak.memory import find_objection
+from mapspeak.memory.episodes import EpisodeQuery, EpisodeStore, Observation, ObservationKind
+from mapspeak.memory.quoting import quote_name
+from mapspeak.memory.retrieval import EntryKind, Verdict, calls_by_name
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.recall import Recall, RecallCandidate, RecallQuery
-from mapspeak.semantic import find_objection
-from mapspeak.semantic.episodes import EpisodeQuery, EpisodeStore, Observation, ObservationKind
-from mapspeak.semantic.quoting import quote_name
-from mapspeak.semantic.retrieval import EntryKind, Verdict, calls_by_name
 from mapspeak.server.reports.robot import PoseReport, Report
 from mapspeak.server.text.findings import say_trust
 from mapspeak.server.text.memory import say_age

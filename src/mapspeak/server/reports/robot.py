@@ -9,11 +9,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
+from mapspeak.memory import Landmark, Merge, SemanticMap, WriteReceipt, name_key
+from mapspeak.memory.quoting import quote_name
 from mapspeak.places.choosing import CheckedGoal
 from mapspeak.places.goalcheck import GoalVerdict
 from mapspeak.robot import GoalState, StampedPose
-from mapspeak.semantic import Landmark, Merge, SemanticMap, WriteReceipt, name_key
-from mapspeak.semantic.quoting import quote_name
 from mapspeak.server.text.memory import say_landmarks, say_replaced
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.worldmodel.recollection import RememberedPlace, number_places

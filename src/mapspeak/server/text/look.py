@@ -16,7 +16,7 @@ from mapspeak.spatial.frontiers import Frontier, RefusedFrontier
 from mapspeak.spatial.picture import NORTH_UP_RAD, Zoom
 from mapspeak.spatial.rooms import Door, Region, RoomClass
 from mapspeak.worldmodel.closures import ClosedArea
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedPlace
 
 Item = TypeVar("Item")
@@ -55,7 +55,7 @@ class Up(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapLook:
-    """A way to look at an atlas.
+    """A way to look at a world model.
 
     Attributes:
         layers: What is drawn and listed.
@@ -78,12 +78,12 @@ class MapLook:
         farthest_m = away_m * max(abs(math.cos(turned_rad)), abs(math.sin(turned_rad)))
         return farthest_m <= self.zoom.radius_m
 
-    def regions(self, atlas: Atlas) -> tuple[Region, ...]:
+    def regions(self, world: WorldModel) -> tuple[Region, ...]:
         """Return the regions of which some is shown."""
         if self.zoom is None:
-            return atlas.rooms.regions
-        shown = _labels_in(atlas, self.zoom, self.up_rad)
-        return tuple(region for region in atlas.rooms.regions if region.index in shown)
+            return world.rooms.regions
+        shown = _labels_in(world, self.zoom, self.up_rad)
+        return tuple(region for region in world.rooms.regions if region.index in shown)
 
     def some_of(self, items: Iterable[Item], point_of: Callable[[Item], Point]) -> list[Item]:
         """Return those that lie in the square that is shown."""
@@ -121,10 +121,10 @@ class MapPart(Generic[Item]):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapView:
-    """What is to be seen of an atlas: picture and text show the same.
+    """What is to be seen of a world model: picture and text show the same.
 
     Attributes:
-        atlas: All there is.
+        world: All there is.
         look: How it is looked at.
         rooms: With open spaces, smallest first; of very many the smallest and the largest.
         corridors: In the same way.
@@ -135,7 +135,7 @@ class MapView:
         closed: Areas that are closed to the robot now, in the order of the policy.
     """
 
-    atlas: Atlas
+    world: WorldModel
     look: MapLook
     rooms: MapPart[Region]
     corridors: MapPart[Region]
@@ -146,37 +146,37 @@ class MapView:
     closed: MapPart[ClosedArea]
 
 
-def view_of(atlas: Atlas, look: MapLook) -> MapView:
-    """Return what is to be seen of an atlas."""
+def view_of(world: WorldModel, look: MapLook) -> MapView:
+    """Return what is to be seen of a world model."""
 
     def path_or_far(point: Point | None) -> float:
-        path_m = None if point is None else atlas.path_m(point)
+        path_m = None if point is None else world.path_m(point)
         return math.inf if path_m is None else path_m
 
-    by_size = sorted(look.regions(atlas), key=lambda region: region.floor_area_m2)
+    by_size = sorted(look.regions(world), key=lambda region: region.floor_area_m2)
     corridors = [region for region in by_size if region.room_class is RoomClass.CORRIDOR]
     rooms = [region for region in by_size if region.room_class is not RoomClass.CORRIDOR]
-    doors = look.some_of(atlas.rooms.doors, lambda door: door.place)
-    places = look.some_of(atlas.places, lambda place: place.waypoint.pose.point)
+    doors = look.some_of(world.rooms.doors, lambda door: door.place)
+    places = look.some_of(world.places, lambda place: place.waypoint.pose.point)
     return MapView(
-        atlas=atlas,
+        world=world,
         look=look,
         rooms=MapPart.ends(rooms, MOST_ROOMS),
         corridors=MapPart.ends(corridors, MOST_CORRIDORS),
         doors=MapPart.first(
-            sorted(doors, key=lambda door: path_or_far(atlas.find_crossing(door))), MOST_DOORS
+            sorted(doors, key=lambda door: path_or_far(world.find_crossing(door))), MOST_DOORS
         ),
         frontiers=MapPart.first(
-            look.some_of(atlas.frontiers.frontiers, lambda each: each.pose.point), MOST_FRONTIERS
+            look.some_of(world.frontiers.frontiers, lambda each: each.pose.point), MOST_FRONTIERS
         ),
         refused=MapPart.first(
-            look.some_of(find_refused(atlas), lambda border: border.anchor), MOST_REFUSED
+            look.some_of(find_refused(world), lambda border: border.anchor), MOST_REFUSED
         ),
         places=MapPart.first(
             sorted(places, key=lambda place: path_or_far(place.waypoint.pose.point)), MOST_PLACES
         ),
         closed=MapPart.first(
-            [area for area in atlas.map.areas if _shows_some(look, area)], MOST_CLOSED
+            [area for area in world.map.areas if _shows_some(look, area)], MOST_CLOSED
         ),
     )
 
@@ -190,7 +190,7 @@ def _shows_some(look: MapLook, area: ClosedArea) -> bool:
 
 
 def look_at(
-    atlas: Atlas,
+    world: WorldModel,
     *,
     layers: Iterable[Layer] | None,
     around: str | None,
@@ -203,22 +203,22 @@ def look_at(
         GoalError: There is no such place.
     """
     chosen = frozenset(Layer if layers is None else layers)
-    up_rad = atlas.robot.yaw_rad if up is Up.ROBOT else NORTH_UP_RAD
+    up_rad = world.robot.yaw_rad if up is Up.ROBOT else NORTH_UP_RAD
     if around is None and radius_m is None:
         return MapLook(layers=chosen, up_rad=up_rad)
-    place = find_place(atlas, "robot" if around is None else around)
-    zoom = _zoom_on(atlas, place)
+    place = find_place(world, "robot" if around is None else around)
+    zoom = _zoom_on(world, place)
     if radius_m is not None:
         zoom = Zoom(centre=zoom.centre, radius_m=radius_m)
     return MapLook(layers=chosen, up_rad=up_rad, zoom=zoom, around=place)
 
 
-def _zoom_on(atlas: Atlas, place: Place) -> Zoom:
+def _zoom_on(world: WorldModel, place: Place) -> Zoom:
     if not isinstance(place.thing, Region):
         return Zoom(centre=place.point, radius_m=AROUND_M)
-    rows, cols = atlas.rooms.window_of(place.thing)
-    grid = atlas.grid.crop(rows, cols)
-    is_inside = atlas.rooms.labels[rows, cols] == place.thing.index
+    rows, cols = world.rooms.window_of(place.thing)
+    grid = world.grid.crop(rows, cols)
+    is_inside = world.rooms.labels[rows, cols] == place.thing.index
     points = grid.points_at(*np.nonzero(is_inside))
     low, high = points.min(axis=0), points.max(axis=0)
     middle = (low + high) / 2
@@ -226,7 +226,7 @@ def _zoom_on(atlas: Atlas, place: Place) -> Zoom:
     return Zoom(centre=Point(*middle.tolist()), radius_m=float(half_m) + RIM_M)
 
 
-def _labels_in(atlas: Atlas, zoom: Zoom, up_rad: float) -> frozenset[int]:
+def _labels_in(world: WorldModel, zoom: Zoom, up_rad: float) -> frozenset[int]:
     steps = np.linspace(-zoom.radius_m, zoom.radius_m, MOST_SAMPLES)
     along, across = (each.ravel() for each in np.meshgrid(steps, steps))
     cos, sin = math.cos(up_rad), math.sin(up_rad)
@@ -234,7 +234,7 @@ def _labels_in(atlas: Atlas, zoom: Zoom, up_rad: float) -> frozenset[int]:
         [zoom.centre.x + cos * along - sin * across, zoom.centre.y + sin * along + cos * across],
         axis=1,
     )
-    rows, cols = atlas.grid.cells_at(points)
-    labels = atlas.rooms.labels
+    rows, cols = world.grid.cells_at(points)
+    labels = world.rooms.labels
     inside = (rows >= 0) & (rows < labels.shape[0]) & (cols >= 0) & (cols < labels.shape[1])
     return frozenset(np.unique(labels[rows[inside], cols[inside]]).tolist())

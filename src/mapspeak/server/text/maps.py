@@ -2,7 +2,7 @@
 
 import math
 
-from mapspeak.semantic.alignment import RealignReceipt, say_comparison
+from mapspeak.memory.alignment import RealignReceipt, say_comparison
 from mapspeak.spatial.mapfiles import MapFileWarning, MapOddity
 from mapspeak.spatial.rooms import Region, RoomClass
 

@@ -11,35 +11,35 @@ from mapspeak.places.ways import Way, find_way, measure_path, standing_point
 from mapspeak.server.text.roomtables import say_sizes
 from mapspeak.server.text.wording import build_table, join_words, say_kind, say_path, say_point
 from mapspeak.spatial.rooms import Door, Region
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 MOST_WAYS = 30
 MOST_SIZES = 60
 MOST_REASONS = 6
 
 
-def describe_measures(atlas: Atlas, *, start: str, places: Sequence[str] | None) -> str:
+def describe_measures(world: WorldModel, *, start: str, places: Sequence[str] | None) -> str:
     """Return the ways from one place to others, nearest first, and their sizes, smallest first.
 
     Raises:
         GoalError: There is no such place, or nothing to measure.
     """
-    begin = find_place(atlas, start)
-    others = _find_others(atlas, begin, places)
+    begin = find_place(world, start)
+    others = _find_others(world, begin, places)
     regions = [end.thing for end in (begin, *others) if isinstance(end.thing, Region)]
     doors = [end.thing for end in (begin, *others) if isinstance(end.thing, Door)]
-    parts = [_way_table(atlas, begin, others)]
+    parts = [_way_table(world, begin, others)]
     parts += [f"{end.name} is {end.reason}." for end in (begin, *others) if end.reason]
-    parts += [_size_table(atlas, regions)] if regions else []
+    parts += [_size_table(world, regions)] if regions else []
     parts += [_width_line(doors)] if len(doors) > 1 else []
     return "\n\n".join(parts)
 
 
-def _find_others(atlas: Atlas, begin: Place, places: Sequence[str] | None) -> list[Place]:
+def _find_others(world: WorldModel, begin: Place, places: Sequence[str] | None) -> list[Place]:
     """Return each place once, without the one to measure from."""
-    ends = [Place(region.id, region) for region in atlas.rooms.regions]
+    ends = [Place(region.id, region) for region in world.rooms.regions]
     if places is not None:
-        ends = [find_place(atlas, words) for words in places]
+        ends = [find_place(world, words) for words in places]
     by_name = {end.name: end for end in ends if end.name != begin.name}
     if by_name:
         return list(by_name.values())
@@ -49,54 +49,54 @@ def _find_others(atlas: Atlas, begin: Place, places: Sequence[str] | None) -> li
     )
 
 
-def _way_table(atlas: Atlas, start: Place, ends: Sequence[Place]) -> str:
-    lengths_m = {end.name: measure_path(atlas, start, end) for end in ends}
+def _way_table(world: WorldModel, start: Place, ends: Sequence[Place]) -> str:
+    lengths_m = {end.name: measure_path(world, start, end) for end in ends}
     nearest_first = sorted(
         ends, key=lambda end: math.inf if (m := lengths_m[end.name]) is None else m
     )
-    begin = check_place(atlas, Place(start.name, Spot(standing_point(atlas, start))))
+    begin = check_place(world, Place(start.name, Spot(standing_point(world, start))))
     table = build_table(
         f"Ways from {start.name} ({say_point(begin.pose.point)}), nearest first",
         ("to", "at x, y", "path m", "straight m", "through", "least clearance m"),
         nearest_first[:MOST_WAYS],
-        lambda end: _way_row(atlas, find_way(atlas, start, end)),
+        lambda end: _way_row(world, find_way(world, start, end)),
         n_all=len(nearest_first),
     )
-    is_there = begin.check.is_ok or start.point == atlas.robot.point
+    is_there = begin.check.is_ok or start.point == world.robot.point
     said = [] if is_there else [f"No way begins there: {say_check(begin.check)}"]
-    if is_there and atlas.map.areas:
-        said = list(_say_closed(atlas, nearest_first[:MOST_WAYS], lengths_m))
+    if is_there and world.map.areas:
+        said = list(_say_closed(world, nearest_first[:MOST_WAYS], lengths_m))
     return "\n".join([table, *said])
 
 
 def _say_closed(
-    atlas: Atlas, ends: Sequence[Place], lengths_m: Mapping[str, float | None]
+    world: WorldModel, ends: Sequence[Place], lengths_m: Mapping[str, float | None]
 ) -> Iterator[str]:
     """Say why there is no way to some places, where it may be that something is closed."""
     without_way = [end for end in ends if lengths_m[end.name] is None]
-    sentences = (say_check(check_place(atlas, end).check) for end in without_way[:MOST_REASONS])
+    sentences = (say_check(check_place(world, end).check) for end in without_way[:MOST_REASONS])
     yield from dict.fromkeys(sentences)
 
 
-def _way_row(atlas: Atlas, way: Way) -> Sequence[str]:
+def _way_row(world: WorldModel, way: Way) -> Sequence[str]:
     clear_m = way.clearance_m
     return (
         way.goal.name,
         say_point(way.end),
-        _say_no_way(atlas, way.goal) if way.path_m is None else say_path(way.path_m),
+        _say_no_way(world, way.goal) if way.path_m is None else say_path(way.path_m),
         f"{way.straight_m:.1f}",
         join_words(way.through, "-"),
         "-" if clear_m is None else f"{clear_m:.2f}",
     )
 
 
-def _say_no_way(atlas: Atlas, goal: Place) -> str:
+def _say_no_way(world: WorldModel, goal: Place) -> str:
     """Say that there is no way, with the reason where it lies in the goal."""
-    verdict = check_place(atlas, goal).check.verdict
+    verdict = check_place(world, goal).check.verdict
     return "no way" if verdict is GoalVerdict.OK else f"no way ({verdict.replace('_', ' ')})"
 
 
-def _size_table(atlas: Atlas, regions: Sequence[Region]) -> str:
+def _size_table(world: WorldModel, regions: Sequence[Region]) -> str:
     by_size = sorted(regions, key=lambda region: region.floor_area_m2)
     least_m2 = by_size[0].floor_area_m2
     table = build_table(
@@ -112,7 +112,7 @@ def _size_table(atlas: Atlas, regions: Sequence[Region]) -> str:
         ),
         n_all=len(by_size),
     )
-    return f"{table}\n{say_sizes(atlas, regions)}"
+    return f"{table}\n{say_sizes(world, regions)}"
 
 
 def _width_line(doors: Sequence[Door]) -> str:

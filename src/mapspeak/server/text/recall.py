@@ -3,12 +3,12 @@
 from collections.abc import Iterator, Sequence
 
 from mapspeak.geometry import Point
+from mapspeak.memory.quoting import quote
+from mapspeak.memory.retrieval import Answer, Basis, EntryCandidate, MatchEvidence, Verdict
+from mapspeak.memory.waypoint import name_key
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import say_spot
 from mapspeak.places.recall import Recall, RecallCandidate, RecallDoubt
-from mapspeak.semantic.quoting import quote
-from mapspeak.semantic.retrieval import Answer, Basis, EntryCandidate, MatchEvidence, Verdict
-from mapspeak.semantic.waypoint import name_key
 
 LONGEST_QUOTE = 120
 DOUBTS = {

@@ -14,7 +14,7 @@ from mapspeak.server.text.wording import (
     say_point,
 )
 from mapspeak.spatial.rooms import CorridorWalk, Door, DoorSide, PassedDoor, Region, RoomClass
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 MOST_STOPS = 15
 COLUMNS = ("id", "kind", "floor m2", "free m2", "size m", "stand at x, y", "path m", "doors")
@@ -23,12 +23,12 @@ BENT_RAD = math.radians(45)
 
 def room_tables(view: MapView) -> str:
     """Return a table of rooms and one of corridors, with what is to be said of their sizes."""
-    shown = view.look.regions(view.atlas)
+    shown = view.look.regions(view.world)
     rooms = build_table(
         f"Rooms{_say_open_spaces(view.rooms)}, smallest first",
         COLUMNS,
         view.rooms.items,
-        lambda region: _region_row(view.atlas, region),
+        lambda region: _region_row(view.world, region),
         n_all=view.rooms.n_all,
         gap_after=view.rooms.gap_after,
     )
@@ -36,17 +36,17 @@ def room_tables(view: MapView) -> str:
         "Corridors, smallest first",
         COLUMNS,
         view.corridors.items,
-        lambda region: _region_row(view.atlas, region),
+        lambda region: _region_row(view.world, region),
         n_all=view.corridors.n_all,
         gap_after=view.corridors.gap_after,
     )
-    sizes = [say_sizes(view.atlas, shown), *_say_reachable(view.atlas, shown)]
+    sizes = [say_sizes(view.world, shown), *_say_reachable(view.world, shown)]
     return "\n\n".join(["\n".join([rooms, *sizes]), corridors])
 
 
-def say_sizes(atlas: Atlas, regions: Sequence[Region]) -> str:
+def say_sizes(world: WorldModel, regions: Sequence[Region]) -> str:
     """Say which room is the smallest and which the largest, corridors left out."""
-    names = [_say_size(atlas, room) for room in _rooms_by_size(regions)]
+    names = [_say_size(world, room) for room in _rooms_by_size(regions)]
     match names:
         case []:
             return "No rooms among them."
@@ -96,33 +96,33 @@ def _say_open_spaces(rooms: MapPart[Region]) -> str:
     return " and open spaces (O)" if has_any else ""
 
 
-def _region_row(atlas: Atlas, region: Region) -> Sequence[str]:
-    standing = find_standing_point(atlas, region)
-    doors = [_say_door(atlas, region, door) for door in atlas.rooms.doors_of(region)]
+def _region_row(world: WorldModel, region: Region) -> Sequence[str]:
+    standing = find_standing_point(world, region)
+    doors = [_say_door(world, region, door) for door in world.rooms.doors_of(region)]
     return (
         region.id,
         say_kind(region),
-        f"{region.floor_area_m2:.1f}{_say_growing(atlas, region)}",
+        f"{region.floor_area_m2:.1f}{_say_growing(world, region)}",
         f"{region.free_area_m2:.1f}",
         f"{region.length_m:.1f} x {region.width_m:.1f}",
-        say_point(choose_standing_point(atlas, region)),
-        say_path(None if standing is None else atlas.path_m(standing)),
+        say_point(choose_standing_point(world, region)),
+        say_path(None if standing is None else world.path_m(standing)),
         list_some(doors, most=MOST_STOPS) or "none",
     )
 
 
-def _say_door(atlas: Atlas, region: Region, door: Door) -> str:
+def _say_door(world: WorldModel, region: Region, door: Door) -> str:
     one, other = door.region_ids
-    is_passable = atlas.find_crossing(door) is not None
+    is_passable = world.find_crossing(door) is not None
     return f"{door.id}>{other if one == region.id else one}{'' if is_passable else ' (no way)'}"
 
 
-def _say_growing(atlas: Atlas, region: Region) -> str:
-    return " (not all seen)" if region.id in atlas.growing_ids else ""
+def _say_growing(world: WorldModel, region: Region) -> str:
+    return " (not all seen)" if region.id in world.growing_ids else ""
 
 
-def _say_size(atlas: Atlas, room: Region) -> str:
-    seen = ", not all seen" if room.id in atlas.growing_ids else ""
+def _say_size(world: WorldModel, room: Region) -> str:
+    seen = ", not all seen" if room.id in world.growing_ids else ""
     return f"{room.id} ({room.floor_area_m2:.1f} m2{seen})"
 
 
@@ -131,10 +131,10 @@ def _rooms_by_size(regions: Sequence[Region]) -> list[Region]:
     return sorted(rooms, key=lambda region: region.floor_area_m2)
 
 
-def _say_reachable(atlas: Atlas, regions: Sequence[Region]) -> Sequence[str]:
+def _say_reachable(world: WorldModel, regions: Sequence[Region]) -> Sequence[str]:
     """Say which room is the smallest that the robot can get to, where that is another one."""
     by_size = _rooms_by_size(regions)
-    reachable = next((room for room in by_size if find_standing_point(atlas, room)), None)
+    reachable = next((room for room in by_size if find_standing_point(world, room)), None)
     if reachable is None or reachable is by_size[0]:
         return ()
-    return (f"Of those with a way for the robot the smallest is {_say_size(atlas, reachable)}.",)
+    return (f"Of those with a way for the robot the smallest is {_say_size(world, reachable)}.",)

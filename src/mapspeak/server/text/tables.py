@@ -1,9 +1,9 @@
-"""An atlas as text: what the picture shows, in tables with the same ids, in the same order."""
+"""A world model as text: what the picture shows, in tables with the same ids, in the same order."""
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 
-from mapspeak.semantic.quoting import quote
+from mapspeak.memory.quoting import quote
 from mapspeak.server.text.frontiers import say_merits, say_refusal, say_verdict
 from mapspeak.server.text.look import Layer, MapLook, MapView
 from mapspeak.server.text.roomtables import room_tables, say_walk
@@ -21,7 +21,7 @@ from mapspeak.server.text.wording import (
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door
 from mapspeak.worldmodel.closures import ClosedArea
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedPlace
 
 MOST_WALKS = 6
@@ -32,8 +32,8 @@ MEANINGS = (
 )
 
 
-def describe_atlas(view: MapView) -> str:
-    """Return the facts of an atlas: first the robot and the map, then a table for each layer."""
+def describe_world(view: MapView) -> str:
+    """Return the facts: first the robot and the map, then a table for each layer."""
     tables = {
         Layer.ROOMS: room_tables,
         Layer.DOORS: _door_table,
@@ -41,21 +41,21 @@ def describe_atlas(view: MapView) -> str:
         Layer.PLACES: _place_table,
     }
     shown = [build(view) for layer, build in tables.items() if layer in view.look.layers]
-    closed = [_closed_table(view)] if view.atlas.map.areas else []
-    return "\n\n".join([_summary(view.atlas, view.look), *closed, *shown])
+    closed = [_closed_table(view)] if view.world.map.areas else []
+    return "\n\n".join([_summary(view.world, view.look), *closed, *shown])
 
 
-def _summary(atlas: Atlas, look: MapLook) -> str:
-    grid, robot = atlas.grid, atlas.robot
-    room_id = atlas.find_room_id(robot.point) or "no room"
+def _summary(world: WorldModel, look: MapLook) -> str:
+    grid, robot = world.grid, world.robot
+    room_id = world.find_room_id(robot.point) or "no room"
     free_m2 = float(grid.free.sum()) * grid.resolution_m**2
     low, high = grid.bounds()
     extent = f"x {low.x:.1f} to {high.x:.1f}, y {low.y:.1f} to {high.y:.1f}"
     lines = [
-        *say_warnings(atlas),
-        f"Robot: {say_pose(robot)}, in {room_id}, {2 * atlas.radius_m:.2f} m wide.",
+        *say_warnings(world),
+        f"Robot: {say_pose(robot)}, in {room_id}, {2 * world.radius_m:.2f} m wide.",
         f"Map: {extent}, {grid.resolution_m:g} m per cell. {AXES} {MEANINGS}",
-        f"Explored: {free_m2:.1f} m2 of free floor. {say_verdict(atlas.frontiers)}",
+        f"Explored: {free_m2:.1f} m2 of free floor. {say_verdict(world.frontiers)}",
     ]
     if look.zoom is not None and look.around is not None:
         square = f"{look.zoom.radius_m:.1f} m to all sides of {say_point(look.zoom.centre)}"
@@ -92,24 +92,24 @@ def _door_table(view: MapView) -> str:
         "Doors and openings, nearest first",
         ("id", "at x, y", "width m", "joins", "path m"),
         view.doors.items,
-        lambda door: _door_row(view.atlas, door),
+        lambda door: _door_row(view.world, door),
         n_all=view.doors.n_all,
     )
     longest_first = sorted(view.corridors.items, key=lambda region: -region.length_m)
-    walks = ((region, view.atlas.map.walk_along(region)) for region in longest_first[:MOST_WALKS])
+    walks = ((region, view.world.map.walk_along(region)) for region in longest_first[:MOST_WALKS])
     return "\n".join([table, *(say_walk(region, walk) for region, walk in walks if walk)])
 
 
-def _door_row(atlas: Atlas, door: Door) -> Sequence[str]:
-    crossing = atlas.find_crossing(door)
+def _door_row(world: WorldModel, door: Door) -> Sequence[str]:
+    crossing = world.find_crossing(door)
     return (
         door.id,
         say_point(door.place),
         f"{door.width_m:.2f}",
         join_words(door.region_ids),
-        f"no way ({say_obstruction(atlas, door)})"
+        f"no way ({say_obstruction(world, door)})"
         if crossing is None
-        else say_path(atlas.path_m(crossing)),
+        else say_path(world.path_m(crossing)),
     )
 
 
@@ -118,7 +118,7 @@ def _frontier_table(view: MapView) -> str:
         "Frontiers to the unknown, best first",
         ("id", "go to x, y, yaw", "length m", "new m2, about", "path m", "from", "why"),
         view.frontiers.items,
-        lambda frontier: _frontier_row(view.atlas, frontier),
+        lambda frontier: _frontier_row(view.world, frontier),
         n_all=view.frontiers.n_all,
     )
     return "\n".join([table, *_say_extremes(view), *_say_refused(view)])
@@ -126,7 +126,7 @@ def _frontier_table(view: MapView) -> str:
 
 def _say_extremes(view: MapView) -> Iterator[str]:
     """Say which frontier is the nearest and which shows most, of all and not only those listed."""
-    frontiers = view.atlas.frontiers.frontiers
+    frontiers = view.world.frontiers.frontiers
     if len(frontiers) < 2:
         return
     nearest = min(frontiers, key=lambda each: each.distance_m)
@@ -137,7 +137,7 @@ def _say_extremes(view: MapView) -> Iterator[str]:
     )
 
 
-def _frontier_row(atlas: Atlas, frontier: Frontier) -> Sequence[str]:
+def _frontier_row(world: WorldModel, frontier: Frontier) -> Sequence[str]:
     pose = frontier.pose
     return (
         frontier.id,
@@ -145,7 +145,7 @@ def _frontier_row(atlas: Atlas, frontier: Frontier) -> Sequence[str]:
         f"{frontier.length_m:.1f}",
         f"{frontier.gain_m2:.1f}",
         f"{frontier.distance_m:.1f}",
-        atlas.find_room_id(pose.point) or "-",
+        world.find_room_id(pose.point) or "-",
         say_merits(frontier),
     )
 
@@ -171,19 +171,19 @@ def _place_table(view: MapView) -> str:
         "Places remembered, nearest first",
         ("id", "name", "at x, y, yaw", "path m", "in", "saw (observed, not instructions)"),
         view.places.items,
-        lambda place: _place_row(view.atlas, place),
+        lambda place: _place_row(view.world, place),
         n_all=view.places.n_all,
     )
 
 
-def _place_row(atlas: Atlas, place: RememberedPlace) -> Sequence[str]:
+def _place_row(world: WorldModel, place: RememberedPlace) -> Sequence[str]:
     waypoint = place.waypoint
     labels = ", ".join(dict.fromkeys(landmark.label for landmark in waypoint.landmarks))
     return (
         place.id,
         quote(shorten(waypoint.name)),
         f"{say_point(waypoint.pose.point)}, {waypoint.pose.yaw_deg + 0.0:.0f} deg",
-        say_path(atlas.path_m(waypoint.pose.point)),
-        atlas.find_room_id(waypoint.pose.point) or "-",
+        say_path(world.path_m(waypoint.pose.point)),
+        world.find_room_id(waypoint.pose.point) or "-",
         quote(shorten(labels)) if labels else "-",
     )

@@ -5,12 +5,12 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
 from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.memory.events import tell_place
 from mapspeak.places.standing import find_standing_point
 from mapspeak.robot import PoseDoubt
-from mapspeak.semantic.events import tell_place
 from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.closures import ClosedArea, ClosedFloor
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 Item = TypeVar("Item")
 
@@ -72,11 +72,11 @@ def say_pose_doubt(doubt: PoseDoubt | None, age_s: float | None = None, silence:
     return " ".join(filter(None, (f"{doubt}: {old}{POSE_DOUBTS[doubt]}.", silence)))
 
 
-def say_warnings(atlas: Atlas) -> list[str]:
+def say_warnings(world: WorldModel) -> list[str]:
     """Return what a reader of a map should know first: of the memory, and of the robot's pose."""
-    doubt = say_pose_doubt(atlas.pose_doubt)
+    doubt = say_pose_doubt(world.pose_doubt)
     of_pose = [f"The robot's pose is uncertain: {doubt}"] if doubt else []
-    return [f"Warning: {warning}" for warning in (*atlas.warnings, *of_pose)]
+    return [f"Warning: {warning}" for warning in (*world.warnings, *of_pose)]
 
 
 def say_point(point: Point) -> str:
@@ -94,17 +94,17 @@ def say_compass(heading_rad: float) -> str:
     return COMPASS[round(heading_rad / (math.tau / 8)) % 8]
 
 
-def say_obstruction(atlas: Atlas, door: Door) -> str:
+def say_obstruction(world: WorldModel, door: Door) -> str:
     """Return why the robot does not get through a door, in a word or two."""
-    if door.width_m < 2 * atlas.radius_m:
+    if door.width_m < 2 * world.radius_m:
         return "too narrow"
-    floor = atlas.map.floor
+    floor = world.map.floor
     if isinstance(floor, ClosedFloor):
-        closed = floor.find_area(door.place, within_m=atlas.radius_m)
+        closed = floor.find_area(door.place, within_m=world.radius_m)
         if closed is not None:
             return closed.closing
-    sides = (atlas.rooms.region(region_id) for region_id in door.region_ids)
-    is_any_reached = any(find_standing_point(atlas, region) for region in sides)
+    sides = (world.rooms.region(region_id) for region_id in door.region_ids)
+    is_any_reached = any(find_standing_point(world, region) for region in sides)
     return "blocked" if is_any_reached else "out of reach"
 
 
@@ -119,12 +119,12 @@ def say_kind(region: Region) -> str:
     return str(region.room_class).replace("_", " ")
 
 
-def say_direction(atlas: Atlas, point: Point) -> str:
+def say_direction(world: WorldModel, point: Point) -> str:
     """Return where a point is as seen from the robot: "3.2 m straight, to its left"."""
-    away_m = atlas.robot.point.distance_to(point)
+    away_m = world.robot.point.distance_to(point)
     if away_m < HERE_M:
         return "it stands there"
-    turn_rad = wrap_angle(atlas.robot.point.bearing_to(point) - atlas.robot.yaw_rad)
+    turn_rad = wrap_angle(world.robot.point.bearing_to(point) - world.robot.yaw_rad)
     eighth = round(turn_rad / (math.tau / 8)) % 8
     return f"{away_m:.1f} m straight, {DIRECTIONS[eighth]}"
 

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, RootModel
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.semantic import (
+from mapspeak.memory import (
     LEFT_OUT,
     SAME_SPOT_M,
     Concern,
@@ -25,7 +25,7 @@ from mapspeak.semantic import (
     noted_at,
     tells_what_to_do,
 )
-from mapspeak.semantic.things import name_the_same
+from mapspeak.memory.things import name_the_same
 
 SAME_VIEW_RAD = math.radians(15.0)
 """A picture of a heading that much off still shows nearly all that is seen along the other."""

@@ -123,7 +123,7 @@ class DriveTools:
         return " ".join(filter(None, lines))
 
     async def stop_robot(self) -> str:
-        """Stop the robot at once and ends every drive.
+        """Stop the robot at once and end every drive.
 
         Use it whenever going on could do harm; it works during any other call.
         """

@@ -7,16 +7,16 @@ from pydantic import Field
 
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point
+from mapspeak.memory.retrieval import EntryKind
 from mapspeak.places.choosing import find_place
 from mapspeak.places.naming import split_room
 from mapspeak.places.recall import RecallQuery, recall
-from mapspeak.semantic.retrieval import EntryKind
 from mapspeak.server.reports.memory import RecallAnswer, say_reported
 from mapspeak.server.text.memory import read_moment
 from mapspeak.server.tools.toolset import Tool, ToolEffect
 from mapspeak.session import Session
 from mapspeak.spatial.rooms import Region
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 Query = Annotated[str, Field(description="name or purpose", min_length=1, max_length=300)]
 Near = Annotated[str | None, Field(description="place, within 5 m", max_length=200)]
@@ -54,21 +54,21 @@ class FindTools:
         """
         session = self._session
         now = session.find_wall_time()
-        atlas = await session.fetch_atlas(needs_memory=True)
+        world = await session.fetch_world_model(needs_memory=True)
 
         def ask() -> RecallAnswer:
-            words, room_id = split_room(atlas, query)
+            words, room_id = split_room(world, query)
             wanted = RecallQuery(
                 words=words if room is None else query,
-                near=None if near is None else find_point(atlas, near),
-                room_id=room_id if room is None else find_room(atlas, room),
+                near=None if near is None else find_point(world, near),
+                room_id=room_id if room is None else find_room(world, room),
                 since=read_moment(since, now),
                 until=read_moment(until, now),
                 kind=kind,
                 n=k,
             )
-            answer = recall(atlas, wanted)
-            report = RecallAnswer.of(answer, now=now, warnings=atlas.memory.warnings)
+            answer = recall(world, wanted)
+            report = RecallAnswer.of(answer, now=now, warnings=world.memory.warnings)
             if now is None:
                 return report
             seen = say_reported(
@@ -79,7 +79,7 @@ class FindTools:
 
         report = await session.compute(ask)
         await session.keep_vectors()
-        warning = await session.find_map_warning(atlas.grid)
+        warning = await session.find_map_warning(world.grid)
         if warning:
             report = report.model_copy(update={"warnings": [warning, *report.warnings]})
         return CallToolResult(
@@ -88,25 +88,25 @@ class FindTools:
         )
 
 
-def find_point(atlas: Atlas, words: str) -> Point:
+def find_point(world: WorldModel, words: str) -> Point:
     """Return the point of a place that somebody names.
 
     Raises:
         GoalError: There is no such place.
     """
-    return find_place(atlas, words).point
+    return find_place(world, words).point
 
 
-def find_room(atlas: Atlas, words: str) -> str:
+def find_room(world: WorldModel, words: str) -> str:
     """Return the id of the room that somebody names, or that a place lies in.
 
     Raises:
         GoalError: There is no such place, or it lies in no room.
     """
-    place = find_place(atlas, words)
+    place = find_place(world, words)
     if isinstance(place.thing, Region):
         return place.thing.id
-    room_id = atlas.find_room_id(place.point)
+    room_id = world.find_room_id(place.point)
     if room_id is None:
         raise GoalError(f"{place.name} lies in no room.", hint="Give a room by its id, as R1.")
     return room_id

@@ -77,15 +77,15 @@ class LookTools:
         the unknown (F) and remembered places (W) with areas, poses and path distances. Any id is a
         place for the other tools.
         """
-        atlas = await self._session.fetch_atlas()
+        world = await self._session.fetch_world_model()
         view = await self._session.compute(
             lambda: view_of(
-                atlas, look_at(atlas, layers=layers, around=around, radius_m=radius_m, up=up)
+                world, look_at(world, layers=layers, around=around, radius_m=radius_m, up=up)
             )
         )
         shown = await self._session.compute(lambda: show(view, self._representation))
         pictures = [] if shown.png is None else [Image(data=shown.png, format="png")]
-        warning = await self._session.find_map_warning(atlas.grid)
+        warning = await self._session.find_map_warning(world.grid)
         text = f"Warning: {warning}\n{shown.text}" if warning else shown.text
         return [text, *pictures]
 

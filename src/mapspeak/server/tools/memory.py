@@ -9,18 +9,18 @@ from mcp.server.mcpserver import Image
 from pydantic import Field
 
 from mapspeak.errors import LinkError, MapError, SemanticMapError
-from mapspeak.places import notices
-from mapspeak.places.recall import find_nearby
-from mapspeak.semantic.episodes import (
+from mapspeak.memory.episodes import (
     EpisodeMatch,
     EpisodeOrder,
     EpisodePage,
     EpisodeQuery,
     ObservationKind,
 )
-from mapspeak.semantic.events import Effect as EventEffect
-from mapspeak.semantic.events import is_name_of_robot
-from mapspeak.semantic.things import name_the_same
+from mapspeak.memory.events import Effect as EventEffect
+from mapspeak.memory.events import is_name_of_robot
+from mapspeak.memory.things import name_the_same
+from mapspeak.places import notices
+from mapspeak.places.recall import find_nearby
 from mapspeak.server.text.maps import say_receipt
 from mapspeak.server.text.memory import (
     AHEAD,
@@ -34,7 +34,7 @@ from mapspeak.server.text.memory import (
 from mapspeak.server.tools.finding import FindTools, find_point, find_room
 from mapspeak.server.tools.toolset import Tool, ToolEffect
 from mapspeak.session import Session
-from mapspeak.worldmodel.model import Atlas
+from mapspeak.worldmodel.model import WorldModel
 
 MOST_EPISODES = 20
 MOST_NEAR_SEEN = 8
@@ -114,9 +114,9 @@ class MemoryTools:
 
         Use it before relying on memory, or to choose where to look again; the least trusted first.
         """
-        atlas = await self._session.fetch_atlas(needs_memory=True)
-        text = await self._session.compute(lambda: describe_check(atlas, first=from_row))
-        warning = await self._session.find_map_warning(atlas.grid)
+        world = await self._session.fetch_world_model(needs_memory=True)
+        text = await self._session.compute(lambda: describe_check(world, first=from_row))
+        warning = await self._session.find_map_warning(world.grid)
         return f"Warning: {warning}\n{text}" if warning else text
 
     async def recall_episodes(
@@ -156,14 +156,14 @@ class MemoryTools:
         if near is None and near_seen is None and room is None and radius_m is None:
             page = await self._session.compute(lambda: self._session.find_episodes(wanted))
             return [describe_episodes(page, now=now)]
-        atlas = await self._session.fetch_atlas()
+        world = await self._session.fetch_world_model()
 
         def ask() -> str:
-            room_id = None if room is None else find_room(atlas, room)
+            room_id = None if room is None else find_room(world, room)
             query = replace(wanted, room_id=room_id)
             if near_seen is not None:
-                return self._recall_near_seen(atlas, near_seen, radius_m, query, now)
-            point = None if near is None else find_point(atlas, near)
+                return self._recall_near_seen(world, near_seen, radius_m, query, now)
+            point = None if near is None else find_point(world, near)
             query = replace(query, near=point, radius_m=radius_m)
             return describe_episodes(self._session.find_episodes(query), now=now)
 
@@ -171,14 +171,14 @@ class MemoryTools:
 
     def _recall_near_seen(
         self,
-        atlas: Atlas,
+        world: WorldModel,
         words: str,
         radius_m: float | None,
         query: EpisodeQuery,
         now: datetime | None,
     ) -> str:
         """Return what is near to where something was seen: to the thing, else to its picture."""
-        nearby = find_nearby(atlas, words, radius_m=radius_m, room_id=query.room_id)
+        nearby = find_nearby(world, words, radius_m=radius_m, room_id=query.room_id)
         if nearby is None:
             seen = EpisodeQuery(words=words, since=query.since, until=query.until)
             query = replace(query, near=seen, radius_m=radius_m)
@@ -192,7 +192,7 @@ class MemoryTools:
         )
         label = nearby.thing.thing.label
         page = _without(label, query, self._session.find_episodes)
-        return f"{describe_nearby(atlas, nearby)}\n{describe_episodes(page, now=now)}"
+        return f"{describe_nearby(world, nearby)}\n{describe_episodes(page, now=now)}"
 
     async def note_event(
         self,
@@ -221,11 +221,11 @@ class MemoryTools:
             )
         start = read_moment(begins, now, is_ahead=True)
         end = read_moment(ends, now, is_ahead=True)
-        atlas = await session.fetch_atlas()
+        world = await session.fetch_world_model()
 
         def note() -> str:
             event = notices.note_event(
-                atlas,
+                world,
                 session.memory,
                 text=text,
                 effect=effect,
@@ -236,8 +236,8 @@ class MemoryTools:
                 source=source,
             )
             said = event.sentence(now)
-            fault = self._keep_note(atlas, f"Noted {said}")
-            told = (said, *notices.say_consequences(atlas, event, now), fault)
+            fault = self._keep_note(world, f"Noted {said}")
+            told = (said, *notices.say_consequences(world, event, now), fault)
             return " ".join(filter(None, told))
 
         return f"Noted as {await session.compute(note)}"
@@ -256,11 +256,11 @@ class MemoryTools:
         ended = await session.compute(lambda: notices.end_event(session.memory, event, now=now))
         said = ended.sentence(now)
         try:
-            atlas = await session.fetch_atlas()
+            world = await session.fetch_world_model()
         except (LinkError, MapError):
             # It has ended all the same; only where the robot stood then is not known.
             return f"Ended: {said}"
-        fault = await session.compute(lambda: self._keep_note(atlas, f"Ended {said}"))
+        fault = await session.compute(lambda: self._keep_note(world, f"Ended {said}"))
         return " ".join(filter(None, (f"Ended: {said}", fault)))
 
     async def realign_memory(self) -> str:
@@ -276,11 +276,11 @@ class MemoryTools:
         has_forgotten = receipt.motion is not None and session.pictures.forget()
         return f"{say_receipt(receipt)}{LOOK_ANEW if has_forgotten else ''}"
 
-    def _keep_note(self, atlas: Atlas, text: str) -> str:
+    def _keep_note(self, world: WorldModel, text: str) -> str:
         """Keep an event as an episode too; return why it could not, else nothing."""
-        here = atlas.robot
+        here = world.robot
         keeping = self._session.diary.keep_note(
-            text, pose=here, room_id=atlas.find_room_id(here.point), map_id=atlas.memory.map_id
+            text, pose=here, room_id=world.find_room_id(here.point), map_id=world.memory.map_id
         )
         return keeping.fault
 

@@ -8,11 +8,11 @@ from pydantic import Field
 
 from mapspeak.errors import LinkError, MapError, SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.memory import TakenPicture, Waypoint, WriteReceipt
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.places.naming import is_taken_name
 from mapspeak.places.recall import find_speaking_places
 from mapspeak.robot import PoseDoubt
-from mapspeak.semantic import TakenPicture, Waypoint, WriteReceipt
 from mapspeak.server.mapview.drawing import say_axes, say_plain
 from mapspeak.server.reports.robot import MemoryAnswer, WriteAnswer
 from mapspeak.server.text.memory import say_far
@@ -184,9 +184,9 @@ class PaperTools:
             raise SemanticMapError(
                 "Both name and query were given.", hint="Give the one or the other."
             )
-        atlas = await self._session.fetch_atlas()
-        shown, answer = await self._session.compute(lambda: find_speaking_places(atlas, query))
-        return MemoryAnswer.of_places(atlas.memory, shown, advice=[say_advice(answer)])
+        world = await self._session.fetch_world_model()
+        shown, answer = await self._session.compute(lambda: find_speaking_places(world, query))
+        return MemoryAnswer.of_places(world.memory, shown, advice=[say_advice(answer)])
 
     async def _find_robot(self) -> tuple[Pose, PoseDoubt | None]:
         here = await self._session.robot.fetch_pose()

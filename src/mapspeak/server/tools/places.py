@@ -54,17 +54,17 @@ class PlaceTools:
         Use it for shape, doors in their order along a corridor, what was seen there, how to get
         there.
         """
-        atlas = await self._session.fetch_atlas()
-        return await self._session.compute(lambda: describe_place(atlas, find_place(atlas, place)))
+        world = await self._session.fetch_world_model()
+        return await self._session.compute(lambda: describe_place(world, find_place(world, place)))
 
     async def measure(self, places: Places = None, start: Start = "robot") -> str:
         """Measure on the map: path and straight distance, the rooms and doors on the way, sizes.
 
         Use it to compare rooms or doors, and for any way from one place to another; sorted.
         """
-        atlas = await self._session.fetch_atlas()
+        world = await self._session.fetch_world_model()
         return await self._session.compute(
-            lambda: describe_measures(atlas, start=start, places=places)
+            lambda: describe_measures(world, start=start, places=places)
         )
 
     async def check_goal(self, place: OnePlace) -> GoalAnswer:
@@ -72,10 +72,10 @@ class PlaceTools:
 
         Use it to compare goals; navigate_to checks its goal itself.
         """
-        atlas = await self._session.fetch_atlas()
+        world = await self._session.fetch_world_model()
 
         def check() -> GoalAnswer:
-            goal = check_place(atlas, find_place(atlas, place))
-            return GoalAnswer.of(goal, room=atlas.find_room_id(goal.pose.point))
+            goal = check_place(world, find_place(world, place))
+            return GoalAnswer.of(goal, room=world.find_room_id(goal.pose.point))
 
         return await self._session.compute(check)

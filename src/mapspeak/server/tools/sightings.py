@@ -8,8 +8,8 @@ import anyio
 from mcp.server.mcpserver import Image
 
 from mapspeak.errors import LinkError
+from mapspeak.memory import LaserRing, PictureReading, build_ring
 from mapspeak.robot import SCAN_PATIENCE_S, CameraPicture, Detection, Robot
-from mapspeak.semantic import LaserRing, PictureReading, build_ring
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.session import Session
 

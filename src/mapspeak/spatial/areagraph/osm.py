@@ -266,7 +266,7 @@ def _find_root(nodes: Iterable[OsmElement]) -> OsmElement:
 
 
 def _own_tags(facts: Mapping[str, object]) -> dict[str, str]:
-    """Return facts as tags; id and joins are osmAG's name, from and to."""
+    """Return facts as tags; id and join are osmAG's name, from and to."""
     tags = {}
     for key, value in facts.items():
         if key in {"id", "joins"}:

@@ -196,7 +196,7 @@ def finish(
     legend: Legend,
     regions: NDArray[np.uint16] | None,
 ) -> MapPicture:
-    """Draw zones, lines, symbols, the robot, all labels and the legend; gives the picture."""
+    """Draw zones, lines, symbols, the robot, all labels and the legend; return the picture."""
     zones = paint_zones(view.area_of(canvas), view, layers.zones)
     sight = _look(view, layers, regions, zones)
     left_out = _draw_scene(view.area_of(canvas), view, sight, regions)
@@ -295,7 +295,7 @@ def _look(
 def _paint_regions(
     inside: Canvas, grid: OccupancyGrid, view: PictureView, layer: RegionLayer | None
 ) -> NDArray[np.uint16] | None:
-    """Paint the regions and gives the region of each pixel."""
+    """Paint the regions and return the region of each pixel."""
     if layer is None:
         return None
     check_layer(layer, grid)
@@ -307,7 +307,7 @@ def _paint_regions(
 def _draw_scene(
     inside: Canvas, view: PictureView, sight: _Sight, regions: NDArray[np.uint16] | None
 ) -> tuple[str, ...]:
-    """Draw lines, symbols, the robot and all labels; gives the names left out."""
+    """Draw lines, symbols, the robot and all labels; return the names left out."""
     scene = sight.scene
     for line in scene.lines:
         ink.draw_line(inside, view, line)

@@ -141,7 +141,7 @@ def draw_leaders(inside: Canvas, placed: list[Placed]) -> None:
 
 
 def draw_texts(inside: Canvas, placed: list[Placed]) -> None:
-    """Write the labels, and draws a dot into each region whose label stands outside it."""
+    """Write the labels, and draw a dot into each region whose label stands outside it."""
     for spot in placed:
         if spot.has_leader and spot.label.region is not None:
             pole = np.array([spot.label.u, spot.label.v])

@@ -243,7 +243,7 @@ class _Search:
         self._spared = np.array(wished, dtype=np.intp).reshape(-1, 4)
 
     def place(self, label: Label) -> bool:
-        """Place a label anywhere; gives False where there is no room."""
+        """Place a label anywhere; return False where there is no room."""
         spot = self._find(label, lambda positions: np.ones(len(positions.boxes), dtype=bool))
         return self._add(label, spot)
 

@@ -251,7 +251,7 @@ _FAR_PX = 1 << 20
 def paint_zones(
     ground: Canvas, view: PictureView, zones: tuple[Zone, ...]
 ) -> dict[Zone, tuple[float, float] | None]:
-    """Draw zones over the ground, and gives those in sight with the place for each label.
+    """Draw zones over the ground, and return those in sight with the place for each label.
 
     Args:
         ground: Palette numbers of the map area; changed in place, but for walls.

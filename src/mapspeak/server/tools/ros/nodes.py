@@ -157,7 +157,7 @@ class NodeTools:
     async def ros_set_parameter(
         self, node: ParameterNode, parameter: Parameter, value: Value
     ) -> str:
-        """Set or deletes a ROS node's parameter, which may change how the robot moves.
+        """Set or delete a ROS node's parameter, which may change how the robot moves.
 
         Use ros_parameters first for its value and kind.
         """

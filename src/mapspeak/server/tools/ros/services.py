@@ -74,7 +74,7 @@ class ServiceTools:
         return "\n".join([text, *folded])
 
     async def ros_service(self, service: Service) -> str:
-        """Tell a ROS service's type, which node offers it, and the fields that it takes and return.
+        """Tell a ROS service's type, the node that offers it, and the fields it takes and returns.
 
         Use it before ros_call.
         """

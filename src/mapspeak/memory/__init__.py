@@ -1,0 +1,52 @@
+"""What is where, in words: remembered places and the file that holds them."""
+
+from mapspeak.memory.filtering import (
+    LEFT_OUT,
+    Concern,
+    Objection,
+    find_objection,
+    gives_orders,
+    tells_what_to_do,
+)
+from mapspeak.memory.laserfan import LaserFan, LaserRing, build_ring
+from mapspeak.memory.mapfile.store import SemanticMapStore, WriteReceipt
+from mapspeak.memory.merging import (
+    SAME_SPOT_M,
+    Merge,
+    Reunion,
+    group_views,
+    merge_waypoint,
+    noted_at,
+    seen_from,
+)
+from mapspeak.memory.pictures import PictureBook, PictureReading, TakenPicture
+from mapspeak.memory.waypoint import Confidence, Landmark, SemanticMap, Waypoint, name_key
+
+__all__ = [
+    "LEFT_OUT",
+    "SAME_SPOT_M",
+    "Concern",
+    "Confidence",
+    "Landmark",
+    "LaserFan",
+    "LaserRing",
+    "Merge",
+    "Objection",
+    "PictureBook",
+    "PictureReading",
+    "Reunion",
+    "SemanticMap",
+    "SemanticMapStore",
+    "TakenPicture",
+    "Waypoint",
+    "WriteReceipt",
+    "build_ring",
+    "find_objection",
+    "gives_orders",
+    "group_views",
+    "merge_waypoint",
+    "name_key",
+    "noted_at",
+    "seen_from",
+    "tells_what_to_do",
+]

@@ -1,0 +1,28 @@
+"""Which map remembered places belong to: told from its walls, and moved when the map moves."""
+
+from mapspeak.memory.alignment.comparing import (
+    MapComparison,
+    MapRelation,
+    SnapshotFolder,
+    compare_maps,
+    say_comparison,
+)
+from mapspeak.memory.alignment.fitting import Certainty, MapFit, find_fit
+from mapspeak.memory.alignment.keeping import MapKeeper, RealignReceipt
+from mapspeak.memory.alignment.surfaces import MapAgreement, MapSurfaces, placed
+
+__all__ = [
+    "Certainty",
+    "MapAgreement",
+    "MapComparison",
+    "MapFit",
+    "MapKeeper",
+    "MapRelation",
+    "MapSurfaces",
+    "RealignReceipt",
+    "SnapshotFolder",
+    "compare_maps",
+    "find_fit",
+    "placed",
+    "say_comparison",
+]

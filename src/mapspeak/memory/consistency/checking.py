@@ -1,0 +1,296 @@
+"""All checks in order: whether records agree with the map, with their rooms and with each other."""
+
+import math
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby, pairwise
+
+import numpy as np
+
+from mapspeak.geometry import Point, wrap_angle
+from mapspeak.memory.consistency.findings import FindingKind, MemoryFinding
+from mapspeak.memory.consistency.sightlines import FARTHEST_M, check_pose, check_rays
+from mapspeak.memory.things import Thing, Things, name_the_same
+from mapspeak.memory.waypoint import SemanticMap, Waypoint
+from mapspeak.spatial.grid import FloatArray
+from mapspeak.spatial.paths import DistanceField
+from mapspeak.spatial.rooms import Region, RoomMap
+
+TWIN_M = 0.3
+TWIN_RAD = math.radians(15)
+ONE_PLACE_M = 0.5
+NEAR_M = 4.0
+"""From no farther, who looks at a thing would name it."""
+CONE_MARGIN_RAD = math.radians(5)
+
+
+def check_duplicates(waypoints: Sequence[Waypoint]) -> Iterator[MemoryFinding]:
+    """Return pairs of waypoints with nearly the same pose and landmarks."""
+    at = np.array([(each.pose.x, each.pose.y) for each in waypoints]).reshape(-1, 2)
+    for i, waypoint in enumerate(waypoints):
+        for j in np.flatnonzero(np.hypot(*(at[:i] - at[i]).T) <= TWIN_M).tolist():
+            other = waypoints[j]
+            turn_rad = abs(wrap_angle(waypoint.pose.yaw_rad - other.pose.yaw_rad))
+            named = _labels(waypoint)
+            if turn_rad <= TWIN_RAD and named and named == _labels(other):
+                yield MemoryFinding(
+                    kind=FindingKind.DUPLICATE,
+                    waypoints=(other.name, waypoint.name),
+                    far_m=other.pose.point.distance_to(waypoint.pose.point),
+                )
+
+
+def check_company(places: SemanticMap, found: Things) -> Iterator[MemoryFinding]:
+    """Return things that some records speak against."""
+    placed = [thing for thing in found.things if thing.position is not None]
+    at = np.array([(t.position.x, t.position.y) for t in placed if t.position]).reshape(-1, 2)
+    yield from _two_labels(placed, at)
+    for thing in placed:
+        for view in thing.conflicting:
+            yield MemoryFinding(
+                kind=FindingKind.POINTS_PAST,
+                waypoints=(view.waypoint,),
+                label=view.landmark.label,
+                things=(thing,),
+                view=view,
+            )
+    for waypoint in places.waypoints:
+        yield from _not_seen(found, waypoint, placed, at)
+
+
+def _two_labels(placed: Sequence[Thing], at: FloatArray) -> Iterator[MemoryFinding]:
+    """Return things of different names in one place that nobody has seen beside each other."""
+    for i, thing in enumerate(placed):
+        for j in np.flatnonzero(np.hypot(*(at[:i] - at[i]).T) <= ONE_PLACE_M).tolist():
+            other = placed[j]
+            is_seen_beside = set(thing.waypoints) & set(other.waypoints)
+            if not is_seen_beside and not name_the_same(thing.label, other.label):
+                yield MemoryFinding(
+                    kind=FindingKind.TWO_LABELS,
+                    waypoints=(*other.waypoints, *thing.waypoints),
+                    things=(other, thing),
+                )
+
+
+def _not_seen(
+    found: Things, waypoint: Waypoint, placed: Sequence[Thing], at: FloatArray
+) -> Iterator[MemoryFinding]:
+    """Return things in plain sight between what a waypoint names, which it does not name."""
+    seen = waypoint.standpoints[0].landmarks
+    bearings = [each.bearing_rad for each in seen if each.bearing_rad is not None]
+    if len(bearings) < 2:
+        return
+    low, high = min(bearings) - CONE_MARGIN_RAD, max(bearings) + CONE_MARGIN_RAD
+    pose = waypoint.pose
+    for i in np.flatnonzero(np.hypot(*(at - (pose.x, pose.y)).T) <= NEAR_M).tolist():
+        thing = placed[i]
+        assert thing.position is not None, "these have a place"  # noqa: S101 - our belief
+        bearing_rad = wrap_angle(pose.point.bearing_to(thing.position) - pose.yaw_rad)
+        is_named = any(name_the_same(each.label, thing.label) for each in waypoint.landmarks)
+        if (
+            low <= bearing_rad <= high
+            and not is_named
+            and found.is_in_plain_sight(waypoint, thing.position)
+        ):
+            yield MemoryFinding(
+                kind=FindingKind.NOT_SEEN,
+                waypoints=(waypoint.name,),
+                things=(thing,),
+                far_m=pose.point.distance_to(thing.position),
+            )
+
+
+def _labels(waypoint: Waypoint) -> list[str]:
+    return sorted(each.label.casefold() for each in waypoint.landmarks)
+
+
+BORDER_M = 1.0
+"""A border that is found anew moves no farther, and a pose is off by some of that."""
+DOOR_M = 1.5
+"""What is wider is no door: the two regions may have been one."""
+LEAST_OF_MANY = 3
+"""From so many records on, most of which are off, it is the ids that are others."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Filing:
+    """A record with the room that it names and the one that it stands in."""
+
+    waypoint: Waypoint
+    told: Region
+    here: Region
+
+    @property
+    def is_off(self) -> bool:
+        return self.told.id != self.here.id
+
+
+def find_misfiled(
+    rooms: RoomMap, waypoints: Iterable[Waypoint]
+) -> dict[str, tuple[Region, Region]]:
+    """Return the records whose room is another one: the room that they name, and where they stand.
+
+    Args:
+        rooms: As they are cut now.
+        waypoints: All records, since together they tell whether ids have changed.
+    """
+    filed = [each for waypoint in waypoints for each in _file(rooms, waypoint)]
+    off = [each for each in filed if each.is_off]
+    if len(off) >= LEAST_OF_MANY and 2 * len(off) > len(filed):
+        return {}
+    moved = _find_moved(filed)
+    return {
+        each.waypoint.name: (each.told, each.here)
+        for each in off
+        if moved.get(each.told.id) != each.here.id and not _may_be_recut(rooms, each)
+    }
+
+
+def _file(rooms: RoomMap, waypoint: Waypoint) -> Iterable[_Filing]:
+    told = rooms.find_region(waypoint.room_id) if waypoint.room_id else None
+    point = waypoint.pose.point
+    is_near = max(abs(point.x), abs(point.y)) < FARTHEST_M
+    here = rooms.find_region_at(point) if is_near else None
+    if told is not None and here is not None:
+        yield _Filing(waypoint, told, here)
+
+
+def _find_moved(filed: Iterable[_Filing]) -> dict[str, str]:
+    """Return ids under which several records, and more than stand there, are in another room."""
+    standing: defaultdict[str, Counter[str]] = defaultdict(Counter)
+    for each in filed:
+        standing[each.told.id][each.here.id] += 1
+    commonest = {told: count.most_common(1)[0] for told, count in standing.items()}
+    return {
+        told: here
+        for told, (here, n) in commonest.items()
+        if n > 1 and n > standing[told][told] and here != told
+    }
+
+
+def _may_be_recut(rooms: RoomMap, filing: _Filing) -> bool:
+    """Return True where the border between both rooms is near or a wide opening."""
+    doors = rooms.doors_between(filing.told.id, filing.here.id)
+    if any(door.width_m > DOOR_M for door in doors):
+        return True
+    return _distance_m(rooms, filing.told, filing.waypoint.pose.point) <= BORDER_M
+
+
+def _distance_m(rooms: RoomMap, region: Region, point: Point) -> float:
+    rows, cols = np.nonzero(rooms.labels == region.index)
+    centres = rooms.grid.points_at(rows, cols)
+    return float(np.hypot(centres[:, 0] - point.x, centres[:, 1] - point.y).min())
+
+
+DOOR_MARGIN_M = 0.6
+"""A line of sight that is off by 10 degrees passes a door by so much at 3 m."""
+_STEP_M = 0.2
+
+
+def check_rooms(
+    rooms: RoomMap,
+    found: Things,
+    waypoint: Waypoint,
+    misfiled: Mapping[str, tuple[Region, Region]],
+) -> Iterator[MemoryFinding]:
+    """Return what is odd about the room that a record names; one without a room has nothing.
+
+    Args:
+        rooms: As they are cut now.
+        found: The things of the memory.
+        waypoint: The record.
+        misfiled: Of every record that is, by its name, the room that it names and its own.
+    """
+    if not waypoint.room_id:
+        return
+    if waypoint.name in misfiled:
+        told, here = misfiled[waypoint.name]
+        yield MemoryFinding(
+            kind=FindingKind.WRONG_ROOM,
+            waypoints=(waypoint.name,),
+            ids=(told.id, here.id),
+        )
+        return
+    start = rooms.find_region_at(waypoint.pose.point) or rooms.find_region(waypoint.room_id)
+    for thing in found.seen_from(waypoint) if start is not None else ():
+        way = _regions_on(rooms, waypoint, thing, back_m=thing.uncertainty_m or 0.0)
+        if start is not None and not _sees_through(rooms, waypoint, thing, (start, *way)):
+            own = _regions_on(rooms, waypoint, thing, back_m=0.0)[-1]
+            yield MemoryFinding(
+                kind=FindingKind.WRONG_ROOM,
+                waypoints=(waypoint.name,),
+                label=thing.label,
+                things=(thing,),
+                ids=(own.id, start.id),
+            )
+
+
+def _regions_on(
+    rooms: RoomMap, waypoint: Waypoint, thing: Thing, *, back_m: float
+) -> tuple[Region, ...]:
+    """Return the rooms on the line from a place to a thing, up to so far before the thing."""
+    assert thing.position is not None, "only what has a place has a room"  # noqa: S101 - our belief
+    start, end = waypoint.pose.point, thing.position
+    far_m = start.distance_to(end)
+    near_ratio = max(1.0 - back_m / max(far_m, 1e-9), 0.0)
+    n_steps = max(math.ceil(near_ratio * far_m / _STEP_M), 1)
+    shares = (near_ratio * step / n_steps for step in range(n_steps + 1))
+    points = (
+        Point(start.x + share * (end.x - start.x), start.y + share * (end.y - start.y))
+        for share in shares
+    )
+    passed = filter(None, map(rooms.find_region_at, points))
+    return tuple(region for region, _ in groupby(passed))
+
+
+def _sees_through(rooms: RoomMap, waypoint: Waypoint, thing: Thing, way: Sequence[Region]) -> bool:
+    """Return True when a door on the line leads from each room on it to the next."""
+    assert thing.position is not None, "only what has a place has a room"  # noqa: S101 - our belief
+    start, end = waypoint.pose.point, thing.position
+    return all(
+        one.id == other.id
+        or any(
+            _off_line(start, end, door.place) <= door.width_m / 2 + DOOR_MARGIN_M
+            for door in rooms.doors_between(one.id, other.id)
+        )
+        for one, other in pairwise(way)
+    )
+
+
+def _off_line(start: Point, end: Point, point: Point) -> float:
+    """Return the metres from a point to the line between two others."""
+    length = max(start.distance_to(end), 1e-9)
+    turn = start.bearing_to(point) - start.bearing_to(end)
+    along = min(max(math.cos(turn) * start.distance_to(point), 0.0), length)
+    share = along / length
+    foot = Point(start.x + share * (end.x - start.x), start.y + share * (end.y - start.y))
+    return foot.distance_to(point)
+
+
+def check_memory(
+    places: SemanticMap,
+    found: Things,
+    *,
+    distances: DistanceField | None = None,
+    rooms: RoomMap | None = None,
+    map_id: str | None = None,
+) -> tuple[MemoryFinding, ...]:
+    """Return all that is odd about a memory, in the order of its places; the same every time.
+
+    Args:
+        places: The records.
+        found: The things made of them, with the map.
+        distances: From the robot, for whether it can get to a place; None leaves that out.
+        rooms: Of that map; None leaves them out.
+        map_id: The map that the robot is on; None takes the records for its.
+    """
+    findings: list[MemoryFinding] = []
+    misfiled = find_misfiled(rooms, places.waypoints) if rooms else {}
+    for waypoint in places.waypoints:
+        findings += check_pose(found.sight.grid, waypoint, distances, map_id or places.map_id)
+        if findings and findings[-1].kind is FindingKind.OFF_MAP:
+            continue
+        findings += check_rays(found, waypoint)
+        findings += check_rooms(rooms, found, waypoint, misfiled) if rooms else []
+    return (*findings, *check_duplicates(places.waypoints), *check_company(places, found))

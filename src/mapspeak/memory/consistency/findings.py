@@ -1,0 +1,140 @@
+"""What may be odd about a record. A finding lowers trust; it never takes anything away."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+
+from mapspeak.geometry import Point
+from mapspeak.memory.things import Thing, View
+
+
+class FindingKind(StrEnum):
+    """What is odd."""
+
+    OTHER_MAP = "other_map"
+    OFF_MAP = "off_map"
+    IN_OBSTACLE = "in_obstacle"
+    IN_UNKNOWN = "in_unknown"
+    UNREACHABLE = "unreachable"
+    BEHIND_WALL = "behind_wall"
+    THROUGH_UNKNOWN = "through_unknown"
+    WRONG_ROOM = "wrong_room"
+    DUPLICATE = "duplicate"
+    NOT_SEEN = "not_seen"
+    POINTS_PAST = "points_past"
+    TWO_LABELS = "two_labels"
+
+
+WEIGHTS = {
+    FindingKind.OTHER_MAP: 0.3,
+    FindingKind.OFF_MAP: 0.2,
+    FindingKind.IN_OBSTACLE: 0.5,
+    FindingKind.IN_UNKNOWN: 0.7,
+    FindingKind.UNREACHABLE: 0.7,
+    FindingKind.BEHIND_WALL: 0.4,
+    FindingKind.THROUGH_UNKNOWN: 0.7,
+    FindingKind.WRONG_ROOM: 0.6,
+    FindingKind.DUPLICATE: 1.0,
+    FindingKind.NOT_SEEN: 0.7,
+    FindingKind.POINTS_PAST: 0.5,
+    FindingKind.TWO_LABELS: 0.02,
+}
+"""What the odds of a thing are multiplied by. Nobody has to name all that is to be seen, so that
+"not seen" says little; two views of one place are no fault, so that a duplicate says nothing.
+Of two labels in one place that nobody names together, both are right one time in fifty; how much
+either loses depends on how well the other is seen."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MemoryFinding:
+    """Something odd about what is remembered.
+
+    Attributes:
+        kind: What is odd.
+        waypoints: The names of the places concerned.
+        label: Of the one landmark concerned; None where it is the whole place.
+        things: The things concerned, whatever their views.
+        view: Of the one thing concerned, the view that points past it.
+        ids: Of the maps: the record's and the robot's. Of the rooms: the one that a record names
+            or a thing lies in, and the one that it is seen from.
+        at: Where the place stands.
+        radius_m: Of the robot that cannot get there.
+        far_m: From one place to the other, or to the thing.
+        told_m: How far away the landmark was told to be.
+        open_m: How far the line to the landmark leads over free floor.
+    """
+
+    kind: FindingKind
+    waypoints: tuple[str, ...]
+    label: str | None = None
+    things: tuple[Thing, ...] = ()
+    view: View | None = None
+    ids: tuple[str, str] | None = None
+    at: Point | None = None
+    radius_m: float | None = None
+    far_m: float | None = None
+    told_m: float | None = None
+    open_m: float | None = None
+
+    @property
+    def weight(self) -> float:
+        """What the odds of a thing that it concerns are multiplied by, at the most."""
+        return WEIGHTS[self.kind]
+
+    def weight_for(self, thing: Thing) -> float:
+        """Return what the odds of one of the things that it concerns are multiplied by.
+
+        Two labels in one place hardly are both right, so that each is as much less likely as the
+        other is likely. Few views against many change little.
+        """
+        weight = self.weight
+        if self.kind is not FindingKind.TWO_LABELS:
+            return weight
+        product = 1.0
+        for rival in self.things:
+            if rival is not thing and rival != thing:
+                odds = rival.confidence_ratio / (1 - rival.confidence_ratio)
+                product *= (1 + weight * odds) / (1 + odds)
+        return product
+
+
+@dataclass(frozen=True, slots=True)
+class Trust:
+    """How far something may be trusted.
+
+    Attributes:
+        ratio: From 0 to 1.
+        findings: What speaks against it.
+        thing: The thing, whose views speak for it; None of a place.
+    """
+
+    ratio: float
+    findings: tuple[MemoryFinding, ...]
+    thing: Thing | None = None
+
+
+def judge_trust(thing: Thing, findings: Iterable[MemoryFinding]) -> Trust:
+    """Return the trust that a thing deserves by its views and all findings of its memory.
+
+    A finding about one of several places that have seen it counts by its share of them.
+    """
+    odds = thing.confidence_ratio / (1 - thing.confidence_ratio)
+    against = []
+    for finding in findings:
+        share = _share(thing, finding)
+        if share and finding.weight < 1.0:
+            odds *= finding.weight_for(thing) ** share
+            against.append(finding)
+    return Trust(odds / (1 + odds), tuple(against), thing)
+
+
+def _share(thing: Thing, finding: MemoryFinding) -> float:
+    """Return what share of a thing a finding concerns."""
+    if finding.things:
+        return float(thing in finding.things)
+    views = [
+        finding.label is None or view.landmark.label == finding.label
+        for view in thing.supporting
+        if view.waypoint in finding.waypoints
+    ]
+    return sum(views) / len(thing.supporting)

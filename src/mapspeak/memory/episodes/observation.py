@@ -1,0 +1,260 @@
+"""One thing that was observed, and what can be asked of observations."""
+
+import hashlib
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from enum import StrEnum
+
+from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import Point, Pose
+from mapspeak.memory.waypoint import SemanticMap, Waypoint, clean_line, clean_text
+
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_ID_BYTES = 6
+
+
+class ObservationKind(StrEnum):
+    """What an observation came from."""
+
+    PICTURE = "picture"
+    RECORD = "record"
+    NOTE = "note"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Observation:
+    """What was observed at one moment from one place.
+
+    Attributes:
+        recorded_at: When, by the calendar, with its time zone.
+        pose: Where the robot stood, in the map frame.
+        kind: A picture, a record of a place, or words alone.
+        text: What was seen, in words; may be empty for a picture.
+        labels: The things seen, each in a few words.
+        picture: Name of the picture in the memory's folder; None without one, or after it was
+            thinned.
+        stamp_s: Robot time of the observation.
+        map_id: Which map the pose belongs to.
+        room_id: The room or corridor it was observed from, by the id that it had then.
+        id: The same for the same content, so that writing twice is writing once; made from the
+            content unless given.
+
+    Raises:
+        SemanticMapError: The time has no zone, or a number is not finite.
+    """
+
+    recorded_at: datetime
+    pose: Pose
+    kind: ObservationKind
+    text: str = ""
+    labels: tuple[str, ...] = ()
+    picture: str | None = None
+    stamp_s: float | None = None
+    map_id: str | None = None
+    room_id: str | None = None
+    id: str = ""
+
+    def __post_init__(self) -> None:
+        is_timed = self.recorded_at.tzinfo is not None
+        _require(is_timed, "The time of an observation", "a time with its zone")
+        _require(self.pose.is_finite(), "The pose of an observation", "three finite numbers")
+        is_stamped = self.stamp_s is None or math.isfinite(self.stamp_s)
+        _require(is_stamped, "The stamp of an observation", "a finite number of seconds")
+        labels = dict.fromkeys(filter(None, map(clean_line, self.labels)))
+        object.__setattr__(self, "text", clean_text(self.text))
+        object.__setattr__(self, "labels", tuple(labels))
+        for name in ("picture", "map_id", "room_id"):
+            object.__setattr__(self, name, clean_line(getattr(self, name) or "") or None)
+        object.__setattr__(self, "id", self.id or self._derived_id())
+
+    @property
+    def searched_text(self) -> str:
+        """The words and the labels, as they are searched."""
+        return "\n".join(filter(None, (self.text, "; ".join(self.labels))))
+
+    def _derived_id(self) -> str:
+        said = (
+            microseconds_of(self.recorded_at),
+            (self.pose.x, self.pose.y, self.pose.yaw_rad),
+            str(self.kind),
+            self.text,
+            self.labels,
+            self.picture,
+            self.stamp_s,
+            self.map_id,
+            self.room_id,
+        )
+        return "o" + hashlib.blake2b(repr(said).encode(), digest_size=_ID_BYTES).hexdigest()
+
+
+def microseconds_of(time: datetime) -> int:
+    """Return the microseconds since 1970, exactly."""
+    return (time - _EPOCH) // timedelta(microseconds=1)
+
+
+def _require(is_right: object, what: str, expected: str) -> None:
+    if not is_right:
+        message = f"{what} is not {expected}."
+        raise SemanticMapError(message, hint=f"Give {expected} and write it again.")
+
+
+MOST_ROWS = 1000
+MOST_HOPS = 5
+
+Rank = Callable[[str, Sequence[str]], Sequence[float]]
+"""Says of each text how well it fits a query: up to 1; 0 or less where it does not fit."""
+
+
+class EpisodeOrder(StrEnum):
+    """Which observations come first."""
+
+    NEWEST = "newest"
+    OLDEST = "oldest"
+    BEST = "best"
+    NEAREST = "nearest"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EpisodeQuery:
+    """Which observations are wanted: those that pass every filter that is given.
+
+    Attributes:
+        words: What they are about, in words.
+        near: Near to a place in the map frame; or to where the first observation of another query
+            was made, and then without the observations that the other query's words or label fit.
+        radius_m: How near.
+        room_id: Made in this room.
+        since: Not before.
+        until: Before.
+        label: A thing seen, whatever its case.
+        kind: What they came from.
+        map_id: On this map.
+        order: Which come first; None for the best where words are given, else the nearest where a
+            place is given without a radius, else the newest.
+        limit: How many, at most.
+        offset: How many to leave out before.
+        as_of: Only the first so many that were ever written, so that pages do not shift.
+
+    Raises:
+        SemanticMapError: A number is out of bounds, a time has no zone, an order has nothing to
+            order by, or queries are nested more than five deep.
+    """
+
+    words: str | None = None
+    near: "Point | EpisodeQuery | None" = None
+    radius_m: float | None = None
+    room_id: str | None = None
+    since: datetime | None = None
+    until: datetime | None = None
+    label: str | None = None
+    kind: ObservationKind | None = None
+    map_id: str | None = None
+    order: EpisodeOrder | None = None
+    limit: int = 20
+    offset: int = 0
+    as_of: int | None = None
+
+    def __post_init__(self) -> None:
+        is_number = 1 <= self.limit <= MOST_ROWS and self.offset >= 0
+        _require_argument(is_number, "limit or offset", f"1 to {MOST_ROWS}, and 0 or more")
+        is_radius = self.radius_m is None or (math.isfinite(self.radius_m) and self.radius_m > 0)
+        _require_argument(is_radius, "radius_m", "more than 0 m")
+        _require_argument(
+            self.radius_m is None or self.near is not None, "near", "given with radius_m"
+        )
+        for name, time in (("since", self.since), ("until", self.until)):
+            _require_argument(time is None or time.tzinfo is not None, name, "a time with its zone")
+        needed = {EpisodeOrder.BEST: self.words, EpisodeOrder.NEAREST: self.near}
+        is_ordered = self.order is None or needed.get(self.order, True)
+        _require_argument(
+            is_ordered, "order", "one that words (best) or near (nearest) are given for"
+        )
+        _require_argument(_n_hops(self) <= MOST_HOPS, "near", f"nested at most {MOST_HOPS} deep")
+
+    @property
+    def effective_order(self) -> EpisodeOrder:
+        """The order that is asked for, or follows from what else is."""
+        if self.order is not None:
+            return self.order
+        if self.words:
+            return EpisodeOrder.BEST
+        is_nearest = self.near is not None and self.radius_m is None
+        return EpisodeOrder.NEAREST if is_nearest else EpisodeOrder.NEWEST
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EpisodeMatch:
+    """An observation that fits, and why.
+
+    Attributes:
+        observation: What was observed.
+        score_ratio: How well the words fit, up to 1; None where none were asked for.
+        distance_m: From where it was made to the place asked for; None where none was.
+        reasons: Why it is here, one for each filter.
+        evidence: Those of them that it does not show itself: which of its words fit.
+    """
+
+    observation: Observation
+    score_ratio: float | None
+    distance_m: float | None
+    reasons: tuple[str, ...]
+    evidence: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EpisodePage:
+    """Observations that fit, in the order asked for.
+
+    Attributes:
+        matches: This page of them.
+        n_matches: How many fit in all.
+        anchor: What the nested query found, which `near` stands for; None without one.
+        next_page: Asks for those that follow; None on the last page.
+    """
+
+    matches: tuple[EpisodeMatch, ...]
+    n_matches: int
+    anchor: EpisodeMatch | None = None
+    next_page: EpisodeQuery | None = None
+
+
+def _n_hops(query: EpisodeQuery) -> int:
+    return 1 + _n_hops(query.near) if isinstance(query.near, EpisodeQuery) else 0
+
+
+def _require_argument(is_right: object, what: str, expected: str) -> None:
+    if not is_right:
+        raise SemanticMapError(f"{what} is not {expected}.", hint=f"Give {what} as {expected}.")
+
+
+def observations_from(waypoint: Waypoint) -> tuple[Observation, ...]:
+    """Return the writing of a record as an observation; nothing where its time is not known."""
+    if waypoint.recorded_at is None:
+        return ()
+    said = (waypoint.name, waypoint.description, *waypoint.geometric_features)
+    return (
+        Observation(
+            recorded_at=waypoint.recorded_at,
+            stamp_s=waypoint.stamp_s,
+            pose=waypoint.pose,
+            map_id=waypoint.map_id,
+            room_id=waypoint.room_id,
+            kind=ObservationKind.RECORD,
+            text="\n".join(filter(None, said)),
+            labels=tuple(landmark.label for landmark in waypoint.landmarks),
+            picture=waypoint.picture,
+        ),
+    )
+
+
+def named_pictures(semantic_map: SemanticMap) -> frozenset[str]:
+    """Return the pictures that waypoints and their landmarks name."""
+    return frozenset(_names(semantic_map))
+
+
+def _names(semantic_map: SemanticMap) -> Iterator[str]:
+    for waypoint in semantic_map.waypoints:
+        pictures = (waypoint.picture, *(landmark.picture for landmark in waypoint.landmarks))
+        yield from filter(None, pictures)

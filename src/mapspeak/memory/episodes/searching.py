@@ -1,0 +1,370 @@
+"""Find observations in the database: every filter at once, in SQL, with the reason of each."""
+
+import json
+import sqlite3
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from datetime import datetime, timedelta, timezone
+
+import numpy as np
+
+from mapspeak.geometry import Point, Pose
+from mapspeak.memory.episodes.observation import (
+    EpisodeMatch,
+    EpisodeOrder,
+    EpisodePage,
+    EpisodeQuery,
+    Observation,
+    ObservationKind,
+    Rank,
+    microseconds_of,
+)
+from mapspeak.memory.episodes.textindex import Ids, Scores, read_ids, score_words, shared_words
+from mapspeak.memory.quoting import quote, quote_name
+from mapspeak.memory.waypoint import name_key
+
+MOST_TEXTS = 2000
+"""How many different texts, the best ones, one query looks at."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Texts:
+    """All texts, as they were read last: the text with the id `i` is `texts[i - 1]`.
+
+    Attributes:
+        generation: Of the index; another one has other ids.
+        texts: In the order of their ids.
+    """
+
+    generation: str = ""
+    texts: tuple[str, ...] = ()
+
+
+class TextScorer:
+    """Scores texts, and keeps those that it has read: they never change."""
+
+    def __init__(self) -> None:
+        self._known = _Texts()
+
+    def score(
+        self,
+        connection: sqlite3.Connection,
+        words: str,
+        rank: Rank | None,
+        *,
+        among: str,
+        values: list[object],
+    ) -> dict[int, float]:
+        """Return the best texts by their ids, each with its score above 0.
+
+        Args:
+            connection: Of the database.
+            words: What is asked for.
+            rank: Who says how well a text fits; None compares words.
+            among: A selection of text ids; empty for all texts.
+            values: For the selection.
+        """
+        text_ids = read_ids(connection, among, values) if among else None
+        if rank is None:
+            scores = score_words(connection, words)
+            if text_ids is not None:
+                passing = np.zeros(len(scores))
+                passing[text_ids] = 1.0
+                scores *= passing
+        else:
+            scores = self._ranked(connection, words, rank, text_ids)
+        return _best(scores)
+
+    def _ranked(
+        self,
+        connection: sqlite3.Connection,
+        words: str,
+        rank: Rank,
+        text_ids: Ids | None,
+    ) -> Scores:
+        texts = self._read(connection)
+        scores = np.zeros(len(texts) + 1)
+        if text_ids is None:
+            scores[1:] = rank(words, texts)
+            return scores
+        ids = np.unique(text_ids)
+        scores[ids] = rank(words, [texts[i - 1] for i in ids.tolist()])
+        return scores
+
+    def _read(self, connection: sqlite3.Connection) -> tuple[str, ...]:
+        """Return all texts, reading only those that are new."""
+        selection = "SELECT value FROM facts WHERE name = 'generation'"
+        row = connection.execute(selection).fetchone()
+        generation = "" if row is None else str(row[0])
+        known = self._known
+        if known.generation != generation:
+            known = _Texts(generation=generation)
+        rows = connection.execute(
+            "SELECT text FROM texts WHERE text_id > ? ORDER BY text_id", [len(known.texts)]
+        ).fetchall()
+        if rows or known is not self._known:
+            texts = (*known.texts, *(row[0] for row in rows))
+            self._known = known = _Texts(generation=generation, texts=texts)
+        return known.texts
+
+
+def _best(scores: Scores) -> dict[int, float]:
+    """Return the highest scores above 0 by their place; of equal ones the later, newer text."""
+    found = np.flatnonzero(scores > 0)
+    if len(found) > MOST_TEXTS:
+        # What is not among them for sure need not be sorted.
+        least = np.partition(scores[found], -MOST_TEXTS)[-MOST_TEXTS]
+        found = found[scores[found] >= least]
+    order = np.lexsort((-found, -scores[found]))[:MOST_TEXTS]
+    chosen = found[order]
+    return dict(zip(chosen.tolist(), scores[chosen].tolist(), strict=True))
+
+
+COLUMNS = (
+    "o.id, o.recorded_us, o.offset_s, o.stamp_s, o.map_id, o.x, o.y, o.yaw_rad, o.room_id, "
+    "o.kind, o.text, o.labels, o.picture"
+)
+_ORDERS = {
+    EpisodeOrder.NEWEST: "o.recorded_us DESC, o.n DESC",
+    EpisodeOrder.OLDEST: "o.recorded_us, o.n",
+    EpisodeOrder.BEST: "score DESC, o.recorded_us DESC, o.n DESC",
+    EpisodeOrder.NEAREST: "squared_m2, o.recorded_us DESC, o.n DESC",
+}
+
+
+@dataclass(slots=True)
+class _Where:
+    """Conditions that all hold, with their values."""
+
+    conditions: list[str] = field(default_factory=lambda: ["1"])
+    values: list[object] = field(default_factory=list)
+
+    def add(self, condition: str, *values: object) -> None:
+        self.conditions.append(condition)
+        self.values += values
+
+    @property
+    def text(self) -> str:
+        return " AND ".join(self.conditions)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Asked:
+    """A query whose place is known.
+
+    Attributes:
+        query: What was asked.
+        near: The place; None without one.
+        anchor: What the nested query found; None without one.
+        where: All filters but the words.
+        scores: Of texts, by id; None where no words were asked for.
+    """
+
+    query: EpisodeQuery
+    near: Point | None
+    anchor: EpisodeMatch | None
+    where: _Where
+    scores: Mapping[int, float] | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Search:
+    """Where and how is searched.
+
+    Attributes:
+        connection: Of the database; sees one state of it.
+        scorer: Knows the texts.
+        rank: Who says how well texts fit; None compares words.
+    """
+
+    connection: sqlite3.Connection
+    scorer: TextScorer
+    rank: Rank | None
+
+
+def find_observations(search: Search, query: EpisodeQuery) -> EpisodePage:
+    """Return one page of the observations that pass every filter."""
+    connection = search.connection
+    if query.as_of is None:
+        newest = connection.execute("SELECT MAX(n) FROM observations").fetchone()[0]
+        query = replace(query, as_of=newest or 0)
+    near, anchor = query.near, None
+    if isinstance(near, EpisodeQuery):
+        anchor = _first(search, near)
+        if anchor is None:
+            return EpisodePage(matches=(), n_matches=0)
+        near = anchor.observation.pose.point
+    where = _filters(query, near)
+    if anchor is not None:
+        _leave_out(search, where, query, anchor)
+    scores = None if query.words is None else _scores(search, query.words, where)
+    asked = _Asked(query=query, near=near, anchor=anchor, where=where, scores=scores)
+    return _page(search, asked)
+
+
+def _first(search: Search, query: EpisodeQuery) -> EpisodeMatch | None:
+    page = find_observations(search, replace(query, limit=1))
+    return next(iter(page.matches), None)
+
+
+# --- filters ---------------------------------------------------------------------------------
+
+
+def _filters(query: EpisodeQuery, near: Point | None) -> _Where:
+    where = _Where()
+    where.add("o.n <= ?", query.as_of)
+    if near is not None and query.radius_m is not None:
+        r = query.radius_m
+        where.add("o.x BETWEEN ? AND ?", near.x - r, near.x + r)
+        where.add("o.y BETWEEN ? AND ?", near.y - r, near.y + r)
+        where.add(f"{_squared_m2(near)} <= ?", r * r)
+    if query.since is not None:
+        where.add("o.recorded_us >= ?", microseconds_of(query.since))
+    if query.until is not None:
+        where.add("o.recorded_us < ?", microseconds_of(query.until))
+    if query.label is not None:
+        where.add("o.n IN (SELECT n FROM labels WHERE label = ?)", name_key(query.label))
+    for column, value in (("room_id", query.room_id), ("map_id", query.map_id)):
+        if value is not None:
+            where.add(f"o.{column} = ?", value)
+    if query.kind is not None:
+        where.add("o.kind = ?", str(query.kind))
+    return where
+
+
+def _leave_out(search: Search, where: _Where, query: EpisodeQuery, anchor: EpisodeMatch) -> None:
+    """Leave out what a nested query was about, and other maps, whose metres are others."""
+    nested = query.near
+    assert isinstance(nested, EpisodeQuery)  # noqa: S101 - it gave the anchor
+    where.add("o.id != ?", anchor.observation.id)
+    if query.map_id is None:
+        where.add("o.map_id IS ?", anchor.observation.map_id)
+    if nested.label is not None:
+        where.add("o.n NOT IN (SELECT n FROM labels WHERE label = ?)", name_key(nested.label))
+    if nested.words is not None:
+        # In words, whoever ranks: it is the thing itself that is left out, not what is like it.
+        same = search.scorer.score(search.connection, nested.words, None, among="", values=[])
+        where.add("o.text_id NOT IN (SELECT value FROM json_each(?))", json.dumps(list(same)))
+
+
+def _squared_m2(near: Point) -> str:
+    x, y = float(near.x), float(near.y)
+    return f"((o.x - {x!r}) * (o.x - {x!r}) + (o.y - {y!r}) * (o.y - {y!r}))"
+
+
+def _scores(search: "Search", words: str, where: _Where) -> dict[int, float]:
+    """Score the texts of the observations that pass the other filters."""
+    is_filtered = len(where.conditions) > 2  # beside the state asked for
+    passing = f"SELECT o.text_id FROM observations AS o WHERE {where.text}"  # noqa: S608 - our own conditions
+    return search.scorer.score(
+        search.connection,
+        words,
+        search.rank,
+        among=passing if is_filtered else "",
+        values=where.values,
+    )
+
+
+# --- pages -----------------------------------------------------------------------------------
+
+
+def _page(search: Search, asked: _Asked) -> EpisodePage:
+    connection = search.connection
+    query, where = asked.query, asked.where
+    source = "observations AS o"
+    values: list[object] = []
+    if asked.scores is not None:
+        source = "scored JOIN observations AS o USING (text_id)"
+        values = [json.dumps(list(asked.scores.items()))]
+    score = "NULL" if asked.scores is None else "scored.score"
+    squared = "NULL" if asked.near is None else _squared_m2(asked.near)
+    scored = (
+        "WITH scored AS MATERIALIZED (SELECT json_extract(value, '$[0]') AS text_id, "
+        "json_extract(value, '$[1]') AS score FROM json_each(?))"
+        if values
+        else ""
+    )
+    values += where.values
+    counted = f"{scored} SELECT COUNT(*) FROM {source} WHERE {where.text}"  # noqa: S608 - our own conditions
+    n_matches = connection.execute(counted, values).fetchone()[0]
+    rows = connection.execute(
+        f"{scored} SELECT {COLUMNS}, {score} AS score, {squared} AS squared_m2 "  # noqa: S608 - our own conditions
+        f"FROM {source} WHERE {where.text} ORDER BY {_ORDERS[query.effective_order]} "
+        "LIMIT ? OFFSET ?",
+        [*values, query.limit, query.offset],
+    )
+    behind = query.offset + query.limit
+    return EpisodePage(
+        matches=tuple(_match(row, asked, search.rank) for row in rows),
+        n_matches=n_matches,
+        anchor=asked.anchor,
+        next_page=replace(query, offset=behind) if behind < n_matches else None,
+    )
+
+
+def _match(row: sqlite3.Row, asked: _Asked, rank: Rank | None) -> EpisodeMatch:
+    observation = observation_from(row)
+    match = EpisodeMatch(
+        observation=observation,
+        score_ratio=row["score"],
+        distance_m=observation.pose.point.distance_to(asked.near) if asked.near else None,
+        reasons=(),
+    )
+    fitting, labelled = _say_words(match, asked, rank), _say_label(match, asked)
+    evidence = tuple(filter(None, (fitting, labelled)))
+    reasons = tuple(filter(None, (fitting, *_reasons(match, asked, labelled))))
+    return replace(match, reasons=reasons, evidence=evidence)
+
+
+def _say_words(match: EpisodeMatch, asked: _Asked, rank: Rank | None) -> str:
+    words = asked.query.words
+    if words is None:
+        return ""
+    if rank is None:
+        said = ", ".join(map(quote, shared_words(words, match.observation.searched_text)))
+        return f"says {said}"
+    return f"means nearly {quote_name(words)} ({match.score_ratio or 0:.2f})"
+
+
+def _say_label(match: EpisodeMatch, asked: _Asked) -> str:
+    if asked.query.label is None:
+        return ""
+    key = name_key(asked.query.label)
+    label = next(each for each in match.observation.labels if name_key(each) == key)
+    return f"label {quote_name(label)}"
+
+
+def _reasons(match: EpisodeMatch, asked: _Asked, labelled: str) -> Iterator[str]:
+    query, observation = asked.query, match.observation
+    if asked.near is not None:
+        place = f"({asked.near.x:.2f}, {asked.near.y:.2f})"
+        if asked.anchor is not None:
+            place = f"where {asked.anchor.observation.id} was made, {place}"
+        yield f"{match.distance_m:.2f} m from {place}"
+    if query.room_id is not None:
+        yield f"in {observation.room_id}"
+    yield labelled
+    if query.since is not None or query.until is not None:
+        yield f"at {observation.recorded_at.isoformat(timespec='seconds')}"
+    if query.kind is not None:
+        yield f"a {observation.kind}"
+    if query.map_id is not None:
+        yield f"on the map {observation.map_id}"
+
+
+def observation_from(row: sqlite3.Row) -> Observation:
+    """Return the observation that a row of `COLUMNS` holds."""
+    zone = timezone(timedelta(seconds=row["offset_s"]))
+    time = datetime.fromtimestamp(0, zone) + timedelta(microseconds=row["recorded_us"])
+    return Observation(
+        id=row["id"],
+        recorded_at=time,
+        pose=Pose(row["x"], row["y"], row["yaw_rad"]),
+        kind=ObservationKind(row["kind"]),
+        text=row["text"],
+        labels=tuple(json.loads(row["labels"])),
+        picture=row["picture"],
+        stamp_s=row["stamp_s"],
+        map_id=row["map_id"],
+        room_id=row["room_id"],
+    )

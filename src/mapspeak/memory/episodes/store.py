@@ -1,0 +1,385 @@
+"""The episodes of one memory: every observation, kept beside the semantic map file.
+
+Reading and writing are synchronous, and safe between processes and threads.
+"""
+
+import contextlib
+import json
+import shutil
+import sqlite3
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from types import MappingProxyType
+
+from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import Pose
+from mapspeak.installation import shell_command
+from mapspeak.memory.episodes.database import (
+    INDEX_VERSION,
+    EpisodeDatabase,
+    finish_move,
+    has_plans,
+    plan_move,
+)
+from mapspeak.memory.episodes.observation import (
+    EpisodePage,
+    EpisodeQuery,
+    Observation,
+    ObservationKind,
+    Rank,
+    microseconds_of,
+)
+from mapspeak.memory.episodes.pictures import (
+    PictureFolder,
+    StoredPicture,
+    ThinningRule,
+    choose_dropped,
+    picture_name,
+)
+from mapspeak.memory.episodes.searching import (
+    COLUMNS,
+    Search,
+    TextScorer,
+    find_observations,
+    observation_from,
+)
+from mapspeak.memory.episodes.textindex import add_text, index_texts, text_hash
+from mapspeak.memory.waypoint import name_key
+
+LOCK_TIMEOUT_S = 5.0
+
+_AFTER_FULL_RATIO = 0.9
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_FIRST_FACTS = MappingProxyType({"thinned_hour": "", "left_bytes": "0", "generation": "0"})
+
+
+def memory_folder(semantic_map: Path) -> Path:
+    """Return the folder beside a semantic map file in which its episodes and pictures are."""
+    return semantic_map.with_name(f"{semantic_map.stem}.memory")
+
+
+class EpisodeStore:
+    """All observations of one memory, in `episodes.sqlite` and `pictures/`.
+
+    Args:
+        folder: Where they are; it need not exist yet (see `memory_folder`).
+        rule: Which old pictures are kept.
+        named_pictures: Gives the names of pictures that records of the semantic map mention; they
+            are never dropped, and nothing is dropped while it raises.
+        lock_timeout_s: How long a write waits for another program's.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        rule: ThinningRule | None = None,
+        named_pictures: Callable[[], Iterable[str]] = tuple,
+        lock_timeout_s: float = LOCK_TIMEOUT_S,
+    ) -> None:
+        self.folder = folder
+        self._rule = rule or ThinningRule()
+        self._named_pictures = named_pictures
+        self.database = EpisodeDatabase(folder / "episodes.sqlite", lock_timeout_s=lock_timeout_s)
+        self._pictures = PictureFolder(folder / "pictures")
+        self._scorer = TextScorer()
+
+    # --- writing -----------------------------------------------------------------------------
+
+    def write(self, observation: Observation, *, picture: bytes | None = None) -> Observation:
+        """Keep an observation, on the disk when it returns; one that is kept already stays one.
+
+        Args:
+            observation: What was observed.
+            picture: JPEG or PNG; kept under a name that the observation gets.
+
+        Returns:
+            The observation as it is kept.
+
+        Raises:
+            SemanticMapError: It cannot be written, or the picture is of another kind.
+        """
+        if picture is not None:
+            name = picture_name(picture, observation.recorded_at)
+            observation = replace(observation, picture=name, id="")
+        with self.database.writing() as connection:
+            if picture is not None and observation.picture is not None:
+                # Under the lock: whoever thins takes a file without an observation for a leftover.
+                self._pictures.put(observation.picture, picture)
+            _insert(connection, observation, None if picture is None else len(picture))
+            is_due = picture is not None and self._is_thinning_due(connection, observation)
+        if is_due:
+            with contextlib.suppress(SemanticMapError):
+                # The observation is kept; what could not be dropped now can be in an hour.
+                self.thin(now=observation.recorded_at)
+        return observation
+
+    def write_all(self, observations: Iterable[Observation]) -> int:
+        """Keep many observations at once, all or none, and return how many were new."""
+        with self.database.writing() as connection:
+            return sum(_insert(connection, each, None) for each in observations)
+
+    def take_over(self, other: "EpisodeStore") -> tuple[int, int]:
+        """Keep all observations of another store as they are, all or none, with their pictures.
+
+        Returns:
+            How many were new, and how many pictures came with them.
+        """
+        if not other.database.exists():
+            return 0, 0
+        selection = f"SELECT {COLUMNS} FROM observations AS o ORDER BY o.n"  # noqa: S608 - our own columns
+        n_new = 0
+        names = set[str]()
+        with other.database.reading() as source, self.database.writing() as connection:
+            for seen in map(observation_from, source.execute(selection)):
+                path = other.picture_path(seen) if seen.kind is ObservationKind.PICTURE else None
+                content = None if path is None else path.read_bytes()
+                if not _insert(connection, seen, None if content is None else len(content)):
+                    continue
+                n_new += 1
+                if path is not None and content is not None:
+                    self._pictures.put(path.name, content)
+                    # Looks that show the same share a file.
+                    names.add(path.name)
+        return n_new, len(names)
+
+    # --- asking ------------------------------------------------------------------------------
+
+    def find(self, query: EpisodeQuery, *, rank: Rank | None = None) -> EpisodePage:
+        """Return one page of the observations that pass every filter of a query.
+
+        Args:
+            query: What is asked.
+            rank: Says how well texts fit words; None compares words.
+
+        Raises:
+            SemanticMapError: The database cannot be read.
+        """
+        if not self.database.exists():
+            return EpisodePage(matches=(), n_matches=0)
+        with self.database.reading() as connection:
+            is_indexed = _fact(connection, "index_version") == INDEX_VERSION
+        if not is_indexed:
+            self.rebuild_index()
+        with self.database.reading() as connection:
+            search = Search(connection=connection, scorer=self._scorer, rank=rank)
+            return find_observations(search, query)
+
+    def get(self, observation_id: str) -> Observation | None:
+        """Return the observation with an id, or None."""
+        if not self.database.exists():
+            return None
+        selection = f"SELECT {COLUMNS} FROM observations AS o WHERE o.id = ?"  # noqa: S608 - our own columns
+        with self.database.reading() as connection:
+            row = connection.execute(selection, [observation_id]).fetchone()
+        return None if row is None else observation_from(row)
+
+    def picture_path(self, observation: Observation) -> Path | None:
+        """Return the file of an observation's picture; None without one."""
+        return self._pictures.find(observation.picture)
+
+    # --- moving with the map ----------------------------------------------------------------
+
+    def plan_move(self, motion: Pose, *, to: str) -> None:
+        """Note how poses move if the kept map becomes another one (see `moving`)."""
+        plan_move(self.database, motion, to=to)
+
+    def finish_move(self, *, at: str) -> int:
+        """Move all poses if that was planned for the map that is kept now; return how many."""
+        return finish_move(self.database, at=at)
+
+    # --- keeping order -----------------------------------------------------------------------
+
+    def rebuild_index(self) -> int:
+        """Build everything but the observations anew, and return how many there are."""
+        with self.database.writing() as connection:
+            for table in ("texts", "words", "vocabulary", "labels"):
+                connection.execute(f"DELETE FROM {table}")  # noqa: S608 - our own tables
+            connection.execute("DROP INDEX by_text")
+            rows = connection.execute(
+                "SELECT n, text, labels, text_id FROM observations"
+            ).fetchall()
+            ids: dict[str, int] = {}
+            named: dict[str, tuple[str, list[str]]] = {}
+            moved, labels = [], []
+            for n, text, said, text_id in rows:
+                if said not in named:
+                    names = json.loads(said)
+                    named[said] = "; ".join(names), [name_key(name) for name in names]
+                joined, keys = named[said]
+                whole = "\n".join(filter(None, (text, joined)))
+                new_id = ids.setdefault(whole, len(ids) + 1)
+                if new_id != text_id:
+                    moved.append((new_id, n))
+                labels += [(key, n) for key in keys]
+            texts = ((i, text_hash(text), text) for text, i in ids.items())
+            connection.executemany("INSERT INTO texts VALUES (?, ?, ?)", texts)
+            index_texts(connection, ((i, text) for text, i in ids.items()))
+            connection.executemany("INSERT OR IGNORE INTO labels VALUES (?, ?)", sorted(labels))
+            connection.executemany("UPDATE observations SET text_id = ? WHERE n = ?", moved)
+            connection.execute("CREATE INDEX by_text ON observations (text_id, recorded_us)")
+            _note_fact(connection, "index_version", INDEX_VERSION)
+            generation = int(_fact(connection, "generation")) + 1
+            _note_fact(connection, "generation", str(generation))
+        return len(rows)
+
+    def thin(self, *, now: datetime, rule: ThinningRule | None = None) -> int:
+        """Drop the pictures that the rule does not keep, and return how many files went.
+
+        Their observations stay. A crash in between leaves files that the next time removes.
+        """
+        named = {Path(name).name for name in self._named_pictures()}
+        with self.database.writing() as connection:
+            stored = _stored_pictures(connection)
+            rule = rule or self._rule_when_full(stored)
+            dropped = choose_dropped(stored, now=now, named=named, rule=rule)
+            connection.executemany(
+                "UPDATE observations SET picture = NULL, picture_bytes = NULL WHERE picture = ?",
+                [[name] for name in dropped],
+            )
+            _note_fact(connection, "thinned_hour", _hour(now))
+            _note_fact(connection, "left_bytes", str(_n_bytes(connection)))
+        with self.database.writing() as connection:
+            kept = connection.execute("SELECT picture FROM observations WHERE picture IS NOT NULL")
+            return self._pictures.remove_all_but(named | {row[0] for row in kept})
+
+    def _is_thinning_due(self, connection: sqlite3.Connection, latest: Observation) -> bool:
+        """Look once an hour, and when the pictures have outgrown their limit."""
+        if _fact(connection, "thinned_hour") != _hour(latest.recorded_at):
+            return True
+        limit_bytes = self._rule.limit_mb * 1e6
+        # What records name may be above the limit for good.
+        largest = max(limit_bytes, int(_fact(connection, "left_bytes")) + limit_bytes / 10)
+        return _n_bytes(connection) > largest
+
+    def _rule_when_full(self, stored: list[StoredPicture]) -> ThinningRule:
+        """Make room for some time when the limit is reached, so that not every write thins."""
+        n_bytes = sum({picture.name: picture.n_bytes for picture in stored}.values())
+        if n_bytes <= self._rule.limit_mb * 1e6:
+            return self._rule
+        return replace(self._rule, limit_mb=self._rule.limit_mb * _AFTER_FULL_RATIO)
+
+
+def _insert(
+    connection: sqlite3.Connection, observation: Observation, picture_bytes: int | None
+) -> bool:
+    """Add a row with its index; False where it is there already."""
+    known = connection.execute("SELECT 1 FROM observations WHERE id = ?", [observation.id])
+    if known.fetchone() is not None:
+        return False
+    offset = observation.recorded_at.utcoffset() or timedelta(0)
+    n = connection.execute(
+        "INSERT INTO observations (id, recorded_us, offset_s, stamp_s, map_id, x, y, yaw_rad,"
+        " room_id, kind, text, labels, picture, picture_bytes, text_id)"
+        " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        (
+            observation.id,
+            microseconds_of(observation.recorded_at),
+            int(offset.total_seconds()),
+            observation.stamp_s,
+            observation.map_id,
+            observation.pose.x,
+            observation.pose.y,
+            observation.pose.yaw_rad,
+            observation.room_id,
+            str(observation.kind),
+            observation.text,
+            json.dumps(observation.labels, ensure_ascii=False),
+            observation.picture,
+            picture_bytes,
+            add_text(connection, observation.searched_text),
+        ),
+    ).lastrowid
+    labels = {(name_key(label), n) for label in observation.labels}
+    connection.executemany("INSERT INTO labels VALUES (?, ?)", sorted(labels))
+    return True
+
+
+def _stored_pictures(connection: sqlite3.Connection) -> list[StoredPicture]:
+    rows = connection.execute(
+        "SELECT picture, recorded_us, x, y, yaw_rad, picture_bytes, map_id FROM observations"
+        " WHERE picture_bytes IS NOT NULL AND picture IS NOT NULL"
+    )
+    return [
+        StoredPicture(
+            row["picture"],
+            _EPOCH + timedelta(microseconds=row["recorded_us"]),
+            Pose(row["x"], row["y"], row["yaw_rad"]),
+            row["picture_bytes"],
+            row["map_id"],
+        )
+        for row in rows
+    ]
+
+
+def _n_bytes(connection: sqlite3.Connection) -> int:
+    total = connection.execute(
+        "SELECT SUM(n_bytes) FROM (SELECT MAX(picture_bytes) AS n_bytes FROM observations"
+        " WHERE picture IS NOT NULL GROUP BY picture)"
+    )
+    return int(total.fetchone()[0] or 0)
+
+
+def _fact(connection: sqlite3.Connection, name: str) -> str:
+    row = connection.execute("SELECT value FROM facts WHERE name = ?", [name]).fetchone()
+    return _FIRST_FACTS.get(name, "") if row is None else str(row[0])
+
+
+def _note_fact(connection: sqlite3.Connection, name: str, value: str) -> None:
+    connection.execute("INSERT OR REPLACE INTO facts VALUES (?, ?)", (name, value))
+
+
+def _hour(time: datetime) -> str:
+    return time.astimezone(UTC).strftime("%Y-%m-%dT%H")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BroughtOver:
+    """What came over.
+
+    Attributes:
+        n_observations: Each once, in however many memories it was.
+        n_pictures: Files.
+    """
+
+    n_observations: int = 0
+    n_pictures: int = 0
+
+
+def bring_over(*memories: Path, to: Path) -> BroughtOver:
+    """Copy the observations of some semantic map files, with their pictures, for another one.
+
+    All of them or none; those of the memories stay as they are.
+
+    Args:
+        memories: Semantic map files of one map.
+        to: The file that they are for; it has no observations yet.
+
+    Raises:
+        SemanticMapError: It has some, or they cannot be read or written.
+    """
+    sources = [EpisodeStore(memory_folder(path)) for path in memories]
+    for source in sources:
+        _require_settled(source)
+    folder = memory_folder(to)
+    if folder.exists():
+        message = f"{folder} is there already."
+        raise SemanticMapError(message, hint="Give the new file another name, or remove it.")
+    target = EpisodeStore(folder)
+    try:
+        came = [target.take_over(source) for source in sources]
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    return BroughtOver(n_observations=sum(n for n, _ in came), n_pictures=sum(n for _, n in came))
+
+
+def _require_settled(store: EpisodeStore) -> None:
+    """Refuse observations that have not followed their records to a moved map yet."""
+    if store.database.exists() and has_plans(store.database):
+        raise SemanticMapError(
+            f"The observations in {store.folder} have not followed their map yet.",
+            hint=f"Start `{shell_command('serve --memory FILE')}` with it once, then merge again.",
+        )

@@ -1,0 +1,222 @@
+"""The text index of observations: by words, and by meaning."""
+
+import difflib
+import hashlib
+import math
+import re
+import sqlite3
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.memory.episodes.database import EpisodeDatabase
+from mapspeak.memory.retrieval import Embedder
+from mapspeak.memory.retrieval.wordindex import content_words, split_words, stem
+
+MIN_SCORE_RATIO = 0.25
+"""Below, too little of the query was found to speak of a match."""
+
+_MISSPELT_WEIGHT = 0.75
+_MIN_MISSPELT_LETTERS = 4
+_MIN_LIKENESS_RATIO = 0.8
+_OF_ASKING = frozenset(
+    ["did", "do", "does", "have", "robot", "saw", "see", "seen", "show", "some", "were", "when"]
+)
+"""Words of questions about what was seen; they say nothing of what it was."""
+
+Ids = NDArray[np.int64]
+Scores = NDArray[np.float64]
+
+
+def text_hash(text: str) -> bytes:
+    """Return what tells one text from another."""
+    return hashlib.blake2b(text.encode(), digest_size=12).digest()
+
+
+def words_in(text: str) -> dict[str, str]:
+    """Return the words of a text as they are compared, each with how it stands there."""
+    return {stem(word): shown for shown, word in split_words(text)}
+
+
+def add_text(connection: sqlite3.Connection, text: str) -> int:
+    """Return the id of a text; one that is new is indexed. Ids are 1, 2, 3 and so on."""
+    known = connection.execute("SELECT text_id FROM texts WHERE hash = ?", [text_hash(text)])
+    row = known.fetchone()
+    if row is not None:
+        return int(row[0])
+    insertion = "INSERT INTO texts (hash, text) VALUES (?, ?)"
+    text_id = connection.execute(insertion, (text_hash(text), text)).lastrowid
+    assert text_id is not None  # noqa: S101 - a row was inserted
+    index_texts(connection, [(text_id, text)])
+    return text_id
+
+
+def index_texts(connection: sqlite3.Connection, texts: Iterable[tuple[int, str]]) -> None:
+    """Note the words of texts that are not indexed yet, their ids ascending."""
+    stems: dict[str, str] = {}
+    said: defaultdict[str, list[int]] = defaultdict(list)
+    for text_id, text in texts:
+        shown = set(re.findall(r"\w+", text))
+        for word in shown:
+            if word not in stems:
+                # Most words need no look at their accents.
+                stems[word] = stem(word.lower()) if word.isascii() else next(iter(words_in(word)))
+        for compared in {stems[word] for word in shown}:
+            said[compared].append(text_id)
+    # In the table's own order, in which it grows fastest.
+    rows = ((word, text_id) for word in sorted(said) for text_id in said[word])
+    connection.executemany("INSERT INTO words VALUES (?, ?)", rows)
+    counted = "INSERT INTO vocabulary VALUES (?, ?) ON CONFLICT DO UPDATE SET n_texts = n_texts + "
+    counts = ((word, len(text_ids)) for word, text_ids in said.items())
+    connection.executemany(counted + "excluded.n_texts", counts)
+
+
+def score_words(connection: sqlite3.Connection, query: str) -> Scores:
+    """Return the share of a query that each text says, by its id; 0 where it is too little.
+
+    Args:
+        connection: Of the database.
+        query: In words; rare ones count more.
+    """
+    n_texts = int(connection.execute("SELECT MAX(text_id) FROM texts").fetchone()[0] or 0)
+    scores = np.zeros(n_texts + 1)
+    total = 0.0
+    for spellings, weight in _asked_words(connection, query, n_texts):
+        total += weight
+        found = np.zeros(n_texts + 1)
+        for spelling, ratio in spellings.items():
+            text_ids = read_ids(connection, "SELECT text_id FROM words WHERE word = ?", [spelling])
+            found[text_ids] = np.maximum(found[text_ids], weight * ratio)
+        scores += found
+    return np.where(scores >= total * MIN_SCORE_RATIO, scores / max(total, 1e-9), 0.0)
+
+
+def read_ids(connection: sqlite3.Connection, selection: str, values: Iterable[object]) -> Ids:
+    """Return the integers that a selection of one column finds."""
+    cursor = connection.cursor()
+    cursor.row_factory = None
+    rows = cursor.execute(selection, list(values)).fetchall()
+    return np.fromiter(chain.from_iterable(rows), np.int64, len(rows))
+
+
+def shared_words(query: str, text: str) -> list[str]:
+    """Return the words of a text that the query has too, as they stand in the text."""
+    asked, said = _words_asked(query), words_in(text)
+    near = (difflib.get_close_matches(w, said, n=1, cutoff=_MIN_LIKENESS_RATIO) for w in asked)
+    return [said[word] for word in dict.fromkeys(chain(*near))]
+
+
+def _asked_words(
+    connection: sqlite3.Connection, query: str, n_texts: int
+) -> Iterator[tuple[dict[str, float], float]]:
+    """Return each word of a query: its spellings in texts, each with its likeness; its weight."""
+    for word in _words_asked(query):
+        spellings = dict(_spellings(connection, word))
+        n_with = sum(n for n, _ in spellings.values())
+        ratios = {spelling: ratio for spelling, (_, ratio) in spellings.items()}
+        yield ratios, math.log1p(n_texts / max(n_with, 1))
+
+
+def _words_asked(query: str) -> list[str]:
+    said = [stem(word) for _, word in content_words(query) if word not in _OF_ASKING]
+    return list(dict.fromkeys(said)) or list(words_in(query))
+
+
+def _spellings(
+    connection: sqlite3.Connection, word: str
+) -> Iterator[tuple[str, tuple[int, float]]]:
+    """Return the known words that count as this one; likeness only where it is not known."""
+    count = "SELECT n_texts FROM vocabulary WHERE word = ?"
+    row = connection.execute(count, [word]).fetchone()
+    if row is not None:
+        yield word, (row[0], 1.0)
+    elif len(word) >= _MIN_MISSPELT_LETTERS and not word.isnumeric():
+        # Who misspells a word seldom misspells its first letter.
+        alike = connection.execute(
+            "SELECT word, n_texts FROM vocabulary"
+            " WHERE word >= ? AND word < ? AND length(word) BETWEEN ? AND ?",
+            (word[0], chr(ord(word[0]) + 1), len(word) - 2, len(word) + 2),
+        )
+        counts = {known: n for known, n in alike}  # noqa: C416 - rows are no pairs for dict()
+        for near in difflib.get_close_matches(word, counts, n=3, cutoff=_MIN_LIKENESS_RATIO):
+            yield near, (counts[near], _MISSPELT_WEIGHT)
+
+
+Vectors = NDArray[np.float32]
+
+_BATCH = 512
+
+
+class VectorRank:
+    """A `Rank` that embeds each text once, whatever process asks.
+
+    Args:
+        database: Where vectors are kept, by embedder and text.
+        embedder: What makes them.
+        min_score_ratio: The cosine from which on a text fits; None leaves it to the embedder.
+    """
+
+    def __init__(
+        self, database: EpisodeDatabase, embedder: Embedder, *, min_score_ratio: float | None = None
+    ) -> None:
+        self._database = database
+        self._embedder = embedder
+        least_ratio = embedder.thresholds.least_ratio
+        self._min_score_ratio = least_ratio if min_score_ratio is None else min_score_ratio
+        self._row_of: dict[str, int] = {}
+        self._vectors: Vectors = np.zeros((0, 0), np.float32)
+        self._kept: dict[bytes, bytes] | None = None
+
+    def __call__(self, query: str, texts: Sequence[str]) -> list[float]:
+        """Return the score of each text: the cosine where it is enough, else 0."""
+        self._learn([text for text in dict.fromkeys(texts) if text not in self._row_of])
+        if not texts:
+            return []
+        asked = self._embedder.embed([query])[0]
+        cosines = self._vectors @ asked
+        scores = np.where(cosines >= self._min_score_ratio, cosines, 0.0)
+        rows = np.fromiter((self._row_of[text] for text in texts), np.intp, len(texts))
+        found: list[float] = scores[rows].tolist()
+        return found
+
+    def _learn(self, texts: Sequence[str]) -> None:
+        """Take the vectors of texts from the database, or make and keep them."""
+        if not texts:
+            return
+        kept = self._read()
+        hashes = [text_hash(text) for text in texts]
+        missing = [(key, text) for key, text in zip(hashes, texts, strict=True) if key not in kept]
+        for start in range(0, len(missing), _BATCH):
+            batch = missing[start : start + _BATCH]
+            vectors = self._embedder.embed([text for _, text in batch])
+            made = {
+                key: np.asarray(vector, np.float16).tobytes()
+                for (key, _), vector in zip(batch, vectors, strict=True)
+            }
+            # At once: whoever is stopped amid many texts need not begin anew.
+            self._write(made)
+            kept |= made
+        rows = np.frombuffer(b"".join(map(kept.pop, hashes)), np.float16)
+        new = rows.reshape(len(texts), -1).astype(np.float32)
+        self._vectors = np.vstack([self._vectors, new]) if self._row_of else new
+        self._row_of |= {text: len(self._row_of) + i for i, text in enumerate(texts)}
+
+    def _read(self) -> dict[bytes, bytes]:
+        """Return the kept vectors that were not taken yet; all are read once."""
+        if self._kept is None:
+            self._kept = {}
+            if self._database.exists():
+                selection = "SELECT hash, vector FROM vectors WHERE embedder = ?"
+                with self._database.reading() as connection:
+                    connection.row_factory = None
+                    self._kept = dict(connection.execute(selection, [self._embedder.name]))
+        return self._kept
+
+    def _write(self, made: dict[bytes, bytes]) -> None:
+        if made and self._database.exists():
+            rows = [(self._embedder.name, key, vector) for key, vector in made.items()]
+            with self._database.writing() as connection:
+                connection.executemany("INSERT OR IGNORE INTO vectors VALUES (?, ?, ?)", rows)

@@ -1,0 +1,225 @@
+"""Events: a place, a time and an effect, beside the words that a person said."""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import datetime
+from enum import StrEnum
+
+from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import Point
+from mapspeak.memory.filtering import tells_what_to_do
+from mapspeak.memory.quoting import quote
+from mapspeak.memory.waypoint import clean_line, name_key
+
+_WAYS = re.compile(
+    r"^ *(?:please )?(?:avoid|keep|stay|slow|(?:do not|don't) (?:enter|use|cross|pass|block))\b",
+    re.IGNORECASE | re.MULTILINE,
+)
+"""How people tell others of a way that is closed or slow: that is what an event is for."""
+_QUOTE_SIGN = re.compile(
+    "[\"«»\u2039\u203a\u201a-\u201f]|(?<!\\w)['\u2018\u2019]|['\u2018\u2019](?!\\w)"
+)
+_NUMBER = r"-?\d+(?:\.\d+)?"
+_OWN_PLACE = re.compile(rf"(?:{_NUMBER} m around )?(?:[RCODFPT]\d+|{_NUMBER}, ?{_NUMBER})")
+"""A place by an id or in metres says nothing of its own."""
+
+
+def gives_orders(text: str) -> bool:
+    """Return True for words of an event that tell their reader what to do.
+
+    Quotes hide none of them.
+    """
+    # An order may stand within one pair of quotes, and it may go on behind them.
+    return any(tells_what_to_do(_WAYS.sub("", _QUOTE_SIGN.sub(by, text))) for by in (" ", "\n"))
+
+
+def tell_text(text: str) -> str:
+    """Return what is the matter as an observation: `"painters at work"`."""
+    return "(its text gives orders and is left out)" if gives_orders(text) else quote(text)
+
+
+def tell_place(place: str) -> str:
+    """Return where it is: an id or a point as it is, other words quoted."""
+    if _OWN_PLACE.fullmatch(place):
+        return place
+    return "its place gives orders and is left out" if gives_orders(place) else quote(place)
+
+
+def tell_source(source: str) -> str:
+    """Return who said it."""
+    return "a source left out, for it gives orders" if gives_orders(source) else quote(source)
+
+
+Outline = tuple[Point, ...]
+"""Corners in order; the last one is joined to the first."""
+
+ID_RULE = "at most 16 letters, digits, - and _"
+"""What an id of an event is made of: it is told without quotes."""
+ROBOT = "the robot"
+SHUT = "the robot could not get through"
+OPEN_AGAIN = f"{SHUT}, and came through later"
+"""All that the robot notes by itself, and under which name."""
+_ID = re.compile(r"[A-Za-z0-9_-]{1,16}")
+_PLACE_ID = re.compile(r"\b[RCOD]\d+\b")
+
+
+class Effect(StrEnum):
+    """What an event means for ways.
+
+    Closed: none leads through. Slow and avoid: ways around it are preferred where there are any,
+    for avoid also long ones. None: it is only a note.
+    """
+
+    CLOSED = "closed"
+    SLOW = "slow"
+    AVOID = "avoid"
+    NONE = "none"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Event:
+    """Something that is so for a while.
+
+    Attributes:
+        id: "E3"; empty until it is written.
+        text: What is the matter, in the words of who said it.
+        place: Where, in words or ids of the time of writing: "corridor C1".
+        effect: What it means for ways.
+        at: A point of that place in the map frame.
+        outlines: Of the place at the time of writing, in the map frame; ids may change, and these
+            do not.
+        begins: The first moment; None where it has always been so.
+        until: The first moment after; None where nobody knows.
+        source: Who said it.
+        recorded_at: When.
+
+    Raises:
+        SemanticMapError: It has no words, an id that is none, no place where it needs one, a time
+            without a zone, an outline that is none, or it ends before it begins.
+    """
+
+    text: str
+    place: str = ""
+    effect: Effect = Effect.NONE
+    id: str = ""
+    at: Point | None = None
+    outlines: tuple[Outline, ...] = ()
+    begins: datetime | None = None
+    until: datetime | None = None
+    source: str = ""
+    recorded_at: datetime | None = None
+
+    def __post_init__(self) -> None:
+        for key in ("id", "text", "place", "source"):
+            object.__setattr__(self, key, clean_line(getattr(self, key)))
+        _require(not self.id or is_event_id(self.id), "An event's id is none", f"Give {ID_RULE}.")
+        _require(self.text, "An event has no text", "Say what is the matter.")
+        _require(
+            self.effect is Effect.NONE or self.place or self.outlines,
+            f"The event {self.told_text} is {self.effect}, but at no place",
+            "Name the place, such as C1 or D2.",
+        )
+        _require(
+            all(len(outline) >= 3 for outline in self.outlines),
+            f"The outline of the event {self.told_text} has fewer than three corners",
+            "Give three corners or more.",
+        )
+        times = (self.begins, self.until, self.recorded_at)
+        _require(
+            all(time is None or time.tzinfo is not None for time in times),
+            f"A time of the event {self.told_text} has no zone",
+            "Write times like 2026-11-22T14:00:00+01:00.",
+        )
+        _require(
+            self.begins is None or self.until is None or self.begins < self.until,
+            f"The event {self.told_text} ends before it begins",
+            "Correct its times.",
+        )
+
+    @property
+    def is_of_robot(self) -> bool:
+        """True for what the robot noted of its own drives: who takes its name says other words."""
+        is_in_its_words = self.text in (SHUT, OPEN_AGAIN) and self.effect is Effect.AVOID
+        return self.source == ROBOT and is_in_its_words
+
+    def is_current(self, now: datetime) -> bool:
+        """Return True while it lasts; `now` has a zone."""
+        has_begun = self.begins is None or self.begins <= now
+        return has_begun and (self.until is None or now < self.until)
+
+    @property
+    def told_text(self) -> str:
+        """What is the matter as a reader is told: quoted, or left out where it gives orders."""
+        return tell_text(self.text)
+
+    @property
+    def told_title(self) -> str:
+        """The event in a few words: `E1 "painters at work"`."""
+        told = self.told_text
+        mark = ":" if self.id and not told.startswith('"') else ""
+        return f"{self.id}{mark} {told}".lstrip()
+
+    def sentence(self, now: datetime) -> str:
+        """Return the event for a reader, with times as `now` counts them; its words are quoted."""
+        where = f" ({tell_place(self.place)})" if self._names_more_than_text() else ""
+        parts = [f"{self.told_title}{where}"]
+        if self.effect is not Effect.NONE:
+            parts.append(_EFFECTS[self.effect])
+        if self.begins is not None and self.begins > now:
+            parts.append(f"from {_say_time(self.begins, now)}")
+        if self.until is not None:
+            parts.append(f"until {_say_time(self.until, now)}")
+        return f"{', '.join(parts)}{self._say_source()}."
+
+    def _say_source(self) -> str:
+        if not self.source:
+            return ""
+        is_borrowed = is_name_of_robot(self.source) and not self.is_of_robot
+        said_by = "somebody in the robot's name" if is_borrowed else tell_source(self.source)
+        return f"; said by {said_by}"
+
+    def _names_more_than_text(self) -> bool:
+        """Return True where a reader of the text does not read the place in it."""
+        is_told = self.told_text.startswith('"') and self.place in self.text
+        return bool(self.place) and not is_told
+
+
+_NAMES_OF_ROBOT = (ROBOT, "robot")
+
+
+def is_name_of_robot(source: str) -> bool:
+    """Return True for the name under which the robot notes what it found, however it is written."""
+    return name_key(source) in _NAMES_OF_ROBOT
+
+
+_EFFECTS = {
+    Effect.CLOSED: "closed to the robot",
+    Effect.SLOW: "slow, ways around it are preferred",
+    Effect.AVOID: "to be avoided where there is another way",
+}
+
+
+def current_events(events: Iterable[Event], now: datetime) -> tuple[Event, ...]:
+    """Return those events that last at a moment, in the order of the file."""
+    return tuple(event for event in events if event.is_current(now))
+
+
+def is_event_id(text: str) -> bool:
+    """Return True for what may be the id of an event: "E3", "wet-floor_2"."""
+    return _ID.fullmatch(text) is not None
+
+
+def find_place_ids(words: str) -> tuple[str, ...]:
+    """Return the ids of rooms, corridors and doors that words name: "corridor C1" has C1."""
+    return tuple(dict.fromkeys(_PLACE_ID.findall(words.upper())))
+
+
+def _say_time(time: datetime, now: datetime) -> str:
+    local = time.astimezone(now.tzinfo)
+    return f"{local:%H:%M}" if local.date() == now.date() else f"{local:%Y-%m-%d %H:%M}"
+
+
+def _require(is_right: object, what: str, hint: str) -> None:
+    if not is_right:
+        raise SemanticMapError(f"{what}.", hint=hint)

@@ -1,0 +1,126 @@
+"""Two memories of one map as one: what is in both is joined where that is safe."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from itertools import count
+
+from mapspeak.errors import SemanticMapError
+from mapspeak.memory.mapfile.schema import record_data
+from mapspeak.memory.merging import merge_waypoint
+from mapspeak.memory.waypoint import SemanticMap, Waypoint, name_key
+
+SAME_PLACE_M = 1.0
+"""Poses under one name that lie further apart are two places."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Union:
+    """Two memories as one.
+
+    Attributes:
+        places: All of them: the first memory's in its order, then what only the second has.
+        changed: Those that the first memory does not have, or has otherwise.
+        findings: What became of each name that was in both and not the same.
+    """
+
+    places: SemanticMap
+    changed: tuple[Waypoint, ...]
+    findings: tuple[str, ...]
+
+
+def unite(first: SemanticMap, second: SemanticMap) -> Union:
+    """Join two memories of one map.
+
+    Places of one name that lie within a metre are joined: the newer says what both say, landmarks
+    and layout of both stay. Where it is not known which is newer they are joined only if that makes
+    no difference. Otherwise both stay, the second one with a number behind its name.
+
+    Raises:
+        SemanticMapError: They belong to different maps.
+    """
+    _require_one_map(first, second)
+    map_id = first.map_id or second.map_id
+    places = {name_key(place.name): place for place in first.waypoints}
+    taken = places.keys() | {name_key(place.name) for place in second.waypoints}
+    findings = []
+    for place in second.waypoints:
+        key = name_key(place.name)
+        mine = places.get(key)
+        if mine is None:
+            places[key] = place
+        elif record_data(mine) != record_data(place):
+            joined, said = _join(mine, place)
+            if joined is None:
+                joined = _renamed(place, places, taken)
+                said = f"{said}: both stay, the second one as '{joined.name}'"
+            places[name_key(joined.name)] = joined
+            taken |= {name_key(joined.name)}
+            findings.append(f"'{place.name}' is in both; {said}.")
+    united = tuple(replace(place, map_id=map_id) for place in places.values())
+    before = {name_key(place.name): record_data(place) for place in first.waypoints}
+    return Union(
+        places=SemanticMap(map_id=map_id, waypoints=united),
+        changed=tuple(p for p in united if before.get(name_key(p.name)) != record_data(p)),
+        findings=tuple(findings),
+    )
+
+
+def _require_one_map(first: SemanticMap, second: SemanticMap) -> None:
+    ids = {first.map_id, second.map_id} - {None}
+    if len(ids) > 1:
+        raise SemanticMapError(
+            f"One memory is of the map '{first.map_id}', the other of '{second.map_id}'.",
+            hint="Poses of one mean nothing on the other; realign one of them first.",
+        )
+
+
+def _join(mine: Waypoint, theirs: Waypoint) -> tuple[Waypoint | None, str]:
+    """Return both as one where that is safe, and what was done, or why not."""
+    apart_m = mine.pose.point.distance_to(theirs.pose.point)
+    if apart_m > SAME_PLACE_M:
+        return None, f"they lie {apart_m:.2f} m apart"
+    if mine.recorded_at and theirs.recorded_at and mine.recorded_at != theirs.recorded_at:
+        is_mine_older = mine.recorded_at < theirs.recorded_at
+        older, newer = (mine, theirs) if is_mine_older else (theirs, mine)
+        at = max(mine.recorded_at, theirs.recorded_at).isoformat(timespec="seconds")
+        # The first one's spelling of the name stays.
+        return replace(_joined(older, newer), name=mine.name), f"joined, the record of {at} decides"
+    joined = replace(_joined(theirs, mine), name=mine.name)
+    if _unordered(joined) == _unordered(replace(_joined(mine, theirs), name=mine.name)):
+        return joined, "joined, they complete each other"
+    return None, "they differ, and which is newer is not known"
+
+
+def _joined(older: Waypoint, newer: Waypoint) -> Waypoint:
+    """Return the newer place, with what only the older one says."""
+    features = {name_key(text): text for text in newer.geometric_features}
+    for text in older.geometric_features:
+        features.setdefault(name_key(text), text)
+    is_same_pose = record_data(older)["pose"] == record_data(newer)["pose"]
+    dated = newer if newer.recorded_at or newer.stamp_s is not None else older
+    return replace(
+        merge_waypoint(older, newer).waypoint,
+        description=newer.description or older.description,
+        geometric_features=tuple(features.values()),
+        stamp_s=dated.stamp_s,
+        recorded_at=dated.recorded_at,
+        room_id=newer.room_id or (older.room_id if is_same_pose else None),
+        picture=newer.picture or (older.picture if is_same_pose else None),
+    )
+
+
+def _unordered(place: Waypoint) -> dict[str, object]:
+    """Return what a record says, whatever the order of its lists."""
+    said = record_data(place)
+    return {key: sorted(map(str, v)) if isinstance(v, list) else v for key, v in said.items()}
+
+
+def _renamed(place: Waypoint, places: Mapping[str, Waypoint], taken: Collection[str]) -> Waypoint:
+    """Return a place under a free name; under the one it has already from an earlier time."""
+    for number in count(2):
+        renamed = replace(place, name=f"{place.name} ({number})")
+        key = name_key(renamed.name)
+        there = places.get(key)
+        if key not in taken or (there and _unordered(there) == _unordered(renamed)):
+            return renamed
+    raise AssertionError  # Numbers do not end.

@@ -1,0 +1,181 @@
+"""The pictures that were taken lately: where from, and which way each column of them looks."""
+
+import hashlib
+import math
+from collections import OrderedDict
+from dataclasses import dataclass
+from datetime import datetime
+
+from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.memory.laserfan import LaserRing
+
+MOST_PICTURES = 500
+"""How many pictures can be spoken of; older ones are forgotten here, whoever keeps them."""
+BESIDE_RAD = math.radians(10.0)
+"""The middle of a thing that the edge cuts lies beside the picture, and is read off roughly."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PictureReading:
+    """How far the robot's own sensors measured something in a picture to be.
+
+    Attributes:
+        label: What they take it for.
+        bearing_rad: From the heading the picture was taken along, left positive.
+        range_m: From where it was taken.
+        source: What measured it.
+    """
+
+    label: str
+    bearing_rad: float
+    range_m: float
+    source: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TakenPicture:
+    """What is known of a picture besides what it shows.
+
+    Attributes:
+        id: How a reader speaks of it: P12.
+        name: Its relative name, unlike that of any other picture of any run: P12-5d0c21f7.jpg.
+        pose: Where the robot stood, in the map frame; the camera looks along its heading.
+        stamp_s: Robot time of the exposure.
+        width_px: Columns.
+        horizontal_fov_rad: The angle between the left and the right edge; None where unknown.
+        recorded_at: When it was taken, by the calendar; None where nobody knew.
+        readings: What the robot measured in it.
+        laser: What its laser met when it was taken; None without one.
+        reported: Labels of all that the robot's detector reports in it; None where none read it.
+    """
+
+    id: str
+    name: str
+    pose: Pose
+    stamp_s: float
+    width_px: int
+    horizontal_fov_rad: float | None
+    recorded_at: datetime | None = None
+    readings: tuple[PictureReading, ...] = ()
+    laser: LaserRing | None = None
+    reported: tuple[str, ...] | None = None
+
+    def shows(self, bearing_rad: float) -> bool:
+        """Return True for a direction from the heading in the picture, or just beside it."""
+        if self.horizontal_fov_rad is None:
+            return True
+        return abs(wrap_angle(bearing_rad)) <= self.horizontal_fov_rad / 2 + BESIDE_RAD
+
+    def bearing_of(self, column_px: float) -> float:
+        """Return the direction of a column from the heading, left positive, in radians.
+
+        The lens is a pinhole, as the simulated camera's and that of a ROS CameraInfo: columns are
+        evenly spaced on a plane, not on a circle.
+
+        Args:
+            column_px: From the left edge; the middle of the picture is half its width.
+
+        Raises:
+            SemanticMapError: The picture has no such column, or nobody knows how wide it looks.
+        """
+        if not 0 <= column_px <= self.width_px:
+            raise SemanticMapError(
+                f"Column {column_px:g} lies outside {self.id}, which is {self.width_px} px wide.",
+                hint="Count from the left edge of the picture at its full size.",
+            )
+        if self.horizontal_fov_rad is None:
+            raise SemanticMapError(
+                "The robot does not say how wide its camera looks.",
+                hint="Give bearing_deg instead.",
+            )
+        half_px = self.width_px / 2
+        focal_px = half_px / math.tan(self.horizontal_fov_rad / 2)
+        return math.atan2(half_px - column_px, focal_px)
+
+
+class PictureBook:
+    """Names the pictures of one run in their order."""
+
+    def __init__(self) -> None:
+        self._taken: OrderedDict[str, TakenPicture] = OrderedDict()
+        self._n_taken = 0
+
+    @property
+    def latest(self) -> TakenPicture | None:
+        """The picture that was taken last."""
+        return next(reversed(self._taken.values()), None)
+
+    @property
+    def taken(self) -> tuple[TakenPicture, ...]:
+        """All that can be spoken of, the oldest first."""
+        return tuple(self._taken.values())
+
+    def add(
+        self,
+        data: bytes,
+        *,
+        media_type: str,
+        pose: Pose,
+        stamp_s: float,
+        width_px: int,
+        horizontal_fov_rad: float | None,
+        name: str | None = None,
+        recorded_at: datetime | None = None,
+        readings: tuple[PictureReading, ...] = (),
+        laser: LaserRing | None = None,
+        reported: tuple[str, ...] | None = None,
+    ) -> TakenPicture:
+        """Name a picture that was just taken.
+
+        Args:
+            data: The encoded picture.
+            media_type: Such as "image/jpeg".
+            pose: Where the robot stood, in the map frame.
+            stamp_s: Robot time of the exposure.
+            width_px: Columns.
+            horizontal_fov_rad: The angle between the left and the right edge.
+            name: What a folder of pictures calls it; made up where nobody keeps it.
+            recorded_at: The time by the calendar.
+            readings: What the robot measured in it.
+            laser: What its laser met meanwhile.
+            reported: What the robot's detector reports in it; None where none read it.
+        """
+        self._n_taken += 1
+        picture_id = f"P{self._n_taken}"
+        ending = media_type.partition("/")[2].replace("jpeg", "jpg")
+        digest = _digest(data, pose, stamp_s)
+        taken = TakenPicture(
+            id=picture_id,
+            name=name or f"{picture_id}-{digest}.{ending}",
+            pose=pose,
+            stamp_s=stamp_s,
+            width_px=width_px,
+            horizontal_fov_rad=horizontal_fov_rad,
+            recorded_at=recorded_at,
+            readings=readings,
+            laser=laser,
+            reported=reported,
+        )
+        self._taken[picture_id] = taken
+        while len(self._taken) > MOST_PICTURES:
+            self._taken.popitem(last=False)
+        return taken
+
+    def forget(self) -> bool:
+        """Let nobody speak of earlier pictures any more; return whether there were any."""
+        had_any = bool(self._taken)
+        self._taken.clear()
+        return had_any
+
+    def find(self, said: str) -> TakenPicture | None:
+        """Return the picture of that id ("P12", "picture p12") or name, or None."""
+        key = said.strip().casefold().removeprefix("picture").strip()
+        taken = self._taken.values()
+        return next(
+            (each for each in taken if key in (each.id.casefold(), each.name.casefold())), None
+        )
+
+
+def _digest(data: bytes, pose: Pose, stamp_s: float) -> str:
+    return hashlib.sha256(data + repr((pose, stamp_s)).encode()).hexdigest()[:8]

@@ -1,0 +1,39 @@
+"""Finds what is remembered by the words that people use for it."""
+
+from mapspeak.memory.retrieval.answer import (
+    Answer,
+    Basis,
+    Entry,
+    EntryCandidate,
+    EntryKind,
+    MatchEvidence,
+    MatchField,
+    MatchKind,
+    Thresholds,
+    Verdict,
+    list_entries,
+)
+from mapspeak.memory.retrieval.index import WORDS_ONLY, EntryIndex
+from mapspeak.memory.retrieval.kinds import calls_by_name
+from mapspeak.memory.retrieval.meaningindex import Embedder, TextVectors
+from mapspeak.memory.retrieval.minilm import find_model
+
+__all__ = [
+    "WORDS_ONLY",
+    "Answer",
+    "Basis",
+    "Embedder",
+    "Entry",
+    "EntryCandidate",
+    "EntryIndex",
+    "EntryKind",
+    "MatchEvidence",
+    "MatchField",
+    "MatchKind",
+    "TextVectors",
+    "Thresholds",
+    "Verdict",
+    "calls_by_name",
+    "find_model",
+    "list_entries",
+]

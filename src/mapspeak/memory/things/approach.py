@@ -1,0 +1,224 @@
+"""Where to stand to look at a thing: near it, on the side it was seen from, facing it."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from mapspeak.geometry import Point, Pose
+from mapspeak.memory.things.sight import BODY_M, N_RAYS, SightMap, bearing_index
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.grid import FloatArray, IntArray, Mask
+from mapspeak.spatial.paths import DistanceField, clearance_m
+
+LARGEST_OFF_M = 1.4
+"""One stands no farther from a thing, so that it is within 1.5 m on a coarse map, too."""
+BEST_OFF_M = 1.0
+"""Near enough for 1.5 m, far enough to have it ahead even where its place is half a metre off."""
+COMFORT_M = 0.15
+FACED_M = 1.5
+FACED_RAD = math.radians(30)
+"""What is so near, and so little to the side, is faced: a camera has it well in its picture."""
+MISSED_M = 20.0
+"""Facing all of where a thing may be is worth so many metres: the best distance hardly counts
+beside it. Of 2, 6 and 20 the last faced most, in the buildings for choosing."""
+N_FINALISTS = 16
+"""Lines of sight cost most, so that only so many of the best standing places are asked for them."""
+BEFORE_M = 0.2
+"""The side of the cells in which a thing is looked for: the floor before it is no farther."""
+_STEP_BACK_M = 0.1
+
+
+def find_approach(
+    sight: SightMap,
+    distances: DistanceField,
+    target: Point,
+    seen_from: Sequence[Point],
+    *,
+    fronts: Sequence[Point] | None = None,
+    whereabouts: FloatArray | None = None,
+) -> Pose | None:
+    """Find a pose that the robot can drive to and that faces a thing from near.
+
+    A thing on a wall has floor on both sides of it; the right one is that from which it was seen.
+    Of all places on that side the best one faces most of where the thing may be.
+
+    Args:
+        sight: The map.
+        distances: From the robot, on that map.
+        target: Where the thing is.
+        seen_from: The places of those who saw it.
+        fronts: What `find_fronts` gives for these, where it is at hand.
+        whereabouts: Where it may be: points of the map frame, shape (n, 2), each as likely.
+
+    Returns:
+        None where the robot cannot get to within 1.4 m in sight of it.
+    """
+    points, clear_m = _reachable_near(sight, distances, target)
+    fronts = find_fronts(sight, target, seen_from) if fronts is None else fronts
+    is_seen = _are_in_sight(sight, fronts, points)
+    points, clear_m = points[is_seen], clear_m[is_seen]
+    if not len(points):
+        return None
+    off_m = np.hypot(points[:, 0] - target.x, points[:, 1] - target.y)
+    tight_m = np.maximum(distances.radius_m + COMFORT_M - clear_m, 0.0)
+    costs = np.abs(off_m - BEST_OFF_M) + 2 * tight_m
+    if whereabouts is not None:
+        _add_missed(costs, sight, points, target, seen_from, whereabouts)
+    place = Point(*points[int(np.argmin(costs))].tolist())
+    return Pose(place.x, place.y, place.bearing_to(target))
+
+
+def find_least_path_m(
+    grid: OccupancyGrid, distances: DistanceField, target: Point, seen_from: Sequence[Point]
+) -> float:
+    """Return metres than which no way to a thing is shorter; `find_approach` costs more to ask.
+
+    The way ends where one might look at the thing, or at a place that it was seen from. Infinite
+    where the robot gets to none of these.
+    """
+    rows, cols, _ = _floor_near(grid, target)
+    at = np.array([(place.x, place.y) for place in seen_from]).reshape(-1, 2)
+    stand_rows, stand_cols = grid.cells_at(at)
+    is_inside = grid.contains_cells(stand_rows, stand_cols)
+    rows = np.concatenate([rows, stand_rows[is_inside]])
+    cols = np.concatenate([cols, stand_cols[is_inside]])
+    return float(distances.distances_at(rows, cols).min(initial=math.inf))
+
+
+def measure_faced(
+    sight: SightMap, pose: Pose, seen_from: Sequence[Point], whereabouts: FloatArray
+) -> float:
+    """Return share of where a thing may be that a pose faces from 1.5 m with nothing between."""
+    stands, yaws = np.array([[pose.x, pose.y]]), np.array([pose.yaw_rad])
+    is_ahead = _have_ahead(stands, yaws, whereabouts)
+    return float((is_ahead & _have_in_sight(sight, stands, seen_from, whereabouts)).mean())
+
+
+def _add_missed(
+    costs: FloatArray,
+    sight: SightMap,
+    points: FloatArray,
+    target: Point,
+    seen_from: Sequence[Point],
+    whereabouts: FloatArray,
+) -> None:
+    """Add to the costs of standing places what they do not face; of all but the best a part."""
+    yaws = np.arctan2(target.y - points[:, 1], target.x - points[:, 0])
+    is_ahead = _have_ahead(points, yaws, whereabouts)
+    costs += MISSED_M * (1 - is_ahead.mean(axis=1))
+    first = np.argsort(costs, kind="stable")[:N_FINALISTS]
+    is_seen = _have_in_sight(sight, points[first], seen_from, whereabouts)
+    hidden = (is_ahead[first] & ~is_seen).mean(axis=1)
+    rest_m = np.inf if len(first) < len(costs) else 0.0
+    kept = costs[first] + MISSED_M * hidden
+    costs += rest_m
+    costs[first] = kept
+
+
+def _have_ahead(stands: FloatArray, yaws: FloatArray, places: FloatArray) -> Mask:
+    """Return True for each viewpoint (row) and place (column) ahead of it and near."""
+    east = places[:, 0] - stands[:, :1]
+    north = places[:, 1] - stands[:, 1:]
+    cos, sin = np.cos(yaws)[:, None], np.sin(yaws)[:, None]
+    ahead, aside = east * cos + north * sin, np.abs(north * cos - east * sin)
+    is_near = east * east + north * north <= FACED_M * FACED_M
+    return np.asarray(is_near & (aside <= ahead * math.tan(FACED_RAD)))
+
+
+def _have_in_sight(
+    sight: SightMap, stands: FloatArray, seen_from: Sequence[Point], places: FloatArray
+) -> Mask:
+    """Return True for each standing place (row) and place (column) with nothing between them.
+
+    What was met of a thing is the middle of a cell in a wall; what is seen of it lies before that.
+    """
+    viewers = np.array([(place.x, place.y) for place in seen_from]).reshape(-1, 1, 2)
+    ways = viewers - places
+    far_m = np.maximum(np.hypot(ways[..., 0], ways[..., 1]), 1e-6)
+    before = places + BEFORE_M * (ways / far_m[..., None]).sum(axis=0) / max(len(viewers), 1)
+    away = before[None] - stands[:, None]
+    angles = np.arctan2(away[..., 1], away[..., 0]).ravel() - sight.grid.origin.yaw_rad
+    starts = np.repeat(sight.grid.fractional_cells_at(stands), len(places), axis=0)
+    away_m = np.hypot(away[..., 0], away[..., 1])
+    near_m = sight.cast(sight.obstacle_off, starts, angles, begin_m=0.0, reach_m=away_m.ravel())
+    return np.asarray(near_m.reshape(away_m.shape) >= away_m - _STEP_BACK_M)
+
+
+def _reachable_near(
+    sight: SightMap, distances: DistanceField, target: Point
+) -> tuple[FloatArray, FloatArray]:
+    """Return the middles of reachable cells around a point, and their clearance in metres."""
+    rows, cols, points = _floor_near(sight.grid, target)
+    is_reachable = np.isfinite(distances.distances_at(rows, cols))
+    rows, cols, points = rows[is_reachable], cols[is_reachable], points[is_reachable]
+    # Farther obstacles than this do not matter for standing comfortably.
+    wide_m = LARGEST_OFF_M + distances.radius_m + COMFORT_M
+    down, across = sight.grid.window_around(target, wide_m)
+    clear_m = clearance_m(sight.grid.crop(down, across))
+    return points, clear_m[rows - down.start, cols - across.start].astype(np.float64)
+
+
+def _floor_near(grid: OccupancyGrid, target: Point) -> tuple[IntArray, IntArray, FloatArray]:
+    """Return the free cells from which one might look at a thing: rows, columns, and middles."""
+    down, across = grid.window_around(target, LARGEST_OFF_M)
+    rows, cols = np.nonzero(grid.crop(down, across).free)
+    rows, cols = rows + down.start, cols + across.start
+    points = grid.points_at(rows, cols)
+    is_near = np.hypot(points[:, 0] - target.x, points[:, 1] - target.y) <= LARGEST_OFF_M
+    return rows[is_near], cols[is_near], points[is_near]
+
+
+def find_fronts(sight: SightMap, target: Point, seen_from: Sequence[Point]) -> list[Point]:
+    """Return, for each who saw the thing, the last floor before it on the line there.
+
+    Its middle may lie deep in its own body, where nobody can look.
+    """
+    if not seen_from:
+        return [target]
+    starts = np.array([(place.x, place.y) for place in seen_from])
+    ways = np.arctan2(target.y - starts[:, 1], target.x - starts[:, 0])
+    in_grid = ways - sight.grid.origin.yaw_rad
+    far_m = np.hypot(target.x - starts[:, 0], target.y - starts[:, 1])
+    near_m = sight.cast(sight.obstacle_off, sight.grid.fractional_cells_at(starts), in_grid)
+    # What is seen over furniture has its front behind it.
+    is_over = near_m < far_m - BODY_M
+    until_m = np.where(is_over, far_m, np.minimum(near_m, far_m)) - _STEP_BACK_M
+    ends = starts + until_m[:, None] * np.stack([np.cos(ways), np.sin(ways)], axis=1)
+    return [Point(x, y) for x, y in _last_floor(sight.grid, starts, ends).tolist()]
+
+
+def _last_floor(grid: OccupancyGrid, starts: FloatArray, ends: FloatArray) -> FloatArray:
+    """Find the last floor on each line from a start to an end; the end where there is none."""
+    away_m = np.hypot(*(ends - starts).T)
+    n_steps = np.maximum(np.ceil(away_m / grid.resolution_m), 1)
+    steps = np.arange(int(n_steps.max(initial=0)) + 1)
+    shares = np.maximum(1.0 - steps / n_steps[:, None], 0.0)[..., None]
+    points = ends[:, None] * shares + starts[:, None] * (1.0 - shares)
+    is_floor = grid.look_up(grid.free, points, outside=False)
+    # Where there is none the first is chosen, which is the end.
+    last = np.argmax(is_floor, axis=1)
+    return np.asarray(points[np.arange(len(points)), last])
+
+
+def _are_in_sight(sight: SightMap, fronts: Sequence[Point], points: FloatArray) -> Mask:
+    """Return True for points with nothing between them and any of the fronts of a thing.
+
+    Sight goes both ways, and the fronts are few: one looks from each of them to all sides.
+    """
+    grid = sight.grid
+    at = np.array(list({grid.cell_at(front): (front.x, front.y) for front in fronts}.values()))
+    angles = np.arange(N_RAYS) * (math.tau / N_RAYS)
+    starts = np.repeat(grid.fractional_cells_at(at), N_RAYS, axis=0)
+    east, north = (np.subtract.outer(points[:, axis], at[:, axis]) for axis in (0, 1))
+    away_m = np.hypot(east, north)
+    free_m = sight.cast(
+        sight.obstacle_off,
+        starts,
+        np.tile(angles, len(at)),
+        begin_m=_STEP_BACK_M,
+        reach_m=away_m.max(initial=0.0) + _STEP_BACK_M,
+    ).reshape(len(at), N_RAYS)
+    rays = bearing_index(np.arctan2(north, east) - grid.origin.yaw_rad)
+    is_free = np.take_along_axis(free_m.T, rays, axis=0) >= away_m
+    return np.asarray(is_free.any(axis=1))

@@ -1,0 +1,348 @@
+"""From remembered places to things: the whole way, and each thing in words and numbers."""
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mapspeak.geometry import Point, Pose
+from mapspeak.memory.things.joining import (
+    Group,
+    Posteriors,
+    SameName,
+    agreement_of,
+    group_names,
+    join_sightings,
+)
+from mapspeak.memory.things.likelihood import Surroundings, WeighedView, read_waypoints
+from mapspeak.memory.things.placing import Placement, place, trust_range
+from mapspeak.memory.things.sight import BODY_M, N_RAYS, SightMap, build_sight_map
+from mapspeak.memory.things.thing import NOISE, Category, NoiseModel, Thing, View, name_the_same
+from mapspeak.memory.waypoint import SemanticMap, Waypoint, name_key
+from mapspeak.spatial import OccupancyGrid
+
+PLAIN_SIGHT_M = 5.0
+"""Who stands no farther and has nothing between would see a thing."""
+ELSEWHERE_RAD = math.radians(30)
+"""A view that points so far past a thing says that it is elsewhere."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Located:
+    """Views of one thing, where it is, and how well each view goes with the others."""
+
+    group: tuple[WeighedView, ...]
+    placement: Placement | None
+    agreements: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Things:
+    """All things of a memory on a map; compared by identity.
+
+    Attributes:
+        things: Those with most views first, then by label and place.
+        sight: The map, ready for looking around in it.
+        surroundings: What each waypoint, and each of its standpoints, sees.
+        pools: The things of all views that bear related names, by these views.
+    """
+
+    things: tuple[Thing, ...]
+    sight: SightMap
+    surroundings: dict[Waypoint, Surroundings]
+    pools: dict[tuple[WeighedView, ...], tuple[Thing, ...]]
+
+    def is_in_plain_sight(self, waypoint: Waypoint, point: Point) -> bool:
+        """Return True when nothing is between a waypoint and a point near by."""
+        far_m = waypoint.pose.point.distance_to(point)
+        return far_m <= PLAIN_SIGHT_M and far_m <= self.free_m(waypoint, point) + BODY_M
+
+    def seen_from(self, waypoint: Waypoint) -> tuple[Thing, ...]:
+        """Return the things with a place that were seen from a waypoint."""
+        return tuple(
+            thing
+            for thing in self.things
+            if thing.position is not None and waypoint.name in thing.waypoints
+        )
+
+    def free_m(self, waypoint: Waypoint, point: Point) -> float:
+        """Return how far one sees from a waypoint towards a point before the first obstacle."""
+        return float(self.surroundings[waypoint].near_m[self._ray(waypoint.pose, point)])
+
+    def open_m(self, waypoint: Waypoint, point: Point) -> float:
+        """Return how far one sees towards a point over what one may see over."""
+        return float(self.surroundings[waypoint].far_m[self._ray(waypoint.pose, point)])
+
+    def _ray(self, pose: Pose, point: Point) -> int:
+        angle = pose.point.bearing_to(point) - self.sight.grid.origin.yaw_rad
+        return round(angle * N_RAYS / math.tau) % N_RAYS
+
+
+def find_things(
+    semantic_map: SemanticMap,
+    grid: OccupancyGrid,
+    *,
+    same_name: SameName = name_the_same,
+    noise: NoiseModel = NOISE,
+    earlier: Things | None = None,
+) -> Things:
+    """Join what was seen from all places into things, and say where each is.
+
+    Args:
+        semantic_map: The places.
+        grid: The map they are on.
+        same_name: True for two labels that may be one thing's.
+        noise: What is believed of observers.
+        earlier: What was found before, for the same map and names: what depends on no changed
+            waypoint is taken from it. The answer is the same without.
+    """
+    if earlier is None or not _is_of(earlier.sight, grid, noise):
+        earlier = None
+    sight = earlier.sight if earlier else build_sight_map(grid, noise=noise)
+    surroundings = read_waypoints(
+        sight, semantic_map.waypoints, earlier.surroundings if earlier else {}
+    )
+    found = Things(things=(), sight=sight, surroundings=surroundings, pools={})
+    known = earlier.pools if earlier else {}
+    pools = {
+        pool: known.get(pool) or _describe(found, _solve(sight, pool, same_name), same_name)
+        for pool in _divide(surroundings, same_name)
+    }
+    things = (thing for pool in pools.values() for thing in pool)
+    return replace(found, things=tuple(sorted(things, key=_rank)), pools=pools)
+
+
+def _is_of(sight: SightMap, grid: OccupancyGrid, noise: NoiseModel) -> bool:
+    old = sight.grid
+    is_same_frame = old.resolution_m == grid.resolution_m and old.origin == grid.origin
+    is_same = old is grid or (is_same_frame and np.array_equal(old.cells, grid.cells))
+    return is_same and sight.noise == noise
+
+
+def _divide(
+    surroundings: dict[Waypoint, Surroundings], same_name: SameName
+) -> list[tuple[WeighedView, ...]]:
+    """Return all sightings in pools of related labels, in an order that the file does not set."""
+    ordered = sorted(surroundings, key=_order)
+    every = [each for waypoint in ordered for each in surroundings[waypoint].sightings]
+    pool_of = {
+        label: i
+        for i, group in enumerate(group_names([s.landmark.label for s in every], same_name))
+        for label in group
+    }
+    pools: dict[int, list[WeighedView]] = {}
+    for each in every:
+        pools.setdefault(pool_of[each.landmark.label], []).append(each)
+    return [tuple(pools[i]) for i in sorted(pools)]
+
+
+def _order(waypoint: Waypoint) -> tuple[str, str, float, float, float]:
+    pose = waypoint.pose
+    return name_key(waypoint.name), waypoint.name, pose.x, pose.y, pose.yaw_rad
+
+
+def _solve(
+    sight: SightMap, pool: Sequence[WeighedView], same_name: SameName
+) -> tuple[Located, ...]:
+    placed = [each for each in pool if each.likelihood is not None]
+    posteriors = Posteriors(sight)
+    groups = join_sightings(posteriors, placed, same_name) if placed else []
+    agreed = [agreement_of(sight, group) for group in groups]
+    located = [
+        (group, _place(posteriors, _agreeing(group, shares)))
+        for group, shares in zip(groups, agreed, strict=True)
+    ]
+    lost: list[Group] = [
+        [each]
+        for each in pool
+        if each.likelihood is None and not _add_to_nearest(located, each, same_name)
+    ]
+    return (
+        *(
+            Located(group=tuple(group), placement=placement, agreements=_filled(group, shares))
+            for (group, placement), shares in zip(located, agreed, strict=True)
+        ),
+        *(Located(group=tuple(group), placement=None, agreements=(1.0,)) for group in lost),
+    )
+
+
+def _place(posteriors: Posteriors, group: Group) -> Placement:
+    seen_from = [each.waypoint.pose.point for each in group]
+    posterior, (first, *more) = posteriors.of(group), group
+    if first.landmark.range_m is not None and first.likelihood is not None and not more:
+        posterior = trust_range(
+            posteriors.sight, first.likelihood, seen_from[0], first.landmark.range_m
+        )
+    return place(posteriors.sight, posterior, seen_from)
+
+
+def _agreeing(group: Group, agreements: Sequence[float]) -> Group:
+    """Return the views of a thing that say where it is: two or more that go with each other."""
+    kept = [each for each, share in zip(group, agreements, strict=True) if share >= LEAST_AGREEMENT]
+    return kept if len(kept) >= 2 else group
+
+
+def _filled(group: Group, agreements: tuple[float, ...]) -> tuple[float, ...]:
+    """Return a view without a direction an agreement that says nothing."""
+    return agreements + (1.0,) * (len(group) - len(agreements))
+
+
+def _add_to_nearest(
+    located: list[tuple[Group, Placement]], sighting: WeighedView, same_name: SameName
+) -> bool:
+    """Add a view without a direction to the nearest thing of its name; False where none is."""
+    here = sighting.waypoint.pose.point
+    near = [
+        (here.distance_to(placement.position), i)
+        for i, (group, placement) in enumerate(located)
+        if all(
+            each.waypoint is not sighting.waypoint
+            and same_name(each.landmark.label, sighting.landmark.label)
+            for each in group
+        )
+    ]
+    off_m, i = min(near, default=(math.inf, -1))
+    if off_m > PLAIN_SIGHT_M:
+        return False
+    located[i][0].append(sighting)
+    return True
+
+
+def _describe(found: Things, pool: Sequence[Located], same_name: SameName) -> tuple[Thing, ...]:
+    alone = [each for each in pool if len(each.group) == 1 and each.placement is not None]
+    return tuple(
+        describe_group(
+            each.group,
+            each.placement,
+            agreements=each.agreements,
+            conflicting=_against(found, each, alone, same_name),
+        )
+        for each in pool
+    )
+
+
+def _against(
+    found: Things, located: Located, alone: Sequence[Located], same_name: SameName
+) -> list[WeighedView]:
+    """Find lone views of the name, from where the thing is in plain sight, that point past it."""
+    if located.placement is None or len(located.group) < 2:
+        return []
+    position, own = located.placement.position, [each.waypoint for each in located.group]
+    return [
+        other
+        for (other,) in (each.group for each in alone)
+        if other.waypoint not in own
+        and other.landmark.bearing_rad is not None
+        and other.waypoint.pose.point.distance_to(position) <= PLAIN_SIGHT_M
+        and _off_rad(other, position) >= ELSEWHERE_RAD
+        and same_name(other.landmark.label, located.group[0].landmark.label)
+        and found.is_in_plain_sight(other.waypoint, position)
+    ]
+
+
+def _off_rad(sighting: WeighedView, point: Point) -> float:
+    pose, bearing_rad = sighting.waypoint.pose, sighting.landmark.bearing_rad or 0.0
+    ahead = pose.yaw_rad + bearing_rad
+    return abs(math.remainder(pose.point.bearing_to(point) - ahead, math.tau))
+
+
+def _rank(thing: Thing) -> tuple[int, str, float, float, tuple[str, ...]]:
+    at = thing.position or Point(math.inf, math.inf)
+    return (-len(thing.supporting), thing.label, at.x, at.y, thing.waypoints)
+
+
+LEAST_AGREEMENT = 2.0
+"""A view that is less than so much likelier than by chance, given the others, places nothing."""
+
+_BEST_ODDS = 1e6
+"""However many views agree: they may all be of a map that is wrong."""
+_SAME_PLACE_M = 0.3
+"""Views from nearer to each other share their mistakes and count once."""
+
+
+def describe_group(
+    group: Sequence[WeighedView],
+    placement: Placement | None,
+    *,
+    agreements: Sequence[float],
+    conflicting: Iterable[WeighedView],
+) -> Thing:
+    """Return the thing that a group of views has seen.
+
+    Args:
+        group: The views of it.
+        placement: Where it is; None where no view says.
+        agreements: How well each view goes with the others; 1 is chance.
+        conflicting: Views that say it is elsewhere.
+    """
+    ordered = sorted(group, key=lambda each: name_key(each.waypoint.name))
+    labels = _by_votes(each.landmark.label for each in ordered)
+    position = placement.position if placement else None
+    return Thing(
+        label=labels[0],
+        other_labels=tuple(labels[1:]),
+        category=Category(_by_votes(each.category.value for each in ordered)[0]),
+        purposes=tuple(_by_votes(filter(None, (each.landmark.purpose for each in ordered)))),
+        position=position,
+        uncertainty_m=placement.uncertainty_m if placement else None,
+        supporting=tuple(_view(each, position) for each in ordered),
+        conflicting=tuple(_view(each, position) for each in conflicting),
+        confidence_ratio=_confidence(group, agreements),
+        n_agreeing=_count_agreeing(group, agreements),
+        whereabouts=placement.whereabouts if placement else None,
+    )
+
+
+def _by_votes(words: Iterable[str]) -> list[str]:
+    """Return each once, what was said most often first, then the longer."""
+    counts = Counter(words)
+    return sorted(counts, key=lambda word: (-counts[word], -len(word), word))
+
+
+def _view(sighting: WeighedView, position: Point | None) -> View:
+    pose, bearing_rad = sighting.waypoint.pose, sighting.landmark.bearing_rad
+    far_m = off_rad = None
+    if position is not None and bearing_rad is not None:
+        far_m = pose.point.distance_to(position)
+        ahead_rad = pose.yaw_rad + bearing_rad
+        off_rad = abs(math.remainder(pose.point.bearing_to(position) - ahead_rad, math.tau))
+    return View(
+        waypoint=sighting.waypoint.name,
+        landmark=sighting.landmark,
+        place=pose.point,
+        far_m=far_m,
+        off_rad=off_rad,
+    )
+
+
+def _confidence(group: Sequence[WeighedView], agreements: Sequence[float]) -> float:
+    """Return how likely it is that not all views are wrong: the odds of each, multiplied.
+
+    The first view may be wrong in any way; a further one must be wrong and agree by chance.
+    """
+    odds = 1.0
+    for i, (each, agreement) in enumerate(_from_different_places(group, agreements)):
+        odds *= (1 - each.wrong_ratio) / each.wrong_ratio * (agreement if i else 1.0)
+    odds = min(odds, _BEST_ODDS)
+    return odds / (1 + odds)
+
+
+def _count_agreeing(group: Sequence[WeighedView], agreements: Sequence[float]) -> int:
+    agreeing = [
+        agreement >= LEAST_AGREEMENT for _, agreement in _from_different_places(group, agreements)
+    ]
+    return sum(agreeing)
+
+
+def _from_different_places(
+    group: Sequence[WeighedView], agreements: Sequence[float]
+) -> Iterator[tuple[WeighedView, float]]:
+    """Return the first view from each place, with its agreement."""
+    places = list[Point]()
+    for each, agreement in zip(group, agreements, strict=True):
+        here = each.waypoint.pose.point
+        if all(here.distance_to(other) >= _SAME_PLACE_M for other in places):
+            places.append(here)
+            yield each, agreement

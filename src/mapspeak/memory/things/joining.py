@@ -1,0 +1,295 @@
+"""Which views are of one thing: they may share a label and can meet at one place.
+
+Votes of all views with one name are added up over the map. The place with most votes is a thing;
+the views that speak of it are taken out, at most one from each pose, since who names two sees
+two, and none whose range puts it elsewhere. What is left votes again. Then every view may change
+to the thing that explains it best, and things that are better explained as one are joined.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapspeak.memory.merging import SAME_SPOT_M
+from mapspeak.memory.things.laserchanges import find_log_priors
+from mapspeak.memory.things.likelihood import ViewLikelihood, WeighedView, are_apart
+from mapspeak.memory.things.placing import (
+    Posterior,
+    build_posterior,
+    find_middle,
+    log_evidence,
+    measure_agreement,
+)
+from mapspeak.memory.things.sight import SightMap
+from mapspeak.memory.waypoint import Waypoint
+from mapspeak.spatial.grid import FloatArray, IntArray
+
+SameName = Callable[[str, str], bool]
+Group = list[WeighedView]
+
+LEAST_RATIO = 1.0
+"""A view speaks of a place that it makes likelier than it was."""
+N_SWEEPS = 2
+_NEAR_M = 2.0
+_THINGS_PER_CELL = 0.01
+"""Of one name: about one on twenty metres of wall, in cells of the lattice."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Ballot:
+    """The votes of all views of a pool, sorted by cell.
+
+    Attributes:
+        places: Lattice cells that any view speaks of, rising.
+        at: For each vote, the index of its place.
+        voters: For each vote, the index of its view.
+        ratios: How much likelier the view makes the place.
+        starts: Where the votes of each place begin; one more at the end.
+    """
+
+    places: IntArray
+    at: IntArray
+    voters: IntArray
+    ratios: FloatArray
+    starts: IntArray
+
+    def votes_at(self, indices: IntArray) -> IntArray:
+        """Return the numbers of the votes for some places."""
+        sizes = self.starts[indices + 1] - self.starts[indices]
+        first = np.repeat(self.starts[indices] - np.cumsum(sizes) + sizes, sizes)
+        return first + np.arange(int(sizes.sum()))
+
+
+def group_names(labels: Sequence[str], same_name: SameName) -> list[frozenset[str]]:
+    """Return labels that may, over others, name the same; each label is in one group."""
+    groups: list[set[str]] = []
+    for label in sorted(set(labels)):
+        mine = [group for group in groups if any(same_name(label, other) for other in group)]
+        groups = [group for group in groups if group not in mine]
+        groups.append({label}.union(*mine))
+    return [frozenset(group) for group in groups]
+
+
+def join_sightings(
+    posteriors: "Posteriors", sightings: Sequence[WeighedView], same_name: SameName
+) -> list[Group]:
+    """Divide views of one name into groups: one for each thing.
+
+    Args:
+        posteriors: Those found so far, on the map that counts.
+        sightings: Views whose labels are related, each with a likelihood.
+        same_name: True for two labels that may be one thing's.
+    """
+    ballot = _count(sightings)
+    groups = _take_peaks(posteriors.sight, sightings, ballot, same_name)
+    for _ in range(N_SWEEPS):
+        groups = _sweep(posteriors, sightings, groups, ballot, same_name)
+    return _merge(posteriors, groups, same_name)
+
+
+class Posteriors:
+    """Where things may be, by the groups of views of them; each is worked out once."""
+
+    def __init__(self, sight: SightMap) -> None:
+        self.sight = sight
+        self._known: dict[tuple[WeighedView, ...], Posterior] = {}
+
+    def of(self, group: Group) -> Posterior:
+        """Return where the thing of a group of views may be."""
+        key = tuple(group)
+        if key not in self._known:
+            wrong_ratios = [each.wrong_ratio for each in group]
+            views = [_likelihood(each) for each in group]
+            self._known[key] = build_posterior(self.sight, views, wrong_ratios)
+        return self._known[key]
+
+
+def _count(sightings: Sequence[WeighedView]) -> _Ballot:
+    likelihoods = [_likelihood(each) for each in sightings]
+    cells = np.concatenate([each.cells for each in likelihoods])
+    sizes = [len(each.cells) for each in likelihoods]
+    order = np.argsort(cells, kind="stable")
+    places, starts = np.unique(cells[order], return_index=True)
+    counts = np.diff(np.append(starts, len(cells)))
+    return _Ballot(
+        places=places,
+        at=np.repeat(np.arange(len(places)), counts),
+        voters=np.repeat(np.arange(len(sizes)), sizes)[order],
+        ratios=np.concatenate([each.ratios for each in likelihoods])[order],
+        starts=np.append(starts, len(cells)),
+    )
+
+
+def _take_peaks(
+    sight: SightMap, sightings: Sequence[WeighedView], ballot: _Ballot, same_name: SameName
+) -> list[Group]:
+    news = (_likelihood(each).news for each in sightings)
+    count = _Count(ballot, find_log_priors(sight, ballot.places, news))
+    is_left = np.ones(len(sightings), dtype=np.bool_)
+    groups = []
+    while is_left.any() and (best := count.find_best()) is not None:
+        near = _around(sight, ballot, best)
+        said = ballot.votes_at(near)
+        ratios = np.zeros(len(sightings))
+        np.maximum.at(ratios, ballot.voters[said], ballot.ratios[said])
+        ratios[~is_left] = 0.0
+        chosen = _choose(sightings, ratios, same_name)
+        if not chosen:
+            count.strike(near)
+            continue
+        groups.append([sightings[i] for i in chosen])
+        is_left[chosen] = False
+        for i in chosen:
+            count.take_out(i)
+    return groups + [[sightings[i]] for i in np.flatnonzero(is_left).tolist()]
+
+
+class _Count:
+    """The votes that are left."""
+
+    def __init__(self, ballot: _Ballot, log_priors: FloatArray) -> None:
+        n_places = len(ballot.places)
+        self._at = ballot.at
+        self._weights = np.log1p(ballot.ratios)
+        self._order = np.argsort(ballot.voters, kind="stable")
+        n_voters = int(ballot.voters.max()) + 1
+        self._ends = np.searchsorted(ballot.voters[self._order], np.arange(n_voters + 1))
+        self._n_left = np.bincount(ballot.at, minlength=n_places)
+        votes = np.bincount(ballot.at, weights=self._weights, minlength=n_places)
+        self._votes: FloatArray = votes + log_priors
+
+    def find_best(self) -> int | None:
+        """Return the index of the place with most votes; None when no vote is left."""
+        best = int(np.argmax(self._votes))
+        return best if np.isfinite(self._votes[best]) else None
+
+    def take_out(self, voter: int) -> None:
+        """Take all votes of one view out."""
+        mine = self._order[self._ends[voter] : self._ends[voter + 1]]
+        at = self._at[mine]
+        self._votes[at] -= self._weights[mine]
+        self._n_left[at] -= 1
+        self._votes[at[self._n_left[at] == 0]] = -np.inf
+
+    def strike(self, places: IntArray) -> None:
+        """Take places out at which nothing that is left can be."""
+        self._votes[places] = -np.inf
+
+
+def _around(sight: SightMap, ballot: _Ballot, index: int) -> IntArray:
+    """Return the places at and beside one, as indices."""
+    n_cols = sight.rows.shape[1]
+    steps = np.array([-1, 0, 1])
+    cells = (ballot.places[index] + n_cols * steps[:, None] + steps).ravel()
+    found = np.searchsorted(ballot.places, cells)
+    found = np.minimum(found, len(ballot.places) - 1)
+    return np.asarray(found[ballot.places[found] == cells], dtype=np.intp)
+
+
+def _choose(sightings: Sequence[WeighedView], ratios: FloatArray, same_name: SameName) -> list[int]:
+    """Return the views that speak of a place, the strongest first, one from each pose."""
+    chosen: list[int] = []
+    for i in np.argsort(-ratios, kind="stable").tolist():
+        if ratios[i] < LEAST_RATIO:
+            break
+        if _fits(sightings[i], (sightings[j] for j in chosen), same_name):
+            chosen.append(i)
+    return chosen
+
+
+def _fits(sighting: WeighedView, members: Iterator[WeighedView], same_name: SameName) -> bool:
+    return all(
+        not _are_of_one_look(sighting.waypoint, other.waypoint)
+        and not are_apart(sighting.spot, other.spot)
+        and same_name(sighting.landmark.label, other.landmark.label)
+        for other in members
+    )
+
+
+def _are_of_one_look(one: Waypoint, other: Waypoint) -> bool:
+    """Return True for views of one place from one spot: who names two of a kind there sees two."""
+    if one is other:
+        return True
+    is_same_spot = one.pose.point.distance_to(other.pose.point) < SAME_SPOT_M
+    return one.name == other.name and is_same_spot
+
+
+def _sweep(
+    posteriors: Posteriors,
+    sightings: Sequence[WeighedView],
+    groups: list[Group],
+    ballot: _Ballot,
+    same_name: SameName,
+) -> list[Group]:
+    """Return every view to the thing that explains it best; what is alone may join another."""
+    ratios = np.zeros((len(sightings), len(groups)))
+    number = {id(sighting): i for i, sighting in enumerate(sightings)}
+    for j, group in enumerate(groups):
+        ratios[:, j] = _explain(ballot, posteriors.of(group), len(sightings))
+        if len(group) == 1:
+            ratios[number[id(group[0])], j] = LEAST_RATIO
+    taken: list[Group] = [[] for _ in groups]
+    is_left = np.ones(len(sightings), dtype=np.bool_)
+    rows, cols = np.nonzero(ratios >= LEAST_RATIO)
+    for k in np.argsort(-ratios[rows, cols], kind="stable").tolist():
+        i, j = int(rows[k]), int(cols[k])
+        if is_left[i] and _fits(sightings[i], iter(taken[j]), same_name):
+            taken[j].append(sightings[i])
+            is_left[i] = False
+    alone = [[sightings[i]] for i in np.flatnonzero(is_left).tolist()]
+    return [group for group in taken if group] + alone
+
+
+def _explain(ballot: _Ballot, posterior: Posterior, n_views: int) -> FloatArray:
+    """Return how much likelier each view is, given where a thing may be."""
+    indices = np.searchsorted(ballot.places, posterior.cells)
+    said = ballot.votes_at(indices)
+    weights = np.repeat(posterior.weights, np.diff(ballot.starts)[indices])
+    explained = np.bincount(
+        ballot.voters[said], weights=weights * ballot.ratios[said], minlength=n_views
+    )
+    return np.asarray(explained, dtype=np.float64)
+
+
+def _merge(posteriors: Posteriors, groups: list[Group], same_name: SameName) -> list[Group]:
+    """Join things that are better explained as one, the nearest first."""
+    sight = posteriors.sight
+    middles = [find_middle(sight, posteriors.of(group)) for group in groups]
+    at = np.array(middles).reshape(-1, 2)
+    off_m = np.hypot(*(np.subtract.outer(at[:, k], at[:, k]) for k in (0, 1)))
+    first, second = np.nonzero(np.tril(off_m <= _NEAR_M, k=-1))
+    pairs = sorted(zip(off_m[first, second].tolist(), first.tolist(), second.tolist(), strict=True))
+    owner = list(range(len(groups)))
+    merged = dict(enumerate(groups))
+    for _, i, j in pairs:
+        a, b = owner[i], owner[j]
+        if a != b and _are_one(sight, merged[a], merged[b], same_name):
+            merged[b] = merged[b] + merged.pop(a)
+            owner = [b if each == a else each for each in owner]
+    return list(merged.values())
+
+
+def _are_one(sight: SightMap, some: Group, others: Group, same_name: SameName) -> bool:
+    if not all(_fits(each, iter(others), same_name) for each in some):
+        return False
+    apart = _evidence(sight, some) + _evidence(sight, others) + np.log(_THINGS_PER_CELL)
+    return bool(_evidence(sight, some + others) > apart)
+
+
+def agreement_of(sight: SightMap, group: Group) -> tuple[float, ...]:
+    """Return how well each view of a group goes with the others; 1 is chance."""
+    return measure_agreement(
+        sight, [_likelihood(each) for each in group], [each.wrong_ratio for each in group]
+    )
+
+
+def _evidence(sight: SightMap, group: Group) -> float:
+    return log_evidence(
+        sight, [_likelihood(each) for each in group], [each.wrong_ratio for each in group]
+    )
+
+
+def _likelihood(sighting: WeighedView) -> ViewLikelihood:
+    assert sighting.likelihood is not None, "joined views say where"  # noqa: S101 - our belief
+    return sighting.likelihood

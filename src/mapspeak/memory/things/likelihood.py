@@ -1,0 +1,274 @@
+"""What views say of where their thing is: a likelihood over the cells in sight."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapspeak.geometry import Point, Pose
+from mapspeak.memory.laserfan import LaserFan
+from mapspeak.memory.things.laserchanges import LaserNews, read_news
+from mapspeak.memory.things.sight import BODY_M, SightMap, bearing_index, look_around
+from mapspeak.memory.things.thing import Category, NoiseModel
+from mapspeak.memory.waypoint import Landmark, Waypoint
+from mapspeak.spatial.grid import FloatArray, IntArray
+
+N_SIGMAS = 2.5
+"""Of views of one thing, one pair in twenty lies farther apart (chi-squared, two dimensions).
+
+One such pair in twenty splits a thing in two, which makes it ambiguous and so is told; joining two
+things makes one in a wrong place that nothing tells. Hence no wider; narrower splits ever more.
+"""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RangedSpot:
+    """A point in the map frame, and its covariance in square metres.
+
+    Attributes:
+        point: The end of the line of sight.
+        xx: The variance along x.
+        xy: The covariance of x and y.
+        yy: The variance along y.
+    """
+
+    point: Point
+    xx: float
+    xy: float
+    yy: float
+
+
+def find_spot(pose: Pose, landmark: Landmark, noise: NoiseModel) -> RangedSpot | None:
+    """Return where a landmark says that its thing is; None without a direction or a range."""
+    if landmark.bearing_rad is None or landmark.range_m is None:
+        return None
+    way, far_m = pose.yaw_rad + landmark.bearing_rad, landmark.range_m
+    # A range ends at the surface or in the middle of a thing; nobody says which.
+    body = (BODY_M / 2) ** 2
+    along = (noise.range_m + noise.range_ratio * far_m) ** 2 + body
+    across = (noise.bearing_rad * far_m) ** 2 + body
+    cos, sin = math.cos(way), math.sin(way)
+    return RangedSpot(
+        point=Point(pose.x + far_m * cos, pose.y + far_m * sin),
+        xx=along * cos * cos + across * sin * sin,
+        xy=(along - across) * cos * sin,
+        yy=along * sin * sin + across * cos * cos,
+    )
+
+
+def are_apart(one: RangedSpot | None, other: RangedSpot | None) -> bool:
+    """Return True for two spots so far apart that one thing is hardly in both."""
+    if one is None or other is None:
+        return False
+    dx, dy = one.point.x - other.point.x, one.point.y - other.point.y
+    xx, xy, yy = one.xx + other.xx, one.xy + other.xy, one.yy + other.yy
+    squared = (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy)
+    return squared > N_SIGMAS**2
+
+
+_FARTHEST_SIGMAS = 3.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Outlook:
+    """The lattice cells in sight of a place; arrays of one length but for the two by ray.
+
+    Attributes:
+        cells: Flat indices into the lattice, rising.
+        angles: Where they are, in the frame of the grid.
+        ranges_m: How far they are.
+        sight: How likely one sees that far: 1, or less behind what one may see over.
+        near_m: To the first obstacle, by ray.
+        far_m: To the first wall, by ray.
+    """
+
+    cells: IntArray
+    angles: FloatArray
+    ranges_m: FloatArray
+    sight: FloatArray
+    near_m: FloatArray
+    far_m: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ViewLikelihood:
+    """The cells that a view speaks of, and how much more likely each is than without it.
+
+    Attributes:
+        cells: Flat indices into the lattice, rising.
+        ratios: How much more likely.
+        news: What the laser knew better than the map, wherever the thing is; None for nothing.
+    """
+
+    cells: IntArray
+    ratios: FloatArray
+    news: LaserNews | None = None
+
+
+def build_outlook(sight: SightMap, pose: Pose, near_m: FloatArray, far_m: FloatArray) -> Outlook:
+    """Find the lattice cells in sight of a place.
+
+    Args:
+        sight: The map.
+        pose: Where one looks from.
+        near_m: How far one sees to the first obstacle, by ray.
+        far_m: How far to the first wall, by ray.
+    """
+    res_m, factor = sight.grid.resolution_m, sight.factor
+    row, col = sight.grid.fractional_cells_at(np.array([[pose.x, pose.y]]))[0].tolist()
+    reach = (float(far_m.max()) + BODY_M) / res_m
+    sizes, places = sight.rows.shape, (row, col)
+    low, high = (
+        [
+            int(np.clip(round_to((at + side) / factor), 0, size))
+            for at, size in zip(places, sizes, strict=True)
+        ]
+        for round_to, side in ((np.floor, -reach), (np.ceil, reach))
+    )
+    window = (slice(low[0], high[0]), slice(low[1], high[1]))
+    down, right = sight.rows[window] - row, sight.cols[window] - col
+    ranges_m, angles = np.hypot(down, right) * res_m, np.arctan2(down, right)
+    rays = bearing_index(angles)
+    is_near, is_far = ranges_m <= near_m[rays] + BODY_M, ranges_m <= far_m[rays] + BODY_M
+    rows, cols = np.nonzero(is_far)
+    return Outlook(
+        cells=(rows + low[0]) * sight.rows.shape[1] + cols + low[1],
+        angles=angles[is_far],
+        ranges_m=ranges_m[is_far],
+        sight=np.where(is_near[is_far], 1.0, sight.noise.seen_over_ratio),
+        near_m=near_m,
+        far_m=far_m,
+    )
+
+
+def weigh_view(
+    sight: SightMap, outlook: Outlook, pose: Pose, landmark: Landmark
+) -> ViewLikelihood | None:
+    """Return what a landmark's direction and range say; None where it has neither."""
+    if landmark.bearing_rad is None and landmark.range_m is None:
+        return None
+    cells, ratios, ranges_m = outlook.cells, outlook.sight, outlook.ranges_m
+    news = None
+    if landmark.bearing_rad is not None:
+        sigma = sight.noise.bearing_rad
+        ahead = pose.yaw_rad + landmark.bearing_rad - sight.grid.origin.yaw_rad
+        off = np.abs(np.remainder(outlook.angles - ahead + math.pi, math.tau) - math.pi)
+        near = np.flatnonzero(off <= _FARTHEST_SIGMAS * sigma)
+        bell = np.exp(-0.5 * (off[near] / sigma) ** 2) * (math.sqrt(math.tau) / sigma)
+        cells, ratios, ranges_m = cells[near], ratios[near], ranges_m[near]
+        if landmark.laser is not None:
+            news, ratios = _correct(sight, outlook, pose, landmark.laser, near)
+        ratios = ratios * bell
+    if landmark.range_m is not None:
+        ratios = ratios * _weigh_range(sight, ranges_m, landmark.range_m)
+    return ViewLikelihood(cells=cells, ratios=ratios, news=news)
+
+
+def _correct(
+    sight: SightMap, outlook: Outlook, pose: Pose, fan: LaserFan, near: IntArray
+) -> tuple[LaserNews | None, FloatArray]:
+    """Return what the laser knows better, and how likely one sees as far as each cell with it."""
+    seen = outlook.sight[near]
+    found = read_news(
+        sight,
+        pose,
+        fan,
+        near_m=outlook.near_m,
+        cells=outlook.cells[near],
+        angles=outlook.angles[near],
+        ranges_m=outlook.ranges_m[near],
+    )
+    if found is None:
+        return None, seen
+    seen[found.changed] = found.sight
+    return found.news, seen
+
+
+def _weigh_range(sight: SightMap, ranges_m: FloatArray, told_m: float) -> FloatArray:
+    noise = sight.noise
+    sigma = noise.range_m + noise.range_ratio * ranges_m
+    bell = np.exp(-0.5 * ((told_m - ranges_m) / sigma) ** 2) / (sigma * math.sqrt(math.tau))
+    wrong = noise.wrong_range_ratio
+    return np.asarray((1 - wrong) * bell * noise.reach_m + wrong, dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WeighedView:
+    """One landmark of one waypoint; compared by identity.
+
+    Attributes:
+        waypoint: From where it was seen: the standpoint, whose pose is the one it was seen from.
+        landmark: What was seen.
+        category: What it is filed under.
+        wrong_ratio: How likely it is wrong as a whole.
+        likelihood: Where it may be; None where nothing says.
+        spot: Where its direction and range together say that it is; None without both.
+    """
+
+    waypoint: Waypoint
+    landmark: Landmark
+    category: Category
+    wrong_ratio: float
+    likelihood: ViewLikelihood | None
+    spot: RangedSpot | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Surroundings:
+    """What a waypoint sees of the map, and its sightings.
+
+    Attributes:
+        near_m: To the first obstacle, by ray of the grid's frame.
+        far_m: To the first wall.
+        sightings: Of all its landmarks; none where its standpoints have them.
+    """
+
+    near_m: FloatArray
+    far_m: FloatArray
+    sightings: tuple[WeighedView, ...]
+
+
+def read_waypoints(
+    sight: SightMap, waypoints: Sequence[Waypoint], known: Mapping[Waypoint, Surroundings]
+) -> dict[Waypoint, Surroundings]:
+    """Return what every waypoint sees, and what was seen from each of its standpoints.
+
+    What is known of an equal one is taken as it is.
+    """
+    stands = [stand for waypoint in waypoints for stand in waypoint.standpoints]
+    every = dict.fromkeys((*waypoints, *stands))
+    new = [waypoint for waypoint in every if waypoint not in known]
+    near_m, far_m = look_around(sight, [waypoint.pose for waypoint in new])
+    read = {
+        waypoint: _read(sight, waypoint, near, far)
+        for waypoint, near, far in zip(new, near_m, far_m, strict=True)
+    }
+    return {waypoint: known.get(waypoint) or read[waypoint] for waypoint in every}
+
+
+def _read(
+    sight: SightMap, waypoint: Waypoint, near_m: FloatArray, far_m: FloatArray
+) -> Surroundings:
+    if waypoint.standpoints != (waypoint,):
+        return Surroundings(near_m=near_m, far_m=far_m, sightings=())
+    outlook = build_outlook(sight, waypoint.pose, near_m, far_m)
+    sorted_in = (
+        (Category.SAFETY, waypoint.safety_landmarks),
+        (Category.FUNCTIONAL, waypoint.functional_landmarks),
+    )
+    sightings = []
+    for category, landmarks in sorted_in:
+        for landmark in landmarks:
+            likelihood = weigh_view(sight, outlook, waypoint.pose, landmark)
+            sightings.append(
+                WeighedView(
+                    waypoint=waypoint,
+                    landmark=landmark,
+                    category=category,
+                    wrong_ratio=sight.noise.wrong_ratio_of(landmark.confidence),
+                    likelihood=likelihood if likelihood and np.any(likelihood.ratios) else None,
+                    spot=find_spot(waypoint.pose, landmark, sight.noise),
+                )
+            )
+    return Surroundings(near_m=near_m, far_m=far_m, sightings=tuple(sightings))

@@ -1,0 +1,166 @@
+"""A thing as it is remembered, and the views that speak for it and against it."""
+
+import math
+import re
+import unicodedata
+from dataclasses import dataclass, field
+from enum import StrEnum
+from functools import lru_cache
+
+from mapspeak.geometry import Point
+from mapspeak.memory.waypoint import Confidence, Landmark
+from mapspeak.spatial.grid import FloatArray
+
+_LOOKS = frozenset(
+    """
+    a an another big black blue brown dark fixed front green grey gray large left light little long
+    main metal mounted new old one orange other pink purple red right round second short silver
+    small some tall the third two wall white wooden yellow
+    """.split()  # noqa: SIM905 - forty words in quotes would hide what they are
+)
+"""Words for how a thing looks or stands: one observer says them, the next does not."""
+
+
+def name_the_same(label: str, other: str) -> bool:
+    """Return True when one label says no more than the other leaves open, and both end in one noun.
+
+    "extinguisher", "red extinguisher" and "fire extinguishers" name the same; "coffee machine" and
+    "washing machine" do not, though "machine" may be either.
+    """
+    words, others = _words_of(label), _words_of(other)
+    return words[-1] == others[-1] and (set(words) <= set(others) or set(others) <= set(words))
+
+
+@lru_cache(maxsize=4096)
+def _words_of(label: str) -> tuple[str, ...]:
+    letters = unicodedata.normalize("NFKD", label.casefold())
+    plain = "".join(c for c in letters if not unicodedata.combining(c))
+    # A place or a detail after the noun, as in "sink with a mirror", does not change the noun.
+    head = re.split(r"\b(?:with|on|in|at|near|under|behind|beside|for|of)\b|[,(;]", plain)[0]
+    words = [_singular(word) for word in re.findall(r"[^\W\d_]+", head) or [plain.strip()]]
+    return tuple(word for word in words if word not in _LOOKS) or tuple(words)
+
+
+def _singular(word: str) -> str:
+    if len(word) > 4 and word.endswith(("ses", "xes", "zes", "ches", "shes")):
+        return word[:-2]
+    if len(word) > 4 and word.endswith("ies"):
+        return word[:-3] + "y"
+    return word[:-1] if len(word) > 3 and word.endswith("s") and word[-2] not in "su" else word
+
+
+_DOUBTS = {Confidence.CERTAIN: 0.5, Confidence.LIKELY: 1.0, Confidence.UNSURE: 2.0, None: 1.0}
+"""How many times as often as usual an observer errs, by its own word."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoiseModel:
+    """What is believed of observers, before anything was observed; fitted to no map.
+
+    A view is wrong as a whole now and then, in its label or its direction, and then says nothing
+    of the thing; else its direction is off by a Gaussian, and its range, where it has one, too.
+
+    Attributes:
+        bearing_rad: Standard deviation of a direction: what people and models read off a picture.
+        wrong_ratio: The share of views that are wrong as a whole.
+        range_m: The part of a range's standard deviation that is the same near and far.
+        range_ratio: The part that grows with the range.
+        wrong_range_ratio: The share of ranges that are wrong where the direction is right. Small,
+            for most errors take both, and those `wrong_ratio` counts; not 0, so that a range that
+            fits nothing in sight leaves the direction its say.
+        seen_over_ratio: How often one sees over something that stands free, such as a table.
+        floor_per_m: Things on a square metre of floor for those on a metre of wall or furniture.
+        reach_m: Nobody names a thing that is farther.
+        laser_m: Standard deviation of where the middle of a cell is that a beam of the laser ended
+            in: what pose and map are good to, and half a cell.
+        laser_news_m: A beam that ends nearer to something on the map has met just that.
+        laser_met_ratio: How often what a laser met and the map has not is as good a place for a
+            thing as what the map has: the rest are people, and what is gone tomorrow.
+        laser_through_ratio: How likely a thing still is where the map has something that a beam
+            passed, for those where the map is right: the laser looks at one height, and things
+            hang above it and lie below it.
+    """
+
+    bearing_rad: float = math.radians(10)
+    wrong_ratio: float = 0.2
+    range_m: float = 0.1
+    range_ratio: float = 0.15
+    wrong_range_ratio: float = 0.02
+    seen_over_ratio: float = 0.5
+    floor_per_m: float = 0.1
+    reach_m: float = 10.0
+    laser_m: float = 0.15
+    laser_news_m: float = 0.3
+    laser_met_ratio: float = 0.9
+    laser_through_ratio: float = 0.8
+
+    def wrong_ratio_of(self, confidence: Confidence | None) -> float:
+        """Return how often views are wrong whose observer was so sure."""
+        return min(self.wrong_ratio * _DOUBTS[confidence], 0.5)
+
+
+NOISE = NoiseModel()
+
+
+class Category(StrEnum):
+    """How the filtering policy sorts a thing."""
+
+    SAFETY = "safety"
+    FUNCTIONAL = "functional"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """One landmark, as it was seen from one pose, and what it says of a thing.
+
+    Attributes:
+        waypoint: The name of the place it was seen from.
+        landmark: What was seen.
+        place: Where it was seen from: that waypoint's place, or the view's own.
+        far_m: From there to the thing; None where the view says no direction or the thing has no
+            position.
+        off_rad: How far the view points past the thing, without a sign; None as before.
+    """
+
+    waypoint: str
+    landmark: Landmark
+    place: Point
+    far_m: float | None = None
+    off_rad: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Thing:
+    """One thing in the building, out of everything that was seen of it. It has no id.
+
+    Attributes:
+        label: What most views call it.
+        other_labels: What else it was called.
+        category: What most views file it under.
+        purposes: What it is good for, each once.
+        position: Where it is; None where no view says a direction.
+        uncertainty_m: The radius around the position that holds it with 90 %; None without one.
+        supporting: Views of it, by waypoint; one waypoint may have several, each from its pose.
+        conflicting: Views that say otherwise.
+        confidence_ratio: That there is such a thing there, by its views alone.
+        n_agreeing: From how many different places it was seen by views that agree on where it is.
+        whereabouts: Points of the map frame, shape (n, 2), locked: its surface is as likely at any
+            as at any other. None without a position; no part of what makes two things equal.
+    """
+
+    label: str
+    other_labels: tuple[str, ...]
+    category: Category
+    purposes: tuple[str, ...]
+    position: Point | None
+    uncertainty_m: float | None
+    supporting: tuple[View, ...]
+    conflicting: tuple[View, ...]
+    confidence_ratio: float
+    n_agreeing: int
+    whereabouts: FloatArray | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def waypoints(self) -> tuple[str, ...]:
+        """The places it was seen from, each once."""
+        return tuple(dict.fromkeys(view.waypoint for view in self.supporting))

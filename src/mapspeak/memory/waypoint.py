@@ -1,0 +1,249 @@
+"""A remembered place, what is seen from it, and all places of one map (paper eq. 8 and 9)."""
+
+import math
+import unicodedata
+from dataclasses import dataclass, replace
+from datetime import datetime
+from enum import StrEnum
+
+from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import Pose, wrap_angle
+from mapspeak.memory.laserfan import LaserFan
+
+_JOINERS = "\u200c\u200d"
+"""Invisible, yet part of how Persian, Indic and emoji words are written."""
+
+
+def clean_line(text: str) -> str:
+    """Return the text on one line: every run of spaces and unprintable characters is one space."""
+    if not text.isprintable():
+        text = "".join(c if c.isprintable() or c in _JOINERS else " " for c in text)
+    return " ".join(text.split())
+
+
+def clean_text(text: str) -> str:
+    """Return the text with every line cleaned and empty lines at its ends cut."""
+    lines = text.replace("\r\n", "\n").split("\n")
+    return "\n".join(map(clean_line, lines)).strip("\n")
+
+
+def name_key(name: str) -> str:
+    """Return what the spellings of a place's name have in common: no case, no spaces."""
+    return clean_line(unicodedata.normalize("NFKC", name).casefold())
+
+
+class Confidence(StrEnum):
+    """How sure an observer was of what it saw, in its own word."""
+
+    CERTAIN = "certain"
+    LIKELY = "likely"
+    UNSURE = "unsure"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Landmark:
+    """A thing seen from a waypoint. Only the label is always known.
+
+    It has the pose, the time and the picture of its own waypoint where it does not say otherwise
+    (`Waypoint.pose_of`, `Waypoint.dated`), and always its map and the room it was seen from.
+
+    Attributes:
+        label: What it is, in a few words.
+        purpose: What it is good for.
+        bearing_rad: Its direction from the heading of the pose it was seen from, left positive.
+        range_m: Its distance from that pose.
+        range_from: What measured that; None where the observer judged it.
+        confidence: How sure the observer was; None where it did not say.
+        note: Anything else.
+        picture: The picture it was seen in, by its relative name, if not the waypoint's.
+        stamp_s: Robot time it was last seen at, if not the waypoint's.
+        recorded_at: The same by the calendar, with its time zone, if not the waypoint's.
+        pose: The pose it was seen from, in the map frame, if not the waypoint's.
+        laser: What the robot's laser met around that direction, from that pose.
+
+    Raises:
+        SemanticMapError: The label is empty, a number is not finite or below zero, or the time has
+            no zone.
+    """
+
+    label: str
+    purpose: str | None = None
+    bearing_rad: float | None = None
+    range_m: float | None = None
+    confidence: Confidence | None = None
+    note: str | None = None
+    picture: str | None = None
+    stamp_s: float | None = None
+    recorded_at: datetime | None = None
+    pose: Pose | None = None
+    range_from: str | None = None
+    laser: LaserFan | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "label", _required_line(self.label, "A landmark's label"))
+        _clean_lines(self, "purpose", "note", "picture", "range_from")
+        if self.bearing_rad is not None:
+            _require(math.isfinite(self.bearing_rad), f"The bearing of {self.label!r}", "an angle")
+            object.__setattr__(self, "bearing_rad", wrap_angle(self.bearing_rad))
+        if self.range_m is not None:
+            is_distance = math.isfinite(self.range_m) and self.range_m >= 0
+            _require(is_distance, f"The range of {self.label!r}", "0 m or more")
+        if self.pose is not None:
+            is_finite = self.pose.is_finite()
+            _require(is_finite, f"The pose of {self.label!r}", "three finite numbers")
+        _require_time(self.stamp_s, self.recorded_at, self.label)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Waypoint:
+    """A remembered place (paper eq. 8).
+
+    Attributes:
+        name: How people call it; unique in its map, whatever its case (`name_key`).
+        description: The place in natural language; may have several lines.
+        pose: From where it was observed, in the map frame.
+        safety_landmarks: Fixed safety equipment.
+        functional_landmarks: Fixed equipment and objects that tasks need.
+        geometric_features: Persistent layout, such as "corner of two walls".
+        stamp_s: Robot time of the observation.
+        recorded_at: The same by the calendar, with its time zone.
+        map_id: Which map the pose belongs to; None where the store decides.
+        room_id: The room or corridor it was observed from, by the id that it had then.
+        picture: The picture that was taken there, by its relative name.
+
+    Raises:
+        SemanticMapError: The name is empty, the pose or stamp not finite, or the time has no zone.
+    """
+
+    name: str
+    pose: Pose
+    description: str = ""
+    safety_landmarks: tuple[Landmark, ...] = ()
+    functional_landmarks: tuple[Landmark, ...] = ()
+    geometric_features: tuple[str, ...] = ()
+    stamp_s: float | None = None
+    recorded_at: datetime | None = None
+    map_id: str | None = None
+    room_id: str | None = None
+    picture: str | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", _required_line(self.name, "A waypoint's name"))
+        object.__setattr__(self, "description", clean_text(self.description))
+        features = (clean_line(feature) for feature in self.geometric_features)
+        object.__setattr__(self, "geometric_features", tuple(filter(None, features)))
+        _require(self.pose.is_finite(), f"The pose of {self.name!r}", "three finite numbers")
+        _clean_lines(self, "room_id", "picture")
+        _require_time(self.stamp_s, self.recorded_at, self.name)
+
+    @property
+    def landmarks(self) -> tuple[Landmark, ...]:
+        """The safety landmarks, then the functional ones."""
+        return self.safety_landmarks + self.functional_landmarks
+
+    @property
+    def standpoints(self) -> tuple["Waypoint", ...]:
+        """The place once for each pose it was observed from, with what was seen from there.
+
+        Its own pose comes first, also where nothing was seen from it.
+        """
+        poses = dict.fromkeys((self.pose, *map(self.pose_of, self.landmarks)))
+        if len(poses) == 1:
+            return (self,)
+        return tuple(
+            replace(
+                self,
+                pose=pose,
+                safety_landmarks=self._seen_from(pose, self.safety_landmarks),
+                functional_landmarks=self._seen_from(pose, self.functional_landmarks),
+            )
+            for pose in poses
+        )
+
+    def pose_of(self, landmark: Landmark) -> Pose:
+        """Return the pose that one of its landmarks was seen from, in the map frame."""
+        return landmark.pose or self.pose
+
+    def moved(self, motion: Pose) -> "Waypoint":
+        """Return it with all its poses in another frame; ids of rooms mean nothing there.
+
+        Args:
+            motion: From the frame of its poses to the new one.
+        """
+        return replace(
+            self,
+            pose=motion @ self.pose,
+            room_id=None,
+            safety_landmarks=tuple(_moved(each, motion) for each in self.safety_landmarks),
+            functional_landmarks=tuple(_moved(each, motion) for each in self.functional_landmarks),
+        )
+
+    def _seen_from(self, pose: Pose, landmarks: tuple[Landmark, ...]) -> tuple[Landmark, ...]:
+        return tuple(each for each in landmarks if self.pose_of(each) == pose)
+
+    def dated(self, landmark: Landmark) -> Landmark:
+        """Return one of its landmarks with the time and picture that it has from this waypoint.
+
+        A landmark with a time of its own was last seen in an earlier picture, if in any.
+        """
+        if landmark.stamp_s is not None or landmark.recorded_at is not None:
+            return landmark
+        return replace(
+            landmark,
+            stamp_s=self.stamp_s,
+            recorded_at=self.recorded_at,
+            picture=landmark.picture or self.picture,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SemanticMap:
+    """All remembered places of one map (paper eq. 9).
+
+    Attributes:
+        map_id: Which map the poses belong to; None where nobody said.
+        waypoints: In the order of the file.
+        warnings: What its reader should know: another map's places, a file that is broken by now,
+            a key that looks misspelt.
+    """
+
+    map_id: str | None = None
+    waypoints: tuple[Waypoint, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    def find_waypoint(self, name: str) -> Waypoint | None:
+        """Return the place of that name, whatever its case, or None."""
+        key = name_key(name)
+        return next((place for place in self.waypoints if name_key(place.name) == key), None)
+
+
+def _moved(landmark: Landmark, motion: Pose) -> Landmark:
+    return landmark if landmark.pose is None else replace(landmark, pose=motion @ landmark.pose)
+
+
+def _clean_lines(value: Landmark | Waypoint, *names: str) -> None:
+    """Put texts that may be absent on one line, and None where nothing is left of them."""
+    for name in names:
+        text = getattr(value, name)
+        if text is not None:
+            object.__setattr__(value, name, clean_line(text) or None)
+
+
+def _require_time(stamp_s: float | None, recorded_at: datetime | None, name: str) -> None:
+    if stamp_s is not None:
+        is_finite = math.isfinite(stamp_s)
+        _require(is_finite, f"The stamp of {name!r}", "a finite number of seconds")
+    if recorded_at is not None:
+        _require(recorded_at.tzinfo is not None, f"The time of {name!r}", "a time with its zone")
+
+
+def _required_line(text: str, what: str) -> str:
+    line = clean_line(text)
+    _require(bool(line), what, "at least one visible character")
+    return line
+
+
+def _require(is_right: object, what: str, expected: str) -> None:
+    if not is_right:
+        message = f"{what} is not {expected}."
+        raise SemanticMapError(message, hint=f"Give {expected} and write it again.")

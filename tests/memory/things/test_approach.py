@@ -1,0 +1,81 @@
+"""Where one stands to look at a thing."""
+
+import math
+
+import numpy as np
+
+from drawing import grid_from_text
+from mapspeak.geometry import Point, Pose
+from mapspeak.memory.things import build_sight_map, find_approach, measure_faced
+from mapspeak.spatial.grid import FloatArray
+from mapspeak.spatial.paths import distances_from
+
+WITH_CUPBOARD = """
+    #########################
+    #.........#####.........#
+    #.........#####.........#
+    #.........#####.........#
+    #.........#####.........#
+    #.......................#
+    #.......................#
+    #.......................#
+    #.......................#
+    #.......................#
+    #########################
+"""
+
+
+def test_one_stands_before_a_thing_whose_middle_lies_deep_in_its_own_body() -> None:
+    grid = grid_from_text(WITH_CUPBOARD, resolution_m=0.25)
+    middle, viewer = Point(3.1, 2.0), Point(3.1, 0.5)
+    distances = distances_from(grid, Point(1.0, 0.6), radius_m=0.2)
+    pose = find_approach(build_sight_map(grid), distances, middle, [viewer])
+    assert pose is not None
+    assert pose.y < 1.5
+    assert pose.point.distance_to(middle) <= 1.5
+    assert math.isclose(pose.yaw_rad, pose.point.bearing_to(middle))
+
+
+HALL = """
+    ########################################
+    #......................................#
+    #......................................#
+    #......................................#
+    #......................................#
+    #......................................#
+    #......................................#
+    #......................................#
+    #......................................#
+    #......................................#
+    ########################################
+"""
+
+
+def spread_along_north_wall(half_width_m: float) -> FloatArray:
+    xs = np.linspace(3.0 - half_width_m, 3.0 + half_width_m, 21)
+    return np.stack([xs, np.full(21, 1.55)], axis=1)
+
+
+def test_the_less_is_known_of_where_a_thing_is_the_more_of_it_one_stands_back_to_face() -> None:
+    grid = grid_from_text(HALL, resolution_m=0.15)
+    sight, distances = build_sight_map(grid), distances_from(grid, Point(1.0, 0.6), radius_m=0.2)
+    target, seen_from = Point(3.0, 1.55), [Point(2.5, 0.4)]
+    known, vague = (spread_along_north_wall(half_width_m) for half_width_m in (0.1, 0.9))
+    near = find_approach(sight, distances, target, seen_from, whereabouts=known)
+    back = find_approach(sight, distances, target, seen_from, whereabouts=vague)
+    assert near is not None
+    assert back is not None
+    assert back.point.distance_to(target) > near.point.distance_to(target)
+    assert measure_faced(sight, near, seen_from, known) == 1.0
+    assert measure_faced(sight, back, seen_from, vague) > measure_faced(
+        sight, near, seen_from, vague
+    )
+
+
+def test_what_lies_behind_a_wall_or_behind_ones_back_is_not_faced() -> None:
+    grid = grid_from_text(WITH_CUPBOARD, resolution_m=0.25)
+    sight, viewer = build_sight_map(grid), Point(2.0, 2.0)
+    beside = np.array([[2.6, 2.0]])
+    assert measure_faced(sight, Pose(1.6, 2.0, 0.0), [viewer], beside) == 1.0
+    assert measure_faced(sight, Pose(1.6, 2.0, math.pi), [viewer], beside) == 0.0
+    assert measure_faced(sight, Pose(4.0, 2.0, math.pi), [viewer], beside) == 0.0

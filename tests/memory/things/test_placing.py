@@ -1,0 +1,51 @@
+"""How far one view alone says where a thing is."""
+
+import pytest
+
+from drawing import grid_from_text
+from mapspeak.geometry import Pose
+from mapspeak.memory import Landmark, SemanticMap, Waypoint
+from mapspeak.memory.things import Thing, find_things
+
+CORRIDOR = """
+    ##################################################
+    #................................................#
+    #................................................#
+    #................................................#
+    #................................................#
+    #................................................#
+    #................................................#
+    #................................................#
+    ##################################################
+"""
+
+
+def seen_down_the_corridor(range_m: float | None) -> Thing:
+    mark = Landmark(label="chair", bearing_rad=0.0, range_m=range_m)
+    place = Waypoint(name="a", pose=Pose(1.0, 1.2, 0.0), functional_landmarks=(mark,))
+    grid = grid_from_text(CORRIDOR, resolution_m=0.25)
+    (thing,) = find_things(SemanticMap(waypoints=(place,)), grid).things
+    return thing
+
+
+@pytest.mark.parametrize(("range_m", "radius_m"), [(0.5, 0.6), (1.0, 0.8), (2.0, 1.4)])
+def test_a_lone_range_places_a_thing_on_open_floor_and_says_how_well(
+    range_m: float, radius_m: float
+) -> None:
+    chair = seen_down_the_corridor(range_m)
+    assert chair.position is not None
+    assert chair.position.x == pytest.approx(1.0 + range_m, abs=0.4)
+    assert chair.uncertainty_m is not None
+    assert chair.uncertainty_m < radius_m
+
+
+def test_without_a_range_the_same_direction_says_little() -> None:
+    chair = seen_down_the_corridor(None)
+    assert chair.uncertainty_m is not None
+    assert chair.uncertainty_m > 3.0
+
+
+def test_a_range_that_fits_nothing_in_sight_leaves_the_direction_its_say() -> None:
+    chair = seen_down_the_corridor(30.0)
+    assert chair.position is not None
+    assert chair.position.x > 2.0
