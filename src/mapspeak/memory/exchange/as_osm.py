@@ -67,7 +67,7 @@ def to_osm(places: SemanticMap, *, anchor: MapAnchor | None = None) -> str:
         del facts["name"]
         tags |= {OWN + key: value for key, value in _tags("", facts)}
         nodes.append(OsmElement(id=-number, tags=tags, place=anchor.locate(place_of(place))))
-    return write_osm_xml(OsmDocument(nodes=tuple(nodes), ways=(), relations=()))
+    return write_osm_xml(OsmDocument(nodes=nodes))
 
 
 def from_osm(text: str) -> SemanticMap:

@@ -2,10 +2,9 @@
 
 from mapspeak.spatial.areagraph.anchor import LatLon, MapAnchor
 from mapspeak.spatial.areagraph.building import build_area_graph
-from mapspeak.spatial.areagraph.geojson import from_geojson, to_geojson
 from mapspeak.spatial.areagraph.graph import Area, AreaGraph, Line, Passage, Polygon, Ring
+from mapspeak.spatial.areagraph.jsonforms import from_geojson, from_json, to_geojson, to_json
 from mapspeak.spatial.areagraph.osm import from_osm, read_area_graph, to_osm
-from mapspeak.spatial.areagraph.records import from_json, to_json
 
 __all__ = [
     "Area",

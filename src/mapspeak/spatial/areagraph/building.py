@@ -1,5 +1,6 @@
 """From rooms on a grid to the area graph."""
 
+import math
 from collections import Counter, defaultdict
 from collections.abc import Mapping
 from itertools import combinations
@@ -20,7 +21,6 @@ from mapspeak.spatial.grid import OccupancyGrid
 from mapspeak.spatial.outlines import (
     BorderRun,
     Vertex,
-    VertexPolygon,
     VertexRing,
     find_borders,
     trace_polygons,
@@ -55,7 +55,13 @@ def build_area_graph(
         Area(
             region=region,
             text=(texts or {}).get(region.id, ""),
-            polygons=tuple(_polygon(rooms.grid, each) for each in polygons.get(region.index, ())),
+            polygons=tuple(
+                Polygon(
+                    outer=_ring(rooms.grid, each.outer),
+                    holes=tuple(_ring(rooms.grid, hole) for hole in each.holes),
+                )
+                for each in polygons.get(region.index, ())
+            ),
         )
         for region in rooms.regions
     )
@@ -83,12 +89,6 @@ def _find_lines(rooms: RoomMap, borders: list[BorderRun]) -> dict[str, VertexLin
         lines = find_lines(shared[pair], places)
         found |= {door.id: line for door, line in zip(between, lines, strict=True)}
     return found
-
-
-def _polygon(grid: OccupancyGrid, polygon: VertexPolygon) -> Polygon:
-    return Polygon(
-        outer=_ring(grid, polygon.outer), holes=tuple(_ring(grid, hole) for hole in polygon.holes)
-    )
 
 
 def _ring(grid: OccupancyGrid, vertices: VertexRing) -> Ring:
@@ -122,8 +122,11 @@ def find_lines(borders: list[BorderRun], places: list[Place]) -> list[VertexLine
     ends: list[list[Vertex]] = [[] for _ in places]
     for run in _runs(borders):
         nearest = min(range(len(places)), key=lambda i: _distance(run, places[i]))
-        ends[nearest] += _ends(run)
-    return [_farthest_pair(each) for each in ends]
+        # A closed run has no vertex at which it begins or ends.
+        touches = Counter(vertex for border in run for vertex in (border.start, border.end))
+        ends[nearest] += [vertex for vertex, n in touches.items() if n % 2]
+    pairs = (combinations(sorted(set(each)), 2) for each in ends)
+    return [max(some, key=lambda pair: math.dist(*pair), default=None) for some in pairs]
 
 
 def _runs(borders: list[BorderRun]) -> list[list[BorderRun]]:
@@ -147,21 +150,6 @@ def _runs(borders: list[BorderRun]) -> list[list[BorderRun]]:
             open_ends += at[border.start] + at[border.end]
         runs.append(run)
     return runs
-
-
-def _ends(run: list[BorderRun]) -> list[Vertex]:
-    """Return the vertices at which a run begins and ends; none when it is closed."""
-    touches = Counter(vertex for border in run for vertex in (border.start, border.end))
-    return sorted(vertex for vertex, n in touches.items() if n % 2)
-
-
-def _farthest_pair(ends: list[Vertex]) -> VertexLine | None:
-    pairs = list(combinations(sorted(set(ends)), 2))
-    return max(pairs, key=lambda pair: _squared_length(*pair)) if pairs else None
-
-
-def _squared_length(one: Vertex, other: Vertex) -> int:
-    return (one[0] - other[0]) ** 2 + (one[1] - other[1]) ** 2
 
 
 def _distance(run: list[BorderRun], place: Place) -> float:

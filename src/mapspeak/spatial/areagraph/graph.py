@@ -2,7 +2,7 @@
 
 import re
 import unicodedata
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -34,8 +34,12 @@ class Polygon:
     holes: tuple[Ring, ...] = ()
 
     def __post_init__(self) -> None:
-        for ring in (self.outer, *self.holes):
-            _check_ring(ring)
+        for ring in self.rings:
+            if len(ring) < 4 or ring[0] != ring[-1]:
+                raise MapError(
+                    f"An outline of the area graph with {len(ring)} points is not closed.",
+                    hint="A ring has four points or more, and the last repeats the first.",
+                )
         if signed_area_m2(self.outer) <= 0 or any(signed_area_m2(ring) >= 0 for ring in self.holes):
             raise MapError(
                 "An outline of the area graph turns the wrong way, or encloses nothing.",
@@ -106,23 +110,13 @@ class AreaGraph:
     def __post_init__(self) -> None:
         _check_ids([area.id for area in self.areas], "areas")
         _check_ids([passage.id for passage in self.passages], "passages")
-        _check_texts((self.name, *(area.text for area in self.areas)))
-        _check_ends(self)
-        _check_doors(self)
-
-    def area(self, area_id: str) -> Area:
-        """Return the area with this id.
-
-        Raises:
-            MapError: There is none.
-        """
-        for area in self.areas:
-            if area.id == area_id:
-                return area
-        raise MapError(
-            f"The area graph has no area {area_id}.",
-            hint=f"Its areas are: {', '.join(area.id for area in self.areas) or 'none'}.",
-        )
+        for text in (self.name, *(area.text for area in self.areas)):
+            if any(unicodedata.category(s) in {"Cc", "Cs"} or s in "\ufffe\uffff" for s in text):
+                raise MapError(
+                    f"The text {text!a} holds control characters, which files cannot carry.",
+                    hint="Rename the map, or remove them from the text.",
+                )
+        _check_passages(self)
 
     def passages_by_area(self) -> Mapping[str, tuple[Passage, ...]]:
         """Return for every area the passages that lead out of it: the graph as adjacency."""
@@ -142,14 +136,6 @@ def signed_area_m2(ring: Ring) -> float:
     )
 
 
-def _check_ring(ring: Ring) -> None:
-    if len(ring) < 4 or ring[0] != ring[-1]:
-        raise MapError(
-            f"An outline of the area graph with {len(ring)} points is not closed.",
-            hint="A ring has four points or more, and the last repeats the first.",
-        )
-
-
 def _check_ids(ids: list[str], what: str) -> None:
     wrong = [name for name in ids if not _ID.fullmatch(name)]
     if wrong:
@@ -162,18 +148,7 @@ def _check_ids(ids: list[str], what: str) -> None:
         raise MapError(f"Two {what} are called {min(doubled)}.", hint="Give each an id of its own.")
 
 
-def _check_texts(texts: Iterable[str]) -> None:
-    for text in texts:
-        if any(
-            unicodedata.category(sign) in {"Cc", "Cs"} or sign in "\ufffe\uffff" for sign in text
-        ):
-            raise MapError(
-                f"The text {text!a} holds control characters, which files cannot carry.",
-                hint="Rename the map, or remove them from the text.",
-            )
-
-
-def _check_ends(graph: AreaGraph) -> None:
+def _check_passages(graph: AreaGraph) -> None:
     known = {area.id for area in graph.areas}
     for passage in graph.passages:
         first, second = passage.door.region_ids
@@ -182,9 +157,6 @@ def _check_ends(graph: AreaGraph) -> None:
                 f"Passage {passage.id} joins {first!a} and {second!a}.",
                 hint="A passage joins two areas of the same graph.",
             )
-
-
-def _check_doors(graph: AreaGraph) -> None:
     passages = graph.passages_by_area()
     for area in graph.areas:
         doors = {passage.id for passage in passages[area.id]}
