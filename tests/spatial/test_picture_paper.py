@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from drawing import grid_from_text
 from mapspeak.geometry import Pose
@@ -13,7 +14,6 @@ from mapspeak.spatial.picture import (
     draw_map_axis,
     draw_map_plain,
     draw_robot_pose,
-    grey_levels,
     paper_spacing_m,
 )
 from mapspeak.spatial.picture.ink import arrow_pixels
@@ -25,6 +25,12 @@ ROOM = """
     #..?#
     #####
     """
+
+
+def grey_levels(grid: OccupancyGrid) -> NDArray[np.uint8]:
+    pixels = pixels_of(draw_map_plain(grid))
+    scale = pixels.shape[1] // grid.n_cols
+    return pixels[scale // 2 :: scale, scale // 2 :: scale, 0]
 
 
 def test_grey_levels_follow_equation_1_for_every_occupancy() -> None:

@@ -1,23 +1,24 @@
 """The map picture: grey levels, metric grid with numbers, the robot's arrow, marks and areas."""
 
-from mapspeak.spatial.picture.drawing import MapLayers, MapPicture, draw_map
+from mapspeak.spatial.picture.drawing import (
+    MapPicture,
+    draw_map,
+    draw_map_axis,
+    draw_map_plain,
+    draw_robot_pose,
+)
 from mapspeak.spatial.picture.marks import (
     Colour,
     LegendEntry,
     LegendSample,
     Line,
     LineStyle,
+    MapLayers,
     Mark,
     PictureRegion,
     RegionLayer,
     Shape,
     Zone,
-)
-from mapspeak.spatial.picture.paper import (
-    draw_map_axis,
-    draw_map_plain,
-    draw_robot_pose,
-    grey_levels,
 )
 from mapspeak.spatial.picture.plan import Zoom
 from mapspeak.spatial.picture.view import NORTH_UP_RAD, Box, PictureView, Pixel, paper_spacing_m
@@ -44,6 +45,5 @@ __all__ = [
     "draw_map_axis",
     "draw_map_plain",
     "draw_robot_pose",
-    "grey_levels",
     "paper_spacing_m",
 ]

@@ -64,6 +64,16 @@ def legend_top(view: PictureView) -> int:
     return view.area.bottom + int(height) + 2 * _NUMBER_GAP_PX
 
 
+def draw_axes(canvas: Canvas, view: PictureView, spacing_m: float) -> None:
+    """Draw the metric grid under the walls, and a thin frame and numbers around the map."""
+    lines = lines_in_view(view, spacing_m)
+    inside, area = view.area_of(canvas), view.area
+    _draw_lines_under_walls(inside, lines)
+    _draw_zero(inside, view)
+    cv2.rectangle(canvas, (area.left - 1, area.top - 1), (area.right, area.bottom), (FRAME,))
+    _draw_numbers(canvas, view, lines, spacing_m)
+
+
 def lines_in_view(view: PictureView, spacing_m: float) -> tuple[MetricLine, ...]:
     """Return the lines at whole multiples of the spacing that cross the map area."""
     corners = view.area_corners()
@@ -77,7 +87,7 @@ def lines_in_view(view: PictureView, spacing_m: float) -> tuple[MetricLine, ...]
     return tuple(lines)
 
 
-def draw_lines_under_walls(inside: Canvas, lines: tuple[MetricLine, ...]) -> None:
+def _draw_lines_under_walls(inside: Canvas, lines: tuple[MetricLine, ...]) -> None:
     """Draw the grid on the map area so that no wall pixel changes; zero's lines are stronger."""
     for over, wanted in (
         (GRID_OVER, [line for line in lines if line.multiple != 0]),
@@ -92,7 +102,7 @@ def draw_lines_under_walls(inside: Canvas, lines: tuple[MetricLine, ...]) -> Non
         inside[crossed] = over[inside[crossed]]
 
 
-def draw_numbers(
+def _draw_numbers(
     canvas: Canvas, view: PictureView, lines: tuple[MetricLine, ...], spacing_m: float
 ) -> None:
     """Write each line's coordinate outside the map at both of its ends.
@@ -116,12 +126,7 @@ def draw_numbers(
                     break
 
 
-def draw_frame(canvas: Canvas, area: Box) -> None:
-    """Draw a thin frame around the map, outside it."""
-    cv2.rectangle(canvas, (area.left - 1, area.top - 1), (area.right, area.bottom), (FRAME,))
-
-
-def draw_zero(inside: Canvas, view: PictureView) -> None:
+def _draw_zero(inside: Canvas, view: PictureView) -> None:
     """Mark the map's origin, (0, 0), with a ring under the walls, where the picture shows it."""
     if not view.shows(Point(0.0, 0.0)):
         return

@@ -269,19 +269,6 @@ def draw_zero_ring(canvas: Canvas, place: FloatArray) -> None:
     draw_polygon(canvas, place + circle, Colour.INK, halo_px=0)
 
 
-def is_in_view(view: PictureView, line: Line) -> bool:
-    """Return True when some of a line lies in the map area."""
-    points = view.area_pixels_at(np.array([[point.x, point.y] for point in line.points]))
-    return bool(_runs_inside(points, view.area))
-
-
-def draw_line(inside: Canvas, view: PictureView, line: Line) -> None:
-    """Draw the part of a line that lies in the map area."""
-    points = view.area_pixels_at(np.array([[point.x, point.y] for point in line.points]))
-    for run in _runs_inside(points, view.area):
-        draw_run(inside, run, line.style, line.colour, width_px=line.width_px)
-
-
 def draw_run(
     canvas: Canvas, run: FloatArray, style: LineStyle, colour: Colour, *, width_px: int
 ) -> None:
@@ -290,9 +277,10 @@ def draw_run(
         draw_stroke(canvas, piece, colour, width_px=width_px)
 
 
-def _runs_inside(points: FloatArray, area: Box) -> list[FloatArray]:
-    """Return the pieces of a polyline inside the area, each as an unbroken polyline."""
-    size = np.array([area.width, area.height], dtype=np.float64)
+def find_runs(view: PictureView, line: Line) -> list[FloatArray]:
+    """Return the pieces of a line inside the map area, each as an unbroken polyline."""
+    points = view.area_pixels_at(np.array([[point.x, point.y] for point in line.points]))
+    size = np.array([view.area.width, view.area.height], dtype=np.float64)
     if ((points >= 0) & (points <= size)).all():
         return [points]
     runs: list[list[FloatArray]] = []

@@ -5,14 +5,13 @@ fewest pixels, whatever the shape of the map.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
 import cv2
 import numpy as np
 
-from mapspeak.geometry import Pose
 from mapspeak.spatial.picture.ink import (
     NUMBER_SIZE_PX,
     draw_arrow,
@@ -33,12 +32,10 @@ from mapspeak.spatial.picture.marks import (
     FillPart,
     LegendEntry,
     LegendSample,
-    Line,
     LineStyle,
-    Mark,
+    MapLayers,
     PictureRegion,
     Shape,
-    Zone,
 )
 from mapspeak.spatial.picture.regions import AUTOMATIC_COLOURS, ZONE_NUMBER
 from mapspeak.spatial.picture.view import PictureView, is_north_up, round_length_m
@@ -55,76 +52,49 @@ Draw = Callable[[Canvas, int, int], None]
 """Draws a sample on a canvas, from a column on, around a row."""
 
 
-@dataclass(frozen=True, slots=True)
-class GroundEntry:
-    """A colour of the ground, by its palette number, and what it means."""
-
-    palette_number: int
-    text: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PictureScene:
-    """What is to be seen in a picture, or may be, besides the ground.
-
-    Attributes:
-        has_origin: The map's origin is in the picture.
-    """
-
-    regions: tuple[PictureRegion, ...] = ()
-    zones: tuple[Zone, ...] = ()
-    lines: tuple[Line, ...] = ()
-    marks: tuple[Mark, ...] = ()
-    robot: Pose | None = None
-    has_origin: bool = False
-
-    def shows(self, sample: LegendSample) -> bool:
-        """Return True when that kind of thing is to be seen."""
-        regions = self.regions
-        is_shown = {
-            LegendSample.ZONE: bool(self.zones),
-            LegendSample.ROBOT: self.robot is not None,
-            LegendSample.ORIGIN: self.has_origin,
-            LegendSample.HATCHED_REGION: any(region.is_hatched for region in regions),
-            LegendSample.DOTTED_REGION: any(region.is_dotted for region in regions),
-            LegendSample.HIGHLIGHTED_REGION: any(region.is_highlighted for region in regions),
-            LegendSample.PLAIN_REGION: any(not (r.is_hatched or r.is_dotted) for r in regions),
-        }
-        return is_shown[sample]
-
-    def find_colour(self, entry: LegendEntry) -> Colour | None:
-        """Return the colour of the first mark or line that an entry explains."""
-        found = [mark.colour for mark in self.marks if mark.shape is entry.sample]
-        found += [line.colour for line in self.lines if line.style is entry.sample]
-        return next((colour for colour in found if entry.colour in {None, colour}), None)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Legend:
     """What a legend has to explain.
 
     Attributes:
         spacing_m: Between the lines of the metric grid.
+        grounds: What palette numbers of the ground mean.
     """
 
     spacing_m: float
-    grounds: tuple[GroundEntry, ...]
+    grounds: Mapping[int, str]
     entries: tuple[LegendEntry, ...] = ()
 
-    def limited_to(self, scene: PictureScene) -> "Legend":
-        """Return the legend with only the entries for what a scene shows, each with a colour."""
-        shown = []
+    def limited_to(
+        self, layers: MapLayers, regions: tuple[PictureRegion, ...], *, has_origin: bool
+    ) -> "Legend":
+        """Return the legend with only the entries for what is to be seen, each with a colour."""
+        shown = {
+            LegendSample.ZONE: bool(layers.zones),
+            LegendSample.ROBOT: layers.robot is not None,
+            LegendSample.ORIGIN: has_origin,
+            LegendSample.HATCHED_REGION: any(region.is_hatched for region in regions),
+            LegendSample.DOTTED_REGION: any(region.is_dotted for region in regions),
+            LegendSample.HIGHLIGHTED_REGION: any(region.is_highlighted for region in regions),
+            LegendSample.PLAIN_REGION: any(not (r.is_hatched or r.is_dotted) for r in regions),
+        }
+        found = [(mark.shape, mark.colour) for mark in layers.marks]
+        styles = [(line.style, line.colour) for line in layers.lines]
+        kept = []
         for entry in self.entries:
             if isinstance(entry.sample, LegendSample):
-                if scene.shows(entry.sample):
-                    shown.append(entry)
-            elif (colour := scene.find_colour(entry)) is not None:
-                shown.append(replace(entry, colour=colour))
-        return replace(self, entries=tuple(shown))
+                if shown[entry.sample]:
+                    kept.append(entry)
+                continue
+            colours = [colour for sample, colour in (*found, *styles) if sample is entry.sample]
+            first = next((colour for colour in colours if entry.colour in {None, colour}), None)
+            if first is not None:
+                kept.append(replace(entry, colour=first))
+        return replace(self, entries=tuple(kept))
 
     def draw(self, canvas: Canvas, view: PictureView, top: int) -> int:
         """Draw the rows that have room from a row of the canvas on; gives the row below them."""
-        for row in _rows(self, view):
+        for row in break_rows(self, view):
             if top + ROW_PX > view.height_px:
                 break
             left = _GAP_PX
@@ -156,17 +126,8 @@ class _Item:
         stamp(canvas, patch, (text_left, middle - int(patch.shape[0]) // 2), halo_px=0)
 
 
-def n_rows_of(legend: Legend, view: PictureView) -> int:
-    """Return how many rows a legend takes at the width of a picture."""
-    return len(_rows(legend, view))
-
-
-def grounds_in(inside: Canvas, grounds: tuple[GroundEntry, ...]) -> tuple[GroundEntry, ...]:
-    """Return those colours of the ground that are to be seen on the map area."""
-    return tuple(entry for entry in grounds if (inside == entry.palette_number).any())
-
-
-def _rows(legend: Legend, view: PictureView) -> list[list[_Item]]:
+def break_rows(legend: Legend, view: PictureView) -> list[list[_Item]]:
+    """Return the items of a legend in rows as wide as a picture."""
     rows: list[list[_Item]] = []
     right = view.width_px
     for item in _items(legend, view):
@@ -181,48 +142,49 @@ def _rows(legend: Legend, view: PictureView) -> list[list[_Item]]:
 def _items(legend: Legend, view: PictureView) -> list[_Item]:
     length_m = round_length_m(_SCALE_BAR_PX / view.pixels_per_m)
     length_px = round(length_m * view.pixels_per_m)
+    draw_bar = partial(_draw_scale_bar, length_px=length_px)
+    up_deg = math.degrees(math.remainder(view.up_rad, math.tau))
     return [
-        _Item(
-            text=f"{length_m:g} m",
-            sample_px=length_px,
-            draw=partial(_draw_scale_bar, length_px=length_px),
-        ),
+        _Item(text=f"{length_m:g} m", sample_px=length_px, draw=draw_bar),
         _Item(text=f"grid {legend.spacing_m:g} m"),
-        _Item(text=_direction(view.up_rad)),
+        _Item(text="x right, y up" if is_north_up(view.up_rad) else f"up is yaw {up_deg:.0f}°"),
+        *(
+            _Item(text=text, sample_px=_SWATCH_PX, draw=partial(_draw_swatch, number=number))
+            for number, text in legend.grounds.items()
+        ),
         *(
             _Item(
                 text=entry.text,
-                sample_px=_SWATCH_PX,
-                draw=partial(_draw_swatch, number=entry.palette_number),
+                sample_px=_SWATCH_PX if _is_small(entry) else _WIDE_SWATCH_PX,
+                draw=partial(_draw_sample, entry=entry),
             )
-            for entry in legend.grounds
+            for entry in legend.entries
         ),
-        *(_item_of_entry(entry) for entry in legend.entries),
     ]
 
 
-def _item_of_entry(entry: LegendEntry) -> _Item:
+def _is_small(entry: LegendEntry) -> bool:
+    return isinstance(entry.sample, Shape) or entry.sample is LegendSample.ORIGIN
+
+
+def _draw_sample(canvas: Canvas, left: int, middle: int, *, entry: LegendEntry) -> None:
     sample, colour = entry.sample, entry.colour or Colour.INK
+    place = np.array([left + _SWATCH_PX / 2, middle + 0.5])
     if isinstance(sample, Shape):
-        draw: Draw = partial(_draw_shape, shape=sample, colour=colour)
-        return _Item(text=entry.text, sample_px=_SWATCH_PX, draw=draw)
-    if isinstance(sample, LineStyle):
-        draw = partial(_draw_line, style=sample, colour=colour)
+        draw_shape(canvas, place, sample, colour)
+    elif isinstance(sample, LineStyle):
+        # Two dashes and the gap between them, so that the style can be seen.
+        run = np.array([[left - 2.0, middle], [left + _WIDE_SWATCH_PX + 3.0, middle]])
+        draw_run(canvas, run, sample, colour, width_px=3)
     elif sample is LegendSample.ROBOT:
-        draw = _draw_robot
-    elif sample is LegendSample.ZONE:
-        draw = _draw_zone
+        place = np.array([left + _WIDE_SWATCH_PX / 2 - 2.0, middle + 0.5])
+        draw_arrow(canvas, place, 0.0, scale=_ARROW_SCALE)
     elif sample is LegendSample.ORIGIN:
-        return _Item(text=entry.text, sample_px=_SWATCH_PX, draw=_draw_origin)
+        draw_zero_ring(canvas, place)
+    elif sample is LegendSample.ZONE:
+        _draw_zone(canvas, left, middle)
     else:
-        draw = partial(_draw_region, sample=sample)
-    return _Item(text=entry.text, sample_px=_WIDE_SWATCH_PX, draw=draw)
-
-
-def _direction(up_rad: float) -> str:
-    if is_north_up(up_rad):
-        return "x right, y up"
-    return f"up is yaw {math.degrees(math.remainder(up_rad, math.tau)):.0f}°"
+        _draw_region(canvas, left, middle, sample=sample)
 
 
 def _draw_scale_bar(canvas: Canvas, left: int, middle: int, *, length_px: int) -> None:
@@ -238,25 +200,6 @@ def _draw_swatch(
     corners = (left, middle - _SWATCH_PX // 2), (left + width_px, middle + _SWATCH_PX // 2)
     cv2.rectangle(canvas, *corners, (number,), cv2.FILLED)
     cv2.rectangle(canvas, *corners, (FRAME,))
-
-
-def _draw_shape(canvas: Canvas, left: int, middle: int, *, shape: Shape, colour: Colour) -> None:
-    draw_shape(canvas, np.array([left + _SWATCH_PX / 2, middle + 0.5]), shape, colour)
-
-
-def _draw_line(canvas: Canvas, left: int, middle: int, *, style: LineStyle, colour: Colour) -> None:
-    # Two dashes and the gap between them, so that the style can be seen.
-    run = np.array([[left - 2.0, middle], [left + _WIDE_SWATCH_PX + 3.0, middle]])
-    draw_run(canvas, run, style, colour, width_px=3)
-
-
-def _draw_robot(canvas: Canvas, left: int, middle: int) -> None:
-    place = np.array([left + _WIDE_SWATCH_PX / 2 - 2.0, middle + 0.5])
-    draw_arrow(canvas, place, 0.0, scale=_ARROW_SCALE)
-
-
-def _draw_origin(canvas: Canvas, left: int, middle: int) -> None:
-    draw_zero_ring(canvas, np.array([left + _SWATCH_PX / 2, middle + 0.5]))
 
 
 def _draw_zone(canvas: Canvas, left: int, middle: int) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.errors import MapError
-from mapspeak.geometry import Point
+from mapspeak.geometry import Point, Pose
 
 Canvas = NDArray[np.uint8]
 """Palette numbers, shape (rows, cols); row 0 is the top."""
@@ -110,13 +110,11 @@ def _grid_over_fill(colour: Colour) -> int:
     return FILLS[colour, FillPart.PLAIN] + len(FillPart)
 
 
-def _build_grid_over(
-    *, on_free: int, on_unknown: int, on_paper_unknown: int, fill_offset: int
-) -> NDArray[np.uint8]:
+def _build_grid_over(first: int, *, fill_offset: int) -> NDArray[np.uint8]:
     """Return what a grid line turns each palette number into; walls stay what they are."""
     over = np.arange(256, dtype=np.uint8)
-    over[FREE], over[UNKNOWN_GROUND], over[GREYS[0]] = on_free, on_unknown, on_paper_unknown
-    over[GREYS[1:51]] = on_free
+    over[FREE], over[UNKNOWN_GROUND], over[GREYS[0]] = first, first + 1, first + 2
+    over[GREYS[1:51]] = first
     for colour in _RGB:
         for part in (FillPart.PLAIN, FillPart.HATCH):
             over[FILLS[colour, part]] = _grid_over_fill(colour) + fill_offset
@@ -133,18 +131,8 @@ def _build_is_busy() -> NDArray[np.uint8]:
 
 
 PALETTE = _build_palette()
-GRID_OVER = _build_grid_over(
-    on_free=_GRID_FREE,
-    on_unknown=_GRID_UNKNOWN,
-    on_paper_unknown=_GRID_PAPER_UNKNOWN,
-    fill_offset=0,
-)
-ZERO_LINE_OVER = _build_grid_over(
-    on_free=_ZERO_FREE,
-    on_unknown=_ZERO_UNKNOWN,
-    on_paper_unknown=_ZERO_PAPER_UNKNOWN,
-    fill_offset=1,
-)
+GRID_OVER = _build_grid_over(_GRID_FREE, fill_offset=0)
+ZERO_LINE_OVER = _build_grid_over(_ZERO_FREE, fill_offset=1)
 IS_BUSY = _build_is_busy()
 
 
@@ -285,3 +273,21 @@ class LegendEntry:
     sample: Shape | LineStyle | LegendSample
     text: str
     colour: Colour | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MapLayers:
+    """What is drawn over the ground, from the lowest to the highest.
+
+    Attributes:
+        zones: Parts of the map that are set apart from it, such as what is closed.
+        legend: What symbols and patterns mean; only those that are to be seen are explained, in
+            this order, below the map.
+    """
+
+    regions: RegionLayer | None = None
+    zones: tuple[Zone, ...] = ()
+    lines: tuple[Line, ...] = ()
+    marks: tuple[Mark, ...] = ()
+    robot: Pose | None = None
+    legend: tuple[LegendEntry, ...] = ()
