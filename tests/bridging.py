@@ -14,7 +14,7 @@ from mapspeak.ros.messages import Dialect
 from mapspeak.rosbridge_server import open_rosbridge_server
 
 STEP_S = 0.05
-PATIENCE_S = 10.0
+PATIENCE_S = 60.0
 
 Operation = dict[str, Any]
 

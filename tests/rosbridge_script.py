@@ -18,7 +18,7 @@ from websockets.protocol import State
 from websockets.server import ServerProtocol
 
 Operation = dict[str, Any]
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 """No wait of a test is longer; none is meant to come near."""
 
 

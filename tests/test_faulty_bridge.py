@@ -16,7 +16,7 @@ from mapspeak.ros.messages import Dialect, FramedPose, write_pose_stamped
 
 pytestmark = pytest.mark.anyio
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 RATE = 20.0
 CLOSE_BY = 0.3
 

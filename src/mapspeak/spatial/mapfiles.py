@@ -19,7 +19,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat,
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
-from ruamel.yaml.events import AliasEvent
+from ruamel.yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent
 
 from mapspeak.errors import MapError, say_cause
 from mapspeak.geometry import Pose
@@ -31,6 +31,7 @@ MAX_CELLS = 80_000_000
 """About 8,900 x 8,900 cells, or 450 x 450 m at 5 cm."""
 
 _MAX_YAML_BYTES = 1_000_000
+_MOST_NESTED = 20
 _FREE, _OCCUPIED = 0, 100
 _UNKNOWN_GREY, _FREE_GREY, _OCCUPIED_GREY = 205, 254, 0
 _DEFAULT_OCCUPIED_THRESH, _DEFAULT_FREE_THRESH = 0.65, 0.196
@@ -250,7 +251,7 @@ def _read_description(path: Path) -> _Description:
 def _parse_yaml(path: Path) -> CommentedMap:
     try:
         with _open_regular(path) as file:
-            document = _load_without_aliases(file.read(_MAX_YAML_BYTES).decode())
+            document = _load_flat(file.read(_MAX_YAML_BYTES).decode())
     except FileNotFoundError as error:
         raise MapError(
             f"There is no map file {path}.", hint="Check the path of the .yaml file."
@@ -273,10 +274,13 @@ def _parse_yaml(path: Path) -> CommentedMap:
     return document
 
 
-def _load_without_aliases(text: str) -> object:
-    """Refuse aliases, since a few lines of them can stand for gigabytes."""
-    if any(isinstance(event, AliasEvent) for event in YAML(pure=True).parse(text)):
-        raise YAMLError("aliases")
+def _load_flat(text: str) -> object:
+    """Refuse aliases and deep nesting: a few lines of them cost gigabytes or minutes."""
+    depth = 0
+    for event in YAML(pure=True).parse(text):
+        depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
+        if isinstance(event, AliasEvent) or depth > _MOST_NESTED:
+            raise YAMLError("aliases or deep nesting")
     return YAML(typ="rt", pure=True).load(text)
 
 

@@ -26,7 +26,7 @@ from mapspeak.ros.messages import Dialect, read_grid, read_header, read_transfor
 
 pytestmark = pytest.mark.anyio
 DIALECTS = tuple(Dialect)
-PATIENCE_S = 10.0
+PATIENCE_S = 60.0
 
 
 def drawn(dialect: Dialect, seed: int = 1) -> tuple[Names, InspectedSystem]:

@@ -120,6 +120,7 @@ async def test_a_silent_service_ends_the_wait_and_not_the_connection() -> None:
         heard = client.subscribe("/slow")
         with pytest.raises(LinkError, match="did not answer within"):
             await client.call_service("/never", timeout_s=0.01)
+        await server.until(lambda: server.asked("subscribe"))
         await server.publish("/slow", {"data": 1})
         assert await heard.wait_for_more_than(0, timeout_s=PATIENCE_S) == {"data": 1}
         assert client.n_connections == 1
