@@ -38,6 +38,7 @@ from mapspeak.ros.definitions import hash_type
 RELIABLE = Quality(is_reliable=True, is_latched=False, depth=10)
 LATCHED = Quality(is_reliable=True, is_latched=True, depth=10)
 BEST_EFFORT = Quality(is_reliable=False, is_latched=False, depth=10)
+PATIENCE_S = 60.0
 QUICK = DdsTiming(quiet_s=0.05)
 SET_BOOL = "std_srvs/srv/SetBool"
 GID_BYTES, LONG_GID_BYTES = 16, 24
@@ -262,10 +263,11 @@ async def open_both(
     framing: Framing = Framing.NUMBERED,
 ) -> AsyncGenerator[tuple[DdsNode, DdsConnection]]:
     network = some_network()
-    async with open_dds_node(network) as node:
-        prepare(node)
-        async with open_here(network, framing=framing) as connection:
-            yield node, connection
+    with anyio.fail_after(PATIENCE_S):
+        async with open_dds_node(network) as node:
+            prepare(node)
+            async with open_here(network, framing=framing) as connection:
+                yield node, connection
 
 
 def answer_set_bool(request: Request, reply: Reply) -> None:

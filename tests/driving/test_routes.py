@@ -97,7 +97,7 @@ def test_a_meaning_that_cannot_be_reached_is_no_candidate() -> None:
     assert [each.name for each in find_candidates(world, "extinguisher")] == ["T2"]
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     places=st.lists(
         st.tuples(st.sampled_from("abc"), st.floats(0.6, 10.2)), min_size=3, max_size=9

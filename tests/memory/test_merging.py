@@ -171,7 +171,7 @@ def test_a_bearing_alone_turns_with_the_robot_and_is_left_out_when_it_has_moved(
     assert moved.label == "sink"
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(waypoints())
 def test_telling_the_same_again_changes_nothing_but_the_time(waypoint: Waypoint) -> None:
     merge = merge_waypoint(waypoint, waypoint)
@@ -183,7 +183,7 @@ def test_telling_the_same_again_changes_nothing_but_the_time(waypoint: Waypoint)
     assert merge.waypoint.description == waypoint.description
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(waypoints(), waypoints())
 def test_no_label_is_ever_lost_or_doubled(before: Waypoint, now: Waypoint) -> None:
     merge = merge_waypoint(before, replace(now, name=before.name))
@@ -266,7 +266,7 @@ def test_a_thing_with_several_views_is_gone_as_a_whole() -> None:
     assert [each.label for each in merge.gone] == ["tap"]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(waypoints(), waypoints())
 def test_moving_there_and_back_is_the_way_it_was(one: Waypoint, other: Waypoint) -> None:
     near = Pose(one.pose.x + 0.3, one.pose.y, other.pose.yaw_rad)

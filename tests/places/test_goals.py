@@ -150,7 +150,7 @@ def test_the_same_is_said_on_a_map_with_a_turned_origin() -> None:
 
 
 @given(x=st.floats(-2.0, 10.0), y=st.floats(-2.0, 7.0))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_the_pose_that_is_offered_instead_is_accepted(x: float, y: float) -> None:
     found = check(Pose(x, y))
     if found.nearest is not None:

@@ -346,7 +346,7 @@ FORMS = (
 )
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(
     forms=st.lists(st.sampled_from(FORMS), min_size=1, max_size=5),
     operand=st.sampled_from(OPERANDS),
@@ -371,7 +371,7 @@ def test_the_same_words_give_the_same_pose() -> None:
     assert len(poses) == 1
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(x=st.floats(6.0, 9.0), y=st.floats(1.0, 2.4), yaw_rad=st.floats(-math.pi, math.pi))
 def test_left_and_right_are_mirror_images(x: float, y: float, yaw_rad: float) -> None:
     """Mirrors the map about its middle row: the place to the left becomes that to the right."""
@@ -390,7 +390,7 @@ def test_left_and_right_are_mirror_images(x: float, y: float, yaw_rad: float) ->
     assert off_m == pytest.approx(0.0, abs=0.26)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(turn_rad=st.floats(-math.pi, math.pi))
 def test_turning_the_map_turns_left_but_not_north(turn_rad: float) -> None:
     turn = Pose(3.0, -2.0, turn_rad)
@@ -404,7 +404,7 @@ def test_turning_the_map_turns_left_but_not_north(turn_rad: float) -> None:
     assert _off(north, desk.pose.point, math.pi / 2) < math.radians(41)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     x=st.floats(0.5, 9.8),
     y=st.floats(0.5, 3.0),

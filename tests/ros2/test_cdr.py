@@ -73,7 +73,7 @@ def tools() -> tuple[Any, Any]:
 
 
 @pytest.mark.parametrize("type_name", TYPES)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(data=st.data())
 def test_either_writes_the_same_bytes_and_reads_the_others(
     tools: tuple[Any, Any], type_name: str, data: st.DataObject

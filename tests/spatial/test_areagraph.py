@@ -273,7 +273,7 @@ def test_names_that_files_cannot_carry_are_refused(name: str) -> None:
         build_area_graph(rooms_of(np.ones((2, 2), np.int16)), name=name)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(labels=label_arrays)
 def test_outlines_hold_exactly_the_cells_of_their_area(labels: Labels) -> None:
     for area in build_area_graph(rooms_of(labels), name="").areas:
@@ -285,7 +285,7 @@ def test_outlines_hold_exactly_the_cells_of_their_area(labels: Labels) -> None:
         assert total_m2 == pytest.approx(mine.sum() * 0.05**2)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(labels=label_arrays)
 def test_no_outline_crosses_or_touches_itself(labels: Labels) -> None:
     for area in build_area_graph(rooms_of(labels), name="").areas:
@@ -294,7 +294,7 @@ def test_no_outline_crosses_or_touches_itself(labels: Labels) -> None:
             assert len(set(visited)) == len(visited)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(labels=label_arrays, origin=origins, name=texts, text=texts)
 def test_nothing_is_lost_on_the_way_through_a_file(
     labels: Labels, origin: Pose, name: str, text: str
@@ -308,7 +308,7 @@ def test_nothing_is_lost_on_the_way_through_a_file(
     assert from_osm(to_osm(graph)) == graph
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(labels=label_arrays, origin=origins, anchor=anchors)
 def test_nothing_is_lost_on_the_way_through_latitude_and_longitude(
     labels: Labels, origin: Pose, anchor: MapAnchor
@@ -319,7 +319,7 @@ def test_nothing_is_lost_on_the_way_through_latitude_and_longitude(
     assert from_osm(to_osm(graph, anchor=anchor)) == graph
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     doors=st.lists(st.integers(2, 22), min_size=1, max_size=3),
     wall=st.integers(8, 30),

@@ -308,7 +308,7 @@ def test_a_frontier_that_has_been_seen_has_nothing_remaining() -> None:
 
 
 @given(seed=st.integers(0, 2**32 - 1), yaw_rad=st.floats(-3.0, 3.0))
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 def test_frontiers_of_any_map_can_be_driven_to(seed: int, yaw_rad: float) -> None:
     rng = np.random.default_rng(seed)
     coarse = rng.choice([-1, 0, 0, 0, 100], size=(12, 12))

@@ -59,7 +59,7 @@ def test_deep_in_a_narrow_passage_the_pose_is_in_its_middle() -> None:
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 def test_a_pose_is_never_nearer_to_a_wall_than_the_radius(seed: int) -> None:
     coarse = np.random.default_rng(seed).choice([-1, 0, 0, 0, 0, 100], size=(12, 12))
     coarse[5:7, 5:7] = 0

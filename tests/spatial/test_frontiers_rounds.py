@@ -13,7 +13,7 @@ from mapspeak.spatial.paths import distances_from
 
 
 @given(seed=st.integers(0, 2**32 - 1), n_stops=st.integers(1, 6))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_shortest_rounds_are_those_of_trying_all_orders(seed: int, n_stops: int) -> None:
     rng = np.random.default_rng(seed)
     between_m = rng.uniform(1.0, 9.0, (n_stops, n_stops))

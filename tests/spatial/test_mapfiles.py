@@ -313,7 +313,7 @@ def written_and_read(grid: OccupancyGrid, mode: MapMode) -> OccupancyGrid:
         return load_map(path).grid
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(cells=trinary_cells, resolution_m=resolutions, origin=origins, mode=st.sampled_from(MapMode))
 def test_a_written_map_is_read_back_the_same(
     cells: NDArray[np.int8], resolution_m: float, origin: Pose, mode: MapMode
@@ -324,7 +324,7 @@ def test_a_written_map_is_read_back_the_same(
     assert (again.resolution_m, again.origin) == (resolution_m, origin)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(cells=any_cells, mode=st.sampled_from([MapMode.SCALE, MapMode.RAW]))
 def test_scale_and_raw_maps_keep_every_value(cells: NDArray[np.int8], mode: MapMode) -> None:
     grid = OccupancyGrid(cells=cells, resolution_m=0.05)

@@ -50,7 +50,7 @@ def scattered(seed: int, shape: tuple[int, int], wall_ratio: float) -> np.ndarra
     n_cols=st.integers(1, 14),
     wall_ratio=st.sampled_from([0.1, 0.3, 0.45]),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_distances_are_those_of_dijkstra(
     seed: int, n_rows: int, n_cols: int, wall_ratio: float
 ) -> None:

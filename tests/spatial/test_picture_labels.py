@@ -48,7 +48,7 @@ def numbers_in_margins(picture: MapPicture) -> list[tuple[int, int]]:
     return [(int(width), int(height)) for _, _, width, height, _ in stats[1:]]
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     shape=st.tuples(st.integers(1, 60), st.integers(1, 60)),
     resolution_m=st.floats(0.02, 2.0),
@@ -141,7 +141,7 @@ def test_a_shared_label_without_room_is_named_mark_by_mark() -> None:
     assert picture.labels_left_out
 
 
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=4)
 @example(seed=182)  # the line to a label crosses another symbol
 @given(seed=st.integers(0, 1000))
 def test_no_label_covers_another_or_a_symbol(seed: int) -> None:

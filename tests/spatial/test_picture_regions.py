@@ -78,7 +78,7 @@ def mosaics(draw: st.DrawFn) -> Labels:
     return labels
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(labels=mosaics(), seed=st.integers(0, 1000))
 def test_another_region_elsewhere_changes_no_colour(labels: Labels, seed: int) -> None:
     keys = np.random.default_rng(seed).permutation(100)[:23] + 1
@@ -91,7 +91,7 @@ def test_another_region_elsewhere_changes_no_colour(labels: Labels, seed: int) -
     assert before == {label: after[label] for label in before}
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(keys=st.permutations(range(1, 21)))
 def test_regions_side_by_side_differ_whatever_their_keys(keys: list[int]) -> None:
     labels = np.repeat(np.arange(1, 21, dtype=np.uint16), 10)[np.newaxis].repeat(30, axis=0)
@@ -174,7 +174,7 @@ def test_where_the_picture_cuts_a_region_off_it_has_no_outline() -> None:
     assert not is_colour(area[:, -1], HIGHLIGHT).any()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     x=st.floats(99.5, 116.0),
     y=st.floats(199.5, 205.0),

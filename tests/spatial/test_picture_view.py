@@ -63,7 +63,7 @@ def distance_to_walls_m(grid: OccupancyGrid, points: Points) -> Points:
     return np.asarray(np.hypot(apart[..., 0], apart[..., 1]).min(axis=1))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(grid=maps(yaw_rad=st.just(0.0)))
 def test_every_cell_of_an_unturned_map_is_seen_at_its_own_place(grid: OccupancyGrid) -> None:
     picture = draw_map(grid, max_edge_px=400)
@@ -74,7 +74,7 @@ def test_every_cell_of_an_unturned_map_is_seen_at_its_own_place(grid: OccupancyG
     assert not is_colour(colours[values == -1], FREE_RGB).any()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(grid=maps(yaw_rad=yaws), up_rad=yaws)
 def test_every_wall_of_a_turned_map_is_seen_at_its_own_place(
     grid: OccupancyGrid, up_rad: float
@@ -86,7 +86,7 @@ def test_every_wall_of_a_turned_map_is_seen_at_its_own_place(
         assert is_wall.tolist() == (values == 100).tolist()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(grid=maps(yaw_rad=yaws), up_rad=yaws)
 def test_where_a_wall_is_seen_there_is_one_within_half_a_cell(
     grid: OccupancyGrid, up_rad: float
@@ -103,7 +103,7 @@ def test_where_a_wall_is_seen_there_is_one_within_half_a_cell(
     assert distance_to_walls_m(grid, seen).max() <= half_cell_m + half_pixel_m
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(grid=maps(yaw_rad=yaws), up_rad=yaws, u=st.integers(0, 319), v=st.integers(0, 319))
 def test_a_pixel_gives_a_point_that_gives_the_pixel(
     grid: OccupancyGrid, up_rad: float, u: int, v: int
@@ -112,7 +112,7 @@ def test_a_pixel_gives_a_point_that_gives_the_pixel(
     assert view.pixel_at(view.point_at(Pixel(u, v))) == Pixel(u, v)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(rows=st.integers(1, 3000), cols=st.integers(1, 3000), max_edge_px=st.integers(320, 1072))
 def test_a_picture_is_never_larger_than_asked(rows: int, cols: int, max_edge_px: int) -> None:
     grid = OccupancyGrid(cells=np.zeros((rows, cols), dtype=np.int8), resolution_m=0.05)

@@ -56,7 +56,7 @@ def draw_or_skip(
         raise
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(look=looks())
 def test_every_cell_of_a_closer_look_is_seen_at_its_own_place(
     look: tuple[OccupancyGrid, Zoom, float],
@@ -71,7 +71,7 @@ def test_every_cell_of_a_closer_look_is_seen_at_its_own_place(
         assert is_wall.tolist() == (grid.cells.ravel()[shown] == 100).tolist()
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(look=looks(), across=st.floats(0, 1), along=st.floats(0, 1), yaw_rad=yaws)
 def test_a_mark_and_the_robot_are_drawn_where_they_are_or_not_at_all(
     look: tuple[OccupancyGrid, Zoom, float], across: float, along: float, yaw_rad: float
@@ -109,7 +109,7 @@ def check_arrow(picture: MapPicture, robot: Pose) -> None:
     assert math.remainder(bearing - robot.yaw_rad, math.tau) == pytest.approx(0.0, abs=0.15)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(look=looks(), u=st.integers(0, 399), v=st.integers(0, 399))
 def test_a_pixel_of_a_closer_look_gives_a_point_that_gives_the_pixel(
     look: tuple[OccupancyGrid, Zoom, float], u: int, v: int
@@ -118,7 +118,7 @@ def test_a_pixel_of_a_closer_look_gives_a_point_that_gives_the_pixel(
     assert view.pixel_at(view.point_at(Pixel(u, v))) == Pixel(u, v)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(look=looks())
 def test_a_closer_look_shows_no_more_than_was_asked_for_and_no_less_than_there_is(
     look: tuple[OccupancyGrid, Zoom, float],

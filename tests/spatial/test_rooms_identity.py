@@ -92,7 +92,7 @@ def test_ids_stay_when_the_map_grows_to_the_left_and_moves_its_origin() -> None:
     assert {id_at(after, x) for x in (-2.0, -6.0)} == {"R3", "R4"}
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(quarter=st.integers(0, 3), x=st.floats(-20.0, 20.0), y=st.floats(-20.0, 20.0))
 def test_ids_stay_when_the_grid_is_turned_about_the_same_building(
     quarter: int, x: float, y: float

@@ -80,7 +80,7 @@ def test_a_mirrored_map_has_the_mirrored_rooms(labels: Labels, axis: int) -> Non
     assert_same_regions(labels, np.flip(mirrored, axis))
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(angle_deg=st.floats(0.0, 360.0))
 def test_a_turned_map_has_the_turned_rooms(angle_deg: float) -> None:
     side = 380
@@ -114,7 +114,7 @@ def test_a_map_of_half_the_resolution_has_the_same_rooms(labels: Labels) -> None
     assert_same_regions(labels[::2, ::2], found)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(before=st.integers(0, 40), after=st.integers(0, 40))
 def test_unknown_ground_around_a_map_changes_nothing(before: int, after: int) -> None:
     padded = np.pad(building(), ((before, after), (after, before)), constant_values=-1)

@@ -82,7 +82,7 @@ def test_a_message_cut_off_is_an_error(message: dict[str, object], data: st.Data
         ODD_CODEC.decode("odd/All", written[:length])
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.data())
 def test_any_message_of_any_type_comes_back_as_it_was_written(data: st.DataObject) -> None:
     type_name = data.draw(st.sampled_from(TYPES))

@@ -40,7 +40,7 @@ WORD = st.sampled_from([b"\xff" * 4, b"\xff\xff\xff\x7f", b"\x00\x00\x00\x80", b
 PIECE = WORD | st.binary(max_size=4)
 
 
-@settings(max_examples=3000, deadline=None)
+@settings(max_examples=3000)
 @given(
     st.sampled_from(sorted(MESSAGES)),
     st.lists(st.tuples(SPOT, st.sampled_from([0, 1, 4]), PIECE), min_size=1, max_size=4),

@@ -221,6 +221,30 @@ async def test_a_type_that_we_do_not_know_is_asked_of_its_node() -> None:
     assert asked == [(name, type_hash)]
 
 
+async def test_a_type_that_its_node_did_not_tell_at_first_is_asked_for_again() -> None:
+    name, answers = "my_msgs/msg/Secret", []
+    label = {"name": "label", "type": {"type_id": 17}}
+    described = {"type_description": {"type_name": name, "fields": [label]}}
+
+    def describe(_: dict[str, Any], reply: Callable[[dict[str, Any]], None]) -> None:
+        answers.append({"successful": bool(answers), "type_description": described})
+        reply(answers[-1])
+
+    def prepare(node: DdsNode) -> None:
+        node.types = types_with(name, "label")
+        service = "type_description_interfaces/srv/GetTypeDescription"
+        node.serve("/robot/get_type_description", service, describe)
+        node.publish_hashed("/secret", name, "RIHS01_0123abcd")
+
+    async with open_both(prepare) as (node, connection):
+        secrets = connection.subscribe("/secret")
+        while secrets.n_received == 0:
+            node.publish("/secret", {"label": "hush"})
+            with anyio.move_on_after(0.05):
+                await secrets.wait_for_more_than(0, timeout_s=5.0)
+    assert [each["successful"] for each in answers] == [False, True]
+
+
 async def test_a_type_that_we_know_in_another_version_is_asked_of_its_node() -> None:
     name, theirs = "std_msgs/msg/String", {"name": "text", "type": {"type_id": 17}}
 

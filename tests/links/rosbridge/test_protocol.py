@@ -383,7 +383,7 @@ def check_that_it_is_an_event(event: Event | None) -> None:
     assert event is None or isinstance(event, Event)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.lists(FRAMES, max_size=6))
 def test_any_operation_gives_an_event_and_never_an_exception(
     operations: list[dict[str, Any]],
@@ -395,7 +395,7 @@ def test_any_operation_gives_an_event_and_never_an_exception(
         assert conversation.n_bytes_held <= 10_000
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.lists(st.binary(max_size=60), max_size=60))
 def test_any_bytes_give_an_event_and_never_an_exception(frames: list[bytes]) -> None:
     conversation = Conversation(max_bytes=10_000)
@@ -404,7 +404,7 @@ def test_any_bytes_give_an_event_and_never_an_exception(frames: list[bytes]) -> 
         check_that_it_is_an_event(conversation.receive_binary(each))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.integers(0, 10**6), st.lists(st.integers(0, 255), min_size=1, max_size=4))
 def test_a_damaged_frame_gives_an_event_and_never_an_exception(
     place: int, damage: list[int]

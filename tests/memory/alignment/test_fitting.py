@@ -37,7 +37,7 @@ MOTIONS = st.builds(
 )
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(MOTIONS)
 def test_a_map_is_found_again_however_it_was_turned_and_shifted(motion: Pose) -> None:
     house = fine(HOUSE)
@@ -48,7 +48,7 @@ def test_a_map_is_found_again_however_it_was_turned_and_shifted(motion: Pose) ->
     assert error_of(house, fit.new_from_old, motion) < 0.1
 
 
-@settings(max_examples=3, deadline=None)
+@settings(max_examples=3)
 @given(MOTIONS)
 def test_there_and_back_again_is_where_one_was(motion: Pose) -> None:
     house = fine(HOUSE)
@@ -59,7 +59,7 @@ def test_there_and_back_again_is_where_one_was(motion: Pose) -> None:
     assert error_of(house, back @ there, Pose(0.0, 0.0)) < 0.15
 
 
-@settings(max_examples=3, deadline=None)
+@settings(max_examples=3)
 @given(MOTIONS, MOTIONS)
 def test_the_fit_turns_with_both_maps(motion: Pose, common: Pose) -> None:
     house = fine(HOUSE)

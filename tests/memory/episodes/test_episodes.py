@@ -301,7 +301,7 @@ def test_a_record_is_an_observation_of_all_that_it_names() -> None:
     assert observations_from(Waypoint(name="undated", pose=Pose(0.0, 0.0))) == ()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(query=st.text(max_size=40), words=st.lists(st.text(max_size=12), max_size=3))
 def test_any_words_at_all_can_be_written_and_asked(
     tmp_path_factory: pytest.TempPathFactory, query: str, words: list[str]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mapspeak.errors import SemanticMapError
@@ -57,7 +57,6 @@ def said(places: SemanticMap) -> tuple[object, Sequence[object]]:
     return places.map_id, [record_data(place) for place in places.waypoints]
 
 
-@settings(deadline=None)
 @given(places=memories(), form=st.sampled_from(ExchangeFormat))
 def test_what_is_exported_and_imported_is_the_same(
     places: SemanticMap, form: ExchangeFormat

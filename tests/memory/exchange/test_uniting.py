@@ -2,7 +2,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mapspeak.errors import SemanticMapError
@@ -110,14 +110,12 @@ PLACES = st.lists(
 MEMORIES = PLACES.map(lambda places: memory(*places))
 
 
-@settings(deadline=None)
 @given(MEMORIES)
 def test_a_memory_joined_with_itself_stays_what_it_is(places: SemanticMap) -> None:
     union = unite(places, places)
     assert (names(union.places), union.changed, union.findings) == (names(places), (), ())
 
 
-@settings(deadline=None)
 @given(MEMORIES, MEMORIES)
 def test_every_name_and_every_landmark_is_in_the_whole(
     first: SemanticMap, second: SemanticMap
@@ -133,7 +131,6 @@ def test_every_name_and_every_landmark_is_in_the_whole(
         }
 
 
-@settings(deadline=None)
 @given(MEMORIES, MEMORIES)
 def test_joining_the_same_again_adds_no_name(first: SemanticMap, second: SemanticMap) -> None:
     once = unite(first, second).places

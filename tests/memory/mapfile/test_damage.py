@@ -33,7 +33,7 @@ SYNTAX = st.sampled_from([b"\n", b"  ", b"- ", b": ", b"#", b"[", b"}", b'"', b"
 REPLACED = st.tuples(st.integers(0, len(FILE)), st.integers(0, 6), SYNTAX)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.lists(DAMAGE | REPLACED, min_size=1, max_size=3))
 def test_any_damaged_file_is_a_map_or_a_semantic_map_error(
     damages: list[tuple[int, int, bytes]],

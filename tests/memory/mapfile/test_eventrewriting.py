@@ -52,7 +52,6 @@ def document_of(text: str) -> MapDocument:
     return parse_document(text.encode(), source="places.yaml")
 
 
-@settings(deadline=None)
 @given(EVENTS, st.sampled_from(LAYOUTS))
 def test_any_event_reads_back_from_any_layout(event: Event, layout: str) -> None:
     before = document_of(layout)
@@ -66,7 +65,6 @@ def test_any_event_reads_back_from_any_layout(event: Event, layout: str) -> None
     assert after.records.keys() == before.records.keys()
 
 
-@settings(deadline=None)
 @given(EVENTS, EVENTS, st.sampled_from(LAYOUTS))
 def test_any_event_can_become_any_other(event: Event, other: Event, layout: str) -> None:
     first, written = with_event(document_of(layout), event)

@@ -25,7 +25,7 @@ TEXTS = st.lists(st.sampled_from(LINES), max_size=14).map("\n".join)
 THREE = "waypoints:\n  - name: a\n    x: 1\n  - name: b\n\n  # c\n  - name: d\n"
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 @given(TEXTS, TEXTS, TEXTS, TEXTS)
 @example(before=THREE, out="", new="  - name: e\n", after="")
 @example(before="waypoints:\n  - name: a\n", out="", new="  - name: b\n", after="events:\n")
@@ -38,7 +38,7 @@ def test_what_changed_is_found_as_if_all_were_looked_at(
         assert find_changed_records(text, before=old, layout=layout) == find_records(text)
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 @given(st.data(), TEXTS, st.text("-n: \n#ab", max_size=6))
 def test_a_change_in_the_middle_of_a_line_is_found_too(
     data: st.DataObject, lines: str, new: str

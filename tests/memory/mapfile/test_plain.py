@@ -64,7 +64,7 @@ def test_what_is_more_than_plain_is_left_to_the_yaml_parser(line: str) -> None:
     assert read_plain_record(f"  - {line}\n") is None
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(waypoints(has_poses=True))
 def test_any_record_of_mapspeak_is_read_as_by_the_yaml_parser(waypoint: Waypoint) -> None:
     block = record_text(record_data(waypoint), indent=2)
@@ -72,7 +72,7 @@ def test_any_record_of_mapspeak_is_read_as_by_the_yaml_parser(waypoint: Waypoint
     assert read_plain_record(block) in (None, read_slowly(block))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.data())
 def test_any_damaged_record_is_read_as_by_the_yaml_parser_or_not_at_all(
     data: st.DataObject,

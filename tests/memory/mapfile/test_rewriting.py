@@ -264,7 +264,7 @@ def test_the_map_is_named_without_moving_anything_else() -> None:
         assert bound_to(document(text), "b1").text == named
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(waypoints(has_poses=True))
 def test_any_waypoint_is_read_back_as_it_was_written(waypoint: Waypoint) -> None:
     document_ = with_waypoint(document(""), waypoint)
@@ -278,7 +278,7 @@ def test_any_waypoint_is_read_back_as_it_was_written(waypoint: Waypoint) -> None
     assert back.pose.point.distance_to(waypoint.pose.point) < 0.001
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(waypoints(has_poses=True), waypoints(has_poses=True))
 def test_any_update_keeps_comments_and_own_keys(first: Waypoint, second: Waypoint) -> None:
     changed = HAND_WRITTEN
@@ -290,7 +290,7 @@ def test_any_update_keeps_comments_and_own_keys(first: Waypoint, second: Waypoin
         assert "lit: yes" in changed
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(waypoints(has_poses=True), waypoints(has_poses=True))
 def test_what_mapspeak_wrote_can_be_updated_to_anything(first: Waypoint, second: Waypoint) -> None:
     once = with_waypoint(document(""), first)

@@ -418,7 +418,7 @@ REQUESTS = st.sampled_from(
 MODELS = st.sampled_from([None, ConceptEmbedder()])
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(memories(), REQUESTS, MODELS, st.randoms(use_true_random=False))
 def test_the_order_of_the_records_does_not_matter(
     entries: list[Entry], query: str, embedder: ConceptEmbedder | None, random: Random
@@ -431,7 +431,7 @@ def test_the_order_of_the_records_does_not_matter(
     assert answers[0] == answers[1]
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(memories(), REQUESTS, MODELS)
 def test_the_same_request_has_the_same_answer_every_time(
     entries: list[Entry], query: str, embedder: ConceptEmbedder | None
@@ -441,7 +441,7 @@ def test_the_same_request_has_the_same_answer_every_time(
     assert index.find(query) == index.find(query)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(memories(), st.sampled_from(LABELS), MODELS)
 def test_an_exact_name_always_wins(
     entries: list[Entry], name: str, embedder: ConceptEmbedder | None

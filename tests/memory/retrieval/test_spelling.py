@@ -1,7 +1,7 @@
 import difflib
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mapspeak.memory.retrieval import MatchKind
@@ -33,7 +33,6 @@ def test_a_known_word_is_not_misspelt() -> None:
     assert Vocabulary(["leather"], is_known="lether".__eq__).find_spellings("lether") == {}
 
 
-@settings(deadline=None)
 @given(st.lists(st.text("abcäö소", min_size=1), max_size=8), st.text("abcdäö소", min_size=4))
 def test_no_likeness_is_lost_by_counting_letters_first(words: list[str], word: str) -> None:
     found = LookAlikes(words).find(word, least_ratio=0.8, limit=3)

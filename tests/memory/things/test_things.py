@@ -136,7 +136,7 @@ def test_a_range_places_a_thing_in_the_middle_of_the_floor() -> None:
     assert off_m(table, at) < 0.35
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.floats(-180, 180), st.sampled_from([0, 1, 2]))
 def test_a_wrong_view_among_three_hardly_moves_the_place_however_wrong_it_is(
     wrong_deg: float, which: int
@@ -325,7 +325,7 @@ def test_no_waypoints_are_no_things() -> None:
     assert things_of() == ()
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.permutations([0, 1, 2, 3, 4]))
 def test_the_order_of_waypoints_does_not_matter(order: list[int]) -> None:
     looks = (
@@ -336,7 +336,7 @@ def test_the_order_of_waypoints_does_not_matter(order: list[int]) -> None:
     assert things_of(*(looks[i] for i in order)) == things_of(*looks)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.floats(-50, 50), st.floats(-50, 50), st.floats(-3.1, 3.1))
 def test_a_turned_and_shifted_world_turns_and_shifts_the_places(
     x: float, y: float, yaw_rad: float

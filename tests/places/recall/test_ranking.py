@@ -43,7 +43,7 @@ def ask(cells: list[tuple[int, int]], *, n: int) -> tuple[RecallCandidate, ...]:
     return recall(world, RecallQuery(words="hydrant", n=n)).candidates
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.lists(free_cells, min_size=2, max_size=7, unique=True))
 def test_of_several_things_of_one_name_the_nearest_by_path_comes_first(
     cells: list[tuple[int, int]],
@@ -54,7 +54,7 @@ def test_of_several_things_of_one_name_the_nearest_by_path_comes_first(
     assert others_m == sorted(others_m)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.lists(free_cells, min_size=3, max_size=7, unique=True))
 def test_who_asks_for_fewer_is_told_the_first_of_those_who_ask_for_all(
     cells: list[tuple[int, int]],

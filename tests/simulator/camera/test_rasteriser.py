@@ -45,7 +45,7 @@ def cast_rays(corners: FloatArray, viewpoint: Viewpoint) -> FloatArray:
     return nearest
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(n=st.integers(1, 60), seed=st.integers(0, 10_000))
 def test_each_pixel_shows_what_a_ray_through_it_meets_first(n: int, seed: int) -> None:
     corners = scatter_triangles(n, seed)

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mapspeak.errors import ConfigError
@@ -37,7 +37,6 @@ def signed_volume(part: Mesh) -> float:
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)
 
 
-@settings(deadline=None)  # the first look at a kind builds it
 @given(kind=kinds, ends=st.tuples(heights, heights))
 def test_footprints_are_convex_and_run_counter_clockwise(
     kind: str, ends: tuple[float, float]
@@ -51,7 +50,6 @@ def test_footprints_are_convex_and_run_counter_clockwise(
         )
 
 
-@settings(deadline=None)  # the first look at a kind builds it
 @given(kind=kinds, levels=st.tuples(heights, heights, heights, heights))
 def test_a_wider_band_of_heights_holds_all_that_a_narrower_one_does(
     kind: str, levels: tuple[float, float, float, float]

@@ -21,6 +21,8 @@ from mapspeak.ros.subscribing import TopicSubscription
 logger = logging.getLogger(__name__)
 
 DEPTH, BULKY_DEPTH = 200, 5
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 30.0
+"""Before a node that did not tell a type is asked for it again."""
 LISTENER_S = 1.0
 """For a known listener to be connected to what we advertised."""
 
@@ -137,20 +139,26 @@ class DdsTopics(NativeTopics[_Request]):
         )
 
     def _learn(self, request: _Request, writer: Endpoint) -> None:
-        """Ask once for a type that we do not know, or know in another version."""
+        """Ask for a type that we do not know, or know in another version, until it is told once."""
         if not request.has_learned:
             request.has_learned = True
             self._start_soon(partial(self._learn_and_arrange, request, writer))
 
     async def _learn_and_arrange(self, request: _Request, writer: Endpoint) -> None:
+        # A node's services may be found after its topics, and a busy node may answer too late.
         topic = request.subscription.topic
-        try:
-            await self._ask_type(writer)
-        except LinkError as error:
-            logger.warning("%s cannot be read: %s", topic, error)
-            return
-        if self.requests.get(topic) is request:
-            self.renew(topic)
+        pause_s = FIRST_PAUSE_S
+        while self.requests.get(topic) is request:
+            try:
+                await self._ask_type(writer)
+            except LinkError as error:
+                if pause_s == FIRST_PAUSE_S:
+                    logger.warning("%s cannot be read: %s", topic, error)
+                await anyio.sleep(pause_s)
+                pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
+            else:
+                self.renew(topic)
+                return
 
     def end(self, request: _Request) -> None:
         """Read a topic no longer."""
