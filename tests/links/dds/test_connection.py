@@ -222,7 +222,8 @@ async def test_a_type_that_we_do_not_know_is_asked_of_its_node() -> None:
 
 
 async def test_a_type_that_its_node_did_not_tell_at_first_is_asked_for_again() -> None:
-    name, answers = "my_msgs/msg/Secret", []
+    name = "my_msgs/msg/Secret"
+    answers: list[dict[str, Any]] = []
     label = {"name": "label", "type": {"type_id": 17}}
     described = {"type_description": {"type_name": name, "fields": [label]}}
 
