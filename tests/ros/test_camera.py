@@ -6,8 +6,8 @@ import pytest
 
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge import Timing
-from mapspeak.ros.robot.camera import RosCamera
 from mapspeak.ros.robot.driving import DrivingPatience
+from mapspeak.ros.robot.sensors import RosCamera
 from rosbridge_robot import ScriptedRobot, connect_scripted
 
 pytestmark = pytest.mark.anyio

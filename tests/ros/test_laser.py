@@ -15,7 +15,7 @@ from mapspeak.robot import RangeScan
 from mapspeak.ros.discovery import RobotOverrides
 from mapspeak.ros.messages import Dialect, FrameTransform, LaserScan, write_scan, write_transforms
 from mapspeak.ros.robot.driving import DrivingPatience
-from mapspeak.ros.robot.laser import Laser
+from mapspeak.ros.robot.sensors import Laser
 from rosbridge_robot import ScriptedRobot, connect_scripted, eventually
 from rosbridge_script import Operation
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mapspeak.ros.subscribing import Announcements
+from mapspeak.ros.link import Announcements
 
 
 @pytest.fixture

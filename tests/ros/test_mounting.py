@@ -8,7 +8,7 @@ import pytest
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.ros.messages import FrameTransform
-from mapspeak.ros.robot.laser import find_mounting
+from mapspeak.ros.robot.sensors import find_mounting, place_beams
 from mapspeak.ros.transforms import TransformTree
 
 
@@ -24,7 +24,7 @@ def tree(*frames: tuple[str, str, Pose]) -> TransformTree:
 
 def one_metre_ahead(grown: TransformTree, *, base: str) -> tuple[float, float]:
     mounting = find_mounting(grown, base=base, sensor="laser")
-    angles_rad, ranges_m = mounting.place(np.zeros(1), np.ones(1))
+    angles_rad, ranges_m = place_beams(mounting, np.zeros(1), np.ones(1))
     return math.degrees(angles_rad[0]), float(ranges_m[0])
 
 
@@ -41,7 +41,7 @@ def test_the_base_may_hang_beside_the_laser_as_well_as_above_it() -> None:
 def test_a_scan_in_the_frame_of_the_base_itself_stays_as_it_is() -> None:
     grown = tree(("odom", "base_link", Pose(5.0, 6.0, 1.0)))
     mounting = find_mounting(grown, base="base_link", sensor="base_link")
-    assert np.allclose(mounting.base_from_sensor, np.eye(4))
+    assert np.allclose(mounting, np.eye(4))
 
 
 def test_a_laser_of_another_robot_is_mounted_nowhere_on_this_one() -> None:

@@ -4,30 +4,33 @@
 works with any ROS robot is written against it. Messages are mappings as rosbridge writes them.
 """
 
+from mapspeak.ros.activity import (
+    REFUSED,
+    ActionEnd,
+    ActionGoal,
+    Listener,
+    Startable,
+    Started,
+    Subscription,
+)
 from mapspeak.ros.definitions import split_definition
-from mapspeak.ros.graph import (
+from mapspeak.ros.port import (
     NAME,
     TYPE,
     LinkKind,
     LinkName,
     NodeLinks,
     OwnEnds,
+    RosConnection,
     RosGraph,
     find_nearest,
     new_id,
-)
-from mapspeak.ros.port import (
-    ActionEnd,
-    ActionGoal,
-    Listener,
-    RosConnection,
-    Subscription,
     started_over,
 )
-from mapspeak.ros.started import Startable, Started
 
 __all__ = [
     "NAME",
+    "REFUSED",
     "TYPE",
     "ActionEnd",
     "ActionGoal",

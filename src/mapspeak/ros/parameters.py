@@ -1,8 +1,11 @@
 """The parameters of a ROS 2 node, by the services that every node offers for them."""
 
 import base64
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any
+
+import numpy as np
 
 from mapspeak.errors import LinkError
 
@@ -23,7 +26,10 @@ KIND_OF: dict[type, int] = {bool: 1, int: 2, float: 3, str: 4}
 DOUBLE, DOUBLE_ARRAY, ARRAY_SHIFT = 3, 8, 5
 
 
-class _Caller(Protocol):
+class ParameterServices(ABC):
+    """The part of the port about parameters, as nodes of ROS 2 serve them."""
+
+    @abstractmethod
     async def call_service(
         self,
         service: str,
@@ -31,69 +37,46 @@ class _Caller(Protocol):
         *,
         type_name: str | None = None,
         timeout_s: float | None = None,
-    ) -> dict[str, Any]: ...
+    ) -> dict[str, Any]:
+        """Return what a service answers."""
 
-
-class NodeParameters:
-    """Lists, reads and sets parameters over whatever can call services.
-
-    Args:
-        caller: Connected to the robot.
-    """
-
-    def __init__(self, caller: _Caller) -> None:
-        self._caller = caller
-
-    async def fetch_names(self, node: str) -> tuple[str, ...]:
-        """Return the names of a node's parameters, in their order.
-
-        Raises:
-            LinkError: The node does not answer.
-        """
-        answer = await self._call(node, "list_parameters", "ListParameters", {"depth": 0})
+    async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
+        """Return the names of a node's parameters, in their order."""
+        answer = await self._ask(node, "list_parameters", "ListParameters", {"depth": 0})
         names = _part(answer.get("result"), "names", node)
         return tuple(sorted(str(name) for name in names))
 
-    async def fetch(self, node: str, name: str) -> Any:  # noqa: ANN401 - any value ROS has
-        """Return the value of a parameter; None where it is not set.
-
-        Raises:
-            LinkError: The node does not answer.
-        """
-        answer = await self._call(node, "get_parameters", "GetParameters", {"names": [name]})
+    async def fetch_parameter(self, node: str, name: str) -> Any:  # noqa: ANN401 - any value ROS has
+        """Return the value of a node's parameter; None where it is not set."""
+        answer = await self._ask(node, "get_parameters", "GetParameters", {"names": [name]})
         values = _part(answer, "values", node)
         value = values[0] if len(values) else {}
         field = FIELD_OF_KIND.get(value.get("type", 0)) if isinstance(value, dict) else None
-        return None if field is None else value.get(field)
+        found = None if field is None else value.get(field)
+        if isinstance(found, bytes):
+            return list(found)
+        return found.tolist() if isinstance(found, np.ndarray) else found
 
-    async def put(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401 - likewise
-        """Set a parameter; a whole number becomes a double where the node keeps doubles.
+    async def set_parameter(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401
+        """Set a node's parameter; a whole number becomes a double where the node keeps doubles.
 
         None deletes it, which a node allows only for what it has not declared.
-
-        Raises:
-            LinkError: The node does not answer, or refuses, and says why.
         """
-        parameter = {"name": name, "value": await self._write(node, name, value)}
-        answer = await self._call(
-            node, "set_parameters", "SetParameters", {"parameters": [parameter]}
-        )
+        written: dict[str, Any] = {"type": NOT_SET}
+        if value is not None:
+            asked = {"names": [name]}
+            answer = await self._ask(node, "get_parameter_types", "GetParameterTypes", asked)
+            written = _write(value, wanted=_first_of(answer.get("types")))
+        parameters = {"parameters": [{"name": name, "value": written}]}
+        answer = await self._ask(node, "set_parameters", "SetParameters", parameters)
         for result in _part(answer, "results", node):
             if isinstance(result, dict) and not result.get("successful", False):
                 raise _refused(node, name, value, result.get("reason"))
 
-    async def _write(self, node: str, name: str, value: Any) -> dict[str, Any]:  # noqa: ANN401
-        if value is None:
-            return {"type": NOT_SET}
-        types = await self._call(
-            node, "get_parameter_types", "GetParameterTypes", {"names": [name]}
-        )
-        return _write(value, wanted=_first_of(types.get("types")))
-
-    async def _call(
+    async def _ask(
         self, node: str, service: str, type_name: str, arguments: Mapping[str, Any]
     ) -> dict[str, Any]:
-        return await self._caller.call_service(
+        return await self.call_service(
             f"{node}/{service}", arguments, type_name=f"rcl_interfaces/srv/{type_name}"
         )
 

@@ -1,114 +1,106 @@
-"""What a connection to a ROS system can do."""
+"""What a connection to a ROS system can do, and what it tells of nodes and topics."""
 
-from collections.abc import Callable, Coroutine, Mapping
-from dataclasses import dataclass
+import difflib
+import re
+import uuid
+from collections.abc import Callable, Coroutine, Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import Any, Protocol
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.graph import LinkName, NodeLinks, OwnEnds, RosGraph
-from mapspeak.ros.messages import Message
-from mapspeak.ros.started import Started
+from mapspeak.ros.activity import ActionGoal, Started, Subscription
+from mapspeak.ros.messages import Dialect, Message
 
-Listener = Callable[[Message], None]
+NAME = re.compile(r"[~/]?[A-Za-z_][A-Za-z0-9_]*(?:/[A-Za-z_][A-Za-z0-9_]*)*")
+TYPE = re.compile(r"[A-Za-z]\w*(?:/(?:msg|srv|action))?/[A-Za-z]\w*")
+
+
+def new_id() -> str:
+    """Return an id that no other client of the same robot uses: 32 hex digits."""
+    return uuid.uuid4().hex
+
+
+def find_nearest(name: str, names: Iterable[str], *, most: int = 3) -> list[str]:
+    """Return the names most like one, the most alike first: what somebody may have meant."""
+    known = list(names)
+    last = name.rstrip("/").rpartition("/")[2].lower()
+    ending = [each for each in known if last and each.lower().endswith(f"/{last}")]
+    like = difflib.get_close_matches(name, known, n=most, cutoff=0.5)
+    return list(dict.fromkeys([*ending, *like]))[:most]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ActionEnd:
-    """The end of a goal.
+class RosGraph:
+    """The topics and actions that are there at one moment.
 
     Attributes:
-        status: As in action_msgs/GoalStatus: 4 succeeded, 5 cancelled, 6 aborted; None if unsaid.
-        is_result: False when the goal was refused; says nothing about success.
-        values: The result message; a text with the reason where it was refused.
+        dialect: Which ROS it is.
+        distro: Such as "jazzy"; empty where the robot does not say.
+        types: The type of each topic, as "package/Type".
+        actions: The action servers of ROS 2; ROS 1 shows them as topics only.
     """
 
-    status: int | None
-    is_result: bool
-    values: Any
+    dialect: Dialect
+    distro: str = ""
+    types: Mapping[str, str] = field(default_factory=dict)
+    actions: tuple[str, ...] = ()
+
+    def topics_of(self, *types: str) -> list[str]:
+        """Return the topics of some types, in the order of their names."""
+        return sorted(topic for topic, type_name in self.types.items() if type_name in types)
 
 
-class Subscription(Protocol):
-    """A topic as we last heard it: the latest message wins."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NodeLinks:
+    """What one node has to do with.
 
-    @property
-    def topic(self) -> str:
-        """Its full name."""
-        ...
+    Attributes:
+        publishes: Topics, by name.
+        subscribes: Topics, by name.
+        serves: Services, by name.
+    """
 
-    @property
-    def latest(self) -> Message | None:
-        """The newest message; None as long as none has come."""
-        ...
-
-    @property
-    def n_received(self) -> int:
-        """Since the subscription began, over all connections."""
-        ...
-
-    @property
-    def begun_s(self) -> float:
-        """Since when we have listened, by the event loop's clock."""
-        ...
-
-    @property
-    def arrived_s(self) -> float:
-        """When the newest came, by the event loop's clock."""
-        ...
-
-    def listen(self, listener: Listener) -> None:
-        """Call a function with every message that comes from now on; it must not raise."""
-        ...
-
-    async def wait_for_more_than(self, n_received: int, *, timeout_s: float) -> Message:
-        """Return the latest message once more than so many have come; wait in wall time.
-
-        Raises:
-            LinkError: None came in time. The subscription goes on.
-        """
-        ...
+    publishes: tuple[str, ...] = ()
+    subscribes: tuple[str, ...] = ()
+    serves: tuple[str, ...] = ()
 
 
-class ActionGoal(Protocol):
-    """What is known of one goal of a ROS 2 action. It is kept after its end."""
+class LinkKind(StrEnum):
+    """What connects us to a ROS system."""
 
-    @property
-    def goal_id(self) -> str:
-        """The id it was sent with."""
-        ...
+    ROSBRIDGE = "rosbridge"
+    RCLPY = "rclpy"
+    DDS = "DDS"
 
-    @property
-    def action(self) -> str:
-        """The action's full name."""
-        ...
 
-    @property
-    def ros_id(self) -> str | None:
-        """The UUID under which the action server knows it, 32 hex digits; None where unknown."""
-        ...
+@dataclass(frozen=True, slots=True)
+class LinkName:
+    """How we are connected.
 
-    @property
-    def is_accepted(self) -> bool:
-        """True when the server is known to have taken it; rosbridge does not tell."""
-        ...
+    Attributes:
+        kind: Through what.
+        place: Where to, without secrets: an address or a domain.
+    """
 
-    @property
-    def feedback(self) -> Message | None:
-        """The latest; None before the first."""
-        ...
+    kind: LinkKind
+    place: str
 
-    @property
-    def end(self) -> ActionEnd | None:
-        """How it ended; None before."""
-        ...
 
-    @property
-    def is_lost(self) -> bool:
-        """True when what would have brought its end is gone; the robot may still drive."""
-        ...
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OwnEnds:
+    """What of a ROS system is our own doing.
 
-    def listen(self, listener: Callable[[], None]) -> None:
-        """Call a function whenever something is said about the goal; it must not raise."""
-        ...
+    Attributes:
+        node: The last part of the name of the node that speaks and listens for us; empty where no
+            node is told that does.
+        publishes: Topics that it publishes for us.
+        hears: Topics that it listens to for us.
+    """
+
+    node: str = ""
+    publishes: frozenset[str] = frozenset()
+    hears: frozenset[str] = frozenset()
 
 
 class RosConnection(Protocol):

@@ -1,12 +1,12 @@
 """The services and actions that we use, each with its topics opened once and kept."""
 
-from collections.abc import Awaitable, Callable, Coroutine, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.links.dds.discovery import Discovery, Endpoint
+from mapspeak.links.dds.discovery import Endpoint
 from mapspeak.links.dds.endpoints import (
     SERVICE_PART,
     Sample,
@@ -17,17 +17,13 @@ from mapspeak.links.dds.endpoints import (
     request_topic,
 )
 from mapspeak.links.dds.goals import DdsActionClient
+from mapspeak.links.dds.graph import DdsGraph
 from mapspeak.links.dds.participant import DdsParticipant
 from mapspeak.links.dds.services import ServiceClient
-from mapspeak.links.dds.topics import DdsTopics
-from mapspeak.links.dds.types import Types
 from mapspeak.ros import ActionGoal
-from mapspeak.ros.goal import PursuedGoal
+from mapspeak.ros.link import check_name, wrong_type
 from mapspeak.ros.messages import Message, bare_type
-from mapspeak.ros.native import check_name, wrong_type
 
-StartSoon = Callable[[Callable[[], Coroutine[Any, Any, None]]], None]
-Learn = Callable[..., Awaitable[None]]
 APPEARANCE_S = 1.0
 """For a service to be found that is asked for, in wall time."""
 
@@ -36,30 +32,14 @@ class Calls:
     """Calls services, and pursues goals.
 
     Args:
+        connection: Knows who serves what, and how types look.
         participant: Ours.
-        discovery: Says who serves what.
-        types: Encodes and decodes.
-        topics: Reads what actions say of their goals.
-        learn: Makes types known by asking the node behind an endpoint; raises `LinkError`.
-        start_soon: Runs something in the background.
     """
 
-    def __init__(
-        self,
-        participant: DdsParticipant,
-        discovery: Discovery,
-        types: Types,
-        topics: DdsTopics,
-        *,
-        learn: Learn,
-        start_soon: StartSoon,
-    ) -> None:
+    def __init__(self, connection: DdsGraph, participant: DdsParticipant) -> None:
+        self._connection = connection
+        self._discovery = connection.discovery
         self._participant = participant
-        self._discovery = discovery
-        self._types = types
-        self._topics = topics
-        self._learn = learn
-        self._start_soon = start_soon
         self._services: dict[str, ServiceClient] = {}
         self._actions: dict[str, DdsActionClient] = {}
         self._news = anyio.Event()
@@ -86,7 +66,7 @@ class Calls:
 
     async def send_goal(
         self, action: str, arguments: Message, *, type_name: str, timeout_s: float
-    ) -> PursuedGoal:
+    ) -> ActionGoal:
         """Send a goal and return what becomes of it, as it becomes.
 
         Raises:
@@ -136,14 +116,14 @@ class Calls:
                 hint="Ask for the list of services; the node that offers it may have ended.",
             )
         name = ServiceName(service=service, type_name=SERVICE_PART.sub("", server.type_name))
-        await self._learn(server, name.request_type, name.reply_type)
+        await self._connection.learn(server, name.request_type, name.reply_type)
         if service not in self._services:
             self._services[service] = ServiceClient(
                 self._participant,
                 name,
                 framing=server.framing,
-                encode=self._types.encode,
-                decode=self._types.decode,
+                encode=self._connection.types.encode,
+                decode=self._connection.types.decode,
             )
         return self._services[service]
 
@@ -155,15 +135,13 @@ class Calls:
         if action in self._actions:
             return self._actions[action]
         client = DdsActionClient(
-            send=send, result=result, cancel=cancel, start_soon=self._start_soon
+            send=send, result=result, cancel=cancel, start_soon=self._connection.start_soon
         )
         self._actions[action] = client
         self.note_change(send.name.reply_topic)
         await self._learn_feedback(action)
         for name, take in (("status", client.take_statuses), ("feedback", client.take_feedback)):
-            subscription = self._topics.subscribe(
-                _part(action, name), type_name=None, is_bulky=False, throttle_ms=0
-            )
+            subscription = self._connection.subscribe(_part(action, name))
             subscription.listen(take)
             if name == "status" and subscription.latest is not None:
                 take(subscription.latest)
@@ -172,7 +150,9 @@ class Calls:
     async def _learn_feedback(self, action: str) -> None:
         writers = self._discovery.writers_of(dds_topic(_part(action, "feedback")))
         if writers:
-            await self._learn(writers[0], f"{action_type_of(writers[0].type_name)}_Feedback")
+            await self._connection.learn(
+                writers[0], f"{action_type_of(writers[0].type_name)}_Feedback"
+            )
 
 
 def _part(action: str, name: str) -> str:

@@ -14,16 +14,13 @@ from mapspeak.links.dds.endpoints import DISCOVERY_TOPIC, DISCOVERY_TYPE, Qualit
 from mapspeak.links.dds.graph import DdsGraph
 from mapspeak.links.dds.network import DdsNetwork, DdsTiming
 from mapspeak.links.dds.participant import DdsParticipant
-from mapspeak.links.dds.topics import DdsTopics
 from mapspeak.links.dds.types import Types
 from mapspeak.ros import ActionGoal, LinkKind, LinkName
 from mapspeak.ros.discovery import RobotOverrides
-from mapspeak.ros.goal import PursuedGoal
+from mapspeak.ros.link import plain_errors
 from mapspeak.ros.messages import Message
-from mapspeak.ros.native import NativeConnection
 from mapspeak.ros.robot import RosRobot, build_ros_robot
 from mapspeak.ros.robot.driving import DrivingPatience
-from mapspeak.ros.subscribing import plain_errors
 
 NODES_QUALITY = Quality(is_reliable=True, is_latched=True, depth=1000)
 LONG_NODES_TYPE = "rmw_dds_common/LongParticipantEntitiesInfo"
@@ -35,7 +32,7 @@ HINT = (
 )
 
 
-class DdsConnection(DdsGraph, NativeConnection):
+class DdsConnection(DdsGraph):
     """One ROS 2 system, as a member of its DDS domain sees it.
 
     Args:
@@ -56,29 +53,12 @@ class DdsConnection(DdsGraph, NativeConnection):
     ) -> None:
         self.network = network
         self.timing = timing
-        self._participant = DdsParticipant(network)
-        discovery = Discovery(
-            self._participant.key, on_change=self._note_change, framing_of=framing_of
-        )
-        super().__init__(discovery, Types())
-        NativeConnection.__init__(self)
+        participant = DdsParticipant(network)
+        discovery = Discovery(participant.key, on_change=self._note_change, framing_of=framing_of)
+        super().__init__(participant, discovery, Types())
         self._tasks: TaskGroup | None = None
         self._found_s: float | None = None
-        self._topics = DdsTopics(
-            self._participant,
-            self.discovery,
-            self.types,
-            ask_type=self.ask_type,
-            start_soon=self.start_soon,
-        )
-        self._calls = Calls(
-            self._participant,
-            self.discovery,
-            self.types,
-            self._topics,
-            learn=self.learn,
-            start_soon=self.start_soon,
-        )
+        self._calls = Calls(self, participant)
 
     @property
     def link(self) -> LinkName:
@@ -95,11 +75,6 @@ class DdsConnection(DdsGraph, NativeConnection):
     def connected_for_s(self) -> float | None:
         """Since when nodes have been there, in wall time; None while none is."""
         return None if self._found_s is None else anyio.current_time() - self._found_s
-
-    @property
-    def topics(self) -> DdsTopics:
-        """What is read and written."""
-        return self._topics
 
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Run something in the background until the connection is closed."""
@@ -134,7 +109,7 @@ class DdsConnection(DdsGraph, NativeConnection):
 
     async def aclose(self) -> None:
         """Leave the domain, once what was published last has arrived."""
-        if self._topics.has_advertised:
+        if self._advertised:
             await self._participant.flush(timeout_s=self.timing.arrival_s)
         self._participant.close()
 
@@ -168,7 +143,7 @@ class DdsConnection(DdsGraph, NativeConnection):
         """Return what a service answers, and when it did."""
         return await self._calls.call(service, arguments, type_name=None, timeout_s=timeout_s)
 
-    async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> PursuedGoal:
+    async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
         """Send a goal to an action and return what becomes of it, as it becomes."""
         return await self._calls.send_goal(
             action, arguments, type_name=type_name, timeout_s=self.timing.answer_s
@@ -198,7 +173,7 @@ class DdsConnection(DdsGraph, NativeConnection):
             self._found_s = anyio.current_time()
         for each in self.discovery.ends_of(dds_name):
             self.types.take_hash(each.type_name, each.type_hash)
-        self._topics.note_change(dds_name)
+        self._note_topic(dds_name)
         self._calls.note_change(dds_name)
 
     def _decode_nodes(self, data: bytes) -> dict[str, Any]:

@@ -12,8 +12,7 @@ import anyio
 
 from mapspeak.errors import LinkError
 from mapspeak.links.dds.services import Answer, ServiceClient
-from mapspeak.ros import ActionEnd, new_id
-from mapspeak.ros.goal import PursuedGoal
+from mapspeak.ros import REFUSED, ActionEnd, ActionGoal, new_id
 from mapspeak.ros.messages import Message
 
 FINAL = (4, 5, 6)
@@ -47,7 +46,7 @@ class DdsActionClient:
         self._result = result
         self._cancel = cancel
         self._start_soon = start_soon
-        self._goals: dict[str, PursuedGoal] = {}
+        self._goals: dict[str, ActionGoal] = {}
         self._asked: dict[int, str] = {}
         self._statuses: dict[str, int] = {}
         self._results: list[Answer] = []
@@ -55,7 +54,7 @@ class DdsActionClient:
         self._is_named = anyio.Event()
         result.on_answer = self._take_result
 
-    async def send_goal(self, action: str, arguments: Message, *, timeout_s: float) -> PursuedGoal:
+    async def send_goal(self, action: str, arguments: Message, *, timeout_s: float) -> ActionGoal:
         """Send a goal; what becomes of it comes later.
 
         Raises:
@@ -65,7 +64,7 @@ class DdsActionClient:
             await service.wait_for_server(timeout_s=timeout_s)
         goal_id = new_id()
         request = self._send.encode({"goal_id": _uuid(goal_id), "goal": arguments})
-        goal = PursuedGoal(goal_id=goal_id, action=action, ros_id=goal_id)
+        goal = ActionGoal(goal_id=goal_id, action=action, ros_id=goal_id)
         self._goals[goal_id] = goal
         self._start_soon(partial(self._wait_for_answer, goal, request, timeout_s))
         return goal
@@ -111,7 +110,7 @@ class DdsActionClient:
 
     # --- acceptance
 
-    async def _wait_for_answer(self, goal: PursuedGoal, request: bytes, timeout_s: float) -> None:
+    async def _wait_for_answer(self, goal: ActionGoal, request: bytes, timeout_s: float) -> None:
         try:
             answer = (await self._send.call(request, timeout_s=timeout_s)).content
         except LinkError:
@@ -125,9 +124,9 @@ class DdsActionClient:
             self._accept(goal.goal_id)
         else:
             del self._goals[goal.goal_id]
-            goal.take_end(ActionEnd(status=None, is_result=False, values=""))
+            goal.take_end(REFUSED)
 
-    async def _wait_until_named(self, goal: PursuedGoal) -> None:
+    async def _wait_until_named(self, goal: ActionGoal) -> None:
         with anyio.move_on_after(SECOND_THOUGHT_S):
             while not goal.is_accepted and goal.goal_id in self._goals:
                 await self._is_named.wait()

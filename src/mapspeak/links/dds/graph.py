@@ -1,18 +1,15 @@
 """What a ROS system is made of, as DDS and its nodes tell: the part of the port that only asks."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from mapspeak.errors import LinkError
-from mapspeak.links.dds.discovery import Discovery, Endpoint
+from mapspeak.links.dds.discovery import Endpoint
 from mapspeak.links.dds.endpoints import SERVICE_PART, Sample, is_hidden
-from mapspeak.links.dds.types import Types
+from mapspeak.links.dds.topics import DdsTopics
 from mapspeak.ros import NodeLinks, RosGraph
 from mapspeak.ros.messages import Dialect
-from mapspeak.ros.parameters import NodeParameters
 
 DESCRIBE = "get_type_description"
 DESCRIBE_TYPE = "type_description_interfaces/srv/GetTypeDescription"
@@ -20,28 +17,12 @@ ASKED_FOR_TIME = "/get_parameter_types"
 PATIENCE_S = 2.0
 
 
-class DdsGraph(ABC):
-    """Answers from what was discovered, by whatever way services are called."""
-
-    def __init__(self, discovery: Discovery, types: Types) -> None:
-        self.discovery = discovery
-        self.types = types
-        self._parameters = NodeParameters(self)
+class DdsGraph(DdsTopics):
+    """Answers from what was discovered, and what nodes tell of their types and their time."""
 
     @abstractmethod
     async def wait_until_connected(self) -> None:
         """Return at once, or when somebody is there again."""
-
-    @abstractmethod
-    async def call_service(
-        self,
-        service: str,
-        arguments: Mapping[str, Any] | None = None,
-        *,
-        type_name: str | None = None,
-        timeout_s: float | None = None,
-    ) -> dict[str, Any]:
-        """Return what a service answers."""
 
     @abstractmethod
     async def ask(self, service: str, arguments: Mapping[str, Any], *, timeout_s: float) -> Sample:
@@ -131,17 +112,11 @@ class DdsGraph(ABC):
 
     async def fetch_service_type(self, service: str) -> str:
         """Return a service's type."""
-        found = self.discovery.service_type(service)
-        if found is None:
-            raise _unknown(service)
-        return found
+        return _known(self.discovery.service_type(service), service)
 
     async def fetch_action_type(self, action: str) -> str:
         """Return an action's type."""
-        found = self.discovery.actions.get(action)
-        if found is None:
-            raise _unknown(action)
-        return found
+        return _known(self.discovery.actions.get(action), action)
 
     async def fetch_definitions(self, type_name: str) -> Mapping[str, str]:
         """Return the .msg texts of a type and of all within: ours, or those that a node tells."""
@@ -155,18 +130,11 @@ class DdsGraph(ABC):
                 continue
         return self.types.definitions(type_name)
 
-    async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
-        """Return the names of a node's parameters."""
-        return await self._parameters.fetch_names(node)
 
-    async def fetch_parameter(self, node: str, name: str) -> Any:  # noqa: ANN401 - any value
-        """Return the value of a node's parameter; None where it is not set."""
-        value = await self._parameters.fetch(node, name)
-        return value.tolist() if isinstance(value, np.ndarray) else value
-
-    async def set_parameter(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401
-        """Set a node's parameter."""
-        await self._parameters.put(node, name, value)
+def _known(found: str | None, name: str) -> str:
+    if found is None:
+        raise _unknown(name)
+    return found
 
 
 def _unknown(name: str) -> LinkError:

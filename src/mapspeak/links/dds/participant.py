@@ -37,7 +37,7 @@ from mapspeak.links.dds.endpoints import (
     dds_type,
 )
 from mapspeak.links.dds.network import DdsNetwork
-from mapspeak.ros.native import environment_with
+from mapspeak.ros.link import environment_with
 
 logger = logging.getLogger(__name__)
 

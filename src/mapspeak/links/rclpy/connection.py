@@ -9,16 +9,13 @@ from anyio.abc import TaskGroup
 from anyio.from_thread import BlockingPortal
 
 from mapspeak.errors import LinkError
-from mapspeak.links.rclpy.goals import Goals
+from mapspeak.links.rclpy.calls import Goals, RclpyServices
 from mapspeak.links.rclpy.graph import RclpyGraph
 from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wait_until
-from mapspeak.links.rclpy.services import RclpyServices
 from mapspeak.links.rclpy.topics import RclpyTopics
 from mapspeak.ros import ActionGoal, LinkKind, LinkName, NodeLinks, RosGraph
-from mapspeak.ros.goal import PursuedGoal
+from mapspeak.ros.link import plain_errors
 from mapspeak.ros.messages import Message
-from mapspeak.ros.native import NativeConnection
-from mapspeak.ros.subscribing import plain_errors
 
 ANSWER_S = 5.0
 """For a service's answer, where the caller says nothing else, and for a first node."""
@@ -38,7 +35,7 @@ HINT = (
 )
 
 
-class Ros2Connection(RclpyGraph, NativeConnection):
+class Ros2Connection(RclpyGraph, RclpyTopics):
     """One ROS 2 system, as our node in it sees it.
 
     Args:
@@ -48,11 +45,10 @@ class Ros2Connection(RclpyGraph, NativeConnection):
     """
 
     def __init__(self, participant: RclpyParticipant, tasks: TaskGroup, *, distro: str) -> None:
-        super().__init__(participant, distro=distro)
-        NativeConnection.__init__(self)
+        super().__init__(participant)
+        self._distro = distro
         self._tasks = tasks
         self._found_s: float | None = None
-        self._topics = RclpyTopics(participant)
         self._services = RclpyServices(participant)
         self._goals = Goals(participant, self._services, start_soon=self.start_soon)
 
@@ -71,11 +67,6 @@ class Ros2Connection(RclpyGraph, NativeConnection):
         """Since when others have been found, in wall time; None before."""
         return None if self._found_s is None else anyio.current_time() - self._found_s
 
-    @property
-    def topics(self) -> RclpyTopics:
-        """What is read and written."""
-        return self._topics
-
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Run something in the background until the connection is closed."""
         self._tasks.start_soon(work)
@@ -89,7 +80,7 @@ class Ros2Connection(RclpyGraph, NativeConnection):
 
     async def aclose(self) -> None:
         """Wait a moment until what was published last has arrived."""
-        await self._topics.flush()
+        await self._flush()
 
     async def wait_until_connected(self) -> None:
         """Return at once, or when the first node of others is found.
@@ -116,7 +107,7 @@ class Ros2Connection(RclpyGraph, NativeConnection):
             service, arguments or {}, type_name=type_name, timeout_s=limit_s
         )
 
-    async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> PursuedGoal:
+    async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
         """Send a goal to an action and return what becomes of it, as it becomes."""
         return await self._goals.send(action, arguments, type_name=type_name)
 
@@ -130,7 +121,7 @@ class Ros2Connection(RclpyGraph, NativeConnection):
         while True:
             # What ROS cannot tell now, it is asked again.
             with suppress(LinkError), errors_of_ros("ROS does not tell who is there"):
-                self._topics.refresh()
+                self._refresh_topics()
                 self._goals.refresh()
             await anyio.sleep(WATCH_S)
 

@@ -1,19 +1,16 @@
 """What a ROS system is made of, as rclpy tells: the part of the port that only asks."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-import numpy as np
 from rclpy.exceptions import NameValidationException
 
 from mapspeak.errors import LinkError
 from mapspeak.links.rclpy.participant import RclpyParticipant
 from mapspeak.links.rclpy.types import find_definitions
 from mapspeak.ros import NodeLinks, RosGraph
+from mapspeak.ros.link import check_name
 from mapspeak.ros.messages import Dialect, bare_type
-from mapspeak.ros.native import check_name
-from mapspeak.ros.parameters import NodeParameters
 
 UNNAMED = "_NODE_NAME_UNKNOWN_"
 """A node of which more is not known yet."""
@@ -21,29 +18,11 @@ SEND_GOAL = "/_action/send_goal"
 NANOSECONDS = 1_000_000_000
 
 
-class RclpyGraph(ABC):
-    """Answers from what our node has discovered, and services of the nodes.
+class RclpyGraph:
+    """Answers from what our node has discovered."""
 
-    Args:
-        participant: Ours.
-        distro: Such as "jazzy"; empty where that is unknown.
-    """
-
-    def __init__(self, participant: RclpyParticipant, *, distro: str) -> None:
-        self._participant = participant
-        self._distro = distro
-        self._parameters = NodeParameters(self)
-
-    @abstractmethod
-    async def call_service(
-        self,
-        service: str,
-        arguments: Mapping[str, Any] | None = None,
-        *,
-        type_name: str | None = None,
-        timeout_s: float | None = None,
-    ) -> dict[str, Any]:
-        """Return what a service answers."""
+    _participant: RclpyParticipant
+    _distro: str
 
     async def fetch_graph(self) -> RosGraph:
         """Return the topics and actions there are."""
@@ -116,36 +95,15 @@ class RclpyGraph(ABC):
 
     async def fetch_service_type(self, service: str) -> str:
         """Return a service's type."""
-        found = self._service_types().get(service)
-        if found is None:
-            raise _unknown(service)
-        return bare_type(found)
+        return _look_up(self._service_types(), service)
 
     async def fetch_action_type(self, action: str) -> str:
         """Return an action's type."""
-        found = self._action_types().get(action)
-        if found is None:
-            raise _unknown(action)
-        return bare_type(found)
+        return _look_up(self._action_types(), action)
 
     async def fetch_definitions(self, type_name: str) -> Mapping[str, str]:
         """Return the .msg texts of a type and of all within, as this machine's ROS has them."""
         return find_definitions(type_name)
-
-    async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
-        """Return the names of a node's parameters."""
-        return await self._parameters.fetch_names(node)
-
-    async def fetch_parameter(self, node: str, name: str) -> Any:  # noqa: ANN401 - any value
-        """Return the value of a node's parameter; None where it is not set."""
-        value = await self._parameters.fetch(node, name)
-        if isinstance(value, bytes):
-            return list(value)
-        return value.tolist() if isinstance(value, np.ndarray) else value
-
-    async def set_parameter(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401
-        """Set a node's parameter."""
-        await self._parameters.put(node, name, value)
 
     def _service_types(self) -> dict[str, str]:
         """Return the types of what somebody serves: a mere client shows as a service too."""
@@ -186,6 +144,12 @@ def _is_hidden(name: str) -> bool:
 
 def _shown(found: Iterable[tuple[str, Any]]) -> tuple[str, ...]:
     return tuple(sorted(name for name, _ in found if not _is_hidden(name)))
+
+
+def _look_up(types: Mapping[str, str], name: str) -> str:
+    if name not in types:
+        raise _unknown(name)
+    return bare_type(types[name])
 
 
 def _unknown(name: str) -> LinkError:

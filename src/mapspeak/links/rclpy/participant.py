@@ -19,7 +19,7 @@ from rclpy.utilities import get_rmw_implementation_identifier
 
 from mapspeak.errors import LinkError
 from mapspeak.ros import new_id
-from mapspeak.ros.native import environment_with
+from mapspeak.ros.link import environment_with
 
 LOG = logging.getLogger(__name__)
 N_DIGITS = 8

@@ -1,6 +1,7 @@
 """The topics that we read and write: each in the quality of service that fits the others there."""
 
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -14,9 +15,8 @@ from mapspeak.errors import LinkError
 from mapspeak.links.rclpy.messages import read_message, write_message
 from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wait_until
 from mapspeak.links.rclpy.types import find_message
+from mapspeak.ros.link import NativeLink, TopicRequest, check_name, wrong_type
 from mapspeak.ros.messages import Message, bare_type
-from mapspeak.ros.native import NativeTopics, check_name, wrong_type
-from mapspeak.ros.subscribing import TopicSubscription
 
 DEPTH, BULKY_DEPTH = 200, 5
 """How many messages ROS keeps until we take them."""
@@ -29,22 +29,16 @@ ARRIVAL_S = 0.5
 
 
 @dataclass(slots=True, eq=False)
-class _Request:
-    """How a topic was asked for.
+class RclpyTopicRequest(TopicRequest):
+    """How a topic was asked for, and is read.
 
     Attributes:
-        subscription: Of the topic.
-        is_bulky: Fewer messages are kept for a slow reader.
-        throttle_s: The least time between two messages.
         quality: In which it is read now; None while it is not.
         reader: What reads it in rclpy.
         n_readers: How many there have been; what an earlier one still brings is dropped.
         taken_s: When the last message was taken.
     """
 
-    subscription: TopicSubscription
-    is_bulky: bool
-    throttle_s: float
     quality: QoSProfile | None = None
     reader: Any = None
     n_readers: int = 0
@@ -58,7 +52,7 @@ class _Advertised:
     made_s: float
 
 
-class RclpyTopics(NativeTopics[_Request]):
+class RclpyTopics(NativeLink[RclpyTopicRequest]):
     """Reads and writes topics of ROS.
 
     A topic is read only once somebody writes it, because how it can be read depends on who does: a
@@ -70,27 +64,21 @@ class RclpyTopics(NativeTopics[_Request]):
     """
 
     def __init__(self, participant: RclpyParticipant) -> None:
-        super().__init__()
+        super().__init__(RclpyTopicRequest)
         self._participant = participant
         self._advertised: dict[str, _Advertised] = {}
 
     # --- reading
 
-    def request(
-        self, subscription: TopicSubscription, *, is_bulky: bool, throttle_s: float
-    ) -> _Request:
-        """Return a request that nothing has been done for yet."""
-        return _Request(subscription, is_bulky, throttle_s)
-
-    def refresh(self) -> None:
+    def _refresh_topics(self) -> None:
         """Take in that others have begun or ended to write topics that we read."""
         for request in list(self.requests.values()):
             # What cannot be read stays silent; who waits for it is told so.
             with suppress(LinkError):
-                self.arrange(request)
+                self._begin(request)
 
-    def arrange(self, request: _Request) -> None:
-        """Read a topic in the best quality that all of its writers offer."""
+    def _begin(self, request: RclpyTopicRequest) -> None:
+        """Read it in the best quality that all of its writers offer."""
         topic = request.subscription.topic
         node = self._participant.node
         writers = node.get_publishers_info_by_topic(topic)
@@ -107,41 +95,35 @@ class RclpyTopics(NativeTopics[_Request]):
         if request.quality == quality:
             return
         message_class = find_message(request.subscription.type_name or writers[0].topic_type)
-        self.end(request)
+        self._end(request)
         with errors_of_ros(f"{topic} cannot be read"):
             request.reader = node.create_subscription(
                 message_class, topic, partial(self._take, request, request.n_readers), quality
             )
         request.quality = quality
 
-    def end(self, request: _Request) -> None:
-        """Read a topic no longer."""
+    def _end(self, request: RclpyTopicRequest) -> None:
         if request.reader is not None:
             self._participant.node.destroy_subscription(request.reader)
         request.reader = request.quality = None
         request.n_readers += 1
 
-    def _take(self, request: _Request, number: int, message: Any) -> None:  # noqa: ANN401 - rclpy has no types
+    def _take(self, request: RclpyTopicRequest, number: int, message: Any) -> None:  # noqa: ANN401 - rclpy has no types
         """Take a message, in the thread of rclpy, and read it there."""
         now_s = time.monotonic()
-        if now_s - request.taken_s < request.throttle_s:
+        if now_s - request.taken_s < request.throttle_ms / 1e3:
             return
         request.taken_s = now_s
         self._participant.hand_over(self._give, request, number, read_message(message))
 
-    def _give(self, request: _Request, number: int, message: Message) -> None:
+    def _give(self, request: RclpyTopicRequest, number: int, message: Message) -> None:
         if request.n_readers == number:
             request.subscription.take(message)
 
     # --- writing
 
-    def advertise(self, topic: str, *, type_name: str) -> None:
-        """Say that we will publish.
-
-        Raises:
-            LinkError: The name or the type is none, or the topic has another type.
-        """
-        self.check(topic, type_name)
+    def _announce(self, topic: str, type_name: str) -> None:
+        self._check(topic, type_name)
         message_class = find_message(type_name)
         known = self._advertised.get(topic)
         if known is not None:
@@ -159,43 +141,40 @@ class RclpyTopics(NativeTopics[_Request]):
             publisher = node.create_publisher(message_class, topic, quality)
         self._advertised[topic] = _Advertised(message_class, publisher, anyio.current_time())
 
-    def unadvertise(self, topic: str) -> None:
-        """Take back what `advertise` said."""
+    def _take_back(self, topic: str) -> None:
         known = self._advertised.pop(topic, None)
         if known is not None:
             self._participant.node.destroy_publisher(known.publisher)
 
-    async def publish(self, topic: str, values: Message) -> None:
-        """Publish, once those who are known to listen are connected.
-
-        Raises:
-            LinkError: The topic was not advertised, or the message does not fit its type.
-        """
+    async def publish(self, topic: str, message: Message) -> None:
+        """Publish, once those who are known to listen are connected."""
+        self.announcements.use(topic)
         known = self._wanted(topic)
-        message = write_message(known.message_class, values)
+        written = write_message(known.message_class, message)
         if self._has_listeners(topic):
             count = known.publisher.get_subscription_count
             await wait_until(lambda: bool(count()), within_s=LISTENER_S)
             await anyio.sleep_until(known.made_s + YOUNG_S)
-        self._write(topic, known, message)
+        self._write(topic, written)
 
-    def publish_at_once(self, topic: str, values: Message) -> None:
-        """Publish to those who are connected already.
+    def _prepare(self, topic: str, message: Message) -> Callable[[], int]:
+        written = write_message(self._wanted(topic).message_class, message)
 
-        Raises:
-            LinkError: The topic was not advertised, or the message does not fit its type.
-        """
-        known = self._wanted(topic)
-        self._write(topic, known, write_message(known.message_class, values))
+        def send() -> int:
+            self._write(topic, written)
+            return 1
 
-    async def flush(self) -> None:
+        return send
+
+    async def _flush(self) -> None:
         """Return when all that was published has arrived, or after a short while."""
         publishers = [each.publisher for each in self._advertised.values()]
         await anyio.to_thread.run_sync(_wait_for_arrival, publishers)
 
-    def _write(self, topic: str, known: _Advertised, message: Any) -> None:  # noqa: ANN401
+    def _write(self, topic: str, written: Any) -> None:  # noqa: ANN401 - rclpy has no types
+        known = self._wanted(topic)
         with errors_of_ros(f"Nothing can be published on {topic}"):
-            known.publisher.publish(message)
+            known.publisher.publish(written)
 
     def _has_listeners(self, topic: str) -> bool:
         infos = self._participant.node.get_subscriptions_info_by_topic(topic)
@@ -207,8 +186,7 @@ class RclpyTopics(NativeTopics[_Request]):
             raise LinkError(f"{topic[:80]} was not advertised.", hint="Advertise it first.")
         return known
 
-    def check(self, topic: str, type_name: str | None) -> None:
-        """Raise `LinkError` where a name or a type is none, or do not go with the other."""
+    def _check(self, topic: str, type_name: str | None) -> None:
         check_name(topic)
         if type_name is None:
             return

@@ -23,16 +23,9 @@ from mapspeak.links.rosbridge.protocol import (
 )
 from mapspeak.links.rosbridge.requests import RosbridgeTopicRequest, ServiceCaller
 from mapspeak.links.rosbridge.rosapi import Rosapi
-from mapspeak.ros import ActionEnd, ActionGoal, LinkName, OwnEnds, Started, Subscription, new_id
-from mapspeak.ros.goal import PursuedGoal
+from mapspeak.ros import ActionEnd, ActionGoal, LinkName, OwnEnds, new_id
+from mapspeak.ros.link import NOTICE_S, plain_errors
 from mapspeak.ros.messages import Message
-from mapspeak.ros.subscribing import (
-    NOTICE_S,
-    Announcements,
-    TopicSubscription,
-    plain_errors,
-    say_again,
-)
 
 N_REMARKS_KEPT = 50
 NODE = "rosbridge_websocket"
@@ -56,14 +49,10 @@ class RosbridgeClient(Rosapi):
         super().__init__()
         self.address = address
         self.timing = timing
-        self.started = Started()
-        """Everything that was started over this connection."""
         self._control = self._channel()
         self._urgent = self._channel()
         self._caller = ServiceCaller(self._free_for_calls)
-        self._requests: dict[str, RosbridgeTopicRequest] = {}
-        self._announcements = Announcements(self._announce, self._take_back)
-        self._goals: dict[str, tuple[PursuedGoal, Channel | None]] = {}
+        self._goals: dict[str, tuple[ActionGoal, Channel | None]] = {}
         self._tasks: TaskGroup | None = None
         self._published_s = float("-inf")
         self.n_frames_refused = 0
@@ -105,9 +94,7 @@ class RosbridgeClient(Rosapi):
     @property
     def own_ends(self) -> OwnEnds:
         """What rosbridge's node does for us; it may do the like for its other clients."""
-        return OwnEnds(
-            node=NODE, publishes=self._announcements.told, hears=frozenset(self._requests)
-        )
+        return OwnEnds(node=NODE, publishes=self.announcements.told, hears=frozenset(self.requests))
 
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Run something in the background until the client is closed."""
@@ -141,70 +128,19 @@ class RosbridgeClient(Rosapi):
             tasks.start_soon(self._control.say_goodbye)
             tasks.start_soon(self._urgent.say_goodbye)
 
-    def subscribe(
-        self,
-        topic: str,
-        *,
-        type_name: str | None = None,
-        is_bulky: bool = False,
-        throttle_ms: int = 0,
-    ) -> TopicSubscription:
-        """Return the subscription to a topic, which is begun where there is none yet.
-
-        The first subscriber decides how messages are written, and how often they come.
-        """
-        request = self._requests.get(topic)
-        if request is None:
-            subscription = TopicSubscription(topic, type_name=type_name)
-            request = RosbridgeTopicRequest(subscription, is_bulky, throttle_ms)
-            self._begin(request)
-            self._requests[topic] = request
-        request.subscription.n_users += 1
-        return request.subscription
-
-    def unsubscribe(self, subscription: Subscription) -> None:
-        """End one use of a subscription; the last one ends it at the server too."""
-        request = self._requests.get(subscription.topic)
-        if request is None or request.subscription is not subscription:
-            return
-        request.subscription.n_users -= 1
-        if request.subscription.n_users == 0:
-            del self._requests[subscription.topic]
-            self._end(request)
-
-    def renew(self, subscription: Subscription) -> None:
-        """Subscribe again: a latched message may have been missed, or cannot be written so."""
-        request = self._requests.get(subscription.topic)
-        if request is not None:
-            self._end(request)
-            request.n_renewals += 1
-            self._begin(request)
-
     def advertise(self, topic: str, *, type_name: str) -> None:
         """Say that we will publish; the robot needs a moment until it listens.
 
         Raises:
             LinkError: The topic was advertised with another type, or its name is none.
         """
-        known = self._announcements.type_of(topic) or type_name
+        known = self.announcements.type_of(topic) or type_name
         if known != type_name:
             raise LinkError(
                 f"{topic} was advertised as {known}, not as {type_name}.",
                 hint="A topic has one type: look it up on the robot.",
             )
-        self._announcements.advertise(topic, type_name)
-
-    def unadvertise(self, topic: str) -> None:
-        """Take back what `advertise` said."""
-        self._announcements.unadvertise(topic)
-
-    def advertise_late(self) -> None:
-        """Tell the robot of what is advertised from now on only with the first message there."""
-        self._announcements.be_late()
-
-    def advertise_early(self) -> None:
-        """Tell the robot at once of all that is advertised, now and from now on."""
-        self._announcements.be_early()
+        super().advertise(topic, type_name=type_name)
 
     async def publish(self, topic: str, message: Message) -> None:
         """Publish on an advertised topic.
@@ -213,22 +149,19 @@ class RosbridgeClient(Rosapi):
             LinkError: There is no connection, or the message cannot be sent.
         """
         text = protocol.publish(topic, message)
-        if self._announcements.use(topic):
+        if self.announcements.use(topic):
             await anyio.sleep(NOTICE_S)
         await self._free_for_topics().send(text, timeout_s=self.timing.answer_s)
         self._published_s = anyio.current_time()
 
-    def publish_everywhere(self, topic: str, message: Message) -> int:
-        """Publish over every open socket, and return over how many: for a stop."""
+    def _prepare(self, topic: str, message: Message) -> Callable[[], int]:
         text = protocol.publish(topic, message)
-        if self._announcements.use(topic):
-            self.start_soon(partial(say_again, partial(self._send_everywhere, text)))
-        return self._send_everywhere(text)
 
-    def _send_everywhere(self, text: bytes) -> int:
-        n_sent = sum([each.send_if_up(text) for each in (self._urgent, self._control)])
-        self._published_s = anyio.current_time()
-        return n_sent
+        def send() -> int:
+            self._published_s = anyio.current_time()
+            return sum([each.send_if_up(text) for each in (self._urgent, self._control)])
+
+        return send
 
     async def call_service(
         self,
@@ -238,17 +171,7 @@ class RosbridgeClient(Rosapi):
         type_name: str | None = None,
         timeout_s: float | None = None,
     ) -> dict[str, Any]:
-        """Return what a service answers. The wait ends, the connection stays.
-
-        Args:
-            service: Its full name.
-            arguments: The fields of the request; None for none.
-            type_name: None leaves it to the server.
-            timeout_s: In wall time; None takes the client's usual limit.
-
-        Raises:
-            LinkError: No answer, a refusal, or no connection.
-        """
+        """Return what a service answers. The wait ends, the connection stays."""
         return await self._caller.call(
             service,
             arguments or {},
@@ -256,13 +179,13 @@ class RosbridgeClient(Rosapi):
             timeout_s=self.timing.answer_s if timeout_s is None else timeout_s,
         )
 
-    async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> PursuedGoal:
+    async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
         """Send a goal to an action of ROS 2 and return what becomes of it, as it becomes.
 
         Raises:
             LinkError: There is no connection, or the goal cannot be sent.
         """
-        goal = PursuedGoal(goal_id=new_id(), action=action)
+        goal = ActionGoal(goal_id=new_id(), action=action)
         text = protocol.send_action_goal(
             action, arguments, operation_id=goal.goal_id, type_name=type_name
         )
@@ -339,7 +262,7 @@ class RosbridgeClient(Rosapi):
     def _take(self, event: Event) -> None:
         match event:
             case Published():
-                request = self._requests.get(event.topic)
+                request = self.requests.get(event.topic)
                 if request is not None:
                     request.subscription.take(event.message)
             case GoalFedBack():

@@ -11,7 +11,7 @@ from mapspeak.links.rosbridge import protocol
 from mapspeak.links.rosbridge.channel import Channel
 from mapspeak.links.rosbridge.protocol import Encoding
 from mapspeak.ros import new_id
-from mapspeak.ros.subscribing import TopicSubscription
+from mapspeak.ros.link import TopicRequest
 
 ROSAPI = "/rosapi/"
 UNKNOWN = "does not exist"
@@ -85,22 +85,14 @@ Where CBOR is beyond the server's size limit it is dropped in silence, while JSO
 
 
 @dataclass(slots=True, eq=False)
-class RosbridgeTopicRequest:
+class RosbridgeTopicRequest(TopicRequest):
     """How a topic was asked for.
 
     Attributes:
-        subscription: Of the topic.
-        is_bulky: See `ENCODINGS`.
-        throttle_ms: The least time between two messages.
-        n_renewals: How often it was asked for anew.
         operation_id: Under which the server knows it.
         channel: Over which it was asked for.
     """
 
-    subscription: TopicSubscription
-    is_bulky: bool
-    throttle_ms: int
-    n_renewals: int = 0
     operation_id: str = ""
     channel: Channel | None = None
 

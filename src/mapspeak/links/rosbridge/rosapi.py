@@ -1,11 +1,11 @@
 """What a robot is made of, as its rosapi tells; what its types look like, where it cannot say."""
 
 import json
-from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
 from mapspeak.errors import LinkError
+from mapspeak.links.rosbridge.requests import RosbridgeTopicRequest
 from mapspeak.ros import NodeLinks, RosGraph
 from mapspeak.ros.definitions import (
     TypeBook,
@@ -14,8 +14,8 @@ from mapspeak.ros.definitions import (
     name_parts,
     split_definition,
 )
+from mapspeak.ros.link import RosLink
 from mapspeak.ros.messages import Dialect, bare_type, read_stamp
-from mapspeak.ros.parameters import NodeParameters
 
 Call = Callable[[str, Mapping[str, Any]], Awaitable[dict[str, Any]]]
 KINDS = ("msg", "srv", "action")
@@ -130,7 +130,7 @@ ROSAPI_HINT = (
 )
 
 
-class Rosapi(ABC):
+class Rosapi(RosLink[RosbridgeTopicRequest]):
     """Asks rosapi, by whatever way services are called.
 
     Some of its services end or hang it on ROS 2 (message_details, get_param_names): these are
@@ -138,20 +138,9 @@ class Rosapi(ABC):
     """
 
     def __init__(self) -> None:
+        super().__init__(RosbridgeTopicRequest)
         self._version: tuple[Dialect, str] | None = None
         self._definitions = DefinitionKeeper(self.call_service)
-        self._parameters = NodeParameters(self)
-
-    @abstractmethod
-    async def call_service(
-        self,
-        service: str,
-        arguments: Mapping[str, Any] | None = None,
-        *,
-        type_name: str | None = None,
-        timeout_s: float | None = None,
-    ) -> dict[str, Any]:
-        """Return what a service answers."""
 
     async def fetch_graph(self) -> RosGraph:
         """Return the topics and actions there are.
@@ -250,7 +239,7 @@ class Rosapi(ABC):
     async def fetch_parameter_names(self, node: str) -> tuple[str, ...]:
         """Return the names of a node's parameters."""
         if await self._fetch_dialect() is Dialect.ROS2:
-            return await self._parameters.fetch_names(node)
+            return await super().fetch_parameter_names(node)
         names = _texts(await self.call_service("/rosapi/get_param_names"), "names")
         below = f"{node.rstrip('/')}/"
         return tuple(sorted(name.removeprefix(below) for name in names if name.startswith(below)))
@@ -258,7 +247,7 @@ class Rosapi(ABC):
     async def fetch_parameter(self, node: str, name: str) -> Any:  # noqa: ANN401 - any value
         """Return the value of a node's parameter; None where it is not set."""
         if await self._fetch_dialect() is Dialect.ROS2:
-            return await self._parameters.fetch(node, name)
+            return await super().fetch_parameter(node, name)
         full = f"{node.rstrip('/')}/{name}"
         answer = await self.call_service("/rosapi/get_param", {"name": full, "default": "null"})
         try:
@@ -272,7 +261,7 @@ class Rosapi(ABC):
     async def set_parameter(self, node: str, name: str, value: Any) -> None:  # noqa: ANN401
         """Set a node's parameter; None deletes it."""
         if await self._fetch_dialect() is Dialect.ROS2:
-            await self._parameters.put(node, name, value)
+            await super().set_parameter(node, name, value)
             return
         full = f"{node.rstrip('/')}/{name}"
         if value is None:

@@ -34,7 +34,6 @@ from mapspeak.ros.discovery.parts import (
     VELOCITY,
     RobotPart,
 )
-from mapspeak.ros.robot.camera import RosCamera
 from mapspeak.ros.robot.driving import (
     MOVE_BASE,
     NAV2,
@@ -44,9 +43,9 @@ from mapspeak.ros.robot.driving import (
     GoalRecord,
 )
 from mapspeak.ros.robot.goaltopic import GoalTopicDriver
-from mapspeak.ros.robot.laser import Laser
 from mapspeak.ros.robot.maps import MapSubscriber
 from mapspeak.ros.robot.poses import PoseKeeper, RobotClock
+from mapspeak.ros.robot.sensors import Laser, RosCamera
 from mapspeak.ros.robot.stopping import Brake, stop_everything
 from mapspeak.ros.transforms import FrameListener
 from mapspeak.spatial import OccupancyGrid

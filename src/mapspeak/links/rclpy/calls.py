@@ -1,11 +1,11 @@
-"""Goals of actions over rclpy.
+"""Services that we call, and goals of actions that we send, over rclpy.
 
 An action is three services and two topics. We use these themselves: rclpy's own client of actions
 loses the answer to a goal that comes while it is still noting that it has sent it.
 """
 
-from collections.abc import Callable, Coroutine
-from dataclasses import dataclass, field
+from collections.abc import Callable, Coroutine, Mapping
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -13,19 +13,101 @@ import anyio
 
 from mapspeak.errors import LinkError
 from mapspeak.links.rclpy.messages import read_message, write_message
-from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros
-from mapspeak.links.rclpy.services import SERVER_S, Client, RclpyServices
-from mapspeak.links.rclpy.types import find_action, name_of
-from mapspeak.ros import ActionEnd, ActionGoal, new_id
-from mapspeak.ros.goal import PursuedGoal
+from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wait_until
+from mapspeak.links.rclpy.types import find_action, find_service, name_of
+from mapspeak.ros import REFUSED, ActionEnd, ActionGoal, new_id
+from mapspeak.ros.link import check_name, wrong_type
 from mapspeak.ros.messages import Message, bare_type
-from mapspeak.ros.native import check_name, wrong_type
 
+SERVER_S = 2.0
+"""For somebody who serves to be found: right after connecting, not all are known."""
 FEEDBACK_DEPTH = 10
 CANCEL_S = 5.0
 CANCEL_TYPE = "action_msgs/srv/CancelGoal"
 
+Client = Any  # rclpy has no types
 StartSoon = Callable[[Callable[[], Coroutine[Any, Any, None]]], None]
+
+
+class RclpyServices:
+    """Calls services; a call that is not answered in time is forgotten.
+
+    Args:
+        participant: Ours.
+    """
+
+    def __init__(self, participant: RclpyParticipant) -> None:
+        self._participant = participant
+        self._clients: dict[str, Client] = {}
+
+    async def call(
+        self,
+        service: str,
+        arguments: Mapping[str, Any],
+        *,
+        type_name: str | None,
+        timeout_s: float,
+    ) -> dict[str, Any]:
+        """Return what a service answers.
+
+        Raises:
+            LinkError: Nobody serves it, it has another type, the request does not fit, or there is
+                no answer.
+        """
+        check_name(service)
+        found = await self._find_type(service, within_s=min(timeout_s, SERVER_S))
+        if type_name is not None and bare_type(type_name) != bare_type(found):
+            raise wrong_type(service, found, type_name)
+        service_class = find_service(found)
+        request = write_message(service_class.Request, arguments)
+        client = await self.connect(service, service_class, within_s=min(timeout_s, SERVER_S))
+        with anyio.move_on_after(timeout_s):
+            return read_message(await self.ask(client, request))
+        raise LinkError(
+            f"{service} did not answer within {timeout_s:g} s.",
+            hint="The node that serves it may be stuck: look at its log, or restart it.",
+        )
+
+    async def connect(self, service: str, service_class: Any, *, within_s: float) -> Client:  # noqa: ANN401
+        """Return a client whose service somebody serves.
+
+        Raises:
+            LinkError: Nobody does.
+        """
+        client = self._clients.get(service)
+        if client is None:
+            with errors_of_ros(f"{service} cannot be called"):
+                client = self._participant.node.create_client(service_class, service)
+            self._clients[service] = client
+        if not await wait_until(client.service_is_ready, within_s=within_s):
+            raise nobody_serves(service)
+        return client
+
+    async def ask(self, client: Client, request: Any) -> Any:  # noqa: ANN401 - rclpy has no types
+        """Return the answer to a request, both as messages of rclpy; wait as long as it takes."""
+        with errors_of_ros("The request cannot be sent"):
+            future = client.call_async(request)
+        try:
+            return await self._participant.wait_for(future)
+        finally:
+            client.remove_pending_request(future)
+
+    async def _find_type(self, service: str, *, within_s: float) -> str:
+        def types() -> list[str]:
+            found = dict(self._participant.node.get_service_names_and_types())
+            return list(found.get(service, []))
+
+        if not await wait_until(lambda: bool(types()), within_s=within_s):
+            raise nobody_serves(service)
+        return types()[0]
+
+
+def nobody_serves(name: str) -> LinkError:
+    """Return the error for a service or an action that is not there."""
+    return LinkError(
+        f"Nobody serves {name[:80]}.",
+        hint="Ask for the list of what there is; the node that offers it may have ended.",
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,20 +125,20 @@ class _Action:
     result: Client
 
 
-@dataclass(slots=True, eq=False)
-class _Pursuit:
-    """A goal under way.
+class RclpyGoal(ActionGoal):
+    """A goal of ours.
 
-    Attributes:
-        goal: As others see it.
+    Args:
         servers: The ids in ROS of what published feedback when it was sent: a server that was
             killed and started again has the same name, and knows nothing of the goal.
-        scope: Of what waits for its answers.
     """
 
-    goal: PursuedGoal
-    servers: frozenset[bytes]
-    scope: anyio.CancelScope = field(default_factory=anyio.CancelScope)
+    def __init__(self, action: str, servers: frozenset[bytes]) -> None:
+        goal_id = new_id()
+        super().__init__(goal_id=goal_id, action=action, ros_id=goal_id)
+        self.servers = servers
+        self.scope = anyio.CancelScope()
+        """Of what waits for its answers."""
 
 
 class Goals:
@@ -75,9 +157,9 @@ class Goals:
         self._services = services
         self._start_soon = start_soon
         self._actions: dict[str, _Action] = {}
-        self._pursuits: dict[str, _Pursuit] = {}
+        self._goals: dict[str, RclpyGoal] = {}
 
-    async def send(self, action: str, arguments: Message, *, type_name: str) -> PursuedGoal:
+    async def send(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
         """Send a goal; what becomes of it comes later.
 
         Raises:
@@ -85,38 +167,33 @@ class Goals:
         """
         check_name(action)
         used = await self._open(action, type_name)
-        goal_id = new_id()
+        goal = RclpyGoal(action, self._servers_of(action))
         request = used.action_class.Impl.SendGoalService.Request()
         request.goal = write_message(used.action_class.Goal, arguments)
-        request.goal_id = write_message(type(request.goal_id), _uuid(goal_id))
-        goal = PursuedGoal(goal_id=goal_id, action=action, ros_id=goal_id)
-        pursuit = _Pursuit(goal, self._servers_of(action))
-        self._pursuits[goal_id] = pursuit
-        self._start_soon(partial(self._pursue, pursuit, used, request))
+        request.goal_id = write_message(type(request.goal_id), _uuid(goal.goal_id))
+        self._goals[goal.goal_id] = goal
+        self._start_soon(partial(self._pursue, goal, used, request))
         return goal
 
     def cancel(self, goal: ActionGoal) -> None:
         """Ask for the end of a goal that the server has taken."""
-        pursuit = self._pursuits.get(goal.goal_id)
-        if pursuit is not None and pursuit.goal.is_accepted:
-            self._start_soon(partial(self._ask_to_cancel, pursuit.goal))
+        if goal.goal_id in self._goals and goal.is_accepted:
+            self._start_soon(partial(self._ask_to_cancel, goal))
 
     def refresh(self) -> None:
         """Take in that servers have gone: nobody will tell how their goals end."""
-        for pursuit in list(self._pursuits.values()):
-            if self._is_served(pursuit):
-                continue
-            del self._pursuits[pursuit.goal.goal_id]
-            pursuit.scope.cancel()
-            pursuit.goal.take_loss()
+        for goal in list(self._goals.values()):
+            if not self._is_served(goal):
+                del self._goals[goal.goal_id]
+                goal.scope.cancel()
+                goal.take_loss()
 
-    def _is_served(self, pursuit: _Pursuit) -> bool:
-        servers = self._servers_of(pursuit.goal.action)
-        if not pursuit.servers:
-            pursuit.servers = servers
-        if not pursuit.servers:
-            return bool(self._actions[pursuit.goal.action].send.service_is_ready())
-        return bool(servers & pursuit.servers)
+    def _is_served(self, goal: RclpyGoal) -> bool:
+        servers = self._servers_of(goal.action)
+        goal.servers = goal.servers or servers
+        if not goal.servers:
+            return bool(self._actions[goal.action].send.service_is_ready())
+        return bool(servers & goal.servers)
 
     def _servers_of(self, action: str) -> frozenset[bytes]:
         infos = self._participant.node.get_publishers_info_by_topic(part_of(action, "feedback"))
@@ -155,20 +232,17 @@ class Goals:
             if bare_type(found.removesuffix("_SendGoal")) != bare_type(type_name):
                 raise wrong_type(action, found.removesuffix("_SendGoal"), type_name)
 
-    async def _pursue(self, pursuit: _Pursuit, used: _Action, request: Any) -> None:  # noqa: ANN401
+    async def _pursue(self, goal: RclpyGoal, used: _Action, request: Any) -> None:  # noqa: ANN401
         """Wait for the server's answers, which may be none at all."""
-        goal = pursuit.goal
-        with pursuit.scope:
+        with goal.scope:
             try:
-                is_accepted = (await self._services.ask(used.send, request)).accepted
-                if is_accepted:
-                    self._accept(pursuit)
+                end = REFUSED
+                if (await self._services.ask(used.send, request)).accepted:
+                    self._accept(goal)
                     end = await self._wait_for_result(used, request.goal_id)
-                else:
-                    end = ActionEnd(status=None, is_result=False, values="")
             except LinkError as error:
                 end = ActionEnd(status=None, is_result=False, values=error.message)
-            self._pursuits.pop(goal.goal_id, None)
+            self._goals.pop(goal.goal_id, None)
             goal.take_end(end)
 
     async def _wait_for_result(self, used: _Action, goal_id: Any) -> ActionEnd:  # noqa: ANN401
@@ -179,12 +253,11 @@ class Goals:
             status=int(answer.status), is_result=True, values=read_message(answer.result)
         )
 
-    def _accept(self, pursuit: _Pursuit) -> None:
-        if pursuit.goal.is_accepted:
-            return
-        pursuit.goal.take_acceptance()
+    def _accept(self, goal: RclpyGoal) -> None:
+        if not goal.is_accepted:
+            goal.take_acceptance()
 
-    async def _ask_to_cancel(self, goal: PursuedGoal) -> None:
+    async def _ask_to_cancel(self, goal: ActionGoal) -> None:
         arguments = {"goal_info": {"goal_id": _uuid(goal.goal_id)}}
         # Whether it is cancelled, its end tells.
         try:
@@ -200,15 +273,15 @@ class Goals:
     def _take_feedback(self, message: Any) -> None:  # noqa: ANN401 - rclpy has no types
         """Take what is said of any goal of the action, in the thread of rclpy."""
         goal_id = bytes(message.goal_id.uuid).hex()
-        if goal_id in self._pursuits:
+        if goal_id in self._goals:
             feedback = read_message(message.feedback)
             self._participant.hand_over(self._give_feedback, goal_id, feedback)
 
     def _give_feedback(self, goal_id: str, feedback: Message) -> None:
-        pursuit = self._pursuits.get(goal_id)
-        if pursuit is not None:
-            self._accept(pursuit)
-            pursuit.goal.take_feedback(feedback)
+        goal = self._goals.get(goal_id)
+        if goal is not None:
+            self._accept(goal)
+            goal.take_feedback(feedback)
 
 
 def part_of(action: str, name: str) -> str:

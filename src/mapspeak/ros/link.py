@@ -1,0 +1,287 @@
+"""What all connections do in the same way: topics are shared by all who ask for them."""
+
+import os
+from abc import abstractmethod
+from collections.abc import Callable, Coroutine, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Generic, TypeVar
+
+import anyio
+
+from mapspeak.errors import LinkError
+from mapspeak.ros import NAME, ActionGoal, OwnEnds, Started, Subscription
+from mapspeak.ros.messages import Message, bare_type
+from mapspeak.ros.parameters import ParameterServices
+
+NOTICE_S = 0.3
+"""From a topic's first announcement until the robot's nodes listen, in wall time."""
+N_AGAIN = 10
+PAUSE_S = 0.1
+
+
+class Announcements:
+    """What we have said, or would say, that we publish.
+
+    What was told is never taken back for being late: rosbridge shows a publisher for ten seconds
+    more, so that a robot that is not to hear of it must not be told in the first place.
+
+    Args:
+        tell: Tells the robot of a topic and its type.
+        take_back: Takes that back.
+    """
+
+    def __init__(self, tell: Callable[[str, str], None], take_back: Callable[[str], None]) -> None:
+        self._tell = tell
+        self._take_back = take_back
+        self._types: dict[str, str] = {}
+        self._told: set[str] = set()
+        self._is_early = True
+
+    @property
+    def told(self) -> frozenset[str]:
+        """The topics that the robot knows us to publish."""
+        return frozenset(self._told)
+
+    def type_of(self, topic: str) -> str | None:
+        """Return the type that a topic was advertised with; None for one that was not."""
+        return self._types.get(topic)
+
+    def advertise(self, topic: str, type_name: str) -> None:
+        """Note a topic, and tell the robot of it where that is to be early."""
+        if self._is_early or topic in self._told:
+            # Told again, also where it is known: the robot may have been started anew.
+            self._tell(topic, type_name)
+            self._told.add(topic)
+        self._types[topic] = type_name
+
+    def unadvertise(self, topic: str) -> None:
+        """Forget a topic."""
+        if self._types.pop(topic, None) is not None and topic in self._told:
+            self._told.discard(topic)
+            self._take_back(topic)
+
+    def be_late(self) -> None:
+        """Tell the robot of topics that follow with the first message on each."""
+        self._is_early = False
+
+    def be_early(self) -> None:
+        """Tell the robot of all topics that were noted, and at once of those that follow."""
+        self._is_early = True
+        for topic in self._types:
+            self.use(topic)
+
+    def use(self, topic: str) -> bool:
+        """Tell the robot of a topic before a message; True when it hears of it only now."""
+        type_name = self._types.get(topic)
+        if type_name is None or topic in self._told:
+            return False
+        self._tell(topic, type_name)
+        self._told.add(topic)
+        return True
+
+
+async def say_again(say: Callable[[], object]) -> None:
+    """Say what must not be missed for another second: the robot may not listen at once."""
+    for _ in range(N_AGAIN):
+        await anyio.sleep(PAUSE_S)
+        with suppress(LinkError):
+            say()
+
+
+@dataclass(slots=True, eq=False)
+class TopicRequest:
+    """How a topic was asked for; each link adds how it is read.
+
+    Attributes:
+        subscription: What all who asked for it share.
+        is_bulky: Its messages hold large arrays.
+        throttle_ms: The least time between two messages.
+        n_renewals: How often it was asked for anew.
+    """
+
+    subscription: Subscription
+    is_bulky: bool
+    throttle_ms: int
+    n_renewals: int = 0
+
+
+Request = TypeVar("Request", bound=TopicRequest)
+
+
+class RosLink(ParameterServices, Generic[Request]):
+    """The part of the port that is the same over every connection.
+
+    Args:
+        request_type: What is kept of a topic that was asked for.
+
+    Attributes:
+        started: Everything that was started over this connection.
+        requests: By topic, what was asked for.
+        announcements: What we publish, or would.
+    """
+
+    def __init__(self, request_type: type[Request]) -> None:
+        self._request_type = request_type
+        self.started = Started()
+        self.requests: dict[str, Request] = {}
+        self.announcements = Announcements(self._announce, self._take_back)
+
+    def subscribe(
+        self,
+        topic: str,
+        *,
+        type_name: str | None = None,
+        is_bulky: bool = False,
+        throttle_ms: int = 0,
+    ) -> Subscription:
+        """Return the subscription to a topic; the first who asks decides how often it is heard."""
+        request = self.requests.get(topic)
+        if request is None:
+            self._check(topic, type_name)
+            subscription = Subscription(topic, type_name=type_name)
+            request = self._request_type(subscription, is_bulky, throttle_ms)
+            self._begin(request)
+            self.requests[topic] = request
+        request.subscription.n_users += 1
+        return request.subscription
+
+    def unsubscribe(self, subscription: Subscription) -> None:
+        """End one use of a subscription; the last one ends the reading too."""
+        request = self.requests.get(subscription.topic)
+        if request is None or request.subscription is not subscription:
+            return
+        subscription.n_users -= 1
+        if subscription.n_users == 0:
+            del self.requests[subscription.topic]
+            self._end(request)
+
+    def renew(self, subscription: Subscription) -> None:
+        """Subscribe again: a latched message may have been missed, or cannot be written so."""
+        request = self.requests.get(subscription.topic)
+        if request is not None:
+            self._end(request)
+            request.n_renewals += 1
+            self._begin(request)
+
+    def advertise(self, topic: str, *, type_name: str) -> None:
+        """Say that we will publish."""
+        self._check(topic, type_name)
+        self.announcements.advertise(topic, type_name)
+
+    def unadvertise(self, topic: str) -> None:
+        """Take back what `advertise` said."""
+        self.announcements.unadvertise(topic)
+
+    def advertise_late(self) -> None:
+        """Tell the robot of what is advertised from now on only with the first message there."""
+        self.announcements.be_late()
+
+    def advertise_early(self) -> None:
+        """Tell the robot at once of all that is advertised, now and from now on."""
+        self.announcements.be_early()
+
+    def publish_everywhere(self, topic: str, message: Message) -> int:
+        """Publish at once by every way that is open, and return how many: for a stop."""
+        is_first = self.announcements.use(topic)
+        send = self._prepare(topic, message)
+        if is_first:
+            self.start_soon(partial(say_again, send))
+        return send()
+
+    @abstractmethod
+    def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        """Run something in the background until the connection is closed."""
+
+    def _check(self, topic: str, type_name: str | None) -> None:
+        """Raise `LinkError` where a name or a type is none, or do not go with the other."""
+
+    @abstractmethod
+    def _begin(self, request: Request) -> None:
+        """Read a topic, or see to it that it is read once that can be done."""
+
+    @abstractmethod
+    def _end(self, request: Request) -> None:
+        """Read a topic no longer."""
+
+    @abstractmethod
+    def _announce(self, topic: str, type_name: str) -> None:
+        """Tell the robot that we will publish."""
+
+    @abstractmethod
+    def _take_back(self, topic: str) -> None:
+        """Tell the robot that we will not publish any more."""
+
+    @abstractmethod
+    def _prepare(self, topic: str, message: Message) -> Callable[[], int]:
+        """Return what publishes a message to those who are connected, and tells by how many ways.
+
+        Raises:
+            LinkError: The topic was not advertised, or the message does not fit its type.
+        """
+
+
+class NativeLink(RosLink[Request]):
+    """A member of the robot's own network: nothing stands between us and its nodes."""
+
+    @property
+    def lost_for_s(self) -> float | None:
+        """None: there is no connection to lose."""
+        return None
+
+    @property
+    def own_ends(self) -> OwnEnds:
+        """Nothing: what such a connection tells of the system leaves our own node out."""
+        return OwnEnds()
+
+    def clear_the_way(self) -> None:
+        """Do nothing: in ROS 2 itself, nothing is held up by what was sent before."""
+
+    def give_up_goal(self, goal: ActionGoal) -> None:
+        """Do nothing: in ROS 2 itself, a goal holds up nothing."""
+
+
+def check_name(name: str) -> None:
+    """Do nothing for the full name of a topic, a service or an action.
+
+    Raises:
+        LinkError: It is none.
+    """
+    if not (name.startswith("/") and NAME.fullmatch(name)):
+        raise LinkError(f"{name[:80]!r} is no full name in ROS.", hint="Such as /robot/map.")
+
+
+def wrong_type(name: str, found: str, given: str) -> LinkError:
+    """Return the error for a topic, service or action that is of another type than given."""
+    return LinkError(
+        f"{name} is a {bare_type(found)}, not a {bare_type(given)}.",
+        hint="Use the type that the robot uses.",
+    )
+
+
+@contextmanager
+def plain_errors() -> Iterator[None]:
+    """Let an error pass as it was raised, out of the group that a task group makes of it."""
+    try:
+        yield
+    except BaseExceptionGroup as group:
+        error: BaseException = group
+        while isinstance(error, BaseExceptionGroup) and len(error.exceptions) == 1:
+            error = error.exceptions[0]
+        raise error from error.__cause__
+
+
+@contextmanager
+def environment_with(variables: Mapping[str, str]) -> Iterator[None]:
+    """Let some variables have these values while the context lasts."""
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

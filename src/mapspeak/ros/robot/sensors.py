@@ -1,0 +1,328 @@
+"""The camera and the laser, whose topics are subscribed to only while somebody looks.
+
+Where on the robot the laser is mounted is worked in.
+"""
+
+import math
+from collections.abc import Callable, Generator, Iterable
+from contextlib import contextmanager
+
+import anyio
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.errors import LinkError
+from mapspeak.robot import SCAN_PATIENCE_S, RangeScan
+from mapspeak.ros import RosConnection, Subscription
+from mapspeak.ros.discovery import RobotProfile
+from mapspeak.ros.discovery.parts import CAMERA
+from mapspeak.ros.discovery.profile import COMPRESSED_IMAGE, RAW_IMAGE
+from mapspeak.ros.messages import (
+    EncodedPicture,
+    FrameTransform,
+    LaserScan,
+    Message,
+    read_camera_info,
+    read_compressed_image,
+    read_image,
+    read_scan,
+)
+from mapspeak.ros.robot.poses import PoseKeeper, RobotClock
+from mapspeak.ros.transforms import FrameListener, TransformTree
+
+LINGER_S = 10.0
+"""After the last look; one who looks around asks again before that."""
+THROTTLE_MS = 100
+
+
+class IdleSubscriptions:
+    """Subscribes when somebody looks, and unsubscribes when nobody has for a while.
+
+    Args:
+        connection: Connected to the robot.
+        subscribe: Begins what is needed for a look; it may raise.
+
+    Attributes:
+        subscriptions: What it gave; empty while nobody looks.
+    """
+
+    def __init__(
+        self, connection: RosConnection, subscribe: Callable[[], tuple[Subscription, ...]]
+    ) -> None:
+        self.subscriptions: tuple[Subscription, ...] = ()
+        self._connection = connection
+        self._subscribe = subscribe
+        self._n_looking = 0
+        self._looked_s = 0.0
+        self._is_open = anyio.Event()
+
+    @contextmanager
+    def look(self) -> Generator[tuple[Subscription, ...]]:
+        """Keep the subscriptions while somebody looks, and return them."""
+        self._n_looking += 1
+        try:
+            if not self.subscriptions:
+                self._looked_s = anyio.current_time()
+                self.subscriptions = self._subscribe()
+                self._is_open.set()
+            yield self.subscriptions
+        finally:
+            self._n_looking -= 1
+            self._looked_s = anyio.current_time()
+
+    async def close_when_idle(self) -> None:
+        """End the subscriptions whenever nobody has looked for a while; run until cancelled."""
+        while True:
+            await self._is_open.wait()
+            await anyio.sleep_until(self._looked_s + LINGER_S)
+            if self._n_looking == 0 and anyio.current_time() >= self._looked_s + LINGER_S:
+                self._close()
+
+    def _close(self) -> None:
+        for subscription in self.subscriptions:
+            self._connection.unsubscribe(subscription)
+        self.subscriptions = ()
+        self._is_open = anyio.Event()
+
+
+PATIENCE_S, LONGEST_PATIENCE_S = 5.0, 30.0
+FIRST_PATIENCE_S = 15.0
+"""For a camera that is published and has said nothing yet: some give a picture in ten seconds."""
+TIMES_SLOWEST = 3.0
+INFO_PATIENCE_S = 1.0
+CAMERA_HINT = "Check that the camera's driver runs, or name another camera_topic in robot.yaml."
+
+
+class RosCamera:
+    """Takes pictures.
+
+    Args:
+        connection: Connected to the robot.
+        profile: Says which topic.
+        patience_s: How long to wait for a picture, in wall time; longer for a slow camera.
+        first_patience_s: How long to wait for the first.
+    """
+
+    def __init__(
+        self,
+        connection: RosConnection,
+        profile: RobotProfile,
+        *,
+        patience_s: float = PATIENCE_S,
+        first_patience_s: float = FIRST_PATIENCE_S,
+    ) -> None:
+        self._connection = connection
+        self._profile = profile
+        self._patience_s = patience_s
+        is_alive = CAMERA.is_alive(profile)
+        self._next_patience_s = first_patience_s if is_alive else patience_s
+        self._slowest_s = 0.0
+        self._idle = IdleSubscriptions(connection, self._subscribe)
+
+    async def fetch(self) -> EncodedPicture:
+        """Return a picture that arrives after it was asked for.
+
+        Raises:
+            LinkError: There is no camera, no picture came, or it cannot be read.
+        """
+        with self._idle.look() as (pictures, *_):
+            message = await self._next_message(pictures)
+        return self._read(message)
+
+    async def fetch_fov_rad(self) -> float | None:
+        """Return the horizontal field of view in radians; None where the camera does not say."""
+        infos = self._idle.subscriptions[1:]
+        if not infos:
+            return None
+        try:
+            info = await infos[0].wait_for_more_than(0, timeout_s=INFO_PATIENCE_S)
+            return read_camera_info(info).horizontal_fov_rad
+        except LinkError:
+            return None
+
+    async def close_when_idle(self) -> None:
+        """End the subscription whenever nobody has looked for a while; run until cancelled."""
+        await self._idle.close_when_idle()
+
+    def _subscribe(self) -> tuple[Subscription, ...]:
+        """Begin with the pictures; the camera's measures follow where it tells them."""
+        profile = self._profile
+        if profile.camera_topic is None:
+            raise LinkError("The robot publishes no camera pictures.", hint=CAMERA_HINT)
+        type_name = profile.dialect.type_name(profile.camera_type or RAW_IMAGE)
+        pictures = self._connection.subscribe(
+            profile.camera_topic, type_name=type_name, is_bulky=True, throttle_ms=THROTTLE_MS
+        )
+        if profile.camera_info_topic is None:
+            return (pictures,)
+        infos = self._connection.subscribe(profile.camera_info_topic, throttle_ms=THROTTLE_MS)
+        return pictures, infos
+
+    async def _next_message(self, pictures: Subscription) -> Message:
+        before, asked_s = pictures.n_received, anyio.current_time()
+        patience_s, self._next_patience_s = self._next_patience_s, self._patience_s
+        try:
+            message = await pictures.wait_for_more_than(before, timeout_s=patience_s)
+        except LinkError as error:
+            raise LinkError(error.message, hint=CAMERA_HINT) from error
+        self._slowest_s = max(self._slowest_s, anyio.current_time() - asked_s)
+        enough_s = max(self._patience_s, TIMES_SLOWEST * self._slowest_s)
+        self._next_patience_s = min(enough_s, LONGEST_PATIENCE_S)
+        return message
+
+    def _read(self, message: Message) -> EncodedPicture:
+        if self._profile.camera_type == COMPRESSED_IMAGE:
+            return read_compressed_image(message)
+        return read_image(message)
+
+
+MOST_TILT_RAD = math.radians(10.0)
+"""A laser that looks more up or down meets the floor or the ceiling within a few metres."""
+
+
+def find_mounting(tree: TransformTree, *, base: str, sensor: str) -> NDArray[np.float64]:
+    """Return where a sensor that looks along the floor is on the robot: base_from_sensor, 4x4.
+
+    Raises:
+        LinkError: The frames do not say, or it looks up or down.
+    """
+    from_base, from_sensor = tree.find_ways(base, sensor)
+    base_from_sensor = np.linalg.inv(_chain(from_base)) @ _chain(from_sensor)
+    tilt_rad = math.acos(min(abs(float(base_from_sensor[2, 2])), 1.0))
+    if tilt_rad > MOST_TILT_RAD:
+        raise LinkError(
+            f"The laser {sensor!r} is tilted by {math.degrees(tilt_rad):.0f} deg.",
+            hint="Name the topic of a laser that looks along the floor: scan_topic in robot.yaml.",
+        )
+    return base_from_sensor
+
+
+def place_beams(
+    base_from_sensor: NDArray[np.float64],
+    angles_rad: NDArray[np.float64],
+    ranges_m: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return finite beams of the sensor's plane as directions and distances from the robot."""
+    ends = np.stack([ranges_m * np.cos(angles_rad), ranges_m * np.sin(angles_rad)])
+    x, y = base_from_sensor[:2, :2] @ ends + base_from_sensor[:2, 3:]
+    return np.arctan2(y, x), np.hypot(x, y)
+
+
+def _chain(way_up: Iterable[FrameTransform]) -> NDArray[np.float64]:
+    """Return the matrix from the lowest frame of a way to the highest."""
+    matrix = np.eye(4)
+    for transform in way_up:
+        matrix = _matrix(transform) @ matrix
+    return matrix
+
+
+def _matrix(transform: FrameTransform) -> NDArray[np.float64]:
+    pose, half_rad = transform.parent_from_child, transform.parent_from_child.yaw_rad / 2
+    x, y, z, w = transform.rotation or (0.0, 0.0, math.sin(half_rad), math.cos(half_rad))
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), pose.x],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w), pose.y],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), transform.height_m],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+
+
+STALE_S = 1.0
+"""Of robot time: an older scan was held up on its way, or its driver's clock is not the robot's."""
+
+
+class Laser:
+    """Takes scans. Whatever goes wrong, there is just none: nothing depends on them.
+
+    Args:
+        connection: Connected to the robot.
+        profile: Says which topic.
+        frames: Knows where the laser is mounted.
+        clock: Tells which scans are old.
+        patience_s: How long to wait for a scan, in wall time.
+    """
+
+    def __init__(
+        self,
+        connection: RosConnection,
+        profile: RobotProfile,
+        *,
+        frames: FrameListener,
+        clock: RobotClock,
+        patience_s: float = SCAN_PATIENCE_S,
+    ) -> None:
+        self._connection = connection
+        self._profile = profile
+        self._frames = frames
+        self._clock = clock
+        self._patience_s = patience_s
+        self._idle = IdleSubscriptions(connection, self._subscribe)
+
+    async def fetch(self, poses: PoseKeeper) -> RangeScan | None:
+        """Return a scan that arrives after it was asked for, or None.
+
+        Args:
+            poses: Knows where the robot is when it comes.
+        """
+        if not self._connection.is_open:
+            return None
+        try:
+            with self._idle.look() as (scans,):
+                message = await self._next_message(scans)
+            return self._read(message, poses)
+        except LinkError:
+            return None
+
+    async def close_when_idle(self) -> None:
+        """End the subscription whenever nobody has looked for a while; run until cancelled."""
+        await self._idle.close_when_idle()
+
+    def _subscribe(self) -> tuple[Subscription, ...]:
+        profile = self._profile
+        if profile.scan_topic is None:
+            raise LinkError("The robot publishes no scans.", hint="Name scan_topic in robot.yaml.")
+        type_name = profile.dialect.type_name("sensor_msgs/LaserScan")
+        scans = self._connection.subscribe(
+            profile.scan_topic, type_name=type_name, is_bulky=True, throttle_ms=THROTTLE_MS
+        )
+        return (scans,)
+
+    async def _next_message(self, scans: Subscription) -> Message:
+        silent_s = anyio.current_time() - scans.begun_s
+        # One that has been silent all the time is waited for but once.
+        left_s = self._patience_s - silent_s if scans.n_received == 0 else self._patience_s
+        return await scans.wait_for_more_than(scans.n_received, timeout_s=max(left_s, 0.0))
+
+    def _read(self, message: Message, poses: PoseKeeper) -> RangeScan:
+        here, scan = poses.latest, read_scan(message)
+        if self._clock.is_set and abs(self._clock.now_s - scan.stamp_s) > STALE_S:
+            raise LinkError("The scan is old.", hint="Compare the clocks of robot and laser.")
+        mounting = find_mounting(
+            self._frames.tree, base=self._profile.base_frame, sensor=scan.frame_id
+        )
+        angles_rad, ranges_m = _as_from_base(scan, mounting)
+        return RangeScan(
+            angles_rad=angles_rad,
+            ranges_m=ranges_m,
+            reach_m=scan.largest_range_m,
+            pose=here.pose,
+            stamp_s=scan.stamp_s,
+        )
+
+
+def _as_from_base(
+    scan: LaserScan, base_from_sensor: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return directions and ranges from the robot; of a beam without a range, its direction."""
+    is_met = np.isfinite(scan.ranges_m)
+    far_m = np.where(is_met, scan.ranges_m, scan.largest_range_m)
+    with np.errstate(over="ignore", invalid="ignore"):
+        beams = np.arange(len(far_m), dtype=np.float64)
+        in_sensor = scan.first_angle_rad + scan.angle_step_rad * beams
+        angles_rad, ranges_m = place_beams(base_from_sensor, in_sensor, far_m)
+    if not np.isfinite(angles_rad).all():
+        raise LinkError("The scan's angles are none.", hint="Look at the topic: its driver errs.")
+    without = np.where(scan.is_open, np.inf, np.nan)
+    return angles_rad, np.where(is_met, ranges_m, without)
