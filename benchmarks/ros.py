@@ -62,9 +62,9 @@ def _measure_decoding(side: int) -> Iterator[Figure]:
     size = f"map of {side} x {side}"
     for name, decode in (
         ("CBOR, bare cbor2", lambda: cbor2.loads(binary, tag_hook=_array_of)),
-        ("CBOR to a grid", lambda: grid_of(conversation.receive_binary(binary))),
+        ("CBOR to a grid", lambda: grid_of(conversation.receive(binary, is_text=False))),
         ("JSON, bare orjson", lambda: orjson.loads(text)),
-        ("JSON to a grid", lambda: grid_of(conversation.receive_text(text))),
+        ("JSON to a grid", lambda: grid_of(conversation.receive(text, is_text=True))),
     ):
         yield Figure(name=f"{size}, {name}", value=_best_ms(decode), unit="ms")
 

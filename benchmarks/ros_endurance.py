@@ -9,6 +9,7 @@ import sys
 import time
 import tracemalloc
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import anyio
@@ -62,11 +63,9 @@ def _measure_frames() -> Iterator[Figure]:
     conversation = Conversation(max_bytes=2_000_000)
     n_crashes = n_hangs = n_wrong = n_refused = 0
     for number in range(N_FRAMES):
-        receive, frames = (
-            (conversation.receive_text, texts)
-            if number % 2
-            else (conversation.receive_binary, binaries)
-        )
+        is_text = bool(number % 2)
+        receive = partial(conversation.receive, is_text=is_text)
+        frames = texts if is_text else binaries
         started_s = time.perf_counter()
         try:
             event = receive(_spoil(chance.choice(frames), chance))

@@ -36,8 +36,6 @@ class Arrival:
 
     Attributes:
         there: The robot itself; None while it is not there.
-        robot: The robot's port; its methods raise `LinkError` while it is not there.
-        connection: The port to its ROS, likewise.
     """
 
     def __init__(self, open_robot: Callable[[], AbstractAsyncContextManager[RosRobot]]) -> None:
@@ -114,8 +112,6 @@ class LatePort:
     """Passes everything on to what implements a port, once that is there.
 
     Args:
-        port: What is implemented.
-        arrival: Brings the robot.
         select: Returns what implements it, of a robot that is there.
     """
 

@@ -14,9 +14,8 @@ from mapspeak.ros.activity import (
     Subscription,
 )
 from mapspeak.ros.definitions import split_definition
+from mapspeak.ros.messages import NAME, TYPE
 from mapspeak.ros.port import (
-    NAME,
-    TYPE,
     LinkKind,
     LinkName,
     NodeLinks,

@@ -16,13 +16,11 @@ class Subscription:
     """The latest message of one topic. Many may wait for the next one at once.
 
     Attributes:
-        topic: Its full name.
         type_name: As asked for; None left it to the robot.
         latest: The newest message; None as long as none has come.
         n_received: Since the subscription began, over all connections.
         begun_s: Since when we have listened, by the event loop's clock.
         arrived_s: When the newest came, by the event loop's clock.
-        n_users: How many have subscribed and not unsubscribed.
     """
 
     def __init__(self, topic: str, *, type_name: str | None) -> None:
@@ -92,11 +90,8 @@ class ActionGoal:
 
     Attributes:
         goal_id: The id it was sent with.
-        action: The action's full name.
         ros_id: The UUID under which the action server knows it, 32 hex digits; None where unknown.
         is_accepted: The server is known to have taken it; rosbridge does not tell.
-        feedback: The latest; None before the first.
-        end: How it ended; None before.
         is_lost: What would have brought its end is gone; the robot may still drive.
     """
 

@@ -95,10 +95,8 @@ class TopicRequest:
     """How a topic was asked for; each link adds how it is read.
 
     Attributes:
-        subscription: What all who asked for it share.
         is_bulky: Its messages hold large arrays.
         throttle_ms: The least time between two messages.
-        n_renewals: How often it was asked for anew.
     """
 
     subscription: Subscription
@@ -113,12 +111,7 @@ Request = TypeVar("Request", bound=TopicRequest)
 class RosLink(ParameterServices, Generic[Request]):
     """The part of the port that is the same over every connection.
 
-    Args:
-        request_type: What is kept of a topic that was asked for.
-
     Attributes:
-        started: Everything that was started over this connection.
-        requests: By topic, what was asked for.
         announcements: What we publish, or would.
     """
 

@@ -1,7 +1,6 @@
 """What a connection to a ROS system can do, and what it tells of nodes and topics."""
 
 import difflib
-import re
 import uuid
 from collections.abc import Callable, Coroutine, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -11,9 +10,6 @@ from typing import Any, Protocol
 from mapspeak.errors import LinkError
 from mapspeak.ros.activity import ActionGoal, Started, Subscription
 from mapspeak.ros.messages import Dialect, Message
-
-NAME = re.compile(r"[~/]?[A-Za-z_][A-Za-z0-9_]*(?:/[A-Za-z_][A-Za-z0-9_]*)*")
-TYPE = re.compile(r"[A-Za-z]\w*(?:/(?:msg|srv|action))?/[A-Za-z]\w*")
 
 
 def new_id() -> str:
@@ -35,7 +31,6 @@ class RosGraph:
     """The topics and actions that are there at one moment.
 
     Attributes:
-        dialect: Which ROS it is.
         distro: Such as "jazzy"; empty where the robot does not say.
         types: The type of each topic, as "package/Type".
         actions: The action servers of ROS 2; ROS 1 shows them as topics only.
@@ -53,13 +48,7 @@ class RosGraph:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NodeLinks:
-    """What one node has to do with.
-
-    Attributes:
-        publishes: Topics, by name.
-        subscribes: Topics, by name.
-        serves: Services, by name.
-    """
+    """What one node has to do with."""
 
     publishes: tuple[str, ...] = ()
     subscribes: tuple[str, ...] = ()
@@ -79,7 +68,6 @@ class LinkName:
     """How we are connected.
 
     Attributes:
-        kind: Through what.
         place: Where to, without secrets: an address or a domain.
     """
 

@@ -142,9 +142,6 @@ class FrameListener:
     """Keeps a tree of frames up to date from /tf and /tf_static.
 
     Neither is throttled: that would drop whole transforms, not repetitions of one.
-
-    Args:
-        connection: Connected to the robot.
     """
 
     def __init__(self, connection: RosConnection) -> None:

@@ -33,7 +33,6 @@ class Calls:
 
     Args:
         connection: Knows who serves what, and how types look.
-        participant: Ours.
     """
 
     def __init__(self, connection: DdsGraph, participant: DdsParticipant) -> None:

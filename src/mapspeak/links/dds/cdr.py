@@ -51,8 +51,6 @@ class _Layout:
     """A type that the store was told of.
 
     Attributes:
-        name: In the store.
-        fields: In their order.
         inner: The layouts of the messages within, by their types.
         least_bytes: Of a message.
         n_fields: Of this and of each type within, by their names in the store.
@@ -69,7 +67,6 @@ class Codec:
     """Reads and writes the messages of all types in a book.
 
     Args:
-        book: Describes the types.
         store: Of an earlier state of the book: code is made anew only for types that differ.
     """
 

@@ -36,8 +36,6 @@ class DdsConnection(DdsGraph):
     """One ROS 2 system, as a member of its DDS domain sees it.
 
     Args:
-        network: Which domain, and how others in it are found.
-        timing: All time limits.
         framing_of: Tells how a node frames services, by the id of its writer.
 
     Raises:
@@ -229,12 +227,6 @@ async def open_dds_robot(
     """Offer the ROS 2 robot in a DDS domain while the context lasts.
 
     Leaving the context does not stop the robot: call `stop` before, where that is wanted.
-
-    Args:
-        network: Which domain, and how others in it are found.
-        overrides: What robot.yaml says.
-        timing: Time limits of the connection.
-        patience: Time limits of navigation.
 
     Raises:
         LinkError: No robot is found there, or it does not say what it offers.

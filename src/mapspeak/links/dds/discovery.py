@@ -44,13 +44,7 @@ class Endpoint:
     """A reader or a writer of somebody else.
 
     Attributes:
-        key: Its id in DDS.
-        topic: As DDS names it.
-        type_name: As ROS names it.
-        is_reliable: See `Quality`.
-        is_latched: See `Quality`.
         type_hash: Of its type, since ROS 2 Iron; empty before.
-        framing: How its node frames services.
     """
 
     key: bytes
@@ -74,7 +68,6 @@ class Discovery:
     """Keeps who is there, without ourselves.
 
     Args:
-        own_key: Of our participant.
         on_change: Is called with the DDS topic whose readers or writers have changed.
         framing_of: Tells how a node frames services, by the id of its writer.
     """

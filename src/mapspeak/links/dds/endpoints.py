@@ -152,7 +152,6 @@ class Quality:
     Attributes:
         is_reliable: What is lost is sent again.
         is_latched: Who comes late gets what was sent last ("transient local").
-        depth: So many samples are kept.
     """
 
     is_reliable: bool

@@ -25,14 +25,7 @@ StartSoon = Callable[[Callable[[], Coroutine[Any, Any, None]]], None]
 
 
 class DdsActionClient:
-    """Pursues goals of one action.
-
-    Args:
-        send: Its service send_goal.
-        result: Its service get_result.
-        cancel: Its service cancel_goal.
-        start_soon: Runs something in the background.
-    """
+    """Pursues goals of one action."""
 
     def __init__(
         self,

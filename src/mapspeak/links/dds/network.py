@@ -16,7 +16,6 @@ class DdsNetwork:
     """A domain, and how its members are found.
 
     Attributes:
-        domain_id: As in ROS_DOMAIN_ID.
         is_local: Members are on this machine only, as with
             ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST.
         peers: Addresses of other machines that multicast does not reach, as in ROS_STATIC_PEERS.

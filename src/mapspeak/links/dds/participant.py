@@ -48,9 +48,6 @@ FOR_EVER_NS = 2**63 - 1
 class DdsParticipant:
     """Our member of a domain.
 
-    Args:
-        network: Which domain, and how to find others in it.
-
     Raises:
         LinkError: DDS cannot be started.
     """

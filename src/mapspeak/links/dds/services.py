@@ -52,15 +52,7 @@ class _Call:
 
 
 class ServiceClient:
-    """Asks one service.
-
-    Args:
-        participant: Ours.
-        name: Of the service, and its type.
-        framing: How the robot frames requests and answers.
-        encode: Gives the bytes of a message of a type.
-        decode: Gives the message of a type in bytes.
-    """
+    """Asks one service."""
 
     def __init__(
         self,

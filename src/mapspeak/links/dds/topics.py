@@ -32,7 +32,6 @@ class DdsTopicRequest(TopicRequest):
 
     Attributes:
         quality: In which it is read now; None while it is not.
-        inlet: What reads it.
         writers: The ids of those who wrote it when the reading began.
         taken_s: When the last message was taken, by the event loop's clock.
         has_learned: Its type was asked for already.
@@ -57,11 +56,6 @@ class DdsTopics(NativeLink[DdsTopicRequest]):
     A topic is read only once somebody writes it, because how it can be read depends on who does: a
     reader that asks for more than a writer offers is not served, and one that asks for less misses
     the latched map.
-
-    Args:
-        participant: Ours.
-        discovery: Says who reads and writes what.
-        types: Encodes and decodes.
     """
 
     def __init__(self, participant: DdsParticipant, discovery: Discovery, types: Types) -> None:

@@ -30,11 +30,7 @@ StartSoon = Callable[[Callable[[], Coroutine[Any, Any, None]]], None]
 
 
 class RclpyServices:
-    """Calls services; a call that is not answered in time is forgotten.
-
-    Args:
-        participant: Ours.
-    """
+    """Calls services; a call that is not answered in time is forgotten."""
 
     def __init__(self, participant: RclpyParticipant) -> None:
         self._participant = participant
@@ -112,13 +108,7 @@ def nobody_serves(name: str) -> LinkError:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Action:
-    """An action that we have used.
-
-    Attributes:
-        action_class: Of rclpy.
-        send: Its service send_goal.
-        result: Its service get_result.
-    """
+    """An action that we have used."""
 
     action_class: Any
     send: Client
@@ -142,13 +132,7 @@ class RclpyGoal(ActionGoal):
 
 
 class Goals:
-    """Sends goals, and says what becomes of them.
-
-    Args:
-        participant: Ours.
-        services: Calls them.
-        start_soon: Runs something in the background.
-    """
+    """Sends goals, and says what becomes of them."""
 
     def __init__(
         self, participant: RclpyParticipant, services: RclpyServices, *, start_soon: StartSoon

@@ -39,8 +39,6 @@ class Ros2Connection(RclpyGraph, RclpyTopics):
     """One ROS 2 system, as our node in it sees it.
 
     Args:
-        participant: Ours.
-        tasks: For what is done in the background.
         distro: Such as "jazzy"; empty where that is unknown.
     """
 

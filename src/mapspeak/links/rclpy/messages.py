@@ -65,10 +65,6 @@ RosMessage = Any  # rclpy has no types
 def write_message(message_class: Any, values: object) -> RosMessage:  # noqa: ANN401
     """Return a message with the values of a mapping; the fields it leaves out keep their defaults.
 
-    Args:
-        message_class: Of rclpy.
-        values: Fields by name.
-
     Raises:
         LinkError: Something does not fit; says which field.
     """

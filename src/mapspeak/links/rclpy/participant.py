@@ -39,7 +39,6 @@ class RclpyParticipant:
 
     Args:
         domain_id: As in ROS_DOMAIN_ID; None takes what that says.
-        portal: To the event loop.
         variables: Stand before those of the environment while the domain is entered.
     """
 
@@ -156,11 +155,7 @@ async def wait_until(is_so: Callable[[], bool], *, within_s: float) -> bool:
 
 @contextmanager
 def errors_of_ros(what: str) -> Iterator[None]:
-    """Turn what rclpy raises into a `LinkError`.
-
-    Args:
-        what: Failed.
-    """
+    """Turn what rclpy raises into a `LinkError`."""
     try:
         yield
     except ERRORS as error:

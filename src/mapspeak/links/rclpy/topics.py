@@ -34,9 +34,7 @@ class RclpyTopicRequest(TopicRequest):
 
     Attributes:
         quality: In which it is read now; None while it is not.
-        reader: What reads it in rclpy.
         n_readers: How many there have been; what an earlier one still brings is dropped.
-        taken_s: When the last message was taken.
     """
 
     quality: QoSProfile | None = None
@@ -58,9 +56,6 @@ class RclpyTopics(NativeLink[RclpyTopicRequest]):
     A topic is read only once somebody writes it, because how it can be read depends on who does: a
     reader that asks for more than a writer offers is not served, and one that asks for less misses
     the latched map.
-
-    Args:
-        participant: Ours.
     """
 
     def __init__(self, participant: RclpyParticipant) -> None:

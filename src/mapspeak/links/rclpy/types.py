@@ -34,7 +34,6 @@ class FieldType:
 
     Attributes:
         base: Of one value: "double", "string" or "package/Type".
-        is_list: There are many.
         length: How many, where that is fixed.
         most: How many at most, where that is limited.
         most_letters: Of a text, where that is limited.

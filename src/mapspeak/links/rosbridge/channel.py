@@ -11,7 +11,7 @@ from anyio.abc import TaskGroup
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge.address import RobotAddress, Timing
 from mapspeak.links.rosbridge.connection import SocketConnection
-from mapspeak.links.rosbridge.protocol import Event, ServiceAnswered, authenticate
+from mapspeak.links.rosbridge.protocol import Event, ServiceAnswered, write_operation
 from mapspeak.links.rosbridge.websocket import open_websocket
 
 logger = logging.getLogger(__name__)
@@ -25,10 +25,8 @@ class Channel:
     """A connection that comes back by itself.
 
     Args:
-        address: Where the robot is.
         on_event: Called with what the server says, answers to calls apart.
         on_loss: Called with this channel when a connection has died or been replaced.
-        timing: All time limits.
     """
 
     def __init__(
@@ -127,12 +125,6 @@ class Channel:
     async def call(self, text: bytes, *, call_id: str, what: str, timeout_s: float) -> object:
         """Return what a service answers.
 
-        Args:
-            text: The call.
-            call_id: Its id.
-            what: The service's name, for people.
-            timeout_s: For everything together, in wall time.
-
         Raises:
             LinkError: There was no answer in time, or it was a refusal.
         """
@@ -212,7 +204,7 @@ class Channel:
         socket = await open_websocket(self._address, timeout_s=self._timing.connect_s)
         connection = SocketConnection(socket, on_event=self._on_event, timing=self._timing)
         if self._address.token is not None:
-            connection.send(authenticate(self._address.token))
+            connection.send(write_operation("auth", token=self._address.token))
         for text in self._standing.values():
             connection.send(text)
         self._connection = connection

@@ -1,6 +1,6 @@
 """The client of one robot: what it subscribes to, publishes, calls and pursues."""
 
-from collections import deque
+import logging
 from collections.abc import AsyncGenerator, Callable, Coroutine, Mapping
 from contextlib import asynccontextmanager
 from functools import partial
@@ -10,7 +10,6 @@ import anyio
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError
-from mapspeak.links.rosbridge import protocol
 from mapspeak.links.rosbridge.address import RobotAddress, Timing
 from mapspeak.links.rosbridge.channel import Channel
 from mapspeak.links.rosbridge.protocol import (
@@ -20,6 +19,8 @@ from mapspeak.links.rosbridge.protocol import (
     GoalFedBack,
     Published,
     StatusNoted,
+    require_cbor,
+    write_operation,
 )
 from mapspeak.links.rosbridge.requests import RosbridgeTopicRequest, ServiceCaller
 from mapspeak.links.rosbridge.rosapi import Rosapi
@@ -27,7 +28,8 @@ from mapspeak.ros import ActionEnd, ActionGoal, LinkName, OwnEnds, new_id
 from mapspeak.ros.link import NOTICE_S, plain_errors
 from mapspeak.ros.messages import Message
 
-N_REMARKS_KEPT = 50
+logger = logging.getLogger(__name__)
+
 NODE = "rosbridge_websocket"
 """What rosbridge's node is called, whatever its namespace."""
 USUAL_TIMING = Timing()
@@ -39,10 +41,6 @@ class RosbridgeClient(Rosapi):
     Some versions of rosbridge handle what comes over one socket one after another, so that a stop
     sent behind a goal would act when the goal has ended. Hence a goal takes the socket that carries
     none, and what is urgent takes the other; a goal that replaces another frees that one's socket.
-
-    Args:
-        address: Where the robot is.
-        timing: All time limits.
     """
 
     def __init__(self, address: RobotAddress, *, timing: Timing = USUAL_TIMING) -> None:
@@ -57,8 +55,6 @@ class RosbridgeClient(Rosapi):
         self._published_s = float("-inf")
         self.n_frames_refused = 0
         """Frames that could not be understood and were left away."""
-        self.remarks: deque[str] = deque(maxlen=N_REMARKS_KEPT)
-        """What the server remarked, and why frames were refused; the newest last."""
 
     @property
     def link(self) -> LinkName:
@@ -148,14 +144,14 @@ class RosbridgeClient(Rosapi):
         Raises:
             LinkError: There is no connection, or the message cannot be sent.
         """
-        text = protocol.publish(topic, message)
+        text = write_operation("publish", topic=topic, msg=message)
         if self.announcements.use(topic):
             await anyio.sleep(NOTICE_S)
         await self._free_for_topics().send(text, timeout_s=self.timing.answer_s)
         self._published_s = anyio.current_time()
 
     def _prepare(self, topic: str, message: Message) -> Callable[[], int]:
-        text = protocol.publish(topic, message)
+        text = write_operation("publish", topic=topic, msg=message)
 
         def send() -> int:
             self._published_s = anyio.current_time()
@@ -186,8 +182,13 @@ class RosbridgeClient(Rosapi):
             LinkError: There is no connection, or the goal cannot be sent.
         """
         goal = ActionGoal(goal_id=new_id(), action=action)
-        text = protocol.send_action_goal(
-            action, arguments, operation_id=goal.goal_id, type_name=type_name
+        text = write_operation(
+            "send_action_goal",
+            id=goal.goal_id,
+            action=action,
+            action_type=type_name,
+            args=arguments,
+            feedback=True,
         )
         channel = self._free_for_topics()
         self._goals[goal.goal_id] = (goal, channel)
@@ -200,7 +201,7 @@ class RosbridgeClient(Rosapi):
 
     def cancel_goal(self, goal: ActionGoal) -> None:
         """Cancel a goal over the socket it does not block; its end tells whether that worked."""
-        text = protocol.cancel_action_goal(goal.action, operation_id=goal.goal_id)
+        text = write_operation("cancel_action_goal", id=goal.goal_id, action=goal.action)
         self.start_soon(partial(self._free_for_calls().send_when_up, text))
 
     def give_up_goal(self, goal: ActionGoal) -> None:
@@ -216,12 +217,12 @@ class RosbridgeClient(Rosapi):
             self._free_for_calls().replace()
 
     def _announce(self, topic: str, type_name: str) -> None:
+        text = write_operation("advertise", id=f"advertise:{topic}", topic=topic, type=type_name)
         for channel in (self._control, self._urgent):
-            text = protocol.advertise(topic, operation_id=f"advertise:{topic}", type_name=type_name)
             channel.keep_standing(f"advertise:{topic}", text)
 
     def _take_back(self, topic: str) -> None:
-        text = protocol.unadvertise(topic, operation_id=f"advertise:{topic}")
+        text = write_operation("unadvertise", id=f"advertise:{topic}", topic=topic)
         for channel in (self._control, self._urgent):
             channel.end_standing(f"advertise:{topic}", text)
 
@@ -244,18 +245,23 @@ class RosbridgeClient(Rosapi):
     def _begin(self, request: RosbridgeTopicRequest) -> None:
         subscription = request.subscription
         request.operation_id = new_id()
-        text = protocol.subscribe(
-            subscription.topic,
-            operation_id=request.operation_id,
-            type_name=subscription.type_name,
-            encoding=request.encoding,
-            throttle_ms=request.throttle_ms,
+        text = write_operation(
+            "subscribe",
+            id=request.operation_id,
+            topic=subscription.topic,
+            type=subscription.type_name,
+            compression=request.encoding.value,
+            # Where some are left out, only the latest waits at the server.
+            throttle_rate=request.throttle_ms or None,
+            queue_length=1 if request.throttle_ms else None,
         )
         request.channel = self._free_for_topics()
         request.channel.keep_standing(request.operation_id, text)
 
     def _end(self, request: RosbridgeTopicRequest) -> None:
-        text = protocol.unsubscribe(request.subscription.topic, operation_id=request.operation_id)
+        text = write_operation(
+            "unsubscribe", id=request.operation_id, topic=request.subscription.topic
+        )
         if request.channel is not None:
             request.channel.end_standing(request.operation_id, text)
 
@@ -278,10 +284,9 @@ class RosbridgeClient(Rosapi):
                         )
                     )
             case StatusNoted():
-                self.remarks.append(f"{event.level}: {event.text}")
+                logger.info("rosbridge notes: %s: %s", event.level, event.text)
             case FrameRefused():
                 self.n_frames_refused += 1
-                self.remarks.append(f"refused: {event.reason}")
 
     def _lose_goals(self, channel: Channel) -> None:
         # rosbridge itself may have gone, and with it what it knew of goals that were given up.
@@ -306,7 +311,7 @@ async def open_client(
         LinkError: It cannot be reached.
         ConfigError: An old package stands before one that is needed.
     """
-    protocol.require_cbor()
+    require_cbor()
     client = RosbridgeClient(address, timing=timing)
     with plain_errors():
         async with anyio.create_task_group() as tasks:

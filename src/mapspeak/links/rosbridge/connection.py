@@ -15,6 +15,7 @@ from mapspeak.links.rosbridge.protocol import (
     MAX_FRAME_BYTES,
     Conversation,
     Event,
+    FrameFault,
     FrameRefused,
     ServiceAnswered,
 )
@@ -45,9 +46,7 @@ class SocketConnection:
     """Serves one socket until it dies or is retired.
 
     Args:
-        socket: Freshly opened.
         on_event: Called with everything the server says but the answers to calls.
-        timing: When it counts as dead.
     """
 
     def __init__(
@@ -159,7 +158,9 @@ class SocketConnection:
 
     async def _understand(self, received: Received) -> Event | None:
         if received.n_bytes > MAX_FRAME_BYTES:
-            return FrameRefused(f"{received.n_bytes} bytes, the limit is {MAX_FRAME_BYTES}")
+            return FrameRefused(
+                FrameFault.TOO_LARGE, f"{received.n_bytes} > {MAX_FRAME_BYTES} bytes"
+            )
         if received.n_bytes <= LIGHT_BYTES and self._conversation.is_light(
             frame := received.join()
         ):
@@ -177,7 +178,9 @@ class SocketConnection:
         self._n_refused += 1
         if not self._is_warned:
             self._is_warned = True
-            logger.warning("A message of the robot was left away: %s.", event.reason)
+            logger.warning(
+                "A message of the robot was left away: %s (%s).", event.fault, event.detail
+            )
         if self._n_refused > MAX_REFUSED:
             self.fault = f"{MAX_REFUSED} messages in a row could not be understood"
             raise SocketClosed

@@ -25,12 +25,6 @@ async def open_rosbridge_robot(
 
     Leaving the context does not stop the robot: call `stop` before, where that is wanted.
 
-    Args:
-        url: Such as ws://192.168.1.20:9090.
-        overrides: What robot.yaml says.
-        timing: Time limits of the connection.
-        patience: Time limits of navigation.
-
     Raises:
         LinkError: The robot cannot be reached, or does not say what it offers.
         ConfigError: The address is none.

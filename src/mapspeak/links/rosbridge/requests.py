@@ -7,9 +7,8 @@ from typing import Any
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.links.rosbridge import protocol
 from mapspeak.links.rosbridge.channel import Channel
-from mapspeak.links.rosbridge.protocol import Encoding
+from mapspeak.links.rosbridge.protocol import Encoding, write_operation
 from mapspeak.ros import new_id
 from mapspeak.ros.link import TopicRequest
 
@@ -23,9 +22,6 @@ class ServiceCaller:
     """Calls services, each over the channel that is free.
 
     rosbridge and rosapi are two nodes: what one of them knows the other may find a moment later.
-
-    Args:
-        choose: Gives that channel.
     """
 
     def __init__(self, choose: Callable[[], Channel]) -> None:
@@ -72,7 +68,9 @@ class ServiceCaller:
         self, service: str, arguments: Mapping[str, Any], type_name: str | None, timeout_s: float
     ) -> dict[str, Any]:
         call_id = new_id()
-        text = protocol.call_service(service, arguments, operation_id=call_id, type_name=type_name)
+        text = write_operation(
+            "call_service", id=call_id, service=service, args=arguments, type=type_name
+        )
         values = await self._choose().call(text, call_id=call_id, what=service, timeout_s=timeout_s)
         return values if isinstance(values, dict) else {}
 

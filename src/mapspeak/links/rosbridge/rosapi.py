@@ -26,9 +26,6 @@ class DefinitionKeeper:
 
     On ROS 2 some of rosapi's services that describe types end or hang it: these are never called
     there, so that services and actions are described by what we know ourselves.
-
-    Args:
-        call: Calls one of rosapi's services with its arguments.
     """
 
     def __init__(self, call: Call) -> None:

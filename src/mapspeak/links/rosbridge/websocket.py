@@ -41,8 +41,6 @@ class Received:
     Attributes:
         parts: Its bytes, as they came; putting large ones together takes a moment. What is too
             large has none.
-        is_text: UTF-8 text, not binary data.
-        n_bytes: Of all of it.
     """
 
     parts: tuple[bytes | bytearray, ...]
@@ -223,10 +221,6 @@ def _bytes_of(frame: Frame) -> bytes | bytearray:
 
 async def open_websocket(address: RobotAddress, *, timeout_s: float) -> WebSocket:
     """Connect to a rosbridge server.
-
-    Args:
-        address: Where it is.
-        timeout_s: For everything together, in wall time.
 
     Raises:
         LinkError: Nobody is there, or somebody else.

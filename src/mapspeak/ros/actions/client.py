@@ -63,12 +63,6 @@ class ActionClient(ABC):
     before it was taken, or whose server fell silent. Should the server take it, or still have it,
     it is cancelled again and again until the server has ended it, and `afterwards` tells so.
 
-    Args:
-        connection: To the robot.
-        action: The action's full name.
-        type_name: As "package/Type".
-        patience: All time limits.
-
     Attributes:
         ends_others: Ending means the goals of other clients too: they move the robot as ours do.
         listeners: Called whenever anything was heard of any goal; they must not raise.

@@ -49,23 +49,16 @@ class SentGoal:
 
     Attributes:
         id: Ours, used nowhere else.
-        action: The action's full name.
-        type: The action's, as it was sent with.
         through: The connection it was sent over, which may be guarded.
         owner: The client with whom it ends; None where somebody else sees to that.
         server_id: What the action server calls it; None where that is unknown.
-        state: How it stands.
-        feedback: The latest; None before the first.
-        n_feedback: How many came.
         silent_s: Robot time since the latest, as far as somebody looked.
-        result: None as long as there is none.
         reason: Why it ended so, where that was said.
         afterwards: What became of a withdrawn goal that the server took after all.
         is_withdrawn: We said that it was over before the server did: should the server take it,
             or still have it, it is cancelled.
         is_settled: The server has ended a withdrawn goal, or never had it.
         sent_s: When it was sent, by the event loop's clock.
-        ended_s: When it ended; None before.
     """
 
     def __init__(

@@ -17,15 +17,7 @@ def open_action(
     type_name: str,
     patience: ActionPatience = USUAL_PATIENCE,
 ) -> ActionClient:
-    """Return the client of an action; the first who asks for it decides how patient it is.
-
-    Args:
-        connection: To the robot.
-        action: The action's full name.
-        dialect: Which ROS.
-        type_name: As "package/Type".
-        patience: All time limits.
-    """
+    """Return the client of an action; the first who asks for it decides how patient it is."""
     known = connection.started.actions.get(action)
     if isinstance(known, ActionClient):
         # A type that somebody got wrong must not stay for ever.

@@ -28,7 +28,6 @@ class Field:
     """One field of a message.
 
     Attributes:
-        name: Of the field.
         type: Of the value, or of one in a list; another message as "package/Type".
         length: Of a list: 0 where it is not fixed; None where it is no list.
         most: How long a list may be at most; None where that is not said.
@@ -69,13 +68,7 @@ class Constant:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MessageType:
-    """What messages of one type look like.
-
-    Attributes:
-        name: As "package/Type".
-        fields: In their order.
-        constants: In their order.
-    """
+    """What messages of one type look like."""
 
     name: str
     fields: tuple[Field, ...]

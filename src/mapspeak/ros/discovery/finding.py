@@ -19,9 +19,6 @@ from mapspeak.ros.messages import Dialect
 class Liveness:
     """Asks for the other end of topics, of each once.
 
-    Args:
-        connection: To the robot.
-
     Attributes:
         dead: Topics without one. A topic of which the robot does not tell is not among them.
     """
@@ -141,11 +138,6 @@ async def look_at_robot(
     connection: RosConnection, frames: frozenset[str], overrides: RobotOverrides
 ) -> tuple[RobotProfile, frozenset[str]]:
     """Return what the robot offers now, or what robot.yaml says, and all names that it lists.
-
-    Args:
-        connection: To the robot.
-        frames: The coordinate frames that were heard of.
-        overrides: What robot.yaml says.
 
     Raises:
         LinkError: rosapi is missing, and robot.yaml does not say which ROS it is.

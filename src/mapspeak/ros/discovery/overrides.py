@@ -22,9 +22,6 @@ class RosSettings(BaseModel):
     """The section `ros` of robot.yaml: the ROS that the robot runs, and how it is found over DDS.
 
     Attributes:
-        version: 1 or 2.
-        domain_id: As in ROS_DOMAIN_ID.
-        discovery_range: As in ROS_AUTOMATIC_DISCOVERY_RANGE.
         static_peers: Addresses of machines that multicast does not reach, as in ROS_STATIC_PEERS.
         rmw_implementation: As in RMW_IMPLEMENTATION; for `--robot ros2` only.
         cyclonedds_uri: As in CYCLONEDDS_URI: the path of a file, or the settings themselves.
@@ -61,22 +58,12 @@ class RobotOverrides(BaseModel):
     """The keys of robot.yaml; what is left away is found by asking the robot.
 
     Attributes:
-        name: How people call the robot.
         ros: Which ROS it runs, 1 or 2, or a section that says more; see `RosSettings`.
         namespace: Looks for topics and frames below this name first: robot1, or /robot1.
-        radius_m: Of the smallest circle around the robot.
-        map_name: Which map or building it drives in.
-        map_topic: Of nav_msgs/OccupancyGrid.
-        map_updates_topic: Of map_msgs/OccupancyGridUpdate.
-        map_frame: The fixed frame of the map.
-        base_frame: The robot's own frame.
         pose_topic: "tf", or a topic that tells the pose.
         pose_type: The type of that topic, where the robot does not list it.
         camera_topic: Of sensor_msgs/Image or sensor_msgs/CompressedImage.
         camera_type: The type of that topic, where the robot does not list it.
-        camera_info_topic: Of sensor_msgs/CameraInfo.
-        scan_topic: Of sensor_msgs/LaserScan.
-        navigation: How goals are sent.
         navigation_name: The action, or the topic for goals.
         velocity_topic: Of geometry_msgs/Twist or TwistStamped.
         velocity_type: The type of that topic, where the robot does not list it.

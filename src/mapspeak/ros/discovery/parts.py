@@ -27,7 +27,6 @@ class RobotPart:
 
     Attributes:
         key: By which robot.yaml names it.
-        fields: Of the profile.
         topic: Gives the topic, or the action, that shows whether it is alive.
         is_heard: We publish that topic, and the robot listens.
         is_second_best: Tells whether there may be better.

@@ -42,29 +42,14 @@ class RobotProfile:
     """What a robot offers; None where it does not.
 
     Attributes:
-        name: How people call it.
-        dialect: Which ROS.
-        distro: Such as "jazzy"; empty where unknown.
-        radius_m: Of the smallest circle around it.
         radius_source: Who said so: a parameter, or robot.yaml; empty where it is assumed.
-        map_name: Which map or building it drives in.
-        map_topic: Of nav_msgs/OccupancyGrid.
-        map_updates_topic: Of map_msgs/OccupancyGridUpdate.
         other_map_topics: Of the same type: costmaps, and maps of other robots.
-        map_frame: The fixed frame of the map.
-        base_frame: The robot's own frame.
-        pose_source: Where its pose comes from.
         pose_topic: The topic, where it is not TF.
         pose_type: Its type, as "package/Type".
         tf_topics: /tf and /tf_static, or those of a namespace.
-        camera_topic: Of the front camera.
         camera_type: Image or CompressedImage, as "package/Type".
-        camera_info_topic: Of sensor_msgs/CameraInfo.
-        scan_topic: Of sensor_msgs/LaserScan.
-        navigation: How goals are sent.
         navigation_name: The action, or the topic for goals.
         planner_name: The action or service that plans a path without driving it.
-        velocity_topic: Takes velocities.
         velocity_type: Twist or TwistStamped, as "package/Type".
         clock_topic: Where a simulation tells its time.
         namespace: Where the robot's topics are, such as /robot1; empty where they are in none.

@@ -27,9 +27,6 @@ class RobotWatch:
     was lost on the way after 3 s.
 
     Args:
-        connection: To the robot.
-        frames: Listens to its frames.
-        overrides: What robot.yaml says.
         settling_s: Without anything new, in wall time, after which all that is there is found.
 
     Attributes:

@@ -2,6 +2,8 @@
 
 from mapspeak.ros.messages.depth import shade_depth
 from mapspeak.ros.messages.dialect import (
+    NAME,
+    TYPE,
     Dialect,
     bare_type,
     read_header,
@@ -45,6 +47,8 @@ from mapspeak.ros.messages.scans import (
 )
 
 __all__ = [
+    "NAME",
+    "TYPE",
     "CameraInfo",
     "Dialect",
     "EncodedPicture",

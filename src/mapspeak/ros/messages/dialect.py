@@ -1,11 +1,15 @@
 """How ROS 1 and ROS 2 write the same thing: types, and time."""
 
 import math
+import re
 from enum import StrEnum
 from typing import Any
 
 from mapspeak.ros.messages.fields import Message, misfit, part_of, text_of, whole_of
 
+NAME = re.compile(r"[~/]?[A-Za-z_][A-Za-z0-9_]*(?:/[A-Za-z_][A-Za-z0-9_]*)*")
+TYPE = re.compile(r"[A-Za-z]\w*(?:/(?:msg|srv|action))?/[A-Za-z]\w*")
+"""What names of ROS, and those of its types, look like."""
 NANOSECONDS = 1_000_000_000
 LARGEST_SECONDS = 2**32 - 1
 

@@ -29,12 +29,7 @@ class EncodedPicture:
     """A picture as a file.
 
     Attributes:
-        data: The file.
         media_type: "image/jpeg" or "image/png".
-        width_px: Columns.
-        height_px: Rows.
-        frame_id: The camera's frame.
-        stamp_s: Robot time of the exposure.
         is_depth: Its grey levels are shaded depth.
     """
 

@@ -21,7 +21,6 @@ class FramedPose:
     Attributes:
         pose: In the frame `frame_id`.
         frame_id: Such as "map".
-        stamp_s: Robot time of the estimate.
     """
 
     pose: Pose
@@ -37,7 +36,6 @@ class FrameTransform:
         parent_from_child: The pose of the child frame in the parent frame, seen from above.
         parent: The outer frame, such as "map".
         child: The inner frame, such as "odom".
-        stamp_s: Robot time of the transform.
         height_m: How far above the parent's origin the child's is.
         rotation: The whole rotation as a unit quaternion x, y, z, w; None where there is no more to
             it than the heading of the pose.
@@ -56,7 +54,6 @@ class Twist:
     """A velocity in the robot's own frame.
 
     Attributes:
-        forward_mps: Along its heading.
         left_mps: Across it.
         turn_radps: Counter-clockwise.
     """

@@ -38,11 +38,6 @@ class LaserScan:
     Attributes:
         ranges_m: One distance per beam; NaN where the beam met nothing or was not valid.
         first_angle_rad: Of the first beam, counter-clockwise from the sensor's x axis.
-        angle_step_rad: From one beam to the next.
-        least_range_m: Nearer things are not measured.
-        largest_range_m: Farther things are not measured.
-        frame_id: The sensor's frame.
-        stamp_s: Robot time of the first beam.
         met_nothing: For each beam, whether it is known to have met nothing as far as
             `largest_range_m`; None where all without a range are.
     """
@@ -76,10 +71,7 @@ class CameraInfo:
     """What a camera says of itself.
 
     Attributes:
-        width_px: Columns.
-        height_px: Rows.
         horizontal_fov_rad: From the left edge to the right one; None where it is not calibrated.
-        frame_id: The camera's frame.
         stamp_s: Robot time of the picture it belongs to.
     """
 

@@ -26,8 +26,6 @@ class GoalRecord:
 
     Attributes:
         goal_id: Ours, used nowhere else.
-        goal: In the map frame.
-        state: How it stands.
         is_replaced: We have sent another goal since.
         afterwards: What became of it after its end.
     """
@@ -143,9 +141,6 @@ class Navigation:
     """A kind of navigation.
 
     Attributes:
-        title: What it is called.
-        dialect: Its ROS.
-        type_name: Of its action.
         write_goal: Gives the goal's fields for a pose.
         read_feedback: Gives how far is left, and how often it had to try again, for a goal.
         hint: What to check when it does not answer.
@@ -173,12 +168,7 @@ class ActionDriver:
     """Sends poses to navigation and reads how its goals end.
 
     Args:
-        connection: Connected to the robot.
-        action: Its full name, such as /navigate_to_pose.
-        navigation: Which kind it is.
         map_frame: In which goals are given.
-        patience: All time limits.
-        now_s: Tells robot time.
         on_lost: Called when navigation has gone under a drive; nobody stops the base then.
     """
 

@@ -28,12 +28,7 @@ class GoalTopicDriver:
     """Publishes goals and judges by the robot's pose what becomes of them.
 
     Args:
-        connection: Connected to the robot.
-        topic: Takes geometry_msgs/PoseStamped.
-        dialect: Which ROS.
         map_frame: In which goals are given.
-        fetch_pose: Tells where the robot is.
-        now_s: Tells robot time.
     """
 
     def __init__(

@@ -34,8 +34,6 @@ class MapSubscriber:
     """Keeps the latest map, and makes a value of it when somebody wants it.
 
     Args:
-        connection: Connected to the robot.
-        profile: Says which topics.
         waits_s: How long to wait for the first map before asking anew, in wall time; None for
             what is usual over the connection.
         in_vain_s: How long to wait when all that has passed.

@@ -33,7 +33,6 @@ class RobotClock:
     """Tells robot time, and waits for it.
 
     Args:
-        connection: Connected to the robot.
         standstill_s: Wall time after which a clock that does not move on stands still.
     """
 
@@ -133,9 +132,6 @@ class PoseKeeper:
     """Tells the pose from the tree of frames, or from a topic where the tree does not reach.
 
     Args:
-        connection: Connected to the robot.
-        profile: Says where the pose comes from.
-        frames: Listens to the tree.
         silence_s: Without anything new from a source that speaks all the time, in wall time, after
             which the pose is too old.
     """

@@ -56,15 +56,7 @@ NOTHING_SAID = RobotOverrides()
 
 
 class RosRobot:
-    """A `Robot` that speaks ROS.
-
-    Args:
-        connection: Connected to the robot.
-        watch: Has looked at the robot, and goes on while something is missing.
-        frames: Listens to its coordinate frames.
-        clock: Tells its time.
-        patience: How long to wait for what it offers, and for its navigation.
-    """
+    """A `Robot` that speaks ROS."""
 
     def __init__(
         self,

@@ -39,7 +39,6 @@ class IdleSubscriptions:
     """Subscribes when somebody looks, and unsubscribes when nobody has for a while.
 
     Args:
-        connection: Connected to the robot.
         subscribe: Begins what is needed for a look; it may raise.
 
     Attributes:
@@ -97,8 +96,6 @@ class RosCamera:
     """Takes pictures.
 
     Args:
-        connection: Connected to the robot.
-        profile: Says which topic.
         patience_s: How long to wait for a picture, in wall time; longer for a slow camera.
         first_patience_s: How long to wait for the first.
     """
@@ -237,10 +234,6 @@ class Laser:
     """Takes scans. Whatever goes wrong, there is just none: nothing depends on them.
 
     Args:
-        connection: Connected to the robot.
-        profile: Says which topic.
-        frames: Knows where the laser is mounted.
-        clock: Tells which scans are old.
         patience_s: How long to wait for a scan, in wall time.
     """
 
@@ -261,11 +254,7 @@ class Laser:
         self._idle = IdleSubscriptions(connection, self._subscribe)
 
     async def fetch(self, poses: PoseKeeper) -> RangeScan | None:
-        """Return a scan that arrives after it was asked for, or None.
-
-        Args:
-            poses: Knows where the robot is when it comes.
-        """
+        """Return a scan that arrives after it was asked for, or None."""
         if not self._connection.is_open:
             return None
         try:

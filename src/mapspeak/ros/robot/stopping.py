@@ -31,8 +31,6 @@ class Brake:
     """Publishes zero velocity; says beforehand that it will, so that the robot listens in time.
 
     Args:
-        connection: Connected to the robot.
-        profile: Says which topic.
         latest_pose: Tells where the robot was last; raises `LinkError` where nobody knows.
     """
 
@@ -126,10 +124,6 @@ def _has_moved(before: StampedPose, now: StampedPose) -> bool:
 
 async def stop_everything(connection: RosConnection, *, brake: Brake) -> None:
     """End all goals of ours, and every drive; the brake was pulled before.
-
-    Args:
-        connection: To the robot; knows what was started over it.
-        brake: Says where zero velocity is published.
 
     Raises:
         LinkError: Names all that could not be told, or goes on.

@@ -1,6 +1,6 @@
 """The rosbridge protocol without I/O: frames in, events out; operations as text."""
 
-from mapspeak.links.rosbridge.protocol.bounds import MAX_FRAME_BYTES
+from mapspeak.links.rosbridge.protocol.bounds import MAX_FRAME_BYTES, FrameFault
 from mapspeak.links.rosbridge.protocol.codec import require_cbor
 from mapspeak.links.rosbridge.protocol.conversation import LIGHT_BYTES, Conversation
 from mapspeak.links.rosbridge.protocol.operations import (
@@ -12,15 +12,7 @@ from mapspeak.links.rosbridge.protocol.operations import (
     Published,
     ServiceAnswered,
     StatusNoted,
-    advertise,
-    authenticate,
-    call_service,
-    cancel_action_goal,
-    publish,
-    send_action_goal,
-    subscribe,
-    unadvertise,
-    unsubscribe,
+    write_operation,
 )
 
 __all__ = [
@@ -29,20 +21,13 @@ __all__ = [
     "Conversation",
     "Encoding",
     "Event",
+    "FrameFault",
     "FrameRefused",
     "GoalEnded",
     "GoalFedBack",
     "Published",
     "ServiceAnswered",
     "StatusNoted",
-    "advertise",
-    "authenticate",
-    "call_service",
-    "cancel_action_goal",
-    "publish",
     "require_cbor",
-    "send_action_goal",
-    "subscribe",
-    "unadvertise",
-    "unsubscribe",
+    "write_operation",
 ]

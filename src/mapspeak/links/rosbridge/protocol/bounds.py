@@ -4,6 +4,7 @@ import math
 from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -29,8 +30,26 @@ Raw = bytes | bytearray | memoryview
 """A large frame is handed on as it came: copying it takes longer than other calls may wait."""
 
 
+class FrameFault(StrEnum):
+    """What is wrong with a frame."""
+
+    NO_JSON = "no_json"
+    NO_CBOR = "no_cbor"
+    NO_PNG = "no_png"
+    NO_FRAGMENT = "no_fragment"
+    TOO_LARGE = "too_large"
+    TOO_DEEP = "too_deep"
+    UNKNOWN_OPERATION = "unknown_operation"
+    MISSING_FIELD = "missing_field"
+
+
 class FrameError(Exception):
     """A frame that cannot be understood; never leaves the protocol."""
+
+    def __init__(self, fault: FrameFault, detail: object) -> None:
+        super().__init__(f"{fault}: {detail}")
+        self.fault = fault
+        self.detail = str(detail)
 
 
 def check_json(text: Raw) -> int:
@@ -42,7 +61,9 @@ def check_json(text: Raw) -> int:
         FrameError: It holds too much.
     """
     if len(text) > MAX_REST_BYTES:
-        raise FrameError(f"{len(text)} bytes besides numbers, the limit is {MAX_REST_BYTES}")
+        raise FrameError(
+            FrameFault.TOO_LARGE, f"{len(text)} > {MAX_REST_BYTES} bytes without numbers"
+        )
     if len(text) < SMALL_BYTES:
         small = bytes(text)
         return small.count(b"[") + small.count(b"{")
@@ -100,10 +121,10 @@ def check_cbor(frame: Raw) -> None:
             n_containers += 1
             n_values = length * _CONTAINERS.get(major, 1)
             if short != _INDEFINITE and n_values > len(frame) - position:
-                raise FrameError("no CBOR: a list that is longer than its frame")
+                raise FrameError(FrameFault.NO_CBOR, "a list longer than its frame")
             open_ends.append(n_values)
             if len(open_ends) > MAX_DEPTH:
-                raise FrameError(f"CBOR that is nested more than {MAX_DEPTH} levels deep")
+                raise FrameError(FrameFault.TOO_DEEP, f"> {MAX_DEPTH}")
         _check_counts(n_containers, n_elements)
 
 
@@ -124,9 +145,7 @@ def _read_length(frame: Raw, position: int, short: int) -> tuple[float, int]:
 
 def _check_counts(n_containers: int, n_elements: int) -> None:
     if n_containers > MAX_CONTAINERS or n_elements > MAX_ELEMENTS:
-        raise FrameError(
-            f"more than {MAX_CONTAINERS} lists and objects, or {MAX_ELEMENTS} values, in one frame"
-        )
+        raise FrameError(FrameFault.TOO_LARGE, f"> {MAX_CONTAINERS} lists or {MAX_ELEMENTS} values")
 
 
 def parts_of(length: int, size: int = PART_BYTES) -> Iterator[tuple[int, int]]:
@@ -192,11 +211,11 @@ class FragmentStore:
 def _read_piece(operation: dict[str, Any]) -> tuple[int, int, bytes]:
     number, total, text = (operation.get(key) for key in ("num", "total", "data"))
     if not (_is_number(number) and _is_number(total) and isinstance(text, str)):
-        raise FrameError("a fragment without num, total and data")
+        raise FrameError(FrameFault.NO_FRAGMENT, "num, total, data")
     # rosbridge tells (length - 1) / size + 1 without rounding: 7.0058 means 7 pieces.
     n_pieces = math.floor(total)
     if not 1 <= n_pieces <= MAX_PIECES or number not in range(n_pieces):
-        raise FrameError(f"fragment {number} of {total}")
+        raise FrameError(FrameFault.NO_FRAGMENT, f"{number} of {total}")
     return int(number), n_pieces, text.encode("utf-8", "surrogatepass")
 
 

@@ -22,6 +22,7 @@ from mapspeak.links.rosbridge.protocol.bounds import (
     MAX_FRAME_BYTES,
     MAX_REST_BYTES,
     FrameError,
+    FrameFault,
     Raw,
     check_cbor,
     check_json,
@@ -233,7 +234,7 @@ def decode_cbor(frame: Raw) -> Any:  # noqa: ANN401 - ROS data enters here
     try:
         return cbor2.loads(frame, semantic_decoders=_DECODERS, max_depth=MAX_DEPTH)
     except (cbor2.CBORDecodeError, ValueError, TypeError, OverflowError, RecursionError) as error:
-        raise FrameError(f"no CBOR: {error}") from error
+        raise FrameError(FrameFault.NO_CBOR, error) from error
 
 
 def require_cbor() -> None:
@@ -260,10 +261,10 @@ def decode_png(text: str) -> memoryview:
     try:
         with Image.open(io.BytesIO(base64.b64decode(text)), formats=["PNG"]) as picture:
             if picture.width * picture.height > MAX_FRAME_PIXELS:
-                raise FrameError(f"a png of {picture.width}x{picture.height} pixels")
+                raise FrameError(FrameFault.TOO_LARGE, f"{picture.size} pixels")
             pixels = (picture if picture.mode == "RGB" else picture.convert("RGB")).tobytes()
     except (OSError, ValueError, SyntaxError, zlib.error, Image.DecompressionBombError) as error:
-        raise FrameError(f"no png: {error}") from error
+        raise FrameError(FrameFault.NO_PNG, error) from error
     # The last row is filled up with line ends.
     n_filled = 3 * picture.width
     end = len(pixels) - n_filled + len(pixels[-n_filled:].rstrip(b"\n\x00"))
@@ -284,11 +285,11 @@ def _parse_json(text: Raw) -> Any:  # noqa: ANN401 - as above
 def _parse_lenient_json(text: Raw, complaint: str) -> Any:  # noqa: ANN401 - as above
     """Read NaN and Infinity too, however a server spells them."""
     if len(text) > MAX_LENIENT_BYTES:
-        raise FrameError(f"no JSON: {complaint}")
+        raise FrameError(FrameFault.NO_JSON, complaint)
     try:
         return json.loads(BARE_NUMBER.sub(_as_python_writes, text))
     except (ValueError, RecursionError) as error:
-        raise FrameError(f"no JSON: {complaint}") from error
+        raise FrameError(FrameFault.NO_JSON, complaint) from error
 
 
 def _put_back(value: Any, lists: Sequence[Numbers]) -> Any:  # noqa: ANN401 - as above
@@ -311,7 +312,7 @@ def _put_back(value: Any, lists: Sequence[Numbers]) -> Any:  # noqa: ANN401 - as
                     container[key] = child if inner_list is None else inner_list
         level = inner
     if level:
-        raise FrameError(f"JSON that is nested more than {MAX_DEPTH} levels deep")
+        raise FrameError(FrameFault.TOO_DEEP, f"> {MAX_DEPTH}")
     return value
 
 

@@ -2,7 +2,13 @@
 
 from typing import Any
 
-from mapspeak.links.rosbridge.protocol.bounds import MAX_FRAME_BYTES, FragmentStore, FrameError, Raw
+from mapspeak.links.rosbridge.protocol.bounds import (
+    MAX_FRAME_BYTES,
+    FragmentStore,
+    FrameError,
+    FrameFault,
+    Raw,
+)
 from mapspeak.links.rosbridge.protocol.codec import decode_cbor, decode_json, decode_png
 from mapspeak.links.rosbridge.protocol.operations import (
     Event,
@@ -16,7 +22,7 @@ from mapspeak.links.rosbridge.protocol.operations import (
 
 MAX_WRAPPINGS = 3
 """A fragmented png is two layers of wrapping; nothing needs more."""
-MAX_REASON_LENGTH = 200
+MAX_DETAIL_LENGTH = 200
 LIGHT_BYTES = 32_768
 """A frame up to this size is read within a few milliseconds, unless more is wrapped in it."""
 SIGNS_OF_MORE = (b"fragment", b"png", b"\\u")
@@ -47,31 +53,21 @@ class Conversation:
         return len(frame) <= LIGHT_BYTES and not any(sign in frame for sign in SIGNS_OF_MORE)
 
     def receive(self, frame: Raw, *, is_text: bool) -> Event | None:
-        """Return what a frame says; None while the message is incomplete."""
-        return self.receive_text(frame) if is_text else self.receive_binary(frame)
-
-    def receive_text(self, frame: Raw) -> Event | None:
-        """Return what a text frame (JSON, UTF-8) says; None while the message is incomplete."""
+        """Return what a frame says, JSON in UTF-8 or CBOR; None while the message is incomplete."""
         try:
-            return self._understand(self._checked(frame, decode_json), n_wrappings=0)
+            decode = decode_json if is_text else decode_cbor
+            return self._understand(self._checked(frame, decode), n_wrappings=0)
         except FrameError as error:
-            return FrameRefused(str(error)[:MAX_REASON_LENGTH])
-
-    def receive_binary(self, frame: Raw) -> Event | None:
-        """Return what a binary frame (CBOR) says; None while the message is incomplete."""
-        try:
-            return self._understand(self._checked(frame, decode_cbor), n_wrappings=0)
-        except FrameError as error:
-            return FrameRefused(str(error)[:MAX_REASON_LENGTH])
+            return FrameRefused(error.fault, error.detail[:MAX_DETAIL_LENGTH])
 
     def _checked(self, frame: Raw, decode: Any) -> Any:  # noqa: ANN401 - ROS data enters here
         if len(frame) > self._max_bytes:
-            raise FrameError(f"a frame of {len(frame)} bytes, the limit is {self._max_bytes}")
+            raise FrameError(FrameFault.TOO_LARGE, f"{len(frame)} > {self._max_bytes} bytes")
         return decode(frame)
 
     def _understand(self, operation: Any, *, n_wrappings: int) -> Event | None:  # noqa: ANN401
         if not isinstance(operation, dict):
-            raise FrameError(f"no rosbridge operation: {type(operation).__name__}")
+            raise FrameError(FrameFault.UNKNOWN_OPERATION, type(operation).__name__)
         match operation.get("op"):
             case "publish":
                 return _published(operation)
@@ -86,7 +82,7 @@ class Conversation:
             case "fragment" | "png" if n_wrappings < MAX_WRAPPINGS:
                 return self._unwrap(operation, n_wrappings=n_wrappings + 1)
             case other:
-                raise FrameError(f"an operation {str(other)[:40]!r} that is not known")
+                raise FrameError(FrameFault.UNKNOWN_OPERATION, str(other)[:40])
 
     def _unwrap(self, operation: dict[str, Any], *, n_wrappings: int) -> Event | None:
         frame: Raw | None
@@ -102,7 +98,7 @@ class Conversation:
 def _published(operation: dict[str, Any]) -> Published:
     message = operation.get("msg")
     if not isinstance(message, dict):
-        raise FrameError("a publication without a message")
+        raise FrameError(FrameFault.MISSING_FIELD, "msg")
     return Published(topic=_text(operation, "topic"), message=message)
 
 
@@ -118,7 +114,7 @@ def _service_answered(operation: dict[str, Any]) -> ServiceAnswered:
 def _goal_fed_back(operation: dict[str, Any]) -> GoalFedBack:
     values = operation.get("values")
     if not isinstance(values, dict):
-        raise FrameError("feedback without values")
+        raise FrameError(FrameFault.MISSING_FIELD, "values")
     return GoalFedBack(goal_id=_text(operation, "id"), values=values)
 
 
@@ -133,16 +129,14 @@ def _goal_ended(operation: dict[str, Any]) -> GoalEnded:
 
 
 def _status_noted(operation: dict[str, Any]) -> StatusNoted:
-    operation_id = operation.get("id")
     return StatusNoted(
         level=str(operation.get("level"))[:40],
-        text=str(operation.get("msg"))[:MAX_REASON_LENGTH],
-        operation_id=operation_id if isinstance(operation_id, str) else None,
+        text=str(operation.get("msg"))[:MAX_DETAIL_LENGTH],
     )
 
 
 def _text(operation: dict[str, Any], key: str) -> str:
     value = operation.get(key)
     if not isinstance(value, str):
-        raise FrameError(f"a {operation['op']} without {key}")
+        raise FrameError(FrameFault.MISSING_FIELD, key)
     return value

@@ -10,8 +10,8 @@ import numpy as np
 import orjson
 
 from mapspeak.errors import LinkError
-from mapspeak.ros import NAME, TYPE
-from mapspeak.ros.messages import Message
+from mapspeak.links.rosbridge.protocol.bounds import FrameFault
+from mapspeak.ros.messages import NAME, TYPE, Message
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -19,7 +19,6 @@ class Published:
     """A message on a topic.
 
     Attributes:
-        topic: As the server names it.
         message: Its fields; may hold numpy arrays.
     """
 
@@ -32,7 +31,6 @@ class ServiceAnswered:
     """The answer to one call.
 
     Attributes:
-        call_id: The id the call was sent with.
         is_success: The service was there and did not fail.
         values: Its response; a text with the reason where it failed.
     """
@@ -44,12 +42,7 @@ class ServiceAnswered:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GoalFedBack:
-    """Feedback of an action.
-
-    Attributes:
-        goal_id: The id the goal was sent with.
-        values: The feedback message.
-    """
+    """Feedback of an action."""
 
     goal_id: str
     values: Message
@@ -60,7 +53,6 @@ class GoalEnded:
     """The end of an action.
 
     Attributes:
-        goal_id: The id the goal was sent with.
         status: As in action_msgs/GoalStatus: 4 succeeded, 5 cancelled, 6 aborted; None if unsaid.
         is_result: False when the goal was refused; says nothing about success.
         values: The result message; a text with the reason where it was refused.
@@ -78,24 +70,18 @@ class StatusNoted:
 
     Attributes:
         level: "error", "warning", "info" or "none".
-        text: The remark.
-        operation_id: What it is about; None where the server does not say.
     """
 
     level: str
     text: str
-    operation_id: str | None
 
 
 @dataclass(frozen=True, slots=True)
 class FrameRefused:
-    """A frame that could not be understood, and was left away.
+    """A frame that could not be understood, and was left away; the detail is for the log."""
 
-    Attributes:
-        reason: What is wrong with it.
-    """
-
-    reason: str
+    fault: FrameFault
+    detail: str
 
 
 Event = Published | ServiceAnswered | GoalFedBack | GoalEnded | StatusNoted | FrameRefused
@@ -112,94 +98,22 @@ class Encoding(StrEnum):
     PNG = "png"
 
 
-def subscribe(
-    topic: str, *, operation_id: str, type_name: str | None, encoding: Encoding, throttle_ms: int
-) -> bytes:
-    """Ask for a topic's messages, of which only the latest waits at the server.
-
-    Args:
-        topic: Its full name.
-        operation_id: To unsubscribe with.
-        type_name: None leaves it to the server.
-        encoding: How messages are to be written.
-        throttle_ms: The least time between two messages; 0 for all of them.
-    """
-    queueing = {"throttle_rate": throttle_ms, "queue_length": 1} if throttle_ms else {}
-    return _encode(
-        "subscribe",
-        id=operation_id,
-        topic=_name(topic),
-        compression=encoding.value,
-        **_type_of(type_name),
-        **queueing,
-    )
-
-
-def unsubscribe(topic: str, *, operation_id: str) -> bytes:
-    """End what `subscribe` began."""
-    return _encode("unsubscribe", id=operation_id, topic=_name(topic))
-
-
-def advertise(topic: str, *, operation_id: str, type_name: str) -> bytes:
-    """Say that messages of a type will be published."""
-    return _encode("advertise", id=operation_id, topic=_name(topic), **_type_of(type_name))
-
-
-def unadvertise(topic: str, *, operation_id: str) -> bytes:
-    """End what `advertise` began."""
-    return _encode("unadvertise", id=operation_id, topic=_name(topic))
-
-
-def publish(topic: str, message: Mapping[str, Any]) -> bytes:
-    """Publish a message on a topic that has been advertised.
+def write_operation(operation: str, **fields: Any) -> bytes:  # noqa: ANN401 - ROS JSON leaves here
+    """Return an operation as the server takes it; fields that are None are left away.
 
     Raises:
-        LinkError: A number in it is NaN or infinite; a robot would act on it.
+        LinkError: A name or a type is none, or a number is not finite: a robot would act on it.
     """
-    return _encode("publish", topic=_name(topic), msg=message)
-
-
-def call_service(
-    service: str, arguments: Mapping[str, Any], *, operation_id: str, type_name: str | None = None
-) -> bytes:
-    """Call a service; the answer carries the same id."""
-    return _encode(
-        "call_service",
-        id=operation_id,
-        service=_name(service),
-        args=arguments,
-        **_type_of(type_name),
-    )
-
-
-def send_action_goal(
-    action: str, arguments: Mapping[str, Any], *, operation_id: str, type_name: str
-) -> bytes:
-    """Send a goal to an action (ROS 2); feedback and result carry the same id."""
-    return _encode(
-        "send_action_goal",
-        id=operation_id,
-        action=_name(action),
-        action_type=_type_name(type_name),
-        args=arguments,
-        feedback=True,
-    )
-
-
-def cancel_action_goal(action: str, *, operation_id: str) -> bytes:
-    """Cancel the goal that was sent with that id (ROS 2); nothing answers."""
-    return _encode("cancel_action_goal", id=operation_id, action=_name(action))
-
-
-def authenticate(token: str) -> bytes:
-    """Return a token to a server that asks for one before anything else."""
-    return _encode("auth", token=token)
-
-
-def _encode(operation: str, **fields: Any) -> bytes:  # noqa: ANN401 - ROS JSON leaves here
-    _check_numbers(fields, depth=0)
+    said = {key: value for key, value in fields.items() if value is not None}
+    for key in ("topic", "service", "action"):
+        if key in said:
+            _check_name(said[key])
+    for key in ("type", "action_type"):
+        if key in said:
+            _check_type(said[key])
+    _check_numbers(said, depth=0)
     try:
-        return orjson.dumps({"op": operation, **fields}, option=orjson.OPT_SERIALIZE_NUMPY)
+        return orjson.dumps({"op": operation, **said}, option=orjson.OPT_SERIALIZE_NUMPY)
     except orjson.JSONEncodeError as error:
         raise LinkError(
             f"A message cannot be written as JSON: {error}.",
@@ -231,23 +145,17 @@ def _not_finite(shown: object) -> LinkError:
     )
 
 
-def _type_of(type_name: str | None) -> dict[str, str]:
-    return {} if type_name is None else {"type": _type_name(type_name)}
-
-
-def _type_name(type_name: str) -> str:
+def _check_type(type_name: str) -> None:
     if TYPE.fullmatch(type_name) is None:
         raise LinkError(
             f"{type_name[:80]!r} is not the name of a ROS type.",
             hint="It looks like geometry_msgs/msg/Twist (ROS 2) or geometry_msgs/Twist (ROS 1).",
         )
-    return type_name
 
 
-def _name(name: str) -> str:
+def _check_name(name: str) -> None:
     if NAME.fullmatch(name) is None:
         raise LinkError(
             f"{name[:80]!r} is not the name of a ROS topic, service or action.",
             hint="It looks like /camera/image_raw: letters, digits, _ and /.",
         )
-    return name
