@@ -67,3 +67,13 @@ def test_what_only_a_sourced_ros_has_is_still_found(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr("sys.path", ["/opt/ros/lib", "", "/usr/lib/python3.11", "/venv/lib"])
     prefer_own_packages("/opt/ros/lib:")
     assert sys.path == ["", "/usr/lib/python3.11", "/venv/lib", "/opt/ros/lib"]
+
+
+OPTIONAL = ("cyclonedds", "onnxruntime", "tokenizers", "inspect_ai", "openai", "rclpy")
+PARTS = ("mapspeak.cli.commands", "mapspeak.server.app", "mapspeak.evaluation.runs.inspecting")
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_nothing_that_is_optional_is_imported_before_it_is_wanted(part: str) -> None:
+    script = f"import sys\nsys.modules.update(dict.fromkeys({OPTIONAL}))\nimport {part}"
+    subprocess.run([sys.executable, "-c", script], check=True)  # noqa: S603 - our own words

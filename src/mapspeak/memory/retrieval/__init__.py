@@ -16,7 +16,7 @@ from mapspeak.memory.retrieval.answer import (
 from mapspeak.memory.retrieval.index import WORDS_ONLY, EntryIndex
 from mapspeak.memory.retrieval.kinds import calls_by_name
 from mapspeak.memory.retrieval.meaningindex import Embedder, TextVectors
-from mapspeak.memory.retrieval.minilm import find_model
+from mapspeak.memory.retrieval.models import find_model
 
 __all__ = [
     "WORDS_ONLY",

@@ -28,7 +28,7 @@ from mapspeak.memory.retrieval.answer import (
 )
 from mapspeak.memory.retrieval.kinds import KindIndex, Missing, calls_by_name, says_purpose
 from mapspeak.memory.retrieval.meaningindex import Likeness, MeaningIndex, TextVectors
-from mapspeak.memory.retrieval.minilm import is_word
+from mapspeak.memory.retrieval.models import is_word
 from mapspeak.memory.retrieval.wordindex import (
     AskedWords,
     LookAlikes,

