@@ -5,9 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapspeak.errors import MapError
-from mapspeak.spatial.grid import IntArray, Mask, OccupancyGrid
-
-__all__ = ["Coverage", "KnownArea", "measure_coverage", "measure_known_area"]
+from mapspeak.spatial.grid import Mask, OccupancyGrid
 
 _BLOCK_CELLS = 1_000_000
 """Cells are looked up in blocks, so that a large map needs little memory."""
@@ -66,7 +64,14 @@ def measure_coverage(
     Raises:
         MapError: The mask has another shape, or no cell of the reference counts.
     """
-    truth = reference.free if reachable is None else _checked(reachable, reference) & reference.free
+    truth = reference.free
+    if reachable is not None:
+        if reachable.shape != truth.shape:
+            raise MapError(
+                f"The reachable cells are {reachable.shape}, the reference is {truth.shape}.",
+                hint="Give one truth value for each cell of the reference.",
+            )
+        truth = truth & reachable
     if not truth.any():
         raise MapError(
             "The reference has no free floor to compare with.",
@@ -96,15 +101,6 @@ def measure_known_area(grid: OccupancyGrid) -> KnownArea:
     )
 
 
-def _checked(reachable: Mask, reference: OccupancyGrid) -> Mask:
-    if reachable.shape != reference.cells.shape:
-        raise MapError(
-            f"The reachable cells are {reachable.shape}, the reference is {reference.cells.shape}.",
-            hint="Give one truth value for each cell of the reference.",
-        )
-    return reachable
-
-
 def _share_found(
     wanted: Mask, wanted_grid: OccupancyGrid, found: Mask, found_grid: OccupancyGrid
 ) -> float:
@@ -113,20 +109,9 @@ def _share_found(
     n_found = 0
     for start in range(0, rows.size, _BLOCK_CELLS):
         block = slice(start, start + _BLOCK_CELLS)
-        n_found += _count_found(rows[block], cols[block], wanted_grid, found, found_grid)
+        points = wanted_grid.points_at(rows[block], cols[block])
+        n_found += int(np.count_nonzero(found_grid.look_up(found, points, outside=False)))
     return n_found / rows.size
-
-
-def _count_found(
-    rows: IntArray,
-    cols: IntArray,
-    wanted_grid: OccupancyGrid,
-    found: Mask,
-    found_grid: OccupancyGrid,
-) -> int:
-    there_rows, there_cols = found_grid.cells_at(wanted_grid.points_at(rows, cols))
-    is_inside = found_grid.contains_cells(there_rows, there_cols)
-    return int(np.count_nonzero(found[there_rows[is_inside], there_cols[is_inside]]))
 
 
 def _count_open_sides(grid: OccupancyGrid) -> int:

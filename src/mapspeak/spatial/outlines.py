@@ -18,7 +18,6 @@ VertexRing = tuple[Vertex, ...]
 """Without the first vertex repeated."""
 
 Labels = NDArray[np.integer[Any]]
-_Ints = NDArray[np.intp]
 
 _LEFT, _STRAIGHT, _RIGHT = 1, 0, 3
 
@@ -71,28 +70,16 @@ def _pieces(here: Labels, there: Labels, *, direction: int) -> list[BorderRun]:
     goes_on &= (np.diff(label) == 0) & (np.diff(other) == 0)
     first = np.flatnonzero(np.concatenate([[True], ~goes_on])) if rows.size else rows
     last = np.append(first[1:], rows.size) - 1 if rows.size else rows
-    ends = zip(
-        label[first].tolist(),
-        other[first].tolist(),
-        along[first].tolist(),
-        (along[last] + 1).tolist(),
-        (across[first] + (direction in {1, 2})).tolist(),
-        strict=True,
-    )
-    return [_border(piece, direction) for piece in ends]
-
-
-def _border(piece: tuple[int, int, int, int, int], direction: int) -> BorderRun:
-    label, other, low, high, line = piece
-    start, end = (low, high) if direction in {0, 1} else (high, low)
-    is_upright = direction in {1, 3}
-    return BorderRun(
-        label=label,
-        other=other,
-        direction=direction,
-        start=(start, line) if is_upright else (line, start),
-        end=(end, line) if is_upright else (line, end),
-    )
+    start, end = along[first], along[last] + 1
+    if direction in {2, 3}:
+        start, end = end, start
+    line = across[first] + (direction in {1, 2})
+    starts, ends = ([at, line] if is_upright else [line, at] for at in (start, end))
+    pieces = np.stack([label[first], other[first], *starts, *ends], axis=1).tolist()
+    return [
+        BorderRun(label=own, other=beside, direction=direction, start=(r0, c0), end=(r1, c1))
+        for own, beside, r0, c0, r1, c1 in pieces
+    ]
 
 
 def trace_polygons(borders: list[BorderRun]) -> dict[int, tuple[VertexPolygon, ...]]:
@@ -153,7 +140,10 @@ def _assemble(rings: list[VertexRing]) -> tuple[VertexPolygon, ...]:
     for ring in rings:
         if twice_area(ring) > 0:
             continue
-        point = _centre_left_of(ring)
+        # The centre of the cell to the left of the ring's first piece.
+        (row, col), (next_row, next_col) = ring[:2]
+        down, right = np.sign(next_row - row), np.sign(next_col - col)
+        point = row + 0.5 * (down + right), col + 0.5 * (right - down)
         around = (i for i, outer in enumerate(outers) if len(outers) == 1 or _holds(outer, point))
         holes[next(around)].append(ring)
     polygons = [
@@ -171,17 +161,9 @@ def twice_area(ring: VertexRing) -> int:
     )
 
 
-def _centre_left_of(ring: VertexRing) -> tuple[float, float]:
-    """Return the centre of the cell to the left of the ring's first piece."""
-    (row, col), (next_row, next_col) = ring[:2]
-    down, right = np.sign(next_row - row), np.sign(next_col - col)
-    return row + 0.5 * (down + right), col + 0.5 * (right - down)
-
-
 def _holds(ring: VertexRing, point: tuple[float, float]) -> bool:
     """Say by crossings whether a cell's centre lies in a ring."""
-    corners: _Ints = np.array(ring)
-    rows, cols = corners[:, 0], corners[:, 1]
+    rows, cols = np.array(ring).T
     next_rows = np.roll(rows, -1)
     crosses = (rows > point[0]) != (next_rows > point[0])
     return bool((crosses & (cols > point[1])).sum() % 2)

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from mapspeak.geometry import Point
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask, OccupancyGrid
 
-__all__ = ["Rays", "cast_rays", "cells_on_line", "mean_on_line", "measure_sight"]
-
 _Reals = NDArray[np.floating[Any]]
 _FARTHEST_CELL = 1e6
 """No map reaches so far; farther places overflow cell indices."""

@@ -1,6 +1,5 @@
 """The cells where known floor meets the unknown, gathered into borders, and how to get to them."""
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -175,19 +174,13 @@ def find_parts_beyond(floor: ReachableFloor, borders: Sequence[Border]) -> list[
         return []
     away = cv2.distanceTransform((~floor.reachable).view(np.uint8), cv2.DIST_L2, 5)
     deepest = math.sqrt(2) * floor.radius_m / floor.grid.resolution_m + ROUNDING_CELLS
-    return [_part_where(border, away[border.rows, border.cols] > deepest) for border in borders]
-
-
-def _part_where(border: Border, is_part: Mask) -> Border | None:
-    ratio = float(is_part.mean())
-    if ratio <= 0.5:
-        return None
-    return dataclasses.replace(
-        border,
-        rows=border.rows[is_part],
-        cols=border.cols[is_part],
-        length_m=ratio * border.length_m,
-    )
+    parts: list[Border | None] = []
+    for border in borders:
+        is_part = away[border.rows, border.cols] > deepest
+        rows, cols, ratio = border.rows[is_part], border.cols[is_part], float(is_part.mean())
+        part = Border(rows=rows, cols=cols, length_m=ratio * border.length_m)
+        parts.append(part if ratio > 0.5 else None)
+    return parts
 
 
 def find_gap_widths_m(floor: ReachableFloor, borders: Sequence[Border]) -> list[float | None]:
@@ -201,16 +194,12 @@ def find_gap_widths_m(floor: ReachableFloor, borders: Sequence[Border]) -> list[
     for width_m in np.arange(0.0, 2 * floor.radius_m - 1e-9, WIDTH_STEP_M):
         if not joined:
             break
-        labels, robot = _label_wide_floor(floor, float(width_m))
+        # The pieces of floor that are nowhere narrower, and where the robot is.
+        wide = floor.free & (floor.clearances_m >= width_m / 2 - 1e-6)
+        wide |= floor.reachable
+        _, labels = cv2.connectedComponents(wide.view(np.uint8), connectivity=4)
+        robot = labels.flat[floor.reachable.argmax()]
         joined = [i for i in joined if (labels[borders[i].rows, borders[i].cols] == robot).any()]
         for index in joined:
             widths_m[index] = float(width_m)
     return widths_m
-
-
-def _label_wide_floor(floor: ReachableFloor, width_m: float) -> tuple[Labels, int]:
-    """Label the pieces of floor that are nowhere narrower, and say where the robot is."""
-    wide = floor.free & (floor.clearances_m >= width_m / 2 - 1e-6)
-    wide |= floor.reachable
-    _, labels = cv2.connectedComponents(wide.view(np.uint8), connectivity=4)
-    return np.asarray(labels, dtype=np.int32), int(labels.flat[floor.reachable.argmax()])

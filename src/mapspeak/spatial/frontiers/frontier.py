@@ -166,17 +166,12 @@ def _inherited(previous: tuple[Frontier, ...], current: tuple[Frontier, ...]) ->
     for ratio, index, old_id in sorted(overlaps, key=lambda each: (-each[0], each[1], each[2])):
         if ratio >= SAME_RATIO and index not in ids and old_id not in ids.values():
             ids[index] = old_id
+    places = {old.id: old.pose.point for old in previous}
     return {
-        index: old_id for index, old_id in ids.items() if _is_near(previous, current, index, old_id)
+        index: old_id
+        for index, old_id in ids.items()
+        if places[old_id].distance_to(current[index].pose.point) <= SAME_PLACE_M
     }
-
-
-def _is_near(
-    previous: tuple[Frontier, ...], current: tuple[Frontier, ...], index: int, old_id: str
-) -> bool:
-    """Return True when the pose has hardly moved: an id that leads somewhere else would mislead."""
-    old = next(frontier for frontier in previous if frontier.id == old_id)
-    return old.pose.point.distance_to(current[index].pose.point) <= SAME_PLACE_M
 
 
 def _overlap_ratio(first: FloatArray, second: FloatArray) -> float:

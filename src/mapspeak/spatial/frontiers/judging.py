@@ -109,9 +109,6 @@ def _verdict(
     return FrontierVerdict.NONE_LEFT if floor.free.any() else FrontierVerdict.NOTHING_KNOWN
 
 
-# --- judging -----------------------------------------------------------------------------------
-
-
 def _judge(
     floor: ReachableFloor, borders: Sequence[Border], looked_from: Sequence[Point]
 ) -> tuple[list[Frontier], list[RefusedFrontier]]:
@@ -132,7 +129,10 @@ def _judge(
             refused.append(_refuse(floor, border, RefusalReason.LOOKED_ALREADY))
         elif border.length_m >= NOISE_M:
             cut_off.append(border)
-    least_m2 = _least_gain_m2(floor)
+    # One and a half robots' width squared, a hundredth of the floor, or 0.5 m2 are worth a drive:
+    # the less, the smaller the robot and the known floor.
+    floor_m2 = int(np.count_nonzero(floor.free)) * floor.grid.resolution_m**2
+    least_m2 = min((3 * floor.radius_m) ** 2, 0.01 * floor_m2, 0.5)
     for border, best in _find_best_options(floor, open_ones):
         if best.gain.area_m2 >= least_m2:
             frontiers.append(_frontier(floor, border, best))
@@ -215,15 +215,6 @@ def _frontier(floor: ReachableFloor, border: Border, option: _Option) -> Frontie
     )
 
 
-def _least_gain_m2(floor: ReachableFloor) -> float:
-    """Return the gain that is worth a drive: the less, the smaller the robot and the known floor.
-
-    That is one and a half robots' width squared, a hundredth of the floor, or 0.5 m2.
-    """
-    floor_m2 = int(np.count_nonzero(floor.free)) * floor.grid.resolution_m**2
-    return min((3 * floor.radius_m) ** 2, 0.01 * floor_m2, 0.5)
-
-
 def _refuse(floor: ReachableFloor, border: Border, reason: RefusalReason) -> RefusedFrontier:
     middle = find_middle(border.rows, border.cols)
     anchor = Cell(int(border.rows[middle]), int(border.cols[middle]))
@@ -263,13 +254,7 @@ def merge_by_place(frontiers: list[Frontier]) -> list[Frontier]:
             near = np.flatnonzero(is_waiting & (gaps_m <= LOOKED_NEAR_M))
             is_waiting[near] = False
             others = [waiting[other] for other in near if other != index]
-            merged.append(_joined(frontier, others) if others else frontier)
+            points = np.concatenate([frontier.points, *(other.points for other in others)])
+            length_m = frontier.length_m + sum(other.length_m for other in others)
+            merged.append(dataclasses.replace(frontier, points=points, length_m=length_m))
     return merged
-
-
-def _joined(first: Frontier, others: list[Frontier]) -> Frontier:
-    return dataclasses.replace(
-        first,
-        points=np.concatenate([first.points, *(frontier.points for frontier in others)]),
-        length_m=first.length_m + sum(frontier.length_m for frontier in others),
-    )

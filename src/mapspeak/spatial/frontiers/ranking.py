@@ -48,7 +48,10 @@ def rank(
     weighed, others = by_rate[:N_WEIGHED], by_rate[N_WEIGHED:]
     ways = _find_ways(floor, weighed, known_ways)
     detours_m = _detours_m(weighed, ways)
-    scores = [_score(each, detour_m) for each, detour_m in zip(weighed, detours_m, strict=True)]
+    scores = []
+    for frontier, detour_m in zip(weighed, detours_m, strict=True):
+        left_m2 = frontier.gain_m2 - DETOUR_WORTH_M2 * detour_m
+        scores.append(gain_rate(left_m2, frontier.distance_m) if left_m2 > 0 else left_m2)
     order = np.argsort(-np.array(scores), kind="stable")
     ranked = [
         *(replace(weighed[index], detour_m=detours_m[index]) for index in order),
@@ -76,12 +79,6 @@ def _with_merits(ranked: Sequence[Frontier]) -> list[Frontier]:
         merits = tuple(merit for merit, is_true in has.items() if is_true)
         found.append(replace(frontier, merits=merits))
     return found
-
-
-def _score(frontier: Frontier, detour_m: float) -> float:
-    """Return the gain less the detour, per metre of way where anything is left of it."""
-    left_m2 = frontier.gain_m2 - DETOUR_WORTH_M2 * detour_m
-    return gain_rate(left_m2, frontier.distance_m) if left_m2 > 0 else left_m2
 
 
 def _find_ways(
@@ -116,7 +113,10 @@ def find_ways_between(floor: ReachableFloor, stops: list[Point]) -> FloatArray:
     grid = floor.grid
     factor = max(int(floor.radius_m / math.sqrt(2) / grid.resolution_m), 1)
     rows, cols = grid.cells_at(np.array([[stop.x, stop.y] for stop in stops]))
-    window = _window(floor, rows, cols)
+    # By way of the robot's own place there is a way between any two of them: none is longer.
+    from_robot_m = floor.distances.distances_at(rows, cols)
+    reach = math.ceil(float(from_robot_m.max()) / grid.resolution_m) + 1
+    window = grid.window(rows, cols, margin=reach)
     coarse = _coarser(floor.reachable[window], factor)
     cells: IntArray = np.ravel_multi_index(
         ((rows - window[0].start) // factor, (cols - window[1].start) // factor), coarse.shape
@@ -127,16 +127,6 @@ def find_ways_between(floor: ReachableFloor, stops: list[Point]) -> FloatArray:
         for start in range(0, cells.size, at_once)
     ]
     return np.concatenate(ways) * factor * grid.resolution_m
-
-
-def _window(floor: ReachableFloor, rows: IntArray, cols: IntArray) -> tuple[slice, slice]:
-    """Return the part of the map that shortest ways between some cells cannot leave.
-
-    By way of the robot's own place there is a way between any two of them.
-    """
-    from_robot_m = floor.distances.distances_at(rows, cols)
-    reach = math.ceil(float(from_robot_m.max()) / floor.grid.resolution_m) + 1
-    return floor.grid.window(rows, cols, margin=reach)
 
 
 def _spread_together(floor: Mask, starts: IntArray, goals: IntArray) -> FloatArray:

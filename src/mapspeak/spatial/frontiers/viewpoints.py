@@ -254,27 +254,6 @@ def _look(
     return is_unknown, ~np.logical_or.accumulate(is_wall, axis=2)
 
 
-def find_area_m2(grid: OccupancyGrid, place: Cell, *, openness_m: float) -> float:
-    """Find how much may come into view from the centre of one cell, which may lie anywhere."""
-    near = _crop(grid, place, math.ceil((SIGHT_M + WALL_HOLE_M) / grid.resolution_m))
-    middle = Cell(near.n_rows // 2, near.n_cols // 2)
-    views = find_views(near, clearance_m(near), [middle])
-    return float(views.areas_m2(openness_m).sum())
-
-
-def _crop(grid: OccupancyGrid, centre: Cell, reach: int) -> OccupancyGrid:
-    """Return the map around a cell, with that cell in the middle and unknown outside the array."""
-    cells = np.full((2 * reach + 1, 2 * reach + 1), UNKNOWN, dtype=np.int8)
-    top, left = centre.row - reach, centre.col - reach
-    rows = slice(max(top, 0), min(top + 2 * reach + 1, grid.n_rows))
-    cols = slice(max(left, 0), min(left + 2 * reach + 1, grid.n_cols))
-    if rows.start < rows.stop and cols.start < cols.stop:
-        cells[rows.start - top : rows.stop - top, cols.start - left : cols.stop - left] = (
-            grid.cells[rows, cols]
-        )
-    return OccupancyGrid(cells=cells, resolution_m=grid.resolution_m)
-
-
 def remaining_ratio(grid: OccupancyGrid, frontier: Frontier) -> float:
     """Return the share of a frontier's gain that its pose still promises.
 
@@ -282,4 +261,13 @@ def remaining_ratio(grid: OccupancyGrid, frontier: Frontier) -> float:
     what it was sent to see. The map may have grown and moved its origin since.
     """
     place = grid.cell_at(frontier.pose.point)
-    return find_area_m2(grid, place, openness_m=frontier.openness_m) / frontier.gain_m2
+    reach = math.ceil((SIGHT_M + WALL_HOLE_M) / grid.resolution_m)
+    # The map around it, which may lie anywhere, with unknown outside the array.
+    cells = np.full((2 * reach + 1, 2 * reach + 1), UNKNOWN, dtype=np.int8)
+    rows, cols = grid.window(place.row, place.col, margin=reach)
+    top, left = place.row - reach, place.col - reach
+    inside = (slice(rows.start - top, rows.stop - top), slice(cols.start - left, cols.stop - left))
+    cells[inside] = grid.cells[rows, cols]
+    near = OccupancyGrid(cells=cells, resolution_m=grid.resolution_m)
+    views = find_views(near, clearance_m(near), [Cell(reach, reach)])
+    return float(views.areas_m2(frontier.openness_m).sum()) / frontier.gain_m2

@@ -161,7 +161,10 @@ def _fine(grid: OccupancyGrid, clearance: Clearance, passable: Mask) -> Lattice:
 
 def _halve(grid: OccupancyGrid, clearance: Clearance, passable: Mask) -> Lattice:
     low_left, low_right, high_left, high_right = _quarters(passable)
-    is_open = _hang_together(low_left, low_right, high_left, high_right)
+    # Open where there are passable ones among four cells, and they touch by their sides.
+    rising = low_left & high_right & ~low_right & ~high_left
+    falling = low_right & high_left & ~low_left & ~high_right
+    is_open = (low_left | low_right | high_left | high_right) & ~(rising | falling)
     to_east = (low_right[:, :-1] & low_left[:, 1:]) | (high_right[:, :-1] & high_left[:, 1:])
     to_north = (high_left[:-1] & low_left[1:]) | (high_right[:-1] & low_right[1:])
     return Lattice(
@@ -183,14 +186,6 @@ def _quarters(values: NDArray[Number]) -> tuple[NDArray[Number], ...]:
     if n_rows % 2 or n_cols % 2:
         values = np.pad(values, ((0, n_rows % 2), (0, n_cols % 2)))
     return values[0::2, 0::2], values[0::2, 1::2], values[1::2, 0::2], values[1::2, 1::2]
-
-
-def _hang_together(low_left: Mask, low_right: Mask, high_left: Mask, high_right: Mask) -> Mask:
-    """Return True where there are passable ones among four cells, and they touch by their sides."""
-    rising = low_left & high_right & ~low_right & ~high_left
-    falling = low_right & high_left & ~low_left & ~high_right
-    some = low_left | low_right | high_left | high_right
-    return some & ~(rising | falling)
 
 
 def _moves(to_east: Mask, to_north: Mask) -> Moves:

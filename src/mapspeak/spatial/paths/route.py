@@ -161,7 +161,13 @@ def find_seeds(lattice: Lattice, start: Point, *, radius_m: float) -> Seeds | No
     rows, cols, costs = _hops(lattice, start, reach_m=radius_m + HOP_MARGIN_M)
     indices = lattice.indices(rows, cols)
     is_open = lattice.is_open.ravel()[indices]
-    return _cheapest(indices[is_open], costs[is_open]) if is_open.any() else None
+    if not is_open.any():
+        return None
+    indices, costs = indices[is_open], costs[is_open]
+    # Each index once, with its least cost.
+    order = np.lexsort((costs, indices))
+    unique, first = np.unique(indices[order], return_index=True)
+    return Seeds(unique, costs[order][first])
 
 
 def _hops(lattice: Lattice, start: Point, *, reach_m: float) -> tuple[IntArray, IntArray, Costs]:
@@ -187,13 +193,6 @@ def _hops(lattice: Lattice, start: Point, *, reach_m: float) -> tuple[IntArray, 
     choice = HOP_COST * HOP_CHOICE_M / lattice.grid.resolution_m
     rows, cols = np.nonzero(is_reached & (more <= choice))
     return rows + top, cols + left, more[rows, cols] / np.float32(lattice.factor)
-
-
-def _cheapest(indices: IntArray, costs: Costs) -> Seeds:
-    """Return each index once, with its least cost."""
-    order = np.lexsort((costs, indices))
-    unique, first = np.unique(indices[order], return_index=True)
-    return Seeds(unique, costs[order][first])
 
 
 def straighten(lattice: Lattice, weights: Costs, way: IntArray, ends: tuple[Point, Point]) -> Path:
@@ -235,7 +234,11 @@ def pull_straight(mask: Mask, weights: Costs, places: FloatArray) -> FloatArray:
 
 def _corner_indices(walled: Costs, weights: Costs, places: FloatArray) -> list[int]:
     """Pick the places where the path turns: from each, the furthest that a leg may reach."""
-    spent = _spent_along(places, weights)
+    cells = np.floor(places).astype(np.intp)
+    on_way = weights[cells[:, 0], cells[:, 1]].astype(np.float64)
+    lengths = np.hypot(*np.diff(places, axis=0).T)
+    # What the way has cost up to each place.
+    spent = np.concatenate([[0.0], np.cumsum(lengths * (on_way[:-1] + on_way[1:]) / 2)])
 
     def is_leg(first: int, last: int) -> bool:
         start, end = places[first], places[last]
@@ -257,14 +260,6 @@ def _resampled(corners: FloatArray) -> FloatArray:
         for start, end in itertools.pairwise(corners)
     ]
     return np.concatenate([*legs, corners[-1:]])
-
-
-def _spent_along(places: FloatArray, weights: Costs) -> FloatArray:
-    """Return what the way has cost up to each place."""
-    cells = np.floor(places).astype(np.intp)
-    on_way = weights[cells[:, 0], cells[:, 1]].astype(np.float64)
-    lengths = np.hypot(*np.diff(places, axis=0).T)
-    return np.concatenate([[0.0], np.cumsum(lengths * (on_way[:-1] + on_way[1:]) / 2)])
 
 
 def _furthest(is_leg: Callable[[int, int], bool], first: int, last: int) -> int:

@@ -115,7 +115,11 @@ class _Front:
         """Take the cells of the next bucket that holds any, each once, and settles them."""
         while self._waiting:
             cells = np.concatenate(self._waiting.pop(min(self._waiting)))
-            cells = self._unique(cells[~self.is_settled[cells]])
+            cells = cells[~self.is_settled[cells]]
+            order = np.arange(cells.size, dtype=np.int32)
+            # Each once: that which wrote last.
+            self._last_writer[cells] = order
+            cells = np.asarray(cells[self._last_writer[cells] == order])
             if cells.size:
                 self.is_settled[cells] = True
                 return cells
@@ -153,9 +157,3 @@ class _Front:
             chosen = cells[buckets == bucket]
             if chosen.size:
                 self._waiting.setdefault(int(bucket), []).append(chosen)
-
-    def _unique(self, cells: IntArray) -> IntArray:
-        order = np.arange(cells.size, dtype=np.int32)
-        self._last_writer[cells] = order
-        is_last = self._last_writer[cells] == order
-        return np.asarray(cells[is_last])

@@ -1,5 +1,6 @@
 """The metric grid of a picture: lines under the walls, and numbers outside the map."""
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -23,7 +24,7 @@ from mapspeak.spatial.picture.marks import (
     Canvas,
 )
 from mapspeak.spatial.picture.plan import Extent, Margins
-from mapspeak.spatial.picture.view import Box, PictureView, decimals_of, is_north_up
+from mapspeak.spatial.picture.view import Box, PictureView, is_north_up
 
 _NUMBER_GAP_PX = 6
 _CORNER_PX = 1e-6
@@ -49,7 +50,10 @@ class MetricLine:
 
 def margins_for(extent: Extent, spacing_m: float, *, up_rad: float, legend_px: int) -> Margins:
     """Return the room that the numbers along the sides need, and a legend of that height below."""
-    height, width = _widest_number(extent, spacing_m, up_rad).shape
+    sides = (extent.left_m, extent.right_m, extent.bottom_m, extent.top_m)
+    farthest = -math.ceil(max(abs(side) for side in sides) / spacing_m)
+    widest = _number("x", farthest, spacing_m, up_rad)
+    height, width = text_patch(widest, NUMBER_SIZE_PX).shape
     return Margins(
         side_px=width + 2 * _NUMBER_GAP_PX,
         top_px=height + 2 * _NUMBER_GAP_PX,
@@ -111,7 +115,8 @@ def _draw_numbers(
     the number of one side gives way to that of the other: it is pulled in, or left out.
     """
     patches = {
-        line: text_patch(_number(line, spacing_m, view.up_rad), NUMBER_SIZE_PX) for line in lines
+        line: text_patch(_number(line.axis, line.multiple, spacing_m, view.up_rad), NUMBER_SIZE_PX)
+        for line in lines
     }
     widest_px = max((patch.shape[1] for patch in patches.values()), default=0)
     stride = _stride(widest_px + _APART_PX, spacing_m * view.pixels_per_m)
@@ -120,7 +125,9 @@ def _draw_numbers(
         for end in line.ends:
             on_line = _box_outside(line, end, patches[line], view.area)
             for box in (on_line, _pulled_in(on_line, view.area)):
-                if not any(_is_near(box, other) for other in taken):
+                # Nearer numbers could be read as one.
+                near = Box(box.left - _APART_PX, box.top - 2, box.right + _APART_PX, box.bottom + 2)
+                if not any(near.overlaps(other) for other in taken):
                     taken.append(box)
                     stamp(canvas, patches[line], (box.left, box.top), halo_px=0)
                     break
@@ -178,29 +185,13 @@ def _pulled_in(box: Box, area: Box) -> Box:
     return Box(left, top, left + box.width, top + box.height)
 
 
-def _is_near(box: Box, other: Box) -> bool:
-    """Return True when two numbers could be read as one."""
-    grown = Box(box.left - _APART_PX, box.top - 2, box.right + _APART_PX, box.bottom + 2)
-    return grown.overlaps(other)
-
-
-def _number(line: MetricLine, spacing_m: float, up_rad: float) -> str:
-    text = f"{line.multiple * spacing_m:.{decimals_of(spacing_m)}f}"
-    return text if is_north_up(up_rad) else f"{line.axis}={text}"
-
-
-def _widest_number(extent: Extent, spacing_m: float, up_rad: float) -> Canvas:
-    sides = (extent.left_m, extent.right_m, extent.bottom_m, extent.top_m)
-    farthest = -math.ceil(max(abs(side) for side in sides) / spacing_m)
-    line = MetricLine(axis="x", multiple=farthest, ends=np.zeros((2, 2)))
-    return text_patch(_number(line, spacing_m, up_rad), NUMBER_SIZE_PX)
+def _number(axis: str, multiple: int, spacing_m: float, up_rad: float) -> str:
+    n_decimals = max(0, -math.floor(math.log10(spacing_m) + 1e-9))
+    text = f"{multiple * spacing_m:.{n_decimals}f}"
+    return text if is_north_up(up_rad) else f"{axis}={text}"
 
 
 def _stride(needed_px: float, pitch_px: float) -> int:
     """Return the smallest of 1, 2, 5, 10, 20, ... lines that leaves room for a number each."""
-    ten = 1
-    while True:
-        for step in (1, 2, 5):
-            if step * ten * pitch_px >= needed_px:
-                return step * ten
-        ten *= 10
+    steps = (step * int(10**power) for power in itertools.count() for step in (1, 2, 5))
+    return next(step for step in steps if step * pitch_px >= needed_px)

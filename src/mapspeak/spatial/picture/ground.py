@@ -13,13 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.spatial.grid import FREE_MAX, UNKNOWN, IntArray, OccupancyGrid
-from mapspeak.spatial.picture.marks import (
-    FREE,
-    GREYS,
-    UNKNOWN_GROUND,
-    WALL,
-    Canvas,
-)
+from mapspeak.spatial.picture.marks import FREE, GREYS, UNKNOWN_GROUND, WALL, Canvas
 from mapspeak.spatial.picture.view import PictureView
 
 Number = TypeVar("Number", np.int8, np.uint16)
@@ -31,7 +25,8 @@ _MAX_SAMPLE_STEP_CELLS = 0.7
 
 def is_aligned(grid: OccupancyGrid, up_rad: float) -> bool:
     """Return True when the grid's axes point right and up in a picture with that direction up."""
-    return abs(_turn_in_view(grid, up_rad)) < _ANGLE_SLACK_RAD
+    turn_rad = math.remainder(grid.origin.yaw_rad - up_rad + math.pi / 2, math.tau)
+    return abs(turn_rad) < _ANGLE_SLACK_RAD
 
 
 def sample(values: NDArray[Number], grid: OccupancyGrid, view: PictureView) -> NDArray[Number]:
@@ -60,11 +55,6 @@ def paint_paper_ground(grid: OccupancyGrid, view: PictureView) -> Canvas:
     return painted
 
 
-def _turn_in_view(grid: OccupancyGrid, up_rad: float) -> float:
-    """Return the angle of the grid's x axis in the picture, counter-clockwise from its right."""
-    return math.remainder(grid.origin.yaw_rad - up_rad + math.pi / 2, math.tau)
-
-
 def _sample_aligned(
     values: NDArray[Number], grid: OccupancyGrid, view: PictureView
 ) -> NDArray[Number]:
@@ -88,10 +78,8 @@ def _first_cells(n_pixels: int, cells_per_pixel: float) -> IntArray:
     """Return the first cell of each pixel in a row; a cell belongs to the pixel of its middle."""
     pixels = np.arange(n_pixels)
     if cells_per_pixel < 1:
-        earlier: IntArray = np.floor(pixels * cells_per_pixel + 1e-6).astype(np.intp)
-        return earlier
-    first: IntArray = np.ceil(pixels * cells_per_pixel - 0.5 - 1e-9).astype(np.intp)
-    return first
+        return np.asarray(np.floor(pixels * cells_per_pixel + 1e-6), dtype=np.intp)
+    return np.asarray(np.ceil(pixels * cells_per_pixel - 0.5 - 1e-9), dtype=np.intp)
 
 
 def _spans(starts: IntArray) -> tuple[IntArray, IntArray]:
@@ -124,7 +112,9 @@ def _sample_turned(
     cells_per_pixel = 1.0 / (view.pixels_per_m * grid.resolution_m)
     n_pooled = max(1, math.floor(cells_per_pixel))
     n_fine = math.ceil(cells_per_pixel / n_pooled / _MAX_SAMPLE_STEP_CELLS)
-    top_left, bottom_right = _cells_in_view(grid, view)
+    corners, size = grid.fractional_cells_at(view.area_corners()), np.array(grid.cells.shape)
+    top_left = np.clip(np.floor(corners.min(axis=0)).astype(np.intp), 0, size)
+    bottom_right = np.clip(np.ceil(corners.max(axis=0)).astype(np.intp), 0, size)
     window = values[top_left[0] : bottom_right[0], top_left[1] : bottom_right[1]]
     if window.size == 0:
         shape = (view.area.height, view.area.width)
@@ -138,15 +128,6 @@ def _sample_turned(
         borderValue=(_outside_value(values),),
     )
     return _coarsen(fine.astype(values.dtype, copy=False), n_fine)
-
-
-def _cells_in_view(grid: OccupancyGrid, view: PictureView) -> tuple[IntArray, IntArray]:
-    """Return the first (row, col) that the view can show, and the first past the last."""
-    corners = grid.fractional_cells_at(view.area_corners())
-    shape = np.array(grid.cells.shape)
-    first = np.clip(np.floor(corners.min(axis=0)).astype(np.intp), 0, shape)
-    last = np.clip(np.ceil(corners.max(axis=0)).astype(np.intp), 0, shape)
-    return first, last
 
 
 def _coarsen(values: NDArray[Number], n_pooled: int) -> NDArray[Number]:

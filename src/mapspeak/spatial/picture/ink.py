@@ -86,9 +86,19 @@ def text_patch(text: str, size_px: int) -> Canvas:
     A tab sets words apart that do not belong together. Patches are kept, and locked, because the
     same numbers and ids are written again and again.
     """
-    rows = [_row_of_words(line.split("\t"), size_px) for line in text.split("\n")]
+    gap = np.zeros((_font(size_px)[2], round(_GAP_RATIO * size_px)), dtype=np.uint8)
+    rows = []
+    for line in text.split("\n"):
+        first, *others = (_word_patch(word, size_px) for word in line.split("\t"))
+        rows.append(np.hstack([first, *(part for other in others for part in (gap, other))]))
     width = max(row.shape[1] for row in rows)
-    patch = np.concatenate([_centred(row, width) for row in rows])
+    lefts = [(width - row.shape[1]) // 2 for row in rows]
+    patch = np.concatenate(
+        [
+            np.pad(row, ((0, 0), (left, width - row.shape[1] - left)))
+            for row, left in zip(rows, lefts, strict=True)
+        ]
+    )
     patch.setflags(write=False)
     return patch
 
@@ -151,16 +161,12 @@ def _in_subpixels(points: FloatArray, top_left: tuple[int, int]) -> NDArray[np.i
     return np.asarray(np.rint(local * (1 << _SHIFT)), dtype=np.int32)
 
 
-def _row_of_words(words: list[str], size_px: int) -> Canvas:
-    """Return patches side by side, as far apart as words that do not belong together."""
-    first, *others = (_word_patch(word, size_px) for word in words)
-    gap = np.zeros((first.shape[0], round(_GAP_RATIO * size_px)), dtype=np.uint8)
-    return np.hstack([first, *(part for other in others for part in (gap, other))])
-
-
 def _word_patch(text: str, size_px: int) -> Canvas:
     font, ascent_px, height_px = _font(size_px)
-    written = _printable(text)
+    # Accents are dropped, and letters that the font lacks replaced.
+    plain = unicodedata.normalize("NFKD", text)
+    kept = (sign for sign in plain if not unicodedata.combining(sign))
+    written = "".join(sign if " " <= sign <= "~" or sign == "°" else "?" for sign in kept)
     picture = Image.new("L", ((len(written) + 2) * size_px, height_px))
     ImageDraw.Draw(picture).text((size_px, ascent_px), written, fill=255, font=font, anchor="ls")
     pixels = np.asarray(picture)
@@ -183,18 +189,6 @@ def _font(size_px: int) -> tuple[ImageFont.FreeTypeFont, int, int]:
         )
     _, top, _, bottom = font.getbbox(_TALL_AND_DEEP, anchor="ls")
     return font, round(-top), round(bottom - top)
-
-
-def _centred(row: Canvas, width: int) -> Canvas:
-    left = (width - row.shape[1]) // 2
-    return np.pad(row, ((0, 0), (left, width - row.shape[1] - left)))
-
-
-def _printable(text: str) -> str:
-    """Return the text in the letters the font has: accents dropped, others replaced."""
-    plain = unicodedata.normalize("NFKD", text)
-    kept = (sign for sign in plain if not unicodedata.combining(sign))
-    return "".join(sign if " " <= sign <= "~" or sign == "°" else "?" for sign in kept)
 
 
 ARROW_REACH_PX = 19.0
@@ -235,13 +229,9 @@ def arrow_pixels(arrow: FloatArray, heading_rad: float) -> FloatArray:
 
 def symbol_box(place: FloatArray, reach_px: float) -> Box:
     """Return the box of the map area that a symbol at (u, v) takes."""
-    u, v = place
-    return Box(
-        math.floor(u - reach_px),
-        math.floor(v - reach_px),
-        math.ceil(u + reach_px),
-        math.ceil(v + reach_px),
-    )
+    left, top = (math.floor(at - reach_px) for at in place)
+    right, bottom = (math.ceil(at + reach_px) for at in place)
+    return Box(left, top, right, bottom)
 
 
 def draw_arrow(canvas: Canvas, place: FloatArray, heading_rad: float, *, scale: float = 1) -> None:
@@ -252,13 +242,11 @@ def draw_arrow(canvas: Canvas, place: FloatArray, heading_rad: float, *, scale: 
 
 def draw_shape(canvas: Canvas, place: FloatArray, shape: Shape, colour: Colour) -> None:
     """Draw a shape around a place (u, v)."""
-    if shape is Shape.CROSS:
-        draw_polygon(canvas, place + _CROSS_PX, colour)
-        return
-    turns = _CORNER_TURNS[shape]
-    reach = 6.0 if shape is Shape.CIRCLE else 8.0
-    corners = place + reach * np.stack([np.cos(turns), np.sin(turns)], axis=1)
-    draw_polygon(canvas, corners, colour)
+    corners = _CROSS_PX
+    if shape is not Shape.CROSS:
+        turns, reach = _CORNER_TURNS[shape], 6.0 if shape is Shape.CIRCLE else 8.0
+        corners = reach * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    draw_polygon(canvas, place + corners, colour)
 
 
 def draw_zero_ring(canvas: Canvas, place: FloatArray) -> None:

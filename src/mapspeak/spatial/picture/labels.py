@@ -93,13 +93,8 @@ FAR_RINGS = _build_rings((6.0, 14.0, 24.0, 36.0, 50.0, 66.0, 84.0, 104.0, 130.0,
 
 def label_at(place: FloatArray, text: str, *, clearance_px: float) -> Label:
     """Return the label of something at (u, v) that reaches that far around."""
-    return Label(
-        wordings=(text,),
-        names=(text,),
-        u=float(place[0]),
-        v=float(place[1]),
-        clearance_px=clearance_px,
-    )
+    u, v = place.tolist()
+    return Label(wordings=(text,), names=(text,), u=u, v=v, clearance_px=clearance_px)
 
 
 def labels_of_marks(marks: tuple[Mark, ...], places: FloatArray) -> list[Label]:

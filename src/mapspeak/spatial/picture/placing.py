@@ -6,7 +6,7 @@ fewest walls and drawn things; a label with no free position gets none.
 
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import astuple, dataclass
 
 import cv2
@@ -86,12 +86,6 @@ class LabelField:
     covered_before: NDArray[np.int32]
     regions: NDArray[np.uint16] | None
 
-    def is_on_map(self, boxes: IntArray) -> Mask:
-        """Return True for boxes that lie inside the map area with their halo."""
-        n_rows, n_cols = self.covered_before.shape[0] - 1, self.covered_before.shape[1] - 1
-        farthest = np.array([n_cols, n_rows]) - HALO_PX
-        return np.asarray((boxes[:, :2] >= HALO_PX).all(1) & (boxes[:, 2:] <= farthest).all(1))
-
     def covered_ratio(self, boxes: IntArray) -> FloatArray:
         """Return the share of each box that lies on walls or drawn things."""
         left, top, right, bottom = boxes.T
@@ -130,11 +124,23 @@ class LabelField:
         """Return the positions of each label that lie on the map; all are judged in one go."""
         if not labels:
             return []
-        boxes, of_wording = _spread(labels, rings)
-        gaps_px = np.tile(rings.gaps_px, len(boxes) // len(rings.gaps_px))
-        kept = np.flatnonzero(self.is_on_map(boxes))
-        boxes, gaps_px = boxes[kept], gaps_px[kept]
-        owner, wording, n_breaks = of_wording[kept].T
+        wordings = [
+            (
+                owner,
+                wording,
+                text.count("\n"),
+                rings.boxes_around(label, text_patch(text, LABEL_SIZE_PX)),
+            )
+            for owner, label in enumerate(labels)
+            for wording, text in enumerate(label.wordings)
+        ]
+        boxes = np.concatenate([each[3] for each in wordings])
+        n_cols, n_rows = self.covered_before.shape[1] - 1, self.covered_before.shape[0] - 1
+        is_on_map = (boxes[:, :2] >= HALO_PX).all(1)
+        is_on_map &= (boxes[:, 2:] <= np.array([n_cols, n_rows]) - HALO_PX).all(1)
+        boxes, gaps_px = boxes[is_on_map], np.tile(rings.gaps_px, len(wordings))[is_on_map]
+        numbers = np.array([each[:3] for each in wordings])
+        owner, wording, n_breaks = np.repeat(numbers, len(rings.gaps_px), axis=0)[is_on_map].T
         region = np.array([label.region or 0 for label in labels])[owner]
         needs_leader = self.needs_leader(boxes, gaps_px, region)
         strayed_ratio = self.strayed_ratio(boxes, region, needs_leader)
@@ -161,16 +167,6 @@ class LabelField:
         ]
 
 
-def _spread(labels: tuple[Label, ...], rings: Rings) -> tuple[IntArray, IntArray]:
-    """Return all boxes of all labels, and for each its label, its wording and that one's breaks."""
-    boxes, wordings = [], []
-    for owner, label in enumerate(labels):
-        for wording, text in enumerate(label.wordings):
-            boxes.append(rings.boxes_around(label, text_patch(text, LABEL_SIZE_PX)))
-            wordings.append((owner, wording, text.count("\n")))
-    return np.concatenate(boxes), np.repeat(np.array(wordings), len(rings.gaps_px), axis=0)
-
-
 def place_labels(
     inside: Canvas,
     labels: list[Label],
@@ -190,36 +186,22 @@ def place_labels(
         return [], ()
     covered_before = cv2.integral(cv2.LUT(inside, IS_BUSY)).astype(np.int32, copy=False)
     field = LabelField(covered_before=covered_before, regions=regions)
-    placed, left_out = _find_places(tuple(labels), field, tuple(obstacles))
-    return placed, tuple(name for label in left_out for name in label.names)
-
-
-def _find_places(
-    labels: tuple[Label, ...], field: LabelField, obstacles: tuple[Box, ...]
-) -> tuple[list[Placed], list[Label]]:
-    """Return the labels that found a place, and those that did not.
-
-    Regions too small for their labels choose first, because these need the free ground around;
-    then points, which have many good places, but spare the best one of a region's label; last
-    regions. Where points took all places in a region after all, those in its best place move.
-
-    Args:
-        labels: In the order in which they may choose among their kind.
-        field: What is on the map.
-        obstacles: Boxes that no label may touch, such as symbols.
-    """
-    search = _Search(labels, field, obstacles)
-    points = [label for label in labels if label.region is None]
-    regions = [label for label in labels if label.region is not None]
-    for label in regions:
+    search = _Search(tuple(labels), field, tuple(obstacles))
+    of_regions = [label for label in labels if label.region is not None]
+    # Regions too small for their labels choose first, because these need the free ground around;
+    # then points, which have many good places, but spare the best one of a region's label; last
+    # regions. Where points took all places in a region after all, those in its best place move.
+    for label in of_regions:
         if label not in search.wishes:
             search.place(label)
-    for label in points:
-        search.place(label)
-    for label in regions:
-        if label in search.wishes and not search.place_inside(label):
-            search.make_room(label)
-    return list(search.placed.values()), [label for label in labels if label not in search.placed]
+    for label in labels:
+        if label.region is None:
+            search.place(label)
+    for label in of_regions:
+        if label in search.wishes:
+            search.place_inside(label)
+    left_out = (label for label in labels if label not in search.placed)
+    return list(search.placed.values()), tuple(name for label in left_out for name in label.names)
 
 
 class _Search:
@@ -242,34 +224,33 @@ class _Search:
         wished = [astuple(spot.box) for spot in self.wishes.values()]
         self._spared = np.array(wished, dtype=np.intp).reshape(-1, 4)
 
-    def place(self, label: Label) -> bool:
-        """Place a label anywhere; return False where there is no room."""
-        spot = self._find(label, lambda positions: np.ones(len(positions.boxes), dtype=bool))
-        return self._add(label, spot)
+    def place(self, label: Label) -> None:
+        """Place a label anywhere, if there is room."""
+        self._add(self._find(label, lambda positions: np.ones(len(positions.boxes), dtype=bool)))
 
-    def place_inside(self, label: Label) -> bool:
-        """Place a region's label inside it; gives False where there is no room."""
-        return self._add(label, self._find_inside(label))
+    def place_inside(self, label: Label) -> None:
+        """Place a region's label inside it, if need be where it wished to be.
 
-    def make_room(self, label: Label) -> None:
-        """Place a region's label where it wished to be, and moves those of points from there."""
-        wish = self.wishes[label]
-        in_its_way = [self.placed[other] for other in self._taken.owners_at(wish.box)]
-        if any(spot.label.region is not None for spot in in_its_way):
-            self.place(label)
-            return
-        for spot in in_its_way:
-            self._taken.remove(spot.label)
-            del self.placed[spot.label]
-        self._add(label, wish)
-        for spot in in_its_way:
-            self.place(spot.label)
+        The labels of points that stand there move.
+        """
+        spot, wish = self._find_inside(label), self.wishes[label]
+        in_its_way: list[Placed] = []
+        if spot is None:
+            in_its_way = [self.placed[other] for other in self._taken.owners_at(wish.box)]
+            if any(other.label.region is not None for other in in_its_way):
+                self.place(label)
+                return
+        for other in in_its_way:
+            self._taken.remove(other.label)
+            del self.placed[other.label]
+        self._add(spot or wish)
+        for other in in_its_way:
+            self.place(other.label)
 
-    def _add(self, label: Label, spot: Placed | None) -> bool:
+    def _add(self, spot: Placed | None) -> None:
         if spot is not None:
-            self.placed[label] = spot
+            self.placed[spot.label] = spot
             self._taken.add(spot)
-        return spot is not None
 
     def _find_inside(self, label: Label) -> Placed | None:
         if label.region is None:
@@ -285,7 +266,10 @@ class _Search:
         """Return the cheapest possible place; far ones are tried where no near one is good."""
         best: Placed | None = None
         best_cost = math.inf
-        for positions in self._near_and_far(label):
+        for is_far in (False, True):
+            if is_far and label not in self._far:
+                self._far[label] = self._field.positions((label,), FAR_RINGS)[0]
+            positions = self._far[label] if is_far else self._near[label]
             taken = self._taken.near(positions.boxes)
             free = _cheapest_free(positions, np.flatnonzero(is_possible(positions)), taken)
             if free.size:
@@ -296,12 +280,6 @@ class _Search:
                 break
         return best
 
-    def _near_and_far(self, label: Label) -> Iterator[Positions]:
-        yield self._near[label]
-        if label not in self._far:
-            self._far[label] = self._field.positions((label,), FAR_RINGS)[0]
-        yield self._far[label]
-
     def _judge(self, positions: Positions, index: IntArray, taken: IntArray) -> tuple[float, int]:
         """Return the lowest cost among positions, the other labels counted, and where it is."""
         label, boxes = positions.label, positions.boxes[index]
@@ -309,8 +287,10 @@ class _Search:
         if label.region is None:
             cost += _COST_OF_HINDERING * _overlaps(boxes, self._spared).any(axis=1)
         if needs_leader.any():
-            crossed_ratio = _crossed_ratio(_leaders(label, boxes), taken)
-            cost += _COST_OF_CROSSING * crossed_ratio * needs_leader
+            u, v = np.moveaxis(_leaders(label, boxes), 2, 0)[..., np.newaxis]
+            left, top, right, bottom = taken.T
+            is_crossing = (u >= left) & (u < right) & (v >= top) & (v < bottom)
+            cost += _COST_OF_CROSSING * is_crossing.any(axis=2).mean(axis=1) * needs_leader
         best = int(np.argmin(cost))
         return float(cost[best]), int(index[best])
 
@@ -369,13 +349,6 @@ def _cheapest_free(positions: Positions, index: IntArray, taken: IntArray) -> In
         if free.size >= _N_CHECKED:
             break
     return np.asarray(free[:_N_CHECKED])
-
-
-def _crossed_ratio(points: FloatArray, taken: IntArray) -> FloatArray:
-    """Return the share of the points of each line that lie in a box taken."""
-    u, v = points[..., 0, np.newaxis], points[..., 1, np.newaxis]
-    is_in = (u >= taken[:, 0]) & (u < taken[:, 2]) & (v >= taken[:, 1]) & (v < taken[:, 3])
-    return np.asarray(is_in.any(axis=2).mean(axis=1), dtype=np.float64)
 
 
 def _overlaps(boxes: IntArray, taken: IntArray) -> Mask:

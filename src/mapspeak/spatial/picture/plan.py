@@ -92,7 +92,13 @@ def extent_of_known(grid: OccupancyGrid, up_rad: float, *, place: Point | None =
     if place is not None and grid.contains(grid.cell_at(place)):
         cell = grid.cell_at(place)
         row, col = np.array([cell.row, cell.row + 1]), np.array([cell.col, cell.col + 1])
-        known = _union(known, _extent_of_corners(grid, up_rad, row, col))
+        there = _extent_of_corners(grid, up_rad, row, col)
+        known = Extent(
+            min(known.left_m, there.left_m),
+            max(known.right_m, there.right_m),
+            min(known.bottom_m, there.bottom_m),
+            max(known.top_m, there.top_m),
+        )
     return _grown(known, _rim_m(grid, max(known.width_m, known.height_m)))
 
 
@@ -157,22 +163,8 @@ def plan_view(
         pixels_per_m = math.floor(steps * pixels_per_cell + 1e-9) / steps / grid.resolution_m
     width_px = min(room_width, _n_pixels(extent.width_m * pixels_per_m))
     height_px = min(room_height, _n_pixels(extent.height_m * pixels_per_m))
-    return _laid_out(extent, up_rad, pixels_per_m, (width_px, height_px), margins)
-
-
-def _n_pixels(length_px: float) -> int:
-    return max(1, math.ceil(length_px - 1e-6))
-
-
-def _laid_out(
-    extent: Extent,
-    up_rad: float,
-    pixels_per_m: float,
-    size_px: tuple[int, int],
-    margins: Margins,
-) -> PictureView:
-    width_px = max(size_px[0] + 2 * margins.side_px, margins.min_width_px)
-    left = (width_px - size_px[0]) // 2
+    whole_px = max(width_px + 2 * margins.side_px, margins.min_width_px)
+    left = (whole_px - width_px) // 2
     cos, sin = math.cos(up_rad), math.sin(up_rad)
     corner = Point(
         sin * extent.left_m + cos * extent.top_m, -cos * extent.left_m + sin * extent.top_m
@@ -181,10 +173,14 @@ def _laid_out(
         corner=corner,
         up_rad=up_rad,
         pixels_per_m=pixels_per_m,
-        area=Box(left, margins.top_px, left + size_px[0], margins.top_px + size_px[1]),
-        width_px=width_px,
-        height_px=size_px[1] + margins.top_px + margins.bottom_px,
+        area=Box(left, margins.top_px, left + width_px, margins.top_px + height_px),
+        width_px=whole_px,
+        height_px=height_px + margins.top_px + margins.bottom_px,
     )
+
+
+def _n_pixels(length_px: float) -> int:
+    return max(1, math.ceil(length_px - 1e-6))
 
 
 def _check_not_empty(grid: OccupancyGrid) -> None:
@@ -243,15 +239,6 @@ def _rim_m(grid: OccupancyGrid, longest_m: float) -> float:
     n_cells = math.ceil(_RIM_M / grid.resolution_m - 1e-9)
     limit = max(_MIN_RIM_LIMIT_CELLS, math.ceil(longest_m / grid.resolution_m))
     return min(n_cells, limit) * grid.resolution_m
-
-
-def _union(one: Extent, other: Extent) -> Extent:
-    return Extent(
-        min(one.left_m, other.left_m),
-        max(one.right_m, other.right_m),
-        min(one.bottom_m, other.bottom_m),
-        max(one.top_m, other.top_m),
-    )
 
 
 def _grown(extent: Extent, rim_m: float) -> Extent:

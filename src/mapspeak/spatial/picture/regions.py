@@ -1,7 +1,5 @@
 """Regions and zones painted on the map area: colours, patterns, outlines, places for labels."""
 
-import math
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -59,14 +57,18 @@ def paint_regions(
     fill = np.take(_fill_by_label(regions, colours, FillPart.PLAIN), labels)
     is_filled = (ground == FREE) & (fill > 0)
     np.copyto(ground, fill, where=is_filled)
-    for places, wanted in (
+    for find_pixels, wanted in (
         (_hatch_pixels, tuple(region for region in regions if region.is_hatched)),
         (_dot_pixels, tuple(region for region in regions if region.is_dotted)),
     ):
         if wanted:
-            hatch = _fill_by_label(wanted, colours, FillPart.HATCH)
-            _paint_pattern(ground, labels, is_filled, places(ground.shape), hatch)
-    edge = _is_edge(labels) & is_filled
+            row, col = find_pixels(ground.shape)
+            hatch = _fill_by_label(wanted, colours, FillPart.HATCH)[labels[row, col]]
+            is_painted = is_filled[row, col] & (hatch > 0)
+            ground[row[is_painted], col[is_painted]] = hatch[is_painted]
+    kernel = np.ones((2 * _EDGE_PX + 1, 2 * _EDGE_PX + 1), dtype=np.uint8)
+    # Another label, or none, is at most the outline's width away.
+    edge = (cv2.dilate(labels, kernel) != cv2.erode(labels, kernel)) & is_filled
     ground[edge] = _fill_by_label(regions, colours, FillPart.OUTLINE)[labels[edge]]
     for region in regions:
         if region.is_highlighted:
@@ -90,20 +92,6 @@ def _fill_by_label(
     for region in regions:
         fills[region.label] = FILLS[colours[region.label], part]
     return fills
-
-
-def _paint_pattern(
-    ground: Canvas,
-    labels: NDArray[np.uint16],
-    is_filled: Mask,
-    places: tuple[IntArray, IntArray],
-    fills: Canvas,
-) -> None:
-    """Paint those of the rows and columns given that lie in a filled region with a pattern."""
-    row, col = places
-    numbers = fills[labels[row, col]]
-    is_painted = is_filled[row, col] & (numbers > 0)
-    ground[row[is_painted], col[is_painted]] = numbers[is_painted]
 
 
 def _hatch_pixels(shape: tuple[int, ...]) -> tuple[IntArray, IntArray]:
@@ -134,13 +122,6 @@ def _highlight(ground: Canvas, is_region: Mask) -> None:
     ground[(bold > 0) & is_region & (ground != WALL)] = _HIGHLIGHT
 
 
-def _is_edge(labels: NDArray[np.uint16]) -> Mask:
-    """Return True where another label, or none, is at most the outline's width away."""
-    kernel = np.ones((2 * _EDGE_PX + 1, 2 * _EDGE_PX + 1), dtype=np.uint8)
-    is_edge: Mask = cv2.dilate(labels, kernel) != cv2.erode(labels, kernel)
-    return is_edge
-
-
 def colour_regions(layer: RegionLayer, grid: OccupancyGrid) -> dict[int, Colour]:
     """Return the colour of each region's label, different from that of the regions near by.
 
@@ -154,7 +135,9 @@ def colour_regions(layer: RegionLayer, grid: OccupancyGrid) -> dict[int, Colour]
         if region.label not in chosen:
             near = neighbours.get(region.label, set())
             taken = {chosen[label] for label in near if label in chosen}
-            chosen[region.label] = _pick_colour(_key(region), taken)
+            start = _key(region) % len(AUTOMATIC_COLOURS)
+            turned = AUTOMATIC_COLOURS[start:] + AUTOMATIC_COLOURS[:start]
+            chosen[region.label] = next((c for c in turned if c not in taken), turned[0])
     return chosen
 
 
@@ -162,41 +145,22 @@ def _key(region: PictureRegion) -> int:
     return region.label if region.key is None else region.key
 
 
-def _pick_colour(key: int, taken: set[Colour]) -> Colour:
-    """Return the first colour not taken, beginning at one that depends on the key alone."""
-    start = key % len(AUTOMATIC_COLOURS)
-    turned = AUTOMATIC_COLOURS[start:] + AUTOMATIC_COLOURS[:start]
-    return next((colour for colour in turned if colour not in taken), turned[0])
-
-
 def _find_neighbours(labels: NDArray[np.uint16], grid: OccupancyGrid) -> dict[int, set[int]]:
     """Return, for each label, those that come near it along a row or a column of cells."""
     step = max(1, round(_LATTICE_M / grid.resolution_m))
-    first_row, first_col = _lattice_start(grid, step)
+    # The lattice stays where it is in the world as a map grows.
+    first_row, first_col = (
+        round(at) % step for at in grid.fractional_cells_at(np.zeros((1, 2)))[0]
+    )
     lattice = np.ascontiguousarray(labels[first_row::step, first_col::step])
     found: dict[int, set[int]] = {}
     for n in {max(1, round(apart_m / (step * grid.resolution_m))) for apart_m in _NEIGHBOUR_M}:
         for one, other in ((lattice[:-n], lattice[n:]), (lattice[:, :-n], lattice[:, n:])):
-            for a, b in _different_pairs(one, other):
-                found.setdefault(a, set()).add(b)
-                found.setdefault(b, set()).add(a)
+            differ = (one != other) & (one > 0) & (other > 0)
+            for pair in np.unique(one[differ].astype(np.uint32) << 16 | other[differ]).tolist():
+                found.setdefault(pair >> 16, set()).add(pair & 0xFFFF)
+                found.setdefault(pair & 0xFFFF, set()).add(pair >> 16)
     return found
-
-
-def _lattice_start(grid: OccupancyGrid, step: int) -> tuple[int, int]:
-    """Return the first row and column of a lattice that stays where it is as a map grows."""
-    origin = grid.origin
-    cos, sin = math.cos(origin.yaw_rad), math.sin(origin.yaw_rad)
-    along_x = (cos * origin.x + sin * origin.y) / grid.resolution_m
-    along_y = (cos * origin.y - sin * origin.x) / grid.resolution_m
-    return -round(along_y) % step, -round(along_x) % step
-
-
-def _different_pairs(one: NDArray[np.uint16], other: NDArray[np.uint16]) -> list[list[int]]:
-    """Return each pair of different labels, neither 0, that stand in the same place."""
-    differ = (one != other) & (one > 0) & (other > 0)
-    joint = np.unique(one[differ].astype(np.uint32) << 16 | other[differ])
-    return [[int(pair >> 16), int(pair & 0xFFFF)] for pair in joint]
 
 
 def find_poles(
@@ -277,17 +241,12 @@ def paint_zones(
 
 def _cover(shape: tuple[int, ...], view: PictureView, zone: Zone) -> tuple[Mask, Mask]:
     """Return which pixels lie in a zone, and which on its outlines."""
-    corners = [
-        _in_subpixels(np.array([[corner.x, corner.y] for corner in outline]), view)
-        for outline in zone.outlines
-    ]
+    corners = []
+    for outline in zone.outlines:
+        points = view.area_pixels_at(np.array([[corner.x, corner.y] for corner in outline])) - 0.5
+        corners.append(np.rint(points.clip(-_FAR_PX, _FAR_PX) * (1 << _SHIFT)).astype(np.int32))
     inside = np.zeros(shape, dtype=np.uint8)
     cv2.fillPoly(inside, corners, (1,), cv2.LINE_8, _SHIFT)
     edge = np.zeros(shape, dtype=np.uint8)
     cv2.polylines(edge, corners, isClosed=True, color=(1,), thickness=_OUTLINE_PX, shift=_SHIFT)
     return inside > 0, edge > 0
-
-
-def _in_subpixels(points: NDArray[np.float64], view: PictureView) -> NDArray[np.int32]:
-    pixels = np.clip(view.area_pixels_at(points) - 0.5, -_FAR_PX, _FAR_PX)
-    return np.asarray(np.rint(pixels * (1 << _SHIFT)), dtype=np.int32)

@@ -1,5 +1,6 @@
 """Where a map lies in a picture: pixels, their conversion to the world, and grid spacings."""
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
@@ -115,8 +116,8 @@ class PictureView:
 
     def area_pixels_at(self, points: FloatArray) -> FloatArray:
         """Return (u, v) as real numbers, counted from the top left corner of the map area."""
-        pixels = self.fractional_pixels_at(points)
-        return np.stack([pixels[:, 0] - self.area.left, pixels[:, 1] - self.area.top], axis=1)
+        corner = np.array([self.area.left, self.area.top])
+        return np.asarray(self.fractional_pixels_at(points) - corner)
 
     def area_of(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return the map area of a picture's array, sharing its memory."""
@@ -133,18 +134,9 @@ class PictureView:
 
     def area_corners(self) -> FloatArray:
         """Return the four corners of the map area as points of the map, shape (4, 2)."""
-        area = self.area
-        return self.points_at(
-            np.array(
-                [
-                    [area.left, area.top],
-                    [area.right, area.top],
-                    [area.right, area.bottom],
-                    [area.left, area.bottom],
-                ],
-                dtype=np.float64,
-            )
-        )
+        left, top, right, bottom = dataclasses.astuple(self.area)
+        corners = [[left, top], [right, top], [right, bottom], [left, bottom]]
+        return self.points_at(np.array(corners, dtype=np.float64))
 
     def heading_at(self, yaw_rad: float) -> float:
         """Return a yaw of the map as an angle in the picture, counter-clockwise from its right."""
@@ -178,11 +170,6 @@ def paper_spacing_m(width_m: float, height_m: float, resolution_m: float) -> flo
     base_m = max(min(width_m, height_m) / _PAPER_N_LINES, resolution_m)
     base_m = max(base_m, max(width_m, height_m) / _PAPER_MAX_LINES)
     return next(step_m for step_m in _candidates(base_m) if step_m >= base_m * (1 - 1e-9))
-
-
-def decimals_of(spacing_m: float) -> int:
-    """Return how many decimals the numbers at multiples of a spacing need."""
-    return max(0, -math.floor(math.log10(spacing_m) + 1e-9))
 
 
 def _candidates(around_m: float) -> list[float]:

@@ -1,7 +1,6 @@
 """A corridor as somebody walks it: which doors come, in which order, on which side."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -9,7 +8,7 @@ import cv2
 import numpy as np
 
 from mapspeak.geometry import Point, wrap_angle
-from mapspeak.spatial.grid import FloatArray, Mask, OccupancyGrid
+from mapspeak.spatial.grid import FloatArray, OccupancyGrid
 from mapspeak.spatial.paths import DistanceField, distances_from, known_clearance_m
 from mapspeak.spatial.rooms.room_map import Door, Region, RoomMap
 
@@ -149,7 +148,10 @@ def _distances_from_end(
     distances = distances_from(floor, one, radius_m=0.0)
     other = _farthest(distances, candidates) or one
     way = distances.way_to(other) or (one,)
-    rows, cols = np.nonzero(floor.free & _is_near(floor, way, region.width_m))
+    off_way = np.ones(floor.cells.shape, dtype=np.uint8)
+    off_way[floor.cells_at(np.array([[point.x, point.y] for point in way]))] = 0
+    off_cells = cv2.distanceTransform(off_way, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    rows, cols = np.nonzero(floor.free & (off_cells * floor.resolution_m <= region.width_m))
     away_m = distances.distances_at(rows, cols)
     is_reached = np.isfinite(away_m)
     points, away_m = floor.points_at(rows[is_reached], cols[is_reached]), away_m[is_reached]
@@ -160,14 +162,6 @@ def _distances_from_end(
         return points, away_m
     whole_m = distances.distance_to(other) or 0.0
     return points, np.maximum(whole_m - away_m, 0.0)
-
-
-def _is_near(floor: OccupancyGrid, way: Sequence[Point], reach_m: float) -> Mask:
-    """Return True for the cells that are no farther than that from a way from cell to cell."""
-    off_way = np.ones(floor.cells.shape, dtype=np.uint8)
-    off_way[floor.cells_at(np.array([[point.x, point.y] for point in way]))] = 0
-    off_cells = cv2.distanceTransform(off_way, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    return np.asarray(off_cells * floor.resolution_m <= reach_m, dtype=np.bool_)
 
 
 def _farthest(distances: DistanceField, candidates: FloatArray) -> Point | None:

@@ -63,17 +63,25 @@ def _name(
         for shape, others in zip(shapes, behind, strict=True)
     ]
     ids = [f"{LETTER[room_class]}{number}" for number, room_class in enumerate(classes, start=1)]
-    regions = tuple(
-        _region(
-            shape,
-            classes[index],
+    regions = []
+    for index, (shape, room_class) in enumerate(zip(shapes, classes, strict=True)):
+        is_corridor = room_class is RoomClass.CORRIDOR
+        length_m, width_m = walked_size(shape) if is_corridor else (shape.length_m, shape.width_m)
+        region = Region(
             id=ids[index],
             index=index + 1,
+            room_class=room_class,
+            free_area_m2=shape.free_area_m2,
+            floor_area_m2=shape.floor_area_m2,
+            length_m=length_m,
+            width_m=width_m,
+            heading_rad=shape.heading_rad,
+            widest=shape.widest,
+            clearance_m=shape.clearance_m,
             door_ids=tuple(door_ids[index]),
             neighbour_ids=tuple(sorted((ids[other] for other in behind[index]), key=sort_key)),
         )
-        for index, shape in enumerate(shapes)
-    )
+        regions.append(region)
     doors = tuple(
         Door(
             id=f"D{number}",
@@ -83,34 +91,7 @@ def _name(
         )
         for number, opening in enumerate(openings, start=1)
     )
-    return regions, doors
-
-
-def _region(
-    shape: RegionShape,
-    room_class: RoomClass,
-    *,
-    id: str,  # noqa: A002 - the field's name
-    index: int,
-    door_ids: tuple[str, ...],
-    neighbour_ids: tuple[str, ...],
-) -> Region:
-    is_corridor = room_class is RoomClass.CORRIDOR
-    length_m, width_m = walked_size(shape) if is_corridor else (shape.length_m, shape.width_m)
-    return Region(
-        id=id,
-        index=index,
-        room_class=room_class,
-        free_area_m2=shape.free_area_m2,
-        floor_area_m2=shape.floor_area_m2,
-        length_m=length_m,
-        width_m=width_m,
-        heading_rad=shape.heading_rad,
-        widest=shape.widest,
-        clearance_m=shape.clearance_m,
-        door_ids=door_ids,
-        neighbour_ids=neighbour_ids,
-    )
+    return tuple(regions), doors
 
 
 def _labels_on_grid(raster: Raster, labels: NDArray[np.int32]) -> Labels:

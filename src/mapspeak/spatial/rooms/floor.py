@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mapspeak.spatial.rooms.furniture import find_blocks
 from mapspeak.spatial.rooms.raster import Picture, Raster, RoomSettings, find_cells
+from mapspeak.spatial.rooms.solids import drop_specks
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -51,7 +52,8 @@ def build_floor(raster: Raster, settings: RoomSettings) -> Floor:
     free = raster.free | block
     occupied = (raster.occupied & (1 - block)) | behind
     floor = _clear(free, occupied, wall, pocket)
-    floor = _drop_crumbs(floor, settings.room_area_m2 / raster.cell_area_m2)
+    # Parts that nothing joins and that are too small for a room are none.
+    floor = drop_specks(floor, settings.room_area_m2 / raster.cell_area_m2)
     return Floor(
         floor=floor,
         wall=wall,
@@ -73,14 +75,6 @@ def cut_away(floor: Floor, cut: Picture, cell_size_m: float) -> Floor:
     """Return the floor without the cells that are set, and its clearances; the walls stay."""
     rest = floor.floor & (1 - cut)
     return replace(floor, floor=rest, clearance_m=_clearance(rest, cell_size_m))
-
-
-def _drop_crumbs(floor: Picture, smallest: float) -> Picture:
-    """Return the floor without parts that nothing joins and that are too small for a room."""
-    _, label, stats, _ = cv2.connectedComponentsWithStats(floor, connectivity=4)
-    is_kept = stats[:, cv2.CC_STAT_AREA] >= smallest
-    is_kept[0] = False
-    return np.asarray(is_kept[label], np.uint8)
 
 
 def _clearance(floor: Picture, cell_size_m: float) -> NDArray[np.float32]:
@@ -137,49 +131,32 @@ def find_walls(
     A run of twice that length is wall in any direction, and so are long curved walls. What is
     thicker than a wall, such as a cupboard, is no piece of one that it stands in line with.
     """
-    cells = _Lengths(raster, settings)
+    size_m = raster.cell_size_m
     occupied = raster.occupied
     thick = cv2.dilate(occupied, np.ones((3, 3), np.uint8))
-    large, slender = _sort_obstacles(raster.free, cells.island)
-    can_be_piece = (large | slender) & (1 - _thick(occupied, cells.thickness))
+    large, slender = _sort_obstacles(raster.free, settings.island_size_m / size_m)
+    side = max(round(settings.wall_thickness_m / size_m), 1)
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    is_thick = np.asarray(cv2.morphologyEx(occupied, cv2.MORPH_OPEN, disc), np.uint8)
+    can_be_piece = (large | slender) & (1 - is_thick)
     wall = np.zeros_like(occupied)
     for angle_deg in directions_deg:
         for turned_deg in (angle_deg, angle_deg + 90):
-            long_run = _open(thick, cells.wall, turned_deg) & occupied & large
-            piece = _open(thick, cells.piece, turned_deg) & occupied & can_be_piece
-            in_line = _dilate(long_run, 2 * cells.reach, turned_deg)
+            long_run = _open(thick, settings.wall_length_m / size_m, turned_deg) & occupied & large
+            piece = (
+                _open(thick, settings.wall_piece_m / size_m, turned_deg) & occupied & can_be_piece
+            )
+            reach = _line(2 * settings.wall_reach_m / size_m, turned_deg)
+            in_line = np.asarray(cv2.dilate(long_run, reach), np.uint8)
             wall |= long_run | (piece & in_line)
     for turned_deg in np.arange(0.0, 180.0, OBLIQUE_STEP_DEG).tolist():
-        wall |= _open(thick, cells.oblique, turned_deg) & occupied & large
+        wall |= _open(thick, settings.oblique_length_m / size_m, turned_deg) & occupied & large
     return wall, occupied & large
-
-
-class _Lengths:
-    """The settings for walls, in raster cells."""
-
-    def __init__(self, raster: Raster, settings: RoomSettings) -> None:
-        self.wall = settings.wall_length_m / raster.cell_size_m
-        self.oblique = settings.oblique_length_m / raster.cell_size_m
-        self.reach = settings.wall_reach_m / raster.cell_size_m
-        self.piece = settings.wall_piece_m / raster.cell_size_m
-        self.thickness = settings.wall_thickness_m / raster.cell_size_m
-        self.island = settings.island_size_m / raster.cell_size_m
 
 
 def _open(picture: cv2.typing.MatLike, length: float, angle_deg: float) -> Picture:
     kernel = _line(length, angle_deg)
     return np.asarray(cv2.morphologyEx(picture, cv2.MORPH_OPEN, kernel), np.uint8)
-
-
-def _thick(occupied: Picture, least: float) -> Picture:
-    """Return 1 where a disc of this diameter in cells fits into an obstacle."""
-    side = max(round(least), 1)
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
-    return np.asarray(cv2.morphologyEx(occupied, cv2.MORPH_OPEN, disc), np.uint8)
-
-
-def _dilate(picture: Picture, length: float, angle_deg: float) -> Picture:
-    return np.asarray(cv2.dilate(picture, _line(length, angle_deg)), np.uint8)
 
 
 def _line(length: float, angle_deg: float) -> Picture:

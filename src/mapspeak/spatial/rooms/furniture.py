@@ -224,7 +224,9 @@ def _choose_blocks(piece: Picture, fixed: Picture, occupied: Picture, cells: _Si
     n, label = cv2.connectedComponents(piece, connectivity=4)
     numbers = np.asarray(label, np.int32)
     floor = 1 - (fixed | piece)
-    around = _number_around(numbers)
+    # The cells in and beside each piece have its number.
+    grown = cv2.dilate(numbers.astype(np.float32), np.ones((3, 3), np.uint8))
+    around = np.asarray(grown, np.int32)
     n_contact = np.bincount(around[fixed > 0], minlength=n)
     is_at_wall = _fills_rectangle(numbers, n, cells) & (n_contact >= cells.depth)
     is_block = (n_contact == 0) | is_at_wall
@@ -233,12 +235,6 @@ def _choose_blocks(piece: Picture, fixed: Picture, occupied: Picture, cells: _Si
     is_block[np.unique(numbers[open_box(piece, cells.thick, cells.thick) > 0])] = False
     is_block[0] = False
     return np.asarray(is_block[numbers], np.uint8)
-
-
-def _number_around(label: Numbers) -> Numbers:
-    """Return the cells in and beside each piece its number."""
-    around = cv2.dilate(label.astype(np.float32), np.ones((3, 3), np.uint8))
-    return np.asarray(around, np.int32)
 
 
 def _count_sides(around: Numbers, n: int, floor: Picture, piece: Picture, cells: _Sizes) -> Counts:

@@ -33,16 +33,26 @@ def match_rooms(previous: RoomMap, current: RoomMap) -> RoomMap:
     vanished = _remember(previous, current, overlap, ids, door_ids)
     now = {ids[region.id]: f"{region.id[0]}{ids[region.id][1:]}" for region in current.regions}
     final = {name: now[kept] for name, kept in ids.items()}
+    renamed = {kept: name for kept, name in now.items() if kept != name}
+    earlier = {old: now[name] for old, name in previous.former_ids.items() if name in now}
     return RoomMap(
         grid=current.grid,
         labels=current.labels,
         regions=tuple(_rename(region, final, door_ids) for region in current.regions),
-        doors=tuple(_rename_door(door, final, door_ids) for door in current.doors),
+        doors=tuple(
+            replace(
+                door,
+                id=door_ids[door.id],
+                region_ids=(final[door.region_ids[0]], final[door.region_ids[1]]),
+            )
+            for door in current.doors
+        ),
         vanished=tuple(
             replace(gone, became=tuple(now.get(name, name) for name in gone.became))
             for gone in vanished
         ),
-        former_ids=_former_ids(previous, now),
+        # What regions were called before, by the names they keep and those they have now.
+        former_ids={old: name for old, name in (earlier | renamed).items() if old != name},
     )
 
 
@@ -98,13 +108,6 @@ def _revive_regions(previous: RoomMap, regions: list[Region]) -> dict[str, str]:
     return ids
 
 
-def _former_ids(previous: RoomMap, now: dict[str, str]) -> dict[str, str]:
-    """Return what regions were called before, by the names they keep and those they have now."""
-    renamed = {kept: name for kept, name in now.items() if kept != name}
-    earlier = {old: now[name] for old, name in previous.former_ids.items() if name in now}
-    return {old: name for old, name in (earlier | renamed).items() if old != name}
-
-
 def _used(previous: RoomMap) -> set[str]:
     used = {region.id for region in previous.regions} | {door.id for door in previous.doors}
     return used | {gone.id for gone in previous.vanished}
@@ -130,7 +133,7 @@ def _match_doors(previous: RoomMap, current: RoomMap, ids: dict[str, str]) -> di
         (before.place.distance_to(now.place), before.id, now.id)
         for before, now in _neighbours(previous.doors, current.doors)
         if before.place.distance_to(now.place)
-        <= _SAME_DOOR_M * (2 if _joins_same(before, now, ids) else 1)
+        <= _SAME_DOOR_M * (1 + (set(before.region_ids) == {ids[name] for name in now.region_ids}))
     ]
     # Doors that were there a while ago come after those that were there just now.
     near += [
@@ -167,10 +170,6 @@ def _tile(door: Door) -> tuple[int, int]:
     return math.floor(door.place.x / side_m), math.floor(door.place.y / side_m)
 
 
-def _joins_same(before: Door, now: Door, ids: dict[str, str]) -> bool:
-    return set(before.region_ids) == {ids[name] for name in now.region_ids}
-
-
 def _rename(region: Region, ids: dict[str, str], door_ids: dict[str, str]) -> Region:
     return replace(
         region,
@@ -183,11 +182,6 @@ def _rename(region: Region, ids: dict[str, str], door_ids: dict[str, str]) -> Re
 def sort_key(name: str) -> tuple[str, int]:
     """Return what ids are sorted by: their letter, then their number."""
     return name[0], int(name[1:])
-
-
-def _rename_door(door: Door, ids: dict[str, str], door_ids: dict[str, str]) -> Door:
-    first, second = door.region_ids
-    return replace(door, id=door_ids[door.id], region_ids=(ids[first], ids[second]))
 
 
 def _remember(
@@ -213,16 +207,13 @@ def _remember(
         Vanished(id=door.id, place=door.place, floor_area_m2=None, became=())
         for door in previous.doors
     ]
-    lost += [replace(gone, became=_regions_at(current, gone, ids)) for gone in previous.vanished]
+    for gone in previous.vanished:
+        # The region that now covers the place of what vanished earlier.
+        region = None if gone.floor_area_m2 is None else current.find_region_at(gone.place)
+        lost.append(replace(gone, became=() if region is None else (ids[region.id],)))
     return tuple(
         sorted((gone for gone in lost if gone.id not in kept), key=lambda g: sort_key(g.id))
     )
-
-
-def _regions_at(current: RoomMap, gone: Vanished, ids: dict[str, str]) -> tuple[str, ...]:
-    """Return the region that now covers the place of what vanished earlier."""
-    region = None if gone.floor_area_m2 is None else current.find_region_at(gone.place)
-    return () if region is None else (ids[region.id],)
 
 
 def _heirs(shared: NDArray[np.float64], final: dict[int, str]) -> tuple[str, ...]:

@@ -262,7 +262,10 @@ def _join_open_borders(
         clearance_m, wide_m = forest.standing_m[narrow], forest.clearance_m[wide]
         if _is_narrow(clearance_m, wide_m, saddle, settings):
             wall_m = frames.measure(saddle.row, saddle.col, saddle.height)
-            if saddle.height <= _door_ratio(wall_m, settings) * clearance_m:
+            # The more wall is in line with a door, the less narrow it must be.
+            share = min(wall_m / settings.frame_m, 1.0)
+            ratio = settings.gap_ratio + share * (settings.door_ratio - settings.gap_ratio)
+            if saddle.height <= ratio * clearance_m:
                 borders.append(_Border(saddle=saddle, wall_m=wall_m))
                 continue
         if _is_mouth(forest, narrow, wide, saddle, settings):
@@ -281,12 +284,6 @@ def _is_narrow(clearance_m: float, wide_m: float, saddle: Saddle, settings: Room
     is_leaf = width_m <= settings.leaf_width_m or saddle.height <= settings.wide_ratio * wide_m
     is_door_wide = is_leaf and width_m <= settings.door_width_m
     return is_door_wide and saddle.height <= settings.door_ratio * clearance_m
-
-
-def _door_ratio(wall_m: float, settings: RoomSettings) -> float:
-    """Return how narrow a door must be: the more wall is in line with it, the less."""
-    share = min(wall_m / settings.frame_m, 1.0)
-    return settings.gap_ratio + share * (settings.door_ratio - settings.gap_ratio)
 
 
 def _is_mouth(
@@ -310,16 +307,13 @@ def _absorb_small(forest: _Forest, borders: list[_Border], settings: RoomSetting
         for border in borders:
             narrow, wide = forest.sides(border.saddle)
             area_m2 = min(forest.area_m2[narrow], forest.area_m2[wide])
-            if narrow != wide and area_m2 < _least_area(border, settings):
+            # A niche has no door frame: it must be larger than a room.
+            is_framed = border.wall_m >= settings.frame_m / 2
+            is_framed &= 2 * border.saddle.height >= settings.least_door_m
+            least_m2 = settings.room_area_m2 if is_framed else settings.niche_area_m2
+            if narrow != wide and area_m2 < least_m2:
                 forest.join(narrow, wide)
                 changed = True
-
-
-def _least_area(border: _Border, settings: RoomSettings) -> float:
-    """Return how large a place behind this border must be: a niche has no door frame."""
-    is_framed = border.wall_m >= settings.frame_m / 2
-    is_framed &= 2 * border.saddle.height >= settings.least_door_m
-    return settings.room_area_m2 if is_framed else settings.niche_area_m2
 
 
 def _number_by_area(basins: BasinLabels, forest: _Forest, room_area_m2: float) -> NDArray[np.int32]:

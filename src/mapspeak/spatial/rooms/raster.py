@@ -143,7 +143,8 @@ def build_raster(grid: OccupancyGrid, *, cell_size_m: float) -> Raster:
             f"The map has {grid.cells.size} cells, more than {MAX_GRID_CELLS}.",
             hint="Ask for a part of it, or for a map at a coarser resolution.",
         )
-    rows, cols = _known_window(grid)
+    is_known = grid.cells >= 0
+    rows, cols = _extent(np.any(is_known, axis=1)), _extent(np.any(is_known, axis=0))
     known = grid.cells[rows, cols]
     shrink, grow = _factors(known.size, grid.resolution_m, cell_size_m)
     if known.size == 0:
@@ -160,11 +161,6 @@ def build_raster(grid: OccupancyGrid, *, cell_size_m: float) -> Raster:
         scale=grow / shrink,
         grid=grid,
     )
-
-
-def _known_window(grid: OccupancyGrid) -> tuple[slice, slice]:
-    known = grid.cells >= 0
-    return _extent(np.any(known, axis=1)), _extent(np.any(known, axis=0))
 
 
 def _extent(used: NDArray[np.bool_]) -> slice:

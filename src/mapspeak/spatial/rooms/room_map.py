@@ -157,16 +157,14 @@ class RoomMap:
                 slice(rows.start + int(along[0]), rows.start + int(along[-1]) + 1),
                 slice(cols.start + int(across[0]), cols.start + int(across[-1]) + 1),
             )
-            if not self._is_cut(window, (rows, cols)):
+            # Where it reaches a side of what was looked at, it may go on beyond.
+            is_cut = any(
+                (inner.start == outer.start > 0) or (inner.stop == outer.stop < size)
+                for inner, outer, size in zip(window, (rows, cols), self.labels.shape, strict=True)
+            )
+            if not is_cut:
                 return window
             reach *= 2
-
-    def _is_cut(self, window: tuple[slice, slice], seen: tuple[slice, slice]) -> bool:
-        """Return True when a region may go on beyond the part that was seen."""
-        return any(
-            (inner.start == outer.start > 0) or (inner.stop == outer.stop < size)
-            for inner, outer, size in zip(window, seen, self.labels.shape, strict=True)
-        )
 
     def doors_of(self, region: Region) -> tuple[Door, ...]:
         """Return the doors that lead out of a region."""
@@ -189,16 +187,12 @@ class RoomMap:
         while queue:
             here = queue.popleft()
             if here == goal:
-                return _walk_back(came_from, goal)
+                way = [goal]
+                while way[-1] != start:
+                    way.append(came_from[way[-1]])
+                return tuple(reversed(way))
             for neighbour in self.region(here).neighbour_ids:
                 if neighbour not in came_from:
                     came_from[neighbour] = here
                     queue.append(neighbour)
         return None
-
-
-def _walk_back(came_from: dict[str, str], goal: str) -> tuple[str, ...]:
-    way = [goal]
-    while came_from[way[-1]] != way[-1]:
-        way.append(came_from[way[-1]])
-    return tuple(reversed(way))
