@@ -125,16 +125,13 @@ def test_a_file_with_a_fault_is_told_with_its_line(
     assert 'line 7, column 15: pose.x, "here", is not a number' in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("ending", ["geojson", "csv", "osm"])
-def test_what_is_exported_can_be_imported_elsewhere(
-    places: Path, tmp_path: Path, ending: str
-) -> None:
-    out, other = tmp_path / f"places.{ending}", tmp_path / "other.yaml"
+def test_what_is_exported_can_be_imported_elsewhere(places: Path, tmp_path: Path) -> None:
+    out, other = tmp_path / "places.geojson", tmp_path / "other.yaml"
     assert "2 places written" in told("export", "--out", out, "--semantic-map", places)
     assert "2 places new or changed, 2 in" in told("import", out, "--semantic-map", other)
     assert SemanticMapStore(other).read() == SemanticMapStore(places).read()
     assert "0 places new or changed" in told("import", out, "--semantic-map", other)
-    assert told("export", "--format", ending, "--semantic-map", other) == out.read_text()
+    assert told("export", "--semantic-map", other) == out.read_text()
 
 
 SIGNS = "\x1b[31mred\x1b[0m \u202eevil\u202c \x9b2J \u2028name: other"
@@ -179,8 +176,7 @@ def hostile(tmp_path: Path) -> Path:
         ["episodes", "--words", "red"],
         ["episodes", "--near-words", "red"],
         ["episodes", "--json"],
-        ["export", "--format", "csv"],
-        ["export", "--format", "geojson"],
+        ["export"],
     ],
     ids=" ".join,
 )
@@ -271,9 +267,9 @@ def test_a_merge_that_fails_leaves_nothing_behind(
     ("arguments", "says"),
     [
         (["list", "--semantic-map", "none.yaml"], "no file none.yaml"),
-        (["export", "--semantic-map", "PLACES"], "--format"),
-        (["export", "--out", "/proc/x.csv", "--semantic-map", "PLACES"], "--out"),
-        (["import", "none.csv", "--semantic-map", "PLACES"], "none.csv cannot be read"),
+        (["export", "--out", "places.csv", "--semantic-map", "PLACES"], ".geojson"),
+        (["export", "--out", "/proc/x.geojson", "--semantic-map", "PLACES"], "--out"),
+        (["import", "none.geojson", "--semantic-map", "PLACES"], "none.geojson cannot be read"),
         (["merge", "PLACES", "none.yaml", "--out", "c.yaml"], "no file none.yaml"),
         (["merge", "PLACES", "PLACES", "--out", "PLACES"], "there already"),
         (["episodes", "--since", "soon", "--semantic-map", "PLACES"], "09:30"),

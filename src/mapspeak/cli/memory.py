@@ -23,18 +23,12 @@ from mapspeak.installation import say_install, shell_command
 
 if TYPE_CHECKING:
     from mapspeak.memory import SemanticMap, Waypoint
-    from mapspeak.memory.exchange import ExchangeFormat, Union
+    from mapspeak.memory.exchange import Union
     from mapspeak.memory.retrieval import EntryCandidate
 
 
-FORMATS = ("geojson", "csv", "osm")
-
-
 @click.command()
-@click.option(
-    "--format", "form", type=click.Choice(FORMATS), help="Follows from --out if left away."
-)
-@click.option("--out", type=FILE, help="The file; stdout without.")
+@click.option("--out", type=FILE, help="The file, such as hall.geojson; stdout without.")
 @click.option(
     "--anchor",
     type=(float, float, float),
@@ -43,47 +37,40 @@ FORMATS = ("geojson", "csv", "osm")
 )
 @MEMORY_OPTION
 def export(
-    form: str | None,
-    out: Path | None,
-    anchor: tuple[float, float, float] | None,
-    semantic_map: Path | None,
+    out: Path | None, anchor: tuple[float, float, float] | None, semantic_map: Path | None
 ) -> None:
-    """Write the places as GeoJSON, CSV, or osmAG for JOSM."""
-    from mapspeak.memory.exchange import export_text  # noqa: PLC0415 - heavy; help must be quick
+    """Write the places as GeoJSON."""
+    from mapspeak.memory.exchange import to_geojson  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.spatial.areagraph import MapAnchor  # noqa: PLC0415
 
-    wanted = _format(form, out, "--out")
+    if out is not None and out.suffix.lower() not in (".geojson", ".json"):
+        raise ConfigError(f"--out {out} is no GeoJSON file.", hint="End its name in .geojson.")
     place = None
     if anchor is not None:
         lat_deg, lon_deg, yaw_deg = anchor
         place = MapAnchor(lat_deg=lat_deg, lon_deg=lon_deg, yaw_rad=math.radians(yaw_deg))
     places = read_places(open_memory(semantic_map))
-    write_out(export_text(places, wanted, anchor=place), out)
+    write_out(to_geojson(places, anchor=place), out)
     if out is not None:
         click.echo(f"{len(places.waypoints)} places written to {out}.")
 
 
 @click.command("import")
 @click.argument("file", type=FILE)
-@click.option(
-    "--format", "form", type=click.Choice(FORMATS), help="Follows from FILE if left away."
-)
 @MEMORY_OPTION
-def import_(file: Path, form: str | None, semantic_map: Path | None) -> None:
-    """Join what was exported, and perhaps edited, into the semantic map file: all or nothing."""
+def import_(file: Path, semantic_map: Path | None) -> None:
+    """Join exported, perhaps edited GeoJSON into the semantic map file: all of it or nothing."""
     from mapspeak.memory import SemanticMapStore  # noqa: PLC0415 - heavy; help must be quick
-    from mapspeak.memory.exchange import import_text, merge_into  # noqa: PLC0415
+    from mapspeak.memory.exchange import from_geojson, merge_into  # noqa: PLC0415
 
-    wanted = _format(form, file, "FILE")
     try:
-        # Line ends within a cell of CSV are the cell's own.
-        text = file.read_bytes().decode("utf-8-sig")
+        text = file.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeError) as error:
         raise ConfigError(
             f"{file} cannot be read: {say_cause(error)}.", hint="Check its path."
         ) from error
     store = SemanticMapStore(find_memory(semantic_map))
-    _tell(merge_into(store, import_text(text, wanted)), store.path)
+    _tell(merge_into(store, from_geojson(text)), store.path)
 
 
 @click.command()
@@ -97,17 +84,6 @@ def merge(first: Path, second: Path, out: Path) -> None:
     union, came = merge_files(first, second, out=out)
     _tell(union, out)
     click.echo(f"{came.n_observations} observations and {came.n_pictures} pictures came along.")
-
-
-def _format(given: str | None, file: Path | None, what: str) -> "ExchangeFormat":
-    from mapspeak.memory.exchange import ExchangeFormat  # noqa: PLC0415 - heavy
-
-    name = given or (file.suffix.lower().removeprefix(".") if file else "")
-    if name not in FORMATS:
-        raise ConfigError(
-            f"{what} does not say the format.", hint=f"Add --format {', '.join(FORMATS)}."
-        )
-    return ExchangeFormat(name)
 
 
 def _tell(union: "Union", path: Path) -> None:

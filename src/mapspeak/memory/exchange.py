@@ -1,0 +1,355 @@
+"""The memory for other programs, as GeoJSON (RFC 7946), and two memories of one map as one.
+
+GeoJSON has a point for each place, with what the semantic map file says of it under the same keys:
+lengths in metres to the millimetre, angles in degrees to the hundredth. Without an anchor,
+coordinates are metres in the map frame, as in the area graph's GeoJSON: the member `mapspeak` says
+so. With one they are longitude and latitude. Comments and people's own keys are lost.
+"""
+
+import json
+import math
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import count
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, FiniteFloat, ValidationError
+
+from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import Point
+from mapspeak.installation import shell_command
+from mapspeak.memory.durable import DurableFile
+from mapspeak.memory.episodes import BroughtOver, bring_over
+from mapspeak.memory.mapfile import (
+    MapDocument,
+    bound_to,
+    parse_document,
+    with_event,
+    with_waypoint,
+)
+from mapspeak.memory.mapfile.schema import record_data, waypoint_from
+from mapspeak.memory.mapfile.store import SemanticMapStore
+from mapspeak.memory.merging import merge_waypoint
+from mapspeak.memory.waypoint import SemanticMap, Waypoint, name_key
+from mapspeak.spatial.areagraph import LatLon, MapAnchor
+
+SAME_PLACE_M = 1.0
+"""Poses under one name that lie further apart are two places."""
+
+Facts = dict[str, object]
+
+_NUMBERS = ("_m", "_s", "_deg")
+_COORDINATES = ("x", "y")
+
+
+class _Anchor(BaseModel):
+    lat_deg: FiniteFloat
+    lon_deg: FiniteFloat
+    yaw_deg: FiniteFloat
+
+
+class _Member(BaseModel):
+    version: Literal[1]
+    map: str | None = None
+    anchor: _Anchor | None = None
+
+
+class _Geometry(BaseModel):
+    type: Literal["Point"]
+    coordinates: tuple[FiniteFloat, FiniteFloat]
+
+
+class _Feature(BaseModel):
+    geometry: _Geometry
+    properties: dict[str, object]
+
+
+class _Collection(BaseModel):
+    type: Literal["FeatureCollection"]
+    mapspeak: _Member
+    features: list[dict[str, object]]
+
+
+def facts_of(waypoint: Waypoint) -> Facts:
+    """Return what is said of a waypoint besides x and y; what is not said is left out."""
+    said: Facts = dict(record_data(waypoint))
+    pose = said.pop("pose")
+    assert isinstance(pose, dict)  # noqa: S101 - a record has a pose
+    facts = {"name": said.pop("name"), "yaw_deg": pose["yaw_deg"]} | said
+    return {key: _plain(key, value) for key, value in facts.items() if value not in (None, "", [])}
+
+
+def place_of(waypoint: Waypoint) -> Point:
+    """Return where a waypoint is, in the map frame, as files say it: to the millimetre."""
+    return Point(round(waypoint.pose.x, 3) + 0.0, round(waypoint.pose.y, 3) + 0.0)
+
+
+def to_geojson(places: SemanticMap, *, anchor: MapAnchor | None = None) -> str:
+    """Return the memory as GeoJSON.
+
+    Args:
+        places: What is written.
+        anchor: Where on Earth the map lies; without one, coordinates are metres in the map frame.
+
+    Raises:
+        MapError: A place is too far from the anchor.
+    """
+    member: Facts = {"version": 1, "map": places.map_id}
+    if anchor is None:
+        member |= {"coordinates": "x and y in metres, in the map frame", "anchor": None}
+    else:
+        on_earth = {"lat_deg": anchor.lat_deg, "lon_deg": anchor.lon_deg, "yaw_deg": anchor.yaw_deg}
+        member |= {
+            "coordinates": "longitude and latitude of WGS 84, in degrees",
+            "anchor": on_earth,
+        }
+    features = [_feature(place, anchor) for place in places.waypoints]
+    collection = {"type": "FeatureCollection", "mapspeak": member, "features": features}
+    return json.dumps(collection, ensure_ascii=False, allow_nan=False, indent=1) + "\n"
+
+
+def from_geojson(text: str) -> SemanticMap:
+    """Read the memory that `to_geojson` wrote; features of other kinds are left aside.
+
+    Raises:
+        SemanticMapError: It is not GeoJSON, or no memory.
+    """
+    try:
+        collection = _Collection.model_validate_json(text)
+        records = list(_records(collection))
+    except ValidationError as error:
+        raise _fault(error, "the file") from error
+    map_id, places = collection.mapspeak.map, dict[str, Waypoint]()
+    for number, (place, facts) in enumerate(records, start=1):
+        said = {key: value for key, value in facts.items() if key != "yaw_deg"}
+        pose = {"x": place.x, "y": place.y, "yaw_deg": facts.get("yaw_deg")}
+        try:
+            waypoint = waypoint_from({**said, "pose": pose}, map_id=map_id)  # type: ignore[dict-item]
+        except ValidationError as error:
+            raise _fault(error, f"record {number} ({facts.get('name')!s})") from error
+        if places.setdefault(name_key(waypoint.name), waypoint) is not waypoint:
+            raise SemanticMapError(
+                f"This is no memory as GeoJSON: two records are called '{waypoint.name}'.",
+                hint="Rename one of them; case and spaces make no difference.",
+            )
+    return SemanticMap(map_id=map_id, waypoints=tuple(places.values()))
+
+
+def _feature(place: Waypoint, anchor: MapAnchor | None) -> Facts:
+    point = place_of(place)
+    position = (point.x, point.y)
+    if anchor is not None:
+        on_earth = anchor.locate(point)
+        position = (on_earth.lon_deg, on_earth.lat_deg)
+    geometry = {"type": "Point", "coordinates": position}
+    properties = {"feature": "waypoint"} | facts_of(place)
+    return {"type": "Feature", "id": place.name, "geometry": geometry, "properties": properties}
+
+
+def _records(collection: _Collection) -> Iterator[tuple[Point, Facts]]:
+    anchor = None
+    if (said := collection.mapspeak.anchor) is not None:
+        anchor = MapAnchor(
+            lat_deg=said.lat_deg, lon_deg=said.lon_deg, yaw_rad=math.radians(said.yaw_deg)
+        )
+    for each in collection.features:
+        properties = each.get("properties")
+        if not isinstance(properties, dict) or properties.get("feature") != "waypoint":
+            continue
+        feature = _Feature.model_validate(each)
+        x, y = feature.geometry.coordinates
+        point = Point(x, y) if anchor is None else anchor.point_at(LatLon(lat_deg=y, lon_deg=x))
+        yield point, feature.properties
+
+
+def _plain(key: str, value: object) -> object:
+    """Return numbers as numbers; the file's schema has them as the text that is to be written."""
+    if isinstance(value, list):
+        return [_plain("", item) for item in value]
+    if isinstance(value, dict):
+        return {name: _plain(name, item) for name, item in value.items()}
+    is_number = key.endswith(_NUMBERS) or key in _COORDINATES
+    return float(value) if isinstance(value, str) and is_number else value
+
+
+def _fault(error: ValidationError, what: str) -> SemanticMapError:
+    """Return the first fault that was found, with its place."""
+    first = error.errors()[0]
+    place = ".".join(map(str, first["loc"])) or "the whole of it"
+    return SemanticMapError(
+        f"This is no memory as GeoJSON: {what}: at {place!a}: {first['msg']}.",
+        hint=f"Mend that place, or write the file anew with `{shell_command('memory export')}`.",
+    )
+
+
+# --- two memories as one ---------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Union:
+    """Two memories as one.
+
+    Attributes:
+        places: All of them: the first memory's in its order, then what only the second has.
+        changed: Those that the first memory does not have, or has otherwise.
+        findings: What became of each name that was in both and not the same.
+    """
+
+    places: SemanticMap
+    changed: tuple[Waypoint, ...]
+    findings: tuple[str, ...]
+
+
+def unite(first: SemanticMap, second: SemanticMap) -> Union:
+    """Join two memories of one map.
+
+    Places of one name that lie within a metre are joined: the newer says what both say, landmarks
+    and layout of both stay. Where it is not known which is newer they are joined only if that makes
+    no difference. Otherwise both stay, the second one with a number behind its name.
+
+    Raises:
+        SemanticMapError: They belong to different maps.
+    """
+    map_id = first.map_id or second.map_id
+    if second.map_id not in (None, map_id):
+        raise SemanticMapError(
+            f"One memory is of the map '{first.map_id}', the other of '{second.map_id}'.",
+            hint="Poses of one mean nothing on the other; realign one of them first.",
+        )
+    places = {name_key(place.name): place for place in first.waypoints}
+    taken = places.keys() | {name_key(place.name) for place in second.waypoints}
+    findings = []
+    for place in second.waypoints:
+        key = name_key(place.name)
+        mine = places.get(key)
+        if mine is None:
+            places[key] = place
+        elif record_data(mine) != record_data(place):
+            joined, said = _join(mine, place)
+            if joined is None:
+                joined = _renamed(place, places, taken)
+                said = f"{said}: both stay, the second one as '{joined.name}'"
+            places[name_key(joined.name)] = joined
+            taken |= {name_key(joined.name)}
+            findings.append(f"'{place.name}' is in both; {said}.")
+    united = tuple(replace(place, map_id=map_id) for place in places.values())
+    before = {name_key(place.name): record_data(place) for place in first.waypoints}
+    return Union(
+        places=SemanticMap(map_id=map_id, waypoints=united),
+        changed=tuple(p for p in united if before.get(name_key(p.name)) != record_data(p)),
+        findings=tuple(findings),
+    )
+
+
+def _join(mine: Waypoint, theirs: Waypoint) -> tuple[Waypoint | None, str]:
+    """Return both as one where that is safe, and what was done, or why not."""
+    apart_m = mine.pose.point.distance_to(theirs.pose.point)
+    if apart_m > SAME_PLACE_M:
+        return None, f"they lie {apart_m:.2f} m apart"
+    if mine.recorded_at and theirs.recorded_at and mine.recorded_at != theirs.recorded_at:
+        is_mine_older = mine.recorded_at < theirs.recorded_at
+        older, newer = (mine, theirs) if is_mine_older else (theirs, mine)
+        at = max(mine.recorded_at, theirs.recorded_at).isoformat(timespec="seconds")
+        # The first one's spelling of the name stays.
+        return replace(_joined(older, newer), name=mine.name), f"joined, the record of {at} decides"
+    joined = replace(_joined(theirs, mine), name=mine.name)
+    if _unordered(joined) == _unordered(replace(_joined(mine, theirs), name=mine.name)):
+        return joined, "joined, they complete each other"
+    return None, "they differ, and which is newer is not known"
+
+
+def _joined(older: Waypoint, newer: Waypoint) -> Waypoint:
+    """Return the newer place, with what only the older one says."""
+    features = {name_key(text): text for text in newer.geometric_features}
+    for text in older.geometric_features:
+        features.setdefault(name_key(text), text)
+    is_same_pose = record_data(older)["pose"] == record_data(newer)["pose"]
+    dated = newer if newer.recorded_at or newer.stamp_s is not None else older
+    return replace(
+        merge_waypoint(older, newer).waypoint,
+        description=newer.description or older.description,
+        geometric_features=tuple(features.values()),
+        stamp_s=dated.stamp_s,
+        recorded_at=dated.recorded_at,
+        room_id=newer.room_id or (older.room_id if is_same_pose else None),
+        picture=newer.picture or (older.picture if is_same_pose else None),
+    )
+
+
+def _unordered(place: Waypoint) -> dict[str, object]:
+    """Return what a record says, whatever the order of its lists."""
+    said = record_data(place)
+    return {key: sorted(map(str, v)) if isinstance(v, list) else v for key, v in said.items()}
+
+
+def _renamed(place: Waypoint, places: Mapping[str, Waypoint], taken: Collection[str]) -> Waypoint:
+    """Return a place under a free name; under the one it has already from an earlier time."""
+    for number in count(2):
+        renamed = replace(place, name=f"{place.name} ({number})")
+        key = name_key(renamed.name)
+        there = places.get(key)
+        if key not in taken or (there and _unordered(there) == _unordered(renamed)):
+            return renamed
+    raise AssertionError  # Numbers do not end.
+
+
+# --- files -----------------------------------------------------------------------------------
+
+
+def merge_into(store: SemanticMapStore, second: SemanticMap) -> Union:
+    """Join a memory into a semantic map file, all of it or nothing (see `unite`).
+
+    Raises:
+        SemanticMapError: The maps differ, or the file has a fault or cannot be written.
+    """
+    unions: list[Union] = []
+
+    def change(document: MapDocument) -> MapDocument:
+        unions.append(unite(document.to_map(), second))
+        return _with_places(document, unions[-1])
+
+    store.rewrite(change)
+    return unions[-1]
+
+
+def merge_files(first: Path, second: Path, *, out: Path) -> tuple[Union, BroughtOver]:
+    """Write two semantic map files as one: the first with its comments, and what it lacks.
+
+    Events of the second one get ids of their own; what is in both is there once. The observations
+    of both come along, with their pictures.
+
+    Raises:
+        SemanticMapError: One cannot be read, the maps differ, or the new file is there already.
+    """
+    if out.exists():
+        message = f"{out} is there already."
+        raise SemanticMapError(message, hint="Name a file that is not, or remove it.")
+    document, other = _read(first), _read(second)
+    union = unite(document.to_map(), other.to_map())
+    # All that the first file says besides places stays: comments, people's own keys.
+    whole = _with_places(document, union)
+    for record in other.events.values():
+        nameless = replace(record.event, id="")
+        if nameless not in (replace(each.event, id="") for each in whole.events.values()):
+            whole, _ = with_event(whole, nameless)
+    # First, so that no file says what its observations lack.
+    came = bring_over(first, second, to=out)
+    SemanticMapStore(out).rewrite(lambda _: whole)
+    return union, came
+
+
+def _with_places(document: MapDocument, union: Union) -> MapDocument:
+    if document.map_id is None and union.places.map_id is not None:
+        document = bound_to(document, union.places.map_id)
+    for place in union.changed:
+        document = with_waypoint(document, place)
+    return document
+
+
+def _read(path: Path) -> MapDocument:
+    content, fingerprint = DurableFile(path, lock_timeout_s=0.0).read()
+    if fingerprint is None:
+        message = f"There is no file {path}."
+        raise SemanticMapError(message, hint="Name a semantic map file, such as places.yaml.")
+    return parse_document(content, source=str(path))
