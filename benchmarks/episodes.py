@@ -26,7 +26,7 @@ from mapspeak.memory.episodes import (
     ObservationKind,
     VectorRank,
 )
-from mapspeak.memory.retrieval.answer import Thresholds
+from mapspeak.memory.search.answer import Thresholds
 
 __all__ = ["measure"]
 

@@ -22,8 +22,8 @@ from benchmarks.memory.sites import Site
 from benchmarks.talking import ServerProcess
 from mapspeak.geometry import Pose
 from mapspeak.memory import Waypoint
-from mapspeak.memory.mapfile.editing import record_text
-from mapspeak.memory.mapfile.schema import record_data
+from mapspeak.memory.store.editing import record_text
+from mapspeak.memory.store.schema import record_data
 from mapspeak.simulator import load_world
 from mapspeak.spatial.mapfiles import MapMode, write_map
 

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.memory.retrieval import Embedder, Thresholds, find_model
-from mapspeak.memory.retrieval.wordindex import split_words, stem
+from mapspeak.memory.search import Embedder, Thresholds, find_model
+from mapspeak.memory.search.wordindex import split_words, stem
 
 __all__ = ["ConceptEmbedder", "shipped_model"]
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from benchmarks.memory.sites import RADIUS_M, Site
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMap
-from mapspeak.memory.retrieval import Embedder
+from mapspeak.memory.search import Embedder
 from mapspeak.places.recall import RecallQuery, recall
 from mapspeak.places.recall.answer import Recall
 from mapspeak.worldmodel.model import WorldModel

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.requests.data import Request, read_maps, things_of
-from mapspeak.memory.retrieval import (
+from mapspeak.memory.search import (
     Embedder,
     Entry,
     EntryIndex,
@@ -21,7 +21,7 @@ from mapspeak.memory.retrieval import (
     Verdict,
     find_model,
 )
-from mapspeak.memory.retrieval.wordindex import split_words
+from mapspeak.memory.search.wordindex import split_words
 
 __all__ = ["FIRST", "Method", "Reply", "list_methods"]
 

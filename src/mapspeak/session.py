@@ -29,7 +29,7 @@ from mapspeak.memory.episodes import (
     named_pictures,
 )
 from mapspeak.memory.events import Event
-from mapspeak.memory.retrieval import Embedder, find_model
+from mapspeak.memory.search import Embedder, find_model
 from mapspeak.places.choosing import CheckedGoal, choose_goal
 from mapspeak.robot import CameraPicture, Robot
 from mapspeak.ros import RosConnection, started_over

@@ -4,9 +4,9 @@ from pathlib import Path
 
 from mapspeak.geometry import Point
 from mapspeak.memory.events import Effect, Event
-from mapspeak.memory.mapfile import parse_document
-from mapspeak.memory.mapfile.eventschema import event_data
-from mapspeak.memory.mapfile.schema import record_data
+from mapspeak.memory.store import parse_document
+from mapspeak.memory.store.eventschema import event_data
+from mapspeak.memory.store.schema import record_data
 
 REFERENCE = Path(__file__).parents[2] / "docs" / "reference" / "semantic-map.md"
 

@@ -226,7 +226,7 @@ def _query(
 def _rank(store: "EpisodeStore") -> "Rank | None":
     """Compare meanings where a model is installed; else words are compared."""
     from mapspeak.memory.episodes import VectorRank  # noqa: PLC0415 - heavy; help must be quick
-    from mapspeak.memory.retrieval import find_model  # noqa: PLC0415
+    from mapspeak.memory.search import find_model  # noqa: PLC0415
 
     model = find_model()
     return None if model is None else VectorRank(store.database, model)

@@ -24,7 +24,7 @@ from mapspeak.installation import say_install, shell_command
 if TYPE_CHECKING:
     from mapspeak.memory import SemanticMap, Waypoint
     from mapspeak.memory.exchange import Union
-    from mapspeak.memory.retrieval import EntryCandidate
+    from mapspeak.memory.search import EntryCandidate
 
 
 @click.command()
@@ -148,7 +148,7 @@ def find(
     Ends with 1 when nothing of the kind is remembered.
     """
     from mapspeak.memory.episodes import memory_folder  # noqa: PLC0415 - heavy; help must be quick
-    from mapspeak.memory.retrieval import (  # noqa: PLC0415
+    from mapspeak.memory.search import (  # noqa: PLC0415
         EntryIndex,
         TextVectors,
         Verdict,

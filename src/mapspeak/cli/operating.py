@@ -107,7 +107,7 @@ def _wait_for_answers(hold: Hold, *, wait_s: float) -> None:
 @click.option("--refused", "only_refused", is_flag=True, help="Only what was refused.")
 def replay(file: Path, only_refused: bool) -> None:  # noqa: FBT001 - a flag
     """Show an audit log: who wanted what, what became of it, and why."""
-    from mapspeak.memory.waypoint import clean_line  # noqa: PLC0415
+    from mapspeak.memory.quoting import clean_line  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.safety import read_audit  # noqa: PLC0415 - heavy; help must be quick
 
     n_shown = n_refused = 0

@@ -1,15 +1,6 @@
 """What is where, in words: remembered places and the file that holds them."""
 
-from mapspeak.memory.filtering import (
-    LEFT_OUT,
-    Concern,
-    Objection,
-    find_objection,
-    gives_orders,
-    tells_what_to_do,
-)
 from mapspeak.memory.laserfan import LaserFan, LaserRing, build_ring
-from mapspeak.memory.mapfile.store import SemanticMapStore, WriteReceipt
 from mapspeak.memory.merging import (
     SAME_SPOT_M,
     Merge,
@@ -20,7 +11,16 @@ from mapspeak.memory.merging import (
     seen_from,
 )
 from mapspeak.memory.pictures import PictureBook, PictureReading, TakenPicture
-from mapspeak.memory.waypoint import Confidence, Landmark, SemanticMap, Waypoint, name_key
+from mapspeak.memory.policy import (
+    LEFT_OUT,
+    Concern,
+    find_concern,
+    gives_orders,
+    tells_what_to_do,
+)
+from mapspeak.memory.quoting import name_key
+from mapspeak.memory.store.semanticmap import SemanticMapStore, WriteReceipt
+from mapspeak.memory.waypoint import Confidence, Landmark, SemanticMap, Waypoint
 
 __all__ = [
     "LEFT_OUT",
@@ -31,7 +31,6 @@ __all__ = [
     "LaserFan",
     "LaserRing",
     "Merge",
-    "Objection",
     "PictureBook",
     "PictureReading",
     "Reunion",
@@ -41,7 +40,7 @@ __all__ = [
     "Waypoint",
     "WriteReceipt",
     "build_ring",
-    "find_objection",
+    "find_concern",
     "gives_orders",
     "group_views",
     "merge_waypoint",

@@ -8,9 +8,8 @@ from enum import StrEnum
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
-from mapspeak.memory.filtering import tells_what_to_do
-from mapspeak.memory.quoting import quote
-from mapspeak.memory.waypoint import clean_line, name_key
+from mapspeak.memory.policy import tells_what_to_do
+from mapspeak.memory.quoting import clean_line, name_key, quote
 
 _WAYS = re.compile(
     r"^ *(?:please )?(?:avoid|keep|stay|slow|(?:do not|don't) (?:enter|use|cross|pass|block))\b",

@@ -13,7 +13,8 @@ from itertools import chain
 
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory.laserfan import SAME_STAND_M
-from mapspeak.memory.waypoint import Confidence, Landmark, Waypoint, name_key
+from mapspeak.memory.quoting import name_key
+from mapspeak.memory.waypoint import Confidence, Landmark, Waypoint
 
 SAME_BEARING_RAD = math.radians(30.0)
 """Two looks at one thing, each 10 degrees off as a rule, differ by less 19 times in 20."""

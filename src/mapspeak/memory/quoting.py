@@ -1,8 +1,29 @@
-"""Remembered text between quotes: whatever it says, it cannot end them."""
+"""Remembered text on clean lines, compared, and told between quotes that it cannot end."""
 
 import re
+import unicodedata
 
-from mapspeak.memory.waypoint import clean_line
+_JOINERS = "\u200c\u200d"
+"""Invisible, yet part of how Persian, Indic and emoji words are written."""
+
+
+def clean_line(text: str) -> str:
+    """Return the text on one line: every run of spaces and unprintable characters is one space."""
+    if not text.isprintable():
+        text = "".join(c if c.isprintable() or c in _JOINERS else " " for c in text)
+    return " ".join(text.split())
+
+
+def clean_text(text: str) -> str:
+    """Return the text with every line cleaned and empty lines at its ends cut."""
+    lines = text.replace("\r\n", "\n").split("\n")
+    return "\n".join(map(clean_line, lines)).strip("\n")
+
+
+def name_key(name: str) -> str:
+    """Return what the spellings of a place's name have in common: no case, no spaces."""
+    return clean_line(unicodedata.normalize("NFKC", name).casefold())
+
 
 LONGEST_NAME = 120
 """What writes allow; a file that somebody else wrote may have any."""

@@ -1,7 +1,6 @@
 """A remembered place, what is seen from it, and all places of one map (paper eq. 8 and 9)."""
 
 import math
-import unicodedata
 from dataclasses import dataclass, replace
 from datetime import datetime
 from enum import StrEnum
@@ -9,27 +8,7 @@ from enum import StrEnum
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.memory.laserfan import LaserFan
-
-_JOINERS = "\u200c\u200d"
-"""Invisible, yet part of how Persian, Indic and emoji words are written."""
-
-
-def clean_line(text: str) -> str:
-    """Return the text on one line: every run of spaces and unprintable characters is one space."""
-    if not text.isprintable():
-        text = "".join(c if c.isprintable() or c in _JOINERS else " " for c in text)
-    return " ".join(text.split())
-
-
-def clean_text(text: str) -> str:
-    """Return the text with every line cleaned and empty lines at its ends cut."""
-    lines = text.replace("\r\n", "\n").split("\n")
-    return "\n".join(map(clean_line, lines)).strip("\n")
-
-
-def name_key(name: str) -> str:
-    """Return what the spellings of a place's name have in common: no case, no spaces."""
-    return clean_line(unicodedata.normalize("NFKC", name).casefold())
+from mapspeak.memory.quoting import clean_line, clean_text, name_key
 
 
 class Confidence(StrEnum):

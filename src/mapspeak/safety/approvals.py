@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mapspeak.errors import ConfigError
-from mapspeak.memory.waypoint import clean_line
+from mapspeak.memory.quoting import clean_line
 from mapspeak.safety.commands import Command, is_same, say_command
 
 

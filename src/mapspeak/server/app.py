@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from mapspeak import __version__
 from mapspeak.errors import ConfigError, MapspeakError
-from mapspeak.memory.waypoint import clean_line
+from mapspeak.memory.quoting import clean_line
 from mapspeak.safety import ApprovalNeededError, Caller, calling
 from mapspeak.server.calllog import CallLog
 from mapspeak.server.mapview.representations import Representation

@@ -14,7 +14,7 @@ from pathlib import Path
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Point
 from mapspeak.memory import SemanticMap, Waypoint
-from mapspeak.memory.retrieval import (
+from mapspeak.memory.search import (
     Answer,
     Basis,
     Embedder,

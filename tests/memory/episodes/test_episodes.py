@@ -22,7 +22,7 @@ from mapspeak.memory.episodes import (
     memory_folder,
     observations_from,
 )
-from mapspeak.memory.retrieval.answer import Thresholds
+from mapspeak.memory.search.answer import Thresholds
 
 NINE = datetime(2026, 11, 20, 9, 0, tzinfo=UTC)
 

@@ -12,7 +12,7 @@ from mapspeak.driving.search.evidence import Opinions, weight_of
 from mapspeak.driving.search.seenfloor import REACH_M, SeenFloor
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory import TakenPicture
-from mapspeak.memory.retrieval import Verdict
+from mapspeak.memory.search import Verdict
 from mapspeak.places.choosing import check_place
 from mapspeak.places.naming import Place
 from mapspeak.spatial.frontiers import Frontier

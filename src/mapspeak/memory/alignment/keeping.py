@@ -17,8 +17,8 @@ from mapspeak.memory.alignment.comparing import (
 from mapspeak.memory.alignment.fitting import Certainty
 from mapspeak.memory.alignment.surfaces import MapSurfaces
 from mapspeak.memory.episodes import EpisodeStore
-from mapspeak.memory.mapfile import MapDocument, moved
-from mapspeak.memory.mapfile.store import SemanticMapStore
+from mapspeak.memory.store import MapDocument, moved
+from mapspeak.memory.store.semanticmap import SemanticMapStore
 from mapspeak.spatial import OccupancyGrid
 
 GROWN_RATIO = 0.1

@@ -9,7 +9,8 @@ from enum import StrEnum
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point, Pose
-from mapspeak.memory.waypoint import SemanticMap, Waypoint, clean_line, clean_text
+from mapspeak.memory.quoting import clean_line, clean_text
+from mapspeak.memory.waypoint import SemanticMap, Waypoint
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _ID_BYTES = 6

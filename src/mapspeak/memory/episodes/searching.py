@@ -20,8 +20,7 @@ from mapspeak.memory.episodes.observation import (
     microseconds_of,
 )
 from mapspeak.memory.episodes.textindex import Ids, Scores, read_ids, score_words, shared_words
-from mapspeak.memory.quoting import quote, quote_name
-from mapspeak.memory.waypoint import name_key
+from mapspeak.memory.quoting import name_key, quote, quote_name
 
 MOST_TEXTS = 2000
 """How many different texts, the best ones, one query looks at."""

@@ -46,7 +46,7 @@ from mapspeak.memory.episodes.searching import (
     observation_from,
 )
 from mapspeak.memory.episodes.textindex import add_text, index_texts, text_hash
-from mapspeak.memory.waypoint import name_key
+from mapspeak.memory.quoting import name_key
 
 LOCK_TIMEOUT_S = 5.0
 

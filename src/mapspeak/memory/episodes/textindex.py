@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.memory.episodes.database import EpisodeDatabase
-from mapspeak.memory.retrieval import Embedder
-from mapspeak.memory.retrieval.wordindex import content_words, split_words, stem
+from mapspeak.memory.policy import words_of
+from mapspeak.memory.search import Embedder
+from mapspeak.memory.search.wordindex import content_words, split_words, stem
 
 MIN_SCORE_RATIO = 0.25
 """Below, too little of the query was found to speak of a match."""
@@ -22,10 +23,6 @@ MIN_SCORE_RATIO = 0.25
 _MISSPELT_WEIGHT = 0.75
 _MIN_MISSPELT_LETTERS = 4
 _MIN_LIKENESS_RATIO = 0.8
-_OF_ASKING = frozenset(
-    ["did", "do", "does", "have", "robot", "saw", "see", "seen", "show", "some", "were", "when"]
-)
-"""Words of questions about what was seen; they say nothing of what it was."""
 
 Ids = NDArray[np.int64]
 Scores = NDArray[np.float64]
@@ -121,7 +118,7 @@ def _asked_words(
 
 
 def _words_asked(query: str) -> list[str]:
-    said = [stem(word) for _, word in content_words(query) if word not in _OF_ASKING]
+    said = [stem(word) for _, word in content_words(query) if word not in words_of("asking")]
     return list(dict.fromkeys(said)) or list(words_in(query))
 
 

@@ -16,8 +16,9 @@ from pydantic import BaseModel, FiniteFloat, ValidationError
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.installation import shell_command
-from mapspeak.memory.mapfile.schema import record_data, waypoint_from
-from mapspeak.memory.waypoint import SemanticMap, Waypoint, name_key
+from mapspeak.memory.quoting import name_key
+from mapspeak.memory.store.schema import record_data, waypoint_from
+from mapspeak.memory.waypoint import SemanticMap, Waypoint
 from mapspeak.spatial.areagraph import LatLon, MapAnchor
 
 Facts = dict[str, object]

@@ -6,19 +6,20 @@ from itertools import count
 from pathlib import Path
 
 from mapspeak.errors import SemanticMapError
-from mapspeak.memory.durable import DurableFile
 from mapspeak.memory.episodes import BroughtOver, bring_over
-from mapspeak.memory.mapfile import (
+from mapspeak.memory.merging import merge_waypoint
+from mapspeak.memory.quoting import name_key
+from mapspeak.memory.store import (
     MapDocument,
     bound_to,
     parse_document,
     with_event,
     with_waypoint,
 )
-from mapspeak.memory.mapfile.schema import record_data
-from mapspeak.memory.mapfile.store import SemanticMapStore
-from mapspeak.memory.merging import merge_waypoint
-from mapspeak.memory.waypoint import SemanticMap, Waypoint, name_key
+from mapspeak.memory.store.durable import DurableFile
+from mapspeak.memory.store.schema import record_data
+from mapspeak.memory.store.semanticmap import SemanticMapStore
+from mapspeak.memory.waypoint import SemanticMap, Waypoint
 
 SAME_PLACE_M = 1.0
 """Poses under one name that lie further apart are two places."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
+from mapspeak.memory.quoting import name_key
 from mapspeak.memory.things.joining import (
     Group,
     Posteriors,
@@ -20,7 +21,7 @@ from mapspeak.memory.things.likelihood import Surroundings, WeighedView, read_wa
 from mapspeak.memory.things.placing import Placement, place, trust_range
 from mapspeak.memory.things.sight import BODY_M, N_RAYS, SightMap, build_sight_map
 from mapspeak.memory.things.thing import NOISE, Category, NoiseModel, Thing, View, name_the_same
-from mapspeak.memory.waypoint import SemanticMap, Waypoint, name_key
+from mapspeak.memory.waypoint import SemanticMap, Waypoint
 from mapspeak.spatial import OccupancyGrid
 
 PLAIN_SIGHT_M = 5.0

@@ -8,17 +8,9 @@ from enum import StrEnum
 from functools import lru_cache
 
 from mapspeak.geometry import Point
+from mapspeak.memory.policy import words_of
 from mapspeak.memory.waypoint import Confidence, Landmark
 from mapspeak.spatial.grid import FloatArray
-
-_LOOKS = frozenset(
-    """
-    a an another big black blue brown dark fixed front green grey gray large left light little long
-    main metal mounted new old one orange other pink purple red right round second short silver
-    small some tall the third two wall white wooden yellow
-    """.split()  # noqa: SIM905 - forty words in quotes would hide what they are
-)
-"""Words for how a thing looks or stands: one observer says them, the next does not."""
 
 
 def name_the_same(label: str, other: str) -> bool:
@@ -38,7 +30,7 @@ def _words_of(label: str) -> tuple[str, ...]:
     # A place or a detail after the noun, as in "sink with a mirror", does not change the noun.
     head = re.split(r"\b(?:with|on|in|at|near|under|behind|beside|for|of)\b|[,(;]", plain)[0]
     words = [_singular(word) for word in re.findall(r"[^\W\d_]+", head) or [plain.strip()]]
-    return tuple(word for word in words if word not in _LOOKS) or tuple(words)
+    return tuple(word for word in words if word not in words_of("looks")) or tuple(words)
 
 
 def _singular(word: str) -> str:

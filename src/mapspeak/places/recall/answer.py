@@ -7,7 +7,7 @@ from enum import StrEnum
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory.consistency import Trust
-from mapspeak.memory.retrieval import Answer, EntryCandidate, EntryKind, Verdict
+from mapspeak.memory.search import Answer, EntryCandidate, EntryKind, Verdict
 from mapspeak.places.goalcheck import GoalCheck
 
 NEAR_M = 5.0

@@ -10,7 +10,7 @@ from itertools import islice
 
 from mapspeak.geometry import Point
 from mapspeak.memory import Landmark
-from mapspeak.memory.retrieval import Answer, Basis, EntryCandidate, EntryKind, Verdict
+from mapspeak.memory.search import Answer, Basis, EntryCandidate, EntryKind, Verdict
 from mapspeak.places.choosing import stand_at
 from mapspeak.places.goalcheck import judge_goal
 from mapspeak.places.naming import Place, split_room

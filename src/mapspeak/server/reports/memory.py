@@ -7,10 +7,10 @@ from pydantic import Field
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
-from mapspeak.memory import find_objection
+from mapspeak.memory import find_concern
 from mapspeak.memory.episodes import EpisodeQuery, EpisodeStore, Observation, ObservationKind
 from mapspeak.memory.quoting import quote_name
-from mapspeak.memory.retrieval import EntryKind, Verdict, calls_by_name
+from mapspeak.memory.search import EntryKind, Verdict, calls_by_name
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.recall import Recall, RecallCandidate, RecallQuery
 from mapspeak.server.reports.robot import PoseReport, Report
@@ -82,7 +82,7 @@ def _find_pictures(
 
 def _find_label(seen: Observation, words: str) -> str | None:
     called = (label for label in seen.labels if calls_by_name(words, [label]))
-    return next((label for label in called if find_objection(label) is None), None)
+    return next((label for label in called if find_concern(label) is None), None)
 
 
 def _count_places(points: list[Point]) -> int:

@@ -21,7 +21,7 @@ from mapspeak.memory import (
     PictureReading,
     TakenPicture,
     Waypoint,
-    find_objection,
+    find_concern,
     noted_at,
     tells_what_to_do,
 )
@@ -167,10 +167,10 @@ class Annotator:
             )
 
     def _is_against_policy(self, text: str) -> bool:
-        objection = find_objection(text)
-        if objection is not None:
-            self.refused.append(f"{text!r}: {objection.sentence}")
-        return objection is not None
+        concern = find_concern(text)
+        if concern is not None:
+            self.refused.append(f"{text!r}: {LEFT_OUT[concern]}")
+        return concern is not None
 
     def _landmark(
         self, thing: LandmarkInput, *, pose: Pose, picture: TakenPicture | None

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point
-from mapspeak.memory.retrieval import EntryKind
+from mapspeak.memory.search import EntryKind
 from mapspeak.places.choosing import find_place
 from mapspeak.places.naming import split_room
 from mapspeak.places.recall import RecallQuery, recall

@@ -1,0 +1,280 @@
+"""What can be found, why it was found, and how far to trust the first candidate."""
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+
+from mapspeak.memory.quoting import name_key
+from mapspeak.memory.waypoint import Landmark, SemanticMap, Waypoint
+
+
+class MatchField(StrEnum):
+    """Where in a record a word was found, or where in what is commonly known of such a thing."""
+
+    NAME = "name"
+    LABEL = "label"
+    CATEGORY = "category"
+    PURPOSE = "purpose"
+    FEATURE = "feature"
+    NOTE = "note"
+    DESCRIPTION = "description"
+    PLACE = "place"
+    OTHER_NAME = "other name"
+    USE = "usual use"
+
+
+class MatchKind(StrEnum):
+    """How a word of the phrase and a word of the record are the same.
+
+    A part is "dish" in "dishwasher": a word at one end of a longer one.
+    """
+
+    SAME = "same"
+    FORM = "form"
+    MISSPELT = "misspelt"
+    PART = "part"
+
+
+FIELD_WEIGHTS = {
+    MatchField.NAME: 1.0,
+    MatchField.LABEL: 0.9,
+    MatchField.CATEGORY: 0.8,
+    MatchField.PURPOSE: 0.8,
+    MatchField.FEATURE: 0.7,
+    MatchField.NOTE: 0.6,
+    MatchField.DESCRIPTION: 0.6,
+    MatchField.PLACE: 0.4,
+    MatchField.OTHER_NAME: 0.7,
+    MatchField.USE: 0.4,
+}
+KIND_WEIGHTS = {
+    MatchKind.SAME: 1.0,
+    MatchKind.FORM: 0.95,
+    MatchKind.MISSPELT: 0.75,
+    MatchKind.PART: 0.6,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MatchEvidence:
+    """One word of the phrase, and where the record says it.
+
+    Attributes:
+        query_word: As it stands in the phrase.
+        found_word: As it stands in the record.
+        field: Which part of the record.
+        text: The name, label, purpose, feature, note or description it stands in.
+        kind: How the two words are the same.
+    """
+
+    query_word: str
+    found_word: str
+    field: MatchField
+    text: str
+    kind: MatchKind
+
+    @property
+    def weight(self) -> float:
+        """How much this finding says, up to 1."""
+        return FIELD_WEIGHTS[self.field] * KIND_WEIGHTS[self.kind]
+
+
+class EntryKind(StrEnum):
+    """What sort of thing is remembered."""
+
+    PLACE = "place"
+    THING = "thing"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entry:
+    """A place or a thing, with all that is said of it.
+
+    Attributes:
+        id: What its owner knows it by; no two entries share it.
+        kind: Whether it is a place or a thing.
+        name: The place's name or the thing's label.
+        category: What sort of equipment it is.
+        purpose: What it is good for.
+        note: Anything else.
+        description: The same in whole sentences.
+        features: Persistent layout, such as "corner of two walls".
+        place: For a thing, the name of the place where it is.
+        surroundings: What is said of that place.
+        other_names: What else it is called.
+    """
+
+    id: str
+    kind: EntryKind
+    name: str
+    category: str | None = None
+    purpose: str | None = None
+    note: str | None = None
+    description: str = ""
+    features: tuple[str, ...] = ()
+    place: str | None = None
+    surroundings: tuple[str, ...] = ()
+    other_names: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All that it is called, its own name first."""
+        return (self.name, *self.other_names)
+
+    @property
+    def texts(self) -> tuple[tuple[MatchField, str], ...]:
+        """All that is said of it, its name first; each text with the part of the record it is."""
+        return tuple((field, text) for field, text in self._fields() if text)
+
+    def _fields(self) -> Iterator[tuple[MatchField, str | None]]:
+        called = MatchField.NAME if self.kind is EntryKind.PLACE else MatchField.LABEL
+        yield from ((called, name) for name in self.names)
+        yield MatchField.CATEGORY, self.category
+        yield MatchField.PURPOSE, self.purpose
+        yield MatchField.NOTE, self.note
+        yield MatchField.DESCRIPTION, self.description
+        yield from ((MatchField.FEATURE, feature) for feature in self.features)
+        yield MatchField.PLACE, self.place
+        yield from ((MatchField.PLACE, text) for text in self.surroundings)
+
+
+def list_entries(semantic_map: SemanticMap) -> tuple[Entry, ...]:
+    """Return each place followed by the landmarks seen from it.
+
+    A place is known by the key of its name; its landmark by both keys and, where one label stands
+    there several times, by its number among those.
+    """
+    return tuple(entry for place in semantic_map.waypoints for entry in _entries_of(place))
+
+
+def _entries_of(place: Waypoint) -> Iterator[Entry]:
+    yield Entry(
+        id=name_key(place.name),
+        kind=EntryKind.PLACE,
+        name=place.name,
+        description=place.description,
+        features=place.geometric_features,
+    )
+    n_before: Counter[str] = Counter()
+    for landmark in place.landmarks:
+        key = name_key(landmark.label)
+        n_before[key] += 1
+        number = f" / {n_before[key]}" if n_before[key] > 1 else ""
+        yield _thing(landmark, place, id_=f"{name_key(place.name)} / {key}{number}")
+
+
+def _thing(landmark: Landmark, place: Waypoint, *, id_: str) -> Entry:
+    return Entry(
+        id=id_,
+        kind=EntryKind.THING,
+        name=landmark.label,
+        category="safety equipment" if landmark in place.safety_landmarks else None,
+        purpose=landmark.purpose,
+        note=landmark.note,
+        place=place.name,
+        surroundings=(place.description, *place.geometric_features),
+    )
+
+
+class Verdict(StrEnum):
+    """How far an answer may be trusted.
+
+    Likely: one fits, but what is remembered of it is not sure. A search of words alone never says
+    that; who knows the views of a thing does.
+    """
+
+    FOUND = "found"
+    LIKELY = "likely"
+    AMBIGUOUS = "ambiguous"
+    NOT_REMEMBERED = "not_remembered"
+
+
+class Basis(StrEnum):
+    """What speaks for a candidate: its name, what it means, or the words said of it."""
+
+    NAME = "name"
+    MEANING = "meaning"
+    WORDS = "words"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Thresholds:
+    """How likenesses are judged; each way of comparing has a scale of its own.
+
+    How sure an answer is, is how alike the request and what is said of the first candidate are,
+    plus how far that is ahead of the first that is called otherwise.
+
+    Attributes:
+        least_ratio: Surer than that something may be meant; else it is not remembered.
+        sure_ratio: As sure as that the first candidate's kind is the one meant.
+        same_ratio: Scores no further apart are as good as equal.
+        absent_ratio: Where a kind of thing that is not remembered is so much more like a request
+            than anything that is, that kind is meant; never where infinite.
+    """
+
+    least_ratio: float
+    sure_ratio: float
+    same_ratio: float
+    absent_ratio: float = math.inf
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EntryCandidate:
+    """Something that a request may mean.
+
+    Attributes:
+        entry: The place or thing.
+        score_ratio: How alike it and the request are; 1 for its very name.
+        basis: What the score compares.
+        field: Which part of the record is most like the request.
+        text: What stands there.
+        evidence: The words of the request that the record says.
+        said_ratio: How much of the request the record says word for word; rare words and names
+            count more, parts of words nothing.
+    """
+
+    entry: Entry
+    score_ratio: float
+    basis: Basis
+    field: MatchField
+    text: str
+    evidence: tuple[MatchEvidence, ...]
+    said_ratio: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """What is remembered of a request.
+
+    Attributes:
+        query: The request, as it was given.
+        understood: The same with misspelt words put right.
+        verdict: How far to trust the first candidate. Where nothing is remembered the candidates
+            are only the nearest things, and probably none of them is meant.
+        candidates: The likeliest first.
+        n_meant: How many, of all that is remembered, fit as well as the first.
+        is_sure: Whether what is meant is called as the first is, however many of it there are.
+        limits: What the search could not do, in words; None where nothing was missing.
+        missing: A kind of thing that is not remembered and more like the request than anything
+            that is; None where there is none, or no model to compare them.
+    """
+
+    query: str
+    understood: str
+    verdict: Verdict
+    candidates: tuple[EntryCandidate, ...]
+    n_meant: int
+    is_sure: bool
+    limits: str | None = None
+    missing: str | None = None
+
+    def find_speaking(self, *, least_said_ratio: float) -> tuple[EntryCandidate, ...]:
+        """Return the candidates that are surely meant, or that say enough of the request."""
+        n_sure = self.n_meant if self.is_sure else 0
+        return tuple(
+            each
+            for number, each in enumerate(self.candidates)
+            if number < n_sure or each.said_ratio >= least_said_ratio
+        )

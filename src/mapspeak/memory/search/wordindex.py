@@ -1,0 +1,286 @@
+"""Compare the words of a phrase with those of many records, rare words counting more."""
+
+import difflib
+import math
+import re
+import unicodedata
+from bisect import bisect_left
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from itertools import takewhile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mapspeak.memory.policy import words_of
+from mapspeak.memory.search.answer import (
+    FIELD_WEIGHTS,
+    KIND_WEIGHTS,
+    MatchEvidence,
+    MatchField,
+    MatchKind,
+)
+
+
+@cache
+def read_wordpieces() -> tuple[str, ...]:
+    """Read the pieces in the order of their numbers, once: nothing ever changes them."""
+    text = (
+        resources.files("mapspeak.memory")
+        .joinpath("data/wordpieces.txt")
+        .read_text(encoding="utf-8")
+    )
+    return tuple(text.split("\n")[:-1])
+
+
+def is_word(word: str) -> bool:
+    """Whether a word in small letters without accents is one of the pieces as a whole."""
+    return word in _all_pieces()
+
+
+@cache
+def _all_pieces() -> frozenset[str]:
+    return frozenset(read_wordpieces())
+
+
+_ENDING = re.compile(r"(?<=\w)['\u2019](?:d|ll|m|re|s|t|ve)\b", re.IGNORECASE)
+"""What is left of a word in "I'm", "where's" and "won't"."""
+
+
+def split_words(text: str) -> Iterator[tuple[str, str]]:
+    """Return each word as it stands and as it is compared: small letters without accents."""
+    for shown in re.findall(r"\w+", text):
+        yield shown, shown.lower() if shown.isascii() else _without_accents(shown)
+
+
+def _without_accents(word: str) -> str:
+    letters = unicodedata.normalize("NFKD", word.casefold())
+    return "".join(letter for letter in letters if not unicodedata.combining(letter))
+
+
+def content_words(text: str) -> Iterator[tuple[str, str]]:
+    """Return the words that say what is meant, without "the", "where's" and "take me to"."""
+    words, fillers = list(split_words(_ENDING.sub("", text))), words_of("fillers")
+    for number, (shown, word) in enumerate(words, 1):
+        # "Aisle A" is not any aisle.
+        tells_apart = len(word) == 1 and 1 < number == len(words)
+        if tells_apart or word not in fillers:
+            yield shown, word
+
+
+def content_stems(text: str) -> tuple[str, ...]:
+    """Return the stems of the words that say what is meant."""
+    return tuple(stem(word) for _, word in content_words(text))
+
+
+def stem(word: str) -> str:
+    """Cut an English ending off: plural, -ing, -ed, -er, a last e."""
+    if len(word) > 4 and word.endswith("ies"):
+        word = word[:-3] + "y"
+    elif len(word) > 4 and word.endswith(("ses", "xes", "zes", "ches", "shes")):
+        word = word[:-2]
+    elif len(word) > 3 and word.endswith("s") and not word.endswith("ss"):
+        word = word[:-1]
+    for ending, n_left in (("ing", 3), ("ed", 3), ("er", 5)):
+        if word.endswith(ending) and len(word) - len(ending) >= n_left:
+            word = word.removesuffix(ending)
+            return word[:-1] if word[-1] == word[-2] and word[-1] not in "ls" else word
+    return word.removesuffix("e") if len(word) > 3 else word
+
+
+_MIN_LETTERS = 4
+"""A shorter word has too many others near it."""
+
+_MIN_LIKENESS_RATIO = 0.8
+_MOST_MISSPELT = 3
+_N_BUCKETS = 32
+"""Letters are counted in so many; two in one bucket let more words through, never fewer."""
+
+
+class LookAlikes:
+    """Texts, ready to be asked for those that are spelt like another."""
+
+    def __init__(self, texts: Iterable[str]) -> None:
+        self._texts = sorted(set(texts))
+        self._letters = np.array([_letters(text) for text in self._texts]).reshape(-1, _N_BUCKETS)
+        self._lengths = np.array([len(text) for text in self._texts], dtype=int)
+
+    def find(self, text: str, *, least_ratio: float, limit: int) -> list[str]:
+        """Find the texts whose spelling is at least so much like this one's, the likest first."""
+        # It is the bound that difflib calls quick_ratio, for all texts at once.
+        n_shared = np.minimum(self._letters, _letters(text)).sum(axis=1)
+        is_like = 2 * n_shared >= least_ratio * (self._lengths + len(text))
+        likely = [self._texts[number] for number in np.flatnonzero(is_like)]
+        return difflib.get_close_matches(text, likely, n=limit, cutoff=least_ratio)
+
+
+class Vocabulary:
+    """The words of all records, ready to be asked for one of them.
+
+    Args:
+        words: As they are compared.
+        is_known: Whether it is a word of the language, and so not a misspelt one.
+    """
+
+    def __init__(
+        self, words: Iterable[str], *, is_known: Callable[[str], bool] = lambda _: False
+    ) -> None:
+        self._words = sorted(set(words))
+        self._look_alikes = LookAlikes(self._words)
+        self._is_known = is_known
+        self._of_stem: dict[str, list[str]] = defaultdict(list)
+        for word in self._words:
+            self._of_stem[stem(word)].append(word)
+        self._stems = sorted(self._of_stem)
+        self._stems_backwards = sorted(own[::-1] for own in self._stems)
+
+    def is_doubtful(self, word: str) -> bool:
+        """Whether a word is neither one of these nor a known one, and so perhaps misspelt."""
+        ways = set(self.find_spellings(word).values())
+        return ways <= {MatchKind.MISSPELT} and not self._is_known(word)
+
+    def find_spellings(self, word: str) -> dict[str, MatchKind]:
+        """Find the words that count as this one, each with how; none where no word does."""
+        found = dict.fromkeys(self._of_stem.get(stem(word), ()), MatchKind.FORM)
+        if word in found:
+            found[word] = MatchKind.SAME
+        found = dict.fromkeys(self._parts(stem(word)), MatchKind.PART) | found
+        return found or dict.fromkeys(self._misspelt(word), MatchKind.MISSPELT)
+
+    def _parts(self, asked: str) -> list[str]:
+        """Return the words that begin or end with this stem, or that it begins or ends with."""
+        n = len(asked)
+        if n < _MIN_LETTERS:
+            return []
+        begins = {asked[:end] for end in range(_MIN_LETTERS, n + 1)}
+        ends = {asked[start:] for start in range(n - _MIN_LETTERS + 1)}
+        stems = {own for own in begins | ends if own in self._of_stem}
+        stems.update(_beginning_with(self._stems, asked))
+        stems.update(own[::-1] for own in _beginning_with(self._stems_backwards, asked[::-1]))
+        return sorted(word for own in stems for word in self._of_stem[own])
+
+    def _misspelt(self, word: str) -> list[str]:
+        if len(word) < _MIN_LETTERS or self._is_known(word):
+            return []
+        return self._look_alikes.find(word, least_ratio=_MIN_LIKENESS_RATIO, limit=_MOST_MISSPELT)
+
+
+def _beginning_with(words: Sequence[str], start: str) -> Iterator[str]:
+    """Return the words that begin so, of words in order."""
+    behind = (words[number] for number in range(bisect_left(words, start), len(words)))
+    return takewhile(lambda word: word.startswith(start), behind)
+
+
+def _letters(word: str) -> NDArray[np.int64]:
+    return np.bincount([ord(letter) % _N_BUCKETS for letter in word], minlength=_N_BUCKETS)
+
+
+Texts = Sequence[tuple[MatchField, str]]
+"""What a record says, each text with the part of the record it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class AskedWords:
+    """A word of the phrase.
+
+    Attributes:
+        shown: As it stands there.
+        spellings: The words of the records that count as this one, the likeliest misspelt first.
+        weight: The rarer in the records, the more.
+        is_doubtful: Whether neither records nor language know the word as it is spelt.
+    """
+
+    shown: str
+    spellings: dict[str, MatchKind]
+    weight: float
+    is_doubtful: bool
+
+    @property
+    def corrected(self) -> str:
+        """The word as it should have been spelt, where it counts as misspelt."""
+        is_misspelt = MatchKind.MISSPELT in self.spellings.values()
+        return next(iter(self.spellings)) if is_misspelt else self.shown
+
+
+class WordIndex:
+    """The words of records, each with the numbers of the records that say it.
+
+    Args:
+        records: What each record says.
+        is_known: Whether it is a word of the language, and so not a misspelt one.
+    """
+
+    def __init__(
+        self, records: Sequence[Texts], *, is_known: Callable[[str], bool] = lambda _: False
+    ) -> None:
+        self._records = records
+        weights: dict[str, dict[int, float]] = defaultdict(dict)
+        # Many records say the same.
+        words_of: dict[str, list[str]] = {}
+        for number, texts in enumerate(records):
+            for field, text in texts:
+                if text not in words_of:
+                    words_of[text] = [word for _, word in split_words(text)]
+                for word in words_of[text]:
+                    least = weights[word].get(number, 0.0)
+                    weights[word][number] = max(least, FIELD_WEIGHTS[field])
+        self._postings = {
+            word: (np.array(list(found)), np.array(list(found.values())))
+            for word, found in weights.items()
+        }
+        self._vocabulary = Vocabulary(self._postings, is_known=is_known)
+
+    def ask(self, phrase: str) -> tuple[AskedWords, ...]:
+        """Return words of a phrase that say what is meant, and what the records have of them."""
+        found = []
+        for shown, compared in content_words(phrase):
+            spellings = self._vocabulary.find_spellings(compared)
+            n_with = sum(len(self._postings[spelling][0]) for spelling in spellings)
+            weight = math.log1p(len(self._records) / max(n_with, 1))
+            is_doubtful = self._vocabulary.is_doubtful(compared)
+            found.append(AskedWords(shown, spellings, weight, is_doubtful))
+        return tuple(found)
+
+    def score_ratios(self, asked: Sequence[AskedWords]) -> NDArray[np.float64]:
+        """Return, for each record, how much of a phrase it says; rare words count more."""
+        return self._score_ratios(asked, KIND_WEIGHTS)
+
+    def said_ratios(self, asked: Sequence[AskedWords]) -> NDArray[np.float64]:
+        """Return the same where a part of a longer word counts as nothing."""
+        return self._score_ratios(asked, KIND_WEIGHTS | {MatchKind.PART: 0.0})
+
+    def _score_ratios(
+        self, asked: Sequence[AskedWords], kind_weights: Mapping[MatchKind, float]
+    ) -> NDArray[np.float64]:
+        found = np.zeros(len(self._records))
+        for word in asked:
+            best = np.zeros(len(self._records))
+            for spelling, kind in word.spellings.items():
+                numbers, weights = self._postings[spelling]
+                best[numbers] = np.maximum(best[numbers], weights * kind_weights[kind])
+            found += word.weight * best
+        return found / max(sum(word.weight for word in asked), 1e-9)
+
+    def explain(self, asked: Sequence[AskedWords], number: int) -> tuple[MatchEvidence, ...]:
+        """Return at most one finding in a record for each word of a phrase, in their order."""
+        findings = (self._finding(word, number) for word in asked)
+        return tuple(finding for finding in findings if finding)
+
+    def _finding(self, asked: AskedWords, number: int) -> MatchEvidence | None:
+        """Return the weightiest place in a record that says a word."""
+        findings = (
+            MatchEvidence(
+                query_word=asked.shown,
+                found_word=shown,
+                field=field,
+                text=text,
+                kind=asked.spellings[compared],
+            )
+            for field, text in self._records[number]
+            for shown, compared in split_words(text)
+            if compared in asked.spellings
+        )
+        return max(findings, key=lambda finding: finding.weight, default=None)

@@ -1,0 +1,277 @@
+"""Where records and line ends stand in a semantic map file, without a YAML parser."""
+
+import json
+import re
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from difflib import SequenceMatcher
+
+from mapspeak.memory.store.editing import is_plain, is_plain_in_flow
+from mapspeak.memory.store.tree import Data
+
+_LIST_KEY = re.compile(r"^waypoints:[ \t]*(?:#[^\n]*)?$", re.MULTILINE)
+_CONTENT = re.compile(r"^( *)([^ #\n])", re.MULTILINE)
+_UNUSUAL_BREAK = re.compile("[\r\x85\u2028\u2029]")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Layout:
+    """Where the records stand.
+
+    Attributes:
+        spans: From each dash's line to behind the record's last line; comments between records
+            belong to none.
+        indent: The column of the dashes.
+        start: Of the first record; the end of the text where there is none.
+        end: Of the last record and the comments behind it; likewise.
+    """
+
+    spans: tuple[tuple[int, int], ...]
+    indent: int
+    start: int
+    end: int
+
+    def skeleton(self, text: str) -> str:
+        """Return the text without its records."""
+        return text[: self.start] + text[self.end :]
+
+    def offset_in_text(self, offset_in_skeleton: int) -> int:
+        """Return where in the text a place of the skeleton stands."""
+        is_before = offset_in_skeleton < self.start
+        return offset_in_skeleton + (0 if is_before else self.end - self.start)
+
+
+def find_records(text: str) -> Layout:
+    """Find the records of a text whose lines end in a line feed."""
+    key = _LIST_KEY.search(text)
+    first = _CONTENT.search(text, key.end()) if key else None
+    if first is None or _UNUSUAL_BREAK.search(text):
+        return whole(text)
+    indent = len(first[1])
+    dash, behind = _patterns(indent)
+    if not dash.match(text, first.start()):
+        return whole(text)
+    after = behind.search(text, first.start())
+    end = after.start() if after else len(text)
+    spans = _find_spans(text, first.start(), end, indent)
+    return Layout(spans=spans, indent=indent, start=first.start(), end=end)
+
+
+def find_changed_records(text: str, *, before: str, layout: Layout) -> Layout:
+    """Find the records of a text that was changed, by looking only at what changed.
+
+    Args:
+        text: As it is now.
+        before: As it was.
+        layout: Where the records stood in that.
+    """
+    n_same = _count_same(before, text)
+    n_same_behind = _count_same(before[n_same:][::-1], text[n_same:][::-1])
+    starts = [start for start, _ in layout.spans]
+    # From the record before the first change, whose end may depend on what follows it.
+    first = bisect_right(starts, n_same) - 2
+    last = bisect_left(starts, len(before) - n_same_behind + 1)
+    n_more = len(text) - len(before)
+    if first < 0 or len(before) - n_same_behind > layout.end:
+        return find_records(text)
+    if layout.end < len(before) and text[layout.end + n_more - 1] != "\n":
+        # What followed the records has become a part of their last line.
+        return find_records(text)
+    start, end = starts[first], (starts[last] if last < len(starts) else layout.end) + n_more
+    dash, behind = _patterns(layout.indent)
+    is_list = dash.match(text, start) and not behind.search(text, start, end)
+    if not is_list or _UNUSUAL_BREAK.search(text, start, end):
+        return find_records(text)
+    spans = (
+        *layout.spans[:first],
+        *_find_spans(text, start, end, layout.indent),
+        *((a + n_more, b + n_more) for a, b in layout.spans[last:]),
+    )
+    return Layout(spans=spans, indent=layout.indent, start=layout.start, end=layout.end + n_more)
+
+
+def _patterns(indent: int) -> tuple[re.Pattern[str], re.Pattern[str]]:
+    """Return what begins a record, and what begins a line that belongs to none."""
+    item = rf" {{{indent}}}-(?:[ \t\n]|\Z)"
+    dash = re.compile(rf"^{item}", re.MULTILINE)
+    return dash, re.compile(rf"^(?!{item}) {{0,{indent}}}[^ #\n]", re.MULTILINE)
+
+
+def _find_spans(text: str, start: int, end: int, indent: int) -> tuple[tuple[int, int], ...]:
+    dash, _ = _patterns(indent)
+    starts = [match.start() for match in dash.finditer(text, start, end)]
+    return tuple(
+        (a, _content_end(text, a, b, indent))
+        for a, b in zip(starts, [*starts[1:], end], strict=True)
+    )
+
+
+def _count_same(one: str, other: str) -> int:
+    """Count the letters that two texts begin with alike."""
+    low, high = 0, min(len(one), len(other))
+    while low < high:
+        middle = (low + high + 1) // 2
+        if one[low:middle] == other[low:middle]:
+            low = middle
+        else:
+            high = middle - 1
+    return low
+
+
+def whole(text: str) -> Layout:
+    """Return the layout of a text whose records cannot be told apart by their dashes."""
+    return Layout(spans=(), indent=2, start=len(text), end=len(text))
+
+
+def _content_end(text: str, start: int, end: int, indent: int) -> int:
+    """Cut blank lines, and comments that stand no further right than the dash, off the end."""
+    while True:
+        end = start + len(text[start:end].rstrip(" \t\n"))
+        line_start = text.rfind("\n", start, end) + 1
+        line = text[line_start:end].lstrip(" ")
+        if not line.startswith("#") or end - line_start - len(line) > indent or line_start <= start:
+            break
+        end = line_start
+    line_end = text.find("\n", end)
+    return len(text) if line_end < 0 else line_end + 1
+
+
+_ENTRY = re.compile(r"([a-z_]+):(?: +(\S.*))?")
+_NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
+_TIME = re.compile(r"\d{4}-\d\d-\d\dT[\d:.]+(?:Z|[+-]\d\d:\d\d)")
+_QUOTED = re.compile(r'"(?:[^"\\]|\\["\\n])*"')
+
+
+class _UnsureError(Exception):
+    """This text needs the YAML parser."""
+
+
+def read_plain_record(block: str) -> dict[str, Data] | None:
+    """Return what one item of the list `waypoints` says; None when a YAML parser must decide."""
+    try:
+        return _read_lines(block.rstrip("\n").split("\n"))
+    except _UnsureError:
+        return None
+
+
+def _read_lines(lines: list[str]) -> dict[str, Data]:
+    margin, dash, first_entry = lines[0].partition("- ")
+    _sure(dash and not margin.strip(" "))
+    record: dict[str, Data] = {}
+    items: list[Data] | None = None
+    entry_margin, item_margin = f"{margin}  ", f"{margin}    - "
+    for line in (entry_margin + first_entry, *lines[1:]):
+        _sure(line.isprintable())
+        if line.startswith(item_margin) and items is not None:
+            items.append(_read_value(line.removeprefix(item_margin)))
+            continue
+        key, value = _read_entry(line, entry_margin)
+        _sure(items != [] and key not in record)
+        items = [] if value is None else None
+        record[key] = items if value is None else _read_value(value)
+    _sure(items != [])
+    return record
+
+
+def _read_entry(line: str, margin: str) -> tuple[str, str | None]:
+    entry = _ENTRY.fullmatch(line, len(margin))
+    if entry is None or not line.startswith(margin):
+        raise _UnsureError
+    return entry[1], entry[2]
+
+
+def _read_value(text: str) -> Data:
+    if text == "[]":
+        return []
+    if text.startswith("[") and text.endswith("]"):
+        return [_read_flow_scalar(item) for item in text[1:-1].split(", ")]
+    if text.startswith("{") and text.endswith("}"):
+        return _read_flow_mapping(text[1:-1])
+    if _QUOTED.fullmatch(text):
+        return str(json.loads(text))
+    _sure(is_plain(text) or _NUMBER.fullmatch(text) or _TIME.fullmatch(text))
+    return text
+
+
+def _read_flow_mapping(text: str) -> Data:
+    mapping: dict[str, Data] = {}
+    for part in text.split(", "):
+        entry = _ENTRY.fullmatch(part)
+        if entry is None or entry[2] is None or entry[1] in mapping:
+            raise _UnsureError
+        mapping[entry[1]] = _read_flow_scalar(entry[2])
+    return mapping
+
+
+def _read_flow_scalar(text: str) -> str:
+    _sure(is_plain_in_flow(text) or _NUMBER.fullmatch(text) or _TIME.fullmatch(text))
+    return text
+
+
+def _sure(is_sure: object) -> None:
+    if not is_sure:
+        raise _UnsureError
+
+
+LF, CRLF = "\n", "\r\n"
+
+
+@dataclass(frozen=True, slots=True)
+class LineEnds:
+    """The line ends of a file that was read.
+
+    Attributes:
+        usual: What most of its lines end in, and every new one.
+        lines: Its lines without their ends.
+        ends: What each of them ends in, but the last; both are empty where all end alike.
+    """
+
+    usual: str
+    lines: tuple[str, ...] = ()
+    ends: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, decoded: str) -> "LineEnds":
+        """Take them from a file's text."""
+        if "\r" not in decoded:
+            # To look for one letter costs a hundredth of counting two.
+            return cls(LF)
+        n_lines, n_crlf = decoded.count(LF), decoded.count(CRLF)
+        usual = CRLF if 2 * n_crlf > n_lines else LF
+        if n_crlf in (0, n_lines):
+            return cls(usual)
+        *ended, last = decoded.split(LF)
+        ends = tuple(CRLF if line.endswith("\r") else LF for line in ended)
+        return cls(usual, (*(line.removesuffix("\r") for line in ended), last), ends)
+
+    def restored(self, text: str) -> str:
+        """Return a text whose lines end in a line feed with the ends of this file.
+
+        Args:
+            text: What the file is to say; most of its lines stood in the file before.
+        """
+        if not self.lines:
+            return text if self.usual == LF else text.replace(LF, self.usual)
+        *ended, last = text.split(LF)
+        ends = [self.usual] * len(ended)
+        for before, after in _same_lines(self.lines[:-1], ended):
+            ends[after] = self.ends[before]
+        return "".join(line + end for line, end in zip(ended, ends, strict=True)) + last
+
+
+def _same_lines(before: Sequence[str], after: Sequence[str]) -> Iterator[tuple[int, int]]:
+    """Return the numbers of lines that are the same, before and after."""
+    n_least = min(len(before), len(after))
+    n_top = next((i for i in range(n_least) if before[i] != after[i]), n_least)
+    n_most = n_least - n_top
+    n_end = next((i for i in range(n_most) if before[-1 - i] != after[-1 - i]), n_most)
+    yield from ((i, i) for i in range(n_top))
+    yield from ((len(before) - 1 - i, len(after) - 1 - i) for i in range(n_end))
+    old, new = before[n_top : len(before) - n_end], after[n_top : len(after) - n_end]
+    if len(old) == len(new):
+        # Values were changed in their places.
+        yield from ((n_top + i, n_top + i) for i in range(len(old)) if old[i] == new[i])
+        return
+    for block in SequenceMatcher(None, old, new).get_matching_blocks():
+        yield from ((n_top + block.a + i, n_top + block.b + i) for i in range(block.size))

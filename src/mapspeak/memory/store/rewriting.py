@@ -1,0 +1,309 @@
+"""A changed file: a record, an event or all places written; every other character as it was."""
+
+from dataclasses import replace
+
+from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import Pose
+from mapspeak.memory.events import Event
+from mapspeak.memory.quoting import name_key
+from mapspeak.memory.store.document import MapDocument, parse_document
+from mapspeak.memory.store.editing import edited_record, entry_text, record_text
+from mapspeak.memory.store.eventschema import event_data
+from mapspeak.memory.store.schema import FILE_VERSION, record_data
+from mapspeak.memory.store.tree import (
+    Data,
+    ListNode,
+    MappingNode,
+    Node,
+    ScalarNode,
+    line_and_column,
+)
+from mapspeak.memory.waypoint import Waypoint
+
+_GREETING = "# mapspeak semantic map. Edit freely: comments and order are kept.\n"
+_OPTIONAL_KEYS = ("stamp_s", "recorded_at", "room_id", "picture")
+
+
+def bound_to(document: MapDocument, map_id: str) -> MapDocument:
+    """Return the file with the map that its waypoints belong to."""
+    return with_entry(document, "map", map_id)
+
+
+def with_entry(document: MapDocument, key: str, value: str) -> MapDocument:
+    """Return the file with one key of its own, beside the records, saying something else."""
+    text = document.text
+    entry = entry_text(key, value, indent=0)
+    present = document.root.find_value(key) if document.root else None
+    listed = document.root.find_key("waypoints") if document.root else None
+    if present is not None:
+        start, end = map(document.layout.offset_in_text, (present.start, present.end))
+        text = text[:start].rstrip(" ") + entry.removeprefix(f"{key}:") + text[end:]
+    elif listed is not None:
+        start = document.layout.offset_in_text(listed.start)
+        text = text[:start] + entry + "\n" + text[start:]
+    elif document.root is not None:
+        text = _ended(text) + entry + "\n"
+    else:
+        text = _ended(text or _GREETING) + f"version: {FILE_VERSION}\n{entry}\n"
+    return _reparsed(document, text, keys=set(document.records))
+
+
+def with_waypoint(document: MapDocument, waypoint: Waypoint) -> MapDocument:
+    """Return the file with a waypoint written: in its own record if its name is there already.
+
+    Raises:
+        SemanticMapError: The file is laid out in a way that cannot be written to.
+    """
+    key = name_key(waypoint.name)
+    record = document.records.get(key)
+    said = record_data(waypoint)
+    if record is None:
+        text = _with_record(document, said)
+    else:
+        _require_cut(document, record.start)
+        block = document.text[record.start : record.end]
+        changed = edited_record(block, old=record_data(record.reading.waypoint), new=said)
+        text = document.text[: record.start] + changed + document.text[record.end :]
+    written = _reparsed(document, text, keys={*document.records, key})
+    if record_data(written.records[key].reading.waypoint) != said:
+        raise _layout_error(document, record.start if record else len(document.text))
+    return written
+
+
+def without_waypoint(document: MapDocument, key: str) -> MapDocument:
+    """Return the file without one record; comments around it stay.
+
+    Raises:
+        SemanticMapError: The file is laid out in a way that cannot be written to.
+    """
+    record = document.records[key]
+    _require_cut(document, record.start)
+    before, after = document.text[: record.start], document.text[record.end :]
+    if before.endswith("\n\n") and after.startswith("\n"):
+        after = after[1:]
+    return _reparsed(document, before + after, keys=set(document.records) - {key})
+
+
+def _with_record(document: MapDocument, said: dict[str, Data]) -> str:
+    layout, text = document.layout, document.text
+    shown = {k: v for k, v in said.items() if v is not None or k not in _OPTIONAL_KEYS}
+    record = record_text(shown, indent=layout.indent)
+    if not layout.spans:
+        return _with_first_record(document, record)
+    last_end = layout.spans[-1][1]
+    is_airy = len(layout.spans) < 2 or text[layout.spans[-2][1] :].startswith("\n")
+    gap = "\n" if is_airy else ""
+    return _ended(text[:last_end]) + gap + record + text[last_end:]
+
+
+def _with_first_record(document: MapDocument, record: str) -> str:
+    text, root = document.text, document.root
+    if root is None:
+        return _ended(text or _GREETING) + f"version: {FILE_VERSION}\nwaypoints:\n{record}"
+    key, listed = root.find_key("waypoints"), root.find_value("waypoints")
+    if key is None or listed is None:
+        return _ended(text) + f"waypoints:\n{record}"
+    if isinstance(listed, ListNode) and listed.items:
+        raise _layout_error(document, key.start)
+    line_end = _line_end(text, listed.end)
+    head = text[: listed.start].rstrip(" ") + text[listed.end : line_end]
+    return f"{head}\n{record}{text[line_end + 1 :]}"
+
+
+def _require_cut(document: MapDocument, start: int) -> None:
+    if not document.layout.spans:
+        raise _layout_error(document, start)
+
+
+def _reparsed(document: MapDocument, text: str, *, keys: set[str]) -> MapDocument:
+    """Read the changed text before anybody relies on it."""
+    try:
+        changed = parse_document(document.encoded(text), source=document.source, previous=document)
+    except SemanticMapError as error:
+        raise _layout_error(document, 0) from error
+    if set(changed.records) != keys:
+        raise _layout_error(document, 0)
+    return changed
+
+
+def _layout_error(document: MapDocument, offset: int) -> SemanticMapError:
+    line, _ = line_and_column(document.text, offset)
+    return SemanticMapError(
+        f"{document.source}, line {line}: mapspeak reads this layout, but cannot write to it.",
+        hint="Put `waypoints:` at the start of a line and each waypoint below it as `- name: ...`, "
+        "its other keys on lines of their own. Nothing was written.",
+    )
+
+
+def _ended(text: str) -> str:
+    return text if not text or text.endswith("\n") else text + "\n"
+
+
+def _line_end(text: str, offset: int) -> int:
+    end = text.find("\n", offset)
+    return len(text) if end < 0 else end
+
+
+_INDENT = 2
+
+
+def with_event(document: MapDocument, event: Event) -> tuple[MapDocument, Event]:
+    """Return the file with an event written: in its own record if its id is there already.
+
+    Returns:
+        The file, and the event as it reads there, with its id.
+
+    Raises:
+        SemanticMapError: The file is laid out in a way that cannot be written to.
+    """
+    named = event if event.id else replace(event, id=_free_id(document))
+    if named.id in document.events:
+        text = changed_events(document, {named.id: named})
+    else:
+        text = _with_new(document, named)
+    changed = _reparsed_with_events(document, text)
+    written = changed.events.get(named.id)
+    if written is None or event_data(written.event) != event_data(named):
+        raise _events_layout_error(document)
+    return changed, written.event
+
+
+def changed_events(document: MapDocument, events: dict[str, Event]) -> str:
+    """Return the file's text with some of its events changed."""
+    text = document.text
+    for record in sorted(document.events.values(), key=lambda each: -each.start):
+        new = events.get(record.event.id)
+        if new is None:
+            continue
+        # As an item of its own, indented as it was: comments and spelling stay.
+        line_start = text.rfind("\n", 0, record.start) + 1
+        before, block = text[line_start : record.start], text[record.start : record.end]
+        if before.strip(" -"):
+            raise _events_layout_error(document)
+        item = " " * len(before) + block
+        edited = edited_record(item, old=event_data(record.event), new=event_data(new))
+        text = text[:line_start] + before + edited[len(before) :] + text[record.end :]
+    return text
+
+
+def _with_new(document: MapDocument, event: Event) -> str:
+    text, root = document.text, document.root
+    ended = text if not text or text.endswith("\n") else text + "\n"
+    said = event_data(event)
+    key = root.find_key("events") if root else None
+    if root is None or key is None:
+        return f"{ended}events:\n{record_text(said, indent=_INDENT)}"
+    listed = root.find_value("events")
+    if isinstance(listed, ListNode) and listed.items:
+        return _behind_last(document, listed, event)
+    return _in_empty(document, key, listed, record_text(said, indent=_INDENT))
+
+
+def _in_empty(document: MapDocument, key: ScalarNode, listed: Node | None, record: str) -> str:
+    """Return the text with a first record below the key, in place of `[]` or null."""
+    text = document.text
+    # Where nothing stands behind the key, a value has no place of its own.
+    is_written = listed is not None and listed.end > listed.start
+    node = listed if listed is not None and is_written else key
+    start, end = map(document.layout.offset_in_text, (node.start, node.end))
+    before, behind = (text[:start], end) if is_written else (text[:end], end)
+    if is_written and "#" in text[start:end]:
+        raise _events_layout_error(document)
+    line_end = _line_end(text, behind)
+    rest = text[behind:line_end].rstrip()
+    head = before if rest else before.rstrip(" \t")
+    return f"{head}{rest}\n{record}{text[line_end + 1 :]}"
+
+
+def _behind_last(document: MapDocument, listed: ListNode, event: Event) -> str:
+    last = listed.items[-1]
+    if listed.is_flow or not isinstance(last, MappingNode):
+        raise _events_layout_error(document)
+    text = document.text
+    start, end = map(document.layout.offset_in_text, (last.start, last.end))
+    line_start = text.rfind("\n", 0, start) + 1
+    dash = text[line_start:start].find("-")
+    if dash < 0:
+        raise _events_layout_error(document)
+    line_end = _line_end(text, end)
+    head = text[:line_end] + "\n"
+    return head + record_text(event_data(event), indent=dash) + text[line_end + 1 :]
+
+
+def _free_id(document: MapDocument) -> str:
+    numbers = [int(each[1:]) for each in document.events if each[:1] == "E" and each[1:].isdigit()]
+    return f"E{max(numbers, default=0) + 1}"
+
+
+def _reparsed_with_events(document: MapDocument, text: str) -> MapDocument:
+    try:
+        changed = parse_document(document.encoded(text), source=document.source, previous=document)
+    except SemanticMapError as error:
+        raise _events_layout_error(document) from error
+    if set(changed.records) != set(document.records):
+        raise _events_layout_error(document)
+    return changed
+
+
+def _events_layout_error(document: MapDocument) -> SemanticMapError:
+    return SemanticMapError(
+        f"mapspeak reads the events of {document.source}, but cannot write to them.",
+        hint="Put `events:` at the start of a line and each event below it as `- text: ...`, its "
+        "other keys on lines of their own. Nothing was written.",
+    )
+
+
+def moved(document: MapDocument, motion: Pose, *, entries: dict[str, str]) -> MapDocument:
+    """Return the file with every waypoint and event moved.
+
+    Args:
+        document: The file.
+        motion: From the frame of its poses to the new one.
+        entries: Keys of the file itself that change with it, such as `map`.
+
+    Raises:
+        SemanticMapError: The file is laid out in a way that cannot be written to.
+    """
+    if document.records and not document.layout.spans:
+        raise _moved_layout_error(document)
+    after = document
+    for key, value in entries.items():
+        after = with_entry(after, key, value)
+    events = {each.event.id: _moved_event(each.event, motion) for each in after.events.values()}
+    after = _reparsed_moved(after, changed_events(after, events))
+    return _reparsed_moved(after, _with_moved_records(after, motion))
+
+
+def _with_moved_records(document: MapDocument, motion: Pose) -> str:
+    pieces, end = [], 0
+    for record in sorted(document.records.values(), key=lambda each: each.start):
+        waypoint = record.reading.waypoint
+        new = waypoint.moved(motion)
+        block = document.text[record.start : record.end]
+        changed = edited_record(block, old=record_data(waypoint), new=record_data(new))
+        pieces += [document.text[end : record.start], changed]
+        end = record.end
+    return "".join([*pieces, document.text[end:]])
+
+
+def _moved_event(event: Event, motion: Pose) -> Event:
+    return replace(
+        event,
+        at=None if event.at is None else motion.transform(event.at),
+        outlines=tuple(tuple(map(motion.transform, outline)) for outline in event.outlines),
+    )
+
+
+def _reparsed_moved(document: MapDocument, text: str) -> MapDocument:
+    changed = parse_document(document.encoded(text), source=document.source, previous=document)
+    if changed.records.keys() != document.records.keys():
+        raise _moved_layout_error(document)
+    return changed
+
+
+def _moved_layout_error(document: MapDocument) -> SemanticMapError:
+    return SemanticMapError(
+        f"mapspeak reads {document.source}, but cannot write to its layout.",
+        hint="Put `waypoints:` at the start of a line and each waypoint below it as `- name: ...`. "
+        "Nothing was written.",
+    )

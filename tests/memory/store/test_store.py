@@ -1,0 +1,388 @@
+import os
+import stat
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from filelock import FileLock
+
+from mapspeak.errors import SemanticMapError
+from mapspeak.geometry import Pose
+from mapspeak.memory import Landmark, SemanticMapStore, Waypoint
+from mapspeak.memory.store.durable import MAX_BYTES, DurableFile
+
+IS_ROOT = hasattr(os, "geteuid") and os.geteuid() == 0
+
+BROKEN = "waypoints:\n  - name: dock\n    pose: {x: 1, y: 2\n"
+
+
+def place(name: str, x: float = 1.0) -> Waypoint:
+    return Waypoint(name=name, pose=Pose(x, 2.0, 0.0))
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "places.yaml"
+
+
+@pytest.fixture
+def store(path: Path) -> SemanticMapStore:
+    return SemanticMapStore(path, map_id="b1")
+
+
+def names(store: SemanticMapStore) -> list[str]:
+    return [place.name for place in store.read().waypoints]
+
+
+# --- writing and reading ---------------------------------------------------------------------
+
+
+def test_a_store_without_a_file_is_an_empty_map_and_makes_none(
+    store: SemanticMapStore, path: Path
+) -> None:
+    assert store.read().waypoints == ()
+    assert list(path.parent.iterdir()) == []
+
+
+def test_a_new_name_creates_a_waypoint(store: SemanticMapStore) -> None:
+    receipt = store.write(place("dock"))
+
+    assert receipt.is_created
+    assert receipt.name == "dock"
+    assert receipt.n_waypoints == 1
+    assert store.read().waypoints == (receipt.waypoint,)
+    assert receipt.waypoint.map_id == "b1"
+
+
+def test_a_known_name_updates_its_waypoint_whatever_its_case(store: SemanticMapStore) -> None:
+    first = store.write(place("Dock", x=1.0)).waypoint
+    store.write(place("hall"))
+
+    receipt = store.write(place(" dock", x=5.0))
+
+    assert not receipt.is_created
+    assert receipt.previous == first
+    assert receipt.n_waypoints == 2
+    assert names(store) == ["dock", "hall"]
+    assert store.read().waypoints[0].pose.x == 5.0
+
+
+def test_what_one_store_writes_another_reads(store: SemanticMapStore, path: Path) -> None:
+    other = SemanticMapStore(path, map_id="b1")
+    assert names(other) == []
+
+    store.write(place("dock"))
+    assert names(other) == ["dock"]
+
+    other.write(place("hall"))
+    assert names(store) == ["dock", "hall"]
+
+
+def test_an_edit_in_place_of_the_same_size_and_time_is_seen(
+    store: SemanticMapStore, path: Path
+) -> None:
+    store.write(place("dock"))
+    before = path.stat()
+    path.write_text(path.read_text().replace("dock", "hall"))
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+
+    assert names(store) == ["hall"]
+    store.write(place("sink"))
+    assert names(SemanticMapStore(path, map_id="b1")) == ["hall", "sink"]
+
+
+def test_an_edit_by_hand_is_seen(store: SemanticMapStore, path: Path) -> None:
+    store.write(place("dock"))
+
+    path.write_text(path.read_text().replace("name: dock", "name: loading dock  # renamed"))
+
+    assert names(store) == ["loading dock"]
+    store.write(place("loading dock", x=9.0))
+    assert "name: loading dock  # renamed\n" in path.read_text()
+
+
+def test_an_unchanged_file_is_not_read_again(store: SemanticMapStore) -> None:
+    store.write(place("dock"))
+
+    assert store.read().waypoints[0] is store.read().waypoints[0]
+
+
+def test_the_folder_is_made_where_it_is_missing(tmp_path: Path) -> None:
+    store = SemanticMapStore(tmp_path / "robots" / "r1" / "places.yaml")
+
+    store.write(place("dock"))
+
+    assert names(store) == ["dock"]
+
+
+def test_a_removed_waypoint_is_given_and_gone(store: SemanticMapStore) -> None:
+    store.write(place("Dock"))
+    hall = store.write(place("hall")).waypoint
+
+    assert store.remove("HALL") == hall
+    assert names(store) == ["Dock"]
+
+
+def test_removing_an_unknown_name_tells_the_names_near_to_it(store: SemanticMapStore) -> None:
+    store.write(place("Dock corner"))
+
+    with pytest.raises(SemanticMapError, match=r'No waypoint is called "dock".*"Dock corner"'):
+        store.remove("dock")
+
+
+def test_what_is_remembered_of_a_place_joins_what_was(store: SemanticMapStore) -> None:
+    hose, tap = Landmark(label="hose"), Landmark(label="tap")
+    store.remember(replace(place("dock"), safety_landmarks=(hose,)))
+
+    receipt, merge = store.remember(replace(place("Dock"), functional_landmarks=(tap,)))
+
+    assert [views[0].label for views in merge.kept] == ["hose"]
+    assert receipt.waypoint.landmarks == store.read().waypoints[0].landmarks == (hose, tap)
+    assert receipt.previous is not None
+    assert receipt.previous.landmarks == (hose,)
+
+
+def test_what_two_stores_remember_of_one_place_is_both_there(
+    store: SemanticMapStore, path: Path
+) -> None:
+    other = SemanticMapStore(path, map_id="b1")
+    other.read()
+    for number in range(4):
+        label = Landmark(label=f"thing {number}")
+        writer = store if number % 2 else other
+        writer.remember(replace(place("dock"), functional_landmarks=(label,)))
+
+    labels = {each.label for each in store.read().waypoints[0].landmarks}
+    assert labels == {f"thing {number}" for number in range(4)}
+
+
+# --- maps ------------------------------------------------------------------------------------
+
+
+def test_places_of_another_map_are_read_with_a_warning(path: Path) -> None:
+    SemanticMapStore(path, map_id="b1").write(place("dock"))
+
+    places = SemanticMapStore(path, map_id="b2").read()
+
+    assert places.map_id == "b1"
+    assert [place.name for place in places.waypoints] == ["dock"]
+    (warning,) = places.warnings
+    assert 'belongs to the map "b1", but the robot is on "b2"' in warning
+
+
+def test_nothing_is_written_to_the_file_of_another_map(path: Path) -> None:
+    SemanticMapStore(path, map_id="b1").write(place("dock"))
+    before = path.read_bytes()
+
+    with pytest.raises(SemanticMapError, match=r'"b1", but the robot is on "b2".*another file'):
+        SemanticMapStore(path, map_id="b2").write(place("hall"))
+    assert path.read_bytes() == before
+
+
+def test_a_waypoint_of_another_map_is_not_written(store: SemanticMapStore) -> None:
+    with pytest.raises(SemanticMapError, match='waypoint "dock" belongs to the map "b2"'):
+        store.write(Waypoint(name="dock", pose=Pose(0.0, 0.0), map_id="b2"))
+
+
+def test_a_file_that_names_no_map_takes_the_one_of_its_first_writer(
+    store: SemanticMapStore, path: Path
+) -> None:
+    path.write_text("waypoints:\n  - {name: dock, pose: {x: 0, y: 0, yaw_deg: 0}}\n")
+    assert store.read().warnings == ()
+
+    store.write(place("hall"))
+
+    assert path.read_text().startswith("map: b1\nwaypoints:\n")
+    assert {place.map_id for place in store.read().waypoints} == {"b1"}
+
+
+def test_a_store_without_a_map_takes_the_file_for_what_it_says(path: Path) -> None:
+    SemanticMapStore(path, map_id="b1").write(place("dock"))
+    store = SemanticMapStore(path)
+
+    store.write(place("hall"))
+
+    assert store.read().map_id == "b1"
+    assert store.read().warnings == ()
+
+
+# --- files that are wrong --------------------------------------------------------------------
+
+
+def test_a_file_that_was_never_right_is_an_error(store: SemanticMapStore, path: Path) -> None:
+    path.write_text(BROKEN)
+
+    for _ in range(2):
+        with pytest.raises(SemanticMapError, match="line 4, column 1"):
+            store.read()
+
+
+def test_a_file_broken_by_hand_gives_the_places_read_before_and_is_not_written_to(
+    store: SemanticMapStore, path: Path
+) -> None:
+    store.write(place("dock"))
+    path.write_text(BROKEN)
+
+    places = store.read()
+    assert [place.name for place in places.waypoints] == ["dock"]
+    assert "line 4, column 1" in places.warnings[0]
+    with pytest.raises(SemanticMapError, match="line 4, column 1"):
+        store.write(place("hall"))
+    assert path.read_text() == BROKEN
+
+    path.write_text(BROKEN.replace("y: 2", "y: 2, yaw_deg: 0}"))
+    store.write(place("hall"))
+    assert names(store) == ["dock", "hall"]
+    assert store.read().warnings == ()
+
+
+def test_a_folder_in_place_of_the_file_is_an_error(tmp_path: Path) -> None:
+    store = SemanticMapStore(tmp_path)
+
+    with pytest.raises(SemanticMapError, match="is a folder"):
+        store.read()
+    with pytest.raises(SemanticMapError, match="is a folder"):
+        store.write(place("dock"))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_in_place_of_the_file_is_an_error(path: Path, store: SemanticMapStore) -> None:
+    os.mkfifo(path)
+
+    with pytest.raises(SemanticMapError, match="no ordinary file"):
+        store.read()
+
+
+def test_a_file_that_is_too_large_is_refused(store: SemanticMapStore, path: Path) -> None:
+    with path.open("wb") as file:
+        file.truncate(MAX_BYTES + 1)
+
+    with pytest.raises(SemanticMapError, match=r"has 20\.0 MB; at most 20 MB"):
+        store.read()
+
+
+def test_a_path_through_a_file_is_an_error(path: Path) -> None:
+    path.write_text("")
+    store = SemanticMapStore(path / "places.yaml")
+
+    with pytest.raises(SemanticMapError, match="Cannot read"):
+        store.read()
+    with pytest.raises(SemanticMapError, match=r"Cannot lock .*Check that"):
+        store.write(place("dock"))
+
+
+def test_a_write_that_fails_leaves_the_file_as_it_was(store: SemanticMapStore, path: Path) -> None:
+    store.write(place("dock"))
+    before = path.read_bytes()
+    (path.parent / ".places.yaml.tmp").mkdir()
+
+    with pytest.raises(SemanticMapError, match="Cannot write"):
+        store.write(place("hall"))
+    assert path.read_bytes() == before
+    assert names(store) == ["dock"]
+
+
+@pytest.mark.skipif(IS_ROOT, reason="root may write anything")
+def test_a_read_only_file_is_not_replaced(store: SemanticMapStore, path: Path) -> None:
+    store.write(place("dock"))
+    path.chmod(0o400)
+
+    with pytest.raises(SemanticMapError, match="read-only"):
+        store.write(place("hall"))
+
+
+@pytest.mark.skipif(IS_ROOT, reason="root may write anything")
+def test_a_folder_that_may_not_be_written_to_is_an_error(
+    store: SemanticMapStore, path: Path
+) -> None:
+    path.parent.chmod(0o500)
+
+    with pytest.raises(SemanticMapError, match="Permission denied"):
+        store.write(place("dock"))
+
+
+# --- the file itself -------------------------------------------------------------------------
+
+
+def test_permissions_are_kept(store: SemanticMapStore, path: Path) -> None:
+    store.write(place("dock"))
+    path.chmod(0o640)
+
+    store.write(place("hall"))
+
+    assert stat.S_IMODE(path.stat().st_mode) == 0o640
+
+
+def test_a_symbolic_link_is_followed(tmp_path: Path) -> None:
+    link, target = tmp_path / "link.yaml", tmp_path / "real" / "places.yaml"
+    link.symlink_to(target)
+
+    SemanticMapStore(link).write(place("dock"))
+    SemanticMapStore(target).write(place("hall"))
+
+    assert link.is_symlink()
+    assert names(SemanticMapStore(link)) == ["dock", "hall"]
+
+
+def test_a_file_that_changed_since_it_was_read_is_not_replaced(path: Path) -> None:
+    path.write_text("first")
+    file = DurableFile(path, lock_timeout_s=1.0)
+    _, expected = file.read()
+    path.write_text("an editor's work")
+
+    with file.locked():
+        assert file.replace(b"ours", expected=expected) is None
+        assert path.read_text() == "an editor's work"
+        assert file.replace(b"ours", expected=file.fingerprint()) == file.fingerprint()
+    assert path.read_text() == "ours"
+
+
+@contextmanager
+def held(lock_path: Path) -> Iterator[None]:
+    """Holds a lock in another thread, as another program would."""
+    is_held, may_end = threading.Event(), threading.Event()
+
+    def hold() -> None:
+        with FileLock(lock_path):
+            is_held.set()
+            may_end.wait(10.0)
+
+    thread = threading.Thread(target=hold)
+    thread.start()
+    assert is_held.wait(10.0)
+    yield
+    may_end.set()
+    thread.join()
+
+
+def test_a_lock_held_too_long_is_an_error_that_names_it(path: Path) -> None:
+    store = SemanticMapStore(path, lock_timeout_s=0.0)
+
+    with held(path.parent / ".places.yaml.lock"):
+        with pytest.raises(SemanticMapError, match=r"has held .*\.places\.yaml\.lock for 0 s"):
+            store.write(place("dock"))
+        assert store.read().waypoints == ()
+
+    store.write(place("dock"))
+    assert names(store) == ["dock"]
+
+
+def test_a_write_leaves_every_other_waypoint_as_it_stands(
+    store: SemanticMapStore, path: Path
+) -> None:
+    rows = "".join(
+        f"  - {{name: row {i}, pose: {{x: {i}, y: 0, yaw_deg: 0}}}}  # {i}\n" for i in range(100)
+    )
+    path.write_text(f"map: b1\nwaypoints:\n{rows}")
+
+    tap = Landmark(label="tap")
+    store.write(Waypoint(name="row 50", pose=Pose(50.0, 0.0), functional_landmarks=(tap,)))
+
+    changed = path.read_text().splitlines()
+    before = f"map: b1\nwaypoints:\n{rows}".splitlines()
+    assert [new for old, new in zip(before, changed, strict=True) if old != new] == [
+        "  - {name: row 50, pose: {x: 50, y: 0, yaw_deg: 0}, functional_landmarks: [tap]}  # 50"
+    ]
