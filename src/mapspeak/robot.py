@@ -197,31 +197,6 @@ class GoalStatus:
     afterwards: str = ""
 
 
-class Health(StrEnum):
-    """How it stands with one thing that a robot should offer."""
-
-    FINE = "fine"
-    DOUBTFUL = "doubtful"
-    MISSING = "missing"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
-    """One line of a check-up.
-
-    Attributes:
-        what: The thing: map, pose, camera, ...
-        health: How it stands with it.
-        said: What was found, with numbers and units.
-        hint: What to start or to change; empty where all is well.
-    """
-
-    what: str
-    health: Health
-    said: str
-    hint: str = ""
-
-
 class Robot(Protocol):
     """A robot with a map, a pose, perhaps a camera, and navigation.
 

@@ -6,11 +6,11 @@ from functools import partial
 import pytest
 
 from drawing import grid_from_text
+from mapspeak.cli.checkup import Health, describe_profile
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import Timing
-from mapspeak.robot import Health
-from mapspeak.ros.discovery import NavigationKind, PoseSource, RobotOverrides, describe_profile
+from mapspeak.ros.discovery import NavigationKind, PoseSource, RobotOverrides
 from mapspeak.ros.messages import Dialect, write_header
 from mapspeak.ros.robot import RosRobot
 from mapspeak.ros.robot.driving import DrivingPatience

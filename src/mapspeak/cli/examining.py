@@ -16,7 +16,7 @@ from mapspeak.cli.robots import RobotChoice, open_robot
 from mapspeak.hold import Hold
 
 if TYPE_CHECKING:
-    from mapspeak.robot import Finding
+    from mapspeak.cli.checkup import Finding
 
 SIGNS = {"fine": "ok", "doubtful": "??", "missing": "--"}
 
@@ -47,9 +47,8 @@ def doctor(
 
 async def examine_choice(choice: RobotChoice) -> "list[Finding]":
     """Return what the robot offers, once all of it has been found, and what it really gives."""
-    from mapspeak.driving.checkup import examine  # noqa: PLC0415
+    from mapspeak.cli.checkup import describe_profile, examine  # noqa: PLC0415 - heavy
     from mapspeak.ros import LinkKind  # noqa: PLC0415
-    from mapspeak.ros.discovery import describe_profile  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.ros.robot import RosRobot  # noqa: PLC0415 - heavy; help must be quick
 
     async with open_robot(choice) as robot:
@@ -66,7 +65,7 @@ async def examine_choice(choice: RobotChoice) -> "list[Finding]":
 
 def find_servers(choice: RobotChoice) -> "list[Finding]":
     """Return which servers of this user drive the same robot; nothing where none does."""
-    from mapspeak.robot import Finding, Health  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.cli.checkup import Finding, Health  # noqa: PLC0415 - heavy; help must be quick
 
     processes = Hold(control_folder(None)).servers_of(choice.address)
     if not processes:

@@ -1,6 +1,5 @@
 """What a robot offers, found by asking it, and overridden where a person knows better."""
 
-from mapspeak.ros.discovery.findings import describe_profile
 from mapspeak.ros.discovery.overrides import (
     RobotOverrides,
     RosSettings,
@@ -23,6 +22,5 @@ __all__ = [
     "RobotWatch",
     "RosSettings",
     "choose_profile",
-    "describe_profile",
     "load_robot_file",
 ]

@@ -5,10 +5,10 @@ import pytest
 
 from alignment_maps import HOUSE, fine
 from fakes import START, FakeRobot, scan_of, two_rooms
-from mapspeak.driving.checkup import examine
+from mapspeak.cli.checkup import Finding, Health, examine
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
-from mapspeak.robot import Finding, Health, RangeScan
+from mapspeak.robot import RangeScan
 from mapspeak.spatial import OccupancyGrid
 
 pytestmark = pytest.mark.anyio

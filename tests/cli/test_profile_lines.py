@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from mapspeak.robot import Finding, Health
+from mapspeak.cli.checkup import Finding, Health, describe_profile
 from mapspeak.ros import LinkKind, LinkName
-from mapspeak.ros.discovery import NavigationKind, RobotProfile, describe_profile
+from mapspeak.ros.discovery import NavigationKind, RobotProfile
 from mapspeak.ros.messages import Dialect
 
 DDS = LinkName(LinkKind.DDS, "ROS domain 41")
