@@ -105,8 +105,7 @@ def _map(side: int) -> OccupancyGrid:
 
 
 async def _receive(grid: OccupancyGrid) -> tuple[list[float], list[float]]:
-    from mapspeak.links.rclpy.messages import read_message, write_message  # noqa: PLC0415
-    from mapspeak.links.rclpy.types import find_message  # noqa: PLC0415
+    from mapspeak.links.rclpy.types import find_message, read_message, write_message  # noqa: PLC0415
 
     domain_id = _enter_domain()
     message = write_message(find_message(TYPE), write_grid(grid, dialect=Dialect.ROS2))
@@ -165,8 +164,7 @@ async def _is_published(connection: RosConnection) -> bool:
 
 def _offer(side: int, domain_id: int, is_there: Any, is_over: Any) -> None:  # noqa: ANN401
     """Publish a map from one event until the other; a process of its own."""
-    from mapspeak.links.rclpy.messages import write_message  # noqa: PLC0415
-    from mapspeak.links.rclpy.types import find_message  # noqa: PLC0415 - needs rclpy
+    from mapspeak.links.rclpy.types import find_message, write_message  # noqa: PLC0415
 
     message_class = find_message(TYPE)
     with _publisher(message_class, domain_id) as publish:

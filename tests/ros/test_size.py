@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.discovery.finding import find_radius_m
+from mapspeak.ros.discovery.watch import find_radius_m
 from mapspeak.ros.messages import Dialect
 
 pytestmark = pytest.mark.anyio

@@ -46,8 +46,7 @@ TYPES = [
 def written_by_rclpy(type_name: str, message: object) -> bytes:
     from rclpy.serialization import serialize_message  # noqa: PLC0415 - needs ROS
 
-    from mapspeak.links.rclpy.messages import write_message  # noqa: PLC0415
-    from mapspeak.links.rclpy.types import find_message  # noqa: PLC0415
+    from mapspeak.links.rclpy.types import find_message, write_message  # noqa: PLC0415
 
     written: bytes = serialize_message(write_message(find_message(type_name), message))
     return written
@@ -56,8 +55,7 @@ def written_by_rclpy(type_name: str, message: object) -> bytes:
 def read_by_rclpy(type_name: str, data: bytes) -> dict[str, Any]:
     from rclpy.serialization import deserialize_message  # noqa: PLC0415 - needs ROS
 
-    from mapspeak.links.rclpy.messages import read_message  # noqa: PLC0415
-    from mapspeak.links.rclpy.types import find_message  # noqa: PLC0415
+    from mapspeak.links.rclpy.types import find_message, read_message  # noqa: PLC0415
 
     return read_message(deserialize_message(data, find_message(type_name)))
 

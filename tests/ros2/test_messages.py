@@ -14,8 +14,7 @@ pytestmark = pytest.mark.ros2
 
 def there_and_back(type_name: str, values: object) -> Any:  # noqa: ANN401 - rclpy has no types
     import_what_warns()
-    from mapspeak.links.rclpy.messages import read_message, write_message  # noqa: PLC0415
-    from mapspeak.links.rclpy.types import find_message  # noqa: PLC0415
+    from mapspeak.links.rclpy.types import find_message, read_message, write_message  # noqa: PLC0415
 
     return read_message(write_message(find_message(type_name), values))
 

@@ -12,9 +12,8 @@ from typing import Any
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.links.rclpy.messages import read_message, write_message
 from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wait_until
-from mapspeak.links.rclpy.types import find_action, find_service, name_of
+from mapspeak.links.rclpy.types import find_message, name_of, read_message, write_message
 from mapspeak.ros import REFUSED, ActionEnd, ActionGoal, new_id
 from mapspeak.ros.link import check_name, wrong_type
 from mapspeak.ros.messages import Message, bare_type
@@ -54,7 +53,7 @@ class RclpyServices:
         found = await self._find_type(service, within_s=min(timeout_s, SERVER_S))
         if type_name is not None and bare_type(type_name) != bare_type(found):
             raise wrong_type(service, found, type_name)
-        service_class = find_service(found)
+        service_class = find_message(found, "srv")
         request = write_message(service_class.Request, arguments)
         client = await self.connect(service, service_class, within_s=min(timeout_s, SERVER_S))
         with anyio.move_on_after(timeout_s):
@@ -185,7 +184,7 @@ class Goals:
 
     async def _open(self, action: str, type_name: str) -> _Action:
         """Return an action that somebody serves, and listen to its feedback from now on."""
-        action_class = find_action(type_name)
+        action_class = find_message(type_name, "action")
         known = self._actions.get(action)
         if known is not None and known.action_class is not action_class:
             raise wrong_type(action, name_of(known.action_class), type_name)

@@ -12,9 +12,8 @@ from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from mapspeak.errors import LinkError
-from mapspeak.links.rclpy.messages import read_message, write_message
 from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wait_until
-from mapspeak.links.rclpy.types import find_message
+from mapspeak.links.rclpy.types import find_message, read_message, write_message
 from mapspeak.ros.link import NativeLink, TopicRequest, check_name, wrong_type
 from mapspeak.ros.messages import Message, bare_type
 

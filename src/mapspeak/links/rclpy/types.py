@@ -1,18 +1,32 @@
-"""The types of the ROS on this machine: their fields, classes and definitions."""
+"""The types of the ROS on this machine, and their messages as plain values."""
 
+import array
+import base64
 import importlib
 import re
 import sys
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from mapspeak.errors import LinkError
 from mapspeak.ros import TYPE
-from mapspeak.ros.definitions import ACTION_PARTS, SERVICE_PARTS, TypeBook, split_parts
+from mapspeak.ros.definitions import (
+    ACTION_PARTS,
+    FLOATS,
+    NOTHING,
+    SERVICE_PARTS,
+    WHOLES,
+    Field,
+    TypeBook,
+    check_message,
+    parse_definition,
+    split_parts,
+)
 from mapspeak.ros.messages import bare_type
 
 FIELD = re.compile(
@@ -21,63 +35,27 @@ FIELD = re.compile(
 TEXT = re.compile(r"(?P<text>w?string)<(?P<most>\d+)>")
 DEFINED_AS = {"boolean": "bool", "octet": "byte", "float": "float32", "double": "float64"}
 """As .msg files name what rclpy names as IDL does."""
-BYTES = ("uint8", "octet")
-NUMBERS = (
-    *("float", "double", "int8", "uint8", "int16", "uint16"),
-    *("int32", "uint32", "int64", "uint64"),
-)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FieldType:
-    """What a field holds.
-
-    Attributes:
-        base: Of one value: "double", "string" or "package/Type".
-        length: How many, where that is fixed.
-        most: How many at most, where that is limited.
-        most_letters: Of a text, where that is limited.
-    """
-
-    base: str
-    is_list: bool = False
-    length: int | None = None
-    most: int | None = None
-    most_letters: int | None = None
-
-    @property
-    def is_message(self) -> bool:
-        """True where each value is a message itself."""
-        return "/" in self.base
-
-    @property
-    def definition(self) -> str:
-        """As a .msg file writes it."""
-        base = DEFINED_AS.get(self.base, self.base)
-        letters = "" if self.most_letters is None else f"<={self.most_letters}"
-        most = "" if self.most is None else f"<={self.most}"
-        number = most if self.length is None else str(self.length)
-        return f"{base}{letters}[{number}]" if self.is_list else f"{base}{letters}"
+NUMBERS = frozenset((*FLOATS, *WHOLES)) - {"byte", "char"}
 
 
 @cache
-def fields_of(message_class: Any) -> dict[str, FieldType]:  # noqa: ANN401 - rclpy has no types
+def fields_of(message_class: Any) -> dict[str, Field]:  # noqa: ANN401 - rclpy has no types
     """Return the fields of a class of messages, in their order."""
-    return {
-        name: _read_type(text)
-        for name, text in message_class.get_fields_and_field_types().items()
-        # An empty message has a field that ROS never shows.
-        if name != "structure_needs_at_least_one_member"
-    }
+    message = parse_definition(name_of(message_class), write_definition(message_class))
+    return {field.name: field for field in message.fields}
 
 
 def write_definition(message_class: Any) -> str:  # noqa: ANN401 - likewise
     """Return the definition of a class of messages, as far as rclpy tells it."""
-    fields = fields_of(message_class)
-    return "\n".join(f"{kind.definition} {name}" for name, kind in fields.items())
+    types = message_class.get_fields_and_field_types()
+    # An empty message has a field that ROS never shows.
+    return "\n".join(
+        f"{_write_type(text)} {name}" for name, text in types.items() if name != NOTHING.name
+    )
 
 
-def _read_type(text: str) -> FieldType:
+def _write_type(text: str) -> str:
+    """Return "float64[<=3]", as .msg files write it, for "sequence<double, 3>"."""
     found = FIELD.fullmatch(text)
     if found is None:
         raise LinkError(
@@ -85,13 +63,10 @@ def _read_type(text: str) -> FieldType:
         )
     base = found["any"] or found["each"] or found["one"]
     limited = TEXT.fullmatch(base)
-    return FieldType(
-        base=limited["text"] if limited else base,
-        is_list=found["one"] is None,
-        length=int(found["length"]) if found["length"] else None,
-        most=int(found["most"]) if found["most"] else None,
-        most_letters=int(limited["most"]) if limited else None,
-    )
+    base = f"{limited['text']}<={limited['most']}" if limited else DEFINED_AS.get(base, base)
+    if found["one"]:
+        return base
+    return f"{base}[{'<=' + found['most'] if found['most'] else found['length'] or ''}]"
 
 
 KINDS = ("msg", "srv", "action")
@@ -100,31 +75,24 @@ NAMED = {"msg": "message", "srv": "service", "action": "action"}
 RosClass = Any  # rclpy has no types
 
 
-def find_message(type_name: str) -> RosClass:
-    """Return the class of a type of messages.
+def find_message(type_name: str, kind: str = "msg") -> RosClass:
+    """Return the class of a type of messages, or of another kind: "srv" or "action".
 
     Raises:
         LinkError: The name is none, or this Python does not have the type.
     """
-    return _wanted(type_name, "msg")
-
-
-def find_service(type_name: str) -> RosClass:
-    """Return the class of a type of services.
-
-    Raises:
-        LinkError: As for messages.
-    """
-    return _wanted(type_name, "srv")
-
-
-def find_action(type_name: str) -> RosClass:
-    """Return the class of a type of actions.
-
-    Raises:
-        LinkError: As for messages.
-    """
-    return _wanted(type_name, "action")
+    found = find_class(type_name, kind)
+    if found is not None:
+        return found
+    if not TYPE.fullmatch(type_name):
+        raise LinkError(f"{type_name[:80]!r} is no type.", hint=f'Such as "package/{kind}/Type".')
+    bare = bare_type(type_name)
+    package = bare.partition("/")[0].replace("_", "-")[:60]
+    raise LinkError(
+        f"This Python's ROS knows no {NAMED[kind]} of the type {bare[:80]}.",
+        hint=f"Install the package (`sudo apt install ros-$ROS_DISTRO-{package}`), or source the "
+        "workspace that has it, and start mapspeak again.",
+    )
 
 
 def find_class(type_name: str, kind: str) -> RosClass | None:
@@ -155,23 +123,6 @@ def _has_types(package: str, kind: str) -> bool:
         and any(Path(folder).glob(f"{package}_s__rosidl_typesupport_*"))
         for folder in folders
     )
-
-
-def _wanted(type_name: str, kind: str) -> RosClass:
-    found = find_class(type_name, kind)
-    if found is None:
-        if not TYPE.fullmatch(type_name):
-            raise LinkError(
-                f"{type_name[:80]!r} is no type.", hint=f'Such as "package/{kind}/Type".'
-            )
-        package = bare_type(type_name).partition("/")[0]
-        raise LinkError(
-            f"This Python's ROS knows no {NAMED[kind]} of the type {bare_type(type_name)[:80]}.",
-            hint=f"Install the package (`sudo apt install ros-$ROS_DISTRO-"
-            f"{package.replace('_', '-')[:60]}`), or source the workspace that has it, and start "
-            "mapspeak again.",
-        )
-    return found
 
 
 PREFIX_ABOVE = 6
@@ -227,3 +178,101 @@ def _read_file(found: Any, bare: str, kind: str) -> str | None:  # noqa: ANN401 
         if path.is_file():
             return path.read_text(encoding="utf-8")
     return None
+
+
+Reader = Callable[[Any], Any]
+
+
+def read_message(message: Any) -> dict[str, Any]:  # noqa: ANN401 - rclpy has no types
+    """Return a message as rosbridge does: uint8[] as bytes, other numbers as numpy arrays."""
+    return {
+        name: getattr(message, name) if read is None else read(getattr(message, name))
+        for name, read in _readers_of(message.__class__)
+    }
+
+
+@cache
+def _readers_of(message_class: Any) -> tuple[tuple[str, Reader | None], ...]:  # noqa: ANN401
+    return tuple((name, _reader_of(kind)) for name, kind in fields_of(message_class).items())
+
+
+def _reader_of(field: Field) -> Reader | None:
+    is_list = field.length is not None
+    if field.is_message:
+        return _read_all if is_list else read_message
+    if field.type == "byte":
+        return b"".join if is_list else _read_octet
+    if not is_list:
+        return None
+    if field.type == "uint8":
+        return bytes
+    return np.asarray if field.type in NUMBERS else list
+
+
+def _read_all(messages: Any) -> list[dict[str, Any]]:  # noqa: ANN401 - rclpy has no types
+    return [read_message(message) for message in messages]
+
+
+def _read_octet(octet: bytes) -> int:
+    return octet[0]
+
+
+RosMessage = Any  # rclpy has no types
+
+
+def write_message(message_class: Any, values: object) -> RosMessage:  # noqa: ANN401
+    """Return a message with the values of a mapping; the fields it leaves out keep their defaults.
+
+    Raises:
+        LinkError: Something does not fit; says which field.
+    """
+    checked = check_message(_book_of(message_class), name_of(message_class), values)
+    return _fill(message_class, checked)
+
+
+@cache
+def _book_of(message_class: Any) -> TypeBook:  # noqa: ANN401 - rclpy has no types
+    texts: dict[str, str] = {}
+    _describe(message_class, texts)
+    return TypeBook(texts)
+
+
+def _describe(message_class: Any, texts: dict[str, str]) -> None:  # noqa: ANN401 - likewise
+    fields = fields_of(message_class)
+    texts[name_of(message_class)] = write_definition(message_class)
+    for field in fields.values():
+        if field.is_message and field.type not in texts:
+            _describe(find_message(field.type), texts)
+
+
+def _fill(message_class: Any, values: Mapping[str, Any]) -> RosMessage:  # noqa: ANN401 - likewise
+    message = message_class()
+    fields = fields_of(message_class)
+    for name, value in values.items():
+        setattr(message, name, _write_field(fields[name], value, getattr(message, name)))
+    return message
+
+
+def _write_field(field: Field, value: Any, default: Any) -> Any:  # noqa: ANN401
+    is_list = field.length is not None
+    if is_list and isinstance(value, str):
+        value = base64.b64decode(value, validate=True)
+    if is_list and field.type in NUMBERS:
+        return _write_numbers(value, default)
+    if field.is_message:
+        inner = find_message(field.type)
+        return [_fill(inner, each) for each in value] if is_list else _fill(inner, value)
+    if field.type == "byte":
+        octets = [bytes([each % 256]) for each in (value if is_list else [value])]
+        return octets if is_list else octets[0]
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def _write_numbers(values: Any, default: Any) -> Any:  # noqa: ANN401
+    """Return many numbers as rclpy keeps them."""
+    is_fixed = isinstance(default, np.ndarray)
+    dtype = default.dtype if is_fixed else np.dtype(default.typecode)
+    if isinstance(values, bytes | bytearray | memoryview):
+        values = np.frombuffer(values, np.uint8)
+    packed = np.ascontiguousarray(values, dtype=dtype)
+    return packed if is_fixed else array.array(default.typecode, packed.tobytes())

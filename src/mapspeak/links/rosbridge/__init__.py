@@ -1,8 +1,7 @@
 """Robots behind rosbridge: its protocol, and a client that keeps one robot connected."""
 
 from mapspeak.links.rosbridge.address import RobotAddress, Timing, quote_address
-from mapspeak.links.rosbridge.client import RosbridgeClient, open_client
-from mapspeak.links.rosbridge.opening import open_rosbridge_robot
+from mapspeak.links.rosbridge.client import RosbridgeClient, open_client, open_rosbridge_robot
 
 __all__ = [
     "RobotAddress",

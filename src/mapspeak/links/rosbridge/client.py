@@ -25,8 +25,11 @@ from mapspeak.links.rosbridge.protocol import (
 from mapspeak.links.rosbridge.requests import RosbridgeTopicRequest, ServiceCaller
 from mapspeak.links.rosbridge.rosapi import Rosapi
 from mapspeak.ros import ActionEnd, ActionGoal, LinkName, OwnEnds, new_id
+from mapspeak.ros.discovery import RobotOverrides
 from mapspeak.ros.link import NOTICE_S, plain_errors
 from mapspeak.ros.messages import Message
+from mapspeak.ros.robot import RosRobot, build_ros_robot
+from mapspeak.ros.robot.driving import DrivingPatience
 
 logger = logging.getLogger(__name__)
 
@@ -322,3 +325,30 @@ async def open_client(
                 with anyio.CancelScope(shield=True):
                     await client.aclose()
                 tasks.cancel_scope.cancel()
+
+
+USUAL_PATIENCE = DrivingPatience()
+NOTHING_SAID = RobotOverrides()
+
+
+@asynccontextmanager
+async def open_rosbridge_robot(
+    url: str | RobotAddress,
+    *,
+    overrides: RobotOverrides = NOTHING_SAID,
+    timing: Timing = USUAL_TIMING,
+    patience: DrivingPatience = USUAL_PATIENCE,
+) -> AsyncGenerator[RosRobot]:
+    """Offer the robot behind a rosbridge server while the context lasts.
+
+    Leaving the context does not stop the robot: call `stop` before, where that is wanted.
+
+    Raises:
+        LinkError: The robot cannot be reached, or does not say what it offers.
+        ConfigError: The address is none.
+    """
+    address = RobotAddress(url=url) if isinstance(url, str) else url
+    async with open_client(address, timing=timing) as client:
+        yield await build_ros_robot(
+            client, overrides=overrides, patience=patience, frames_s=timing.frames_s
+        )

@@ -1,29 +1,29 @@
 """What ROS types look like: definitions read, known ones, messages shown, checked and built."""
 
-from mapspeak.ros.definitions.book import TypeBook
-from mapspeak.ros.definitions.checking import check_message
-from mapspeak.ros.definitions.describing import describe_type, say_fields
-from mapspeak.ros.definitions.known import DISTROS, known_definitions
-from mapspeak.ros.definitions.parsing import (
+from mapspeak.ros.definitions.checking import check_message, describe_type, say_fields
+from mapspeak.ros.definitions.texts import (
+    ACTION_PARTS,
+    DISTROS,
+    GENERATED,
+    SERVICE_PARTS,
+    find_actions_of_ros1,
+    kinds_of,
+    known_definitions,
+    name_parts,
+    split_definition,
+    split_parts,
+    write_definition,
+)
+from mapspeak.ros.definitions.types import (
     FLOATS,
     TIMES,
     WHOLES,
     Constant,
     Field,
     MessageType,
+    TypeBook,
     find_odd_lines,
     parse_definition,
-)
-from mapspeak.ros.definitions.parts import (
-    ACTION_PARTS,
-    GENERATED,
-    SERVICE_PARTS,
-    find_actions_of_ros1,
-    kinds_of,
-    name_parts,
-    split_definition,
-    split_parts,
-    write_definition,
 )
 from mapspeak.ros.definitions.typestore import (
     NOTHING,

@@ -3,8 +3,7 @@
 from typing import Any
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.definitions.book import MOST_NESTED, TypeBook
-from mapspeak.ros.definitions.parsing import Field, MessageType
+from mapspeak.ros.definitions.types import MOST_NESTED, Field, MessageType, TypeBook
 from mapspeak.ros.messages import bare_type
 
 NOTHING = Field(name="structure_needs_at_least_one_member", type="uint8")

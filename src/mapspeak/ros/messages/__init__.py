@@ -1,17 +1,16 @@
 """ROS messages as rosbridge carries them, and our values: read and written, in both dialects."""
 
-from mapspeak.ros.messages.depth import shade_depth
-from mapspeak.ros.messages.dialect import (
+from mapspeak.ros.messages.fields import (
     NAME,
     TYPE,
     Dialect,
+    Message,
     bare_type,
     read_header,
     read_stamp,
     write_header,
     write_stamp,
 )
-from mapspeak.ros.messages.fields import Message
 from mapspeak.ros.messages.grids import apply_grid_update, read_grid, write_grid
 from mapspeak.ros.messages.pictures import (
     EncodedPicture,
@@ -19,7 +18,7 @@ from mapspeak.ros.messages.pictures import (
     read_image,
     write_compressed_image,
 )
-from mapspeak.ros.messages.pixels import read_depth
+from mapspeak.ros.messages.pixels import read_depth, shade_depth
 from mapspeak.ros.messages.poses import (
     FramedPose,
     FrameTransform,

@@ -8,19 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.errors import MapError
-from mapspeak.ros.messages.dialect import (
-    Dialect,
-    read_header,
-    write_header,
-    write_stamp,
-)
 from mapspeak.ros.messages.fields import (
+    Dialect,
     Message,
     decode_base64,
     misfit,
     number_of,
     part_of,
+    read_header,
     whole_of,
+    write_header,
+    write_stamp,
 )
 from mapspeak.ros.messages.poses import read_pose, write_pose
 from mapspeak.spatial import OccupancyGrid

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.messages.depth import read_compressed_depth, shade_depth
-from mapspeak.ros.messages.dialect import Dialect, read_header, write_header
-from mapspeak.ros.messages.fields import Message, text_of
+from mapspeak.ros.messages.fields import Dialect, Message, read_header, text_of, write_header
 from mapspeak.ros.messages.pixels import (
     LARGEST_SIDE_PX,
     bytes_of,
+    read_compressed_depth,
     read_depth,
     read_pixels,
+    shade_depth,
 )
 
 JPEG_QUALITY = 85

@@ -7,8 +7,16 @@ from typing import Any
 
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
-from mapspeak.ros.messages.dialect import Dialect, read_header, write_header
-from mapspeak.ros.messages.fields import Message, number_of, part_of, parts_of, text_of
+from mapspeak.ros.messages.fields import (
+    Dialect,
+    Message,
+    number_of,
+    part_of,
+    parts_of,
+    read_header,
+    text_of,
+    write_header,
+)
 
 NORM_TOLERANCE = 0.01
 """How far a quaternion's squared length may be from 1; tf2 draws the line there too."""

@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.messages.dialect import Dialect, read_header, write_header
 from mapspeak.ros.messages.fields import (
+    Dialect,
     Message,
     floats_of,
     misfit,
     number_of,
+    read_header,
     whole_of,
+    write_header,
 )
 
 LARGEST_SIDE_PX = 65535
