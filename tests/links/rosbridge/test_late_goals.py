@@ -290,7 +290,7 @@ def goals_of(robot: RosRobot) -> list[SentGoal]:
     return client_of(robot).goals
 
 
-def client_of(robot: RosRobot) -> ActionClient:
+def client_of(robot: RosRobot) -> ActionClient[Any]:
     client = robot.connection.started.actions["/navigate_to_pose"]
     assert isinstance(client, ActionClient)
     return client

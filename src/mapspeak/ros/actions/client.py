@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from typing import Generic, TypeVar
 
 import anyio
 
@@ -33,6 +34,8 @@ LONGEST_LOOK_S = 2.0
 
 logger = logging.getLogger(__name__)
 
+Goal = TypeVar("Goal", bound=SentGoal)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ActionPatience:
@@ -56,7 +59,7 @@ class ActionPatience:
     return_s: float = 5.0
 
 
-class ActionClient(ABC):
+class ActionClient(ABC, Generic[Goal]):
     """Sends goals to one action, and knows each of them until the action server has ended it.
 
     A goal that we said to be over is *withdrawn*: one that was not taken in time, that was ended
@@ -82,7 +85,7 @@ class ActionClient(ABC):
         self.listeners: list[Callable[[], None]] = []
         self._connection = connection
         self._patience = patience
-        self._goals: dict[str, SentGoal] = {}
+        self._goals: dict[str, Goal] = {}
         self._being_ended: set[str] = set()
         self._statuses: dict[str, ActionState] = {}
         self._feedback_within_s = math.inf
@@ -102,12 +105,12 @@ class ActionClient(ABC):
         return frozenset(goal.owner for goal in self.open_goals if goal.owner is not None)
 
     @property
-    def goals(self) -> list[SentGoal]:
+    def goals(self) -> list[Goal]:
         """Our goals, in the order in which they were sent; of those that are over, the latest."""
         return list(self._goals.values())
 
     @property
-    def open_goals(self) -> list[SentGoal]:
+    def open_goals(self) -> list[Goal]:
         """Our goals that are not over, in the order in which they were sent."""
         return [goal for goal in self.goals if not goal.is_over]
 
@@ -117,7 +120,7 @@ class ActionClient(ABC):
         return self._statuses
 
     @property
-    def ours(self) -> Mapping[str, SentGoal]:
+    def ours(self) -> Mapping[str, Goal]:
         """Our own goals by the server's ids, as far as these are known."""
         return {goal.server_id: goal for goal in self._goals.values() if goal.server_id}
 
@@ -176,7 +179,7 @@ class ActionClient(ABC):
         through: RosConnection,
         owner: str | None = None,
         n_stops: int | None = None,
-    ) -> SentGoal:
+    ) -> Goal:
         """Send a goal; `wait_until_taken` has to follow.
 
         Args:
@@ -203,7 +206,7 @@ class ActionClient(ABC):
             self._withdraw(goal, ActionState.CANCELLED, TOO_EARLY)
         return goal
 
-    async def wait_until_taken(self, goal: SentGoal) -> None:
+    async def wait_until_taken(self, goal: Goal) -> None:
         """Return when the server has taken or refused a goal; withdraw one that it does not."""
         try:
             is_taken = await goal.wait_until_taken(within_s=self._patience.acceptance_s)
@@ -215,7 +218,7 @@ class ActionClient(ABC):
             reason = NOT_TAKEN.format(self._patience.acceptance_s)
             self._withdraw(goal, ActionState.REJECTED, reason)
 
-    async def cancel(self, goal: SentGoal) -> None:
+    async def cancel(self, goal: Goal) -> None:
         """End one goal, and wait a moment for its end.
 
         Raises:
@@ -258,15 +261,15 @@ class ActionClient(ABC):
     # --- inside: each ROS in its own way
 
     @abstractmethod
-    async def _begin(self, arguments: Message, through: RosConnection, sent_s: float) -> SentGoal:
+    async def _begin(self, arguments: Message, through: RosConnection, sent_s: float) -> Goal:
         """Send a goal."""
 
     @abstractmethod
-    def _ask_to_cancel(self, goal: SentGoal) -> None:
+    def _ask_to_cancel(self, goal: Goal) -> None:
         """Ask at once for the end of a goal, whatever comes of it."""
 
     @abstractmethod
-    async def _cancel(self, goal: SentGoal) -> bool:
+    async def _cancel(self, goal: Goal) -> bool:
         """Ask for the end of a goal; return True when the server says that it has ended.
 
         Raises:
@@ -274,25 +277,25 @@ class ActionClient(ABC):
         """
 
     @abstractmethod
-    def _look_at(self, goal: SentGoal) -> None:
+    def _look_at(self, goal: Goal) -> None:
         """Take in that time has passed for a goal."""
 
     # --- inside: withdrawing, once for all
 
-    def _withdraw(self, goal: SentGoal, state: ActionState, reason: str) -> None:
+    def _withdraw(self, goal: Goal, state: ActionState, reason: str) -> None:
         """Say that a goal is over, and see to it that the server sees it so."""
         goal.withdraw(state, reason=reason)
         self._ask_to_cancel(goal)
         self._tell()
 
-    async def _give_up(self, goal: SentGoal) -> None:
+    async def _give_up(self, goal: Goal) -> None:
         """End a goal whose sender has gone."""
         if goal.state is ActionState.SENT:
             self._withdraw(goal, ActionState.CANCELLED, GIVEN_UP)
         elif not goal.is_over:
             self._ask_to_cancel(goal)
 
-    def _note_life(self, goal: SentGoal) -> None:
+    def _note_life(self, goal: Goal) -> None:
         """Take in that the server has a goal; one that was withdrawn is cancelled at once."""
         if goal.is_withdrawn and not goal.is_settled and goal.id not in self._being_ended:
             self._being_ended.add(goal.id)
@@ -301,12 +304,12 @@ class ActionClient(ABC):
             logger.warning("A goal of %s that was withdrawn: %s", self.action, goal.afterwards)
             self._connection.start_soon(partial(self._end_for_certain, goal))
 
-    def _note_server_end(self, goal: SentGoal) -> None:
+    def _note_server_end(self, goal: Goal) -> None:
         """Take in that the server has ended a goal that was withdrawn."""
         if goal.is_withdrawn and not goal.is_settled:
             goal.settle()
 
-    async def _end_for_certain(self, goal: SentGoal) -> None:
+    async def _end_for_certain(self, goal: Goal) -> None:
         """Cancel a goal until the server has ended it."""
         for pause_s in PAUSES_S:
             try:
@@ -318,7 +321,7 @@ class ActionClient(ABC):
                 break
         self._being_ended.discard(goal.id)
 
-    async def _cancel_each(self, goals: Iterable[SentGoal]) -> None:
+    async def _cancel_each(self, goals: Iterable[Goal]) -> None:
         """Ask for the end of all goals; raise `LinkError` when one of them was refused."""
         faults: list[LinkError] = []
         for goal in goals:
@@ -329,7 +332,7 @@ class ActionClient(ABC):
         if faults:
             raise faults[0]
 
-    async def _check_ended(self, goals: Iterable[SentGoal]) -> None:
+    async def _check_ended(self, goals: Iterable[Goal]) -> None:
         with anyio.move_on_after(self._patience.end_s):
             for goal in goals:
                 await goal.wait_until_over(within_s=self._patience.end_s)
@@ -346,11 +349,6 @@ class ActionClient(ABC):
         over = [goal for goal in self._goals.values() if goal.is_over]
         for goal in over[: max(len(over) - N_KEPT, 0)]:
             del self._goals[goal.id]
-            self._forget(goal)
-
-    @abstractmethod
-    def _forget(self, goal: SentGoal) -> None:
-        """Forget what else is known of a goal."""
 
     def _tell(self) -> None:
         for listener in self.listeners:

@@ -59,6 +59,7 @@ class SentGoal:
             or still have it, it is cancelled.
         is_settled: The server has ended a withdrawn goal, or never had it.
         sent_s: When it was sent, by the event loop's clock.
+        listed_end_s: When the list of all goals first told its end; None before.
     """
 
     def __init__(
@@ -88,6 +89,7 @@ class SentGoal:
         self.is_settled = False
         self.sent_s = sent_s
         self.ended_s: float | None = None
+        self.listed_end_s: float | None = None
         self._news = anyio.Event()
 
     @property

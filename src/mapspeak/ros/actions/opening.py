@@ -1,5 +1,7 @@
 """The client of an action: one for each connection and action, whoever uses it."""
 
+from typing import Any
+
 from mapspeak.ros import RosConnection
 from mapspeak.ros.actions.client import ActionClient, ActionPatience
 from mapspeak.ros.actions.ros1 import Ros1ActionClient
@@ -16,7 +18,7 @@ def open_action(
     dialect: Dialect,
     type_name: str,
     patience: ActionPatience = USUAL_PATIENCE,
-) -> ActionClient:
+) -> ActionClient[Any]:
     """Return the client of an action; the first who asks for it decides how patient it is."""
     known = connection.started.actions.get(action)
     if isinstance(known, ActionClient):

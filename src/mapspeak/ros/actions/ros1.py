@@ -33,14 +33,13 @@ STATES = {
 NOW = write_stamp(0.0, dialect=Dialect.ROS1)
 
 
-class Ros1ActionClient(ActionClient):
+class Ros1ActionClient(ActionClient[SentGoal]):
     """Sends goals under ids of ours, by which actionlib's list of goals tells them for certain."""
 
     def __init__(
         self, connection: RosConnection, action: str, *, type_name: str, patience: ActionPatience
     ) -> None:
         super().__init__(connection, action, type_name=type_name, patience=patience)
-        self._ended_s: dict[str, float] = {}
         self._list = self._listen("status", STATUS_TYPE, self._take_list)
         self._listen("result", f"{type_name}ActionResult", self._take_result)
         self._listen("feedback", f"{type_name}ActionFeedback", self._take_feedback)
@@ -106,9 +105,6 @@ class Ros1ActionClient(ActionClient):
         self._publish_cancel(goal.id, goal.through)
         return False
 
-    def _forget(self, goal: SentGoal) -> None:
-        self._ended_s.pop(goal.id, None)
-
     def _publish_cancel(self, goal_id: str, through: RosConnection) -> None:
         through.advertise(f"{self.action}/cancel", type_name=CANCEL_TYPE)
         message = {"stamp": NOW, "id": goal_id}
@@ -120,7 +116,7 @@ class Ros1ActionClient(ActionClient):
 
     def _look_at(self, goal: SentGoal) -> None:
         """Take in that a server has fallen silent; what it lists it says five times a second."""
-        if goal.id in self._ended_s:
+        if goal.listed_end_s is not None:
             self._end_by_list(goal, self._statuses.get(goal.id, ActionState.LOST), "")
         since_s = self._connection.connected_for_s
         if goal.is_over or since_s is None or since_s < self._patience.return_s:
@@ -171,7 +167,8 @@ class Ros1ActionClient(ActionClient):
         now_s = anyio.current_time()
         goal.reason = goal.reason or text
         goal.move_on(ActionState.ACCEPTED)
-        if now_s - self._ended_s.setdefault(goal.id, now_s) >= self._patience.result_s:
+        goal.listed_end_s = goal.listed_end_s or now_s
+        if now_s - goal.listed_end_s >= self._patience.result_s:
             said = [f"{part.rstrip('.')}." for part in (goal.reason, RESULT_LATE) if part]
             goal.end(state, reason=" ".join(said))
 

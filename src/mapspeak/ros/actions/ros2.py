@@ -32,21 +32,35 @@ RECENT_S = 60.0
 N_SEEN_KEPT = 1_000
 
 
-class _Track:
-    """What the connection knows of one goal of ours."""
+class Ros2Goal(SentGoal):
+    """A goal of ours, with what the connection tells of it and what of that was taken in."""
 
-    def __init__(self, goal: SentGoal, wire: ActionGoal, *, n_seen: int) -> None:
-        self.goal = goal
+    def __init__(
+        self,
+        wire: ActionGoal,
+        *,
+        type_name: str,
+        through: RosConnection,
+        sent_s: float,
+        n_seen: int,
+    ) -> None:
+        super().__init__(
+            wire.goal_id,
+            action=wire.action,
+            type_name=type_name,
+            through=through,
+            sent_s=sent_s,
+            server_id=wire.ros_id,
+        )
         self.wire = wire
         self.n_seen = n_seen
-        self.feedback: Message | None = None
-        self.ended_s: float | None = None
+        self.taken_feedback: Message | None = None
         self.n_lists_at_loss: int | None = None
         self.n_lists_at_end = 0
         self.heard_s = anyio.current_time()
 
 
-class Ros2ActionClient(ActionClient):
+class Ros2ActionClient(ActionClient[Ros2Goal]):
     """Sends goals, and joins what is heard of them: from the connection, and from the list.
 
     In ROS 2 itself the server knows a goal by the id that we gave it. rosbridge gives it another,
@@ -63,7 +77,6 @@ class Ros2ActionClient(ActionClient):
         self, connection: RosConnection, action: str, *, type_name: str, patience: ActionPatience
     ) -> None:
         super().__init__(connection, action, type_name=type_name, patience=patience)
-        self._tracks: dict[str, _Track] = {}
         self._seen: dict[str, int] = {}
         self._n_seen = 0
         self._suspected: set[str] = set()
@@ -101,40 +114,30 @@ class Ros2ActionClient(ActionClient):
         answer = await self._call_cancel(connection, {})
         return len(answer.get("goals_canceling") or [])
 
-    async def _begin(self, arguments: Message, through: RosConnection, sent_s: float) -> SentGoal:
+    async def _begin(self, arguments: Message, through: RosConnection, sent_s: float) -> Ros2Goal:
         n_seen = self._n_seen
         wire = await through.send_goal(self.action, arguments, type_name=self.type_name)
-        goal = SentGoal(
-            wire.goal_id,
-            action=self.action,
-            type_name=self.type_name,
-            through=through,
-            sent_s=sent_s,
-            server_id=wire.ros_id,
+        goal = Ros2Goal(
+            wire, type_name=self.type_name, through=through, sent_s=sent_s, n_seen=n_seen
         )
         self._goals[goal.id] = goal
-        track = self._tracks[goal.id] = _Track(goal, wire, n_seen=n_seen)
-        wire.listen(partial(self._hear, track))
+        wire.listen(partial(self._hear, goal))
         # The list may have come while the goal was still being sent.
-        self._claim(self._seen_since(track))
-        self._hear(track)
+        self._claim(self._seen_since(goal))
+        self._hear(goal)
         return goal
 
-    def _ask_to_cancel(self, goal: SentGoal) -> None:
-        track = self._tracks[goal.id]
-        goal.through.cancel_goal(track.wire)
+    def _ask_to_cancel(self, goal: Ros2Goal) -> None:
+        goal.through.cancel_goal(goal.wire)
         if goal.is_withdrawn:
-            track.n_lists_at_end = self._lists.n_received
-            goal.through.give_up_goal(track.wire)
+            goal.n_lists_at_end = self._lists.n_received
+            goal.through.give_up_goal(goal.wire)
             if goal.server_id is None:
                 # It may be one of those that could not be told apart until now.
-                self._claim(self._seen_since(track))
+                self._claim(self._seen_since(goal))
 
-    def _forget(self, goal: SentGoal) -> None:
-        del self._tracks[goal.id]
-
-    async def _cancel(self, goal: SentGoal) -> bool:
-        wire = self._tracks[goal.id].wire
+    async def _cancel(self, goal: Ros2Goal) -> bool:
+        wire = goal.wire
         if wire.ros_id is None:
             goal.through.cancel_goal(wire)
         if goal.server_id is None:
@@ -173,25 +176,24 @@ class Ros2ActionClient(ActionClient):
 
     # --- what is heard
 
-    def _hear(self, track: _Track) -> None:
+    def _hear(self, goal: Ros2Goal) -> None:
         """Take in what the connection tells of a goal."""
-        track.heard_s = anyio.current_time()
-        self._consider(track)
+        goal.heard_s = anyio.current_time()
+        self._consider(goal)
         self._tell()
 
-    def _look_at(self, goal: SentGoal) -> None:
-        track = self._tracks[goal.id]
-        self._consider(track)
-        if track.wire.is_lost:
+    def _look_at(self, goal: Ros2Goal) -> None:
+        self._consider(goal)
+        if goal.wire.is_lost:
             # What brought its feedback is gone; the list goes on.
             goal.silent_s = 0.0
-        silent_s = anyio.current_time() - track.heard_s
+        silent_s = anyio.current_time() - goal.heard_s
         is_sent = goal.state is ActionState.SENT
         if not (is_sent or goal.is_over) and silent_s > self._patience.return_s:
-            track.heard_s = anyio.current_time()
+            goal.heard_s = anyio.current_time()
             self._connection.start_soon(partial(self._check_served, goal))
 
-    async def _check_served(self, goal: SentGoal) -> None:
+    async def _check_served(self, goal: Ros2Goal) -> None:
         """Withdraw a goal whose server is no more: over rosbridge nobody else would tell."""
         try:
             servers = await self._connection.fetch_publishers(f"{self.action}/_action/status")
@@ -213,44 +215,44 @@ class Ros2ActionClient(ActionClient):
 
     def _consider_all(self) -> None:
         for goal in self.goals:
-            self._consider(self._tracks[goal.id])
+            self._consider(goal)
         self._tell()
 
-    def _consider(self, track: _Track) -> None:
+    def _consider(self, goal: Ros2Goal) -> None:
         """Draw from all that has been heard how a goal stands."""
-        goal, wire = track.goal, track.wire
+        wire = goal.wire
         status = self._statuses.get(goal.server_id or "")
         if goal.is_withdrawn:
-            self._consider_withdrawn(track, status)
+            self._consider_withdrawn(goal, status)
             return
         if wire.end is not None:
             self._end_by_result(goal, wire.end)
             return
-        if wire.feedback is not None and wire.feedback is not track.feedback:
-            track.feedback = wire.feedback
+        if wire.feedback is not None and wire.feedback is not goal.taken_feedback:
+            goal.taken_feedback = wire.feedback
             goal.take_feedback(wire.feedback)
         if wire.is_accepted:
             goal.move_on(ActionState.ACCEPTED)
         if status is not None and not status.is_final:
             goal.move_on(status)
         elif status is not None:
-            self._end_by_list(track, status)
+            self._end_by_list(goal, status)
         if wire.is_lost and not goal.is_over:
-            self._consider_loss(track, is_listed=status is not None)
+            self._consider_loss(goal, is_listed=status is not None)
 
-    def _consider_withdrawn(self, track: _Track, status: ActionState | None) -> None:
-        goal, wire = track.goal, track.wire
+    def _consider_withdrawn(self, goal: Ros2Goal, status: ActionState | None) -> None:
+        wire = goal.wire
         is_server_gone = wire.is_lost and wire.ros_id is not None
         if wire.end is not None or is_server_gone or (status is not None and status.is_final):
             self._note_server_end(goal)
             return
-        is_listed = status is not None and self._lists.n_received > track.n_lists_at_end
+        is_listed = status is not None and self._lists.n_received > goal.n_lists_at_end
         # That a lost goal was taken once is no sign of life.
         is_taken = wire.is_accepted and goal.state is not ActionState.LOST
-        if is_taken or is_listed or wire.feedback is not track.feedback:
+        if is_taken or is_listed or wire.feedback is not goal.taken_feedback:
             self._note_life(goal)
 
-    def _end_by_result(self, goal: SentGoal, end: ActionEnd) -> None:
+    def _end_by_result(self, goal: Ros2Goal, end: ActionEnd) -> None:
         values = end.values if isinstance(end.values, Mapping) else None
         if not end.is_result:
             said = end.values if isinstance(end.values, str) else ""
@@ -263,35 +265,35 @@ class Ros2ActionClient(ActionClient):
         else:
             goal.end(state, reason=_reason_of(values, state), result=values)
 
-    def _end_by_list(self, track: _Track, state: ActionState) -> None:
+    def _end_by_list(self, goal: Ros2Goal, state: ActionState) -> None:
         now_s = anyio.current_time()
-        track.ended_s = track.ended_s or now_s
-        track.goal.move_on(ActionState.ACCEPTED)
+        goal.listed_end_s = goal.listed_end_s or now_s
+        goal.move_on(ActionState.ACCEPTED)
         # The result says why; it follows its status at once unless its connection has gone.
-        if track.wire.is_lost:
-            track.goal.end(state, reason=RESULT_GONE)
-        elif now_s - track.ended_s > self._patience.result_s:
-            track.goal.end(state, reason=RESULT_LATE)
+        if goal.wire.is_lost:
+            goal.end(state, reason=RESULT_GONE)
+        elif now_s - goal.listed_end_s > self._patience.result_s:
+            goal.end(state, reason=RESULT_LATE)
 
-    def _consider_loss(self, track: _Track, *, is_listed: bool) -> None:
+    def _consider_loss(self, goal: Ros2Goal, *, is_listed: bool) -> None:
         n_lists = self._lists.n_received
-        if track.n_lists_at_loss is None:
-            track.n_lists_at_loss = n_lists
-        has_news = n_lists > track.n_lists_at_loss
+        if goal.n_lists_at_loss is None:
+            goal.n_lists_at_loss = n_lists
+        has_news = n_lists > goal.n_lists_at_loss
         if has_news and is_listed:
             return
         since_s = self._connection.connected_for_s
         if has_news or (since_s is not None and since_s > self._patience.return_s):
-            self._withdraw(track.goal, ActionState.LOST, GONE)
+            self._withdraw(goal, ActionState.LOST, GONE)
 
     # --- which goal is ours, where only rosbridge knows
 
-    def _seen_since(self, track: _Track) -> list[str]:
+    def _seen_since(self, goal: Ros2Goal) -> list[str]:
         """Return the listed goals that go on, and were first seen after a goal was sent."""
         return [
             server_id
             for server_id, state in self._statuses.items()
-            if not state.is_final and self._seen.get(server_id, -1) >= track.n_seen
+            if not state.is_final and self._seen.get(server_id, -1) >= goal.n_seen
         ]
 
     def _claim(self, server_ids: list[str]) -> None:
@@ -308,11 +310,11 @@ class Ros2ActionClient(ActionClient):
             else:
                 self._give_to_open(server_id)
 
-    def _unresolved(self) -> list[SentGoal]:
+    def _unresolved(self) -> list[Ros2Goal]:
         """Return the withdrawn goals that the server may still take under an unknown id."""
         return [goal for goal in self._suspects() if goal.is_withdrawn and not goal.is_settled]
 
-    def _suspects(self) -> list[SentGoal]:
+    def _suspects(self) -> list[Ros2Goal]:
         """Return our goals that are over, and that the list may still name for the first time."""
         return [
             goal
@@ -322,14 +324,14 @@ class Ros2ActionClient(ActionClient):
             and (self._is_recent(goal) or (goal.is_withdrawn and not goal.is_settled))
         ]
 
-    def _is_recent(self, goal: SentGoal) -> bool:
-        heard_s = max(goal.ended_s or 0.0, self._tracks[goal.id].heard_s)
+    def _is_recent(self, goal: Ros2Goal) -> bool:
+        heard_s = max(goal.ended_s or 0.0, goal.heard_s)
         return anyio.current_time() - heard_s < RECENT_S
 
     def _give_to_open(self, server_id: str) -> None:
         """Give an id to a goal under way that was sent before the id was seen."""
         for goal in self.open_goals:
-            is_older = self._tracks[goal.id].n_seen <= self._seen.get(server_id, -1)
+            is_older = goal.n_seen <= self._seen.get(server_id, -1)
             if goal.server_id is None and is_older:
                 goal.server_id = server_id
                 return
@@ -337,26 +339,26 @@ class Ros2ActionClient(ActionClient):
     def _give_to_ended(self, server_id: str, state: ActionState) -> None:
         """Give an id to a goal that has ended in the same way, or was to be cancelled."""
         for goal in self._suspects():
-            end = self._tracks[goal.id].wire.end
+            end = goal.wire.end
             told = STATES.get(end.status or 0) if end is not None else ActionState.CANCELLED
             if told is state and (end is not None or goal.is_withdrawn):
                 self._resolve(goal, server_id)
                 return
 
-    def _resolve(self, goal: SentGoal, server_id: str) -> None:
+    def _resolve(self, goal: Ros2Goal, server_id: str) -> None:
         """Give an id to a goal that is over; what it may have been is then known to be another."""
         goal.server_id = server_id
         self._note_life(goal)
         if not self._suspects():
-            for track in [self._tracks[each.id] for each in self.open_goals]:
-                self._claim(self._seen_since(track))
+            for each in self.open_goals:
+                self._claim(self._seen_since(each))
 
     async def _find_out(self, server_id: str) -> None:
         """Cancel a goal that has appeared where it is one of ours that was withdrawn."""
         begun_s = anyio.current_time()
         for pause_s in SUSPECTED_S:
             for goal in self._unresolved():
-                goal.through.cancel_goal(self._tracks[goal.id].wire)
+                goal.through.cancel_goal(goal.wire)
             await anyio.sleep(pause_s)
             state = self._statuses.get(server_id, ActionState.CANCELLED)
             is_late = anyio.current_time() - begun_s > UNNAMED_S
@@ -380,8 +382,7 @@ class Ros2ActionClient(ActionClient):
             # It may be the one that is wanted, and that is told as under way.
             return False
         return any(
-            (goal.state is ActionState.CANCELLED or self._tracks[goal.id].wire.is_lost)
-            and self._is_recent(goal)
+            (goal.state is ActionState.CANCELLED or goal.wire.is_lost) and self._is_recent(goal)
             for goal in self._unresolved()
         )
 

@@ -2,6 +2,7 @@
 
 from collections import OrderedDict
 from dataclasses import dataclass
+from typing import Any
 
 import anyio
 
@@ -34,7 +35,7 @@ class TrackedGoal:
 
     handle: str
     goal: SentGoal
-    action: ActionClient
+    action: ActionClient[Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -174,7 +175,7 @@ class ActionBook:
         """Return when an action server's list of goals came, by the event loop's clock."""
         return (await self._find_client(action)).listed_s
 
-    async def _find_client(self, action: str) -> ActionClient:
+    async def _find_client(self, action: str) -> ActionClient[Any]:
         known = self._inquiry.connection.started.actions.get(action)
         if isinstance(known, ActionClient):
             return known
@@ -184,7 +185,7 @@ class ActionBook:
         type_name = "" if is_ros2 else await self._inquiry.fetch_action_type(action)
         return await self._open(action, type_name)
 
-    async def _open(self, action: str, type_name: str) -> ActionClient:
+    async def _open(self, action: str, type_name: str) -> ActionClient[Any]:
         return open_action(
             self._inquiry.connection,
             action,
