@@ -109,7 +109,7 @@ Request = TypeVar("Request", bound=TopicRequest)
 
 
 class RosLink(ParameterServices, Generic[Request]):
-    """The part of the port that is the same over every connection.
+    """The part of the port that is the same over every connection; it raises what the port says.
 
     Attributes:
         announcements: What we publish, or would.
@@ -208,11 +208,7 @@ class RosLink(ParameterServices, Generic[Request]):
 
     @abstractmethod
     def _prepare(self, topic: str, message: Message) -> Callable[[], int]:
-        """Return what publishes a message to those who are connected, and tells by how many ways.
-
-        Raises:
-            LinkError: The topic was not advertised, or the message does not fit its type.
-        """
+        """Return what publishes a message to those who are connected; it tells by how many ways."""
 
 
 class NativeLink(RosLink[Request]):
@@ -236,11 +232,7 @@ class NativeLink(RosLink[Request]):
 
 
 def check_name(name: str) -> None:
-    """Do nothing for the full name of a topic, a service or an action.
-
-    Raises:
-        LinkError: It is none.
-    """
+    """Do nothing for the full name of a topic, a service or an action."""
     if not (name.startswith("/") and NAME.fullmatch(name)):
         raise LinkError(f"{name[:80]!r} is no full name in ROS.", hint="Such as /robot/map.")
 

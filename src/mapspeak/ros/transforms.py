@@ -82,11 +82,7 @@ class TransformTree:
     def find_ways(
         self, one: str, other: str
     ) -> tuple[tuple[FrameTransform, ...], tuple[FrameTransform, ...]]:
-        """Return the transforms from each of two frames up to the first that both lie in.
-
-        Raises:
-            LinkError: They lie in no common frame.
-        """
+        """Return the transforms from each of two frames up to the first that both lie in."""
         above = [one]
         while (known := self._to_parent.get(above[-1])) and known.transform.parent not in above:
             above.append(known.transform.parent)

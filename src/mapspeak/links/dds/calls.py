@@ -51,11 +51,7 @@ class Calls:
         type_name: str | None,
         timeout_s: float,
     ) -> Sample:
-        """Return what a service answers, and when it did.
-
-        Raises:
-            LinkError: Nobody serves it, it has another type, or it does not answer.
-        """
+        """Return what a service answers, and when it did."""
         check_name(service)
         found = self._discovery.service_type(service)
         if type_name is not None and found not in (None, bare_type(type_name)):
@@ -66,11 +62,7 @@ class Calls:
     async def send_goal(
         self, action: str, arguments: Message, *, type_name: str, timeout_s: float
     ) -> ActionGoal:
-        """Send a goal and return what becomes of it, as it becomes.
-
-        Raises:
-            LinkError: Nobody serves the action, it has another type, or the goal does not fit.
-        """
+        """Send a goal and return what becomes of it, as it becomes."""
         check_name(action)
         found = self._discovery.actions.get(action)
         if found not in (None, bare_type(type_name)):

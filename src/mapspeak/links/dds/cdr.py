@@ -81,9 +81,6 @@ class Codec:
         Args:
             type_name: Such as "nav_msgs/OccupancyGrid".
             data: With its header of four bytes.
-
-        Raises:
-            LinkError: These bytes are no such message, or nobody knows the type.
         """
         layout = self._find(type_name)
         if len(data) > MOST_BYTES:
@@ -101,11 +98,7 @@ class Codec:
             ) from error
 
     def encode(self, type_name: str, message: Message) -> bytes:
-        """Return the bytes of a message with their header; fields left out hold their defaults.
-
-        Raises:
-            LinkError: The message does not fit its type, or nobody knows the type.
-        """
+        """Return the bytes of a message with their header; fields left out hold their defaults."""
         layout = self._find(type_name)
         filled = self._fill(layout, check_message(self._book, type_name, message))
         return bytes(self.store.serialize_cdr(filled, layout.name, little_endian=True))
@@ -167,11 +160,7 @@ class Store(Typestore):
         return message
 
     def lay_out(self, message: MessageType, inner: Mapping[str, _Layout]) -> _Layout:
-        """Return the layout of a type, given those of the types within.
-
-        Raises:
-            LinkError: It is too large, or holds what CDR cannot.
-        """
+        """Return the layout of a type, given those of the types within."""
         key = (message.fields, tuple(layout.name for layout in inner.values()))
         with self._lock:
             if key not in self._layouts:

@@ -112,11 +112,7 @@ class DdsConnection(DdsGraph):
         self._participant.close()
 
     async def wait_until_connected(self) -> None:
-        """Return at once, or when a node is there again.
-
-        Raises:
-            LinkError: None is, within the usual time for an answer.
-        """
+        """Return at once, or when a node is there again."""
         await self._wait_for_node(self.timing.answer_s)
 
     # --- services and actions

@@ -252,11 +252,7 @@ class Outlet:
         self._news = anyio.Event()
 
     def write(self, data: bytes) -> None:
-        """Send the bytes of one message.
-
-        Raises:
-            LinkError: DDS does not take it.
-        """
+        """Send the bytes of one message."""
         if self.writer is None:
             raise LinkError("The connection is closed.", hint="Connect again.")
         try:

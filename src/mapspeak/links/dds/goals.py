@@ -48,11 +48,7 @@ class DdsActionClient:
         result.on_answer = self._take_result
 
     async def send_goal(self, action: str, arguments: Message, *, timeout_s: float) -> ActionGoal:
-        """Send a goal; what becomes of it comes later.
-
-        Raises:
-            LinkError: Nobody serves the action, or the goal does not fit.
-        """
+        """Send a goal; what becomes of it comes later."""
         for service in (self._send, self._result, self._cancel):
             await service.wait_for_server(timeout_s=timeout_s)
         goal_id = new_id()

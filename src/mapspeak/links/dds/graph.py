@@ -32,9 +32,6 @@ class DdsGraph(DdsTopics):
         """Make types known: does nothing where they are, else asks the node behind an endpoint.
 
         Nodes find a type by its hash, and DDS tells no hash by which they find that of a service.
-
-        Raises:
-            LinkError: They stay unknown.
         """
         unknown = [name for name in wanted if not self.types.knows(name)]
         if unknown and SERVICE_PART.search(unknown[0]):
@@ -43,11 +40,7 @@ class DdsGraph(DdsTopics):
             await self.ask_type(endpoint)
 
     async def ask_type(self, endpoint: Endpoint) -> None:
-        """Ask the node behind a reader or writer of a topic for its type.
-
-        Raises:
-            LinkError: It does not tell.
-        """
+        """Ask the node behind a reader or writer of a topic for its type."""
         service = f"{self.discovery.node_with(endpoint.key)}/{DESCRIBE}"
         if not endpoint.type_hash or self.discovery.server_of(service) is None:
             raise self.types.refusal(endpoint.type_name)

@@ -97,9 +97,6 @@ class DdsParticipant:
             quality: What is asked of the writers; one that offers less is not heard.
             decode: Is called in another thread.
             take: Is called in the event loop.
-
-        Raises:
-            LinkError: The topic is in use with another type.
         """
         try:
             known, _ = self._topic(topic, type_name)
@@ -110,11 +107,7 @@ class DdsParticipant:
             raise _unusable(topic, type_name, error) from error
 
     def write_to(self, topic: str, type_name: str, *, quality: Quality) -> Outlet:
-        """Begin to write on a topic; see `read`.
-
-        Raises:
-            LinkError: The topic is in use with another type.
-        """
+        """Begin to write on a topic; see `read`."""
         try:
             known, raw_type = self._topic(topic, type_name)
             writer = DataWriter(self._publisher, known, quality.writers_qos)

@@ -88,11 +88,7 @@ class ServiceClient:
         )
 
     async def call(self, request: bytes, *, timeout_s: float) -> Sample:
-        """Return what the service answers to a request that `encode` gave.
-
-        Raises:
-            LinkError: It does not answer in time.
-        """
+        """Return what the service answers to a request that `encode` gave."""
         deadline_s = anyio.current_time() + timeout_s
         await self.wait_for_server(timeout_s=timeout_s)
         with anyio.move_on_at(deadline_s):
@@ -101,11 +97,7 @@ class ServiceClient:
         raise self._silence(timeout_s)
 
     async def wait_for_server(self, *, timeout_s: float) -> None:
-        """Return when somebody reads our requests.
-
-        Raises:
-            LinkError: Nobody does, within that time.
-        """
+        """Return when somebody reads our requests."""
         if not await self._outlet.wait_for_reader(timeout_s=timeout_s):
             raise LinkError(
                 f"Nobody serves {self.name.service}.",
@@ -126,11 +118,7 @@ class ServiceClient:
             self._turns.total_tokens = MOST_AT_ONCE if self.tells_whom else 1
 
     def encode(self, arguments: Mapping[str, Any]) -> bytes:
-        """Return a request.
-
-        Raises:
-            LinkError: It does not fit.
-        """
+        """Return a request."""
         return self._encode(self.name.request_type, arguments)
 
     def post(self, request: bytes) -> int:

@@ -69,11 +69,7 @@ def action_parts(action_type: str) -> dict[str, str]:
 
 
 def read_type_description(answer: Message) -> dict[str, str]:
-    """Return the texts of all types in an answer of type_description_interfaces/GetTypeDescription.
-
-    Raises:
-        LinkError: The node does not describe the type.
-    """
+    """Return the texts of all types in an answer of type_description_interfaces."""
     if not answer["successful"]:
         raise LinkError(
             f"The robot does not describe a type: {str(answer['failure_reason'])[:200]}",
@@ -121,21 +117,13 @@ class Types:
         self._codec = Codec(self._book)
 
     def encode(self, type_name: str, message: Mapping[str, Any]) -> bytes:
-        """Return the bytes of a message.
-
-        Raises:
-            LinkError: It does not fit its type, or we do not know the type as the robot has it.
-        """
+        """Return the bytes of a message."""
         if self._is_other_version(type_name):
             raise self.refusal(type_name)
         return self._codec.encode(type_name, message)
 
     def decode(self, type_name: str, data: bytes) -> dict[str, Any]:
-        """Return the message in some bytes.
-
-        Raises:
-            LinkError: It is none of that type, or nobody knows the type.
-        """
+        """Return the message in some bytes."""
         return self._codec.decode(type_name, data)
 
     def knows(self, type_name: str) -> bool:
@@ -197,11 +185,7 @@ class Types:
         yield from map(_book_of, DISTROS)
 
     def take_description(self, answer: Message) -> None:
-        """Take in what a node says of a type.
-
-        Raises:
-            LinkError: It does not describe it.
-        """
+        """Take in what a node says of a type."""
         texts = read_type_description(answer)
         self._other_versions -= texts.keys()
         self._use(TypeBook({**self._book.texts, **texts}))

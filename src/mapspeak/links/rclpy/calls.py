@@ -43,12 +43,7 @@ class RclpyServices:
         type_name: str | None,
         timeout_s: float,
     ) -> dict[str, Any]:
-        """Return what a service answers.
-
-        Raises:
-            LinkError: Nobody serves it, it has another type, the request does not fit, or there is
-                no answer.
-        """
+        """Return what a service answers."""
         check_name(service)
         found = await self._find_type(service, within_s=min(timeout_s, SERVER_S))
         if type_name is not None and bare_type(type_name) != bare_type(found):
@@ -64,11 +59,7 @@ class RclpyServices:
         )
 
     async def connect(self, service: str, service_class: Any, *, within_s: float) -> Client:  # noqa: ANN401
-        """Return a client whose service somebody serves.
-
-        Raises:
-            LinkError: Nobody does.
-        """
+        """Return a client whose service somebody serves."""
         client = self._clients.get(service)
         if client is None:
             with errors_of_ros(f"{service} cannot be called"):
@@ -143,11 +134,7 @@ class Goals:
         self._goals: dict[str, RclpyGoal] = {}
 
     async def send(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
-        """Send a goal; what becomes of it comes later.
-
-        Raises:
-            LinkError: Nobody serves the action, it has another type, or the goal does not fit.
-        """
+        """Send a goal; what becomes of it comes later."""
         check_name(action)
         used = await self._open(action, type_name)
         goal = RclpyGoal(action, self._servers_of(action))

@@ -81,11 +81,7 @@ class Ros2Connection(RclpyGraph, RclpyTopics):
         await self._flush()
 
     async def wait_until_connected(self) -> None:
-        """Return at once, or when the first node of others is found.
-
-        Raises:
-            LinkError: None is, within the usual time for an answer.
-        """
+        """Return at once, or when the first node of others is found."""
         if not await wait_until(self._sees_others, within_s=ANSWER_S):
             raise LinkError("No other node of ROS 2 has been found in our domain.", hint=HINT)
 

@@ -97,11 +97,7 @@ class RclpyParticipant:
                 raise
 
     async def wait_for(self, future: Any) -> Any:  # noqa: ANN401 - rclpy has no types
-        """Return the result of one of rclpy's futures.
-
-        Raises:
-            LinkError: It ended with an error.
-        """
+        """Return the result of one of rclpy's futures."""
         is_done = anyio.Event()
         future.add_done_callback(lambda _: self.hand_over(is_done.set))
         await is_done.wait()

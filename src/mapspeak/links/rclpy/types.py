@@ -221,11 +221,7 @@ RosMessage = Any  # rclpy has no types
 
 
 def write_message(message_class: Any, values: object) -> RosMessage:  # noqa: ANN401
-    """Return a message with the values of a mapping; the fields it leaves out keep their defaults.
-
-    Raises:
-        LinkError: Something does not fit; says which field.
-    """
+    """Return a message with these values; the fields they leave out keep their defaults."""
     checked = check_message(_book_of(message_class), name_of(message_class), values)
     return _fill(message_class, checked)
 

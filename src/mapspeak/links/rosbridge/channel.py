@@ -107,27 +107,15 @@ class Channel:
             await self.send(text, timeout_s=self._timing.answer_s)
 
     async def wait_until_up(self, timeout_s: float) -> None:
-        """Return at once, or when there is a connection again.
-
-        Raises:
-            LinkError: There was none in time.
-        """
+        """Return at once, or when there is a connection again."""
         await self._wait_for_connection(timeout_s)
 
     async def send(self, text: bytes, *, timeout_s: float) -> None:
-        """Send something once there is a connection.
-
-        Raises:
-            LinkError: There was none in time.
-        """
+        """Send something once there is a connection."""
         (await self._wait_for_connection(timeout_s)).send(text)
 
     async def call(self, text: bytes, *, call_id: str, what: str, timeout_s: float) -> object:
-        """Return what a service answers.
-
-        Raises:
-            LinkError: There was no answer in time, or it was a refusal.
-        """
+        """Return what a service answers."""
         deadline_s = anyio.current_time() + timeout_s
         connection = await self._wait_for_connection(timeout_s)
         n_answers = connection.n_answers

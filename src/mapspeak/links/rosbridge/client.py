@@ -101,11 +101,7 @@ class RosbridgeClient(Rosapi):
             self._tasks.start_soon(work)
 
     async def wait_until_connected(self) -> None:
-        """Return at once, or when both sockets are open again.
-
-        Raises:
-            LinkError: They are not within the usual time for an answer.
-        """
+        """Return at once, or when both sockets are open again."""
         await self._control.wait_until_up(self.timing.answer_s)
         await self._urgent.wait_until_up(self.timing.answer_s)
 
@@ -128,11 +124,7 @@ class RosbridgeClient(Rosapi):
             tasks.start_soon(self._urgent.say_goodbye)
 
     def advertise(self, topic: str, *, type_name: str) -> None:
-        """Say that we will publish; the robot needs a moment until it listens.
-
-        Raises:
-            LinkError: The topic was advertised with another type, or its name is none.
-        """
+        """Say that we will publish; the robot needs a moment until it listens."""
         known = self.announcements.type_of(topic) or type_name
         if known != type_name:
             raise LinkError(
@@ -142,11 +134,7 @@ class RosbridgeClient(Rosapi):
         super().advertise(topic, type_name=type_name)
 
     async def publish(self, topic: str, message: Message) -> None:
-        """Publish on an advertised topic.
-
-        Raises:
-            LinkError: There is no connection, or the message cannot be sent.
-        """
+        """Publish on an advertised topic."""
         text = write_operation("publish", topic=topic, msg=message)
         if self.announcements.use(topic):
             await anyio.sleep(NOTICE_S)
@@ -179,11 +167,7 @@ class RosbridgeClient(Rosapi):
         )
 
     async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
-        """Send a goal to an action of ROS 2 and return what becomes of it, as it becomes.
-
-        Raises:
-            LinkError: There is no connection, or the goal cannot be sent.
-        """
+        """Send a goal to an action of ROS 2 and return what becomes of it, as it becomes."""
         goal = ActionGoal(goal_id=new_id(), action=action)
         text = write_operation(
             "send_action_goal",

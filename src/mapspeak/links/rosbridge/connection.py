@@ -74,11 +74,7 @@ class SocketConnection:
         return bool(self._pending)
 
     def send(self, text: bytes) -> None:
-        """Send a text after those before it.
-
-        Raises:
-            LinkError: The robot takes nothing any more.
-        """
+        """Send a text after those before it."""
         try:
             self._is_sent = anyio.Event()
             self._unsent.send_nowait(text)

@@ -35,11 +35,7 @@ class ServiceCaller:
         type_name: str | None,
         timeout_s: float,
     ) -> dict[str, Any]:
-        """Return what a service answers, as the port says.
-
-        Raises:
-            LinkError: No answer, a refusal, or no connection.
-        """
+        """Return what a service answers, as the port says."""
         until_s = anyio.current_time() + timeout_s
         left_s = timeout_s
         while True:

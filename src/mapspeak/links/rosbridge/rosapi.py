@@ -140,11 +140,7 @@ class Rosapi(RosLink[RosbridgeTopicRequest]):
         self._definitions = DefinitionKeeper(self.call_service)
 
     async def fetch_graph(self) -> RosGraph:
-        """Return the topics and actions there are.
-
-        Raises:
-            LinkError: rosapi is missing, or gives no usable answer.
-        """
+        """Return the topics and actions there are."""
         listed = await self._list_topics()
         dialect, distro = await self._fetch_version(list(listed.values()))
         actions: tuple[str, ...] = ()

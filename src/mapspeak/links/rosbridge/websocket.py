@@ -129,33 +129,21 @@ class WebSocket:
         return self._arrived.popleft()
 
     async def send(self, text: bytes) -> None:
-        """Send one text message.
-
-        Raises:
-            SocketClosed: The other end has gone.
-        """
+        """Send one text message."""
         if self._protocol.state is not State.OPEN:
             raise SocketClosed
         self._protocol.send_text(text)
         await self._flush()
 
     async def ping(self) -> None:
-        """Ask the other end for a sign of life.
-
-        Raises:
-            SocketClosed: The other end has gone.
-        """
+        """Ask the other end for a sign of life."""
         if self._protocol.state is not State.OPEN:
             raise SocketClosed
         self._protocol.send_ping(b"")
         await self._flush()
 
     async def say_goodbye(self) -> None:
-        """Say that we will send nothing more; whoever receives learns when the other end agrees.
-
-        Raises:
-            SocketClosed: The other end has gone already.
-        """
+        """Say that we will send nothing more; whoever receives learns when the other end agrees."""
         if self._protocol.state is State.OPEN:
             self._protocol.send_close()
         await self._flush()

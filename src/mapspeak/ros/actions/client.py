@@ -270,11 +270,7 @@ class ActionClient(ABC, Generic[Goal]):
 
     @abstractmethod
     async def _cancel(self, goal: Goal) -> bool:
-        """Ask for the end of a goal; return True when the server says that it has ended.
-
-        Raises:
-            LinkError: The server refuses, or cannot be told.
-        """
+        """Ask for the end of a goal; return True when the server says that it has ended."""
 
     @abstractmethod
     def _look_at(self, goal: Goal) -> None:

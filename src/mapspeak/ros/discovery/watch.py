@@ -246,11 +246,7 @@ class RobotWatch:
 
     @property
     def profile(self) -> RobotProfile:
-        """What was found so far.
-
-        Raises:
-            LinkError: There has been no look yet.
-        """
+        """What was found so far."""
         if self._profile is None:
             raise LinkError("The robot has not been looked at yet.", hint="Try again in a moment.")
         return self._profile
@@ -278,11 +274,7 @@ class RobotWatch:
         return self._is_settled
 
     async def begin(self, *, frames_s: float) -> None:
-        """Look for the first time, and wait a moment for frames from the map to the base.
-
-        Raises:
-            LinkError: The robot does not say what it offers.
-        """
+        """Look for the first time, and wait a moment for frames from the map to the base."""
         while self._profile is None:
             try:
                 await self.look()
@@ -312,11 +304,7 @@ class RobotWatch:
                 pause_s = min(pause_s, LONGEST_PAUSE_S)
 
     async def find(self, part: RobotPart) -> None:
-        """Return when a part is found; look once more for one that counts as missing.
-
-        Raises:
-            LinkError: The robot does not say what it offers.
-        """
+        """Return when a part is found; look once more for one that counts as missing."""
         await self.wait_for(part)
         if part in self.missing:
             await self.look()
@@ -330,11 +318,7 @@ class RobotWatch:
         await self._wait_until(lambda: False)
 
     async def look(self) -> None:
-        """Take in what there is now: people start rosbridge first and SLAM later.
-
-        Raises:
-            LinkError: The robot does not say what it offers.
-        """
+        """Take in what there is now: people start rosbridge first and SLAM later."""
         frames = self._frames.tree.frames
         now, names = await look_at_robot(self._connection, frames, self._overrides)
         if names != self._names or frames != self._frames_seen:

@@ -1,4 +1,7 @@
-"""ROS messages as rosbridge carries them, and our values: read and written, in both dialects."""
+"""ROS messages as rosbridge carries them, and our values: read and written, in both dialects.
+
+What reads a message raises `LinkError` where it is none of that type.
+"""
 
 from mapspeak.ros.messages.fields import (
     NAME,

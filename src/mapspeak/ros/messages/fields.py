@@ -152,11 +152,7 @@ def bare_type(name: str) -> str:
 
 
 def read_stamp(stamp: Message) -> float:
-    """Read a time of either dialect, in seconds.
-
-    Raises:
-        LinkError: It is no time.
-    """
+    """Read a time of either dialect, in seconds."""
     is_ros1 = "secs" in stamp
     whole_s = whole_of(
         stamp, "secs" if is_ros1 else "sec", low=-LARGEST_SECONDS, high=LARGEST_SECONDS
@@ -166,11 +162,7 @@ def read_stamp(stamp: Message) -> float:
 
 
 def write_stamp(stamp_s: float, *, dialect: Dialect) -> dict[str, int]:
-    """Write a time given in seconds.
-
-    Raises:
-        LinkError: ROS cannot say that time.
-    """
+    """Write a time given in seconds."""
     if not (math.isfinite(stamp_s) and abs(stamp_s) < LARGEST_SECONDS):
         raise misfit("stamp", stamp_s, "a time in seconds")
     whole_s = math.floor(stamp_s)
@@ -183,11 +175,7 @@ def write_stamp(stamp_s: float, *, dialect: Dialect) -> dict[str, int]:
 
 
 def read_header(message: Message) -> tuple[str, float]:
-    """Read the frame and the time in seconds that a message's header gives.
-
-    Raises:
-        LinkError: The message has no such header.
-    """
+    """Read the frame and the time in seconds that a message's header gives."""
     header = part_of(message, "header")
     return text_of(header, "frame_id").lstrip("/"), read_stamp(part_of(header, "stamp"))
 

@@ -46,9 +46,6 @@ def read_image(message: Message) -> EncodedPicture:
     """Read sensor_msgs/Image: colours become JPEG; grey levels and depth become PNG.
 
     Depth is shaded from near (bright) to far (dark); black is where nothing was measured.
-
-    Raises:
-        LinkError: It is no image, or its encoding is not known.
     """
     encoding = text_of(message, "encoding")
     if encoding in ("16UC1", "32FC1"):
@@ -57,11 +54,7 @@ def read_image(message: Message) -> EncodedPicture:
 
 
 def read_compressed_image(message: Message) -> EncodedPicture:
-    """Read sensor_msgs/CompressedImage: JPEG and PNG pass as they are, depth is shaded.
-
-    Raises:
-        LinkError: It is none, is cut off, or is neither JPEG nor PNG.
-    """
+    """Read sensor_msgs/CompressedImage: JPEG and PNG pass as they are, depth is shaded."""
     frame_id, stamp_s = read_header(message)
     form, data = text_of(message, "format"), bytes_of(message)
     if "compressedDepth" in form:

@@ -32,11 +32,7 @@ def shade_depth(depth_m: Depth) -> NDArray[np.uint8]:
 
 
 def read_compressed_depth(data: bytes, form: str) -> Depth:
-    """Read image_transport's compressedDepth: metres, NaN where nothing was measured.
-
-    Raises:
-        LinkError: It is damaged, or compressed with RVL.
-    """
+    """Read image_transport's compressedDepth: metres, NaN where nothing was measured."""
     if "rvl" in form.lower():
         raise LinkError(
             "The camera compresses depth with RVL, which cannot be read.",
@@ -92,11 +88,7 @@ YUV = {
 
 
 def read_pixels(message: Message) -> Pixels:
-    """Read grey levels, shape (rows, cols), or RGB, shape (rows, cols, 3).
-
-    Raises:
-        LinkError: The fields do not fit together, or the encoding is not known.
-    """
+    """Read grey levels, shape (rows, cols), or RGB, shape (rows, cols, 3)."""
     encoding = text_of(message, "encoding")
     samples = _read_samples(message, encoding)
     if encoding == "mono16":
@@ -116,11 +108,7 @@ def read_pixels(message: Message) -> Pixels:
 
 
 def read_depth(message: Message) -> Depth:
-    """Read 16UC1 (millimetres) or 32FC1 (metres): metres, NaN where nothing was measured.
-
-    Raises:
-        LinkError: The fields do not fit together, or it is no depth image.
-    """
+    """Read 16UC1 (millimetres) or 32FC1 (metres): metres, NaN where nothing was measured."""
     encoding = text_of(message, "encoding")
     if encoding not in ("16UC1", "32FC1"):
         raise misfit("encoding", encoding, "16UC1 or 32FC1")
@@ -130,11 +118,7 @@ def read_depth(message: Message) -> Depth:
 
 
 def bytes_of(message: Message) -> bytes:
-    """Return the field `data` of a message with uint8[]: base64 text, bytes, array or list.
-
-    Raises:
-        LinkError: It is none of these.
-    """
+    """Return the field `data` of a message with uint8[]: base64 text, bytes, array or list."""
     data = message.get("data")
     try:
         match data:

@@ -105,11 +105,7 @@ def write_yaw(yaw_rad: float) -> dict[str, float]:
 
 
 def read_pose(message: Message) -> Pose:
-    """Read geometry_msgs/Pose; height and tilt are left away.
-
-    Raises:
-        LinkError: It is no pose.
-    """
+    """Read geometry_msgs/Pose; height and tilt are left away."""
     place = part_of(message, "position")
     yaw_rad = read_yaw(part_of(message, "orientation"))
     return Pose(number_of(place, "x"), number_of(place, "y"), yaw_rad)
@@ -122,11 +118,7 @@ def write_pose(pose: Pose) -> dict[str, Any]:
 
 
 def read_pose_stamped(message: Message) -> FramedPose:
-    """Read geometry_msgs/PoseStamped.
-
-    Raises:
-        LinkError: It is none.
-    """
+    """Read geometry_msgs/PoseStamped."""
     frame_id, stamp_s = read_header(message)
     return FramedPose(pose=read_pose(part_of(message, "pose")), frame_id=frame_id, stamp_s=stamp_s)
 
@@ -138,11 +130,7 @@ def write_pose_stamped(framed: FramedPose, *, dialect: Dialect) -> dict[str, Any
 
 
 def read_pose_with_covariance(message: Message) -> FramedPose:
-    """Read geometry_msgs/PoseWithCovarianceStamped, or the pose of nav_msgs/Odometry.
-
-    Raises:
-        LinkError: It is neither.
-    """
+    """Read geometry_msgs/PoseWithCovarianceStamped, or the pose of nav_msgs/Odometry."""
     frame_id, stamp_s = read_header(message)
     pose = read_pose(part_of(part_of(message, "pose"), "pose"))
     return FramedPose(pose=pose, frame_id=frame_id, stamp_s=stamp_s)
@@ -164,11 +152,7 @@ def write_odometry(
 
 
 def read_transforms(message: Message) -> tuple[FrameTransform, ...]:
-    """Read tf2_msgs/TFMessage.
-
-    Raises:
-        LinkError: It is none.
-    """
+    """Read tf2_msgs/TFMessage."""
     return tuple(_read_transform(each) for each in parts_of(message, "transforms"))
 
 
@@ -178,11 +162,7 @@ def write_transforms(transforms: Iterable[FrameTransform], *, dialect: Dialect) 
 
 
 def read_twist(message: object) -> Twist:
-    """Read geometry_msgs/Twist, or the one within geometry_msgs/TwistStamped.
-
-    Raises:
-        LinkError: It is neither.
-    """
+    """Read geometry_msgs/Twist, or the one within geometry_msgs/TwistStamped."""
     is_stamped = isinstance(message, Mapping) and "twist" in message
     twist = part_of(message, "twist") if is_stamped else message
     linear, angular = part_of(twist, "linear"), part_of(twist, "angular")

@@ -90,9 +90,6 @@ def read_scan(message: Message) -> LaserScan:
     A beam that met nothing is infinite (REP 117), or at its limit or beyond, as Stage and some
     drivers of ROS 1 write it, and as AMCL reads it. Zero, NaN and what is too
     near say nothing: drivers write them for dark things, glass, and the robot's own posts.
-
-    Raises:
-        LinkError: It is none.
     """
     frame_id, stamp_s = read_header(message)
     ranges_m = floats_of(message, "ranges")
@@ -155,11 +152,7 @@ def write_scan(scan: LaserScan, *, dialect: Dialect) -> dict[str, Any]:
 
 
 def read_camera_info(message: Message) -> CameraInfo:
-    """Read sensor_msgs/CameraInfo.
-
-    Raises:
-        LinkError: It is none.
-    """
+    """Read sensor_msgs/CameraInfo."""
     frame_id, stamp_s = read_header(message)
     width_px = whole_of(message, "width", low=0, high=LARGEST_SIDE_PX)
     height_px = whole_of(message, "height", low=0, high=LARGEST_SIDE_PX)

@@ -195,11 +195,7 @@ class PoseKeeper:
         return StampedPose(found.outer_from_inner, found.stamp_s, silent_s=silent_s)
 
     def _measure_silence(self, arrived_s: float | None, *, what: str) -> float:
-        """Return the wall time since the source of the pose said anything new.
-
-        Raises:
-            LinkError: It is too long ago.
-        """
+        """Return the wall time since the source of the pose said anything new."""
         if arrived_s is None:
             return 0.0
         silent_s = max(anyio.current_time() - arrived_s, 0.0)

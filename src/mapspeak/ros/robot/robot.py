@@ -324,9 +324,6 @@ async def build_ros_robot(
         overrides: What robot.yaml says.
         patience: Time limits for what it offers, and of navigation.
         frames_s: How long to wait for its frames, in wall time.
-
-    Raises:
-        LinkError: The robot does not say what it offers.
     """
     # Whether it is to be driven or only watched, whoever uses it says.
     connection.advertise_late()

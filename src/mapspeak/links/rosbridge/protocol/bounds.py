@@ -182,11 +182,7 @@ class FragmentStore:
         return sum(message.n_bytes for message in self._unfinished.values())
 
     def add(self, operation: dict[str, Any]) -> bytes | None:
-        """Take one piece, and return the whole text once it is complete.
-
-        Raises:
-            FrameError: It is no piece.
-        """
+        """Take one piece, and return the whole text once it is complete."""
         number, n_pieces, text = _read_piece(operation)
         # The server gives small numbers as ids, the same one to every message.
         key = (str(operation.get("id")), n_pieces)

@@ -253,11 +253,7 @@ def require_cbor() -> None:
 
 
 def decode_png(text: str) -> memoryview:
-    """Return the text that rosbridge hid in the pixels of a picture.
-
-    Raises:
-        FrameError: It is no such picture.
-    """
+    """Return the text that rosbridge hid in the pixels of a picture."""
     try:
         with Image.open(io.BytesIO(base64.b64decode(text)), formats=["PNG"]) as picture:
             if picture.width * picture.height > MAX_FRAME_PIXELS:
@@ -293,11 +289,7 @@ def _parse_lenient_json(text: Raw, complaint: str) -> Any:  # noqa: ANN401 - as 
 
 
 def _put_back(value: Any, lists: Sequence[Numbers]) -> Any:  # noqa: ANN401 - as above
-    """Put lists where their markers are, and check how deep the value is nested.
-
-    Raises:
-        FrameError: It is nested too deep.
-    """
+    """Put lists where their markers are, and check how deep the value is nested."""
     places = {marker_of(number): each for number, each in enumerate(lists)}
     level = [value]
     for _ in range(MAX_DEPTH):
