@@ -96,6 +96,27 @@ async def test_a_stop_that_cannot_end_a_goal_says_which(tmp_path: Path) -> None:
     assert PATROL in said
 
 
+@pytest.mark.parametrize("ros", [1, 2])
+async def test_a_stop_that_nobody_hears_is_told_though_a_goal_was_sent_before(
+    tmp_path: Path, ros: int
+) -> None:
+    scripted = ScriptedRobot(ros=ros, actions=(PATROL,))
+    for topic in ("/move_base/status", "/move_base/feedback", "/move_base/result", "/cmd_vel"):
+        scripted.topics.pop(topic, None)
+    scripted.services["/rosapi/action_type"] = lambda _: {"type": TYPE}
+    scripted.services["/rosapi/subscribers"] = lambda _: {"subscribers": []}
+    async with (
+        connect_scripted(scripted, timing=QUICK, patience=SHORT) as robot,
+        serving(robot, tmp_path) as (_, caller),
+    ):
+        scripted.accepts_goals = False
+        await caller.client.call_tool(
+            "ros_send_goal", {"action": PATROL, "fields": {}, "wait_s": 0}
+        )
+        said = await caller.refuse("stop_robot")
+    assert "NOT STOPPED: Nobody could be told" in said
+
+
 async def test_a_stop_publishes_zero_velocity_wherever_a_velocity_was_published(
     tmp_path: Path,
 ) -> None:

@@ -23,6 +23,7 @@ from mapspeak.ros.port import (
     RosConnection,
     RosGraph,
     find_nearest,
+    has_listeners,
     new_id,
     started_over,
 )
@@ -44,6 +45,7 @@ __all__ = [
     "Started",
     "Subscription",
     "find_nearest",
+    "has_listeners",
     "new_id",
     "split_definition",
     "started_over",

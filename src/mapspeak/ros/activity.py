@@ -147,8 +147,10 @@ class Startable(Protocol):
         """The clients with whom goals end that are under way."""
         ...
 
-    async def end(self) -> None:
+    async def end(self) -> bool:
         """End every goal of ours, also one that the robot takes only later.
+
+        Returns whether somebody was there to be told; False also where nothing was under way.
 
         Raises:
             LinkError: Says what could not be ended.

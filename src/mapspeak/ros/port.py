@@ -304,3 +304,11 @@ def started_over(connection: RosConnection | None) -> Started:
         return Started() if connection is None else connection.started
     except LinkError:
         return Started()
+
+
+async def has_listeners(connection: RosConnection, topic: str) -> bool:
+    """Return whether anybody listens to a topic; True where the robot does not say."""
+    try:
+        return bool(await connection.fetch_subscribers(topic))
+    except LinkError:
+        return True

@@ -230,8 +230,10 @@ class ActionClient(ABC, Generic[Goal]):
             await self._cancel(goal)
             await self._check_ended([goal])
 
-    async def end(self) -> None:
+    async def end(self) -> bool:
         """End every goal of ours, and where they move the robot too, those of others.
+
+        Returns whether somebody was there to be told; False also where nothing was under way.
 
         Raises:
             LinkError: Says what could not be ended.
@@ -249,6 +251,7 @@ class ActionClient(ABC, Generic[Goal]):
             await self._cancel_each(taken)
         await self._check_ended(taken)
         self._tell()
+        return bool(taken) or (self.ends_others and await self._is_served())
 
     @abstractmethod
     async def cancel_all(self, through: RosConnection | None = None) -> int:
@@ -259,6 +262,10 @@ class ActionClient(ABC, Generic[Goal]):
         """
 
     # --- inside: each ROS in its own way
+
+    async def _is_served(self) -> bool:
+        """Return whether somebody has heard `cancel_all`; a service that cancels has answered."""
+        return True
 
     @abstractmethod
     async def _begin(self, arguments: Message, through: RosConnection, sent_s: float) -> Goal:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.ros import Listener, RosConnection, Subscription, new_id
+from mapspeak.ros import Listener, RosConnection, Subscription, has_listeners, new_id
 from mapspeak.ros.actions.client import (
     GONE,
     RESULT_LATE,
@@ -71,6 +71,9 @@ class Ros1ActionClient(ActionClient[SentGoal]):
         """Cancel every goal of the action, whoever sent it; return how many there were."""
         self._publish_cancel("", through or self._connection)
         return sum(not state.is_final for state in self._statuses.values())
+
+    async def _is_served(self) -> bool:
+        return await has_listeners(self._connection, f"{self.action}/cancel")
 
     async def _begin(self, arguments: Message, through: RosConnection, sent_s: float) -> SentGoal:
         goal_id = new_id()

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import GoalState, StampedPose
-from mapspeak.ros import RosConnection, new_id
+from mapspeak.ros import RosConnection, has_listeners, new_id
 from mapspeak.ros.messages import Dialect, FramedPose, write_pose_stamped
 from mapspeak.ros.robot.driving import LATEST_S, GoalRecord
 
@@ -101,11 +101,12 @@ class GoalTopicDriver:
             await self._publish((await self._fetch_pose()).pose)
             record.end(GoalState.CANCELLED)
 
-    async def end(self) -> None:
-        """Send the robot to where it is."""
+    async def end(self) -> bool:
+        """Send the robot to where it is; return whether anybody listens to goals."""
         await self._publish((await self._fetch_pose()).pose)
         if self._current is not None:
             self._current.end(GoalState.CANCELLED)
+        return await has_listeners(self._connection, self._topic)
 
     async def _publish(self, goal: Pose) -> None:
         pose = FramedPose(pose=goal, frame_id=self._map_frame, stamp_s=LATEST_S)

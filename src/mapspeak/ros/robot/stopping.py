@@ -9,7 +9,7 @@ import anyio
 from mapspeak.errors import LinkError
 from mapspeak.geometry import wrap_angle
 from mapspeak.robot import StampedPose
-from mapspeak.ros import RosConnection, Startable
+from mapspeak.ros import RosConnection, Startable, has_listeners
 from mapspeak.ros.discovery import RobotProfile
 from mapspeak.ros.discovery.profile import TWIST, TWIST_STAMPED
 from mapspeak.ros.messages import Message, Twist, write_header, write_twist
@@ -132,32 +132,30 @@ async def stop_everything(connection: RosConnection, *, brake: Brake) -> None:
     connection.clear_the_way()
     actions = list(connection.started.actions.values())
     faults: list[LinkError] = []
+    told: list[bool] = []
 
     async def try_to_end(action: Startable) -> None:
         try:
-            await action.end()
+            told.append(await action.end())
         except LinkError as error:
             faults.append(error)
 
     async with anyio.create_task_group() as tasks:
         for action in actions:
             tasks.start_soon(try_to_end, action)
-    if not (actions or await _is_heard(connection, brake)):
-        raise LinkError(
-            "Nobody could be told: no navigation is known, and nobody listens to velocities.",
-            hint="Check that the robot runs, and in the ROS system that this server is in.",
-        )
     if faults:
         said = dict.fromkeys(fault.message for fault in faults)
         raise LinkError(" ".join(said), hint=faults[0].hint) from faults[0]
+    if not any(told) and not await _is_heard(connection, brake):
+        raise LinkError(
+            "Nobody could be told: no navigation is there, and nobody listens to velocities.",
+            hint="Check that the robot runs, and in the ROS system that this server is in.",
+        )
 
 
 async def _is_heard(connection: RosConnection, brake: Brake) -> bool:
-    """Return whether anybody listens to zero velocity; True where the robot does not say."""
+    """Return whether anybody listens to zero velocity."""
     for topic in brake.topics:
-        try:
-            if await connection.fetch_subscribers(topic):
-                return True
-        except LinkError:
+        if await has_listeners(connection, topic):
             return True
     return False
