@@ -78,6 +78,7 @@ class FakeRobot:
         self.grid = grid
         self.pose = pose
         self.has_camera = has_camera
+        self.is_radius_assumed = False
         self.detections: tuple[Detection, ...] = ()
         self.scan: RangeScan | None = None
         self.n_stops = 0
@@ -99,6 +100,7 @@ class FakeRobot:
             has_camera=self.has_camera,
             has_laser=self.scan is not None,
             detector="fake detector" if self.detections else None,
+            is_radius_assumed=self.is_radius_assumed,
         )
 
     @property

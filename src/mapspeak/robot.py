@@ -32,6 +32,7 @@ class RobotDescription:
         has_laser: It has a laser that measures along the floor; whether that turns is not said.
         detector: What its own object detector is called; None where it has none.
         map_frame: What ROS calls the frame of its map.
+        is_radius_assumed: Neither the robot nor its owner has told the radius.
     """
 
     name: str
@@ -41,6 +42,7 @@ class RobotDescription:
     has_laser: bool
     detector: str | None
     map_frame: str = "map"
+    is_radius_assumed: bool = False
 
 
 class PoseDoubt(StrEnum):

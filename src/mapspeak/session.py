@@ -43,11 +43,10 @@ LOOK_S = 0.05
 """Wall time between two looks for a hold, and at where a drive leads."""
 WATCH_S = 0.5
 """Wall time between two looks at the clients and at how a drive stands."""
-
+MAP_S = 1.0
+"""Wall time for a map to come, where only the name of a room is wanted of it."""
 ANY_EPISODE = EpisodeQuery(words="anything", limit=1)
-
 T = TypeVar("T")
-
 logger = logging.getLogger(__name__)
 
 
@@ -58,20 +57,16 @@ class Session:
         robot: The robot itself; tools never see it where there is a guard.
         memory: The semantic map's file.
         lease_s: Without a client for so long, a driving robot is stopped.
-        guard: What commands are held to; without one, as in tests, to nothing.
+        guard: What commands are held to; None in tests.
         ros: The connection of a robot that speaks ROS.
         find_model: Finds what compares meanings; asked once, when it is needed.
 
     Attributes:
         robot: The port to the robot, behind the guard.
-        memory: The semantic map's file.
-        pictures: The pictures that were taken lately, by their ids.
+        pictures: Taken lately, by their ids.
         diary: Every observation, as it was made.
         keeper: The map that the memory belongs to.
-        recollector: What was made of the memory, until it changes.
-        drives: Every drive of the robot.
-        guard: What commands are held to.
-        ros: The connection of a robot that speaks ROS; None for any other.
+        recollector: Keeps what was made of the memory.
     """
 
     def __init__(
@@ -178,6 +173,7 @@ class Session:
                 revision=revision,
                 recollector=self.recollector,
                 pose_doubt=stamped.find_doubt(self.robot.now_s),
+                is_radius_assumed=self.robot.description.is_radius_assumed,
             )
             self._looked_s = self.robot.now_s
             return self._world
@@ -193,6 +189,10 @@ class Session:
         world = self._world
         if world is None or self.robot.now_s < self._looked_s:
             # A simulation that was begun anew may show another world.
+            with anyio.move_on_after(MAP_S) as waiting:
+                await self.robot.fetch_map()
+            if waiting.cancelled_caught:
+                raise LinkError("No map has come yet.", hint="Wait, then ask again.")
             world = await self.fetch_world_model()
         return await self.compute(lambda: world.find_room_id(point))
 

@@ -4,6 +4,7 @@ import math
 import re
 from pathlib import Path
 
+import anyio
 import pytest
 from PIL import Image
 
@@ -12,6 +13,7 @@ from fakes import FakeRobot, two_rooms
 from mapspeak.evaluation.reading import read_map_picture, read_map_text
 from mapspeak.geometry import Pose
 from mapspeak.robot import Detection
+from rosbridge_script import PATIENCE_S
 from served import MODES, connect, pictures_of, report_of, text_of
 
 pytestmark = pytest.mark.anyio
@@ -45,6 +47,28 @@ async def test_a_robot_without_a_map_yet_says_what_to_start(tmp_path: Path) -> N
     assert result.is_error
     assert "Start SLAM" in text_of(result)
     assert report_of(pose)["place"] == "no map yet"
+
+
+async def test_a_picture_does_not_wait_for_a_map_that_does_not_come(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    robot.may_give_map = anyio.Event()
+    async with connect(robot, tmp_path) as client:
+        with anyio.fail_after(PATIENCE_S):
+            picture = await client.call_tool("look_through_camera", {})
+            pose = await client.call_tool("get_robot_pose", {})
+    assert pictures_of(picture)
+    assert report_of(pose)["place"] == "no map yet"
+
+
+async def test_an_assumed_size_of_the_robot_is_said(tmp_path: Path) -> None:
+    robot = FakeRobot(two_rooms())
+    async with connect(robot, tmp_path) as client:
+        told = await client.call_tool("look_at_map", {})
+    robot.is_radius_assumed = True
+    async with connect(robot, tmp_path) as client:
+        assumed = await client.call_tool("look_at_map", {})
+    assert "is assumed" not in text_of(told)
+    assert "A radius of 0.20 m is assumed" in text_of(assumed)
 
 
 async def test_a_robot_without_a_camera_says_what_to_use_instead(tmp_path: Path) -> None:

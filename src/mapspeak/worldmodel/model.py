@@ -125,11 +125,13 @@ class WorldModel:
         revision: The state of the map, where somebody has made it already.
         recollector: Keeps what is made of the memory; that of `previous` where None.
         pose_doubt: Why the robot may be elsewhere.
+        is_radius_assumed: Nobody has told how large the robot is.
 
     Attributes:
         map: The state of the map.
         robot: Where the robot is.
         pose_doubt: Why it may be elsewhere; None for a fresh pose on the map.
+        is_radius_assumed: Nobody has told how large it is.
         memory: What is remembered.
         places: Remembered places.
         recollector: Keeps what is made of the memory.
@@ -148,6 +150,7 @@ class WorldModel:
         revision: MapRevision | None = None,
         recollector: Recollector | None = None,
         pose_doubt: PoseDoubt | None = None,
+        is_radius_assumed: bool = False,
     ) -> None:
         before = None if previous is None else previous.map
         is_unchanged = before is not None and before.is_of(grid)
@@ -158,6 +161,7 @@ class WorldModel:
         )
         self.robot = robot
         self.pose_doubt = pose_doubt
+        self.is_radius_assumed = is_radius_assumed
         self.memory = memory
         self.places: tuple[RememberedPlace, ...] = (
             previous.places

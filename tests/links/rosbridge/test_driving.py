@@ -18,7 +18,7 @@ from mapspeak.ros.messages import (
 )
 from mapspeak.ros.robot import RosRobot
 from mapspeak.ros.robot.driving import DrivingPatience
-from rosbridge_robot import ScriptedRobot, connect_scripted, eventually
+from rosbridge_robot import STATUS_TOPIC, ScriptedRobot, connect_scripted, eventually
 from rosbridge_script import PATIENCE_S, Operation
 
 pytestmark = pytest.mark.anyio
@@ -36,6 +36,7 @@ PENDING, ACTIVE, PREEMPTED, SUCCEEDED, ABORTED, REJECTED = 0, 1, 2, 3, 4, 5
 GOAL = Pose(4.0, 2.0)
 
 
+EXECUTING = 2
 connected = partial(connect_scripted, timing=QUICK, patience=LONG)
 
 
@@ -201,6 +202,15 @@ async def test_a_goal_that_another_client_has_sent_to_move_base_is_seen() -> Non
             return await robot.fetch_foreign_goals() == (GoalState.DRIVING,)
 
         await eventually(is_seen)
+
+
+async def test_a_goal_of_another_client_is_seen_by_who_asks_at_once() -> None:
+    scripted = ScriptedRobot()
+    uuid = {"uuid": list(range(16))}
+    statuses = [{"goal_info": {"goal_id": uuid}, "status": EXECUTING}]
+    scripted.latched[STATUS_TOPIC] = {"status_list": statuses}
+    async with connected(scripted) as robot:
+        assert await robot.fetch_foreign_goals() == (GoalState.DRIVING,)
 
 
 async def test_odd_messages_of_move_base_are_left_away() -> None:

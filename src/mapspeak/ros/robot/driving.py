@@ -98,9 +98,8 @@ class DrivingPatience(ActionPatience):
 class GoalDriver(Protocol):
     """One way of sending goals."""
 
-    @property
-    def foreign_goals(self) -> tuple[GoalState, ...]:
-        """How goals stand that others have sent and that are under way, as last heard."""
+    async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
+        """Return how goals stand that others have sent and that are under way."""
         ...
 
     async def send(self, goal: Pose) -> GoalRecord:
@@ -201,9 +200,9 @@ class ActionDriver:
         self._client.expect_feedback(within_s=navigation.feedback_s, now_s=now_s)
         self._client.listeners.append(self._consider_all)
 
-    @property
-    def foreign_goals(self) -> tuple[GoalState, ...]:
-        """How goals of others stand, by the list of all."""
+    async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
+        """Return how goals of others stand, by the list of all."""
+        await self._client.wait_for_list()
         return tuple(
             GoalState.ACCEPTED if state is ActionState.ACCEPTED else GoalState.DRIVING
             for state in self._client.others.values()

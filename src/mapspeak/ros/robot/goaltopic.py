@@ -62,9 +62,8 @@ class GoalTopicDriver:
         """None: whoever drives sees to the end."""
         return frozenset()
 
-    @property
-    def foreign_goals(self) -> tuple[GoalState, ...]:
-        """Nothing: a topic for goals does not tell what became of them."""
+    async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
+        """Return nothing: a topic for goals does not tell what became of them."""
         return ()
 
     async def send(self, goal: Pose) -> GoalRecord:

@@ -100,6 +100,7 @@ class RosRobot:
             has_laser=LASER.is_alive(self.profile),
             detector=None,
             map_frame=self.profile.map_frame,
+            is_radius_assumed=not self.profile.radius_source,
         )
 
     @property
@@ -184,7 +185,8 @@ class RosRobot:
 
     async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
         """Return how goals stand that other clients have sent, as far as navigation tells."""
-        return () if self._driver is None else self._driver.foreign_goals
+        await self._watch.wait_for(NAVIGATION)
+        return () if self._driver is None else await self._driver.fetch_foreign_goals()
 
     async def cancel_goal(self, robot_goal_id: str) -> None:
         """Ask navigation to end a drive, and wait a moment until it has."""

@@ -72,11 +72,18 @@ def say_pose_doubt(doubt: PoseDoubt | None, age_s: float | None = None, silence:
     return " ".join(filter(None, (f"{doubt}: {old}{POSE_DOUBTS[doubt]}.", silence)))
 
 
+ASSUMED_RADIUS = (
+    "The robot does not tell its size. A radius of {:.2f} m is assumed: doors and goals may be too "
+    "tight for it, unless radius_m stands in robot.yaml."
+)
+
+
 def say_warnings(world: WorldModel) -> list[str]:
     """Return what a reader of a map should know first: of the memory, and of the robot's pose."""
     doubt = say_pose_doubt(world.pose_doubt)
     of_pose = [f"The robot's pose is uncertain: {doubt}"] if doubt else []
-    return [f"Warning: {warning}" for warning in (*world.warnings, *of_pose)]
+    of_size = [ASSUMED_RADIUS.format(world.radius_m)] if world.is_radius_assumed else []
+    return [f"Warning: {warning}" for warning in (*world.warnings, *of_pose, *of_size)]
 
 
 def say_point(point: Point) -> str:
