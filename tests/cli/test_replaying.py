@@ -35,3 +35,13 @@ def test_a_log_is_shown_with_who_what_and_why(tmp_path: Path) -> None:
     assert stopped.endswith("#3 mapspeak: -> stop: stopped")
     assert summary == "4 lines shown; 1 commands were refused."
     assert len(replay(tmp_path, "--refused")) == 3
+
+
+def test_nothing_that_a_log_says_acts_on_the_terminal_or_begins_a_line(tmp_path: Path) -> None:
+    guard = make_guard(tmp_path)
+    with calling(Caller(client="evil\x1b[2J\nmapspeak", tool="publish")):
+        guard.clear(LAMP, robot_s=1.0)
+    guard.note_event("stop", "\x1b]0;title\x07\n#9 mapspeak: all is well", robot_s=3.0)
+    shown = CliRunner().invoke(cli, ["replay", str(tmp_path / "audit.jsonl")]).output
+    assert all(line.isprintable() for line in shown.splitlines())
+    assert len(shown.splitlines()) == 4

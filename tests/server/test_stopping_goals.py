@@ -10,10 +10,12 @@ from mcp.client import Client
 
 from faulty import Faults
 from faulty_bridge import NEXT_ROOM, FaultyBridge, open_faulty_bridge
+from guarding import MONDAY_NOON, make_guard
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.memory import SemanticMapStore
 from mapspeak.ros.messages import Dialect
 from mapspeak.ros.robot.driving import DrivingPatience
+from mapspeak.safety import CommandKind, Guard, Patterns, Policy
 from mapspeak.server.app import build_server
 from mapspeak.session import Session
 from rosbridge_robot import CANCELED, ScriptedRobot, connect_scripted
@@ -26,17 +28,21 @@ RATE = 5.0
 SHORT = DrivingPatience(acceptance_s=0.5, end_s=2.0, settling_s=0.0)
 LONG = DrivingPatience(acceptance_s=PATIENCE_S, end_s=2.0, settling_s=0.0)
 PATROL = "/patrol"
+EXECUTING = 2
 TYPE = "nav2_msgs/action/FollowWaypoints"
 STILL_M = 0.2
 
 
 @asynccontextmanager
-async def serving(robot: object, folder: Path) -> AsyncGenerator[tuple[Session, Caller]]:
+async def serving(
+    robot: object, folder: Path, *, guard: Guard | None = None
+) -> AsyncGenerator[tuple[Session, Caller]]:
     memory = SemanticMapStore(folder / "map.yaml")
     session = Session(
         robot,  # type: ignore[arg-type]
         memory,
         lease_s=60.0,
+        guard=guard,
         ros=robot.connection,  # type: ignore[attr-defined]
         find_model=lambda: None,
     )
@@ -61,25 +67,50 @@ class Patrol:
                 await self._scripted.end_goal(CANCELED, goal=number)
 
 
-@pytest.mark.parametrize("stop", ["stop_robot", "lost client", "end of the server"])
+@pytest.mark.parametrize("stop", ["stop_robot", "lost client", "end of the server", "hold"])
 async def test_a_stop_ends_goals_of_any_action(tmp_path: Path, stop: str) -> None:
     scripted = ScriptedRobot(actions=("/navigate_to_pose", PATROL))
-    patrol = Patrol(scripted)
+    allowed = {CommandKind.ACT: Patterns(allow=("*", PATROL))}
+    patrol, guard = Patrol(scripted), make_guard(tmp_path, Policy(patterns=allowed))
     async with (
         connect_scripted(scripted, timing=QUICK, patience=LONG) as robot,
-        serving(robot, tmp_path) as (session, caller),
+        serving(robot, tmp_path, guard=guard) as (session, caller),
     ):
         running = await caller.ask("ros_send_goal", action=PATROL, fields={}, wait_s=0)
         if stop == "stop_robot":
             await caller.ask("stop_robot")
         elif stop == "lost client":
             await session.client_is_gone("")
+        elif stop == "hold":
+            guard.hold.put("smoke", at=MONDAY_NOON)
+            async with anyio.create_task_group() as tasks:
+                tasks.start_soon(session.keep_watch)
+                await scripted.until(lambda: patrol.cancelled)
+                tasks.cancel_scope.cancel()
         else:
             await session.close()
         ended = await caller.ask("ros_goal_status", wait_s=5)
     assert "running" in running
     assert "cancelled after" in ended
     assert patrol.cancelled == [PATROL]
+
+
+async def test_a_goal_to_navigation_that_a_ros_tool_sent_is_no_other_clients(
+    tmp_path: Path,
+) -> None:
+    scripted = ScriptedRobot()
+    async with (
+        connect_scripted(scripted, timing=QUICK, patience=LONG) as robot,
+        serving(robot, tmp_path) as (_, caller),
+    ):
+        await caller.ask(
+            "ros_send_goal",
+            action="/navigate_to_pose",
+            fields={"pose": {"header": {"frame_id": "map"}, "pose": {"orientation": {"w": 1.0}}}},
+            wait_s=0,
+        )
+        await scripted.tell_status(bytes(range(16)), EXECUTING)
+        assert await robot.fetch_foreign_goals() == ()
 
 
 async def test_a_stop_that_cannot_end_a_goal_says_which(tmp_path: Path) -> None:

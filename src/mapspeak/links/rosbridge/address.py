@@ -10,7 +10,7 @@ from urllib.parse import parse_qsl, urlencode
 from websockets.exceptions import InvalidURI
 from websockets.uri import WebSocketURI, parse_uri
 
-from mapspeak.errors import ConfigError
+from mapspeak.errors import ConfigError, say_cause
 from mapspeak.ros import LinkKind, LinkName
 
 
@@ -111,7 +111,7 @@ class RobotAddress:
             return ssl.create_default_context(cafile=self.ca_file)
         except (OSError, ssl.SSLError) as error:
             raise ConfigError(
-                f"The CA file {self.ca_file} cannot be used: {error}.",
+                f"The CA file {self.ca_file} cannot be used: {say_cause(error)}.",
                 hint="Give a PEM file with the certificate that signed the robot's.",
             ) from error
 

@@ -143,8 +143,9 @@ class ExploreTools:
         """Drive the robot from frontier to frontier by itself, until nothing is left to explore.
 
         Use it to map a building quickly; use navigate_to with an F id to choose each frontier
-        yourself. It drives on only while it is called: while state is driving or at_goal, call it
-        again with the same arguments. Tells "nothing left" from "what is left cannot be reached".
+        yourself. Between calls the robot ends only the drive it is on: while state is driving or
+        at_goal, call it again with the same arguments. Tells "nothing left" from "what is left
+        cannot be reached".
         """
         bounds = Bounds(
             n_goals=n_goals,
