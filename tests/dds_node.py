@@ -27,8 +27,9 @@ from mapspeak.links.dds.endpoints import (
     Outlet,
     Quality,
     Sample,
-    ServiceName,
     dds_topic,
+    reply_topic,
+    request_topic,
 )
 from mapspeak.links.dds.network import DdsNetwork
 from mapspeak.links.dds.participant import DdsParticipant
@@ -136,32 +137,32 @@ class DdsNode:
         framing: Framing = Framing.NUMBERED,
     ) -> None:
         """Serves: `answer` gets each request, and a function that replies, at once or later."""
-        name = ServiceName(service=service, type_name=type_name)
+        request_type, reply_type = f"{type_name}_Request", f"{type_name}_Response"
         replies = self.participant.write_to(
-            name.reply_topic, name.reply_type, quality=self._hashed(RELIABLE, name.reply_type)
+            reply_topic(service), reply_type, quality=self._hashed(RELIABLE, reply_type)
         )
-        self._outlets[name.reply_topic] = (name.reply_type, replies)
+        self._outlets[reply_topic(service)] = (reply_type, replies)
         skip = NUMBER_BYTES if framing is Framing.NUMBERED else 0
 
         def decode(data: bytes) -> tuple[bytes, Request]:
             number = data[HEADER_BYTES : HEADER_BYTES + skip]
             bare = data[:HEADER_BYTES] + data[HEADER_BYTES + skip :]
-            return number, self.types.decode(name.request_type, bare)
+            return number, self.types.decode(request_type, bare)
 
         def take(request: tuple[bytes, Request]) -> None:
             number, arguments = request
 
             def reply(message: Request) -> None:
-                data = self.types.encode(name.reply_type, message)
+                data = self.types.encode(reply_type, message)
                 replies.write(data[:HEADER_BYTES] + number + data[HEADER_BYTES:])
 
             answer(arguments, reply)
 
         self._inlets.append(
             self.participant.read(
-                name.request_topic,
-                name.request_type,
-                quality=self._hashed(RELIABLE, name.request_type),
+                request_topic(service),
+                request_type,
+                quality=self._hashed(RELIABLE, request_type),
                 decode=decode,
                 take=lambda sample: take(_content(sample)),
             )

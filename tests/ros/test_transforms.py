@@ -26,9 +26,9 @@ def test_transforms_are_chained_from_the_map_to_the_base() -> None:
         transform("odom", "base_link", Pose(2.0, 0.0, 0.0), stamp_s=4.0),
     )
     found = grown.find(outer="map", inner="base_link")
-    assert found.outer_from_inner.x == pytest.approx(1.0)
-    assert found.outer_from_inner.y == pytest.approx(2.0)
-    assert found.outer_from_inner.yaw_rad == pytest.approx(math.pi / 2)
+    assert found.pose.x == pytest.approx(1.0)
+    assert found.pose.y == pytest.approx(2.0)
+    assert found.pose.yaw_rad == pytest.approx(math.pi / 2)
     assert found.stamp_s == 4.0
 
 
@@ -41,7 +41,7 @@ def test_a_static_transform_does_not_make_a_pose_old() -> None:
 def test_a_latecomer_does_not_replace_what_is_newer() -> None:
     grown = tree(transform("map", "base_link", Pose(1.0, 0.0), stamp_s=5.0))
     grown.take([transform("map", "base_link", Pose(9.0, 0.0), stamp_s=4.0)], is_static=False)
-    assert grown.find(outer="map", inner="base_link").outer_from_inner.x == 1.0
+    assert grown.find(outer="map", inner="base_link").pose.x == 1.0
 
 
 def test_a_transform_that_is_told_again_as_it_was_is_no_news() -> None:
@@ -55,7 +55,7 @@ def test_a_transform_that_is_told_again_as_it_was_is_no_news() -> None:
 def test_a_clock_that_was_set_back_does_not_freeze_the_pose() -> None:
     grown = tree(transform("map", "base_link", Pose(1.0, 0.0), stamp_s=5_000.0))
     grown.take([transform("map", "base_link", Pose(2.0, 0.0), stamp_s=0.5)], is_static=False)
-    assert grown.find(outer="map", inner="base_link").outer_from_inner.x == 2.0
+    assert grown.find(outer="map", inner="base_link").pose.x == 2.0
 
 
 def test_a_gap_names_both_of_its_edges() -> None:

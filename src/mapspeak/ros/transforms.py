@@ -7,6 +7,7 @@ import anyio
 
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
+from mapspeak.robot import StampedPose
 from mapspeak.ros import RosConnection, Subscription
 from mapspeak.ros.messages import Dialect, FrameTransform, Message, read_transforms
 
@@ -17,19 +18,6 @@ TF_HINT = (
     "Start SLAM or localisation (slam_toolbox, Cartographer, AMCL, gmapping) and the robot's "
     "drivers; `ros2 run tf2_tools view_frames` (ROS 1: `rosrun tf view_frames`) draws the tree."
 )
-
-
-@dataclass(frozen=True, slots=True)
-class FoundTransform:
-    """Where a frame lies in another.
-
-    Attributes:
-        outer_from_inner: The inner frame's pose in the outer one.
-        stamp_s: Robot time of the oldest part that moves; 0 where nothing moves.
-    """
-
-    outer_from_inner: Pose
-    stamp_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +53,10 @@ class TransformTree:
                 self._to_parent[transform.child] = _Known(transform, is_static)
         return is_news
 
-    def find(self, *, outer: str, inner: str) -> FoundTransform:
-        """Return where a frame lies in one that is above it in the tree.
+    def find(self, *, outer: str, inner: str) -> StampedPose:
+        """Return the pose of a frame in one that is above it in the tree.
+
+        Its stamp is that of the oldest part that moves; 0 where nothing moves.
 
         Raises:
             LinkError: There is no such way, or it goes round in a circle.
@@ -77,7 +67,7 @@ class TransformTree:
             outer_from_inner = known.transform.parent_from_child @ outer_from_inner
             if not known.is_static:
                 stamps.append(known.transform.stamp_s)
-        return FoundTransform(outer_from_inner, min(stamps, default=0.0))
+        return StampedPose(outer_from_inner, min(stamps, default=0.0))
 
     def find_ways(
         self, one: str, other: str

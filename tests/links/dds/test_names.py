@@ -3,11 +3,12 @@ import pytest
 pytest.importorskip("cyclonedds", reason="has no wheel for this Python")
 
 from mapspeak.links.dds.endpoints import (
-    ServiceName,
     action_type_of,
     dds_topic,
     dds_type,
     is_hidden,
+    reply_topic,
+    request_topic,
     ros_type,
     service_of,
     service_type_of,
@@ -22,10 +23,12 @@ def test_a_topic_and_its_type_are_named_as_ros_names_them_in_dds() -> None:
 
 
 def test_a_service_has_a_topic_for_requests_and_one_for_answers() -> None:
-    name = ServiceName(service="/robot/get_state", type_name="lifecycle_msgs/srv/GetState")
-    assert name.request_topic == "rq/robot/get_stateRequest"
-    assert name.reply_topic == "rr/robot/get_stateReply"
-    assert dds_type(name.reply_type) == "lifecycle_msgs::srv::dds_::GetState_Response_"
+    assert request_topic("/robot/get_state") == "rq/robot/get_stateRequest"
+    assert reply_topic("/robot/get_state") == "rr/robot/get_stateReply"
+    assert (
+        dds_type("lifecycle_msgs/srv/GetState_Response")
+        == "lifecycle_msgs::srv::dds_::GetState_Response_"
+    )
 
 
 @pytest.mark.parametrize("name", ["/map", "/robot1/navigate_to_pose/_action/status"])

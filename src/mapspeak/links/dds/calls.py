@@ -10,7 +10,6 @@ from mapspeak.links.dds.discovery import Endpoint
 from mapspeak.links.dds.endpoints import (
     SERVICE_PART,
     Sample,
-    ServiceName,
     action_type_of,
     dds_topic,
     reply_topic,
@@ -106,15 +105,15 @@ class Calls:
                 f"Nobody serves {service[:80]}.",
                 hint="Ask for the list of services; the node that offers it may have ended.",
             )
-        name = ServiceName(service=service, type_name=SERVICE_PART.sub("", server.type_name))
-        await self._connection.learn(server, name.request_type, name.reply_type)
+        type_name = SERVICE_PART.sub("", server.type_name)
+        await self._connection.learn(server, f"{type_name}_Request", f"{type_name}_Response")
         if service not in self._services:
             self._services[service] = ServiceClient(
                 self._participant,
-                name,
+                service,
+                type_name,
                 framing=server.framing,
-                encode=self._connection.types.encode,
-                decode=self._connection.types.decode,
+                types=self._connection.types,
             )
         return self._services[service]
 
@@ -129,7 +128,7 @@ class Calls:
             send=send, result=result, cancel=cancel, start_soon=self._connection.start_soon
         )
         self._actions[action] = client
-        self.note_change(send.name.reply_topic)
+        self.note_change(reply_topic(send.service))
         await self._learn_feedback(action)
         for name, take in (("status", client.take_statuses), ("feedback", client.take_feedback)):
             subscription = self._connection.subscribe(_part(action, name))

@@ -22,39 +22,6 @@ SERVICE_PART = re.compile(r"_(?:Request|Response)$")
 ACTION_PART = re.compile(r"_(?:SendGoal|GetResult)$|_FeedbackMessage$")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ServiceName:
-    """One service, or one of the three services of an action.
-
-    Attributes:
-        service: Its full name, such as /robot/get_parameters.
-        type_name: Such as "rcl_interfaces/srv/GetParameters".
-    """
-
-    service: str
-    type_name: str
-
-    @property
-    def request_topic(self) -> str:
-        """Where requests are written."""
-        return request_topic(self.service)
-
-    @property
-    def reply_topic(self) -> str:
-        """Where the answers to everybody's requests come."""
-        return reply_topic(self.service)
-
-    @property
-    def request_type(self) -> str:
-        """The type of the request as a message."""
-        return f"{self.type_name}_Request"
-
-    @property
-    def reply_type(self) -> str:
-        """The type of the answer as a message."""
-        return f"{self.type_name}_Response"
-
-
 def full_type(name: str, *, kind: str = "msg") -> str:
     """Return a type as "package/kind/Type", however it was written."""
     package, *middle, last = name.strip("/").split("/")

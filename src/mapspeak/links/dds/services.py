@@ -16,8 +16,9 @@ import anyio
 from mapspeak.errors import LinkError
 from mapspeak.links.dds.cdr import HEADER_BYTES
 from mapspeak.links.dds.discovery import Framing
-from mapspeak.links.dds.endpoints import Outlet, Quality, Sample, ServiceName
+from mapspeak.links.dds.endpoints import Outlet, Quality, Sample, reply_topic, request_topic
 from mapspeak.links.dds.participant import DdsParticipant
+from mapspeak.links.dds.types import Types
 from mapspeak.ros import new_id
 
 QUALITY = Quality(is_reliable=True, is_latched=False, depth=100)
@@ -28,8 +29,6 @@ LATE_ANSWER_S = 1.0
 """So long an answer is held that may belong to an earlier call, which was given up."""
 
 Answer = dict[str, Any]
-Encode = Callable[[str, Mapping[str, Any]], bytes]
-Decode = Callable[[str, bytes], Answer]
 
 
 class _Call:
@@ -52,22 +51,22 @@ class _Call:
 
 
 class ServiceClient:
-    """Asks one service."""
+    """Asks one service, of a type such as "rcl_interfaces/srv/GetParameters"."""
 
     def __init__(
         self,
         participant: DdsParticipant,
-        name: ServiceName,
+        service: str,
+        type_name: str,
         *,
         framing: Framing,
-        encode: Encode,
-        decode: Decode,
+        types: Types,
     ) -> None:
-        self.name = name
+        self.service = service
+        self._request_type, self._reply_type = f"{type_name}_Request", f"{type_name}_Response"
         self._participant = participant
         self._framing = framing
-        self._encode = encode
-        self._decode = decode
+        self._types = types
         self.on_answer: Callable[[int, Answer], None] | None = None
         """Is called with every answer, and the number of its request; 0 where that is not known."""
         self._id = int(new_id()[:16], 16)
@@ -77,14 +76,14 @@ class ServiceClient:
         self._calls: dict[int, _Call] = {}
         # Who reads our requests must know our reader by then: it is announced first.
         self._inlet = participant.read(
-            name.reply_topic,
-            name.reply_type,
+            reply_topic(service),
+            self._reply_type,
             quality=QUALITY,
             decode=self._understand,
             take=self._take,
         )
         self._outlet: Outlet = participant.write_to(
-            name.request_topic, name.request_type, quality=QUALITY
+            request_topic(service), self._request_type, quality=QUALITY
         )
 
     async def call(self, request: bytes, *, timeout_s: float) -> Sample:
@@ -100,8 +99,8 @@ class ServiceClient:
         """Return when somebody reads our requests."""
         if not await self._outlet.wait_for_reader(timeout_s=timeout_s):
             raise LinkError(
-                f"Nobody serves {self.name.service}.",
-                hint=f"Start the node that does: `ros2 service info {self.name.service}`.",
+                f"Nobody serves {self.service}.",
+                hint=f"Start the node that does: `ros2 service info {self.service}`.",
             )
 
     @property
@@ -119,7 +118,7 @@ class ServiceClient:
 
     def encode(self, arguments: Mapping[str, Any]) -> bytes:
         """Return a request."""
-        return self._encode(self.name.request_type, arguments)
+        return self._types.encode(self._request_type, arguments)
 
     def post(self, request: bytes) -> int:
         """Send a request without waiting for the answer, and return its number."""
@@ -130,11 +129,6 @@ class ServiceClient:
         self._outlet.write(request)
         self._n_open += 1
         return self._number
-
-    def close(self) -> None:
-        """Let go of both topics."""
-        self._participant.end_reading(self._inlet)
-        self._participant.end_writing(self._outlet)
 
     async def _call(self, request: bytes, *, deadline_s: float, timeout_s: float) -> Sample:
         n_before = 0 if self.tells_whom else self._n_open
@@ -161,7 +155,7 @@ class ServiceClient:
 
     def _silence(self, timeout_s: float) -> LinkError:
         return LinkError(
-            f"{self.name.service} has not answered within {timeout_s:g} s.",
+            f"{self.service} has not answered within {timeout_s:g} s.",
             hint="The node that serves it may be busy or stuck: try again, or restart it.",
         )
 
@@ -170,12 +164,12 @@ class ServiceClient:
     def _understand(self, data: bytes) -> tuple[int | None, Answer]:
         """Return number of the request, None for others' and 0 where unknown, and the answer."""
         if self._framing is Framing.BARE:
-            return 0, self._decode(self.name.reply_type, data)
+            return 0, self._types.decode(self._reply_type, data)
         asker, number = NUMBER.unpack_from(data.ljust(HEADER_BYTES + NUMBER.size), HEADER_BYTES)
         if asker != self._id:
             return None, {}
         bare = data[:HEADER_BYTES] + data[HEADER_BYTES + NUMBER.size :]
-        return number, self._decode(self.name.reply_type, bare)
+        return number, self._types.decode(self._reply_type, bare)
 
     def _take(self, sample: Sample) -> None:
         number, answer = (0, None) if sample.refusal is not None else sample.content

@@ -168,16 +168,7 @@ async def _shows_all_nodes(system: RclpyContext) -> bool:
 async def open_connection(
     *, domain_id: int | None = None, distro: str = "", variables: Mapping[str, str]
 ) -> AsyncGenerator[Ros2Connection]:
-    """Keep a node of ours in a domain while the context lasts.
-
-    Args:
-        domain_id: As in ROS_DOMAIN_ID; None takes what that says.
-        distro: Such as "jazzy"; empty where that is unknown.
-        variables: Stand before those of the environment while the domain is entered.
-
-    Raises:
-        LinkError: ROS cannot be started.
-    """
+    """Keep a node of ours in a domain while the context lasts; see `open_ros2_connection`."""
     with plain_errors():
         async with (
             BlockingPortal() as portal,

@@ -62,12 +62,7 @@ async def open_ros2_robot(
 
     Leaving the context does not stop the robot: call `stop` before, where that is wanted.
 
-    Args:
-        domain_id: As in ROS_DOMAIN_ID; None takes what that says.
-        distro: Such as "jazzy"; empty where that is unknown.
-        variables: Stand before those of the environment while the domain is entered.
-        overrides: What robot.yaml says.
-        patience: Time limits of navigation.
+    The first arguments are those of `open_ros2_connection`.
 
     Raises:
         ConfigError: This Python has no rclpy.

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import anyio
@@ -27,45 +27,29 @@ class GoalRecord:
     Attributes:
         goal_id: Ours, used nowhere else.
         is_replaced: We have sent another goal since.
-        afterwards: What became of it after its end.
     """
 
     def __init__(self, goal_id: str, goal: Pose) -> None:
         self.goal_id = goal_id
         self.goal = goal
-        self.state = GoalState.ACCEPTED
+        self.status = GoalStatus(state=GoalState.ACCEPTED)
         self.is_replaced = False
-        self.afterwards = ""
-        self._distance_left_m: float | None = None
-        self._n_recoveries = 0
-        self._reason = ""
-        self._is_unanswered = False
-
-    @property
-    def status(self) -> GoalStatus:
-        """How it stands, as the port tells it."""
-        return GoalStatus(
-            state=self.state,
-            distance_left_m=self._distance_left_m,
-            n_recoveries=self._n_recoveries,
-            reason=self._reason,
-            is_unanswered=self._is_unanswered,
-            afterwards=self.afterwards,
-        )
 
     @property
     def is_over(self) -> bool:
         """True when nothing more will happen."""
-        return self.state.is_final
+        return self.status.state.is_final
 
     def drive(self, *, distance_left_m: float | None = None, n_recoveries: int = 0) -> None:
         """Note that the robot is on its way."""
         if self.is_over:
             return
-        self.state = GoalState.DRIVING
-        if distance_left_m is not None:
-            self._distance_left_m = distance_left_m
-        self._n_recoveries = max(self._n_recoveries, n_recoveries)
+        now = self.status
+        left_m = now.distance_left_m if distance_left_m is None else distance_left_m
+        n_recoveries = max(now.n_recoveries, n_recoveries)
+        self.status = replace(
+            now, state=GoalState.DRIVING, distance_left_m=left_m, n_recoveries=n_recoveries
+        )
 
     def end(self, state: GoalState, reason: str = "", *, is_unanswered: bool = False) -> None:
         """Note how it ended; the first word counts."""
@@ -74,10 +58,22 @@ class GoalRecord:
         if self.is_replaced and state in (GoalState.BLOCKED, GoalState.CANCELLED):
             # Navigation tells a replaced goal as aborted or cancelled.
             state, reason = GoalState.PREEMPTED, "A newer goal replaced it."
-        self.state, self._reason = state, reason
-        self._is_unanswered = is_unanswered
-        if state is GoalState.ARRIVED:
-            self._distance_left_m = 0.0
+        left_m = 0.0 if state is GoalState.ARRIVED else self.status.distance_left_m
+        self.status = replace(
+            self.status,
+            state=state,
+            reason=reason,
+            is_unanswered=is_unanswered,
+            distance_left_m=left_m,
+        )
+
+
+class _Drive(GoalRecord):
+    """A goal as the robot's port tells it, and as the action client knows it."""
+
+    def __init__(self, sent: SentGoal, goal: Pose) -> None:
+        super().__init__(sent.id, goal)
+        self.sent = sent
 
 
 LATEST_S = 0.0
@@ -155,14 +151,6 @@ class Navigation:
     feedback_s: float = 10.0
 
 
-@dataclass(slots=True, kw_only=True, eq=False)
-class _Drive:
-    """A goal as the action client knows it, and as the robot's port tells it."""
-
-    sent: SentGoal
-    record: GoalRecord
-
-
 class ActionDriver:
     """Sends poses to navigation and reads how its goals end.
 
@@ -210,21 +198,21 @@ class ActionDriver:
 
     async def send(self, goal: Pose) -> GoalRecord:
         """Send a goal, and wait until navigation has taken or refused it."""
-        before = [drive for drive in self._drives.values() if not drive.record.is_over]
+        before = [drive for drive in self._drives.values() if not drive.is_over]
         pose = FramedPose(pose=goal, frame_id=self._map_frame, stamp_s=LATEST_S)
         goal_fields = self._navigation.write_goal(pose)
         sent = await self._client.send(goal_fields, through=self._connection)
-        drive = _Drive(sent=sent, record=GoalRecord(sent.id, goal))
-        self._drives = {each.sent.id: each for each in [*before, drive]}
+        drive = _Drive(sent, goal)
+        self._drives = {each.goal_id: each for each in [*before, drive]}
         for each in before:
-            each.record.is_replaced = True
+            each.is_replaced = True
         await self._client.wait_until_taken(sent)
         self._consider(drive)
         with anyio.move_on_after(self._patience.end_s):
             for each in before:
                 await each.sent.wait_until_over(within_s=self._patience.end_s)
                 self._consider(each)
-        return drive.record
+        return drive
 
     async def look_at(self, record: GoalRecord) -> None:
         """Bring a record up to date."""
@@ -246,15 +234,16 @@ class ActionDriver:
 
     def _consider(self, drive: _Drive) -> None:
         """Draw from how the action's goal stands how the drive stands."""
-        sent, record = drive.sent, drive.record
-        record.afterwards = sent.afterwards
-        if record.is_over:
+        sent = drive.sent
+        if drive.status.afterwards != sent.afterwards:
+            drive.status = replace(drive.status, afterwards=sent.afterwards)
+        if drive.is_over:
             return
         if sent.feedback is not None:
-            left_m, n_recoveries = self._navigation.read_feedback(sent.feedback, record.goal)
-            record.drive(distance_left_m=left_m, n_recoveries=n_recoveries)
+            left_m, n_recoveries = self._navigation.read_feedback(sent.feedback, drive.goal)
+            drive.drive(distance_left_m=left_m, n_recoveries=n_recoveries)
         elif sent.state in (ActionState.RUNNING, ActionState.CANCELLING):
-            record.drive()
+            drive.drive()
         if sent.is_over and not self._may_be_replaced_yet(drive):
             self._end(drive)
 
@@ -265,7 +254,7 @@ class ActionDriver:
         another way, and may come first.
         """
         sent = drive.sent
-        if drive.record.is_replaced or sent.state is not ActionState.ABORTED:
+        if drive.is_replaced or sent.state is not ActionState.ABORTED:
             return False
         listed = self._client.listed.get(sent.server_id or "")
         is_behind = listed is not None and not listed.is_final
@@ -273,7 +262,7 @@ class ActionDriver:
         return is_behind and ended_s < self._patience.result_s
 
     def _end(self, drive: _Drive) -> None:
-        sent, record, navigation = drive.sent, drive.record, self._navigation
+        sent, navigation = drive.sent, self._navigation
         state, reason = STATE_OF[sent.state], sent.reason
         is_unanswered = sent.is_withdrawn and state is GoalState.REJECTED
         if state is GoalState.ARRIVED:
@@ -290,11 +279,11 @@ class ActionDriver:
             reason = f"{reason} {RESTARTED.format(navigation.title, navigation.hint)}"
         elif state is GoalState.CANCELLED and REPLACED in reason:
             state = GoalState.PREEMPTED
-        elif state is GoalState.BLOCKED and not record.is_replaced and self._client.others:
+        elif state is GoalState.BLOCKED and not drive.is_replaced and self._client.others:
             state, reason = GoalState.PREEMPTED, "Another client sent a newer goal."
         elif state is GoalState.BLOCKED and not reason:
             reason = f"{navigation.title} gave up and did not say why."
-        record.end(state, reason, is_unanswered=is_unanswered)
+        drive.end(state, reason, is_unanswered=is_unanswered)
         if state is GoalState.LOST:
             self._on_lost()
 

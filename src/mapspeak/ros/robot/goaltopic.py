@@ -1,7 +1,6 @@
 """Goals for a robot that takes a pose on a topic and says nothing: its own pose has to tell."""
 
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import GoalState, StampedPose
@@ -14,14 +13,6 @@ ARRIVAL_M = 0.35
 STANDING_M = 0.05
 GIVEN_UP_S = 20.0
 """A robot that has stood still for so long has come as far as it could."""
-
-
-@dataclass(slots=True)
-class _Progress:
-    """Where the robot was when it last moved, and when."""
-
-    place: Point
-    since_s: float
 
 
 class GoalTopicDriver:
@@ -48,7 +39,8 @@ class GoalTopicDriver:
         self._fetch_pose = fetch_pose
         self._now_s = now_s
         self._current: GoalRecord | None = None
-        self._progress: _Progress | None = None
+        self._moved: tuple[Point, float] | None = None
+        """Where the robot was when it last moved, and when."""
         connection.advertise(topic, type_name=dialect.type_name("geometry_msgs/PoseStamped"))
         connection.started.actions[topic] = self
 
@@ -74,7 +66,7 @@ class GoalTopicDriver:
         if self._current is not None:
             self._current.end(GoalState.PREEMPTED, "A newer goal replaced it.")
         self._current = record
-        self._progress = None
+        self._moved = None
         record.drive()
         return record
 
@@ -113,6 +105,6 @@ class GoalTopicDriver:
 
     def _stood_for_s(self, place: Point) -> float:
         now_s = self._now_s()
-        if self._progress is None or place.distance_to(self._progress.place) > STANDING_M:
-            self._progress = _Progress(place, now_s)
-        return max(now_s - self._progress.since_s, 0.0)
+        if self._moved is None or place.distance_to(self._moved[0]) > STANDING_M:
+            self._moved = (place, now_s)
+        return max(now_s - self._moved[1], 0.0)

@@ -192,7 +192,7 @@ class PoseKeeper:
     def _from_frames(self, frame: str) -> StampedPose:
         found = self._frames.tree.find(outer=self._profile.map_frame, inner=frame)
         silent_s = self._measure_silence(self._frames.arrived_s, what="transform")
-        return StampedPose(found.outer_from_inner, found.stamp_s, silent_s=silent_s)
+        return replace(found, silent_s=silent_s)
 
     def _measure_silence(self, arrived_s: float | None, *, what: str) -> float:
         """Return the wall time since the source of the pose said anything new."""
