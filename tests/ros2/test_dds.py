@@ -191,7 +191,7 @@ async def test_services_and_parameters_of_every_kind_answer(robot: RobotProcess)
     assert values["sensor_ids"] == [3, 5]
     assert values["sensor_is_on"] == [True, False]
     assert values["layers"] == ["static", "obstacles"]
-    assert values["serial"] == b"\x01\xff"
+    assert values["serial"] == [1, 255]
 
 
 async def test_a_velocity_is_heard_by_the_robot(robot: RobotProcess) -> None:

@@ -13,7 +13,6 @@ from mapspeak.ros.activity import (
     Started,
     Subscription,
 )
-from mapspeak.ros.definitions import split_definition
 from mapspeak.ros.messages import NAME, TYPE
 from mapspeak.ros.port import (
     LinkKind,
@@ -47,6 +46,5 @@ __all__ = [
     "find_nearest",
     "has_listeners",
     "new_id",
-    "split_definition",
     "started_over",
 ]

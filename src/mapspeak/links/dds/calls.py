@@ -15,10 +15,9 @@ from mapspeak.links.dds.endpoints import (
     reply_topic,
     request_topic,
 )
-from mapspeak.links.dds.goals import DdsActionClient
 from mapspeak.links.dds.graph import DdsGraph
 from mapspeak.links.dds.participant import DdsParticipant
-from mapspeak.links.dds.services import ServiceClient
+from mapspeak.links.dds.services import DdsActionClient, ServiceClient
 from mapspeak.ros import ActionGoal
 from mapspeak.ros.link import check_name, wrong_type
 from mapspeak.ros.messages import Message, bare_type

@@ -11,7 +11,7 @@ from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge.address import RobotAddress, Timing
-from mapspeak.links.rosbridge.channel import Channel
+from mapspeak.links.rosbridge.channel import Channel, RosbridgeTopicRequest, ServiceCaller
 from mapspeak.links.rosbridge.protocol import (
     Event,
     FrameRefused,
@@ -22,7 +22,6 @@ from mapspeak.links.rosbridge.protocol import (
     require_cbor,
     write_operation,
 )
-from mapspeak.links.rosbridge.requests import RosbridgeTopicRequest, ServiceCaller
 from mapspeak.links.rosbridge.rosapi import Rosapi
 from mapspeak.ros import ActionEnd, ActionGoal, LinkName, OwnEnds, new_id
 from mapspeak.ros.discovery import RobotOverrides

@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 
 from mapspeak.errors import LinkError
-from mapspeak.links.rosbridge.requests import RosbridgeTopicRequest
+from mapspeak.links.rosbridge.channel import RosbridgeTopicRequest
 from mapspeak.ros import NodeLinks, RosGraph
 from mapspeak.ros.definitions import (
     TypeBook,

@@ -1,6 +1,6 @@
 """What ROS types look like: definitions read, known ones, messages shown, checked and built."""
 
-from mapspeak.ros.definitions.checking import check_message, describe_type, say_fields
+from mapspeak.ros.definitions.checking import check_message, describe_type
 from mapspeak.ros.definitions.texts import (
     ACTION_PARTS,
     DISTROS,
@@ -18,7 +18,6 @@ from mapspeak.ros.definitions.types import (
     FLOATS,
     TIMES,
     WHOLES,
-    Constant,
     Field,
     MessageType,
     TypeBook,
@@ -30,7 +29,6 @@ from mapspeak.ros.definitions.typestore import (
     describe_field,
     hash_type,
     look_up,
-    name_in_ros2,
 )
 
 __all__ = [
@@ -42,7 +40,6 @@ __all__ = [
     "SERVICE_PARTS",
     "TIMES",
     "WHOLES",
-    "Constant",
     "Field",
     "MessageType",
     "TypeBook",
@@ -55,10 +52,8 @@ __all__ = [
     "kinds_of",
     "known_definitions",
     "look_up",
-    "name_in_ros2",
     "name_parts",
     "parse_definition",
-    "say_fields",
     "split_definition",
     "split_parts",
     "write_definition",

@@ -21,7 +21,7 @@ from mapspeak.ros.messages.pictures import (
     read_image,
     write_compressed_image,
 )
-from mapspeak.ros.messages.pixels import read_depth, shade_depth
+from mapspeak.ros.messages.pixels import read_depth
 from mapspeak.ros.messages.poses import (
     FramedPose,
     FrameTransform,
@@ -75,7 +75,6 @@ __all__ = [
     "read_stamp",
     "read_transforms",
     "read_twist",
-    "shade_depth",
     "write_camera_info",
     "write_compressed_image",
     "write_grid",
