@@ -23,9 +23,9 @@ from mapspeak.links.dds.discovery import Framing
 from mapspeak.links.dds.endpoints import (
     DISCOVERY_TOPIC,
     DISCOVERY_TYPE,
-    Inlet,
-    Outlet,
     Quality,
+    RawReader,
+    RawWriter,
     Sample,
     dds_topic,
     reply_topic,
@@ -100,28 +100,28 @@ class DdsNode:
         self._has_long_ids = distro == HUMBLE
         self._book = build_type_book(distro) if distro and not self._has_long_ids else None
         self.heard: dict[str, list[Request]] = {}
-        self._outlets: dict[str, tuple[str, Outlet]] = {}
-        self._inlets: list[Inlet] = []
+        self._raw_writers: dict[str, tuple[str, RawWriter]] = {}
+        self._raw_readers: list[RawReader] = []
         self._introduction = self.participant.write_to(
             DISCOVERY_TOPIC, DISCOVERY_TYPE, quality=LATCHED
         )
 
     def advertise(self, topic: str, type_name: str, *, quality: Quality = RELIABLE) -> None:
-        outlet = self.participant.write_to(
+        raw_writer = self.participant.write_to(
             dds_topic(topic), type_name, quality=self._hashed(quality, type_name)
         )
-        self._outlets[topic] = (type_name, outlet)
+        self._raw_writers[topic] = (type_name, raw_writer)
         self.introduce()
 
     def publish(self, topic: str, message: Request) -> None:
-        type_name, outlet = self._outlets[topic]
-        outlet.write(self.types.encode(type_name, message))
+        type_name, raw_writer = self._raw_writers[topic]
+        raw_writer.write(self.types.encode(type_name, message))
 
     def publish_hashed(self, topic: str, type_name: str, type_hash: str) -> None:
         """Advertises a topic and tells the hash of its type, as newer versions of ROS do."""
         quality = Hashed(is_reliable=True, is_latched=False, depth=10, type_hash=type_hash)
-        outlet = self.participant.write_to(dds_topic(topic), type_name, quality=quality)
-        self._outlets[topic] = (type_name, outlet)
+        raw_writer = self.participant.write_to(dds_topic(topic), type_name, quality=quality)
+        self._raw_writers[topic] = (type_name, raw_writer)
         self.introduce()
 
     def listen(self, topic: str, type_name: str, *, quality: Quality = RELIABLE) -> None:
@@ -141,7 +141,7 @@ class DdsNode:
         replies = self.participant.write_to(
             reply_topic(service), reply_type, quality=self._hashed(RELIABLE, reply_type)
         )
-        self._outlets[reply_topic(service)] = (reply_type, replies)
+        self._raw_writers[reply_topic(service)] = (reply_type, replies)
         skip = NUMBER_BYTES if framing is Framing.NUMBERED else 0
 
         def decode(data: bytes) -> tuple[bytes, Request]:
@@ -158,7 +158,7 @@ class DdsNode:
 
             answer(arguments, reply)
 
-        self._inlets.append(
+        self._raw_readers.append(
             self.participant.read(
                 request_topic(service),
                 request_type,
@@ -171,14 +171,16 @@ class DdsNode:
 
     def stop_serving(self, service: str) -> None:
         topic = f"rr{service}Reply"
-        _, outlet = self._outlets.pop(topic)
-        self.participant.end_writing(outlet)
+        _, raw_writer = self._raw_writers.pop(topic)
+        self.participant.end_writing(raw_writer)
 
     def introduce(self) -> None:
         """Tells which readers and writers are this node's, as the middlewares of ROS do."""
         namespace, _, last = self.name.rpartition("/")
-        writers = [outlet.writer for _, outlet in self._outlets.values() if outlet.writer]
-        readers = [inlet._reader for inlet in self._inlets if inlet._reader]
+        writers = [
+            raw_writer.writer for _, raw_writer in self._raw_writers.values() if raw_writer.writer
+        ]
+        readers = [raw_reader._reader for raw_reader in self._raw_readers if raw_reader._reader]
         node = {
             "node_namespace": namespace or "/",
             "node_name": last,
@@ -205,7 +207,7 @@ class DdsNode:
     def _read(
         self, topic: str, type_name: str, quality: Quality, take: Callable[[Request], None]
     ) -> None:
-        self._inlets.append(
+        self._raw_readers.append(
             self.participant.read(
                 topic,
                 type_name,

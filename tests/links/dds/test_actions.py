@@ -92,9 +92,9 @@ class Counter:
 
     def answer_other_client(self, status: int) -> None:
         """Answers as if another client had asked for the result of its own goal."""
-        type_name, outlet = self.node._outlets["rr/count/_action/get_resultReply"]
+        type_name, raw_writer = self.node._raw_writers["rr/count/_action/get_resultReply"]
         message = {"status": status, "result": {"sequence": [99]}}
-        outlet.write(self.node.types.encode(type_name, message))
+        raw_writer.write(self.node.types.encode(type_name, message))
 
     def end(self, uuid: bytes, status: int, *numbers: int) -> None:
         self.statuses[uuid] = status

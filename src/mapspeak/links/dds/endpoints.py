@@ -161,7 +161,7 @@ Decode = Callable[[bytes], Any]
 Take = Callable[[Sample], None]
 
 
-class Inlet:
+class RawReader:
     """A reader of one topic. Both functions are given with it: one decodes, one takes."""
 
     def __init__(self, reader: DataReader[Any], decode: Decode, take: Take) -> None:
@@ -201,7 +201,7 @@ class Inlet:
         return self._reader is not None
 
 
-class EndpointInlet(Inlet):
+class EndpointReader(RawReader):
     """A reader of DDS's own topic about all writers, or about all readers."""
 
     def understand(self, sample: Any) -> Sample | None:  # noqa: ANN401 - without types
@@ -209,7 +209,7 @@ class EndpointInlet(Inlet):
         return Sample(content=sample, source_s=0.0)
 
 
-class Outlet:
+class RawWriter:
     """A writer of one topic."""
 
     def __init__(self, writer: DataWriter[Any], raw_type: type[RawMessage]) -> None:

@@ -27,11 +27,11 @@ from cyclonedds.topic import Topic
 from mapspeak.errors import LinkError
 from mapspeak.links.dds.endpoints import (
     Decode,
-    EndpointInlet,
-    Inlet,
-    Outlet,
+    EndpointReader,
     Quality,
     RawMessage,
+    RawReader,
+    RawWriter,
     Sample,
     Take,
     dds_type,
@@ -68,8 +68,8 @@ class DdsParticipant:
         self._waitset.attach(self._closing)
         self._lock = threading.Lock()
         self._topics: dict[tuple[str, str], tuple[Topic[Any], type[RawMessage]]] = {}
-        self._inlets: list[Inlet] = []
-        self._outlets: list[Outlet] = []
+        self._raw_readers: list[RawReader] = []
+        self._raw_writers: list[RawWriter] = []
         self._is_closing = False
 
     @property
@@ -84,11 +84,11 @@ class DdsParticipant:
             (BuiltinTopicDcpsSubscription, take_reader),
         ):
             reader = BuiltinDataReader(self._participant, topic)
-            self._keep(EndpointInlet(reader, lambda data: data, take))
+            self._keep(EndpointReader(reader, lambda data: data, take))
 
     def read(
         self, topic: str, type_name: str, *, quality: Quality, decode: Decode, take: Take
-    ) -> Inlet:
+    ) -> RawReader:
         """Begin to read a topic.
 
         Args:
@@ -101,40 +101,40 @@ class DdsParticipant:
         try:
             known, _ = self._topic(topic, type_name)
             return self._keep(
-                Inlet(DataReader(self._participant, known, quality.qos), decode, take)
+                RawReader(DataReader(self._participant, known, quality.qos), decode, take)
             )
         except DDSException as error:
             raise _unusable(topic, type_name, error) from error
 
-    def write_to(self, topic: str, type_name: str, *, quality: Quality) -> Outlet:
+    def write_to(self, topic: str, type_name: str, *, quality: Quality) -> RawWriter:
         """Begin to write on a topic; see `read`."""
         try:
             known, raw_type = self._topic(topic, type_name)
             writer = DataWriter(self._publisher, known, quality.writers_qos)
         except DDSException as error:
             raise _unusable(topic, type_name, error) from error
-        outlet = Outlet(writer, raw_type)
+        raw_writer = RawWriter(writer, raw_type)
         with self._lock:
-            self._outlets.append(outlet)
+            self._raw_writers.append(raw_writer)
             writer.set_status_mask(DDSStatus.PublicationMatched)
             self._waitset.attach(writer)
-        return outlet
+        return raw_writer
 
-    def end_reading(self, inlet: Inlet) -> None:
+    def end_reading(self, raw_reader: RawReader) -> None:
         """Read a topic no longer."""
         with self._lock:
-            if inlet in self._inlets:
-                self._inlets.remove(inlet)
-                self._waitset.detach(inlet.condition)
-                inlet.close()
+            if raw_reader in self._raw_readers:
+                self._raw_readers.remove(raw_reader)
+                self._waitset.detach(raw_reader.condition)
+                raw_reader.close()
 
-    def end_writing(self, outlet: Outlet) -> None:
+    def end_writing(self, raw_writer: RawWriter) -> None:
         """Write on a topic no longer."""
         with self._lock:
-            if outlet in self._outlets and outlet.writer is not None:
-                self._outlets.remove(outlet)
-                self._waitset.detach(outlet.writer)
-                outlet.writer = None
+            if raw_writer in self._raw_writers and raw_writer.writer is not None:
+                self._raw_writers.remove(raw_writer)
+                self._waitset.detach(raw_writer.writer)
+                raw_writer.writer = None
 
     async def flush(self, *, timeout_s: float) -> None:
         """Return when all that was written has arrived, or the time is over."""
@@ -155,11 +155,11 @@ class DdsParticipant:
         with suppress(DDSException):
             self._closing.set(True)
 
-    def _keep(self, inlet: Inlet) -> Inlet:
+    def _keep(self, raw_reader: RawReader) -> RawReader:
         with self._lock:
-            self._inlets.append(inlet)
-            self._waitset.attach(inlet.condition)
-        return inlet
+            self._raw_readers.append(raw_reader)
+            self._waitset.attach(raw_reader.condition)
+        return raw_reader
 
     def _topic(self, topic: str, type_name: str) -> tuple[Topic[Any], type[RawMessage]]:
         known = self._topics.get((topic, type_name))
@@ -181,47 +181,49 @@ class DdsParticipant:
             self._waitset.wait(FOR_EVER_NS)
             # The lock is not held while the event loop is waited for: it takes it too.
             with self._lock:
-                collected = [(inlet, inlet.collect()) for inlet in self._inlets]
-                matched = [(outlet, _count_readers(outlet)) for outlet in self._outlets]
+                collected = [(raw_reader, raw_reader.collect()) for raw_reader in self._raw_readers]
+                matched = [
+                    (raw_writer, _count_readers(raw_writer)) for raw_writer in self._raw_writers
+                ]
             heard = [
-                (inlet, understood)
-                for inlet, samples in collected
+                (raw_reader, understood)
+                for raw_reader, samples in collected
                 for sample in samples
-                if (understood := inlet.understand(sample)) is not None
+                if (understood := raw_reader.understand(sample)) is not None
             ]
             if not self._is_closing:
                 from_thread.run_sync(_hand_over, heard, matched)
 
     def _leave(self) -> None:
         with self._lock:
-            for inlet in self._inlets:
-                inlet.close()
-            for outlet in self._outlets:
-                outlet.writer = None
-            self._inlets, self._outlets = [], []
+            for raw_reader in self._raw_readers:
+                raw_reader.close()
+            for raw_writer in self._raw_writers:
+                raw_writer.writer = None
+            self._raw_readers, self._raw_writers = [], []
         # All that is ours goes with it, whatever still refers to it in Python.
         self._participant.__del__()
 
 
-def _hand_over(heard: list[tuple[Inlet, Sample]], matched: list[tuple[Outlet, int]]) -> None:
-    for outlet, n_matched in matched:
-        if n_matched != outlet.n_matched:
-            outlet.note_matched(n_matched)
-    for inlet, sample in heard:
-        if not inlet.is_open:
+def _hand_over(heard: list[tuple[RawReader, Sample]], matched: list[tuple[RawWriter, int]]) -> None:
+    for raw_writer, n_matched in matched:
+        if n_matched != raw_writer.n_matched:
+            raw_writer.note_matched(n_matched)
+    for raw_reader, sample in heard:
+        if not raw_reader.is_open:
             continue
         try:
-            inlet.take(sample)
+            raw_reader.take(sample)
         except Exception:
             # A fault of ours; one odd message must not cost the robot its connection.
             logger.exception("What the robot said could not be taken in")
 
 
-def _count_readers(outlet: Outlet) -> int:
-    if outlet.writer is None:
+def _count_readers(raw_writer: RawWriter) -> int:
+    if raw_writer.writer is None:
         return 0
     # Reading the status also lets the wait begin anew.
-    status = outlet.writer.get_publication_matched_status()  # type: ignore[no-untyped-call]
+    status = raw_writer.writer.get_publication_matched_status()  # type: ignore[no-untyped-call]
     return int(status.current_count)
 
 

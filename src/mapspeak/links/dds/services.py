@@ -20,7 +20,7 @@ import anyio
 from mapspeak.errors import LinkError
 from mapspeak.links.dds.cdr import HEADER_BYTES
 from mapspeak.links.dds.discovery import Framing
-from mapspeak.links.dds.endpoints import Outlet, Quality, Sample, reply_topic, request_topic
+from mapspeak.links.dds.endpoints import Quality, RawWriter, Sample, reply_topic, request_topic
 from mapspeak.links.dds.participant import DdsParticipant
 from mapspeak.links.dds.types import Types
 from mapspeak.ros import REFUSED, ActionEnd, ActionGoal, new_id
@@ -80,14 +80,14 @@ class ServiceClient:
         self._turns = anyio.CapacityLimiter(MOST_AT_ONCE if self.tells_whom else 1)
         self._calls: dict[int, _Call] = {}
         # Who reads our requests must know our reader by then: it is announced first.
-        self._inlet = participant.read(
+        self._raw_reader = participant.read(
             reply_topic(service),
             self._reply_type,
             quality=QUALITY,
             decode=self._understand,
             take=self._take,
         )
-        self._outlet: Outlet = participant.write_to(
+        self._raw_writer: RawWriter = participant.write_to(
             request_topic(service), self._request_type, quality=QUALITY
         )
 
@@ -102,7 +102,7 @@ class ServiceClient:
 
     async def wait_for_server(self, *, timeout_s: float) -> None:
         """Return when somebody reads our requests."""
-        if not await self._outlet.wait_for_reader(timeout_s=timeout_s):
+        if not await self._raw_writer.wait_for_reader(timeout_s=timeout_s):
             raise LinkError(
                 f"Nobody serves {self.service}.",
                 hint=f"Start the node that does: `ros2 service info {self.service}`.",
@@ -131,7 +131,7 @@ class ServiceClient:
         if self._framing is Framing.NUMBERED:
             number = NUMBER.pack(self._id, self._number)
             request = request[:HEADER_BYTES] + number + request[HEADER_BYTES:]
-        self._outlet.write(request)
+        self._raw_writer.write(request)
         self._n_open += 1
         return self._number
 

@@ -10,7 +10,7 @@ import anyio
 
 from mapspeak.errors import LinkError
 from mapspeak.links.dds.discovery import Discovery, Endpoint
-from mapspeak.links.dds.endpoints import Inlet, Outlet, Quality, Sample, dds_topic, full_type
+from mapspeak.links.dds.endpoints import Quality, RawReader, RawWriter, Sample, dds_topic, full_type
 from mapspeak.links.dds.participant import DdsParticipant
 from mapspeak.links.dds.types import Types
 from mapspeak.ros import TYPE
@@ -38,7 +38,7 @@ class DdsTopicRequest(TopicRequest):
     """
 
     quality: Quality | None = None
-    inlet: Inlet | None = None
+    raw_reader: RawReader | None = None
     writers: frozenset[bytes] = frozenset()
     taken_s: float = float("-inf")
     has_learned: bool = False
@@ -47,7 +47,7 @@ class DdsTopicRequest(TopicRequest):
 @dataclass(frozen=True, slots=True)
 class _Advertised:
     type_name: str
-    outlet: Outlet
+    raw_writer: RawWriter
 
 
 class DdsTopics(NativeLink[DdsTopicRequest]):
@@ -100,7 +100,7 @@ class DdsTopics(NativeLink[DdsTopicRequest]):
             return
         self._end(request)
         request.quality, request.writers = quality, keys
-        request.inlet = self._participant.read(
+        request.raw_reader = self._participant.read(
             name,
             writers[0].type_name,
             quality=quality,
@@ -131,9 +131,9 @@ class DdsTopics(NativeLink[DdsTopicRequest]):
                 return
 
     def _end(self, request: DdsTopicRequest) -> None:
-        if request.inlet is not None:
-            self._participant.end_reading(request.inlet)
-        request.inlet = request.quality = None
+        if request.raw_reader is not None:
+            self._participant.end_reading(request.raw_reader)
+        request.raw_reader = request.quality = None
 
     def _take(self, request: DdsTopicRequest, sample: Sample) -> None:
         if sample.refusal is not None:
@@ -159,13 +159,13 @@ class DdsTopics(NativeLink[DdsTopicRequest]):
         name = dds_topic(topic)
         is_latched = any(each.is_latched for each in self.discovery.readers_of(name))
         quality = Quality(is_reliable=True, is_latched=is_latched, depth=DEPTH)
-        outlet = self._participant.write_to(name, full, quality=quality)
-        self._advertised[topic] = _Advertised(full, outlet)
+        raw_writer = self._participant.write_to(name, full, quality=quality)
+        self._advertised[topic] = _Advertised(full, raw_writer)
 
     def _take_back(self, topic: str) -> None:
         known = self._advertised.pop(topic, None)
         if known is not None:
-            self._participant.end_writing(known.outlet)
+            self._participant.end_writing(known.raw_writer)
 
     async def publish(self, topic: str, message: Message) -> None:
         """Publish, once those who are known to listen are connected."""
@@ -176,14 +176,14 @@ class DdsTopics(NativeLink[DdsTopicRequest]):
             await self.ask_type(listeners[0])
         data = self.types.encode(known.type_name, message)
         if listeners:
-            await known.outlet.wait_for_reader(timeout_s=LISTENER_S)
-        known.outlet.write(data)
+            await known.raw_writer.wait_for_reader(timeout_s=LISTENER_S)
+        known.raw_writer.write(data)
 
     def _prepare(self, topic: str, message: Message) -> Callable[[], int]:
         data = self.types.encode(self._wanted(topic).type_name, message)
 
         def send() -> int:
-            self._wanted(topic).outlet.write(data)
+            self._wanted(topic).raw_writer.write(data)
             return 1
 
         return send
