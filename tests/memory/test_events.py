@@ -204,7 +204,7 @@ def test_a_comment_within_an_empty_list_is_not_lost(store: SemanticMapStore) -> 
     text = "version: 1\nevents: [ # none yet\n]\n"
     store.path.write_text(text)
 
-    with pytest.raises(SemanticMapError, match="cannot write to them"):
+    with pytest.raises(SemanticMapError, match="cannot write to it"):
         store.write_event(BROKEN)
 
     assert store.path.read_text() == text

@@ -12,14 +12,13 @@ HERE = Pose(1.0, 2.0, 0.5)
 def taken(
     book: PictureBook, *, data: bytes = b"jpeg", stamp_s: float = 1.0, fov_deg: float | None = 90.0
 ) -> TakenPicture:
-    return book.add(
-        data,
-        media_type="image/jpeg",
+    picture = TakenPicture(
         pose=HERE,
         stamp_s=stamp_s,
         width_px=640,
         horizontal_fov_rad=None if fov_deg is None else math.radians(fov_deg),
     )
+    return book.add(picture, data, media_type="image/jpeg")
 
 
 @pytest.mark.parametrize(

@@ -233,7 +233,9 @@ def _rank(store: "EpisodeStore") -> "Rank | None":
 
 
 def _line(match: "EpisodeMatch") -> str:
-    seen = match.observation
+    from mapspeak.server.text.episodes import say_reasons  # noqa: PLC0415 - heavy
+
+    seen, reasons = match.observation, "; ".join(say_reasons(match))
     said = seen.text.replace("\n", " ") or ", ".join(seen.labels)
     parts = (
         f"{seen.recorded_at:%Y-%m-%d %H:%M:%S}",
@@ -242,12 +244,14 @@ def _line(match: "EpisodeMatch") -> str:
         str(seen.kind),
         said,
         seen.picture or "",
-        f"[{'; '.join(match.reasons)}]" if match.reasons else "",
+        f"[{reasons}]" if reasons else "",
     )
     return "  ".join(filter(None, parts))
 
 
 def _facts(match: "EpisodeMatch", store: "EpisodeStore") -> dict[str, object]:
+    from mapspeak.server.text.episodes import say_reasons  # noqa: PLC0415 - heavy
+
     seen = match.observation
     path = store.picture_path(seen)
     return {
@@ -265,5 +269,5 @@ def _facts(match: "EpisodeMatch", store: "EpisodeStore") -> dict[str, object]:
         "picture": None if path is None else str(path),
         "score": match.score_ratio,
         "distance_m": match.distance_m,
-        "reasons": list(match.reasons),
+        "reasons": say_reasons(match),
     }

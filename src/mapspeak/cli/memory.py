@@ -159,7 +159,8 @@ def find(
     store = open_memory(semantic_map)
     places = read_places(store)
     model = find_model()
-    vectors = None if model is None else TextVectors.in_folder(memory_folder(store.path), model)
+    kept = memory_folder(store.path) / "vectors.npz"
+    vectors = None if model is None else TextVectors(model, kept=kept)
     answer = EntryIndex(list_entries(places), vectors=vectors).find(" ".join(words), limit=limit)
     if vectors is not None:
         vectors.keep()

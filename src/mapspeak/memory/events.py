@@ -82,16 +82,11 @@ class Event:
 
     Attributes:
         id: "E3"; empty until it is written.
-        text: What is the matter, in the words of who said it.
         place: Where, in words or ids of the time of writing: "corridor C1".
-        effect: What it means for ways.
-        at: A point of that place in the map frame.
         outlines: Of the place at the time of writing, in the map frame; ids may change, and these
             do not.
         begins: The first moment; None where it has always been so.
         until: The first moment after; None where nobody knows.
-        source: Who said it.
-        recorded_at: When.
 
     Raises:
         SemanticMapError: It has no words, an id that is none, no place where it needs one, a time

@@ -138,7 +138,6 @@ class LaserRing:
     """What the laser met all around, one beam to every step; compared by identity.
 
     Attributes:
-        pose: From where, in the map frame.
         ranges_m: From that pose, shape (120,), counter-clockwise from its heading; infinite where a
             beam met nothing, NaN where it is not known.
         reach_m: How far a beam that met nothing would have met something.
@@ -187,7 +186,6 @@ def build_ring(
     """Return a turn of the laser in even steps: of several beams to a step, the one nearest to it.
 
     Args:
-        pose: From where, in the map frame.
         angles_rad: By beam, from the heading, left positive.
         ranges_m: Likewise; infinite where it met nothing, NaN where it is not known.
         reach_m: How far a beam that met nothing would have met something.

@@ -38,7 +38,6 @@ class Reunion:
 
     Attributes:
         before: As it was remembered, as seen from the new pose; the latest view, if of several.
-        after: As it is remembered from now on.
         further: Views of it from elsewhere that are remembered besides, the latest first.
     """
 
@@ -52,7 +51,6 @@ class Merge:
     """A waypoint written again, and what became of each thing.
 
     Attributes:
-        waypoint: As it is to be remembered.
         new: Landmarks that were not there before.
         merged: Things that were, and are seen again.
         kept: Things that were, and are not named this time: all views of each, the latest first.
@@ -75,7 +73,6 @@ def merge_waypoint(before: Waypoint | None, now: Waypoint, *, gone: Iterable[str
 
     Args:
         before: What was remembered under that name; None for a new place.
-        now: What is seen.
         gone: Labels of things that are not there any more.
     """
     if before is None:

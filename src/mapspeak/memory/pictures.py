@@ -3,7 +3,7 @@
 import hashlib
 import math
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 from mapspeak.errors import SemanticMapError
@@ -23,8 +23,6 @@ class PictureReading:
     Attributes:
         label: What they take it for.
         bearing_rad: From the heading the picture was taken along, left positive.
-        range_m: From where it was taken.
-        source: What measured it.
     """
 
     label: str
@@ -42,7 +40,6 @@ class TakenPicture:
         name: Its relative name, unlike that of any other picture of any run: P12-5d0c21f7.jpg.
         pose: Where the robot stood, in the map frame; the camera looks along its heading.
         stamp_s: Robot time of the exposure.
-        width_px: Columns.
         horizontal_fov_rad: The angle between the left and the right edge; None where unknown.
         recorded_at: When it was taken, by the calendar; None where nobody knew.
         readings: What the robot measured in it.
@@ -50,12 +47,12 @@ class TakenPicture:
         reported: Labels of all that the robot's detector reports in it; None where none read it.
     """
 
-    id: str
-    name: str
     pose: Pose
     stamp_s: float
     width_px: int
     horizontal_fov_rad: float | None
+    id: str = ""
+    name: str = ""
     recorded_at: datetime | None = None
     readings: tuple[PictureReading, ...] = ()
     laser: LaserRing | None = None
@@ -111,52 +108,20 @@ class PictureBook:
         """All that can be spoken of, the oldest first."""
         return tuple(self._taken.values())
 
-    def add(
-        self,
-        data: bytes,
-        *,
-        media_type: str,
-        pose: Pose,
-        stamp_s: float,
-        width_px: int,
-        horizontal_fov_rad: float | None,
-        name: str | None = None,
-        recorded_at: datetime | None = None,
-        readings: tuple[PictureReading, ...] = (),
-        laser: LaserRing | None = None,
-        reported: tuple[str, ...] | None = None,
-    ) -> TakenPicture:
-        """Name a picture that was just taken.
+    def add(self, picture: TakenPicture, data: bytes, *, media_type: str) -> TakenPicture:
+        """Return a picture that was just taken with its id, and a name where no folder gave one.
 
         Args:
-            data: The encoded picture.
+            picture: What is known of it.
+            data: As it was encoded.
             media_type: Such as "image/jpeg".
-            pose: Where the robot stood, in the map frame.
-            stamp_s: Robot time of the exposure.
-            width_px: Columns.
-            horizontal_fov_rad: The angle between the left and the right edge.
-            name: What a folder of pictures calls it; made up where nobody keeps it.
-            recorded_at: The time by the calendar.
-            readings: What the robot measured in it.
-            laser: What its laser met meanwhile.
-            reported: What the robot's detector reports in it; None where none read it.
         """
         self._n_taken += 1
         picture_id = f"P{self._n_taken}"
         ending = media_type.partition("/")[2].replace("jpeg", "jpg")
-        digest = _digest(data, pose, stamp_s)
-        taken = TakenPicture(
-            id=picture_id,
-            name=name or f"{picture_id}-{digest}.{ending}",
-            pose=pose,
-            stamp_s=stamp_s,
-            width_px=width_px,
-            horizontal_fov_rad=horizontal_fov_rad,
-            recorded_at=recorded_at,
-            readings=readings,
-            laser=laser,
-            reported=reported,
-        )
+        content = data + repr((picture.pose, picture.stamp_s)).encode()
+        name = f"{picture_id}-{hashlib.sha256(content).hexdigest()[:8]}.{ending}"
+        taken = replace(picture, id=picture_id, name=picture.name or name)
         self._taken[picture_id] = taken
         while len(self._taken) > MOST_PICTURES:
             self._taken.popitem(last=False)
@@ -175,7 +140,3 @@ class PictureBook:
         return next(
             (each for each in taken if key in (each.id.casefold(), each.name.casefold())), None
         )
-
-
-def _digest(data: bytes, pose: Pose, stamp_s: float) -> str:
-    return hashlib.sha256(data + repr((pose, stamp_s)).encode()).hexdigest()[:8]

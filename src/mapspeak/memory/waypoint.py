@@ -28,12 +28,9 @@ class Landmark:
 
     Attributes:
         label: What it is, in a few words.
-        purpose: What it is good for.
         bearing_rad: Its direction from the heading of the pose it was seen from, left positive.
         range_m: Its distance from that pose.
         range_from: What measured that; None where the observer judged it.
-        confidence: How sure the observer was; None where it did not say.
-        note: Anything else.
         picture: The picture it was seen in, by its relative name, if not the waypoint's.
         stamp_s: Robot time it was last seen at, if not the waypoint's.
         recorded_at: The same by the calendar, with its time zone, if not the waypoint's.
@@ -62,14 +59,14 @@ class Landmark:
         object.__setattr__(self, "label", _required_line(self.label, "A landmark's label"))
         _clean_lines(self, "purpose", "note", "picture", "range_from")
         if self.bearing_rad is not None:
-            _require(math.isfinite(self.bearing_rad), f"The bearing of {self.label!r}", "an angle")
+            require(math.isfinite(self.bearing_rad), f"The bearing of {self.label!r}", "an angle")
             object.__setattr__(self, "bearing_rad", wrap_angle(self.bearing_rad))
         if self.range_m is not None:
             is_distance = math.isfinite(self.range_m) and self.range_m >= 0
-            _require(is_distance, f"The range of {self.label!r}", "0 m or more")
+            require(is_distance, f"The range of {self.label!r}", "0 m or more")
         if self.pose is not None:
             is_finite = self.pose.is_finite()
-            _require(is_finite, f"The pose of {self.label!r}", "three finite numbers")
+            require(is_finite, f"The pose of {self.label!r}", "three finite numbers")
         _require_time(self.stamp_s, self.recorded_at, self.label)
 
 
@@ -79,13 +76,11 @@ class Waypoint:
 
     Attributes:
         name: How people call it; unique in its map, whatever its case (`name_key`).
-        description: The place in natural language; may have several lines.
         pose: From where it was observed, in the map frame.
         safety_landmarks: Fixed safety equipment.
         functional_landmarks: Fixed equipment and objects that tasks need.
         geometric_features: Persistent layout, such as "corner of two walls".
         stamp_s: Robot time of the observation.
-        recorded_at: The same by the calendar, with its time zone.
         map_id: Which map the pose belongs to; None where the store decides.
         room_id: The room or corridor it was observed from, by the id that it had then.
         picture: The picture that was taken there, by its relative name.
@@ -111,7 +106,7 @@ class Waypoint:
         object.__setattr__(self, "description", clean_text(self.description))
         features = (clean_line(feature) for feature in self.geometric_features)
         object.__setattr__(self, "geometric_features", tuple(filter(None, features)))
-        _require(self.pose.is_finite(), f"The pose of {self.name!r}", "three finite numbers")
+        require(self.pose.is_finite(), f"The pose of {self.name!r}", "three finite numbers")
         _clean_lines(self, "room_id", "picture")
         _require_time(self.stamp_s, self.recorded_at, self.name)
 
@@ -181,7 +176,6 @@ class SemanticMap:
 
     Attributes:
         map_id: Which map the poses belong to; None where nobody said.
-        waypoints: In the order of the file.
         warnings: What its reader should know: another map's places, a file that is broken by now,
             a key that looks misspelt.
     """
@@ -211,18 +205,23 @@ def _clean_lines(value: Landmark | Waypoint, *names: str) -> None:
 def _require_time(stamp_s: float | None, recorded_at: datetime | None, name: str) -> None:
     if stamp_s is not None:
         is_finite = math.isfinite(stamp_s)
-        _require(is_finite, f"The stamp of {name!r}", "a finite number of seconds")
+        require(is_finite, f"The stamp of {name!r}", "a finite number of seconds")
     if recorded_at is not None:
-        _require(recorded_at.tzinfo is not None, f"The time of {name!r}", "a time with its zone")
+        require(recorded_at.tzinfo is not None, f"The time of {name!r}", "a time with its zone")
 
 
 def _required_line(text: str, what: str) -> str:
     line = clean_line(text)
-    _require(bool(line), what, "at least one visible character")
+    require(bool(line), what, "at least one visible character")
     return line
 
 
-def _require(is_right: object, what: str, expected: str) -> None:
+def require(is_right: object, what: str, expected: str) -> None:
+    """Refuse what is not as expected.
+
+    Raises:
+        SemanticMapError: It is not.
+    """
     if not is_right:
         message = f"{what} is not {expected}."
         raise SemanticMapError(message, hint=f"Give {expected} and write it again.")

@@ -3,7 +3,6 @@
 Making it is costly, so it is made when first asked for and kept until memory or map change.
 """
 
-import contextlib
 import logging
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -188,7 +187,6 @@ class Recollector:
         # Held while the model is loaded: by whoever needs it first, or ahead of the first question.
         self._loading = threading.RLock()
         self._latest: Recollection | None = None
-        self._n_kept = 0
 
     def recollect(self, memory: SemanticMap, grid: OccupancyGrid) -> Recollection:
         """Return what is remembered on a map; things keep their ids."""
@@ -223,13 +221,7 @@ class Recollector:
 
     @cached_property
     def _vectors(self) -> TextVectors | None:
-        if self._embedder is None:
-            return None
-        vectors = TextVectors(self._embedder)
-        if self._kept is not None:
-            vectors.read(self._kept)
-            self._n_kept = len(vectors)
-        return vectors
+        return None if self._embedder is None else TextVectors(self._embedder, kept=self._kept)
 
     def _find_vectors(self) -> TextVectors | None:
         with self._loading:
@@ -238,12 +230,8 @@ class Recollector:
     def keep(self) -> None:
         """Write the vectors of texts that are new since they were written last."""
         vectors: TextVectors | None = self.__dict__.get("_vectors")
-        if self._kept is None or vectors is None or len(vectors) == self._n_kept:
-            return
-        with contextlib.suppress(OSError):
-            self._kept.parent.mkdir(parents=True, exist_ok=True)
-            vectors.write(self._kept)
-            self._n_kept = len(vectors)
+        if vectors is not None:
+            vectors.keep()
 
     def _make(
         self, memory: SemanticMap, grid: OccupancyGrid, earlier: Recollection | None

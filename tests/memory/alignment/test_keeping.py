@@ -11,7 +11,7 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMapStore, Waypoint
 from mapspeak.memory.alignment import Certainty, MapKeeper, MapRelation
-from mapspeak.memory.alignment.comparing import FIRST_NAME
+from mapspeak.memory.alignment.keeping import FIRST_NAME
 from mapspeak.memory.episodes import (
     EpisodeStore,
     Observation,

@@ -13,6 +13,7 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, Waypoint
 from mapspeak.memory.episodes import (
+    EpisodeFilter,
     EpisodeOrder,
     EpisodeQuery,
     EpisodeStore,
@@ -110,15 +111,10 @@ def test_each_filter_says_why_an_observation_is_there(store: EpisodeStore) -> No
     (match,) = store.find(query).matches
     assert match.observation.text == "The ladder again, now by the door."
     assert match.distance_m == pytest.approx(1.0)
-    assert match.reasons == (
-        'says "ladder"',
-        "1.00 m from (9.00, 1.00)",
-        "in R2",
-        'label "ladder"',
-        "at 2026-11-20T10:00:00+00:00",
-        "a note",
-        "on the map hall",
-    )
+    assert set(match.filters) == set(EpisodeFilter) - {EpisodeFilter.MEANING}
+    assert match.fitting == ("ladder",)
+    assert match.label == "ladder"
+    assert match.near == Point(9.0, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -183,7 +179,8 @@ def test_a_rank_that_is_given_decides_what_fits(store: EpisodeStore) -> None:
     (match,) = store.find(EpisodeQuery(words="cold drinks"), rank=rank).matches
     assert match.observation.text == "A fridge and a sink."
     assert match.score_ratio == pytest.approx(0.8)
-    assert match.reasons == ('means nearly "cold drinks" (0.80)',)
+    assert match.filters == (EpisodeFilter.MEANING,)
+    assert match.fitting == ("cold drinks",)
     in_r2 = store.find(EpisodeQuery(words="cold drinks", room_id="R2"), rank=rank)
     assert in_r2.n_matches == 0
 

@@ -359,11 +359,11 @@ def test_kept_vectors_are_used_by_the_same_model_only(tmp_path: Path) -> None:
 
 def test_vectors_are_kept_with_the_memory_and_not_asked_for_again(tmp_path: Path) -> None:
     folder = tmp_path / "places.memory"
-    first = TextVectors.in_folder(folder, ConceptEmbedder())
+    first = TextVectors(ConceptEmbedder(), kept=folder / "vectors.npz")
     first.find(["ladder", "sink"])
     first.keep()
     embedder = ConceptEmbedder()
-    again = TextVectors.in_folder(folder, embedder)
+    again = TextVectors(embedder, kept=folder / "vectors.npz")
 
     again.find(["sink", "ladder"])
     again.keep()

@@ -1,14 +1,16 @@
 """What is remembered is told between quotes, and none of it stands outside of them."""
 
 import re
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import pytest
 
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark
-from mapspeak.memory.episodes import EpisodeMatch
+from mapspeak.memory.episodes import EpisodeFilter, EpisodeMatch
 from mapspeak.memory.episodes.observation import Observation, ObservationKind
+from mapspeak.server.text.episodes import say_reasons
 from mapspeak.server.text.memory import say_episode
 from mapspeak.server.text.things import say_landmark
 
@@ -20,7 +22,7 @@ def unquoted(line: str) -> str:
 
 
 def match(seen: Observation) -> EpisodeMatch:
-    return EpisodeMatch(observation=seen, score_ratio=None, distance_m=None, reasons=())
+    return EpisodeMatch(observation=seen)
 
 
 @pytest.mark.parametrize(
@@ -63,3 +65,35 @@ def test_all_words_of_a_landmark_are_quoted() -> None:
     told = say_landmark(Landmark(label=HOSTILE, purpose=HOSTILE, note=HOSTILE))
 
     assert unquoted(told) == " for , note "
+
+
+def test_each_filter_says_why_an_observation_is_there() -> None:
+    seen = Observation(
+        recorded_at=datetime(2026, 11, 20, 10, tzinfo=UTC),
+        pose=Pose(9.0, 2.0, 0.0),
+        kind=ObservationKind.NOTE,
+        room_id="R2",
+        map_id="hall",
+    )
+    found = EpisodeMatch(
+        observation=seen,
+        score_ratio=0.8,
+        distance_m=1.0,
+        filters=tuple(EpisodeFilter),
+        fitting=("ladder",),
+        label="ladder",
+        near=Point(9.0, 1.0),
+        near_id="o12",
+    )
+
+    assert say_reasons(found) == [
+        'says "ladder"',
+        'means nearly "ladder" (0.80)',
+        "1.00 m from where o12 was made, (9.00, 1.00)",
+        "in R2",
+        'label "ladder"',
+        "at 2026-11-20T10:00:00+00:00",
+        "a note",
+        "on the map hall",
+    ]
+    assert say_reasons(replace(found, near_id=None))[2] == "1.00 m from (9.00, 1.00)"

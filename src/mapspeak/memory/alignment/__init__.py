@@ -1,14 +1,15 @@
 """Which map remembered places belong to: told from its walls, and moved when the map moves."""
 
-from mapspeak.memory.alignment.comparing import (
+from mapspeak.memory.alignment.fitting import Certainty, MapFit, find_fit
+from mapspeak.memory.alignment.keeping import (
     MapComparison,
+    MapKeeper,
     MapRelation,
+    RealignReceipt,
     SnapshotFolder,
     compare_maps,
     say_comparison,
 )
-from mapspeak.memory.alignment.fitting import Certainty, MapFit, find_fit
-from mapspeak.memory.alignment.keeping import MapKeeper, RealignReceipt
 from mapspeak.memory.alignment.surfaces import MapAgreement, MapSurfaces, placed
 
 __all__ = [

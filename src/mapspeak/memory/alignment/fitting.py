@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.memory.alignment.surfaces import MapAgreement, MapSurfaces, judge, placed
+from mapspeak.memory.alignment.surfaces import MapAgreement, MapSurfaces, judge, placed, sample
 from mapspeak.spatial.grid import FloatArray
 
 Raster = NDArray[np.float32]
@@ -183,7 +183,7 @@ def refine(old: MapSurfaces, new: MapSurfaces, guess: Pose) -> Pose:
     Each step moves the points towards the lines of their nearest walls (Chen and Medioni, "Object
     modelling by registration of multiple range images", 1992).
     """
-    points = _sample(old.points)
+    points = sample(old.points, most=MOST_POINTS)
     transform = guess
     for reach_m in REACHES_M:
         reach_m = max(reach_m, 1.5 * new.grid.resolution_m)  # noqa: PLW2901 - coarse maps
@@ -220,12 +220,6 @@ def _find_step(new: MapSurfaces, points: FloatArray, reach_m: float) -> Pose | N
     return about @ Pose(x, y, yaw_rad) @ about.inverse()
 
 
-def _sample(points: FloatArray) -> FloatArray:
-    """Return some of the points, spread evenly over the map, the same ones every time."""
-    stride = max(-(-len(points) // MOST_POINTS), 1)
-    return points[::stride]
-
-
 LEAST_AGREEMENT = 0.88
 """Other buildings reach .98 where they share a wall or two, and .83 where they share more."""
 LEAST_OVERLAP = 0.35
@@ -257,7 +251,6 @@ class MapFit:
         new_from_old: The transform from the old map's frame to the new one's.
         quality: How well the maps agree when it is laid so.
         rival: How well they agree in the next best place; None where there is no other.
-        certainty: What follows from both.
         off_m: How far the middle of the old map's walls moves.
     """
 
@@ -302,7 +295,7 @@ def find_fit(old: MapSurfaces, new: MapSurfaces) -> MapFit | None:
         return None
     judged.sort(key=lambda each: -each[1].evidence_m)
     best, quality = judged[0]
-    middle = Point(*((old.points.min(axis=0) + old.points.max(axis=0)) / 2).tolist())
+    middle = Point(*_middle(old.points).tolist())
     others = [each for transform, each in judged[1:] if not _is_same_place(transform, best, middle)]
     rival = _strongest(others, quality)
     return MapFit(

@@ -1,25 +1,225 @@
-"""Records and the map they belong to, kept together: noticed when the map is another, and moved."""
+"""The map that records belong to: kept beside their file, compared with the robot's, and followed.
 
+It is kept as `places.memory/map.yaml` and a picture. The .yaml is what counts. It names its
+picture, whose name says what is in it, so that a crash between the two leaves the pair that was
+there before.
+"""
+
+import math
+import os
+import zlib
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 
-from mapspeak.errors import SemanticMapError
+import numpy as np
+
+from mapspeak.errors import MapError, SemanticMapError
 from mapspeak.geometry import Pose
-from mapspeak.memory.alignment.comparing import (
-    FIRST_NAME,
-    LEAST_STILL_M,
-    MapComparison,
-    MapRelation,
-    SnapshotFolder,
-    compare_maps,
-    say_comparison,
+from mapspeak.memory.alignment.fitting import (
+    LEAST_OVERLAP,
+    LEAST_SHARED_M,
+    Certainty,
+    MapFit,
+    find_fit,
 )
-from mapspeak.memory.alignment.fitting import Certainty
-from mapspeak.memory.alignment.surfaces import MapSurfaces
+from mapspeak.memory.alignment.surfaces import MapAgreement, MapSurfaces, judge
 from mapspeak.memory.episodes import EpisodeStore
 from mapspeak.memory.store import MapDocument, moved
 from mapspeak.memory.store.semanticmap import SemanticMapStore
-from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial import UNKNOWN, OccupancyGrid
+from mapspeak.spatial.mapfiles import load_map, write_map
+
+FIRST_NAME = "map.yaml"
+
+
+class SnapshotFolder:
+    """The folder with the maps that a memory's poses belong to, or did once."""
+
+    def __init__(self, memory_path: Path) -> None:
+        real = Path(os.path.realpath(memory_path))
+        self.path = real.with_name(f"{real.stem}.memory")
+
+    def load(self, name: str) -> OccupancyGrid | None:
+        """Return a map that was kept; None where there is none of that name.
+
+        Raises:
+            SemanticMapError: It is there, but damaged.
+        """
+        path = self.path / Path(name).name
+        if not path.exists():
+            return None
+        try:
+            return load_map(path).grid
+        except MapError as error:
+            raise SemanticMapError(
+                f"The map that the records belong to cannot be read: {error.message}",
+                hint=f"Take {path} away if it is of no use: the next write keeps a new one.",
+            ) from error
+
+    def keep(self, grid: OccupancyGrid, name: str) -> None:
+        """Write a map in place of the one of that name; it is on the disk when this returns.
+
+        Raises:
+            SemanticMapError: It cannot be written.
+        """
+        grid = _in_three_greys(grid)
+        stem = f"{Path(name).stem}-{zlib.crc32(grid.cells.tobytes()):08x}"
+        try:
+            self.path.mkdir(exist_ok=True, parents=True)
+            new = self.path / f"{stem}.yaml"
+            picture = write_map(grid, new)
+            _sync(picture)
+            _sync(new)
+            new.replace(self.path / name)
+            self._forget_pictures_of(name, but=picture)
+        except MapError as error:
+            raise SemanticMapError(error.message, hint=error.hint) from error
+        except OSError as error:
+            raise SemanticMapError(
+                f"The map cannot be kept in {self.path}: {error.strerror or error}.",
+                hint="Check that the folder may be written to and has room.",
+            ) from error
+
+    def free_name(self) -> str:
+        """Return a name for another map that none has yet: map-2.yaml, map-3.yaml, ..."""
+        number = 2
+        while (self.path / f"map-{number}.yaml").exists():
+            number += 1
+        return f"map-{number}.yaml"
+
+    def note(self, name: str, content: bytes) -> Path:
+        """Write any other file into the folder; it is on the disk when this returns."""
+        path = self.path / name
+        try:
+            path.write_bytes(content)
+            _sync(path)
+        except OSError as error:
+            raise SemanticMapError(
+                f"{path} cannot be written: {error.strerror or error}.",
+                hint="Check that the folder may be written to and has room.",
+            ) from error
+        return path
+
+    def _forget_pictures_of(self, name: str, *, but: Path) -> None:
+        for picture in self.path.glob(f"{Path(name).stem}-????????.pgm"):
+            if picture != but:
+                picture.unlink(missing_ok=True)
+
+
+def _in_three_greys(grid: OccupancyGrid) -> OccupancyGrid:
+    """Return the map with free, occupied and unknown alone: map files know no free cell of 45."""
+    cells = np.where(grid.free, 0, np.where(grid.occupied, 100, UNKNOWN)).astype(np.int8)
+    return OccupancyGrid(
+        cells=cells, resolution_m=grid.resolution_m, origin=grid.origin, stamp_s=grid.stamp_s
+    )
+
+
+def _sync(path: Path) -> None:
+    with path.open("rb+") as file:
+        os.fsync(file.fileno())
+
+
+NO_MOTION = Pose(0.0, 0.0, 0.0)
+STILL_M, STILL_RAD = 0.1, math.radians(1.0)
+"""A smaller motion is how maps differ from run to run, and no reason to touch records."""
+LEAST_STILL_M, LEAST_STILL_AGREEMENT = 8.0, 0.85
+"""So much is enough where maps agree as they lie: no place had to be looked for."""
+PERHAPS_AGREEMENT = 0.75
+"""Maps that agree less, wherever they are laid, show different places."""
+
+
+class MapRelation(StrEnum):
+    """How the map of the records and the robot's present map go together."""
+
+    SAME = "same"
+    MOVED = "moved"
+    OTHER = "other_building"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MapComparison:
+    """What a comparison of two maps gives.
+
+    Attributes:
+        as_it_lies: How well they agree when nothing is moved.
+        fit: The best place for the old map, where one had to be looked for.
+        shortest_m: The walls of the map that shows less of them.
+    """
+
+    relation: MapRelation
+    as_it_lies: MapAgreement
+    fit: MapFit | None
+    shortest_m: float
+
+
+def compare_maps(old: OccupancyGrid, new: OccupancyGrid) -> MapComparison:
+    """Compare two maps: whether they show the same building, and in the same frame."""
+    before, after = MapSurfaces(old), MapSurfaces(new)
+    as_it_lies = judge(before, after, NO_MOTION)
+    fit, relation = None, MapRelation.SAME
+    shortest_m = min(before.length_m, after.length_m)
+    if not _is_good(as_it_lies):
+        relation = MapRelation.UNKNOWN
+        if shortest_m >= LEAST_SHARED_M:
+            fit = find_fit(before, after)
+            relation = _relation_of(fit)
+    return MapComparison(relation=relation, as_it_lies=as_it_lies, fit=fit, shortest_m=shortest_m)
+
+
+def say_comparison(comparison: MapComparison) -> str:
+    """Return what a comparison gives, with figures: the message where records cannot be moved."""
+    relation, fit = comparison.relation, comparison.fit
+    figures = _figures(comparison.as_it_lies)
+    if fit is None and relation is MapRelation.SAME:
+        return f"The map is the one that the records belong to: {figures}."
+    if fit is None and relation is MapRelation.UNKNOWN:
+        return (
+            f"Whether this is the map that the records belong to cannot be told yet: one of the "
+            f"two maps shows {comparison.shortest_m:.0f} m of walls, and {LEAST_SHARED_M:.0f} m "
+            "are needed."
+        )
+    said = f"{_OPENINGS[relation]} As they lie, {figures}."
+    return said if fit is None else f"{said} {fit.sentence}"
+
+
+_OPENINGS = {
+    MapRelation.SAME: "The map is the one that the records belong to, with changes in it.",
+    MapRelation.MOVED: "The building is the one that the records belong to, but its map has moved.",
+    MapRelation.OTHER: "This map shows another building than the one that the records belong to, "
+    "or another part of it.",
+    MapRelation.UNKNOWN: "Whether this is the map that the records belong to cannot be told.",
+}
+
+
+def _relation_of(fit: MapFit | None) -> MapRelation:
+    if fit is None:
+        return MapRelation.OTHER
+    if fit.is_sure_enough:
+        is_still = fit.off_m < STILL_M and abs(fit.new_from_old.yaw_rad) < STILL_RAD
+        return MapRelation.SAME if is_still else MapRelation.MOVED
+    is_possible = fit.certainty is Certainty.AMBIGUOUS or (
+        fit.quality.agreement_ratio >= PERHAPS_AGREEMENT
+        and fit.quality.overlap_ratio >= LEAST_OVERLAP
+    )
+    return MapRelation.UNKNOWN if is_possible else MapRelation.OTHER
+
+
+def _is_good(quality: MapAgreement) -> bool:
+    return (
+        quality.agreement_ratio >= LEAST_STILL_AGREEMENT
+        and quality.overlap_ratio >= LEAST_OVERLAP
+        and quality.shared_m >= LEAST_STILL_M
+    )
+
+
+def _figures(quality: MapAgreement) -> str:
+    return (
+        f"{quality.agreement_ratio:.0%} of the walls that both maps show agree "
+        f"({quality.shared_m:.0f} m, {quality.overlap_ratio:.0%} of the smaller map)"
+    )
+
 
 GROWN_RATIO = 0.1
 """A map that shows so much more floor than the kept one is kept in its place."""
@@ -31,29 +231,24 @@ class RealignReceipt:
     """What became of records whose map has moved.
 
     Attributes:
-        comparison: Of the old map and the new one.
         motion: From the old frame to the new one; None where nothing had to move.
         certainty: How sure it is; None where nothing had to move.
-        n_waypoints: How many were moved.
-        n_events: Likewise.
-        n_observations: Likewise.
         undo_path: The file as it was before.
     """
 
     comparison: MapComparison
-    motion: Pose | None
-    certainty: Certainty | None
-    n_waypoints: int
-    n_events: int
-    n_observations: int
-    undo_path: Path | None
+    motion: Pose | None = None
+    certainty: Certainty | None = None
+    n_waypoints: int = 0
+    n_events: int = 0
+    n_observations: int = 0
+    undo_path: Path | None = None
 
 
 class MapKeeper:
     """Keeps the map that a store's records belong to, and compares it with the robot's.
 
     Args:
-        store: The records.
         episodes: What was observed on the way, with poses on the same map.
     """
 
@@ -115,7 +310,7 @@ class MapKeeper:
             )
         comparison = self._compare(kept, grid)
         if comparison.relation is MapRelation.SAME:
-            return _nothing_moved(comparison)
+            return RealignReceipt(comparison=comparison)
         fit = comparison.fit
         if comparison.relation is not MapRelation.MOVED or fit is None:
             raise SemanticMapError(
@@ -132,8 +327,6 @@ class MapKeeper:
             How many were moved.
         """
         return 0 if self._episodes is None else self._episodes.finish_move(at=self._name())
-
-    # --- inside ---
 
     def _move(
         self,
@@ -193,18 +386,6 @@ class MapKeeper:
         comparison = compare_maps(kept, grid)
         self._compared = (kept, grid, comparison)
         return comparison
-
-
-def _nothing_moved(comparison: MapComparison) -> RealignReceipt:
-    return RealignReceipt(
-        comparison=comparison,
-        motion=None,
-        certainty=None,
-        n_waypoints=0,
-        n_events=0,
-        n_observations=0,
-        undo_path=None,
-    )
 
 
 def _floor_m2(grid: OccupancyGrid) -> float:

@@ -30,11 +30,7 @@ _NEIGHBOURS = np.ones((3, 3), dtype=np.uint8)
 
 @dataclass(frozen=True, eq=False)
 class MapSurfaces:
-    """The surfaces of one map; parts are computed when first asked for.
-
-    Attributes:
-        grid: The map.
-    """
+    """The surfaces of one map; parts are computed when first asked for."""
 
     grid: OccupancyGrid
 
@@ -193,7 +189,7 @@ def _count(
     one: MapSurfaces, other: MapSurfaces, transform: Pose, tolerance_m: float
 ) -> tuple[float, float]:
     """Return the metres of one map's surface that the other has seen, and that agree with it."""
-    points = _sample(one.points)
+    points = sample(one.points, most=MOST_POINTS)
     if not points.size:
         return 0.0, 0.0
     distances, is_seen = other.distances_at(placed(points, transform))
@@ -202,6 +198,6 @@ def _count(
     return float(np.count_nonzero(is_seen)) * metres_each, float(n_agreeing) * metres_each
 
 
-def _sample(points: FloatArray) -> FloatArray:
+def sample(points: FloatArray, *, most: int) -> FloatArray:
     """Return some of the points, spread evenly over the map, the same ones every time."""
-    return points[:: max(-(-len(points) // MOST_POINTS), 1)]
+    return points[:: max(-(-len(points) // most), 1)]

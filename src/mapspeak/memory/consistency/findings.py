@@ -50,14 +50,11 @@ class MemoryFinding:
     """Something odd about what is remembered.
 
     Attributes:
-        kind: What is odd.
         waypoints: The names of the places concerned.
         label: Of the one landmark concerned; None where it is the whole place.
-        things: The things concerned, whatever their views.
         view: Of the one thing concerned, the view that points past it.
         ids: Of the maps: the record's and the robot's. Of the rooms: the one that a record names
             or a thing lies in, and the one that it is seen from.
-        at: Where the place stands.
         radius_m: Of the robot that cannot get there.
         far_m: From one place to the other, or to the thing.
         told_m: How far away the landmark was told to be.
@@ -103,8 +100,6 @@ class Trust:
     """How far something may be trusted.
 
     Attributes:
-        ratio: From 0 to 1.
-        findings: What speaks against it.
         thing: The thing, whose views speak for it; None of a place.
     """
 

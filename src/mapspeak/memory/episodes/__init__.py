@@ -5,6 +5,7 @@ about what was observed, when and from where.
 """
 
 from mapspeak.memory.episodes.observation import (
+    EpisodeFilter,
     EpisodeMatch,
     EpisodeOrder,
     EpisodePage,
@@ -21,6 +22,7 @@ from mapspeak.memory.episodes.textindex import VectorRank
 
 __all__ = [
     "BroughtOver",
+    "EpisodeFilter",
     "EpisodeMatch",
     "EpisodeOrder",
     "EpisodePage",

@@ -17,7 +17,7 @@ from filelock import FileLock, Timeout
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose, wrap_angle
-from mapspeak.memory.episodes.pictures import sync_folder
+from mapspeak.memory.store.durable import sync_folder
 
 SCHEMA_VERSION = 1
 INDEX_VERSION = "1"
@@ -74,7 +74,6 @@ class EpisodeDatabase:
 
     Args:
         path: The file; it is made with its folder by the first write.
-        lock_timeout_s: How long a writer waits for another one.
     """
 
     def __init__(self, path: Path, *, lock_timeout_s: float) -> None:
@@ -183,7 +182,6 @@ def plan_move(database: EpisodeDatabase, motion: Pose, *, to: str) -> None:
     """Note how poses move if the kept map becomes another one.
 
     Args:
-        database: The observations.
         motion: From the frame of their poses to the new one.
         to: The name of the map that would be kept.
     """
@@ -198,10 +196,6 @@ def finish_move(database: EpisodeDatabase, *, at: str) -> int:
     """Move all poses if that was planned for the map that is kept now; forget other plans.
 
     Rooms of the old map are left away: their ids mean nothing on the new one.
-
-    Args:
-        database: The observations.
-        at: The name of the map that is kept.
 
     Returns:
         How many were moved.

@@ -10,7 +10,7 @@ from enum import StrEnum
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory.quoting import clean_line, clean_text
-from mapspeak.memory.waypoint import SemanticMap, Waypoint
+from mapspeak.memory.waypoint import SemanticMap, Waypoint, require
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _ID_BYTES = 6
@@ -30,14 +30,10 @@ class Observation:
 
     Attributes:
         recorded_at: When, by the calendar, with its time zone.
-        pose: Where the robot stood, in the map frame.
-        kind: A picture, a record of a place, or words alone.
         text: What was seen, in words; may be empty for a picture.
-        labels: The things seen, each in a few words.
         picture: Name of the picture in the memory's folder; None without one, or after it was
             thinned.
         stamp_s: Robot time of the observation.
-        map_id: Which map the pose belongs to.
         room_id: The room or corridor it was observed from, by the id that it had then.
         id: The same for the same content, so that writing twice is writing once; made from the
             content unless given.
@@ -59,10 +55,10 @@ class Observation:
 
     def __post_init__(self) -> None:
         is_timed = self.recorded_at.tzinfo is not None
-        _require(is_timed, "The time of an observation", "a time with its zone")
-        _require(self.pose.is_finite(), "The pose of an observation", "three finite numbers")
+        require(is_timed, "The time of an observation", "a time with its zone")
+        require(self.pose.is_finite(), "The pose of an observation", "three finite numbers")
         is_stamped = self.stamp_s is None or math.isfinite(self.stamp_s)
-        _require(is_stamped, "The stamp of an observation", "a finite number of seconds")
+        require(is_stamped, "The stamp of an observation", "a finite number of seconds")
         labels = dict.fromkeys(filter(None, map(clean_line, self.labels)))
         object.__setattr__(self, "text", clean_text(self.text))
         object.__setattr__(self, "labels", tuple(labels))
@@ -95,12 +91,6 @@ def microseconds_of(time: datetime) -> int:
     return (time - _EPOCH) // timedelta(microseconds=1)
 
 
-def _require(is_right: object, what: str, expected: str) -> None:
-    if not is_right:
-        message = f"{what} is not {expected}."
-        raise SemanticMapError(message, hint=f"Give {expected} and write it again.")
-
-
 MOST_ROWS = 1000
 MOST_HOPS = 5
 
@@ -122,20 +112,11 @@ class EpisodeQuery:
     """Which observations are wanted: those that pass every filter that is given.
 
     Attributes:
-        words: What they are about, in words.
         near: Near to a place in the map frame; or to where the first observation of another query
             was made, and then without the observations that the other query's words or label fit.
-        radius_m: How near.
-        room_id: Made in this room.
-        since: Not before.
-        until: Before.
         label: A thing seen, whatever its case.
-        kind: What they came from.
-        map_id: On this map.
         order: Which come first; None for the best where words are given, else the nearest where a
             place is given without a radius, else the newest.
-        limit: How many, at most.
-        offset: How many to leave out before.
         as_of: Only the first so many that were ever written, so that pages do not shift.
 
     Raises:
@@ -185,23 +166,41 @@ class EpisodeQuery:
         return EpisodeOrder.NEAREST if is_nearest else EpisodeOrder.NEWEST
 
 
+class EpisodeFilter(StrEnum):
+    """What an observation was found by; words are compared as they are, or by what they mean."""
+
+    WORDS = "words"
+    MEANING = "meaning"
+    PLACE = "place"
+    ROOM = "room"
+    LABEL = "label"
+    TIME = "time"
+    KIND = "kind"
+    MAP = "map"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EpisodeMatch:
     """An observation that fits, and why.
 
     Attributes:
-        observation: What was observed.
         score_ratio: How well the words fit, up to 1; None where none were asked for.
         distance_m: From where it was made to the place asked for; None where none was.
-        reasons: Why it is here, one for each filter.
-        evidence: Those of them that it does not show itself: which of its words fit.
+        filters: All that it has passed.
+        fitting: Which of its words fit; those asked for, where meanings were compared.
+        label: The one asked for, as it stands there.
+        near: The place asked for.
+        near_id: The observation that a nested query found there; None without one.
     """
 
     observation: Observation
-    score_ratio: float | None
-    distance_m: float | None
-    reasons: tuple[str, ...]
-    evidence: tuple[str, ...] = ()
+    score_ratio: float | None = None
+    distance_m: float | None = None
+    filters: tuple[EpisodeFilter, ...] = ()
+    fitting: tuple[str, ...] = ()
+    label: str | None = None
+    near: Point | None = None
+    near_id: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,7 +208,6 @@ class EpisodePage:
     """Observations that fit, in the order asked for.
 
     Attributes:
-        matches: This page of them.
         n_matches: How many fit in all.
         anchor: What the nested query found, which `near` stands for; None without one.
         next_page: Asks for those that follow; None on the last page.

@@ -1,11 +1,9 @@
 """The folder of pictures, and which old ones are deleted."""
 
-import contextlib
 import hashlib
 import math
 import os
 import re
-import sys
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
@@ -13,6 +11,7 @@ from pathlib import Path
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
+from mapspeak.memory.store.durable import sync_folder
 
 _SUFFIXES = {b"\xff\xd8\xff": "jpg", b"\x89PNG\r\n\x1a\n": "png"}
 _OURS = re.compile(r"\d{8}T\d{6}Z-[0-9a-f]{12}\.(?:jpg|png)(?:\.tmp)?")
@@ -73,18 +72,6 @@ class PictureFolder:
         return len(unknown)
 
 
-def sync_folder(folder: Path) -> None:
-    """Make the new name of a file last, where the system can."""
-    if sys.platform == "win32":
-        return
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        with contextlib.suppress(OSError):
-            os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThinningRule:
     """What is kept of the pictures: all new ones, then one per place and hour, then per day.
@@ -110,15 +97,7 @@ class ThinningRule:
 
 @dataclass(frozen=True, slots=True)
 class StoredPicture:
-    """A picture in the memory's folder, with the observation that it was taken for.
-
-    Attributes:
-        name: Its file's.
-        taken_at: When, with a time zone.
-        pose: Of the robot, in the map frame.
-        n_bytes: The size of its file.
-        map_id: Which map the pose belongs to.
-    """
+    """A picture in the memory's folder, with the observation that it was taken for."""
 
     name: str
     taken_at: datetime
@@ -143,7 +122,6 @@ def choose_dropped(
         pictures: All that are stored; one file may serve several observations.
         now: The time that ages are counted from.
         named: Names that records of the semantic map mention.
-        rule: What is kept.
     """
     ordered = sorted(pictures, key=lambda picture: (picture.taken_at, picture.name), reverse=True)
     newest_of_group: dict[object, StoredPicture] = {}

@@ -1,4 +1,4 @@
-"""Find observations in the database: every filter at once, in SQL, with the reason of each."""
+"""Find observations in the database: every filter at once, in SQL."""
 
 import json
 import sqlite3
@@ -10,6 +10,7 @@ import numpy as np
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory.episodes.observation import (
+    EpisodeFilter,
     EpisodeMatch,
     EpisodeOrder,
     EpisodePage,
@@ -20,7 +21,7 @@ from mapspeak.memory.episodes.observation import (
     microseconds_of,
 )
 from mapspeak.memory.episodes.textindex import Ids, Scores, read_ids, score_words, shared_words
-from mapspeak.memory.quoting import name_key, quote, quote_name
+from mapspeak.memory.quoting import name_key
 
 MOST_TEXTS = 2000
 """How many different texts, the best ones, one query looks at."""
@@ -57,11 +58,8 @@ class TextScorer:
         """Return the best texts by their ids, each with its score above 0.
 
         Args:
-            connection: Of the database.
-            words: What is asked for.
             rank: Who says how well a text fits; None compares words.
             among: A selection of text ids; empty for all texts.
-            values: For the selection.
         """
         text_ids = read_ids(connection, among, values) if among else None
         if rank is None:
@@ -152,9 +150,6 @@ class _Asked:
     """A query whose place is known.
 
     Attributes:
-        query: What was asked.
-        near: The place; None without one.
-        anchor: What the nested query found; None without one.
         where: All filters but the words.
         scores: Of texts, by id; None where no words were asked for.
     """
@@ -172,7 +167,6 @@ class Search:
 
     Attributes:
         connection: Of the database; sees one state of it.
-        scorer: Knows the texts.
         rank: Who says how well texts fit; None compares words.
     """
 
@@ -302,53 +296,37 @@ def _page(search: Search, asked: _Asked) -> EpisodePage:
 
 
 def _match(row: sqlite3.Row, asked: _Asked, rank: Rank | None) -> EpisodeMatch:
-    observation = observation_from(row)
-    match = EpisodeMatch(
+    query, near, observation = asked.query, asked.near, observation_from(row)
+    fitting: tuple[str, ...] = ()
+    if query.words is not None:
+        is_ranked = rank is not None
+        said = [query.words] if is_ranked else shared_words(query.words, observation.searched_text)
+        fitting = tuple(said)
+    key = None if query.label is None else name_key(query.label)
+    return EpisodeMatch(
         observation=observation,
         score_ratio=row["score"],
-        distance_m=observation.pose.point.distance_to(asked.near) if asked.near else None,
-        reasons=(),
+        distance_m=None if near is None else observation.pose.point.distance_to(near),
+        filters=tuple(_filters_of(asked, rank)),
+        fitting=fitting,
+        label=next((each for each in observation.labels if name_key(each) == key), None),
+        near=near,
+        near_id=None if asked.anchor is None else asked.anchor.observation.id,
     )
-    fitting, labelled = _say_words(match, asked, rank), _say_label(match, asked)
-    evidence = tuple(filter(None, (fitting, labelled)))
-    reasons = tuple(filter(None, (fitting, *_reasons(match, asked, labelled))))
-    return replace(match, reasons=reasons, evidence=evidence)
 
 
-def _say_words(match: EpisodeMatch, asked: _Asked, rank: Rank | None) -> str:
-    words = asked.query.words
-    if words is None:
-        return ""
-    if rank is None:
-        said = ", ".join(map(quote, shared_words(words, match.observation.searched_text)))
-        return f"says {said}"
-    return f"means nearly {quote_name(words)} ({match.score_ratio or 0:.2f})"
-
-
-def _say_label(match: EpisodeMatch, asked: _Asked) -> str:
-    if asked.query.label is None:
-        return ""
-    key = name_key(asked.query.label)
-    label = next(each for each in match.observation.labels if name_key(each) == key)
-    return f"label {quote_name(label)}"
-
-
-def _reasons(match: EpisodeMatch, asked: _Asked, labelled: str) -> Iterator[str]:
-    query, observation = asked.query, match.observation
-    if asked.near is not None:
-        place = f"({asked.near.x:.2f}, {asked.near.y:.2f})"
-        if asked.anchor is not None:
-            place = f"where {asked.anchor.observation.id} was made, {place}"
-        yield f"{match.distance_m:.2f} m from {place}"
-    if query.room_id is not None:
-        yield f"in {observation.room_id}"
-    yield labelled
-    if query.since is not None or query.until is not None:
-        yield f"at {observation.recorded_at.isoformat(timespec='seconds')}"
-    if query.kind is not None:
-        yield f"a {observation.kind}"
-    if query.map_id is not None:
-        yield f"on the map {observation.map_id}"
+def _filters_of(asked: _Asked, rank: Rank | None) -> Iterator[EpisodeFilter]:
+    query = asked.query
+    given = {
+        EpisodeFilter.WORDS if rank is None else EpisodeFilter.MEANING: query.words,
+        EpisodeFilter.PLACE: asked.near,
+        EpisodeFilter.ROOM: query.room_id,
+        EpisodeFilter.LABEL: query.label,
+        EpisodeFilter.TIME: query.since or query.until,
+        EpisodeFilter.KIND: query.kind,
+        EpisodeFilter.MAP: query.map_id,
+    }
+    return (each for each, value in given.items() if value is not None)
 
 
 def observation_from(row: sqlite3.Row) -> Observation:

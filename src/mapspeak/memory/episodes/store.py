@@ -65,10 +65,8 @@ class EpisodeStore:
 
     Args:
         folder: Where they are; it need not exist yet (see `memory_folder`).
-        rule: Which old pictures are kept.
         named_pictures: Gives the names of pictures that records of the semantic map mention; they
             are never dropped, and nothing is dropped while it raises.
-        lock_timeout_s: How long a write waits for another program's.
     """
 
     def __init__(
@@ -92,7 +90,6 @@ class EpisodeStore:
         """Keep an observation, on the disk when it returns; one that is kept already stays one.
 
         Args:
-            observation: What was observed.
             picture: JPEG or PNG; kept under a name that the observation gets.
 
         Returns:
@@ -151,7 +148,6 @@ class EpisodeStore:
         """Return one page of the observations that pass every filter of a query.
 
         Args:
-            query: What is asked.
             rank: Says how well texts fit words; None compares words.
 
         Raises:
@@ -341,7 +337,6 @@ class BroughtOver:
 
     Attributes:
         n_observations: Each once, in however many memories it was.
-        n_pictures: Files.
     """
 
     n_observations: int = 0

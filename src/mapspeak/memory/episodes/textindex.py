@@ -75,7 +75,6 @@ def score_words(connection: sqlite3.Connection, query: str) -> Scores:
     """Return the share of a query that each text says, by its id; 0 where it is too little.
 
     Args:
-        connection: Of the database.
         query: In words; rare ones count more.
     """
     n_texts = int(connection.execute("SELECT MAX(text_id) FROM texts").fetchone()[0] or 0)
@@ -152,17 +151,11 @@ class VectorRank:
 
     Args:
         database: Where vectors are kept, by embedder and text.
-        embedder: What makes them.
-        min_score_ratio: The cosine from which on a text fits; None leaves it to the embedder.
     """
 
-    def __init__(
-        self, database: EpisodeDatabase, embedder: Embedder, *, min_score_ratio: float | None = None
-    ) -> None:
+    def __init__(self, database: EpisodeDatabase, embedder: Embedder) -> None:
         self._database = database
         self._embedder = embedder
-        least_ratio = embedder.thresholds.least_ratio
-        self._min_score_ratio = least_ratio if min_score_ratio is None else min_score_ratio
         self._row_of: dict[str, int] = {}
         self._vectors: Vectors = np.zeros((0, 0), np.float32)
         self._kept: dict[bytes, bytes] | None = None
@@ -174,7 +167,7 @@ class VectorRank:
             return []
         asked = self._embedder.embed([query])[0]
         cosines = self._vectors @ asked
-        scores = np.where(cosines >= self._min_score_ratio, cosines, 0.0)
+        scores = np.where(cosines >= self._embedder.thresholds.least_ratio, cosines, 0.0)
         rows = np.fromiter((self._row_of[text] for text in texts), np.intp, len(texts))
         found: list[float] = scores[rows].tolist()
         return found

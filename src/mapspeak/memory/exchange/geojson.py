@@ -73,7 +73,6 @@ def to_geojson(places: SemanticMap, *, anchor: MapAnchor | None = None) -> str:
     """Return the memory as GeoJSON.
 
     Args:
-        places: What is written.
         anchor: Where on Earth the map lies; without one, coordinates are metres in the map frame.
 
     Raises:

@@ -179,8 +179,7 @@ def merge_files(first: Path, second: Path, *, out: Path) -> tuple[Union, Brought
 
 
 def _with_places(document: MapDocument, union: Union) -> MapDocument:
-    if document.map_id is None and union.places.map_id is not None:
-        document = bound_to(document, union.places.map_id)
+    document = bound_to(document, union.places.map_id)
     for place in union.changed:
         document = with_waypoint(document, place)
     return document

@@ -64,9 +64,7 @@ class MatchEvidence:
     Attributes:
         query_word: As it stands in the phrase.
         found_word: As it stands in the record.
-        field: Which part of the record.
         text: The name, label, purpose, feature, note or description it stands in.
-        kind: How the two words are the same.
     """
 
     query_word: str
@@ -94,11 +92,7 @@ class Entry:
 
     Attributes:
         id: What its owner knows it by; no two entries share it.
-        kind: Whether it is a place or a thing.
         name: The place's name or the thing's label.
-        category: What sort of equipment it is.
-        purpose: What it is good for.
-        note: Anything else.
         description: The same in whole sentences.
         features: Persistent layout, such as "corner of two walls".
         place: For a thing, the name of the place where it is.
@@ -225,7 +219,6 @@ class EntryCandidate:
     """Something that a request may mean.
 
     Attributes:
-        entry: The place or thing.
         score_ratio: How alike it and the request are; 1 for its very name.
         basis: What the score compares.
         field: Which part of the record is most like the request.
@@ -249,7 +242,6 @@ class Answer:
     """What is remembered of a request.
 
     Attributes:
-        query: The request, as it was given.
         understood: The same with misspelt words put right.
         verdict: How far to trust the first candidate. Where nothing is remembered the candidates
             are only the nearest things, and probably none of them is meant.

@@ -63,8 +63,6 @@ class _Asked:
     """A request, and how alike each entry is to it.
 
     Attributes:
-        request: As it is understood.
-        words: Its words.
         common: The same, as they stand in what is commonly known.
         ratios: By all that is said and commonly known of the entry.
         said_ratios: By what is said of it alone.
@@ -122,7 +120,6 @@ class EntryIndex:
         Args:
             query: What people say: a name, a thing, what it is for, what is the matter.
             among: The ids to choose from; all where None.
-            limit: How many candidates at most.
         """
         words = self._words.ask(query)
         understood = self._understand(query, words)

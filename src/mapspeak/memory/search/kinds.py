@@ -151,7 +151,6 @@ class Missing:
     """A kind of thing of which none is remembered.
 
     Attributes:
-        name: What it is called.
         ratio: How alike its name and a request are.
     """
 
@@ -163,8 +162,6 @@ class KindIndex:
     """The kinds of some entries, and the names of all other kinds.
 
     Args:
-        entries: What is remembered.
-        said: The texts of each.
         vectors: What compares meanings; None where there is no model.
     """
 

@@ -61,7 +61,6 @@ class TextVectors:
     """The vectors of texts, each asked of an embedder once.
 
     Args:
-        embedder: Gives the vectors.
         kept: A file with those of an earlier session, which `keep` writes; None where none is kept.
     """
 
@@ -72,11 +71,6 @@ class TextVectors:
         if kept is not None:
             self.read(kept)
         self._n_kept = len(self._vectors)
-
-    @classmethod
-    def in_folder(cls, folder: Path, embedder: Embedder) -> "TextVectors":
-        """Take up the vectors that are kept in a memory's folder; `keep` writes the new ones."""
-        return cls(embedder, kept=folder / "vectors.npz")
 
     def keep(self) -> None:
         """Write the file if there are new vectors; one that cannot be written costs only time."""
@@ -200,8 +194,6 @@ class MeaningIndex:
     however many things are called a ladder or stand in one place.
 
     Args:
-        entries: What is remembered.
-        said: The texts of each.
         common: What is commonly known of each.
         vectors: What compares meanings.
     """
@@ -231,11 +223,7 @@ class MeaningIndex:
         self._lengths = np.maximum(self._lengths_of_sums(), _LEAST_LENGTH)
 
     def compare(self, vector: Floats) -> Likeness:
-        """Return how alike each entry and a phrase are: as its part that is most like the phrase.
-
-        Args:
-            vector: The phrase's.
-        """
+        """Return how alike each entry and the phrase of a vector are: by the part most like it."""
         likeness = self._texts @ vector
         ratios = likeness[self._names] + likeness[self._contexts]
         # Rounded, since the order of the rows may change the last digit of a product.

@@ -121,7 +121,6 @@ class Vocabulary:
     """The words of all records, ready to be asked for one of them.
 
     Args:
-        words: As they are compared.
         is_known: Whether it is a word of the language, and so not a misspelt one.
     """
 
@@ -187,7 +186,6 @@ class AskedWords:
     """A word of the phrase.
 
     Attributes:
-        shown: As it stands there.
         spellings: The words of the records that count as this one, the likeliest misspelt first.
         weight: The rarer in the records, the more.
         is_doubtful: Whether neither records nor language know the word as it is spelt.
@@ -209,7 +207,6 @@ class WordIndex:
     """The words of records, each with the numbers of the records that say it.
 
     Args:
-        records: What each record says.
         is_known: Whether it is a word of the language, and so not a misspelt one.
     """
 

@@ -52,7 +52,6 @@ class Reading:
     """What the text of one record says, kept so that it need not be read again.
 
     Attributes:
-        waypoint: The record as a value.
         key: The `name_key` of its name.
         misspelt: Keys that look like known ones, each with the known one.
     """
@@ -88,7 +87,6 @@ class MapDocument:
         source: How messages call the file.
         text: All of it, with lines that end in a line feed.
         line_ends: How its lines end.
-        has_bom: It begins with a byte order mark.
         root: Its top mapping without the records; None where the file says nothing.
         layout: Where the records stand in the text.
         records: By `name_key`, in the order of the file.
@@ -135,7 +133,6 @@ def parse_document(
     """Read a semantic map file.
 
     Args:
-        content: The file's bytes.
         source: How messages call the file.
         previous: What was read from it before; spares reading unchanged records again.
 

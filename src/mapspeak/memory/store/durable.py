@@ -57,7 +57,6 @@ class DurableFile:
 
     Args:
         path: Where it is; a symbolic link is followed. It need not exist yet.
-        lock_timeout_s: How long a writer waits for another one.
     """
 
     def __init__(self, path: Path, *, lock_timeout_s: float) -> None:
@@ -124,7 +123,7 @@ class DurableFile:
             finally:
                 temporary.unlink(missing_ok=True)
             renamed = after.renamed(self.fingerprint())
-            _sync_folder(target.parent)
+            sync_folder(target.parent)
             return renamed
 
     def _target(self) -> Path:
@@ -181,7 +180,7 @@ def _take_after(path: Path, like: os.stat_result) -> None:
     path.chmod(stat.S_IMODE(like.st_mode))
 
 
-def _sync_folder(folder: Path) -> None:
+def sync_folder(folder: Path) -> None:
     """Make the new name of a file last, where the system can."""
     if sys.platform == "win32":
         return

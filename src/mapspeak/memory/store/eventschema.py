@@ -1,7 +1,6 @@
 """What one event of the semantic map file must say; turned into an `Event`, and back."""
 
 import re
-from datetime import datetime
 from typing import Annotated
 
 from pydantic import (
@@ -18,6 +17,7 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.memory.events import ID_RULE, Effect, Event, Outline, is_event_id
 from mapspeak.memory.quoting import quote_name
+from mapspeak.memory.store.schema import Time, length_text, time_text
 from mapspeak.memory.store.tree import Data, ListNode, MappingNode, Node, TextError
 
 EventNode = tuple[Event, Node]
@@ -26,14 +26,6 @@ EventNode = tuple[Event, Node]
 _NUMBER = r"-?\d+(?:\.\d+)?"
 _CORNER = re.compile(rf"\s*({_NUMBER})\s+({_NUMBER})\s*")
 _EXAMPLE = "- {text: the floor is wet, place: C1, effect: closed, until: 2026-11-22T14:00:00+01:00}"
-
-
-def _time_with_zone(value: object) -> datetime | None:
-    time = datetime.fromisoformat(value) if isinstance(value, str) else None
-    if value is not None and (time is None or time.tzinfo is None):
-        message = "is not a date and time with a time zone"
-        raise ValueError(message)
-    return time
 
 
 def _outlines_of(value: object) -> tuple[Outline, ...]:
@@ -62,9 +54,6 @@ def _event_id(value: str | None) -> str | None:
     return value
 
 
-_Time = Annotated[datetime | None, BeforeValidator(_time_with_zone)]
-
-
 class _PointEntry(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
@@ -83,10 +72,10 @@ class _EventEntry(BaseModel):
     effect: Effect = Effect.NONE
     at: _PointEntry | None = None
     outline: Annotated[tuple[Outline, ...], BeforeValidator(_outlines_of)] = ()
-    begins: Annotated[_Time, Field(alias="from")] = None
-    until: _Time = None
+    begins: Annotated[Time, Field(alias="from")] = None
+    until: Time = None
     source: str | None = None
-    recorded_at: _Time = None
+    recorded_at: Time = None
 
     def to_event(self, number: int) -> Event:
         return Event(
@@ -136,12 +125,14 @@ def event_data(event: Event) -> dict[str, Data]:
         "text": event.text,
         "place": event.place,
         "effect": event.effect.value,
-        "at": None if event.at is None else {"x": _length(event.at.x), "y": _length(event.at.y)},
+        "at": None
+        if event.at is None
+        else {"x": length_text(event.at.x), "y": length_text(event.at.y)},
         "outline": "; ".join(map(_outline_text, event.outlines)),
-        "from": _time_text(event.begins),
-        "until": _time_text(event.until),
+        "from": time_text(event.begins),
+        "until": time_text(event.until),
         "source": event.source,
-        "recorded_at": _time_text(event.recorded_at),
+        "recorded_at": time_text(event.recorded_at),
     }
     return {key: value for key, value in entries.items() if value}
 
@@ -167,13 +158,4 @@ def _fault_in(item: Node, error: ValidationError) -> TextError:
 
 
 def _outline_text(outline: Outline) -> str:
-    return ", ".join(f"{_length(corner.x)} {_length(corner.y)}" for corner in outline)
-
-
-def _length(value: float) -> str:
-    # Adding zero turns -0.0 into 0.0.
-    return f"{round(value, 3) + 0.0:.3f}".removesuffix("0")
-
-
-def _time_text(time: datetime | None) -> Data:
-    return None if time is None else time.isoformat(timespec="seconds")
+    return ", ".join(f"{length_text(corner.x)} {length_text(corner.y)}" for corner in outline)

@@ -59,13 +59,7 @@ def find_records(text: str) -> Layout:
 
 
 def find_changed_records(text: str, *, before: str, layout: Layout) -> Layout:
-    """Find the records of a text that was changed, by looking only at what changed.
-
-    Args:
-        text: As it is now.
-        before: As it was.
-        layout: Where the records stood in that.
-    """
+    """Find the records of a text that was changed, by looking only at what changed."""
     n_same = _count_same(before, text)
     n_same_behind = _count_same(before[n_same:][::-1], text[n_same:][::-1])
     starts = [start for start, _ in layout.spans]

@@ -14,8 +14,6 @@ from mapspeak.memory.store.tree import (
     Data,
     ListNode,
     MappingNode,
-    Node,
-    ScalarNode,
     line_and_column,
 )
 from mapspeak.memory.waypoint import Waypoint
@@ -24,8 +22,10 @@ _GREETING = "# mapspeak semantic map. Edit freely: comments and order are kept.\
 _OPTIONAL_KEYS = ("stamp_s", "recorded_at", "room_id", "picture")
 
 
-def bound_to(document: MapDocument, map_id: str) -> MapDocument:
-    """Return the file with the map that its waypoints belong to."""
+def bound_to(document: MapDocument, map_id: str | None) -> MapDocument:
+    """Return the file with the map that its waypoints belong to, where it does not say one."""
+    if document.map_id is not None or map_id is None:
+        return document
     return with_entry(document, "map", map_id)
 
 
@@ -45,7 +45,7 @@ def with_entry(document: MapDocument, key: str, value: str) -> MapDocument:
         text = _ended(text) + entry + "\n"
     else:
         text = _ended(text or _GREETING) + f"version: {FILE_VERSION}\n{entry}\n"
-    return _reparsed(document, text, keys=set(document.records))
+    return _reparsed(document, text)
 
 
 def with_waypoint(document: MapDocument, waypoint: Waypoint) -> MapDocument:
@@ -100,14 +100,24 @@ def _with_first_record(document: MapDocument, record: str) -> str:
     text, root = document.text, document.root
     if root is None:
         return _ended(text or _GREETING) + f"version: {FILE_VERSION}\nwaypoints:\n{record}"
-    key, listed = root.find_key("waypoints"), root.find_value("waypoints")
-    if key is None or listed is None:
-        return _ended(text) + f"waypoints:\n{record}"
-    if isinstance(listed, ListNode) and listed.items:
-        raise _layout_error(document, key.start)
-    line_end = _line_end(text, listed.end)
-    head = text[: listed.start].rstrip(" ") + text[listed.end : line_end]
-    return f"{head}\n{record}{text[line_end + 1 :]}"
+    return _with_first_item(document, root, "waypoints", record)
+
+
+def _with_first_item(document: MapDocument, root: MappingNode, list_key: str, item: str) -> str:
+    """Return the text with a first item below a key, in place of `[]`, null or nothing."""
+    text, listed = document.text, root.find_value(list_key)
+    if listed is None:
+        return _ended(text) + f"{list_key}:\n{item}"
+    start, end = map(document.layout.offset_in_text, (listed.start, listed.end))
+    if (isinstance(listed, ListNode) and listed.items) or "#" in text[start:end]:
+        raise _layout_error(document, start, list_key)
+    line_end = _line_end(text, end)
+    rest = text[end:line_end].rstrip()
+    if start < end and rest:
+        # Where a value went, a comment keeps its distance.
+        rest = f"  {rest.strip()}"
+    head = text[:start].rstrip(" \t") + rest
+    return f"{head}\n{item}{text[line_end + 1 :]}"
 
 
 def _require_cut(document: MapDocument, start: int) -> None:
@@ -115,23 +125,28 @@ def _require_cut(document: MapDocument, start: int) -> None:
         raise _layout_error(document, start)
 
 
-def _reparsed(document: MapDocument, text: str, *, keys: set[str]) -> MapDocument:
+def _reparsed(
+    document: MapDocument, text: str, *, keys: set[str] | None = None, list_key: str = "waypoints"
+) -> MapDocument:
     """Read the changed text before anybody relies on it."""
     try:
         changed = parse_document(document.encoded(text), source=document.source, previous=document)
     except SemanticMapError as error:
-        raise _layout_error(document, 0) from error
-    if set(changed.records) != keys:
-        raise _layout_error(document, 0)
+        raise _layout_error(document, 0, list_key) from error
+    if set(changed.records) != (set(document.records) if keys is None else keys):
+        raise _layout_error(document, 0, list_key)
     return changed
 
 
-def _layout_error(document: MapDocument, offset: int) -> SemanticMapError:
+def _layout_error(
+    document: MapDocument, offset: int, list_key: str = "waypoints"
+) -> SemanticMapError:
     line, _ = line_and_column(document.text, offset)
+    item, first_key = {"waypoints": ("waypoint", "name"), "events": ("event", "text")}[list_key]
     return SemanticMapError(
         f"{document.source}, line {line}: mapspeak reads this layout, but cannot write to it.",
-        hint="Put `waypoints:` at the start of a line and each waypoint below it as `- name: ...`, "
-        "its other keys on lines of their own. Nothing was written.",
+        hint=f"Put `{list_key}:` at the start of a line and each {item} below it as "
+        f"`- {first_key}: ...`, its other keys on lines of their own. Nothing was written.",
     )
 
 
@@ -161,10 +176,10 @@ def with_event(document: MapDocument, event: Event) -> tuple[MapDocument, Event]
         text = changed_events(document, {named.id: named})
     else:
         text = _with_new(document, named)
-    changed = _reparsed_with_events(document, text)
+    changed = _reparsed(document, text, list_key="events")
     written = changed.events.get(named.id)
     if written is None or event_data(written.event) != event_data(named):
-        raise _events_layout_error(document)
+        raise _layout_error(document, 0, "events")
     return changed, written.event
 
 
@@ -179,7 +194,7 @@ def changed_events(document: MapDocument, events: dict[str, Event]) -> str:
         line_start = text.rfind("\n", 0, record.start) + 1
         before, block = text[line_start : record.start], text[record.start : record.end]
         if before.strip(" -"):
-            raise _events_layout_error(document)
+            raise _layout_error(document, record.start, "events")
         item = " " * len(before) + block
         edited = edited_record(item, old=event_data(record.event), new=event_data(new))
         text = text[:line_start] + before + edited[len(before) :] + text[record.end :]
@@ -187,44 +202,22 @@ def changed_events(document: MapDocument, events: dict[str, Event]) -> str:
 
 
 def _with_new(document: MapDocument, event: Event) -> str:
-    text, root = document.text, document.root
-    ended = text if not text or text.endswith("\n") else text + "\n"
-    said = event_data(event)
-    key = root.find_key("events") if root else None
-    if root is None or key is None:
-        return f"{ended}events:\n{record_text(said, indent=_INDENT)}"
-    listed = root.find_value("events")
+    record = record_text(event_data(event), indent=_INDENT)
+    if document.root is None:
+        return _ended(document.text) + f"events:\n{record}"
+    listed = document.root.find_value("events")
     if isinstance(listed, ListNode) and listed.items:
         return _behind_last(document, listed, event)
-    return _in_empty(document, key, listed, record_text(said, indent=_INDENT))
-
-
-def _in_empty(document: MapDocument, key: ScalarNode, listed: Node | None, record: str) -> str:
-    """Return the text with a first record below the key, in place of `[]` or null."""
-    text = document.text
-    # Where nothing stands behind the key, a value has no place of its own.
-    is_written = listed is not None and listed.end > listed.start
-    node = listed if listed is not None and is_written else key
-    start, end = map(document.layout.offset_in_text, (node.start, node.end))
-    before, behind = (text[:start], end) if is_written else (text[:end], end)
-    if is_written and "#" in text[start:end]:
-        raise _events_layout_error(document)
-    line_end = _line_end(text, behind)
-    rest = text[behind:line_end].rstrip()
-    head = before if rest else before.rstrip(" \t")
-    return f"{head}{rest}\n{record}{text[line_end + 1 :]}"
+    return _with_first_item(document, document.root, "events", record)
 
 
 def _behind_last(document: MapDocument, listed: ListNode, event: Event) -> str:
-    last = listed.items[-1]
-    if listed.is_flow or not isinstance(last, MappingNode):
-        raise _events_layout_error(document)
-    text = document.text
+    last, text = listed.items[-1], document.text
     start, end = map(document.layout.offset_in_text, (last.start, last.end))
     line_start = text.rfind("\n", 0, start) + 1
     dash = text[line_start:start].find("-")
-    if dash < 0:
-        raise _events_layout_error(document)
+    if listed.is_flow or not isinstance(last, MappingNode) or dash < 0:
+        raise _layout_error(document, start, "events")
     line_end = _line_end(text, end)
     head = text[:line_end] + "\n"
     return head + record_text(event_data(event), indent=dash) + text[line_end + 1 :]
@@ -235,43 +228,24 @@ def _free_id(document: MapDocument) -> str:
     return f"E{max(numbers, default=0) + 1}"
 
 
-def _reparsed_with_events(document: MapDocument, text: str) -> MapDocument:
-    try:
-        changed = parse_document(document.encoded(text), source=document.source, previous=document)
-    except SemanticMapError as error:
-        raise _events_layout_error(document) from error
-    if set(changed.records) != set(document.records):
-        raise _events_layout_error(document)
-    return changed
-
-
-def _events_layout_error(document: MapDocument) -> SemanticMapError:
-    return SemanticMapError(
-        f"mapspeak reads the events of {document.source}, but cannot write to them.",
-        hint="Put `events:` at the start of a line and each event below it as `- text: ...`, its "
-        "other keys on lines of their own. Nothing was written.",
-    )
-
-
 def moved(document: MapDocument, motion: Pose, *, entries: dict[str, str]) -> MapDocument:
     """Return the file with every waypoint and event moved.
 
     Args:
-        document: The file.
         motion: From the frame of its poses to the new one.
         entries: Keys of the file itself that change with it, such as `map`.
 
     Raises:
         SemanticMapError: The file is laid out in a way that cannot be written to.
     """
-    if document.records and not document.layout.spans:
-        raise _moved_layout_error(document)
+    if document.records:
+        _require_cut(document, 0)
     after = document
     for key, value in entries.items():
         after = with_entry(after, key, value)
     events = {each.event.id: _moved_event(each.event, motion) for each in after.events.values()}
-    after = _reparsed_moved(after, changed_events(after, events))
-    return _reparsed_moved(after, _with_moved_records(after, motion))
+    after = _reparsed(after, changed_events(after, events))
+    return _reparsed(after, _with_moved_records(after, motion))
 
 
 def _with_moved_records(document: MapDocument, motion: Pose) -> str:
@@ -291,19 +265,4 @@ def _moved_event(event: Event, motion: Pose) -> Event:
         event,
         at=None if event.at is None else motion.transform(event.at),
         outlines=tuple(tuple(map(motion.transform, outline)) for outline in event.outlines),
-    )
-
-
-def _reparsed_moved(document: MapDocument, text: str) -> MapDocument:
-    changed = parse_document(document.encoded(text), source=document.source, previous=document)
-    if changed.records.keys() != document.records.keys():
-        raise _moved_layout_error(document)
-    return changed
-
-
-def _moved_layout_error(document: MapDocument) -> SemanticMapError:
-    return SemanticMapError(
-        f"mapspeak reads {document.source}, but cannot write to its layout.",
-        hint="Put `waypoints:` at the start of a line and each waypoint below it as `- name: ...`. "
-        "Nothing was written.",
     )

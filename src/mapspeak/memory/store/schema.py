@@ -40,11 +40,12 @@ def _label_alone(value: object) -> object:
 def _time_with_zone(value: object) -> datetime | None:
     time = datetime.fromisoformat(value) if isinstance(value, str) else None
     if value is not None and (time is None or time.tzinfo is None):
-        raise ValueError
+        message = "is not a date and time with a time zone"
+        raise ValueError(message)
     return time
 
 
-_Time = Annotated[datetime | None, BeforeValidator(_time_with_zone)]
+Time = Annotated[datetime | None, BeforeValidator(_time_with_zone)]
 
 
 def _laser_fan(value: object) -> LaserFan | None:
@@ -90,7 +91,7 @@ class _LandmarkEntry(BaseModel):
     note: str | None = None
     picture: str | None = None
     stamp_s: FiniteFloat | None = None
-    recorded_at: _Time = None
+    recorded_at: Time = None
     seen_from: _PoseEntry | None = None
     laser: _Laser = None
 
@@ -128,7 +129,7 @@ class _WaypointEntry(BaseModel):
     functional_landmarks: _Landmarks = []
     geometric_features: Annotated[list[_Words], BeforeValidator(_nothing_as_empty)] = []
     stamp_s: FiniteFloat | None = None
-    recorded_at: _Time = None
+    recorded_at: Time = None
     room_id: str | None = None
     picture: str | None = None
 
@@ -225,7 +226,7 @@ def record_data(waypoint: Waypoint) -> dict[str, Data]:
         "functional_landmarks": [_landmark_data(thing, pose) for thing in functional],
         "geometric_features": list(waypoint.geometric_features),
         "stamp_s": _length_if_any(waypoint.stamp_s),
-        "recorded_at": _time(waypoint.recorded_at),
+        "recorded_at": time_text(waypoint.recorded_at),
         "room_id": waypoint.room_id,
         "picture": waypoint.picture,
     }
@@ -287,7 +288,7 @@ def _lookalikes(data: Data, known_keys: frozenset[str]) -> Iterator[tuple[str, s
 
 
 def _pose_data(pose: Pose) -> dict[str, Data]:
-    return {"x": _length(pose.x), "y": _length(pose.y), "yaw_deg": _angle(pose.yaw_rad)}
+    return {"x": length_text(pose.x), "y": length_text(pose.y), "yaw_deg": _angle(pose.yaw_rad)}
 
 
 def _landmark_data(landmark: Landmark, pose: dict[str, Data]) -> Data:
@@ -302,7 +303,7 @@ def _landmark_data(landmark: Landmark, pose: dict[str, Data]) -> Data:
         "note": landmark.note,
         "picture": landmark.picture,
         "stamp_s": _length_if_any(landmark.stamp_s),
-        "recorded_at": _time(landmark.recorded_at),
+        "recorded_at": time_text(landmark.recorded_at),
         "seen_from": None if seen_from == pose else seen_from,
         "laser": None if landmark.laser is None else landmark.laser.text,
     }
@@ -310,15 +311,17 @@ def _landmark_data(landmark: Landmark, pose: dict[str, Data]) -> Data:
     return landmark.label if said == ["label"] else {key: entries[key] for key in said}
 
 
-def _time(time: datetime | None) -> str | None:
+def time_text(time: datetime | None) -> str | None:
+    """Return a time as the file says it, to the second."""
     return None if time is None else time.isoformat(timespec="seconds")
 
 
 def _length_if_any(value: float | None) -> str | None:
-    return None if value is None else _length(value)
+    return None if value is None else length_text(value)
 
 
-def _length(value: float) -> str:
+def length_text(value: float) -> str:
+    """Return metres, or seconds, to the thousandth."""
     return _decimals(value, 3)
 
 

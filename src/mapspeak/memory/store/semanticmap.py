@@ -37,7 +37,6 @@ class WriteReceipt:
     Attributes:
         waypoint: As it is remembered from now on: millimetres, hundredths of a degree.
         previous: What was remembered under that name before; None where it is new.
-        n_waypoints: How many the map holds now.
     """
 
     waypoint: Waypoint
@@ -60,7 +59,6 @@ class _Seen:
     """The file as it was read last.
 
     Attributes:
-        fingerprint: Of that state.
         document: The last one without a fault.
         fault: What is wrong with the present one.
     """
@@ -76,7 +74,6 @@ class SemanticMapStore:
     Args:
         path: The file; it and its folder need not exist yet.
         map_id: The map that the robot is on. None takes the file for what it says it is.
-        lock_timeout_s: How long a write waits for another program's.
     """
 
     def __init__(
@@ -119,7 +116,9 @@ class SemanticMapStore:
         Raises:
             SemanticMapError: As for `write`.
         """
-        _, after = self._change(lambda document: _with_event(document, event, self.map_id))
+        _, after = self._change(
+            lambda document: with_event(bound_to(document, self.map_id), event)[0]
+        )
         ids = [event.id] if event.id else list(after.events)[-1:]
         return after.events[ids[0]].event
 
@@ -140,7 +139,6 @@ class SemanticMapStore:
         What another program remembers of it in the same moment is joined, too.
 
         Args:
-            waypoint: What is seen now.
             gone: Labels of landmarks that are not there any more.
 
         Raises:
@@ -163,7 +161,9 @@ class SemanticMapStore:
         self._require_same_map(waypoint.map_id, f"The waypoint {quote_name(waypoint.name)}")
         key = name_key(waypoint.name)
         before, after = self._change(
-            lambda document: _written(document, change(_known(document, key)), map_id)
+            lambda document: with_waypoint(
+                bound_to(document, map_id), change(_known(document, key))
+            )
         )
         return WriteReceipt(
             waypoint=after.records[key].reading.waypoint,
@@ -274,18 +274,6 @@ def _say_map(map_id: str | None) -> str:
 def _known(document: MapDocument, key: str) -> Waypoint | None:
     record = document.records.get(key)
     return None if record is None else record.reading.waypoint
-
-
-def _written(document: MapDocument, waypoint: Waypoint, map_id: str | None) -> MapDocument:
-    if document.map_id is None and map_id is not None:
-        document = bound_to(document, map_id)
-    return with_waypoint(document, waypoint)
-
-
-def _with_event(document: MapDocument, event: Event, map_id: str | None) -> MapDocument:
-    if document.map_id is None and map_id is not None:
-        document = bound_to(document, map_id)
-    return with_event(document, event)[0]
 
 
 def _removed(document: MapDocument, name: str) -> MapDocument:

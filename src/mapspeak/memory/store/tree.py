@@ -59,7 +59,6 @@ class ScalarNode:
     """One piece of text, as it reads once quotes and folds are undone.
 
     Attributes:
-        text: What it says.
         is_plain: It stands without quotes.
         start: Offset of its first character, the quote included.
         end: Offset behind its last.
@@ -193,7 +192,11 @@ class _Builder:
     def add(self, event: Event) -> None:
         match event:
             case AliasEvent():
-                raise _alias_fault(event)
+                raise TextError(
+                    f"A semantic map has no aliases, and *{event.anchor} is one.",
+                    hint="Write the value itself in this place.",
+                    offset=event.start_mark.index,
+                )
             case ScalarEvent():
                 self._close(self._scalar(event))
             case CollectionStartEvent():
@@ -237,7 +240,12 @@ class _Builder:
                 message = "A key is a list or a mapping."
                 raise TextError(message, hint="Use a word.", offset=key.start)
             if key.text in seen:
-                raise _twice_fault(key, seen[key.text])
+                raise TextError(
+                    f"The key {quote_name(key.text)} stands here twice.",
+                    hint="Keep one of the two.",
+                    offset=key.start,
+                    other_offset=seen[key.text].start,
+                )
             seen[key.text] = key
             yield key, self._behind_colon(key, value)
 
@@ -260,23 +268,6 @@ class _Builder:
                 hint="Keep one document in the file: take out the line '---' or '...'.",
                 offset=node.start,
             )
-
-
-def _alias_fault(event: AliasEvent) -> TextError:
-    return TextError(
-        f"A semantic map has no aliases, and *{event.anchor} is one.",
-        hint="Write the value itself in this place.",
-        offset=event.start_mark.index,
-    )
-
-
-def _twice_fault(key: ScalarNode, first: ScalarNode) -> TextError:
-    return TextError(
-        f"The key {quote_name(key.text)} stands here twice.",
-        hint="Keep one of the two.",
-        offset=key.start,
-        other_offset=first.start,
-    )
 
 
 _COMMENT = re.compile(r"(?:(?<=\s)|^)#[^\n]*")

@@ -44,9 +44,7 @@ def find_approach(
     Of all places on that side the best one faces most of where the thing may be.
 
     Args:
-        sight: The map.
         distances: From the robot, on that map.
-        target: Where the thing is.
         seen_from: The places of those who saw it.
         fronts: What `find_fronts` gives for these, where it is at hand.
         whereabouts: Where it may be: points of the map frame, shape (n, 2), each as likely.

@@ -13,12 +13,11 @@ from mapspeak.memory.things.joining import (
     Group,
     Posteriors,
     SameName,
-    agreement_of,
     group_names,
     join_sightings,
 )
 from mapspeak.memory.things.likelihood import Surroundings, WeighedView, read_waypoints
-from mapspeak.memory.things.placing import Placement, place, trust_range
+from mapspeak.memory.things.placing import Placement, measure_agreement, place, trust_range
 from mapspeak.memory.things.sight import BODY_M, N_RAYS, SightMap, build_sight_map
 from mapspeak.memory.things.thing import NOISE, Category, NoiseModel, Thing, View, name_the_same
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
@@ -92,8 +91,6 @@ def find_things(
     """Join what was seen from all places into things, and say where each is.
 
     Args:
-        semantic_map: The places.
-        grid: The map they are on.
         same_name: True for two labels that may be one thing's.
         noise: What is believed of observers.
         earlier: What was found before, for the same map and names: what depends on no changed
@@ -150,7 +147,7 @@ def _solve(
     placed = [each for each in pool if each.likelihood is not None]
     posteriors = Posteriors(sight)
     groups = join_sightings(posteriors, placed, same_name) if placed else []
-    agreed = [agreement_of(sight, group) for group in groups]
+    agreed = [measure_agreement(sight, group) for group in groups]
     located = [
         (group, _place(posteriors, _agreeing(group, shares)))
         for group, shares in zip(groups, agreed, strict=True)
@@ -173,9 +170,7 @@ def _place(posteriors: Posteriors, group: Group) -> Placement:
     seen_from = [each.waypoint.pose.point for each in group]
     posterior, (first, *more) = posteriors.of(group), group
     if first.landmark.range_m is not None and first.likelihood is not None and not more:
-        posterior = trust_range(
-            posteriors.sight, first.likelihood, seen_from[0], first.landmark.range_m
-        )
+        posterior = trust_range(posteriors.sight, first, first.landmark.range_m)
     return place(posteriors.sight, posterior, seen_from)
 
 
@@ -273,7 +268,6 @@ def describe_group(
     """Return the thing that a group of views has seen.
 
     Args:
-        group: The views of it.
         placement: Where it is; None where no view says.
         agreements: How well each view goes with the others; 1 is chance.
         conflicting: Views that say it is elsewhere.
@@ -303,18 +297,13 @@ def _by_votes(words: Iterable[str]) -> list[str]:
 
 
 def _view(sighting: WeighedView, position: Point | None) -> View:
-    pose, bearing_rad = sighting.waypoint.pose, sighting.landmark.bearing_rad
-    far_m = off_rad = None
-    if position is not None and bearing_rad is not None:
-        far_m = pose.point.distance_to(position)
-        ahead_rad = pose.yaw_rad + bearing_rad
-        off_rad = abs(math.remainder(pose.point.bearing_to(position) - ahead_rad, math.tau))
+    place, has_way = sighting.waypoint.pose.point, sighting.landmark.bearing_rad is not None
     return View(
         waypoint=sighting.waypoint.name,
         landmark=sighting.landmark,
-        place=pose.point,
-        far_m=far_m,
-        off_rad=off_rad,
+        place=place,
+        far_m=place.distance_to(position) if position and has_way else None,
+        off_rad=_off_rad(sighting, position) if position and has_way else None,
     )
 
 
@@ -331,10 +320,8 @@ def _confidence(group: Sequence[WeighedView], agreements: Sequence[float]) -> fl
 
 
 def _count_agreeing(group: Sequence[WeighedView], agreements: Sequence[float]) -> int:
-    agreeing = [
-        agreement >= LEAST_AGREEMENT for _, agreement in _from_different_places(group, agreements)
-    ]
-    return sum(agreeing)
+    apart = _from_different_places(group, agreements)
+    return sum(agreement >= LEAST_AGREEMENT for _, agreement in apart)
 
 
 def _from_different_places(

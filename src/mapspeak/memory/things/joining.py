@@ -13,13 +13,13 @@ import numpy as np
 
 from mapspeak.memory.merging import SAME_SPOT_M
 from mapspeak.memory.things.laserchanges import find_log_priors
-from mapspeak.memory.things.likelihood import ViewLikelihood, WeighedView, are_apart
+from mapspeak.memory.things.likelihood import WeighedView, are_apart
 from mapspeak.memory.things.placing import (
     Posterior,
     build_posterior,
     find_middle,
+    likelihood_of,
     log_evidence,
-    measure_agreement,
 )
 from mapspeak.memory.things.sight import SightMap
 from mapspeak.memory.waypoint import Waypoint
@@ -77,7 +77,6 @@ def join_sightings(
     """Divide views of one name into groups: one for each thing.
 
     Args:
-        posteriors: Those found so far, on the map that counts.
         sightings: Views whose labels are related, each with a likelihood.
         same_name: True for two labels that may be one thing's.
     """
@@ -99,14 +98,12 @@ class Posteriors:
         """Return where the thing of a group of views may be."""
         key = tuple(group)
         if key not in self._known:
-            wrong_ratios = [each.wrong_ratio for each in group]
-            views = [_likelihood(each) for each in group]
-            self._known[key] = build_posterior(self.sight, views, wrong_ratios)
+            self._known[key] = build_posterior(self.sight, group)
         return self._known[key]
 
 
 def _count(sightings: Sequence[WeighedView]) -> _Ballot:
-    likelihoods = [_likelihood(each) for each in sightings]
+    likelihoods = [likelihood_of(each) for each in sightings]
     cells = np.concatenate([each.cells for each in likelihoods])
     sizes = [len(each.cells) for each in likelihoods]
     order = np.argsort(cells, kind="stable")
@@ -124,7 +121,7 @@ def _count(sightings: Sequence[WeighedView]) -> _Ballot:
 def _take_peaks(
     sight: SightMap, sightings: Sequence[WeighedView], ballot: _Ballot, same_name: SameName
 ) -> list[Group]:
-    news = (_likelihood(each).news for each in sightings)
+    news = (likelihood_of(each).news for each in sightings)
     count = _Count(ballot, find_log_priors(sight, ballot.places, news))
     is_left = np.ones(len(sightings), dtype=np.bool_)
     groups = []
@@ -273,23 +270,5 @@ def _merge(posteriors: Posteriors, groups: list[Group], same_name: SameName) -> 
 def _are_one(sight: SightMap, some: Group, others: Group, same_name: SameName) -> bool:
     if not all(_fits(each, iter(others), same_name) for each in some):
         return False
-    apart = _evidence(sight, some) + _evidence(sight, others) + np.log(_THINGS_PER_CELL)
-    return bool(_evidence(sight, some + others) > apart)
-
-
-def agreement_of(sight: SightMap, group: Group) -> tuple[float, ...]:
-    """Return how well each view of a group goes with the others; 1 is chance."""
-    return measure_agreement(
-        sight, [_likelihood(each) for each in group], [each.wrong_ratio for each in group]
-    )
-
-
-def _evidence(sight: SightMap, group: Group) -> float:
-    return log_evidence(
-        sight, [_likelihood(each) for each in group], [each.wrong_ratio for each in group]
-    )
-
-
-def _likelihood(sighting: WeighedView) -> ViewLikelihood:
-    assert sighting.likelihood is not None, "joined views say where"  # noqa: S101 - our belief
-    return sighting.likelihood
+    apart = log_evidence(sight, some) + log_evidence(sight, others) + np.log(_THINGS_PER_CELL)
+    return bool(log_evidence(sight, some + others) > apart)

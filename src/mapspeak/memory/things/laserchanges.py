@@ -45,7 +45,6 @@ class Correction:
     """How a laser corrects the map for one look.
 
     Attributes:
-        news: Where the map is wrong.
         changed: The numbers of the cells in directions where it is.
         sight: How likely one sees each of these: what counts instead of `Outlook.sight`.
     """
@@ -83,9 +82,6 @@ def read_news(
     """Return how a fan corrects the map; None where the map is right.
 
     Args:
-        sight: The map.
-        pose: Where one looks from.
-        fan: What the laser met there.
         near_m: How far one sees on the map to the first obstacle, by ray.
         cells: Lattice cells in sight around the direction that was told, rising.
         angles: Where they are, in the frame of the grid.
@@ -124,7 +120,6 @@ def find_log_priors(
     """Return how likely a thing is in cells before any view, by the map and what corrects it.
 
     Args:
-        sight: The map.
         cells: Of the lattice, rising.
         news: Of all views of a thing.
     """

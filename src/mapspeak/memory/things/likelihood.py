@@ -28,9 +28,6 @@ class RangedSpot:
 
     Attributes:
         point: The end of the line of sight.
-        xx: The variance along x.
-        xy: The covariance of x and y.
-        yy: The variance along y.
     """
 
     point: Point
@@ -110,8 +107,6 @@ def build_outlook(sight: SightMap, pose: Pose, near_m: FloatArray, far_m: FloatA
     """Find the lattice cells in sight of a place.
 
     Args:
-        sight: The map.
-        pose: Where one looks from.
         near_m: How far one sees to the first obstacle, by ray.
         far_m: How far to the first wall, by ray.
     """
@@ -199,8 +194,6 @@ class WeighedView:
 
     Attributes:
         waypoint: From where it was seen: the standpoint, whose pose is the one it was seen from.
-        landmark: What was seen.
-        category: What it is filed under.
         wrong_ratio: How likely it is wrong as a whole.
         likelihood: Where it may be; None where nothing says.
         spot: Where its direction and range together say that it is; None without both.

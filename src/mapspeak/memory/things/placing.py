@@ -6,13 +6,13 @@ moves nothing (a mixture of a Gaussian and uniform outliers, for each view).
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mapspeak.geometry import Point
 from mapspeak.memory.things.laserchanges import find_log_priors
-from mapspeak.memory.things.likelihood import N_SIGMAS, ViewLikelihood
+from mapspeak.memory.things.likelihood import N_SIGMAS, ViewLikelihood, WeighedView
 from mapspeak.memory.things.sight import BODY_M, SightMap
 from mapspeak.spatial.grid import FloatArray, IntArray
 
@@ -64,61 +64,57 @@ class Placement:
         object.__setattr__(self, "whereabouts", points)
 
 
-def build_posterior(
-    sight: SightMap, views: Sequence[ViewLikelihood], wrong_ratios: Sequence[float]
-) -> Posterior:
+def build_posterior(sight: SightMap, views: Sequence[WeighedView]) -> Posterior:
     """Weigh the cells by all views; cells that hardly count are left out."""
-    cells, logs = _log_weights(sight, views, wrong_ratios)
+    cells, logs = _log_weights(sight, views)
     weights = _normalised(logs.sum(axis=0))
     kept = weights >= _LEAST_WEIGHT * weights.max()
     return Posterior(cells=cells[kept], weights=weights[kept] / weights[kept].sum())
 
 
-def measure_agreement(
-    sight: SightMap, views: Sequence[ViewLikelihood], wrong_ratios: Sequence[float]
-) -> tuple[float, ...]:
+def measure_agreement(sight: SightMap, views: Sequence[WeighedView]) -> tuple[float, ...]:
     """Return for each view how much likelier it is than by chance, given all the others."""
     if len(views) < 2:
         return (1.0,) * len(views)
-    cells, logs = _log_weights(sight, views, wrong_ratios)
+    cells, logs = _log_weights(sight, views)
     every = logs.sum(axis=0)
     agreements = []
-    for i, view in enumerate(views):
-        weights = _normalised(every - logs[i + 1])
-        agreements.append(float(weights[np.searchsorted(cells, view.cells)] @ view.ratios))
+    for i, said in enumerate(map(likelihood_of, views), start=1):
+        weights = _normalised(every - logs[i])
+        agreements.append(float(weights[np.searchsorted(cells, said.cells)] @ said.ratios))
     return tuple(agreements)
 
 
-def log_evidence(
-    sight: SightMap, views: Sequence[ViewLikelihood], wrong_ratios: Sequence[float]
-) -> float:
+def log_evidence(sight: SightMap, views: Sequence[WeighedView]) -> float:
     """Return how well all views go together as views of one thing, as a logarithm."""
-    logs = _log_weights(sight, views, wrong_ratios)[1].sum(axis=0)
+    logs = _log_weights(sight, views)[1].sum(axis=0)
     top = float(logs.max())
     return top + float(np.log(np.exp(logs - top).sum()))
 
 
-def trust_range(sight: SightMap, view: ViewLikelihood, viewer: Point, told_m: float) -> Posterior:
+def trust_range(sight: SightMap, view: WeighedView, told_m: float) -> Posterior:
     """Weigh the cells by a lone view with a range, as if it were not wrong.
 
     How likely it is wrong, the trust in it says. Kept in the weight, that would reach as far as
     the line of sight: there are walls along it, and things stand by walls more often than on the
-    floor where this one was told to be.
-
-    Args:
-        sight: The map.
-        view: What the view says.
-        viewer: Where one looked from.
-        told_m: The range; cells that its noise tells apart from it count only where all are such.
+    floor where this one was told to be. Cells that the range's noise tells apart from it count only
+    where all are such.
     """
-    rows, cols = sight.rows.ravel()[view.cells], sight.cols.ravel()[view.cells]
+    said, viewer = likelihood_of(view), view.waypoint.pose
+    rows, cols = sight.rows.ravel()[said.cells], sight.cols.ravel()[said.cells]
     here = sight.grid.fractional_cells_at(np.array([[viewer.x, viewer.y]]))[0]
     far_m = np.hypot(rows - here[0], cols - here[1]) * sight.grid.resolution_m
     sigmas_m = sight.noise.range_m + sight.noise.range_ratio * far_m
     is_told = np.abs(far_m - told_m) <= N_SIGMAS * sigmas_m
     kept = is_told if is_told.any() else slice(None)
-    told = ViewLikelihood(cells=view.cells[kept], ratios=view.ratios[kept], news=view.news)
-    return build_posterior(sight, [told], [0.0])
+    told = replace(said, cells=said.cells[kept], ratios=said.ratios[kept])
+    return build_posterior(sight, [replace(view, likelihood=told, wrong_ratio=0.0)])
+
+
+def likelihood_of(view: WeighedView) -> ViewLikelihood:
+    """Return where a view that says so has its thing."""
+    assert view.likelihood is not None, "joined views say where"  # noqa: S101 - our belief
+    return view.likelihood
 
 
 def find_middle(sight: SightMap, posterior: Posterior) -> tuple[float, float]:
@@ -132,7 +128,6 @@ def place(sight: SightMap, posterior: Posterior, seen_from: Sequence[Point]) -> 
     """Return the middle of the densest part of the weight, and how far 90 % of it reaches.
 
     Args:
-        sight: The map.
         posterior: Where the thing may be, by the cells that the robot has met of it.
         seen_from: The places of those who saw it: its middle lies behind what they met.
     """
@@ -178,19 +173,18 @@ def _behind(surface: Point, seen_from: Sequence[Point]) -> Point:
     )
 
 
-def _log_weights(
-    sight: SightMap, views: Sequence[ViewLikelihood], wrong_ratios: Sequence[float]
-) -> tuple[IntArray, FloatArray]:
+def _log_weights(sight: SightMap, views: Sequence[WeighedView]) -> tuple[IntArray, FloatArray]:
     """Return cells, and in logarithms their prior, then what each view says of them."""
+    said = [likelihood_of(view) for view in views]
     is_spoken_of = np.zeros(sight.log_prior.size, dtype=np.bool_)
-    for view in views:
-        is_spoken_of[view.cells] = True
+    for each in said:
+        is_spoken_of[each.cells] = True
     cells = np.flatnonzero(is_spoken_of)
     logs = np.empty((len(views) + 1, len(cells)))
-    logs[0] = find_log_priors(sight, cells, (view.news for view in views))
-    for i, (view, wrong) in enumerate(zip(views, wrong_ratios, strict=True), start=1):
-        logs[i] = wrong
-        logs[i, np.searchsorted(cells, view.cells)] += (1 - wrong) * view.ratios
+    logs[0] = find_log_priors(sight, cells, (each.news for each in said))
+    for i, (view, each) in enumerate(zip(views, said, strict=True), start=1):
+        logs[i] = view.wrong_ratio
+        logs[i, np.searchsorted(cells, each.cells)] += (1 - view.wrong_ratio) * each.ratios
     np.log(logs[1:], out=logs[1:])
     return cells, logs
 

@@ -35,14 +35,12 @@ class SightMap:
     """A map made ready for looking around in it; compared by identity.
 
     Attributes:
-        grid: The map.
         obstacle_off: Cells to the nearest obstacle or unknown cell, from each.
         wall_off: The same where what stands free does not count.
         factor: How many cells of the map make the side of one of the lattice.
         log_prior: How likely a thing is in each lattice cell before any view, as a logarithm.
         rows: Of the place that stands for each lattice cell: the middle of its obstacles.
         cols: The same, in fractional cells of the map.
-        noise: What is believed of observers.
     """
 
     grid: OccupancyGrid

@@ -107,7 +107,6 @@ class View:
 
     Attributes:
         waypoint: The name of the place it was seen from.
-        landmark: What was seen.
         place: Where it was seen from: that waypoint's place, or the view's own.
         far_m: From there to the thing; None where the view says no direction or the thing has no
             position.
@@ -127,9 +126,7 @@ class Thing:
 
     Attributes:
         label: What most views call it.
-        other_labels: What else it was called.
         category: What most views file it under.
-        purposes: What it is good for, each once.
         position: Where it is; None where no view says a direction.
         uncertainty_m: The radius around the position that holds it with 90 %; None without one.
         supporting: Views of it, by waypoint; one waypoint may have several, each from its pose.

@@ -12,6 +12,7 @@ from mapspeak.memory.consistency import MemoryFinding
 from mapspeak.memory.episodes import EpisodeMatch, EpisodePage
 from mapspeak.memory.quoting import quote, quote_name, tell_name
 from mapspeak.places.recall import Nearby
+from mapspeak.server.text.episodes import say_evidence
 from mapspeak.server.text.findings import say_finding, say_trust
 from mapspeak.server.text.wording import say_count, say_point, say_pose, shorten
 from mapspeak.worldmodel.model import WorldModel
@@ -214,9 +215,7 @@ def say_episode(match: EpisodeMatch, *, now: datetime | None) -> str:
         parts.append(f"picture {tell_name(seen.picture)}")
     if match.distance_m is not None:
         parts.append(f"{match.distance_m:.1f} m away")
-    if match.evidence:
-        parts.append("; ".join(match.evidence))
-    return " | ".join(parts)
+    return " | ".join(filter(None, (*parts, say_evidence(match))))
 
 
 MOVED_M = 0.05

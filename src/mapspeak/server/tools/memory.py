@@ -292,7 +292,7 @@ class MemoryTools:
                 f"There is no observation {observation_id[:40]!r}.",
                 hint="Call recall_episodes without picture_of for their ids.",
             )
-        match = EpisodeMatch(observation=seen, score_ratio=None, distance_m=None, reasons=())
+        match = EpisodeMatch(observation=seen)
         said = say_episode(match, now=self._session.find_wall_time())
         path = await self._session.compute(lambda: store.picture_path(seen))
         if path is None:

@@ -8,7 +8,7 @@ import anyio
 from mcp.server.mcpserver import Image
 
 from mapspeak.errors import LinkError
-from mapspeak.memory import LaserRing, PictureReading, build_ring
+from mapspeak.memory import LaserRing, PictureReading, TakenPicture, build_ring
 from mapspeak.robot import SCAN_PATIENCE_S, CameraPicture, Detection, Robot
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.session import Session
@@ -70,19 +70,18 @@ async def look_ahead(session: Session) -> CameraSighting:
     laser = await fetch_ring(robot)
     labels = tuple(seen.label for seen in detections)
     kept = await session.keep_picture(picture, labels=labels)
-    taken = session.pictures.add(
-        picture.data,
-        media_type=picture.media_type,
+    taken = TakenPicture(
         pose=picture.pose,
         stamp_s=picture.stamp_s,
         width_px=picture.width_px,
         horizontal_fov_rad=picture.horizontal_fov_rad,
-        name=kept.picture,
+        name=kept.picture or "",
         recorded_at=session.find_wall_time(),
         readings=tuple(_read(detector, detections)),
         laser=laser,
         reported=None if detector is None else labels,
     )
+    taken = session.pictures.add(taken, picture.data, media_type=picture.media_type)
     lines = [_say_picture(taken.id, picture)]
     lines += [say_pose_doubt(picture.pose_doubt)] if picture.pose_doubt else []
     lines += [] if detector is None else _say_detections(detector, detections)
