@@ -2,7 +2,7 @@
 
 import json
 import sqlite3
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta, timezone
 
@@ -27,24 +27,12 @@ MOST_TEXTS = 2000
 """How many different texts, the best ones, one query looks at."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Texts:
-    """All texts, as they were read last: the text with the id `i` is `texts[i - 1]`.
-
-    Attributes:
-        generation: Of the index; another one has other ids.
-        texts: In the order of their ids.
-    """
-
-    generation: str = ""
-    texts: tuple[str, ...] = ()
-
-
 class TextScorer:
     """Scores texts, and keeps those that it has read: they never change."""
 
     def __init__(self) -> None:
-        self._known = _Texts()
+        # Of which index, since another one has other ids; the text with the id i is [i - 1].
+        self._known: tuple[str, tuple[str, ...]] = ("", ())
 
     def score(
         self,
@@ -93,16 +81,16 @@ class TextScorer:
         selection = "SELECT value FROM facts WHERE name = 'generation'"
         row = connection.execute(selection).fetchone()
         generation = "" if row is None else str(row[0])
-        known = self._known
-        if known.generation != generation:
-            known = _Texts(generation=generation)
+        known_generation, known = self._known
+        if known_generation != generation:
+            known = ()
         rows = connection.execute(
-            "SELECT text FROM texts WHERE text_id > ? ORDER BY text_id", [len(known.texts)]
+            "SELECT text FROM texts WHERE text_id > ? ORDER BY text_id", [len(known)]
         ).fetchall()
-        if rows or known is not self._known:
-            texts = (*known.texts, *(row[0] for row in rows))
-            self._known = known = _Texts(generation=generation, texts=texts)
-        return known.texts
+        if rows or known_generation != generation:
+            known = (*known, *(row[0] for row in rows))
+            self._known = (generation, known)
+        return known
 
 
 def _best(scores: Scores) -> dict[int, float]:
@@ -146,27 +134,12 @@ class _Where:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Asked:
-    """A query whose place is known.
+class EpisodeSearch:
+    """Questions to one state of the database.
 
     Attributes:
-        where: All filters but the words.
-        scores: Of texts, by id; None where no words were asked for.
-    """
-
-    query: EpisodeQuery
-    near: Point | None
-    anchor: EpisodeMatch | None
-    where: _Where
-    scores: Mapping[int, float] | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Search:
-    """Where and how is searched.
-
-    Attributes:
-        connection: Of the database; sees one state of it.
+        connection: Sees that state.
+        scorer: Knows the texts.
         rank: Who says how well texts fit; None compares words.
     """
 
@@ -174,33 +147,112 @@ class Search:
     scorer: TextScorer
     rank: Rank | None
 
+    def find(self, query: EpisodeQuery) -> EpisodePage:
+        """Return one page of the observations that pass every filter."""
+        if query.as_of is None:
+            newest = self.connection.execute("SELECT MAX(n) FROM observations").fetchone()[0]
+            query = replace(query, as_of=newest or 0)
+        near, anchor = query.near, None
+        if isinstance(near, EpisodeQuery):
+            anchor = next(iter(self.find(replace(near, limit=1)).matches), None)
+            if anchor is None:
+                return EpisodePage(matches=(), n_matches=0)
+            where = _filters(query, anchor.observation.pose.point)
+            self._leave_out(where, near, anchor, is_on_any_map=query.map_id is None)
+            near = anchor.observation.pose.point
+        else:
+            where = _filters(query, near)
+        scores = None if query.words is None else self._score(query.words, where)
+        n_matches, rows = self._select(query, near, where, scores)
+        behind = query.offset + query.limit
+        return EpisodePage(
+            matches=tuple(self._match(row, query, near, anchor) for row in rows),
+            n_matches=n_matches,
+            anchor=anchor,
+            next_page=replace(query, offset=behind) if behind < n_matches else None,
+        )
 
-def find_observations(search: Search, query: EpisodeQuery) -> EpisodePage:
-    """Return one page of the observations that pass every filter."""
-    connection = search.connection
-    if query.as_of is None:
-        newest = connection.execute("SELECT MAX(n) FROM observations").fetchone()[0]
-        query = replace(query, as_of=newest or 0)
-    near, anchor = query.near, None
-    if isinstance(near, EpisodeQuery):
-        anchor = _first(search, near)
-        if anchor is None:
-            return EpisodePage(matches=(), n_matches=0)
-        near = anchor.observation.pose.point
-    where = _filters(query, near)
-    if anchor is not None:
-        _leave_out(search, where, query, anchor)
-    scores = None if query.words is None else _scores(search, query.words, where)
-    asked = _Asked(query=query, near=near, anchor=anchor, where=where, scores=scores)
-    return _page(search, asked)
+    def _leave_out(
+        self, where: _Where, nested: EpisodeQuery, anchor: EpisodeMatch, *, is_on_any_map: bool
+    ) -> None:
+        """Leave out what a nested query was about, and other maps, whose metres are others."""
+        where.add("o.id != ?", anchor.observation.id)
+        if is_on_any_map:
+            where.add("o.map_id IS ?", anchor.observation.map_id)
+        if nested.label is not None:
+            where.add("o.n NOT IN (SELECT n FROM labels WHERE label = ?)", name_key(nested.label))
+        if nested.words is not None:
+            # In words, whoever ranks: it is the thing itself that is left out, not what is like it.
+            same = self.scorer.score(self.connection, nested.words, None, among="", values=[])
+            where.add("o.text_id NOT IN (SELECT value FROM json_each(?))", json.dumps(list(same)))
 
+    def _score(self, words: str, where: _Where) -> dict[int, float]:
+        """Score the texts of the observations that pass the other filters."""
+        is_filtered = len(where.conditions) > 2  # beside the state asked for
+        passing = f"SELECT o.text_id FROM observations AS o WHERE {where.text}"  # noqa: S608 - our own conditions
+        among = passing if is_filtered else ""
+        return self.scorer.score(
+            self.connection, words, self.rank, among=among, values=where.values
+        )
 
-def _first(search: Search, query: EpisodeQuery) -> EpisodeMatch | None:
-    page = find_observations(search, replace(query, limit=1))
-    return next(iter(page.matches), None)
+    def _select(
+        self,
+        query: EpisodeQuery,
+        near: Point | None,
+        where: _Where,
+        scores: Mapping[int, float] | None,
+    ) -> tuple[int, sqlite3.Cursor]:
+        """Return how many observations pass, and the rows of this page."""
+        source, score, scored, values = "observations AS o", "NULL", "", where.values
+        if scores is not None:
+            source, score = "scored JOIN observations AS o USING (text_id)", "scored.score"
+            scored = (
+                "WITH scored AS MATERIALIZED (SELECT json_extract(value, '$[0]') AS text_id, "
+                "json_extract(value, '$[1]') AS score FROM json_each(?))"
+            )
+            values = [json.dumps(list(scores.items())), *where.values]
+        squared = "NULL" if near is None else _squared_m2(near)
+        counted = f"{scored} SELECT COUNT(*) FROM {source} WHERE {where.text}"  # noqa: S608 - our own conditions
+        n_matches = self.connection.execute(counted, values).fetchone()[0]
+        rows = self.connection.execute(
+            f"{scored} SELECT {COLUMNS}, {score} AS score, {squared} AS squared_m2 "  # noqa: S608 - our own conditions
+            f"FROM {source} WHERE {where.text} ORDER BY {_ORDERS[query.effective_order]} "
+            "LIMIT ? OFFSET ?",
+            [*values, query.limit, query.offset],
+        )
+        return n_matches, rows
 
-
-# --- filters ---------------------------------------------------------------------------------
+    def _match(
+        self,
+        row: sqlite3.Row,
+        query: EpisodeQuery,
+        near: Point | None,
+        anchor: EpisodeMatch | None,
+    ) -> EpisodeMatch:
+        observation = observation_from(row)
+        given = {
+            EpisodeFilter.WORDS if self.rank is None else EpisodeFilter.MEANING: query.words,
+            EpisodeFilter.PLACE: near,
+            EpisodeFilter.ROOM: query.room_id,
+            EpisodeFilter.LABEL: query.label,
+            EpisodeFilter.TIME: query.since or query.until,
+            EpisodeFilter.KIND: query.kind,
+            EpisodeFilter.MAP: query.map_id,
+        }
+        fitting = [] if query.words is None else [query.words]
+        if query.words is not None and self.rank is None:
+            fitting = shared_words(query.words, observation.searched_text)
+        key = None if query.label is None else name_key(query.label)
+        return EpisodeMatch(
+            observation=observation,
+            score_ratio=row["score"],
+            distance_m=None if near is None else observation.pose.point.distance_to(near),
+            filters=tuple(each for each, value in given.items() if value is not None),
+            fitting=tuple(fitting),
+            label=next((each for each in observation.labels if name_key(each) == key), None),
+            near=near,
+            near_id=None if anchor is None else anchor.observation.id,
+        )
 
 
 def _filters(query: EpisodeQuery, near: Point | None) -> _Where:
@@ -225,108 +277,9 @@ def _filters(query: EpisodeQuery, near: Point | None) -> _Where:
     return where
 
 
-def _leave_out(search: Search, where: _Where, query: EpisodeQuery, anchor: EpisodeMatch) -> None:
-    """Leave out what a nested query was about, and other maps, whose metres are others."""
-    nested = query.near
-    assert isinstance(nested, EpisodeQuery)  # noqa: S101 - it gave the anchor
-    where.add("o.id != ?", anchor.observation.id)
-    if query.map_id is None:
-        where.add("o.map_id IS ?", anchor.observation.map_id)
-    if nested.label is not None:
-        where.add("o.n NOT IN (SELECT n FROM labels WHERE label = ?)", name_key(nested.label))
-    if nested.words is not None:
-        # In words, whoever ranks: it is the thing itself that is left out, not what is like it.
-        same = search.scorer.score(search.connection, nested.words, None, among="", values=[])
-        where.add("o.text_id NOT IN (SELECT value FROM json_each(?))", json.dumps(list(same)))
-
-
 def _squared_m2(near: Point) -> str:
     x, y = float(near.x), float(near.y)
     return f"((o.x - {x!r}) * (o.x - {x!r}) + (o.y - {y!r}) * (o.y - {y!r}))"
-
-
-def _scores(search: "Search", words: str, where: _Where) -> dict[int, float]:
-    """Score the texts of the observations that pass the other filters."""
-    is_filtered = len(where.conditions) > 2  # beside the state asked for
-    passing = f"SELECT o.text_id FROM observations AS o WHERE {where.text}"  # noqa: S608 - our own conditions
-    return search.scorer.score(
-        search.connection,
-        words,
-        search.rank,
-        among=passing if is_filtered else "",
-        values=where.values,
-    )
-
-
-# --- pages -----------------------------------------------------------------------------------
-
-
-def _page(search: Search, asked: _Asked) -> EpisodePage:
-    connection = search.connection
-    query, where = asked.query, asked.where
-    source = "observations AS o"
-    values: list[object] = []
-    if asked.scores is not None:
-        source = "scored JOIN observations AS o USING (text_id)"
-        values = [json.dumps(list(asked.scores.items()))]
-    score = "NULL" if asked.scores is None else "scored.score"
-    squared = "NULL" if asked.near is None else _squared_m2(asked.near)
-    scored = (
-        "WITH scored AS MATERIALIZED (SELECT json_extract(value, '$[0]') AS text_id, "
-        "json_extract(value, '$[1]') AS score FROM json_each(?))"
-        if values
-        else ""
-    )
-    values += where.values
-    counted = f"{scored} SELECT COUNT(*) FROM {source} WHERE {where.text}"  # noqa: S608 - our own conditions
-    n_matches = connection.execute(counted, values).fetchone()[0]
-    rows = connection.execute(
-        f"{scored} SELECT {COLUMNS}, {score} AS score, {squared} AS squared_m2 "  # noqa: S608 - our own conditions
-        f"FROM {source} WHERE {where.text} ORDER BY {_ORDERS[query.effective_order]} "
-        "LIMIT ? OFFSET ?",
-        [*values, query.limit, query.offset],
-    )
-    behind = query.offset + query.limit
-    return EpisodePage(
-        matches=tuple(_match(row, asked, search.rank) for row in rows),
-        n_matches=n_matches,
-        anchor=asked.anchor,
-        next_page=replace(query, offset=behind) if behind < n_matches else None,
-    )
-
-
-def _match(row: sqlite3.Row, asked: _Asked, rank: Rank | None) -> EpisodeMatch:
-    query, near, observation = asked.query, asked.near, observation_from(row)
-    fitting: tuple[str, ...] = ()
-    if query.words is not None:
-        is_ranked = rank is not None
-        said = [query.words] if is_ranked else shared_words(query.words, observation.searched_text)
-        fitting = tuple(said)
-    key = None if query.label is None else name_key(query.label)
-    return EpisodeMatch(
-        observation=observation,
-        score_ratio=row["score"],
-        distance_m=None if near is None else observation.pose.point.distance_to(near),
-        filters=tuple(_filters_of(asked, rank)),
-        fitting=fitting,
-        label=next((each for each in observation.labels if name_key(each) == key), None),
-        near=near,
-        near_id=None if asked.anchor is None else asked.anchor.observation.id,
-    )
-
-
-def _filters_of(asked: _Asked, rank: Rank | None) -> Iterator[EpisodeFilter]:
-    query = asked.query
-    given = {
-        EpisodeFilter.WORDS if rank is None else EpisodeFilter.MEANING: query.words,
-        EpisodeFilter.PLACE: asked.near,
-        EpisodeFilter.ROOM: query.room_id,
-        EpisodeFilter.LABEL: query.label,
-        EpisodeFilter.TIME: query.since or query.until,
-        EpisodeFilter.KIND: query.kind,
-        EpisodeFilter.MAP: query.map_id,
-    }
-    return (each for each, value in given.items() if value is not None)
 
 
 def observation_from(row: sqlite3.Row) -> Observation:

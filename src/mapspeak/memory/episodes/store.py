@@ -40,9 +40,8 @@ from mapspeak.memory.episodes.pictures import (
 )
 from mapspeak.memory.episodes.searching import (
     COLUMNS,
-    Search,
+    EpisodeSearch,
     TextScorer,
-    find_observations,
     observation_from,
 )
 from mapspeak.memory.episodes.textindex import add_text, index_texts, text_hash
@@ -160,8 +159,8 @@ class EpisodeStore:
         if not is_indexed:
             self.rebuild_index()
         with self.database.reading() as connection:
-            search = Search(connection=connection, scorer=self._scorer, rank=rank)
-            return find_observations(search, query)
+            search = EpisodeSearch(connection=connection, scorer=self._scorer, rank=rank)
+            return search.find(query)
 
     def get(self, observation_id: str) -> Observation | None:
         """Return the observation with an id, or None."""
