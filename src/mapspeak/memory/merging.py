@@ -85,7 +85,8 @@ def merge_waypoint(before: Waypoint | None, now: Waypoint, *, gone: Iterable[str
     partner = dict(_pair(looks, old))
     united = {j: _noted(_united(looks[j], old[i]), now) for j, i in partner.items()}
     missed = [i for i in range(len(old)) if i not in partner.values()]
-    kept = {i: _noted(old[i], now) for i in missed if not _is_among(old[i], gone_keys)}
+    lasting = [i for i in missed if name_key(old[i][0].label) not in gone_keys]
+    kept = {i: _noted(old[i], now) for i in lasting}
     after = [united.get(j, (thing,)) for j, thing in enumerate(now.landmarks)]
     n_now, n_before = len(now.safety_landmarks), len(of_safety)
     safety = (*after[:n_now], *(views for i, views in kept.items() if i < n_before))
@@ -193,10 +194,6 @@ def _noted(views: Views, now: Waypoint) -> Views:
 def _reunion(old: Views, after: Views, now: Waypoint) -> Reunion:
     before = seen_from(old[0], old[0].pose or now.pose, now.pose_of(after[0]))
     return Reunion(before=before, after=after[0], further=after[1:])
-
-
-def _is_among(views: Views, keys: Iterable[str]) -> bool:
-    return name_key(views[0].label) in keys
 
 
 def _is_further_view(waypoint: Waypoint, view: Landmark, others: Sequence[Landmark]) -> bool:

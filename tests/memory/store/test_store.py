@@ -50,8 +50,8 @@ def test_a_store_without_a_file_is_an_empty_map_and_makes_none(
 def test_a_new_name_creates_a_waypoint(store: SemanticMapStore) -> None:
     receipt = store.write(place("dock"))
 
-    assert receipt.is_created
-    assert receipt.name == "dock"
+    assert receipt.previous is None
+    assert receipt.waypoint.name == "dock"
     assert receipt.n_waypoints == 1
     assert store.read().waypoints == (receipt.waypoint,)
     assert receipt.waypoint.map_id == "b1"
@@ -63,7 +63,7 @@ def test_a_known_name_updates_its_waypoint_whatever_its_case(store: SemanticMapS
 
     receipt = store.write(place(" dock", x=5.0))
 
-    assert not receipt.is_created
+    assert receipt.previous is not None
     assert receipt.previous == first
     assert receipt.n_waypoints == 2
     assert names(store) == ["dock", "hall"]

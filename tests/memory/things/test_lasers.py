@@ -11,9 +11,8 @@ from fakes import scan_of
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint, build_ring
 from mapspeak.memory.things import NOISE, Thing, build_sight_map, find_things
-from mapspeak.memory.things.laserchanges import find_log_priors
 from mapspeak.memory.things.likelihood import ViewLikelihood, build_outlook, weigh_view
-from mapspeak.memory.things.sight import SightMap, look_around
+from mapspeak.memory.things.sight import SightMap, find_log_priors, look_around
 from mapspeak.spatial import OccupancyGrid
 
 CELL_M = 0.1

@@ -97,20 +97,9 @@ class _LandmarkEntry(BaseModel):
 
     def to_landmark(self) -> Landmark:
         bearing_rad = None if self.bearing_deg is None else math.radians(self.bearing_deg)
-        return Landmark(
-            label=self.label,
-            purpose=self.purpose,
-            bearing_rad=bearing_rad,
-            range_m=self.range_m,
-            range_from=self.range_from,
-            confidence=self.confidence,
-            note=self.note,
-            picture=self.picture,
-            stamp_s=self.stamp_s,
-            recorded_at=self.recorded_at,
-            pose=None if self.seen_from is None else self.seen_from.to_pose(),
-            laser=self.laser,
-        )
+        pose = None if self.seen_from is None else self.seen_from.to_pose()
+        said = {key: value for key, value in self if key not in ("bearing_deg", "seen_from")}
+        return Landmark(**said, bearing_rad=bearing_rad, pose=pose)
 
 
 _Landmarks = Annotated[
@@ -134,19 +123,14 @@ class _WaypointEntry(BaseModel):
     picture: str | None = None
 
     def to_waypoint(self, map_id: str | None) -> Waypoint:
-        return Waypoint(
-            name=self.name,
-            description=self.description or "",
-            pose=self.pose.to_pose(),
-            safety_landmarks=tuple(entry.to_landmark() for entry in self.safety_landmarks),
-            functional_landmarks=tuple(entry.to_landmark() for entry in self.functional_landmarks),
-            geometric_features=tuple(self.geometric_features),
-            stamp_s=self.stamp_s,
-            recorded_at=self.recorded_at,
-            map_id=map_id,
-            room_id=self.room_id,
-            picture=self.picture,
-        )
+        said = dict(self) | {
+            "description": self.description or "",
+            "pose": self.pose.to_pose(),
+            "safety_landmarks": tuple(entry.to_landmark() for entry in self.safety_landmarks),
+            "functional_landmarks": tuple(each.to_landmark() for each in self.functional_landmarks),
+            "geometric_features": tuple(self.geometric_features),
+        }
+        return Waypoint(**said, map_id=map_id)
 
 
 class _FileEntry(BaseModel):

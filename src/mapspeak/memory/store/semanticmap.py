@@ -43,16 +43,6 @@ class WriteReceipt:
     previous: Waypoint | None
     n_waypoints: int
 
-    @property
-    def name(self) -> str:
-        """What the place is called."""
-        return self.waypoint.name
-
-    @property
-    def is_created(self) -> bool:
-        """True when the name was not in the map before."""
-        return self.previous is None
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Seen:

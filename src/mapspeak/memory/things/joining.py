@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapspeak.memory.merging import SAME_SPOT_M
-from mapspeak.memory.things.laserchanges import find_log_priors
 from mapspeak.memory.things.likelihood import WeighedView, are_apart
 from mapspeak.memory.things.placing import (
     Posterior,
@@ -21,7 +20,7 @@ from mapspeak.memory.things.placing import (
     likelihood_of,
     log_evidence,
 )
-from mapspeak.memory.things.sight import SightMap
+from mapspeak.memory.things.sight import SightMap, find_log_priors
 from mapspeak.memory.waypoint import Waypoint
 from mapspeak.spatial.grid import FloatArray, IntArray
 

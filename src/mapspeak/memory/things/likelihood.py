@@ -8,8 +8,14 @@ import numpy as np
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory.laserfan import LaserFan
-from mapspeak.memory.things.laserchanges import LaserNews, read_news
-from mapspeak.memory.things.sight import BODY_M, SightMap, bearing_index, look_around
+from mapspeak.memory.things.sight import (
+    BODY_M,
+    LaserNews,
+    SightMap,
+    bearing_index,
+    look_around,
+    read_news,
+)
 from mapspeak.memory.things.thing import Category, NoiseModel
 from mapspeak.memory.waypoint import Landmark, Waypoint
 from mapspeak.spatial.grid import FloatArray, IntArray

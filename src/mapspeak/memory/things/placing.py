@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapspeak.geometry import Point
-from mapspeak.memory.things.laserchanges import find_log_priors
 from mapspeak.memory.things.likelihood import N_SIGMAS, ViewLikelihood, WeighedView
-from mapspeak.memory.things.sight import BODY_M, SightMap
+from mapspeak.memory.things.sight import BODY_M, SightMap, find_log_priors
 from mapspeak.spatial.grid import FloatArray, IntArray
 
 _LEAST_WEIGHT = 1e-4

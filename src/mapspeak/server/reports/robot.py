@@ -299,12 +299,12 @@ class WriteAnswer(Report):
     ) -> Self:
         """Make the report of a write, with the id that the place has in the memory now."""
         places = number_places(memory.waypoints)
-        stored = next(place for place in places if _is_called(place, receipt.name))
+        stored = next(place for place in places if _is_called(place, receipt.waypoint.name))
         waypoint = receipt.waypoint
         return cls(
             id=stored.id,
             seen_from=f"{say_pose(waypoint.pose)}, in {waypoint.room_id or 'no room'}",
-            is_new=receipt.is_created,
+            is_new=receipt.previous is None,
             replaced="; ".join(say_replaced(receipt.previous, merge.waypoint)),
             landmarks=list(say_landmarks(merge)),
             refused=list(refused),
