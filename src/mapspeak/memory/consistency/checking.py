@@ -141,7 +141,7 @@ def check_duplicates(waypoints: Sequence[Waypoint]) -> Iterator[MemoryFinding]:
                 )
 
 
-def check_company(places: SemanticMap, found: Things) -> Iterator[MemoryFinding]:
+def check_things(places: SemanticMap, found: Things) -> Iterator[MemoryFinding]:
     """Return things that some records speak against."""
     placed = [thing for thing in found.things if thing.position is not None]
     at = np.array([(t.position.x, t.position.y) for t in placed if t.position]).reshape(-1, 2)
@@ -387,4 +387,4 @@ def check_memory(
             continue
         findings += check_rays(found, waypoint)
         findings += check_rooms(rooms, found, waypoint, misfiled) if rooms else []
-    return (*findings, *check_duplicates(places.waypoints), *check_company(places, found))
+    return (*findings, *check_duplicates(places.waypoints), *check_things(places, found))

@@ -120,8 +120,8 @@ def _count(sightings: Sequence[WeighedView]) -> _Ballot:
 def _take_peaks(
     sight: SightMap, sightings: Sequence[WeighedView], ballot: _Ballot, same_name: SameName
 ) -> list[Group]:
-    news = (likelihood_of(each).news for each in sightings)
-    count = _Count(ballot, find_log_priors(sight, ballot.places, news))
+    updates = (likelihood_of(each).update for each in sightings)
+    count = _Count(ballot, find_log_priors(sight, ballot.places, updates))
     is_left = np.ones(len(sightings), dtype=np.bool_)
     groups = []
     while is_left.any() and (best := count.find_best()) is not None:

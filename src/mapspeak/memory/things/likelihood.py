@@ -10,11 +10,11 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.memory.laserfan import LaserFan
 from mapspeak.memory.things.sight import (
     BODY_M,
-    LaserNews,
+    LaserUpdate,
     SightMap,
     bearing_index,
     look_around,
-    read_news,
+    read_update,
 )
 from mapspeak.memory.things.thing import Category, NoiseModel
 from mapspeak.memory.waypoint import Landmark, Waypoint
@@ -101,12 +101,12 @@ class ViewLikelihood:
     Attributes:
         cells: Flat indices into the lattice, rising.
         ratios: How much more likely.
-        news: What the laser knew better than the map, wherever the thing is; None for nothing.
+        update: What the laser knew better than the map, wherever the thing is; None for nothing.
     """
 
     cells: IntArray
     ratios: FloatArray
-    news: LaserNews | None = None
+    update: LaserUpdate | None = None
 
 
 def build_outlook(sight: SightMap, pose: Pose, near_m: FloatArray, far_m: FloatArray) -> Outlook:
@@ -150,7 +150,7 @@ def weigh_view(
     if landmark.bearing_rad is None and landmark.range_m is None:
         return None
     cells, ratios, ranges_m = outlook.cells, outlook.sight, outlook.ranges_m
-    news = None
+    update = None
     if landmark.bearing_rad is not None:
         sigma = sight.noise.bearing_rad
         ahead = pose.yaw_rad + landmark.bearing_rad - sight.grid.origin.yaw_rad
@@ -159,19 +159,19 @@ def weigh_view(
         bell = np.exp(-0.5 * (off[near] / sigma) ** 2) * (math.sqrt(math.tau) / sigma)
         cells, ratios, ranges_m = cells[near], ratios[near], ranges_m[near]
         if landmark.laser is not None:
-            news, ratios = _correct(sight, outlook, pose, landmark.laser, near)
+            update, ratios = _correct(sight, outlook, pose, landmark.laser, near)
         ratios = ratios * bell
     if landmark.range_m is not None:
         ratios = ratios * _weigh_range(sight, ranges_m, landmark.range_m)
-    return ViewLikelihood(cells=cells, ratios=ratios, news=news)
+    return ViewLikelihood(cells=cells, ratios=ratios, update=update)
 
 
 def _correct(
     sight: SightMap, outlook: Outlook, pose: Pose, fan: LaserFan, near: IntArray
-) -> tuple[LaserNews | None, FloatArray]:
+) -> tuple[LaserUpdate | None, FloatArray]:
     """Return what the laser knows better, and how likely one sees as far as each cell with it."""
     seen = outlook.sight[near]
-    found = read_news(
+    found = read_update(
         sight,
         pose,
         fan,
@@ -183,7 +183,7 @@ def _correct(
     if found is None:
         return None, seen
     seen[found.changed] = found.sight
-    return found.news, seen
+    return found.update, seen
 
 
 def _weigh_range(sight: SightMap, ranges_m: FloatArray, told_m: float) -> FloatArray:

@@ -180,7 +180,7 @@ def _log_weights(sight: SightMap, views: Sequence[WeighedView]) -> tuple[IntArra
         is_spoken_of[each.cells] = True
     cells = np.flatnonzero(is_spoken_of)
     logs = np.empty((len(views) + 1, len(cells)))
-    logs[0] = find_log_priors(sight, cells, (each.news for each in said))
+    logs[0] = find_log_priors(sight, cells, (each.update for each in said))
     for i, (view, each) in enumerate(zip(views, said, strict=True), start=1):
         logs[i] = view.wrong_ratio
         logs[i, np.searchsorted(cells, each.cells)] += (1 - view.wrong_ratio) * each.ratios

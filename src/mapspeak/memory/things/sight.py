@@ -165,7 +165,7 @@ _LEAST_MET = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LaserNews:
+class LaserUpdate:
     """What a look with the laser says of the cells it speaks of.
 
     Attributes:
@@ -186,7 +186,7 @@ class Correction:
         sight: How likely one sees each of these: what counts instead of `Outlook.sight`.
     """
 
-    news: LaserNews
+    update: LaserUpdate
     changed: IntArray
     sight: FloatArray
 
@@ -206,7 +206,7 @@ class _Beams:
     end_m: FloatArray
 
 
-def read_news(
+def read_update(
     sight: SightMap,
     pose: Pose,
     fan: LaserFan,
@@ -226,13 +226,13 @@ def read_news(
     """
     ahead = pose.yaw_rad - sight.grid.origin.yaw_rad
     beams = _compare(sight, pose, fan, ahead, near_m)
-    is_news = beams.is_new | beams.is_through
-    if not is_news.any():
+    is_update = beams.is_new | beams.is_through
+    if not is_update.any():
         return None
     off = np.remainder(angles - ahead - fan.first_rad + fan.step_rad / 2, math.tau)
     number = (off / fan.step_rad).astype(np.intp)
-    inside = np.flatnonzero(number < len(is_news))
-    inside = inside[is_news[number[inside]]]
+    inside = np.flatnonzero(number < len(is_update))
+    inside = inside[is_update[number[inside]]]
     beam, far_m, cells = number[inside], ranges_m[inside], cells[inside]
     behind_m = far_m - beams.end_m[beam]
     log_priors = sight.log_prior.ravel()[cells]
@@ -241,27 +241,27 @@ def read_news(
         noise.laser_met_ratio * beams.is_new[beam]
     )
     likelier = np.log(np.exp(log_priors) + (1 - np.exp(log_priors)) * met)
-    is_passed = beams.is_through[beam] & (behind_m < -noise.laser_news_m) & (log_priors == 0.0)
+    is_passed = beams.is_through[beam] & (behind_m < -noise.laser_update_m) & (log_priors == 0.0)
     told = np.where(is_passed, math.log(noise.laser_through_ratio), likelier)
     kept = is_passed | (met > _LEAST_MET)
     return Correction(
-        news=LaserNews(cells=cells[kept], log_priors=told[kept]),
+        update=LaserUpdate(cells=cells[kept], log_priors=told[kept]),
         changed=inside,
         sight=np.where(behind_m <= BODY_M, 1.0, noise.seen_over_ratio),
     )
 
 
 def find_log_priors(
-    sight: SightMap, cells: IntArray, news: Iterable[LaserNews | None]
+    sight: SightMap, cells: IntArray, updates: Iterable[LaserUpdate | None]
 ) -> FloatArray:
     """Return how likely a thing is in cells before any view, by the map and what corrects it.
 
     Args:
         cells: Of the lattice, rising.
-        news: Of all views of a thing.
+        updates: Of all views of a thing.
     """
     logs = sight.log_prior.ravel()[cells]
-    told = [each for each in news if each is not None and each.cells.size]
+    told = [each for each in updates if each is not None and each.cells.size]
     if not told:
         return logs
     best = np.full(len(cells), -np.inf)
@@ -282,14 +282,14 @@ def _compare(
     rays = bearing_index(angles)
     # An edge of what stands there may lie on either side of a beam.
     beside_m = np.max([near_m[(rays + step) % N_RAYS] for step in _BESIDE], axis=0)
-    news_m = sight.noise.laser_news_m
-    is_past = (end_m > beside_m + news_m) & (beside_m < sight.noise.reach_m)
+    update_m = sight.noise.laser_update_m
+    is_past = (end_m > beside_m + update_m) & (beside_m < sight.noise.reach_m)
     # One beam alone has slipped past a corner or through a gap that the map has closed.
     has_past_beside = np.zeros_like(is_past)
     has_past_beside[1:] |= is_past[:-1]
     has_past_beside[:-1] |= is_past[1:]
     return _Beams(
-        is_new=is_end & (_off_m(sight, pose, angles, np.where(is_end, end_m, 0.0)) > news_m),
+        is_new=is_end & (_off_m(sight, pose, angles, np.where(is_end, end_m, 0.0)) > update_m),
         is_through=is_past & has_past_beside,
         end_m=np.where(np.isnan(end_m), 0.0, end_m),
     )

@@ -65,7 +65,7 @@ class NoiseModel:
         reach_m: Nobody names a thing that is farther.
         laser_m: Standard deviation of where the middle of a cell is that a beam of the laser ended
             in: what pose and map are good to, and half a cell.
-        laser_news_m: A beam that ends nearer to something on the map has met just that.
+        laser_update_m: A beam that ends nearer to something on the map has met just that.
         laser_met_ratio: How often what a laser met and the map has not is as good a place for a
             thing as what the map has: the rest are people, and what is gone tomorrow.
         laser_through_ratio: How likely a thing still is where the map has something that a beam
@@ -82,7 +82,7 @@ class NoiseModel:
     floor_per_m: float = 0.1
     reach_m: float = 10.0
     laser_m: float = 0.15
-    laser_news_m: float = 0.3
+    laser_update_m: float = 0.3
     laser_met_ratio: float = 0.9
     laser_through_ratio: float = 0.8
 
