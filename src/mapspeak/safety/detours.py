@@ -12,7 +12,7 @@ from mapspeak.safety.guard import Permit
 from mapspeak.safety.monitor import KEEP_M, GoalMonitor
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import Path, find_path
-from mapspeak.worldmodel.closures import MARGIN_M, ClosedArea, distance_to_line
+from mapspeak.worldmodel.closures import MARGIN_M, ClosedArea, distance_to_sides
 from mapspeak.worldmodel.revision import MapRevision
 
 STEP_M = 0.1
@@ -70,7 +70,8 @@ def _simplify(points: Sequence[Point]) -> list[Point]:
     represent a digitized line or its caricature" (1973).
     """
     start, end = points[0], points[-1]
-    off_m = [distance_to_line(each, start, end) for each in points[1:-1]]
+    line = np.array([[start.x, start.y, end.x, end.y]])
+    off_m = [distance_to_sides(each, line) for each in points[1:-1]]
     if not off_m or max(off_m) <= STRAY_M:
         return [start, end]
     farthest = off_m.index(max(off_m)) + 1

@@ -10,7 +10,7 @@ import numpy as np
 from mapspeak.geometry import Point
 from mapspeak.memory.quoting import quote_name
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.spatial.grid import FloatArray, IntArray, Mask
+from mapspeak.spatial.grid import FloatArray, Mask
 from mapspeak.spatial.rooms import Door, Region, RoomMap
 
 CLOSED = 100
@@ -50,7 +50,9 @@ class ClosedArea:
 
     def __post_init__(self) -> None:
         # A mask has thousands of sides, and distances are asked for many times a second.
-        sides = np.concatenate([_sides_of(outline) for outline in self.outlines])
+        outlines = [np.array([[at.x, at.y] for at in outline]) for outline in self.outlines]
+        # Rows of x, y, x, y.
+        sides = np.concatenate([np.hstack([each, np.roll(each, -1, axis=0)]) for each in outlines])
         sides.setflags(write=False)
         object.__setattr__(self, "_sides", sides)
 
@@ -99,20 +101,19 @@ class ClosedArea:
 
     def distance_to_border(self, point: Point) -> float:
         """Return the metres from a point to the nearest outline; negative inside the area."""
-        x0, y0, x1, y1 = self._sides.T
-        along_x, along_y = x1 - x0, y1 - y0
-        squared = along_x**2 + along_y**2
-        share = (point.x - x0) * along_x + (point.y - y0) * along_y
-        share = np.clip(share / np.where(squared > 0.0, squared, 1.0), 0.0, 1.0)
-        off_x, off_y = x0 + share * along_x - point.x, y0 + share * along_y - point.y
-        away_m = float(np.sqrt((off_x**2 + off_y**2).min()))
+        away_m = distance_to_sides(point, self._sides)
         return -away_m if self.contains(point) else away_m
 
 
-def _sides_of(outline: Outline) -> FloatArray:
-    """Return the sides of an outline as rows of x, y, x, y."""
-    corners = np.array([[corner.x, corner.y] for corner in outline], dtype=np.float64)
-    return np.hstack([corners, np.roll(corners, -1, axis=0)])
+def distance_to_sides(point: Point, sides: FloatArray) -> float:
+    """Return the metres from a point to the nearest of straight lines, rows of x, y, x, y."""
+    x0, y0, x1, y1 = sides.T
+    along_x, along_y = x1 - x0, y1 - y0
+    squared = along_x**2 + along_y**2
+    share = (point.x - x0) * along_x + (point.y - y0) * along_y
+    share = np.clip(share / np.where(squared > 0.0, squared, 1.0), 0.0, 1.0)
+    off_x, off_y = x0 + share * along_x - point.x, y0 + share * along_y - point.y
+    return float(np.sqrt((off_x**2 + off_y**2).min()))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -168,30 +169,17 @@ def mask_areas(grid: OccupancyGrid, areas: Sequence[ClosedArea]) -> Mask:
     drawn = np.zeros(grid.cells.shape, dtype=np.uint8)
     for area in areas:
         # Several outlines are filled as `contains` counts them; a border belongs to its area.
-        cv2.fillPoly(drawn, [_corners_in(grid, outline) for outline in area.outlines], 1)
+        polygons = []
+        for outline in area.outlines:
+            rows, cols = grid.cells_at(np.array([[corner.x, corner.y] for corner in outline]))
+            corners = np.stack([cols, rows], axis=1).clip(-_FAR_CELLS, _FAR_CELLS)
+            polygons.append(corners.astype(np.int32))
+        cv2.fillPoly(drawn, polygons, 1)
     return np.asarray(drawn > 0, dtype=np.bool_)
-
-
-def _corners_in(grid: OccupancyGrid, outline: Outline) -> IntArray:
-    """Return the cells of an outline's corners as (col, row)."""
-    points = np.array([[corner.x, corner.y] for corner in outline])
-    rows, cols = grid.cells_at(points)
-    return np.stack([cols, rows], axis=1).clip(-_FAR_CELLS, _FAR_CELLS).astype(np.int32)
 
 
 _FAR_CELLS = 30_000
 """OpenCV draws with 16 bits before the point; no map has so many rows or columns."""
-
-
-def distance_to_line(point: Point, start: Point, end: Point) -> float:
-    """Return the metres from a point to the straight line between two others."""
-    along_x, along_y = end.x - start.x, end.y - start.y
-    squared = along_x**2 + along_y**2
-    if squared == 0.0:
-        return point.distance_to(start)
-    share = ((point.x - start.x) * along_x + (point.y - start.y) * along_y) / squared
-    share = min(max(share, 0.0), 1.0)
-    return point.distance_to(Point(start.x + share * along_x, start.y + share * along_y))
 
 
 SILL_M = 0.3

@@ -1,9 +1,10 @@
 """The map under ids: rooms, doors, frontiers and remembered places, as everybody names them."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -22,8 +23,8 @@ from mapspeak.spatial.frontiers import (
 )
 from mapspeak.spatial.paths import DistanceField
 from mapspeak.spatial.rooms import Door, RoomMap
-from mapspeak.worldmodel.judging import Judge
 from mapspeak.worldmodel.recollection import (
+    Judge,
     Recollection,
     Recollector,
     RememberedPlace,
@@ -61,6 +62,9 @@ def find_crossing(rooms: RoomMap, distances: DistanceField, door: Door) -> Point
 
 
 STEP_M = 0.2
+
+Key = TypeVar("Key")
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,17 +128,12 @@ class WorldModel:
         previous: The one before, whose ids are kept and whose parts are used where they hold.
         revision: The state of the map, where somebody has made it already.
         recollector: Keeps what is made of the memory; that of `previous` where None.
-        pose_doubt: Why the robot may be elsewhere.
+        pose_doubt: Why the robot may be elsewhere; None for a fresh pose on the map.
         is_radius_assumed: Nobody has told how large the robot is.
 
     Attributes:
         map: The state of the map.
-        robot: Where the robot is.
-        pose_doubt: Why it may be elsewhere; None for a fresh pose on the map.
-        is_radius_assumed: Nobody has told how large it is.
-        memory: What is remembered.
         places: Remembered places.
-        recollector: Keeps what is made of the memory.
         warnings: What a reader of the memory should know.
     """
 
@@ -247,10 +246,11 @@ class WorldModel:
 
     def find_crossing(self, door: Door) -> Point | None:
         """Find where the robot passes a door; None where it does not get through."""
-        crossings = self.reach.crossings
-        if door.id not in crossings:
-            crossings[door.id] = find_crossing(self.rooms, self.distances, door)
-        return crossings[door.id]
+        return _keep(
+            self.reach.crossings,
+            door.id,
+            lambda: find_crossing(self.rooms, self.distances, door),
+        )
 
     @cached_property
     def recollection(self) -> Recollection:
@@ -277,73 +277,69 @@ class WorldModel:
 
     def find_approach(self, remembered: RememberedThing) -> Pose | None:
         """Find where the robot stands to face a thing from near; None where it cannot."""
-        known = self._reminders.approaches
-        if remembered not in known:
-            position = remembered.thing.position
-            known[remembered] = (
-                None
-                if position is None
-                else find_approach(
-                    self.recollection.found.sight,
-                    self.distances,
-                    position,
-                    [view.place for view in remembered.thing.supporting],
-                    fronts=self._find_fronts(remembered),
-                    whereabouts=remembered.thing.whereabouts,
-                )
-            )
-        return known[remembered]
+        thing = remembered.thing
+        if (position := thing.position) is None:
+            return None
+        return _keep(
+            self._reminders.approaches,
+            remembered,
+            lambda: find_approach(
+                self.recollection.found.sight,
+                self.distances,
+                position,
+                _seen_from(remembered),
+                fronts=self._find_fronts(remembered),
+                whereabouts=thing.whereabouts,
+            ),
+        )
 
     def find_least_path_m(self, remembered: RememberedThing) -> float:
         """Return metres than which no way to look at a thing is shorter."""
-        seen_from = [view.place for view in remembered.thing.supporting]
+        seen_from = _seen_from(remembered)
         return find_least_path_m(self.grid, self.distances, remembered.point, seen_from)
 
     def measure_faced(self, remembered: RememberedThing) -> float:
         """Return the share of where a thing may be that the robot would face before it."""
-        known, thing = self._reminders.faced, remembered.thing
-        if remembered not in known:
-            pose = self.find_approach(remembered)
-            seen_from = [view.place for view in thing.supporting]
-            known[remembered] = (
-                0.0
-                if pose is None or thing.whereabouts is None
-                else measure_faced(
-                    self.recollection.found.sight, pose, seen_from, thing.whereabouts
-                )
-            )
-        return known[remembered]
+        pose, whereabouts = self.find_approach(remembered), remembered.thing.whereabouts
+        if pose is None or whereabouts is None:
+            return 0.0
+        sight, seen_from = self.recollection.found.sight, _seen_from(remembered)
+        return _keep(
+            self._reminders.faced,
+            remembered,
+            lambda: measure_faced(sight, pose, seen_from, whereabouts),
+        )
 
     def rooms_before(self, remembered: RememberedThing) -> tuple[str, ...]:
         """Return the rooms a thing may be in, by id: those on the side that it was seen from."""
-        known = self._reminders.rooms
-        if remembered not in known:
-            seen_from = [view.place for view in remembered.thing.supporting]
-            room_ids = map(self._find_room_on_line, self._find_fronts(remembered), seen_from)
-            known[remembered] = tuple(dict.fromkeys(filter(None, room_ids)))
-        return known[remembered]
+        fronts, seen_from = self._find_fronts(remembered), _seen_from(remembered)
+        return _keep(
+            self._reminders.rooms,
+            remembered,
+            lambda: tuple(
+                dict.fromkeys(filter(None, map(self._find_room_on_line, fronts, seen_from)))
+            ),
+        )
 
     def _find_fronts(self, remembered: RememberedThing) -> list[Point]:
         """Return last floor before a thing for each who saw it; their own without a position."""
-        known, thing = self._reminders.fronts, remembered.thing
-        if remembered not in known:
-            seen_from = [view.place for view in thing.supporting]
-            sight, position = self.recollection.found.sight, thing.position
-            known[remembered] = (
-                seen_from if position is None else find_fronts(sight, position, seen_from)
-            )
-        return known[remembered]
+        seen_from, position = _seen_from(remembered), remembered.thing.position
+        if position is None:
+            return seen_from
+        sight = self.recollection.found.sight
+        return _keep(
+            self._reminders.fronts, remembered, lambda: find_fronts(sight, position, seen_from)
+        )
 
     def _find_room_on_line(self, end: Point, start: Point) -> str | None:
         """Return room of the last floor on a line: what hangs on a wall is in no room itself."""
         n_steps = math.ceil(start.distance_to(end) / STEP_M)
-        for step in range(n_steps, -1, -1):
-            share = step / max(n_steps, 1)
-            x, y = start.x + share * (end.x - start.x), start.y + share * (end.y - start.y)
-            room_id = self.find_room_id(Point(x, y))
-            if room_id is not None:
-                return room_id
-        return None
+        shares = (step / max(n_steps, 1) for step in range(n_steps, -1, -1))
+        points = (
+            Point(start.x + share * (end.x - start.x), start.y + share * (end.y - start.y))
+            for share in shares
+        )
+        return next(filter(None, map(self.find_room_id, points)), None)
 
     @property
     def _reminders(self) -> Reminders:
@@ -364,3 +360,14 @@ class WorldModel:
             *(refused.anchor for refused in frontiers.refused),
         )
         return frozenset(filter(None, map(self.find_room_id, borders)))
+
+
+def _keep(known: dict[Key, Found], key: Key, find: Callable[[], Found]) -> Found:
+    """Return what is known under a key; find it where nothing is."""
+    if key not in known:
+        known[key] = find()
+    return known[key]
+
+
+def _seen_from(remembered: RememberedThing) -> list[Point]:
+    return [view.place for view in remembered.thing.supporting]

@@ -5,7 +5,8 @@ Making it is costly, so it is made when first asked for and kept until memory or
 
 import logging
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +14,7 @@ from pathlib import Path
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Point
 from mapspeak.memory import SemanticMap, Waypoint
+from mapspeak.memory.consistency import MemoryFinding, Trust, judge_trust
 from mapspeak.memory.search import (
     Answer,
     Basis,
@@ -36,12 +38,7 @@ MOST_CALLED = 1000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RememberedPlace:
-    """A waypoint of the semantic map under its id.
-
-    Attributes:
-        id: "W1" for the first in the file.
-        waypoint: The record.
-    """
+    """A waypoint of the semantic map under its id, "W1" for the first in the file."""
 
     id: str
     waypoint: Waypoint
@@ -49,11 +46,10 @@ class RememberedPlace:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RememberedThing:
-    """A thing that was seen from remembered places, under its id; compared by identity.
+    """A thing that was seen from remembered places; compared by identity.
 
     Attributes:
         id: "T1"; it stays while the thing does.
-        thing: What is known of it.
     """
 
     id: str
@@ -76,14 +72,7 @@ class Recollection:
         found: The things made of them.
         things: The same under their ids, in the order of these.
         n_named: How many ids were ever given.
-        find_vectors: Gives what compares meanings, or None.
-
-    Attributes:
-        memory: The records.
-        found: The things made of them.
-        things: The same under their ids, in the order of these.
-        n_named: How many ids were ever given.
-        places: The records under their ids.
+        find_vectors: Find what compares meanings, or None.
     """
 
     def __init__(
@@ -167,6 +156,39 @@ class Recollection:
     def _entries(self) -> tuple[Entry, ...]:
         places = (_place_entry(each) for each in self.places)
         return (*places, *(_thing_entry(each, self._by_name) for each in self.things))
+
+
+class Judge:
+    """All findings of a memory, and how far each remembered place and thing may be trusted."""
+
+    def __init__(self, findings: Iterable[MemoryFinding]) -> None:
+        self.findings = tuple(findings)
+        # By identity: findings hold the very things, and comparing those as values is slow.
+        self._of_thing: dict[int, list[int]] = defaultdict(list)
+        self._of_waypoint: dict[str, list[int]] = defaultdict(list)
+        for number, finding in enumerate(self.findings):
+            for thing in finding.things:
+                self._of_thing[id(thing)].append(number)
+            for name in () if finding.things else finding.waypoints:
+                self._of_waypoint[name].append(number)
+
+    def judge_thing(self, remembered: RememberedThing) -> Trust:
+        """Return the trust that a thing deserves."""
+        thing = remembered.thing
+        numbers = set(self._of_thing.get(id(thing), ()))
+        for name in thing.waypoints:
+            numbers.update(self._of_waypoint.get(name, ()))
+        return judge_trust(thing, [self.findings[number] for number in sorted(numbers)])
+
+    def judge_place(self, place: RememberedPlace) -> Trust:
+        """Return the trust that a record deserves: it is sure until something speaks against it."""
+        ratio, against = 1.0, []
+        for number in self._of_waypoint.get(place.waypoint.name, ()):
+            finding = self.findings[number]
+            if finding.label is None and finding.weight < 1.0:
+                ratio *= finding.weight
+                against.append(finding)
+        return Trust(ratio, tuple(against))
 
 
 class Recollector:

@@ -69,12 +69,6 @@ class MapRevision:
         areas: What is closed of the floor: no way leads over it.
         hindrances: What ways lead round where that is not too far.
         leaves_pockets: A robot that a gap too narrow by a cell shuts in gets out of it.
-
-    Attributes:
-        grid: The map.
-        radius_m: Of the robot.
-        areas: What is closed of the floor.
-        hindrances: What costs more than its length.
     """
 
     def __init__(
@@ -128,11 +122,9 @@ class MapRevision:
         if not (self.areas or self.hindrances):
             return self
         if self._open is None:
+            radius_m, leaves_pockets = self.radius_m, self._leaves_pockets
             self._open = MapRevision(
-                self.grid,
-                radius_m=self.radius_m,
-                previous=self,
-                leaves_pockets=self._leaves_pockets,
+                self.grid, radius_m=radius_m, previous=self, leaves_pockets=leaves_pockets
             )
         return self._open
 
@@ -184,20 +176,17 @@ class MapRevision:
     def distances_from(self, point: Point) -> DistanceField:
         """Return the path distances from a place to every other."""
         cell = self.grid.cell_at(point)
-        if cell not in self._fields:
+        field = self._fields.get(cell)
+        if field is None:
             known = next(iter(self._fields.values()), None)
-            field = (
-                distances_from(
-                    self.floor,
-                    point,
-                    radius_m=self.radius_m,
-                    leaves_pockets=self._leaves_pockets,
+            if known is not None:
+                field = known.from_elsewhere(point)
+            else:
+                radius_m, leaves_pockets = self.radius_m, self._leaves_pockets
+                field = distances_from(
+                    self.floor, point, radius_m=radius_m, leaves_pockets=leaves_pockets
                 )
-                if known is None
-                else known.from_elsewhere(point)
-            )
             # A new dictionary each time: several threads may ask at once.
             kept = list(self._fields.items())[1 - MOST_FIELDS :]
             self._fields = {**dict(kept), cell: field}
-            return field
-        return self._fields[cell]
+        return field
