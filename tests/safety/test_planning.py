@@ -51,7 +51,7 @@ class Site:
     def __init__(self, folder: Path, *areas: AreaRule, policy: Policy | None = None) -> None:
         self.actions = Actions()
         self.robot = FakeRobot(HALL, pose=START)
-        session = Session(
+        self.session = session = Session(
             self.robot,
             SemanticMapStore(folder / "m.yaml"),
             lease_s=60.0,
@@ -163,3 +163,15 @@ def test_a_message_that_is_nested_too_deep_counts_as_one_with_a_strange_pose() -
     for _ in range(50):
         message = {"inner": message}
     assert [frame for frame, _ in find_poses(message)] == [NO_FRAME]
+
+
+async def test_a_drive_is_checked_on_the_map_that_was_surveyed_to_find_its_goal(
+    tmp_path: Path,
+) -> None:
+    site = Site(tmp_path, PIT, policy=Policy(areas=(PIT,), clearance_m=0.1))
+    goal = await site.session.find_goal(place=None, x=9.0, y=2.0, yaw_deg=0.0)
+    surveyed = (await site.session.fetch_world_model()).map
+
+    await site.session.robot.send_goal(goal.pose)
+
+    assert (await site.session.fetch_world_model()).map is surveyed

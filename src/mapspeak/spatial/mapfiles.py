@@ -97,10 +97,6 @@ class LoadedMap:
     warnings: tuple[MapFileWarning, ...]
 
 
-def _lowered(value: object) -> object:
-    return value.lower() if isinstance(value, str) else value
-
-
 class _Description(BaseModel):
     """The .yaml beside a map's picture."""
 
@@ -112,7 +108,9 @@ class _Description(BaseModel):
     occupied_thresh: FiniteFloat
     free_thresh: FiniteFloat
     negate: bool
-    mode: Annotated[MapMode, BeforeValidator(_lowered)] = MapMode.TRINARY
+    mode: Annotated[
+        MapMode, BeforeValidator(lambda said: said.lower() if isinstance(said, str) else said)
+    ] = MapMode.TRINARY
 
 
 def load_map(path: Path) -> LoadedMap:
@@ -261,8 +259,10 @@ def _parse_yaml(path: Path) -> CommentedMap:
             hint="Give the path of a .yaml file that may be read.",
         ) from error
     except (ValueError, RecursionError, YAMLError) as error:
+        mark = error.problem_mark if isinstance(error, MarkedYAMLError) else None
+        line = "" if mark is None else f" line {mark.line + 1}"
         raise MapError(
-            f"{path.name}{_line_of(error)} is not YAML.",
+            f"{path.name}{line} is not YAML.",
             hint="A map's .yaml holds lines such as 'resolution: 0.05', no aliases.",
         ) from error
     if not isinstance(document, CommentedMap):
@@ -281,11 +281,6 @@ def _load_flat(text: str) -> object:
         if isinstance(event, AliasEvent) or depth > _MOST_NESTED:
             raise YAMLError("aliases or deep nesting")
     return YAML(typ="rt", pure=True).load(text)
-
-
-def _line_of(error: Exception) -> str:
-    mark = error.problem_mark if isinstance(error, MarkedYAMLError) else None
-    return f" line {mark.line + 1}" if mark is not None else ""
 
 
 def _say_wrong_value(path: Path, document: CommentedMap, error: ValidationError) -> MapError:

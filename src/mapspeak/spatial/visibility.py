@@ -125,9 +125,13 @@ def _pieces(start: FloatArray, end: FloatArray) -> tuple[IntArray, FloatArray]:
 
     The idea is that of Amanatides and Woo, "A fast voxel traversal algorithm" (1987).
     """
-    pairs = zip(start.tolist(), end.tolist(), strict=True)
-    cuts = np.concatenate([_crossings(first, last) for first, last in pairs])
-    cuts.sort()
+    crossings = []
+    for first, last in zip(start.tolist(), end.tolist(), strict=True):
+        # Where, from 0 to 1, the coordinate passes whole numbers.
+        low, high = math.floor(min(first, last)) + 1, math.ceil(max(first, last))
+        if low < high:
+            crossings.append((np.arange(low, high) - first) / (last - first))
+    cuts = np.sort(np.concatenate([_WHOLE[:0], *crossings]))
     borders = np.concatenate([_WHOLE[:1], cuts, _WHOLE[1:]])
     shares = borders[1:] - borders[:-1]
     is_piece = shares > 1e-9
@@ -136,14 +140,6 @@ def _pieces(start: FloatArray, end: FloatArray) -> tuple[IntArray, FloatArray]:
     middles = ((borders[:-1] + borders[1:]) / 2)[is_piece]
     cells = np.floor(start + middles[:, None] * (end - start)).astype(np.intp)
     return cells, shares[is_piece]
-
-
-def _crossings(start: float, end: float) -> FloatArray:
-    """Return where, from 0 to 1, a coordinate that goes from start to end passes whole numbers."""
-    first, last = math.floor(min(start, end)) + 1, math.ceil(max(start, end))
-    if first >= last:
-        return _WHOLE[:0]
-    return np.asarray((np.arange(first, last) - start) / (end - start))
 
 
 def _cells_beside(cells: IntArray, corners: IntArray) -> IntArray:

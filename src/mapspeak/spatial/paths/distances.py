@@ -40,11 +40,16 @@ class DistanceField:
 
     def distance_to(self, point: Point) -> float | None:
         """Return the metres to a point by path; None where the robot cannot get to."""
-        index = self.lattice.index_at(point)
-        if index is None or not math.isfinite(self.costs[index]):
+        index = self._find_reached(point)
+        if index is None:
             return None
         by_cells = float(self.costs[index]) * self.lattice.cell_size_m
         return max(by_cells, self.start.distance_to(point))
+
+    def _find_reached(self, point: Point) -> int | None:
+        """Find the lattice cell at a point; None where the robot cannot get to."""
+        index = self.lattice.index_at(point)
+        return index if index is not None and math.isfinite(self.costs[index]) else None
 
     def is_reachable(self, point: Point) -> bool:
         """Return True where the robot can drive to from the start."""
@@ -52,8 +57,8 @@ class DistanceField:
 
     def path_to(self, point: Point) -> Path | None:
         """Find a way near the shortest one, off walls as far as its surroundings allow."""
-        goal = self.lattice.index_at(point)
-        if goal is None or not math.isfinite(self.costs[goal]):
+        goal = self._find_reached(point)
+        if goal is None:
             return None
         way = descend(self.lattice.moves, None, self.costs, goal)
         return find_path_near(self.lattice, way, (self.start, point), radius_m=self.radius_m)
@@ -65,9 +70,9 @@ class DistanceField:
             point: Where to.
             weights: What a metre costs in each cell of the map, 1 or more.
         """
-        goal = self.lattice.index_at(point)
+        goal = self._find_reached(point)
         seeds = find_seeds(self.lattice, self.start, radius_m=self.radius_m)
-        if goal is None or seeds is None or not math.isfinite(self.costs[goal]):
+        if goal is None or seeds is None:
             return None
         coarse = self.lattice.coarsened(weights)
         costs = spread(self.lattice.moves, coarse, seeds, goals=np.array([goal]))
@@ -77,8 +82,8 @@ class DistanceField:
 
     def way_to(self, point: Point) -> tuple[Point, ...] | None:
         """Return the shortest way from cell to cell, good enough to draw; `path_to` is to drive."""
-        goal = self.lattice.index_at(point)
-        if goal is None or not math.isfinite(self.costs[goal]):
+        goal = self._find_reached(point)
+        if goal is None:
             return None
         way = descend(self.lattice.moves, None, self.costs, goal)
         rows, cols = np.divmod(way, self.lattice.n_cols)
@@ -94,11 +99,7 @@ class DistanceField:
 
     def build_reachable_mask(self) -> Mask:
         """Return where on the map the robot can drive to, as a mask."""
-        lattice = self.lattice
-        finite = np.isfinite(self.costs).reshape(lattice.moves.shape)
-        fine = finite.repeat(lattice.factor, axis=0).repeat(lattice.factor, axis=1)
-        n_rows, n_cols = lattice.passable.shape
-        return np.asarray(lattice.passable & fine[:n_rows, :n_cols], dtype=np.bool_)
+        return self.lattice.passable & _refined(self.lattice, self.costs)
 
     def distances_at(self, rows: IntArray, cols: IntArray) -> FloatArray:
         """Return the metres by path to cells of the map; infinite where the robot cannot get to."""
@@ -201,3 +202,11 @@ def _find_largest(lattice: Lattice, is_reached: Mask, costs: Costs) -> Mask | No
     largest = 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax())
     is_more = stats[largest, cv2.CC_STAT_AREA] > np.count_nonzero(here)
     return np.asarray(pieces == largest) if is_more else None
+
+
+def _refined(lattice: Lattice, costs: Costs) -> Mask:
+    """Return True in the cells of the map whose lattice cell has been reached."""
+    is_reached = np.isfinite(costs).reshape(lattice.moves.shape)
+    fine = is_reached.repeat(lattice.factor, axis=0).repeat(lattice.factor, axis=1)
+    n_rows, n_cols = lattice.passable.shape
+    return np.asarray(fine[:n_rows, :n_cols])
