@@ -1,24 +1,232 @@
 """Rooms, corridors and doors found on an occupancy grid."""
 
+import math
+from dataclasses import dataclass
 from itertools import permutations
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.spatial.grid import OccupancyGrid
-from mapspeak.spatial.rooms.description import (
-    Opening,
-    RegionShape,
-    classify,
-    find_openings,
-    measure_regions,
-    walked_size,
-)
+from mapspeak.geometry import Point
+from mapspeak.spatial.grid import Mask, OccupancyGrid
 from mapspeak.spatial.rooms.identity import match_rooms, sort_key
-from mapspeak.spatial.rooms.raster import Raster, RoomSettings, build_raster
+from mapspeak.spatial.rooms.raster import Raster, RoomSettings, build_raster, find_cells
 from mapspeak.spatial.rooms.room_map import LETTER, Door, Labels, Region, RoomClass, RoomMap
-from mapspeak.spatial.rooms.segmentation import segment
+from mapspeak.spatial.rooms.segmentation import Segmentation, segment
+
+STRIP = 3.0
+"""So many squares in a row are a strip: something to walk along, not a room."""
+CORRIDOR_LADDER = ((2 * STRIP, 0), (2.5, 3), (2.0, 4), (1.5, 6))
+"""Elongation above which a region is a corridor, by the least number of its neighbours.
+
+An L-shaped room is as elongated as a strip, and leads to one or two others. What leads to no more
+is a corridor only if it is a strip, straight (`Shape.is_strip`) or on both sides of a bend.
+"""
+ISLAND_RATIO = 0.1
+"""Something that stands free in a region is ignored up to this share of its floor."""
+OPEN_SPACE_WIDTH_M = 8.0
+OPEN_SPACE_AREA_M2 = 100.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RegionShape:
+    """The measures of one region; the fields are those of `Region`, and two more.
+
+    Attributes:
+        open_clearance_m: The largest clearance if what stands free in the region were gone.
+        mean_clearance_m: The mean distance of its floor from the nearest wall.
+    """
+
+    free_area_m2: float
+    floor_area_m2: float
+    length_m: float
+    width_m: float
+    heading_rad: float
+    widest: Point
+    clearance_m: float
+    open_clearance_m: float
+    mean_clearance_m: float
+
+    @property
+    def elongation(self) -> float:
+        """Area over the square of the widest clearance diameter: 1 for a square, more if long."""
+        return self.floor_area_m2 / max(2 * self.open_clearance_m, 1e-6) ** 2
+
+    @property
+    def is_strip(self) -> bool:
+        """True where it is much longer than wide, and hardly bends."""
+        return self.elongation > STRIP and self.length_m > STRIP * self.width_m
+
+
+def measure_regions(segmentation: Segmentation) -> list[RegionShape]:
+    """Return the measures of every region, in the order of their numbers."""
+    windows = _find_windows(segmentation)
+    return [_measure(segmentation, index, window) for index, window in enumerate(windows, start=1)]
+
+
+def _find_windows(segmentation: Segmentation) -> list[tuple[slice, slice]]:
+    labels = segmentation.labels
+    n = int(labels.max(initial=0))
+    if n == 0:
+        return []
+    framed = np.pad(labels, ((0, 0), (1, 1)))
+    rows, cols = find_cells(framed[:, 1:] != framed[:, :-1])
+    low = np.full((2, n + 1), max(labels.shape), np.intp)
+    high = np.zeros((2, n + 1), np.intp)
+    for number in (framed[rows, cols], framed[rows, cols + 1]):
+        for axis, (first, last) in enumerate(((rows, rows + 1), (cols, cols))):
+            np.minimum.at(low[axis], number, first)
+            np.maximum.at(high[axis], number, last)
+    return [
+        (slice(int(low[0, i]), int(high[0, i])), slice(int(low[1, i]), int(high[1, i])))
+        for i in range(1, n + 1)
+    ]
+
+
+def _measure(segmentation: Segmentation, index: int, window: tuple[slice, slice]) -> RegionShape:
+    raster = segmentation.raster
+    inside = segmentation.labels[window] == index
+    clearance = np.where(inside, segmentation.floor.clearance_m[window], 0)
+    row, col = np.unravel_index(int(np.argmax(clearance)), clearance.shape)
+    length, width, heading = _bounding_rectangle(inside)
+    return RegionShape(
+        free_area_m2=int((inside & (raster.free[window] > 0)).sum()) * raster.cell_area_m2,
+        floor_area_m2=int(inside.sum()) * raster.cell_area_m2,
+        length_m=length * raster.cell_size_m,
+        width_m=width * raster.cell_size_m,
+        heading_rad=(heading + raster.grid.origin.yaw_rad) % math.pi,
+        widest=raster.point_at(window[0].start + row + 0.5, window[1].start + col + 0.5),
+        clearance_m=float(clearance[row, col]),
+        open_clearance_m=max(clearance[row, col], _open_clearance(inside) * raster.cell_size_m),
+        mean_clearance_m=float(clearance[inside].mean()),
+    )
+
+
+def _open_clearance(inside: Mask) -> float:
+    """Return the clearance in cells once small holes are filled, such as a partition's; or 0."""
+    outside = cv2.copyMakeBorder(
+        (~inside).astype(np.uint8), 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=1
+    )
+    n, label = cv2.connectedComponents(outside, connectivity=4)
+    if n <= 2:
+        return 0.0
+    is_island = np.bincount(label.ravel(), minlength=n) <= ISLAND_RATIO * int(inside.sum())
+    is_island[0] = is_island[label[0, 0]] = False
+    if not is_island.any():
+        return 0.0
+    whole = ((outside == 0) | is_island[label]).astype(np.uint8)
+    return float(cv2.distanceTransform(whole, cv2.DIST_L2, cv2.DIST_MASK_PRECISE).max()) - 0.5
+
+
+def _bounding_rectangle(inside: Mask) -> tuple[float, float, float]:
+    """Return length, width and direction of the smallest turned rectangle, in cells and radians."""
+    outline, _ = cv2.findContours(
+        inside.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE
+    )
+    corners = cv2.convexHull(np.concatenate(outline))
+    (_, (one, other), angle_deg) = cv2.minAreaRect(corners)
+    if one < other:
+        one, other, angle_deg = other, one, angle_deg + 90
+    return one + 1, other + 1, math.radians(angle_deg)
+
+
+def classify(shape: RegionShape, *, n_neighbours: int) -> RoomClass:
+    """Return what a person would call a region."""
+    is_corridor = shape.is_strip or any(
+        shape.elongation > elongation and n_neighbours >= least
+        for elongation, least in CORRIDOR_LADDER
+    )
+    if is_corridor:
+        return RoomClass.CORRIDOR
+    is_wide = 2 * shape.clearance_m >= OPEN_SPACE_WIDTH_M
+    is_open = is_wide and shape.floor_area_m2 >= OPEN_SPACE_AREA_M2
+    return RoomClass.OPEN_SPACE if is_open else RoomClass.ROOM
+
+
+def walked_size(shape: RegionShape) -> tuple[float, float]:
+    """Return length along and width across a corridor, however often it bends.
+
+    In a long strip the mean distance from the nearer side is a quarter of the width.
+    """
+    width_m = 4 * shape.mean_clearance_m
+    return shape.floor_area_m2 / width_m, width_m
+
+
+_REACH_M = 0.3
+"""Border cells nearer than this to each other are one opening."""
+_LEAST_M = 0.25
+"""A narrower gap is a crack in the map of a wall: no person and hardly a robot gets through."""
+_ROUNDING_M = 1e-3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Opening:
+    """A door before it has an id; `first` and `second` are region numbers, first the smaller."""
+
+    first: int
+    second: int
+    place: Point
+    width_m: float
+
+
+def find_openings(segmentation: Segmentation) -> list[Opening]:
+    """Return every way between two regions, ordered by regions, widest first."""
+    row, col, first, second = _border_cells(segmentation.labels)
+    openings = []
+    order = np.lexsort((second, first))
+    starts = np.flatnonzero(np.diff(first[order]) | np.diff(second[order])) + 1
+    for here in np.split(order, starts) if order.size else ():
+        pair = int(first[here[0]]), int(second[here[0]])
+        openings += _split(segmentation, pair, row[here], col[here])
+    return [opening for opening in openings if opening.width_m >= _LEAST_M - _ROUNDING_M]
+
+
+def _border_cells(labels: NDArray[np.int32]) -> tuple[NDArray[np.intp], ...]:
+    """Return rows, columns and both regions of cells that touch a region with a higher number."""
+    found = []
+    for here, there, down, right in (
+        (np.s_[:-1, :], np.s_[1:, :], 1, 0),
+        (np.s_[:, :-1], np.s_[:, 1:], 0, 1),
+    ):
+        one, other = labels[here], labels[there]
+        rows, cols = find_cells((one != other) & (one > 0) & (other > 0))
+        a, b = one[rows, cols], other[rows, cols]
+        higher = a > b
+        rows, cols = rows + down * higher, cols + right * higher
+        found.append(np.stack([rows, cols, np.minimum(a, b), np.maximum(a, b)]))
+    joined = np.unique(np.concatenate(found, axis=1), axis=1)
+    return tuple(joined.astype(np.intp))
+
+
+def _split(
+    segmentation: Segmentation,
+    pair: tuple[int, int],
+    rows: NDArray[np.intp],
+    cols: NDArray[np.intp],
+) -> list[Opening]:
+    """Return the separate openings of a pair of regions: border cells that hang together."""
+    cell_size_m = segmentation.raster.cell_size_m
+    top, left = int(rows.min()), int(cols.min())
+    picture = np.zeros((int(rows.max()) - top + 1, int(cols.max()) - left + 1), np.uint8)
+    picture[rows - top, cols - left] = 1
+    reach = 2 * round(_REACH_M / 2 / cell_size_m) + 1
+    n, run = cv2.connectedComponents(cv2.dilate(picture, np.ones((reach, reach), np.uint8)))
+    number = run[rows - top, cols - left]
+    openings = []
+    for i in range(1, n):
+        mine = np.flatnonzero(number == i)
+        clearance = segmentation.floor.clearance_m[rows[mine], cols[mine]]
+        best = mine[int(np.argmax(clearance))]
+        openings.append(
+            Opening(
+                first=pair[0],
+                second=pair[1],
+                place=segmentation.raster.point_at(rows[best] + 0.5, cols[best] + 0.5),
+                width_m=2 * float(clearance.max()),
+            )
+        )
+    return sorted(openings, key=lambda opening: -opening.width_m)
 
 
 def find_rooms(

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.spatial.rooms.furniture import find_blocks
-from mapspeak.spatial.rooms.raster import Picture, Raster, RoomSettings, find_cells
-from mapspeak.spatial.rooms.solids import drop_specks
+from mapspeak.spatial.rooms.raster import Picture, Raster, RoomSettings, drop_specks, find_cells
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

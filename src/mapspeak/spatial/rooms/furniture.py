@@ -8,8 +8,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.spatial.rooms.raster import Picture, Raster, RoomSettings
-from mapspeak.spatial.rooms.solids import (
+from mapspeak.spatial.rooms.raster import (
+    Picture,
+    Raster,
+    RoomSettings,
     Truths,
     drop_small,
     drop_specks,

@@ -1,12 +1,15 @@
-"""A raster cut into rooms."""
+"""A raster cut into rooms: at its narrow places, and at wide openings between wall ends.
 
+Such openings are too wide, beside the rooms behind, for clearances to see.
+"""
+
+import math
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.spatial.rooms.doorways import Doorway, find_doorways
 from mapspeak.spatial.rooms.floor import Floor, build_floor, cut_away
 from mapspeak.spatial.rooms.merging import (
     BasinLabels,
@@ -16,7 +19,221 @@ from mapspeak.spatial.rooms.merging import (
     find_saddles,
     merge_basins,
 )
-from mapspeak.spatial.rooms.raster import Picture, Raster, RoomSettings, find_cells
+from mapspeak.spatial.rooms.raster import (
+    Affine,
+    Picture,
+    Places,
+    Raster,
+    RoomSettings,
+    Truths,
+    find_cells,
+    is_upright,
+    turn_closed,
+)
+
+_APART_M = 0.4
+"""Openings nearer than this to each other, one behind the other, are one doorway."""
+_SHARED_M = 0.3
+"""Jambs nearer than this to each other are ends of one wall."""
+_DRIFT_RATIO = 0.25
+"""A wall that leaves its line by more than this share of the way does not run along it."""
+
+Spot = tuple[float, float]
+Opening = tuple[int, int, int]
+"""Row, first column, and the column behind the last."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Doorway:
+    """An opening between two jambs, given as columns and rows of the raster.
+
+    Attributes:
+        roots: Where the solid pieces begin of which the jambs are the ends.
+    """
+
+    start: Spot
+    end: Spot
+    roots: tuple[Spot, Spot]
+    width_m: float
+
+    def beside(self, cells: float) -> tuple[int, int]:
+        """Return the row and the column that many cells off the middle, at right angles."""
+        across, along = self.end[0] - self.start[0], self.end[1] - self.start[1]
+        share = cells / math.hypot(across, along)
+        col = (self.start[0] + self.end[0]) / 2 - share * along
+        row = (self.start[1] + self.end[1]) / 2 + share * across
+        return round(row), round(col)
+
+
+def find_doorways(raster: Raster, floor: Floor, settings: RoomSettings) -> list[Doorway]:
+    """Return the wide openings in line with the strongest walls, or at right angles to them.
+
+    One jamb is the end of something thin that runs on in line; the other is such an end too, or
+    the corner of a wall.
+    """
+    if not floor.directions_deg:
+        return []
+    jamb = floor.wall | floor.obstacle
+    pictures = [jamb, floor.wall, floor.solid, floor.floor & (1 - jamb)]
+    margin = round(max(settings.stub_m, settings.tip_m) / raster.cell_size_m) + 2
+    turned, back = _turn(pictures, floor.directions_deg[0], margin)
+    sideways = [np.asarray(cv2.transpose(picture), np.uint8) for picture in turned]
+    rows = _find_along_rows(turned, back, raster, settings)
+    cols = _find_along_rows(sideways, back[:, [1, 0, 2]], raster, settings)
+    reach = _SHARED_M / raster.cell_size_m
+    return _leave_out_crossing(rows, cols, reach) + _leave_out_crossing(cols, rows, reach)
+
+
+def _turn(pictures: list[Picture], angle_deg: float, margin: int) -> tuple[list[Picture], Affine]:
+    """Return pictures whose walls run along rows and columns, and the way back from them.
+
+    Around them is a margin of what is neither jamb nor floor.
+    """
+    if is_upright(angle_deg):
+        framed = [np.pad(picture, margin) for picture in pictures]
+        return framed, np.array([[1.0, 0.0, -margin], [0.0, 1.0, -margin]])
+    high, wide = pictures[0].shape
+    there = cv2.getRotationMatrix2D((wide / 2, high / 2), angle_deg, 1.0)
+    corners = np.array([[0, 0, 1], [wide, 0, 1], [0, high, 1], [wide, high, 1]]) @ there.T
+    there[:, 2] += margin - corners.min(axis=0)
+    size = (np.ptp(corners, axis=0) + 2 * margin + 1).astype(int).tolist()
+    *solids, last = pictures
+    turned, *closed = turn_closed([last, *solids], np.asarray(there, np.float64), size)
+    back = np.asarray(cv2.invertAffineTransform(there), np.float64)
+    return [*closed, turned & (1 - closed[0])], back
+
+
+def _find_along_rows(
+    pictures: list[Picture], back: Affine, raster: Raster, settings: RoomSettings
+) -> list[Doorway]:
+    jamb, wall, solid, floor = pictures
+    row, first, stop = _find_gaps(floor, jamb, raster, settings)
+    jambs = _Jambs(wall, solid, raster.cell_size_m, settings)
+    left_end, right_end = jambs.is_end(row, first - 1, -1), jambs.is_end(row, stop, 1)
+    left_corner, right_corner = jambs.is_corner(row, first - 1, -1), jambs.is_corner(row, stop, 1)
+    chosen = (left_end & (right_end | right_corner)) | (right_end & left_corner)
+    openings = _choose_narrowest(
+        row[chosen], first[chosen], stop[chosen], round(_APART_M / raster.cell_size_m)
+    )
+    longest = round(settings.wall_length_m / raster.cell_size_m)
+    return [_doorway(opening, solid, longest, back, raster.cell_size_m) for opening in openings]
+
+
+def _find_gaps(
+    floor: Picture, jamb: Picture, raster: Raster, settings: RoomSettings
+) -> tuple[Places, Places, Places]:
+    """Return row, first column and the column behind the last of floor between jambs."""
+    # The margin is no floor, so that changes come in pairs and no run goes on in the next row.
+    change = np.flatnonzero(floor.ravel()[1:] != floor.ravel()[:-1]) + 1
+    first, stop = change[::2], change[1::2]
+    width_m = (stop - first) * raster.cell_size_m
+    cells = jamb.ravel()
+    chosen = (width_m > settings.leaf_width_m) & (width_m <= settings.door_width_m)
+    chosen &= (cells[first - 1] & cells[stop]) > 0
+    row, first_col = np.divmod(first[chosen], floor.shape[1])
+    return row, first_col, first_col + (stop - first)[chosen]
+
+
+class _Jambs:
+    """Tells what stands at the ends of a gap.
+
+    Args:
+        wall: 1 on walls.
+        solid: 1 where nothing is free.
+    """
+
+    def __init__(
+        self, wall: Picture, solid: Picture, cell_size_m: float, settings: RoomSettings
+    ) -> None:
+        self._wall, self._solid = wall > 0, solid > 0
+        self._stub = max(round(settings.stub_m / cell_size_m), 1)
+        self._tip = max(round(settings.tip_m / cell_size_m), 1)
+
+    def is_end(self, row: Places, col: Places, step: int) -> Truths:
+        """Return True at the end of something thin that runs on in the direction of the step."""
+        is_end = np.ones(row.size, bool)
+        up, down = self._extent(row, col)
+        at_first = up - down
+        for further in range(self._stub):
+            up, down = self._extent(row, col + step * further)
+            # Twice the way from the middle of the wall here to that at the jamb.
+            drift = np.abs(up - down - at_first)
+            is_end &= self._solid[row, col + step * further] & (up + down < self._tip)
+            is_end &= drift <= 2 * _DRIFT_RATIO * self._stub
+        return is_end
+
+    def is_corner(self, row: Places, col: Places, step: int) -> Truths:
+        """Return True where a wall ends above or below."""
+        up, down = self._extent(row, col + step)
+        return self._wall[row, col] & (np.minimum(up, down) <= self._tip)
+
+    def _extent(self, row: Places, col: Places) -> tuple[Places, Places]:
+        """Return how many solid cells follow above and below; one more than a tip has, at most."""
+        extents = []
+        for way in (-1, 1):
+            is_solid = self._solid[row, col]
+            n = np.zeros(row.size, np.intp)
+            for further in range(1, self._tip + 2):
+                is_solid = is_solid & self._solid[row + way * further, col]
+                n += is_solid
+            extents.append(n)
+        return extents[0], extents[1]
+
+
+def _choose_narrowest(row: Places, first: Places, stop: Places, reach: int) -> list[Opening]:
+    """Return the narrowest of openings that lie one behind the other."""
+    kept: list[Opening] = []
+    for i in np.lexsort((first, row, stop - first)).tolist():
+        here = int(row[i]), int(first[i]), int(stop[i])
+        is_behind = any(
+            abs(here[0] - other[0]) <= reach and here[1] < other[2] and other[1] < here[2]
+            for other in kept
+        )
+        if not is_behind:
+            kept.append(here)
+    return kept
+
+
+def _doorway(
+    opening: Opening, solid: Picture, longest: int, back: Affine, cell_size_m: float
+) -> Doorway:
+    row, first, stop = opening
+    left = _run(solid[row, max(first - longest, 0) : first][::-1])
+    right = _run(solid[row, stop : stop + longest])
+    root, start, end, other_root = (
+        (float(x), float(y))
+        for x, y in (
+            back @ (col, row, 1.0) for col in (first - left, first - 1, stop, stop + right)
+        )
+    )
+    width_m = (stop - first) * cell_size_m
+    return Doorway(start=start, end=end, roots=(root, other_root), width_m=width_m)
+
+
+def _run(solid: Picture) -> int:
+    """Return how many cells are solid before the first that is not."""
+    return int(np.argmin(solid)) if not solid.all() else solid.size
+
+
+def _leave_out_crossing(
+    doorways: list[Doorway], others: list[Doorway], reach: float
+) -> list[Doorway]:
+    """Leave out what crosses a corridor from the end of the wall between two rooms.
+
+    The doorways of those two rooms, at right angles to it, each have a jamb there.
+    """
+    jambs = np.array([jamb for other in others for jamb in (other.start, other.end)])
+
+    def is_between_rooms(jamb: Spot) -> bool:
+        near = np.hypot(*(jambs - jamb).T) <= reach if jambs.size else np.zeros(0, bool)
+        return int(near.sum()) >= 2
+
+    return [
+        doorway
+        for doorway in doorways
+        if not is_between_rooms(doorway.start) and not is_between_rooms(doorway.end)
+    ]
+
 
 Labels = NDArray[np.int32]
 
