@@ -27,6 +27,7 @@ from mapspeak.memory.search import (
 )
 from mapspeak.memory.things import Category, Thing, Things, find_things, name_the_same
 from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.rooms.identity import match_best_first
 
 logger = logging.getLogger(__name__)
 
@@ -303,16 +304,14 @@ def number_things(
             ids[number] = replace(same.pop(thing), thing=thing)
     new = [number for number in range(len(things)) if number not in ids]
     gone = list(same.values())
-    pairs = sorted(
-        (rank, number, each.id)
+    seen_better = match_best_first(
+        ((rank, number), each.id, number)
         for number in new
         for each in gone
         if (rank := _sameness(things[number], each.thing)) is not None
     )
-    left = {each.id: each for each in gone}
-    for _, number, thing_id in pairs:
-        if number not in ids and thing_id in left:
-            ids[number] = replace(left.pop(thing_id), thing=things[number])
+    for number, thing_id in seen_better.items():
+        ids[number] = RememberedThing(id=thing_id, thing=things[number])
     for number in new:
         if number not in ids:
             n_named += 1

@@ -44,17 +44,6 @@ class Hindrance:
         return any(self.area.contains(point) for point in path.sampled(STEP_M))
 
 
-def weigh_floor(grid: OccupancyGrid, hindrances: Sequence[Hindrance]) -> Costs | None:
-    """Return what a metre counts in each cell of a map; None where it is one everywhere."""
-    if not hindrances:
-        return None
-    weights = np.ones(grid.cells.shape, dtype=np.float32)
-    for hindrance in hindrances:
-        inside = mask_areas(grid, [hindrance.area])
-        weights[inside] = np.maximum(weights[inside], np.float32(hindrance.weight))
-    return weights
-
-
 MOST_FIELDS = 6
 """Distances from so many places are kept; on a map of 16 Mcells each takes 16 MB."""
 
@@ -161,7 +150,13 @@ class MapRevision:
     @cached_property
     def weights(self) -> Costs | None:
         """What a metre counts in each cell of the map; None where it is one everywhere."""
-        return weigh_floor(self.grid, self.hindrances)
+        if not self.hindrances:
+            return None
+        weights = np.ones(self.grid.cells.shape, dtype=np.float32)
+        for hindrance in self.hindrances:
+            inside = mask_areas(self.grid, [hindrance.area])
+            weights[inside] = np.maximum(weights[inside], np.float32(hindrance.weight))
+        return weights
 
     def find_path(self, start: Point, goal: Point) -> Path | None:
         """Find the way to take from one place to another, round hindrances where that pays."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial.grid import FloatArray
+from mapspeak.spatial.rooms.identity import match_best_first
 
 TOUCH_M = 0.3
 """Points of one frontier on two maps are no further apart."""
@@ -157,15 +158,14 @@ def match_frontiers(previous: FrontierReport, current: FrontierReport) -> Fronti
 
 def _inherited(previous: tuple[Frontier, ...], current: tuple[Frontier, ...]) -> dict[int, str]:
     """Return the ids that pass on, largest overlap first, by index among the current ones."""
-    overlaps = [
+    overlaps = (
         (_overlap_ratio(old.points, new.points), index, old.id)
         for old in previous
         for index, new in enumerate(current)
-    ]
-    ids: dict[int, str] = {}
-    for ratio, index, old_id in sorted(overlaps, key=lambda each: (-each[0], each[1], each[2])):
-        if ratio >= SAME_RATIO and index not in ids and old_id not in ids.values():
-            ids[index] = old_id
+    )
+    ids = match_best_first(
+        ((-ratio, index), old_id, index) for ratio, index, old_id in overlaps if ratio >= SAME_RATIO
+    )
     places = {old.id: old.pose.point for old in previous}
     return {
         index: old_id

@@ -1,9 +1,8 @@
 """Frontiers of a map: which borders with the unknown are places to go, and why others are not."""
 
 import dataclasses
+import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import repeat
 
 import numpy as np
 
@@ -26,7 +25,6 @@ from mapspeak.spatial.frontiers.frontier import (
 )
 from mapspeak.spatial.frontiers.ranking import gain_rate, rank
 from mapspeak.spatial.frontiers.viewpoints import (
-    ExpectedGain,
     FrontierViewpoint,
     find_viewpoints,
     find_views,
@@ -133,11 +131,11 @@ def _judge(
     # the less, the smaller the robot and the known floor.
     floor_m2 = int(np.count_nonzero(floor.free)) * floor.grid.resolution_m**2
     least_m2 = min((3 * floor.radius_m) ** 2, 0.01 * floor_m2, 0.5)
-    for border, best in _find_best_options(floor, open_ones):
-        if best.gain.area_m2 >= least_m2:
-            frontiers.append(_frontier(floor, border, best))
+    for (border, _), frontier in zip(open_ones, _find_poses(floor, open_ones), strict=True):
+        if frontier.gain_m2 >= least_m2:
+            frontiers.append(frontier)
         elif border.length_m >= NOISE_M:
-            poor.append((border, best.gain.area_m2))
+            poor.append((border, frontier.gain_m2))
     parts_beyond = find_parts_beyond(floor, [border for border, _ in poor])
     for (border, gain_m2), beyond in zip(poor, parts_beyond, strict=True):
         if beyond is None:
@@ -146,20 +144,6 @@ def _judge(
         else:
             cut_off.append(beyond)
     return frontiers, refused + _refuse_cut_off(floor, cut_off)
-
-
-@dataclass(frozen=True, slots=True)
-class _Option:
-    """A viewpoint of a border with what speaks for it."""
-
-    viewpoint: FrontierViewpoint
-    gain: ExpectedGain
-    distance_m: float
-    openness_m: float
-
-    @property
-    def rate(self) -> float:
-        return gain_rate(self.gain.area_m2, self.distance_m)
 
 
 def _without_looked(
@@ -176,43 +160,41 @@ def _without_looked(
     ]
 
 
-def _find_best_options(
+def _find_poses(
     floor: ReachableFloor, borders: Sequence[tuple[Border, list[FrontierViewpoint]]]
-) -> list[tuple[Border, _Option]]:
-    """Return borders with the viewpoint that shows most per metre of way to it."""
+) -> list[Frontier]:
+    """Return borders with the pose at the viewpoint that shows most per metre of way to it."""
+    grid = floor.grid
     viewpoints = [viewpoint for _, own in borders for viewpoint in own]
     cells = [viewpoint.cell for viewpoint in viewpoints]
-    views = find_views(floor.grid, floor.clearances_m, cells)
+    views = find_views(grid, floor.clearances_m, cells)
     rows = np.array([cell.row for cell in cells], dtype=np.intp)
     cols = np.array([cell.col for cell in cells], dtype=np.intp)
     distances_m = floor.distances.distances_at(rows, cols).tolist()
-    options = map(_Option, viewpoints, views.find_gains(), distances_m, repeat(views.openness_m))
-    return [
-        (border, max((next(options) for _ in own), key=lambda option: option.rate))
-        for border, own in borders
-    ]
-
-
-def _frontier(floor: ReachableFloor, border: Border, option: _Option) -> Frontier:
-    grid = floor.grid
-    place, target = (grid.point_at(at) for at in (option.viewpoint.cell, option.viewpoint.target))
-    bearing_rad = option.gain.bearing_rad
-    # Where the unknown lies all around, the robot faces the border.
-    yaw_rad = (
-        place.bearing_to(target)
-        if bearing_rad is None
-        else wrap_angle(bearing_rad + grid.origin.yaw_rad)
-    )
-    return Frontier(
-        id="",
-        points=grid.points_at(border.rows, border.cols),
-        anchor=target,
-        length_m=border.length_m,
-        gain_m2=option.gain.area_m2,
-        distance_m=option.distance_m,
-        openness_m=option.openness_m,
-        pose=Pose(place.x, place.y, yaw_rad),
-    )
+    options = zip(viewpoints, views.find_gains(), distances_m, strict=True)
+    frontiers = []
+    for border, own in borders:
+        viewpoint, gain, distance_m = max(
+            itertools.islice(options, len(own)),
+            key=lambda option: gain_rate(option[1].area_m2, option[2]),
+        )
+        place, target = grid.point_at(viewpoint.cell), grid.point_at(viewpoint.target)
+        # Where the unknown lies all around, the robot faces the border.
+        yaw_rad = place.bearing_to(target)
+        if gain.bearing_rad is not None:
+            yaw_rad = wrap_angle(gain.bearing_rad + grid.origin.yaw_rad)
+        frontier = Frontier(
+            id="",
+            points=grid.points_at(border.rows, border.cols),
+            anchor=target,
+            length_m=border.length_m,
+            gain_m2=gain.area_m2,
+            distance_m=distance_m,
+            openness_m=views.openness_m,
+            pose=Pose(place.x, place.y, yaw_rad),
+        )
+        frontiers.append(frontier)
+    return frontiers
 
 
 def _refuse(floor: ReachableFloor, border: Border, reason: RefusalReason) -> RefusedFrontier:

@@ -76,26 +76,19 @@ def find_viewpoints(
     rows = np.concatenate([target[0] for target in targets])
     cols = np.concatenate([target[1] for target in targets])
     cells = _find_cells(floor, rows, cols)
-    ends = np.cumsum([target[0].size for target in targets])
-    return [
-        _viewpoints(floor, cells[own], rows[own], cols[own])
-        for own in (slice(*pair) for pair in itertools.pairwise([0, *ends.tolist()]))
-    ]
-
-
-def _viewpoints(
-    floor: ReachableFloor, cells: IntArray, rows: IntArray, cols: IntArray
-) -> list[FrontierViewpoint]:
-    """Return each cell of a border once, where there is any."""
-    targets = {
-        cell: Cell(row, col)
-        for cell, row, col in zip(cells.tolist(), rows.tolist(), cols.tolist(), strict=True)
-        if cell >= 0
-    }
-    n_cols = floor.grid.n_cols
-    return [
-        FrontierViewpoint(Cell(*divmod(cell, n_cols)), target) for cell, target in targets.items()
-    ]
+    found = zip(cells.tolist(), rows.tolist(), cols.tolist(), strict=True)
+    viewpoints = []
+    for own_rows, _ in targets:
+        of_border = itertools.islice(found, own_rows.size)
+        # Each cell once, for the last of its targets.
+        target_of = {cell: Cell(row, col) for cell, row, col in of_border if cell >= 0}
+        viewpoints.append(
+            [
+                FrontierViewpoint(Cell(*divmod(cell, floor.grid.n_cols)), target)
+                for cell, target in target_of.items()
+            ]
+        )
+    return viewpoints
 
 
 def _choose_targets(floor: ReachableFloor, border: Border) -> tuple[IntArray, IntArray]:

@@ -5,11 +5,15 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import product
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.spatial.rooms.room_map import Door, Region, RoomMap, Vanished
+
+Old = TypeVar("Old", str, int)
+New = TypeVar("New", str, int)
 
 _SAMPLES = 200_000
 _SAME_DOOR_M = 0.6
@@ -17,6 +21,22 @@ _SAME_SIZE_RATIO = 1.5
 """A region that is back has at most this many times the floor it had, or at least one over that."""
 _REMAINS_RATIO = 0.25
 """A vanished region became every region that covers at least this share of what is still seen."""
+
+
+def match_best_first(pairs: Iterable[tuple[Any, Old, New]]) -> dict[New, Old]:
+    """Return for each new thing the old one that it continues: the best pair first, each once.
+
+    Args:
+        pairs: How unlike two are, which may be compared with that of others, the old one and the
+            new one.
+    """
+    matched: dict[New, Old] = {}
+    taken: set[Old] = set()
+    for _, old, new in sorted(pairs):
+        if new not in matched and old not in taken:
+            matched[new] = old
+            taken.add(old)
+    return matched
 
 
 def match_rooms(previous: RoomMap, current: RoomMap) -> RoomMap:
@@ -77,35 +97,28 @@ def _match_regions(
     """Return the final id for each id of the current map."""
     old = {region.index: region.id for region in previous.regions}
     new = {region.index: region.id for region in current.regions}
-    ids: dict[str, str] = {}
     rows, cols = np.nonzero(overlap[1:, 1:])
-    pairs = sorted(
-        zip((rows + 1).tolist(), (cols + 1).tolist(), strict=True),
-        key=lambda pair: (-overlap[pair], pair),
+    same = match_best_first(
+        (-overlap[before, now], before, now)
+        for before, now in zip((rows + 1).tolist(), (cols + 1).tolist(), strict=True)
+        if before in old and now in new
     )
-    for before, now in pairs:
-        if before in old and now in new:
-            ids[new.pop(now)] = old.pop(before)
-    ids |= _revive_regions(previous, [region for region in current.regions if region.index in new])
+    ids = {new[now]: old[before] for now, before in same.items()}
+    ids |= _revive_regions(previous, [each for each in current.regions if each.index not in same])
     missing = [name for name in new.values() if name not in ids]
     return ids | _fresh(missing, _used(previous))
 
 
 def _revive_regions(previous: RoomMap, regions: list[Region]) -> dict[str, str]:
     """Return the ids of vanished regions that are back: about as large, and in their place."""
-    back = [
+    return match_best_first(
         (gone.place.distance_to(region.widest), gone.id, region.id)
         for gone in previous.vanished
         for region in regions
         if gone.floor_area_m2 is not None
         and gone.place.distance_to(region.widest) <= region.clearance_m
         and 1 / _SAME_SIZE_RATIO <= region.floor_area_m2 / gone.floor_area_m2 <= _SAME_SIZE_RATIO
-    ]
-    ids: dict[str, str] = {}
-    for _, gone_id, region_id in sorted(back):
-        if region_id not in ids and gone_id not in ids.values():
-            ids[region_id] = gone_id
-    return ids
+    )
 
 
 def _used(previous: RoomMap) -> set[str]:
@@ -142,12 +155,7 @@ def _match_doors(previous: RoomMap, current: RoomMap, ids: dict[str, str]) -> di
         for door in current.doors
         if gone.floor_area_m2 is None and gone.place.distance_to(door.place) <= _SAME_DOOR_M
     ]
-    matched: dict[str, str] = {}
-    taken: set[str] = set()
-    for _, before_id, now_id in sorted(near):
-        if now_id not in matched and before_id not in taken:
-            matched[now_id] = before_id
-            taken.add(before_id)
+    matched = match_best_first(near)
     new = [door.id for door in current.doors if door.id not in matched]
     return matched | _fresh(new, _used(previous))
 
