@@ -225,20 +225,14 @@ def outline_around(point: Point, *, radius_m: float) -> Outline:
 
 def _direction_of(rooms: RoomMap, door: Door) -> float:
     """Return the direction from post to post: that of the border between the two regions."""
-    border = _border_near(rooms, door)
+    own, beside = (rooms.region(each).index for each in door.region_ids)
+    touching = cv2.dilate((rooms.labels == beside).astype(np.uint8), np.ones((3, 3), np.uint8))
+    points = rooms.grid.points_at(*np.nonzero((rooms.labels == own) & (touching > 0)))
+    off_m = np.hypot(points[:, 0] - door.place.x, points[:, 1] - door.place.y)
+    border = points[off_m <= door.width_m / 2 + POST_M]
     if len(border) < 2:
         one, other = (rooms.region(each).widest for each in door.region_ids)
         return one.bearing_to(other) + math.pi / 2
     centred = border - border.mean(axis=0)
     _, _, axes = np.linalg.svd(centred, full_matrices=False)
     return math.atan2(axes[0, 1], axes[0, 0])
-
-
-def _border_near(rooms: RoomMap, door: Door) -> FloatArray:
-    """Return the centres of cells of one region that touch the other, near the door."""
-    one, other = (rooms.region(each).index for each in door.region_ids)
-    touching = cv2.dilate((rooms.labels == other).astype(np.uint8), np.ones((3, 3), np.uint8))
-    rows, cols = np.nonzero((rooms.labels == one) & (touching > 0))
-    points = rooms.grid.points_at(rows, cols)
-    off_m = np.hypot(points[:, 0] - door.place.x, points[:, 1] - door.place.y)
-    return points[off_m <= door.width_m / 2 + POST_M]

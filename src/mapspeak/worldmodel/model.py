@@ -1,10 +1,11 @@
 """The map under ids: rooms, doors, frontiers and remembered places, as everybody names them."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, MutableMapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeVar
+from weakref import WeakKeyDictionary
 
 import cv2
 import numpy as np
@@ -65,6 +66,7 @@ STEP_M = 0.2
 
 Key = TypeVar("Key")
 Found = TypeVar("Found")
+ThingMap = WeakKeyDictionary[RememberedThing, Found]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +79,11 @@ class Reach:
         standing: Where it would stand in each region, by the region's id.
         out_of_reach: The same for regions it cannot get to.
         frontiers: By the places from which it has looked already.
-        reminders: What was found of remembered things; of one state of the memory at a time.
+        approaches: Where it would stand before a remembered thing, while that is remembered so.
+        faced: The share of where a thing may be that it would face there.
+        fronts: The last floor before a thing, for each who saw it.
+        rooms: The rooms before a thing, by id.
+        judges: What may be trusted, for a state of the memory.
     """
 
     start: Point
@@ -85,35 +91,11 @@ class Reach:
     standing: dict[str, Point | None] = field(default_factory=dict)
     out_of_reach: dict[str, Point] = field(default_factory=dict)
     frontiers: dict[tuple[Point, ...], FrontierReport] = field(default_factory=dict)
-    reminders: dict[Recollection, "Reminders"] = field(default_factory=dict)
-
-
-@dataclass(slots=True, eq=False)
-class Reminders:
-    """What was found of remembered things on one map, for one state of the memory.
-
-    Attributes:
-        approaches: Where the robot would stand before a thing.
-        faced: The share of where a thing may be that it would face there.
-        fronts: The last floor before a thing, for each who saw it.
-        rooms: The rooms before a thing, by id.
-        judge: What may be trusted; None until somebody asks.
-    """
-
-    approaches: dict[RememberedThing, Pose | None] = field(default_factory=dict)
-    faced: dict[RememberedThing, float] = field(default_factory=dict)
-    fronts: dict[RememberedThing, list[Point]] = field(default_factory=dict)
-    rooms: dict[RememberedThing, tuple[str, ...]] = field(default_factory=dict)
-    judge: Judge | None = None
-
-    def of(self, things: Sequence[RememberedThing]) -> "Reminders":
-        """Return what holds for another state of the memory: what was found of the very same."""
-        return Reminders(
-            approaches={each: self.approaches[each] for each in things if each in self.approaches},
-            faced={each: self.faced[each] for each in things if each in self.faced},
-            fronts={each: self.fronts[each] for each in things if each in self.fronts},
-            rooms={each: self.rooms[each] for each in things if each in self.rooms},
-        )
+    approaches: ThingMap[Pose | None] = field(default_factory=WeakKeyDictionary)
+    faced: ThingMap[float] = field(default_factory=WeakKeyDictionary)
+    fronts: ThingMap[list[Point]] = field(default_factory=WeakKeyDictionary)
+    rooms: ThingMap[tuple[str, ...]] = field(default_factory=WeakKeyDictionary)
+    judges: WeakKeyDictionary[Recollection, Judge] = field(default_factory=WeakKeyDictionary)
 
 
 class WorldModel:
@@ -265,15 +247,13 @@ class WorldModel:
     @property
     def judge(self) -> Judge:
         """Says how far what is remembered may be trusted, and what is odd about it."""
-        known = self._reminders
-        if known.judge is None:
-            # What is closed for now says nothing against a record of what lies behind it.
-            distances = self.map.open.distances_from(self.robot.point)
-            findings = check_memory(
-                self.memory, self.recollection.found, distances=distances, rooms=self.rooms
-            )
-            known.judge = Judge(findings)
-        return known.judge
+        return _keep(self.reach.judges, self.recollection, self._judge)
+
+    def _judge(self) -> Judge:
+        # What is closed for now says nothing against a record of what lies behind it.
+        distances = self.map.open.distances_from(self.robot.point)
+        found = self.recollection.found
+        return Judge(check_memory(self.memory, found, distances=distances, rooms=self.rooms))
 
     def find_approach(self, remembered: RememberedThing) -> Pose | None:
         """Find where the robot stands to face a thing from near; None where it cannot."""
@@ -281,7 +261,7 @@ class WorldModel:
         if (position := thing.position) is None:
             return None
         return _keep(
-            self._reminders.approaches,
+            self.reach.approaches,
             remembered,
             lambda: find_approach(
                 self.recollection.found.sight,
@@ -305,7 +285,7 @@ class WorldModel:
             return 0.0
         sight, seen_from = self.recollection.found.sight, _seen_from(remembered)
         return _keep(
-            self._reminders.faced,
+            self.reach.faced,
             remembered,
             lambda: measure_faced(sight, pose, seen_from, whereabouts),
         )
@@ -314,7 +294,7 @@ class WorldModel:
         """Return the rooms a thing may be in, by id: those on the side that it was seen from."""
         fronts, seen_from = self._find_fronts(remembered), _seen_from(remembered)
         return _keep(
-            self._reminders.rooms,
+            self.reach.rooms,
             remembered,
             lambda: tuple(
                 dict.fromkeys(filter(None, map(self._find_room_on_line, fronts, seen_from)))
@@ -327,9 +307,7 @@ class WorldModel:
         if position is None:
             return seen_from
         sight = self.recollection.found.sight
-        return _keep(
-            self._reminders.fronts, remembered, lambda: find_fronts(sight, position, seen_from)
-        )
+        return _keep(self.reach.fronts, remembered, lambda: find_fronts(sight, position, seen_from))
 
     def _find_room_on_line(self, end: Point, start: Point) -> str | None:
         """Return room of the last floor on a line: what hangs on a wall is in no room itself."""
@@ -340,15 +318,6 @@ class WorldModel:
             for share in shares
         )
         return next(filter(None, map(self.find_room_id, points)), None)
-
-    @property
-    def _reminders(self) -> Reminders:
-        known = self.reach.reminders
-        if self.recollection not in known:
-            before = next(iter(known.values()), Reminders())
-            known.clear()
-            known[self.recollection] = before.of(self.things)
-        return known[self.recollection]
 
     @cached_property
     def growing_ids(self) -> frozenset[str]:
@@ -362,7 +331,7 @@ class WorldModel:
         return frozenset(filter(None, map(self.find_room_id, borders)))
 
 
-def _keep(known: dict[Key, Found], key: Key, find: Callable[[], Found]) -> Found:
+def _keep(known: MutableMapping[Key, Found], key: Key, find: Callable[[], Found]) -> Found:
     """Return what is known under a key; find it where nothing is."""
     if key not in known:
         known[key] = find()

@@ -45,7 +45,7 @@ class RememberedPlace:
     waypoint: Waypoint
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, weakref_slot=True)
 class RememberedThing:
     """A thing that was seen from remembered places; compared by identity.
 
