@@ -19,7 +19,7 @@ from mapspeak.ros import ActionGoal, LinkKind, LinkName
 from mapspeak.ros.discovery import RobotOverrides
 from mapspeak.ros.link import plain_errors
 from mapspeak.ros.messages import Message
-from mapspeak.ros.robot import RosRobot, build_ros_robot
+from mapspeak.ros.robot import NOTHING_SAID, USUAL_PATIENCE, RosRobot, build_ros_robot
 from mapspeak.ros.robot.driving import DrivingPatience
 
 NODES_QUALITY = Quality(is_reliable=True, is_latched=True, depth=1000)
@@ -206,10 +206,6 @@ async def open_dds_connection(
                 with anyio.CancelScope(shield=True):
                     await connection.aclose()
                 tasks.cancel_scope.cancel()
-
-
-USUAL_PATIENCE = DrivingPatience()
-NOTHING_SAID = RobotOverrides()
 
 
 @asynccontextmanager

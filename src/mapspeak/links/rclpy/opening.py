@@ -7,11 +7,9 @@ from types import MappingProxyType
 from mapspeak.errors import ConfigError
 from mapspeak.ros import RosConnection
 from mapspeak.ros.discovery import RobotOverrides
-from mapspeak.ros.robot import RosRobot, build_ros_robot
+from mapspeak.ros.robot import NOTHING_SAID, USUAL_PATIENCE, RosRobot, build_ros_robot
 from mapspeak.ros.robot.driving import DrivingPatience
 
-USUAL_PATIENCE = DrivingPatience()
-NOTHING_SAID = RobotOverrides()
 NO_VARIABLES: Mapping[str, str] = MappingProxyType({})
 HINT = (
     "Source ROS 2 (`source /opt/ros/$ROS_DISTRO/setup.sh`) and start mapspeak with its Python, or "

@@ -27,7 +27,7 @@ from mapspeak.ros import ActionEnd, ActionGoal, LinkName, OwnEnds, new_id
 from mapspeak.ros.discovery import RobotOverrides
 from mapspeak.ros.link import NOTICE_S, plain_errors
 from mapspeak.ros.messages import Message
-from mapspeak.ros.robot import RosRobot, build_ros_robot
+from mapspeak.ros.robot import NOTHING_SAID, USUAL_PATIENCE, RosRobot, build_ros_robot
 from mapspeak.ros.robot.driving import DrivingPatience
 
 logger = logging.getLogger(__name__)
@@ -308,10 +308,6 @@ async def open_client(
                 with anyio.CancelScope(shield=True):
                     await client.aclose()
                 tasks.cancel_scope.cancel()
-
-
-USUAL_PATIENCE = DrivingPatience()
-NOTHING_SAID = RobotOverrides()
 
 
 @asynccontextmanager

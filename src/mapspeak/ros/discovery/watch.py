@@ -44,18 +44,17 @@ class Liveness:
         fetch = connection.fetch_subscribers if is_heard else connection.fetch_publishers
         # For us and other clients rosbridge listens to all sorts of topics, and serves none.
         is_own = own.node and (is_heard or topic in own.publishes)
-        found = await _ask(fetch, topic)
+        found = await _ask(fetch(topic))
         if found is None:
             return
         if not [node for node in found if not (is_own and node.endswith(f"/{own.node}"))]:
             self.dead |= {topic}
 
 
-async def _ask(
-    fetch: Callable[[str], Awaitable[tuple[str, ...]]], topic: str
-) -> tuple[str, ...] | None:
+async def _ask(question: Awaitable[tuple[str, ...]]) -> tuple[str, ...] | None:
+    """Return an answer; None where the robot does not give it."""
     try:
-        return await fetch(topic)
+        return await question
     except LinkError:
         return None
 
@@ -145,7 +144,8 @@ async def look_at_robot(
         LinkError: rosapi is missing, and robot.yaml does not say which ROS it is.
     """
     graph = await _fetch_graph(connection, overrides)
-    services = await _fetch_services(connection) if graph.types else None
+    listed = await _ask(connection.fetch_services()) if graph.types else None
+    services = None if listed is None else frozenset(listed)
     profile = await _choose_alive(connection, graph, overrides, frames, services)
     names = frozenset(graph.types) | frozenset(graph.actions) | (services or frozenset())
     if profile.radius_source or not graph.types:
@@ -194,13 +194,6 @@ async def _fetch_graph(connection: RosConnection, overrides: RobotOverrides) -> 
             raise
         return RosGraph(dialect=said)
     return graph if said is None else replace(graph, dialect=said)
-
-
-async def _fetch_services(connection: RosConnection) -> frozenset[str] | None:
-    try:
-        return frozenset(await connection.fetch_services())
-    except LinkError:
-        return None
 
 
 FRAMES_S = 2.0
