@@ -41,7 +41,7 @@ SOURCES = {
     ),
 }
 """Where the messages of each group are written, below src/mapspeak."""
-ERRORS = {"ConfigError", "LinkError", "MapError", "GoalError", "PolicyError", "Refused"}
+ERRORS = {"ConfigError", "LinkError", "MapError", "GoalError", "PolicyError", "refuse"}
 LEFT_OUT = "…"
 LEAST_WORDS = 3
 TABLE = re.compile(r"(?<=<!-- tools -->\n).*?(?=<!-- /tools -->)", re.DOTALL)
@@ -92,7 +92,7 @@ def _messages(group: str) -> Iterator[tuple[str, str]]:
             for node in ast.walk(tree):
                 if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ERRORS:
                     named = {each.arg: each.value for each in node.keywords}
-                    said = node.args[0] if node.args else named.get("reason")
+                    said = node.args[0] if node.args else None
                     told = _say(said, texts), _say(named.get("hint"), texts)
                     if all(len(re.findall(r"[a-z]{2,}", text)) >= LEAST_WORDS for text in told):
                         yield told

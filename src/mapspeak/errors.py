@@ -27,6 +27,8 @@ class NextStep(StrEnum):
     WAIT_OR_STOP = "wait_or_stop"
     DRIVE_FIRST = "drive_first"
     DRIVE_AGAIN = "drive_again"
+    DRIVE_ROUND = "drive_round"
+    USE_OTHER_TOOLS = "use_other_tools"
     BEGIN_ROUTE = "begin_route"
 
 

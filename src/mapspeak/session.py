@@ -19,7 +19,7 @@ from mapspeak.driving.stops import Lease
 from mapspeak.errors import LinkError, MapError, MapspeakError, SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.memory import PictureBook, SemanticMap, SemanticMapStore
-from mapspeak.memory.alignment import MapComparison, MapKeeper, MapRelation, say_comparison
+from mapspeak.memory.alignment import MapComparison, MapKeeper
 from mapspeak.memory.episodes import (
     EpisodePage,
     EpisodeQuery,
@@ -254,19 +254,27 @@ class Session:
         if self.diary.is_kept:
             await self.compute(self.recollector.keep)
 
-    async def keep_map(self) -> str:
-        """Keep the map with the memory after a write; return what a reader should hear of it."""
+    async def keep_map(self) -> MapComparison | None:
+        """Keep the map with the memory after a write; return how it lies on the one before.
+
+        Raises:
+            SemanticMapError: The map cannot be kept or compared.
+        """
         try:
             grid = await self.robot.fetch_map()
         except LinkError:
-            return ""
+            return None
         if not grid.cells.size:
-            return ""
-        return await self.compute(lambda: _said_of(self.keeper.keep, grid))
+            return None
+        return await self.compute(lambda: self.keeper.keep(grid))
 
-    async def find_map_warning(self, grid: OccupancyGrid) -> str:
-        """Say so where the memory belongs to another map, or to this one before it moved."""
-        return await self.compute(lambda: _said_of(self.keeper.compare, grid))
+    async def compare_map(self, grid: OccupancyGrid) -> MapComparison | None:
+        """Return how a map lies on the one that the memory belongs to; None where that has none.
+
+        Raises:
+            SemanticMapError: The maps cannot be compared.
+        """
+        return await self.compute(lambda: self.keeper.compare(grid))
 
     async def find_goal(
         self, *, place: str | None, x: float | None, y: float | None, yaw_deg: float | None
@@ -382,19 +390,3 @@ def _prepare(world: WorldModel) -> None:
     """Make what the first question would: things, their index, what speaks against them."""
     world.recollection.prepare()
     _ = world.judge
-
-
-def _said_of(compare: Callable[[OccupancyGrid], MapComparison | None], grid: OccupancyGrid) -> str:
-    """Return what a comparison of maps gives a reader to do; empty where all is well."""
-    try:
-        comparison = compare(grid)
-    except SemanticMapError as error:
-        return str(error)
-    if comparison is None or comparison.relation is MapRelation.SAME:
-        return ""
-    next_step = {
-        MapRelation.MOVED: "Remembered poses are off by as much: realign_memory moves them.",
-        MapRelation.OTHER: "Remembered poses mean nothing here: another memory belongs to it.",
-    }
-    unsure = "Remembered poses may be off: let the robot see more, then call realign_memory."
-    return f"{say_comparison(comparison)} {next_step.get(comparison.relation, unsure)}"

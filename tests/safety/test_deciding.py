@@ -82,8 +82,8 @@ def test_a_read_only_policy_refuses_everything(command: Command) -> None:
 def test_a_hold_refuses_everything_and_names_how_it_is_lifted(command: Command) -> None:
     decision = decide(command, policy=Policy(), situation=Situation(held_by="a person"))
     assert isinstance(decision, Refused)
-    assert "a person" in decision.reason
-    assert shell_command("release") in decision.hint
+    assert "a person" in decision.error.message
+    assert shell_command("release") in decision.error.hint
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda each: each.kind)
@@ -94,7 +94,7 @@ def test_more_commands_in_a_minute_than_allowed_are_refused_with_both_numbers(
     assert decide(command, policy=policy, situation=Situation(n_in_last_minute=6)) == Allowed()
     decision = decide(command, policy=policy, situation=Situation(n_in_last_minute=7))
     assert isinstance(decision, Refused)
-    assert "7" in decision.reason
+    assert "7" in decision.error.message
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda each: each.kind)
@@ -117,14 +117,14 @@ def test_a_goal_that_is_no_goal_is_refused(verdict: GoalVerdict) -> None:
     command = drive(verdict, path_m=None)
     decision = decide(command, policy=Policy(), situation=NOW)
     assert isinstance(decision, Refused)
-    assert decision.reason == say_check(command.check)
+    assert decision.error.message == say_check(command.check)
 
 
 def test_the_time_of_a_hold_is_told_to_the_second() -> None:
     held = Situation(held_by="`mapspeak stop`, at 2026-11-22 10:00:01.123456")
     decision = decide(drive(), policy=Policy(), situation=held)
     assert isinstance(decision, Refused)
-    assert decision.reason == "The robot is held: `mapspeak stop`, at 2026-11-22 10:00:01."
+    assert decision.error.message == "The robot is held: `mapspeak stop`, at 2026-11-22 10:00:01."
 
 
 def test_goals_without_a_known_way_can_be_allowed_but_never_closed_ones() -> None:
@@ -139,8 +139,8 @@ def test_goals_without_a_known_way_can_be_allowed_but_never_closed_ones() -> Non
 def test_a_goal_that_is_too_far_is_refused_with_both_lengths() -> None:
     decision = decide(drive(path_m=30.0), policy=Policy(farthest_m=20.0), situation=NOW)
     assert isinstance(decision, Refused)
-    assert "30.0 m" in decision.reason
-    assert "20.0 m" in decision.reason
+    assert "30.0 m" in decision.error.message
+    assert "20.0 m" in decision.error.message
 
 
 @pytest.mark.parametrize(
@@ -164,7 +164,7 @@ def test_a_velocity_above_the_limit_is_refused_with_number_and_unit(
 ) -> None:
     decision = decide(velocity(message), policy=Policy(), situation=NOW)
     assert isinstance(decision, Refused)
-    assert says in decision.reason
+    assert says in decision.error.message
 
 
 def test_a_velocity_hidden_deep_in_a_message_is_refused_unread() -> None:
@@ -200,7 +200,7 @@ def test_exactly_the_velocities_within_the_limits_pass(x: float, y: float, turn:
 def test_what_would_go_around_the_policy_is_denied_by_default(command: Command) -> None:
     decision = decide(command, policy=Policy(), situation=NOW)
     assert isinstance(decision, Refused)
-    assert "denies" in decision.reason
+    assert "denies" in decision.error.message
 
 
 DENIED: dict[CommandKind, tuple[str, ...]] = {
@@ -266,7 +266,7 @@ def test_the_usual_denials_know_what_stock_robots_call_it(kind: CommandKind, nam
     refused = refusal_of(named(kind, name), Policy())
     assert refused is not None
     assert refused.rule == f"{kind}.usual_denials"
-    assert "()" not in refused.reason
+    assert "()" not in refused.error.message
 
 
 @pytest.mark.parametrize(
@@ -313,11 +313,11 @@ def test_an_action_that_does_not_drive_the_base_is_allowed(type_name: str) -> No
 def test_a_refusal_says_its_key_and_how_this_one_name_is_opened() -> None:
     refused = refusal_of(named(CommandKind.ACT, "/spin"), Policy())
     assert refused is not None
-    assert refused.reason == (
+    assert refused.error.message == (
         "The policy denies this: send a goal to /spin (act.usual_denials: *spin*)."
     )
-    assert '`act: {allow: ["*", "/spin"]}`' in refused.hint
-    assert "--policy" in refused.hint
+    assert '`act: {allow: ["*", "/spin"]}`' in refused.error.hint
+    assert "--policy" in refused.error.hint
 
 
 def test_a_name_that_is_allowed_in_full_is_free_of_the_usual_denials() -> None:
@@ -346,8 +346,8 @@ def test_a_denial_of_ones_own_says_its_key(patterns: Patterns, key: str) -> None
     refused = refusal_of(velocity({}, topic="/lamp"), policy)
     assert refused is not None
     assert refused.rule == key
-    assert f"({key}: " in refused.reason
-    assert f"change {key}" in refused.hint
+    assert f"({key}: " in refused.error.message
+    assert f"change {key}" in refused.error.hint
 
 
 def test_only_what_is_allowed_passes_and_a_denial_is_stronger() -> None:

@@ -355,8 +355,7 @@ class DriveBook:
         goals = await self._robot.fetch_foreign_goals()
         if goals:
             raise GoalError(
-                f"navigate_to has sent the robot nowhere, but it follows another goal: "
-                f"{', '.join(goals)}.",
+                f"The robot follows a goal that was not sent from here: {', '.join(goals)}.",
                 hint="Wait for its end, or end it.",
                 step=NextStep.WAIT_OR_STOP,
             )
@@ -367,7 +366,7 @@ class DriveBook:
             return drive
         if not self._drives:
             raise GoalError(
-                "navigate_to has sent the robot nowhere yet.",
+                "The robot was sent nowhere yet.",
                 hint="Send it somewhere first.",
                 step=NextStep.DRIVE_FIRST,
             )

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from mapspeak.errors import GoalError, NextStep, PolicyError
 from mapspeak.hold import say_hold
 from mapspeak.installation import shell_command
 from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, say_check
@@ -42,18 +43,11 @@ class Refused:
 
     Attributes:
         rule: The rule's key in policy.yaml, or what else is against it.
-        reason: What is wrong, with the number and the unit.
-        hint: What could be done instead.
+        error: What whoever gave the command is told.
     """
 
     rule: str
-    reason: str
-    hint: str
-
-    @property
-    def is_of_the_goal(self) -> bool:
-        """True when another goal may be allowed now, and False when no command would be."""
-        return self.rule.startswith("goals")
+    error: GoalError | PolicyError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,6 +81,12 @@ class Situation:
     objection: Refused | None = None
 
 
+def refuse(message: str, *, rule: str, hint: str, step: NextStep | None = None) -> Refused:
+    """Return a refusal; of a goal where another one may be allowed."""
+    kind = GoalError if rule.startswith("goals") else PolicyError
+    return Refused(rule=rule, error=kind(message, hint=hint, step=step))
+
+
 def decide(command: Command, *, policy: Policy, situation: Situation) -> Decision:
     """Decide on a command."""
     refusals = (
@@ -107,15 +107,15 @@ def decide(command: Command, *, policy: Policy, situation: Situation) -> Decisio
 
 def _against_everything(policy: Policy, situation: Situation) -> Refused | None:
     if policy.is_read_only:
-        return Refused(
+        return refuse(
+            "The policy is read-only: nothing may move or change.",
             rule="read_only",
-            reason="The policy is read-only: nothing may move or change.",
             hint="Look, measure and remember what you see; a person can change policy.yaml.",
         )
     if situation.held_by is not None:
-        return Refused(
+        return refuse(
+            f"The robot is held: {say_hold(situation.held_by)}.",
             rule="hold",
-            reason=f"The robot is held: {say_hold(situation.held_by)}.",
             hint=f"Tell the person at the robot: `{shell_command('release')}` lets it drive again.",
         )
     return None
@@ -139,11 +139,11 @@ def _against_name(command: Command, policy: Policy) -> Refused | None:
     if denial.key == "usual_denials":
         opened = json.dumps([*patterns.allow, name], ensure_ascii=False)
         how = f"open this one name: `{command.kind}: {{allow: {opened}}}`"
-    return Refused(
+    return refuse(
+        f"The policy denies this: {say_command(command)} ({key}: {said}).",
         rule=key,
-        reason=f"The policy denies this: {say_command(command)} ({key}: {said}).",
-        hint="To drive use navigate_to, to stop stop_robot. In the file given to mapspeak with "
-        f"--policy a person can {how}.",
+        hint=f"In the file given to mapspeak with --policy a person can {how}.",
+        step=NextStep.USE_OTHER_TOOLS,
     )
 
 
@@ -172,22 +172,19 @@ def judge_check(check: GoalCheck, policy: Policy) -> Refused | None:
     """Return what is against a goal by what the map says of it; None when nothing is."""
     always = (GoalVerdict.NOT_FINITE, GoalVerdict.CLOSED)
     if not check.is_ok and (policy.needs_known_way or check.verdict in always):
-        return Refused(rule="goals", reason=say_check(check), hint=_what_instead(check))
+        near = check.nearest
+        if near is not None:
+            hint = f"The nearest pose that works is x={near.x:.2f}, y={near.y:.2f}."
+            return refuse(say_check(check), rule="goals", hint=hint)
+        hint = "No place near it works either."
+        return refuse(say_check(check), rule="goals", hint=hint, step=NextStep.CHOOSE_ON_MAP)
     if check.path_m is not None and check.path_m > policy.farthest_m:
-        return Refused(
+        return refuse(
+            f"The goal is {check.path_m:.1f} m away, the policy allows {policy.farthest_m:.1f} m.",
             rule="goals.farthest_m",
-            reason=f"The goal is {check.path_m:.1f} m away, the policy allows "
-            f"{policy.farthest_m:.1f} m.",
             hint="Choose a nearer goal, and go on from there.",
         )
     return None
-
-
-def _what_instead(check: GoalCheck) -> str:
-    near = check.nearest
-    if near is None:
-        return "No place near it works either; call look_at_map and choose another one."
-    return f"The nearest pose that works is x={near.x:.2f}, y={near.y:.2f}."
 
 
 def _against_speed(command: Command, policy: Policy) -> Refused | None:
@@ -203,9 +200,9 @@ def _against_speed(command: Command, policy: Policy) -> Refused | None:
         most: float = getattr(policy.speeds, key)
         # Written so that what is no number is refused too.
         if not speed <= most:
-            return Refused(
+            return refuse(
+                f"{name} of {speed:g} {unit} is above the limit, {most:g} {unit}.",
                 rule=f"speed.{key}",
-                reason=f"{name} of {speed:g} {unit} is above the limit, {most:g} {unit}.",
                 hint=f"Publish at most {most:g} {unit}; a person can change speed.{key} in "
                 "policy.yaml.",
             )
@@ -247,9 +244,9 @@ def _against_rate(command: Command, policy: Policy, situation: Situation) -> Ref
     if most is None or situation.n_in_last_minute < most:
         return None
     key = f"rates.{RATE_KEYS[command.kind]}"
-    return Refused(
-        rule=key,
-        reason=f"{situation.n_in_last_minute} commands of the kind {command.kind} were given in "
+    return refuse(
+        f"{situation.n_in_last_minute} commands of the kind {command.kind} were given in "
         f"the last minute, the policy allows {most}.",
+        rule=key,
         hint=f"Wait, or do more with each command; a person can change {key} in policy.yaml.",
     )

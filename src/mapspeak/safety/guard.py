@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 
-from mapspeak.errors import GoalError, PolicyError
+from mapspeak.errors import PolicyError
 from mapspeak.hold import Hold
 from mapspeak.installation import shell_command
 from mapspeak.safety.approvals import Approvals, Errand, Errands, current_errand
@@ -124,9 +124,8 @@ class Guard:
         verdict, said = _say_decision(decision)
         self._note("decision", permit, robot_s=robot_s, verdict=verdict, said=said)
         match decision:
-            case Refused(reason=reason, hint=hint):
-                kind_of_error = GoalError if decision.is_of_the_goal else PolicyError
-                raise kind_of_error(reason, hint=hint)
+            case Refused(error=error):
+                raise error
             case NeedsApproval(question=question):
                 raise self._ask(command, question, caller)
             case Allowed():
@@ -229,8 +228,8 @@ class Guard:
 
 def _say_decision(decision: Decision) -> tuple[str, str]:
     match decision:
-        case Refused(rule=rule, reason=reason):
-            return "refused", f"{rule}: {reason}"
+        case Refused(rule=rule, error=error):
+            return "refused", f"{rule}: {error.message}"
         case NeedsApproval(question=question):
             return "needs approval", question
         case Allowed(by=by):

@@ -36,7 +36,7 @@ class Mover(StrEnum):
 
 ADVICE = {
     Mover.NAVIGATION: "Lead it round by goals on the way.",
-    Mover.VELOCITY: "Drive it away from there, or use navigate_to, which leads round.",
+    Mover.VELOCITY: "Drive it away from there, or send it to a goal: ways lead round.",
     Mover.OTHERS: "Find out what drives it: another client's goal, or velocities of its own.",
 }
 

@@ -10,7 +10,7 @@ import anyio.to_thread
 from mapspeak.geometry import Pose
 from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, check_goal
 from mapspeak.robot import Robot
-from mapspeak.safety.deciding import MOST_NESTED, Refused, judge_check
+from mapspeak.safety.deciding import MOST_NESTED, Refused, judge_check, refuse
 from mapspeak.safety.detours import plan_legs
 from mapspeak.safety.policy import Policy
 from mapspeak.safety.surveying import Surveyor
@@ -186,17 +186,17 @@ def _number(message: Message, name: str) -> float:
 
 def _refuse_frame(frame: str, map_frame: str) -> Refused:
     said = "no frame" if frame == NO_FRAME else f"the frame {frame[:80]!r}"
-    return Refused(
-        rule="keep_out",
-        reason=f"Areas are closed to the robot, and this goal has a pose in {said}: whether it "
+    return refuse(
+        f"Areas are closed to the robot, and this goal has a pose in {said}: whether it "
         "lies in one of them cannot be known.",
+        rule="keep_out",
         hint=f"Give poses in the frame {map_frame!r}.",
     )
 
 
 def _refuse_many(n_poses: int) -> Refused:
-    return Refused(
+    return refuse(
+        f"This goal has {n_poses} poses; at most {MOST_POSES} are checked.",
         rule="goals",
-        reason=f"This goal has {n_poses} poses; at most {MOST_POSES} are checked.",
         hint="Send it in parts.",
     )

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import anyio
 
-from mapspeak.errors import ConfigError, LinkError, MapspeakError, PolicyError
+from mapspeak.errors import ConfigError, LinkError, MapspeakError, NextStep, PolicyError
 from mapspeak.geometry import Pose
 from mapspeak.hold import say_hold
 from mapspeak.robot import (
@@ -381,7 +381,8 @@ class GuardedRobot:
         self._guard.note_result(permit, "given up: the robot was stopped", robot_s=self.now_s)
         return PolicyError(
             f"The robot was stopped before it could {what}.",
-            hint="Call navigate_to again when it may drive.",
+            hint="Send the goal again when it may drive.",
+            step=NextStep.DRIVE_AGAIN,
         )
 
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import anyio
 
-from mapspeak.errors import LinkError
+from mapspeak.errors import LinkError, NextStep
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import Robot
-from mapspeak.safety.deciding import Refused, find_speeds
+from mapspeak.safety.deciding import Refused, find_speeds, refuse
 from mapspeak.safety.monitor import BRAKING_MPS2, REACTION_S, find_entered
 from mapspeak.safety.planning import Planner
 from mapspeak.safety.surveying import Surveyor
@@ -145,13 +145,10 @@ class HandDriving:
         )
 
 
-def refuse_velocity(reason: str) -> Refused:
+def refuse_velocity(message: str) -> Refused:
     """Return the refusal of a velocity for where it leads."""
-    return Refused(
-        rule="keep_out",
-        reason=reason,
-        hint="Publish a velocity that leads away, or use navigate_to, which leads round.",
-    )
+    hint = "Publish a velocity that leads away."
+    return refuse(message, rule="keep_out", hint=hint, step=NextStep.DRIVE_ROUND)
 
 
 def zero_velocity_of(message: Message) -> dict[str, Any]:

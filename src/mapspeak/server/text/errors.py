@@ -15,6 +15,8 @@ STEPS = {
     NextStep.WAIT_OR_STOP: "{hint} with stop_robot.",
     NextStep.DRIVE_FIRST: "Call navigate_to first.",
     NextStep.DRIVE_AGAIN: "Call navigate_to again when it may drive.",
+    NextStep.DRIVE_ROUND: "{hint}, or use navigate_to, which leads round.",
+    NextStep.USE_OTHER_TOOLS: "To drive use navigate_to, to stop stop_robot. {hint}.",
     NextStep.BEGIN_ROUTE: "Call follow_route with its stops.",
 }
 """What is said instead of a hint in plain words, with or without it."""

@@ -1,8 +1,10 @@
 """Maps in words: what a region is, what is odd about a map's files, how one map lies on another."""
 
 import math
+from collections.abc import Awaitable
 
-from mapspeak.memory.alignment import RealignReceipt, say_comparison
+from mapspeak.errors import SemanticMapError
+from mapspeak.memory.alignment import MapComparison, MapRelation, RealignReceipt, say_comparison
 from mapspeak.spatial.mapfiles import MapFileWarning, MapOddity
 from mapspeak.spatial.rooms import Region, RoomClass
 
@@ -38,6 +40,24 @@ def say_map_warning(warning: MapFileWarning) -> str:
                 "No cell of the map is free. Check negate and the thresholds: with negate: 0 "
                 "white is free."
             )
+
+
+async def say_moved(comparing: Awaitable[MapComparison | None]) -> str:
+    """Say what to do where the memory belongs to another map; empty where all is well."""
+    try:
+        comparison = await comparing
+    except SemanticMapError as error:
+        return str(error)
+    if comparison is None or comparison.relation is MapRelation.SAME:
+        return ""
+    unsure = "Remembered poses may be off: let the robot see more, then call realign_memory."
+    return f"{say_comparison(comparison)} {AFTER_MOVE.get(comparison.relation, unsure)}"
+
+
+AFTER_MOVE = {
+    MapRelation.MOVED: "Remembered poses are off by as much: realign_memory moves them.",
+    MapRelation.OTHER: "Remembered poses mean nothing here: another memory belongs to it.",
+}
 
 
 def say_receipt(receipt: RealignReceipt) -> str:

@@ -12,6 +12,7 @@ from mapspeak.places.choosing import find_place
 from mapspeak.places.naming import split_room
 from mapspeak.places.recall import RecallQuery, recall
 from mapspeak.server.reports.memory import RecallAnswer, say_reported
+from mapspeak.server.text.maps import say_moved
 from mapspeak.server.text.memory import read_moment
 from mapspeak.server.tools.toolset import Tool, ToolEffect
 from mapspeak.session import Session
@@ -79,7 +80,7 @@ class FindTools:
 
         report = await session.compute(ask)
         await session.keep_vectors()
-        warning = await session.find_map_warning(world.grid)
+        warning = await say_moved(session.compare_map(world.grid))
         if warning:
             report = report.model_copy(update={"warnings": [warning, *report.warnings]})
         return CallToolResult(

@@ -9,6 +9,7 @@ from mapspeak.errors import LinkError, MapError
 from mapspeak.server.mapview.representations import Representation, show
 from mapspeak.server.reports.robot import PoseAnswer
 from mapspeak.server.text.look import Layer, Up, look_at, view_of
+from mapspeak.server.text.maps import say_moved
 from mapspeak.server.tools.sightings import look_ahead
 from mapspeak.server.tools.toolset import Tool, ToolEffect
 from mapspeak.session import Session
@@ -85,7 +86,7 @@ class LookTools:
         )
         shown = await self._session.compute(lambda: show(view, self._representation))
         pictures = [] if shown.png is None else [Image(data=shown.png, format="png")]
-        warning = await self._session.find_map_warning(world.grid)
+        warning = await say_moved(self._session.compare_map(world.grid))
         text = f"Warning: {warning}\n{shown.text}" if warning else shown.text
         return [text, *pictures]
 

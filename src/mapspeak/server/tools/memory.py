@@ -21,7 +21,7 @@ from mapspeak.memory.events import is_name_of_robot
 from mapspeak.memory.things import name_the_same
 from mapspeak.places import notices
 from mapspeak.places.recall import find_nearby
-from mapspeak.server.text.maps import say_receipt
+from mapspeak.server.text.maps import say_moved, say_receipt
 from mapspeak.server.text.memory import (
     AHEAD,
     PAST,
@@ -116,7 +116,7 @@ class MemoryTools:
         """
         world = await self._session.fetch_world_model(needs_memory=True)
         text = await self._session.compute(lambda: describe_check(world, first=from_row))
-        warning = await self._session.find_map_warning(world.grid)
+        warning = await say_moved(self._session.compare_map(world.grid))
         return f"Warning: {warning}\n{text}" if warning else text
 
     async def recall_episodes(

@@ -15,6 +15,7 @@ from mapspeak.places.recall import find_speaking_places
 from mapspeak.robot import PoseDoubt
 from mapspeak.server.mapview.drawing import say_axes, say_plain
 from mapspeak.server.reports.robot import MemoryAnswer, WriteAnswer
+from mapspeak.server.text.maps import say_moved
 from mapspeak.server.text.memory import say_far
 from mapspeak.server.text.recall import say_advice
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
@@ -165,7 +166,7 @@ class PaperTools:
         )
         kept = await self._session.compute(lambda: self._session.diary.keep_record(waypoint))
         unsure = say_pose_doubt(doubt) if pose.point == here.point else ""
-        far, moved = await self._say_far(receipt), await self._session.keep_map()
+        far, moved = await self._say_far(receipt), await say_moved(self._session.keep_map())
         places = await self._session.compute(self._session.memory.read)
         told, refused = filter(None, (*far, unsure, kept.fault, moved)), annotator.refused
         return WriteAnswer.of(receipt, places, merge=merge, refused=refused, warnings=(*told,))
