@@ -55,7 +55,6 @@ class RouteStop:
     """One stop of a route.
 
     Attributes:
-        words: As it was asked for.
         goal: What it is taken for.
         leg_m: The path to it from the stop before, as planned.
         state: How it stands.
@@ -63,7 +62,6 @@ class RouteStop:
             the drive there ended.
     """
 
-    words: str
     goal: StopCandidate
     leg_m: float
     state: StopState = StopState.AHEAD
@@ -131,8 +129,8 @@ class RouteBook:
             await self._give_up()
             self._plan = plan
             self._stops = [
-                RouteStop(words=words, goal=goal, leg_m=leg_m)
-                for words, goal, leg_m in zip(plan.stops, plan.chosen, plan.legs_m, strict=True)
+                RouteStop(goal=goal, leg_m=leg_m)
+                for goal, leg_m in zip(plan.chosen, plan.legs_m, strict=True)
             ]
             self._pause_s, self._is_looking, self._pause_until_s = pause_s, is_looking, None
 

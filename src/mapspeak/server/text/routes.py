@@ -13,12 +13,12 @@ def say_route(progress: RouteProgress) -> str:
         return f"No stop is left{left_out}."
     if progress.number is None:
         return _say_driving(progress)
-    number, stop = progress.number + 1, progress.stops[progress.number]
+    number, words = progress.number + 1, progress.plan.stops[progress.number]
     if progress.state is RouteState.AT_STOP:
-        return f"The robot stands at stop {number}, {stop.words}."
+        return f"The robot stands at stop {number}, {words}."
     if progress.ended is not None:
         return progress.ended.reason or f"The drive to stop {number} was {progress.ended.state}."
-    return f"Stop {number}, {stop.words}: {say_obstacle(stop)}"
+    return f"Stop {number}, {words}: {say_obstacle(progress.stops[progress.number])}"
 
 
 def _say_driving(progress: RouteProgress) -> str:
