@@ -18,8 +18,8 @@ from benchmarks.relations.sites import Site, build_sites
 from benchmarks.relations.truth import Truth, angle_off
 from mapspeak.errors import GoalError
 from mapspeak.memory import SemanticMap
-from mapspeak.places.choosing import CheckedGoal, check_place, find_place
 from mapspeak.places.naming import Place
+from mapspeak.places.relations.choosing import CheckedGoal, check_place, find_place
 from mapspeak.worldmodel.model import WorldModel
 
 __all__ = ["main", "measure"]

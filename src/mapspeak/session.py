@@ -30,7 +30,7 @@ from mapspeak.memory.episodes import (
 )
 from mapspeak.memory.events import Event
 from mapspeak.memory.search import Embedder, find_model
-from mapspeak.places.choosing import CheckedGoal, choose_goal
+from mapspeak.places.relations.choosing import CheckedGoal, choose_goal
 from mapspeak.robot import CameraPicture, Robot
 from mapspeak.ros import RosConnection, started_over
 from mapspeak.safety import Guard, GuardedConnection, GuardedRobot, Surveyor, WhenBusy

@@ -19,12 +19,12 @@ from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMap, SemanticMapStore, Waypoint
 from mapspeak.memory.events import Effect
-from mapspeak.places.choosing import check_place, find_place
 from mapspeak.places.goalcheck import GoalVerdict, say_check
-from mapspeak.places.notices import (
+from mapspeak.places.recall.notices import (
     close_floor_of,
     say_consequences,
 )
+from mapspeak.places.relations.choosing import check_place, find_place
 from mapspeak.safety import Policy, Surveyor
 from mapspeak.server.text.exploration import say_progress
 from mapspeak.server.text.frontiers import say_refusal

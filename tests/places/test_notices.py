@@ -11,7 +11,7 @@ from closing import EAST, LATER, NOW, WEST, event, goes_north, revision_with, wo
 from mapspeak.errors import GoalError, SemanticMapError
 from mapspeak.memory import SemanticMapStore
 from mapspeak.memory.events import Effect
-from mapspeak.places.notices import (
+from mapspeak.places.recall.notices import (
     close_floor_of,
     end_event,
     find_hindrances,

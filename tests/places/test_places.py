@@ -8,8 +8,8 @@ from fakes import two_rooms
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import SemanticMap, Waypoint
-from mapspeak.places.choosing import check_place, choose_goal, find_place
 from mapspeak.places.naming import Place, Spot, is_taken_name
+from mapspeak.places.relations.choosing import check_place, choose_goal, find_place
 from mapspeak.places.ways import find_way
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.worldmodel.model import WorldModel

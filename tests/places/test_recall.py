@@ -11,9 +11,9 @@ from mapspeak.errors import ConfigError, GoalError
 from mapspeak.geometry import Point
 from mapspeak.memory import Landmark, SemanticMap, Waypoint
 from mapspeak.memory.search import Basis, EntryKind, Verdict
-from mapspeak.places.choosing import check_place, find_place
 from mapspeak.places.naming import AmbiguousPlaceError
 from mapspeak.places.recall import RecallDoubt, RecallQuery, recall
+from mapspeak.places.relations.choosing import check_place, find_place
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import Recollector
 from remembering import EXTINGUISHER, LADDER, ROBOT, look, looks_at, world_of

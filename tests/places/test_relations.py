@@ -9,8 +9,8 @@ from drawing import grid_from_text
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory import Landmark, SemanticMap, Waypoint
-from mapspeak.places.choosing import check_place, find_place
 from mapspeak.places.naming import Place
+from mapspeak.places.relations.choosing import check_place, find_place
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.rooms import Door
 from mapspeak.worldmodel.model import WorldModel

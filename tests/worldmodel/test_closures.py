@@ -5,8 +5,8 @@ from drawing import grid_from_text, text_from_grid
 from guarding import corners
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import SemanticMap
-from mapspeak.places.choosing import check_place, find_place
 from mapspeak.places.goalcheck import GoalVerdict, check_goal, say_check
+from mapspeak.places.relations.choosing import check_place, find_place
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import distances_from
 from mapspeak.worldmodel.closures import MARGIN_M, ClosedArea, close_floor

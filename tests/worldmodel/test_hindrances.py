@@ -8,11 +8,11 @@ from closing import EAST, NOW, RADIUS_M, WEST, event, goes_north, office, revisi
 from guarding import corners
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory.events import Effect, Event
-from mapspeak.places.choosing import find_place
-from mapspeak.places.notices import (
+from mapspeak.places.recall.notices import (
     close_floor_of,
     say_unplaced,
 )
+from mapspeak.places.relations.choosing import find_place
 from mapspeak.places.ways import find_way
 from mapspeak.safety.detours import plan_legs
 from mapspeak.worldmodel.revision import MapRevision

@@ -8,7 +8,7 @@ import anyio
 import anyio.to_thread
 
 from mapspeak.memory.events import Effect, Event
-from mapspeak.places.notices import (
+from mapspeak.places.recall.notices import (
     close_floor_of,
     find_hindrances,
     say_events,

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point, Pose
-from mapspeak.places.choosing import CheckedGoal, check_place, find_place
 from mapspeak.places.goalcheck import say_refusal
 from mapspeak.places.naming import AmbiguousPlaceError, Place
 from mapspeak.places.relations import Nearest, find_all_near, parse_relation
+from mapspeak.places.relations.choosing import CheckedGoal, check_place, find_place
 from mapspeak.spatial.paths import DistanceField
 from mapspeak.worldmodel.model import WorldModel
 

@@ -13,8 +13,8 @@ from mapspeak.driving.search.seenfloor import REACH_M, SeenFloor
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory import TakenPicture
 from mapspeak.memory.search import Verdict
-from mapspeak.places.choosing import check_place
 from mapspeak.places.naming import Place
+from mapspeak.places.relations.choosing import check_place
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.visibility import cast_rays
 from mapspeak.worldmodel.model import WorldModel

@@ -11,7 +11,6 @@ from itertools import islice
 from mapspeak.geometry import Point
 from mapspeak.memory import Landmark
 from mapspeak.memory.search import Answer, Basis, EntryCandidate, EntryKind, Verdict
-from mapspeak.places.choosing import stand_at
 from mapspeak.places.goalcheck import judge_goal
 from mapspeak.places.naming import Place, split_room
 from mapspeak.places.recall.answer import (
@@ -20,6 +19,7 @@ from mapspeak.places.recall.answer import (
     RecallQuery,
     find_doubt,
 )
+from mapspeak.places.relations.choosing import stand_at
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import Remembered, RememberedPlace, RememberedThing
 

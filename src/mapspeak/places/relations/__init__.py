@@ -2,6 +2,5 @@
 
 from mapspeak.places.relations.grammar import Nearest, parse_relation
 from mapspeak.places.relations.proximity import find_all_near
-from mapspeak.places.relations.relating import find_related
 
-__all__ = ["Nearest", "find_all_near", "find_related", "parse_relation"]
+__all__ = ["Nearest", "find_all_near", "parse_relation"]

@@ -11,8 +11,8 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, Merge, SemanticMap, WriteReceipt, name_key
 from mapspeak.memory.quoting import quote_name
-from mapspeak.places.choosing import CheckedGoal
 from mapspeak.places.goalcheck import GoalVerdict
+from mapspeak.places.relations.choosing import CheckedGoal
 from mapspeak.robot import GoalState, StampedPose
 from mapspeak.server.text.memory import say_landmarks, say_replaced
 from mapspeak.server.text.wording import say_pose, say_pose_doubt

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 
 from mapspeak.memory import group_views
 from mapspeak.memory.quoting import quote
-from mapspeak.places.choosing import CheckedGoal, check_place
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import Place
+from mapspeak.places.relations.choosing import CheckedGoal, check_place
 from mapspeak.places.ways import standing_point
 from mapspeak.server.text.frontiers import say_merits
 from mapspeak.server.text.maps import say_size

@@ -10,8 +10,8 @@ import numpy as np
 
 from mapspeak.driving.exploration.progress import find_refused
 from mapspeak.geometry import Point
-from mapspeak.places.choosing import find_place
 from mapspeak.places.naming import Place
+from mapspeak.places.relations.choosing import find_place
 from mapspeak.spatial.frontiers import Frontier, RefusedFrontier
 from mapspeak.spatial.picture import NORTH_UP_RAD, Zoom
 from mapspeak.spatial.rooms import Door, Region, RoomClass

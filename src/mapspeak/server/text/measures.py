@@ -4,9 +4,9 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from mapspeak.errors import GoalError
-from mapspeak.places.choosing import check_place, find_place
 from mapspeak.places.goalcheck import GoalVerdict, say_check
 from mapspeak.places.naming import Place, Spot
+from mapspeak.places.relations.choosing import check_place, find_place
 from mapspeak.places.ways import Way, find_way, measure_path, standing_point
 from mapspeak.server.text.roomtables import say_sizes
 from mapspeak.server.text.wording import build_table, join_words, say_kind, say_path, say_point

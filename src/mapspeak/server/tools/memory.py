@@ -19,8 +19,7 @@ from mapspeak.memory.episodes import (
 from mapspeak.memory.events import Effect as EventEffect
 from mapspeak.memory.events import is_name_of_robot
 from mapspeak.memory.things import name_the_same
-from mapspeak.places import notices
-from mapspeak.places.recall import find_nearby
+from mapspeak.places.recall import find_nearby, notices
 from mapspeak.server.text.maps import say_moved, say_receipt
 from mapspeak.server.text.memory import (
     AHEAD,

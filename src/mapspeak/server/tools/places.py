@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from mapspeak.places.choosing import check_place, find_place
+from mapspeak.places.relations.choosing import check_place, find_place
 from mapspeak.server.reports.robot import GoalAnswer
 from mapspeak.server.text.descriptions import describe_place
 from mapspeak.server.text.measures import describe_measures

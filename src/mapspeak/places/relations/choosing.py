@@ -16,7 +16,7 @@ from mapspeak.places.naming import (
     place_of,
     say_spot,
 )
-from mapspeak.places.relations import find_related
+from mapspeak.places.relations.relating import find_related
 from mapspeak.places.standing import (
     arrival_pose,
     choose_crossing,

@@ -16,8 +16,8 @@ from mapspeak.memory.events import (
     find_place_ids,
     gives_orders,
 )
-from mapspeak.places.choosing import find_place
 from mapspeak.places.naming import Place, Spot
+from mapspeak.places.relations.choosing import find_place
 from mapspeak.spatial.rooms import Door, Region, RoomMap
 from mapspeak.worldmodel.closures import (
     ClosedArea,
