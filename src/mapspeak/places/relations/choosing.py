@@ -53,29 +53,33 @@ class CheckedGoal:
     """A pose to drive to, judged against the map.
 
     Attributes:
-        name: Such as "R3" or "(1.20, -3.40)".
+        place: What is meant.
         pose: Where to stand.
         check: What is to be said of it.
-        reason: Why there, where words had to be read for it; else empty.
         comes_straight_on: Nobody asked for a heading: it is that of the way from the robot.
     """
 
-    name: str
+    place: Place
     pose: Pose
     check: GoalCheck
-    reason: str = ""
     comes_straight_on: bool = False
+
+    @property
+    def name(self) -> str:
+        """What the place is called, such as "R3" or "(1.20, -3.40)"."""
+        return self.place.name
 
     @property
     def title(self) -> str:
         """What the drive there is called: the id of what has one, else the name with its reason."""
-        is_told = self.reason and not is_taken_name(self.name)
-        return f"{self.name}: {self.reason}" if is_told else self.name
+        reason = self.place.reason
+        is_told = reason and not is_taken_name(self.name)
+        return f"{self.name}: {reason}" if is_told else self.name
 
     @property
     def sentence(self) -> str:
         """Why there, and what is to be said of it."""
-        return "; ".join(filter(None, (self.reason, say_check(self.check))))
+        return "; ".join(filter(None, (self.place.reason, say_check(self.check))))
 
 
 def choose_goal(
@@ -123,7 +127,7 @@ def check_place(world: WorldModel, place: Place, *, yaw_deg: float | None = None
     if check.nearest is not None and is_free:
         check = replace(check, nearest=arrival_pose(world, check.nearest.point))
     straight_on = is_free and not isinstance(place.thing, Region)
-    return CheckedGoal(place.name, pose, check, place.reason, straight_on)
+    return CheckedGoal(place, pose, check, straight_on)
 
 
 def _has_heading(place: Place) -> bool:
