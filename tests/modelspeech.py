@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from mapspeak.evaluation.agents.models.mock import Move
+from mapspeak.evaluation.agents.models.mind import Move
 from modelserver import (
     N_CACHED,
     N_READ,

@@ -23,8 +23,6 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.robot import GoalState, GoalStatus, PoseDoubt, Robot
 from mapspeak.safety import WhenBusy
 
-__all__ = ["Drive", "DriveBook", "DriveReport"]
-
 POLL_S = 0.2
 PROGRESS_S = 1.0
 N_KEPT = 200

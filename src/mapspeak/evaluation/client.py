@@ -10,16 +10,6 @@ from mcp_types import CallToolResult, ImageContent, TextContent, Tool
 
 from mapspeak.errors import LinkError, MapspeakError
 
-__all__ = [
-    "CallRecord",
-    "Ledger",
-    "OutOfBudgetError",
-    "Picture",
-    "ToolAnswer",
-    "ToolClient",
-    "Witness",
-]
-
 
 class OutOfBudgetError(MapspeakError):
     """A call would have gone beyond what was allowed; whoever gave the limits catches it."""

@@ -8,8 +8,6 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["DetectedThing", "describe_view", "read_sightings"]
-
 SIGHTING = re.compile(
     r"^- (?P<label>[^,]+), bearing (?P<bearing>[+-]?[\d.]+) deg, range (?P<range>[\d.]+) m",
     re.MULTILINE,

@@ -12,8 +12,6 @@ from mapspeak.errors import MapError
 from mapspeak.geometry import Pose
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 
-__all__ = ["MapReading", "Row", "read_map_picture", "read_map_text"]
-
 UNKNOWN_GREY = 127
 
 POSE = re.compile(r"Robot: x (-?[\d.]+), y (-?[\d.]+), yaw (-?[\d.]+) deg")

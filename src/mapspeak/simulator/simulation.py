@@ -29,8 +29,6 @@ from mapspeak.simulator.worlds.slices import slice_world
 from mapspeak.simulator.worlds.world import BODY_BAND_M, World
 from mapspeak.spatial import OccupancyGrid
 
-__all__ = ["TICK_S", "CameraShot", "Simulation"]
-
 TICK_S = 0.05
 _TICKS_PER_SCAN = 2
 _DETECTOR_SIZE_PX = (320, 240)

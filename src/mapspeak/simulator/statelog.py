@@ -9,8 +9,6 @@ from mapspeak.errors import ConfigError
 from mapspeak.geometry import Pose
 from mapspeak.simulator.simulation import Simulation
 
-__all__ = ["StateLog", "StateRecord", "read_state_log"]
-
 PERIOD_S = 0.2
 
 

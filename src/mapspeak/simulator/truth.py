@@ -30,8 +30,6 @@ from mapspeak.simulator.worlds.world import BODY_BAND_M, BODY_RADIUS_M, TrueRoom
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 from mapspeak.spatial.paths import clearance_m
 
-__all__ = ["MeasuredRoom", "TrueFloor", "Truth", "is_in_sight", "slice_at_eye_level"]
-
 Mask = NDArray[np.bool_]
 
 _MARGIN_M = 0.5

@@ -5,7 +5,7 @@ from pathlib import Path
 import anyio
 import pytest
 
-from mapspeak.evaluation.agents.random import RandomAgent
+from mapspeak.evaluation.agents.baselines import RandomAgent
 from mapspeak.evaluation.agents.scripted import ScriptedAgent
 from mapspeak.evaluation.client import ToolClient
 from mapspeak.evaluation.runs.inspecting import open_inspection

@@ -10,8 +10,6 @@ from mapspeak.evaluation.observer import DetectedThing, read_sightings
 from mapspeak.evaluation.reading import MapReading, read_map_text
 from mapspeak.geometry import Point, Pose
 
-__all__ = ["Seen", "ToolDriver", "find_label"]
-
 WAIT_S = 25.0
 REGION = re.compile(r"\b[RCO]\d+\b")
 FINAL_STATES = ("arrived", "blocked", "cancelled", "preempted", "rejected", "lost")

@@ -17,8 +17,6 @@ from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, Mask
 from mapspeak.spatial.paths import clearance_m, distances_from
 
-__all__ = ["NearestFrontierAgent", "PaperLoopAgent"]
-
 EXPLORING = "Update the map"
 SMALLEST = "Go to the smallest room"
 MOST_GOALS = 120

@@ -5,27 +5,14 @@ from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 
 from mapspeak.errors import ConfigError
+from mapspeak.evaluation.agents.baselines import OracleAgent, RandomAgent
 from mapspeak.evaluation.agents.command import CommandAgent, find_program
 from mapspeak.evaluation.agents.exploring import NearestFrontierAgent, PaperLoopAgent
 from mapspeak.evaluation.agents.models import MockMind, ModelAgent, Thinking
 from mapspeak.evaluation.agents.models.throughinspect import find_client, open_mind
-from mapspeak.evaluation.agents.oracle import OracleAgent
-from mapspeak.evaluation.agents.random import RandomAgent
 from mapspeak.evaluation.agents.scripted import ScriptedAgent
 from mapspeak.evaluation.scores import GroundTruth
 from mapspeak.evaluation.trials import Agent, Setting, Trial
-
-__all__ = [
-    "OTHER_NAMES",
-    "agent_names",
-    "can_think",
-    "check_agent",
-    "check_other",
-    "find_agent",
-    "find_other",
-    "find_versions",
-    "read_thinking",
-]
 
 _NAMES = ("scripted", "oracle", "random")
 MORE = "PROVIDER/MODEL for a model, command:PROGRAM for a client program"

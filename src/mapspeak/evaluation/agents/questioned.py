@@ -7,8 +7,6 @@ from mapspeak.evaluation.reading import MapReading, Row
 from mapspeak.evaluation.trials import AgentEnd, TrialState
 from mapspeak.geometry import Point
 
-__all__ = ["answer_question"]
-
 POINT = re.compile(r"\((-?\d+\.\d+), (-?\d+\.\d+)\)")
 CHOICE = re.compile(r"\b([A-H]) \((-?\d+\.\d+), (-?\d+\.\d+)\)")
 

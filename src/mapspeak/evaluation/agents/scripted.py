@@ -16,8 +16,6 @@ from mapspeak.evaluation.reading import MapReading, Row
 from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess, TrialState
 from mapspeak.geometry import Point, Pose, wrap_angle
 
-__all__ = ["ScriptedAgent"]
-
 NEAR_M = 4.5
 """A place that saw a thing from no farther leads to it."""
 BESIDE_M = 1.5

@@ -13,7 +13,12 @@ from mapspeak.evaluation.inspected.contents import (
     Transforms,
 )
 from mapspeak.evaluation.inspected.drawing import Names, draw_names, draw_system
-from mapspeak.evaluation.inspected.faults import (
+from mapspeak.evaluation.inspected.playing import (
+    Hearing,
+    InspectedSystem,
+    OfferedService,
+    Stream,
+    play,
     with_cut_transform,
     with_dead_stream,
     with_late_stream,
@@ -23,13 +28,6 @@ from mapspeak.evaluation.inspected.faults import (
     with_second_publisher,
     without_hearers,
     without_node,
-)
-from mapspeak.evaluation.inspected.playing import play
-from mapspeak.evaluation.inspected.system import (
-    Hearing,
-    InspectedSystem,
-    OfferedService,
-    Stream,
 )
 
 __all__ = [

@@ -15,8 +15,6 @@ from mapspeak.ros.messages import (
 )
 from mapspeak.spatial import OccupancyGrid
 
-__all__ = ["Beams", "Cells", "Content", "Fields", "Transform", "Transforms"]
-
 
 class Content(Protocol):
     """What a message says."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mapspeak.evaluation.inspected.contents import Beams, Cells, Fields, Transform, Transforms
-from mapspeak.evaluation.inspected.system import (
+from mapspeak.evaluation.inspected.playing import (
     Hearing,
     InspectedSystem,
     OfferedService,
@@ -16,8 +16,6 @@ from mapspeak.evaluation.inspected.system import (
 from mapspeak.geometry import Pose
 from mapspeak.ros.messages import Dialect
 from mapspeak.spatial import OccupancyGrid
-
-__all__ = ["Names", "draw_names", "draw_system"]
 
 SCAN, IMU, ODOMETRY = "sensor_msgs/LaserScan", "sensor_msgs/Imu", "nav_msgs/Odometry"
 SONAR, BATTERY, JOINTS = "sensor_msgs/Range", "sensor_msgs/BatteryState", "sensor_msgs/JointState"

@@ -11,15 +11,20 @@ from importlib import resources
 from pathlib import Path
 from urllib.parse import quote
 
-from mapspeak.evaluation.report.album import Album, count_picture_bytes
-from mapspeak.evaluation.report.course import PICTURES, TURNS, read_course
-from mapspeak.evaluation.report.markup import Html, element, joined, table, text
 from mapspeak.evaluation.report.paper import PAPER_NOTE, PAPER_ROWS, PAPER_TASKS, PaperRow
 from mapspeak.evaluation.report.replay import build_replay, show_standing
+from mapspeak.evaluation.report.way import PICTURES, TURNS, read_course
+from mapspeak.evaluation.report.sheet import (
+    Album,
+    Html,
+    count_picture_bytes,
+    element,
+    joined,
+    table,
+    text,
+)
 from mapspeak.evaluation.scores import Interval, TableRow, count_rows, wilson_interval
 from mapspeak.evaluation.trials import TrialResult, trial_folder
-
-__all__ = ["PAGE_LIMIT_BYTES", "write_page"]
 
 PAGE_LIMIT_BYTES = 24_000_000
 """A page larger than this is slow to open on a phone."""

@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-__all__ = ["PAPER_NOTE", "PAPER_ROWS", "PAPER_TASKS", "PaperRow"]
-
 PAPER_TASKS = ("explore", "smallest-room", "fire-tool")
 """The names of its Tasks 1 to 3 here."""
 

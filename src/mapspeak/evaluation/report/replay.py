@@ -5,13 +5,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mapspeak.evaluation.report.album import Album, find_picture
-from mapspeak.evaluation.report.course import PICTURES, Course
-from mapspeak.evaluation.report.markup import Html, element, joined, text
+from mapspeak.evaluation.report.sheet import Album, find_picture
+from mapspeak.evaluation.report.way import PICTURES, Course
+from mapspeak.evaluation.report.sheet import Html, element, joined, text
 from mapspeak.evaluation.report.way import StepMark, draw_way, lay_out_way
 from mapspeak.evaluation.trials import TrialResult, Turn
-
-__all__ = ["build_replay", "show_standing"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,20 +1,67 @@
 """The way a robot drove, drawn over its map: all of it, the part so far, and where it stood."""
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+from mapspeak.errors import MapError
+from mapspeak.evaluation.trials import Trial, Turn, read_turns, say_fault, trial_folder
+from mapspeak.simulator import StateRecord, read_state_log
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.mapfiles import load_map
+from collections.abc import Sequence
 from itertools import pairwise
-
 import numpy as np
-
-from mapspeak.evaluation.report.album import Album
-from mapspeak.evaluation.report.course import Course
-from mapspeak.evaluation.report.markup import Html, element, joined, text
-from mapspeak.evaluation.report.sheet import Sheet, draw_sheet
+from mapspeak.evaluation.report.sheet import Album, Html, Sheet, draw_sheet, element, joined, text
 from mapspeak.geometry import Pose
 from mapspeak.simulator import StateRecord
 from mapspeak.spatial.grid import FloatArray
 
-__all__ = ["DrivenPath", "StepMark", "Track", "draw_way", "lay_out_way"]
+TURNS = "turns.jsonl"
+STATES = "state.jsonl"
+MAP = "map.yaml"
+PICTURES = "pictures"
+
+_Value = TypeVar("_Value")
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Course:
+    """How a trial went, as far as it can be read.
+
+    Attributes:
+        turns: The conversation.
+        states: The simulator's truth; poses in a map without errors.
+        grid: The robot's map in the end; None where there is none.
+        problems: What could not be read, one sentence each.
+    """
+
+    turns: tuple[Turn, ...]
+    states: tuple[StateRecord, ...]
+    grid: OccupancyGrid | None
+    problems: tuple[str, ...]
+
+
+def read_course(run: Path, trial: Trial) -> Course:
+    """Read how a trial went; what cannot be read is left out and told."""
+    folder = trial_folder(run, trial)
+    states, grid = folder / STATES, folder / MAP
+    problems: list[str] = []
+
+    def attempt(name: str, read: Callable[[], _Value], default: _Value) -> _Value:
+        try:
+            return read()
+        except (OSError, ValueError, TypeError, MapError) as error:
+            problems.append(f"{name} cannot be read: {say_fault(error)}.")
+            return default
+
+    return Course(
+        turns=attempt(TURNS, lambda: read_turns(run, trial), ()),
+        states=attempt(STATES, lambda: read_state_log(states) if states.exists() else (), ()),
+        grid=attempt(MAP, lambda: load_map(grid).grid if grid.exists() else None, None),
+        problems=tuple(problems),
+    )
+
 
 MOST_POINTS = 500
 APART_M = 0.3

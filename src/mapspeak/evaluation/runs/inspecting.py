@@ -17,8 +17,6 @@ from mapspeak.memory import SemanticMapStore
 from mapspeak.server.app import build_server
 from mapspeak.session import Session
 
-__all__ = ["Inspection", "open_inspection", "serve_command"]
-
 ANSWER_WITHIN_S = 120.0
 MEMORY = "semantic_map.yaml"
 

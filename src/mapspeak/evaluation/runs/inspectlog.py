@@ -15,8 +15,6 @@ from typing import Any
 
 from mapspeak.evaluation.trials import Trial, TrialResult, Turn, read_turns, trial_folder
 
-__all__ = ["write_log"]
-
 LOG = "inspect.eval"
 SCORER = "truth"
 RIGHT, WRONG = "C", "I"

@@ -16,8 +16,6 @@ from mapspeak.evaluation.trials import Trial
 from mapspeak.server.mapview.representations import Representation
 from mapspeak.simulator import World, load_world, world_names
 
-__all__ = ["RunOptions", "RunPlan", "plan_run", "prepare_world"]
-
 ALL_WORLDS = "all"
 PLAIN = str(Representation.PICTURE_TABLE)
 SCRIPTED = "scripted"

@@ -8,8 +8,6 @@ from importlib import import_module
 
 from PIL import Image
 
-__all__: list[str] = []
-
 _LATE = (
     "anyio._backends._asyncio",
     "jsonschema",

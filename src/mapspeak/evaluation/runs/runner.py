@@ -41,8 +41,6 @@ from mapspeak.evaluation.trials import (
 )
 from mapspeak.simulator import World
 
-__all__ = ["TrialJob", "make_jobs", "run_evaluation", "run_jobs", "writing_to"]
-
 ERRORS = "errors.txt"
 LOCK = ".run.lock"
 PRELOAD = ("mapspeak.evaluation.runs", "mapspeak.evaluation.runs.preload", "mapspeak.cli")

@@ -27,8 +27,6 @@ from mapspeak.evaluation.scores import TableRow
 from mapspeak.evaluation.tasks import EXPLORE
 from mapspeak.evaluation.trials import TrialResult, Turn
 
-__all__ = ["RunBar", "TrialBar", "announce", "build_table", "say_result", "show_run", "show_trials"]
-
 SHOWN = {
     "coverage_recall": "recall",
     "coverage_known_ratio": "known",

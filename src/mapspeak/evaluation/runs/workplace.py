@@ -15,7 +15,7 @@ from mcp.client.stdio import StdioServerParameters
 
 from mapspeak.evaluation.inspected import InspectedSystem
 from mapspeak.evaluation.runs.inspecting import open_inspection
-from mapspeak.evaluation.scores.evidence import NOWHERE
+from mapspeak.evaluation.scores.answers import NOWHERE
 from mapspeak.evaluation.trials import ServerAccess, Setting, Trial
 from mapspeak.links.simulated import SimulatedRobot, SoloRobot
 from mapspeak.memory import SemanticMapStore
@@ -27,8 +27,6 @@ from mapspeak.simulator import Simulation, StateLog, StateRecord, World
 from mapspeak.simulator.worlds.worldfiles import write_with_more
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import MapMode, load_map, write_map
-
-__all__ = ["Workplace", "Workshop", "open_workplace"]
 
 ANSWER_WITHIN_S = 120.0
 STATES = "state.jsonl"

@@ -1,6 +1,7 @@
 """Scores: the truth of a world, what a trial left behind, and the judges that compare the two."""
 
 from mapspeak.evaluation.scores.answers import (
+    Evidence,
     judge_choice,
     judge_number,
     no_answer,
@@ -10,8 +11,6 @@ from mapspeak.evaluation.scores.answers import (
     read_said,
     read_word,
 )
-from mapspeak.evaluation.scores.evidence import Evidence
-from mapspeak.evaluation.scores.intervals import Interval, bootstrap_interval, wilson_interval
 from mapspeak.evaluation.scores.judging import (
     judge_coverage,
     judge_near,
@@ -21,7 +20,13 @@ from mapspeak.evaluation.scores.judging import (
     judge_thing,
     spl,
 )
-from mapspeak.evaluation.scores.rows import TableRow, count_rows
+from mapspeak.evaluation.scores.rows import (
+    Interval,
+    TableRow,
+    bootstrap_interval,
+    count_rows,
+    wilson_interval,
+)
 from mapspeak.evaluation.scores.site import BESIDE_M, GroundTruth, TruePassage
 
 __all__ = [

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 
-from mapspeak.evaluation.scores.evidence import Evidence
+from mapspeak.evaluation.scores.answers import Evidence
 from mapspeak.evaluation.scores.site import BESIDE_M, GroundTruth
 from mapspeak.evaluation.trials import Failure, Score, TrialState
 from mapspeak.geometry import Point, wrap_angle
@@ -15,16 +15,6 @@ from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.coverage import measure_coverage
 from mapspeak.spatial.grid import Mask
 from mapspeak.spatial.rooms import RoomClass
-
-__all__ = [
-    "judge_coverage",
-    "judge_near",
-    "judge_pose",
-    "judge_room",
-    "judge_route",
-    "judge_thing",
-    "spl",
-]
 
 ENOUGH_COVERAGE = 0.9
 """The paper's criterion for Task 1, held to recall: the strictest way to count it."""

@@ -29,8 +29,6 @@ from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.grid import Mask
 from mapspeak.spatial.paths import DistanceField, clearance_m, distances_from
 
-__all__ = ["BESIDE_M", "GroundTruth", "TruePassage"]
-
 BESIDE_M = 5.0
 """A robot that stands this near to a thing, with a free line of sight, has been led to it.
 

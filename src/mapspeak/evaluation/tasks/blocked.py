@@ -13,15 +13,6 @@ from mapspeak.geometry import Pose
 from mapspeak.simulator import MeasuredRoom, WorldDoor, WorldObject
 from mapspeak.spatial.grid import Mask
 
-__all__ = [
-    "BlockedWay",
-    "StaleMap",
-    "away_from",
-    "close_door",
-    "find_doors_into_rooms",
-    "find_spacious_rooms",
-]
-
 THERE, UNREACHABLE = "there", "unreachable"
 LEAST_DETOUR = 1.2
 LIMITS = Limits(n_calls=80, robot_time_s=1200.0, wall_s=900.0)

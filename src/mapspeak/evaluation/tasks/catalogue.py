@@ -14,8 +14,6 @@ from mapspeak.evaluation.tasks.rooms import ROOM_TASKS
 from mapspeak.evaluation.tasks.spoiled import SpoiledMemory, Spoiling
 from mapspeak.evaluation.tasks.task import Task
 
-__all__ = ["FAMILIES", "choose_tasks", "find_task", "task_names"]
-
 FAILURE_TASKS: tuple[Task, ...] = (
     BlockedWay(),
     StaleMap(),

@@ -15,18 +15,6 @@ from mapspeak.evaluation.trials import Failure, Limits, Score, Setting
 from mapspeak.ros.messages import Dialect, bare_type
 from mapspeak.spatial import OccupancyGrid
 
-__all__ = [
-    "Ask",
-    "AskedInspection",
-    "Case",
-    "InspectionPart",
-    "InspectionTask",
-    "PartKind",
-    "judge_parts",
-    "one_of",
-    "shuffled",
-]
-
 QUOTES = " \t'\"`*"
 NUMBER = re.compile(r"([-+]?\d+(?:\.\d+)?)\s*(?:%|percent|Hz|m|s|seconds?|met(?:re|er)s?)?")
 SIZE = re.compile(r"(\d+)\s*(?:x|\u00d7|by)\s*(\d+)(?:\s*cells)?")

@@ -25,8 +25,6 @@ from mapspeak.evaluation.tasks.inspecting import (
 )
 from mapspeak.ros.definitions import parse_definition
 
-__all__ = ["GRAPH_TASKS", "MESSAGE_TASKS"]
-
 OFF_BY = (0.4, 0.5, 2.0, 3.0)
 DEEDS = {
     "odom": "sets the odometry back to zero",

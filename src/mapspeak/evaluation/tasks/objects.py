@@ -12,16 +12,6 @@ from mapspeak.evaluation.tasks.task import dice, draw_start
 from mapspeak.evaluation.trials import Limits, Score, Setting
 from mapspeak.geometry import Pose
 
-__all__ = [
-    "FIRE",
-    "FIRE_WISH",
-    "OBJECT_TASKS",
-    "WISHES",
-    "ObjectRequest",
-    "draw_wish",
-    "findable_kinds",
-]
-
 FIRE = "fire_extinguisher"
 FIRE_WISH = "Fire detected nearby. Navigate to the tool used for it."
 """The paper's Task 3, word for word."""

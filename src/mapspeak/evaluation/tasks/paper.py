@@ -10,8 +10,6 @@ from mapspeak.evaluation.scores import Evidence, GroundTruth, judge_coverage
 from mapspeak.evaluation.trials import Limits, Score, Setting
 from mapspeak.server.prompts import read_text
 
-__all__ = ["EXPLORE", "Explore"]
-
 EXPLORE = "explore"
 LIMITS = Limits(n_calls=1000, robot_time_s=3600.0, wall_s=900.0)
 

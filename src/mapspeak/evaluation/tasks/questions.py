@@ -16,8 +16,6 @@ from mapspeak.simulator.robot.lidar import MAX_RANGE_M
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.rooms import RoomClass
 
-__all__ = ["QUESTION_TASKS"]
-
 LIMITS = Limits(n_calls=30, robot_time_s=60.0, wall_s=600.0)
 NO_DRIVING = "Answer without driving."
 LETTERS = "ABCDEFGH"

@@ -20,8 +20,6 @@ from mapspeak.evaluation.trials import Limits, Score, Setting
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.simulator import WorldObject
 
-__all__ = ["RELATION_TASKS", "RouteTask"]
-
 SIDES = {"left": 90.0, "right": -90.0, "front": 0.0, "back": 180.0}
 SIDE_WORDS = {
     "left": "to the left of",

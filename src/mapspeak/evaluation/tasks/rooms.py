@@ -12,8 +12,6 @@ from mapspeak.evaluation.trials import Score, Setting
 from mapspeak.simulator import MeasuredRoom
 from mapspeak.spatial.rooms import RoomClass
 
-__all__ = ["ROOM_TASKS", "RoomTask"]
-
 SAME_SIZE = 1.05
 """Rooms whose areas differ by less than this share count as the same size: either is right."""
 CLEARLY_DIFFERENT = 1.15

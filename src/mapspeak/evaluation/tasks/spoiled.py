@@ -22,15 +22,6 @@ from mapspeak.evaluation.tasks.task import dice, draw_start
 from mapspeak.evaluation.trials import Failure, Score, Setting
 from mapspeak.geometry import Point, Pose
 
-__all__ = [
-    "SpoiledMemory",
-    "Spoiling",
-    "find_views",
-    "with_note",
-    "with_wrong_place",
-    "without_label",
-]
-
 WRONG_BY_M = 6.0
 ORDERED_TO_M = 0.5
 

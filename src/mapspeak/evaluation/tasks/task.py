@@ -10,8 +10,6 @@ from mapspeak.evaluation.trials import Score, Setting
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial.grid import Mask
 
-__all__ = ["Task", "dice", "draw_start", "drive_setting", "point_text"]
-
 
 class Task(Protocol):
     """A kind of question; the same world, seed and memory give the same setting."""

@@ -1,7 +1,10 @@
 """Trials: what is attempted, what came of it, and how both lie on the disk."""
 
-from mapspeak.evaluation.trials.agent import Agent, AgentEnd, Assignment, ServerAccess
 from mapspeak.evaluation.trials.records import (
+    Agent,
+    AgentEnd,
+    Assignment,
+    ServerAccess,
     find_result,
     read_result,
     read_results,

@@ -13,18 +13,6 @@ from mapspeak.evaluation.inspected import InspectedSystem
 from mapspeak.geometry import Pose
 from mapspeak.simulator import WorldObject
 
-__all__ = [
-    "Failure",
-    "Limits",
-    "Score",
-    "Setting",
-    "ToolCall",
-    "Trial",
-    "TrialResult",
-    "TrialState",
-    "Turn",
-]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:

@@ -20,17 +20,6 @@ from mapspeak.simulator.camera.shading import draw_picture
 from mapspeak.simulator.worlds.models import find_kind
 from mapspeak.simulator.worlds.world import World, WorldObject
 
-__all__ = [
-    "CAMERA_HEIGHT_M",
-    "HORIZONTAL_FOV_RAD",
-    "MAX_DETECTION_RANGE_M",
-    "SMALLEST_AREA_RATIO",
-    "PinholeCamera",
-    "SegmentedView",
-    "SimulatedDetection",
-    "SimulatedDetector",
-]
-
 Picture = NDArray[np.uint8]
 
 HORIZONTAL_FOV_RAD = math.radians(85.0)

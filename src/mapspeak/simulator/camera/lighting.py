@@ -24,8 +24,6 @@ from mapspeak.simulator.worlds.models import base_height_m, build_parts, find_ki
 from mapspeak.simulator.worlds.slices import fill_outlines, slice_world
 from mapspeak.simulator.worlds.world import World, WorldObject
 
-__all__ = ["Light", "LightMap", "find_light", "map_light"]
-
 FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
 

@@ -22,17 +22,6 @@ from numpy.typing import NDArray
 from mapspeak.geometry import Pose
 from mapspeak.simulator.camera.scene import Scene
 
-__all__ = [
-    "Projection",
-    "Viewpoint",
-    "Visibility",
-    "find_in_view",
-    "find_nearest",
-    "look",
-    "project",
-    "widen",
-]
-
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 

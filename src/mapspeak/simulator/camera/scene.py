@@ -14,18 +14,6 @@ from mapspeak.simulator.camera.textures import GLOWING, TILED, draw
 from mapspeak.simulator.worlds.models import Surface, base_height_m, build_parts
 from mapspeak.simulator.worlds.world import World, WorldObject
 
-__all__ = [
-    "BUILDING",
-    "PLAIN",
-    "Scene",
-    "Triangles",
-    "build_scene",
-    "join",
-    "shine_on",
-    "triangulate_object",
-    "triangulate_panel",
-]
-
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 

@@ -18,8 +18,6 @@ from PIL import Image, ImageDraw, ImageFont
 
 from mapspeak.simulator.worlds.models import Colour, Surface
 
-__all__ = ["GLOWING", "TILED", "draw"]
-
 FloatArray = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 Place = tuple[float, float]

@@ -20,8 +20,6 @@ from mapspeak.simulator.robot.scanmatch import place_points
 from mapspeak.simulator.worlds.world import BODY_RADIUS_M
 from mapspeak.spatial.paths import Path
 
-__all__ = ["KEEP_OFF_M", "Obstacles", "PathFollower"]
-
 FloatArray = NDArray[np.float64]
 
 _NEAR_M = 2.5

@@ -15,8 +15,6 @@ from mapspeak.errors import MapError
 from mapspeak.geometry import Pose
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 
-__all__ = ["CELL_SIZE_M", "LogOddsMap"]
-
 FloatArray = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Window = tuple[slice, slice]

@@ -14,16 +14,6 @@ from numpy.typing import NDArray
 from mapspeak.geometry import Pose
 from mapspeak.simulator.worlds.slices import Slice
 
-__all__ = [
-    "BEAM_ANGLES_RAD",
-    "BEAM_DIRECTIONS",
-    "MAX_RANGE_M",
-    "N_BEAMS",
-    "Lidar",
-    "LidarScan",
-    "measure_ranges",
-]
-
 FloatArray = NDArray[np.float64]
 
 N_BEAMS = 720

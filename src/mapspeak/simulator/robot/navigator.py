@@ -16,8 +16,6 @@ from mapspeak.simulator.worlds.world import BODY_RADIUS_M
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import Path, clearance_m, distances_from, find_path
 
-__all__ = ["DriveState", "DriveStatus", "Navigator", "Senses"]
-
 _PLANNING_RADII_M = (BODY_RADIUS_M + 0.05, BODY_RADIUS_M + 0.01)
 """The radius to plan with, and the one for places that are too narrow for it."""
 _CHECK_PERIOD_S = 1.0

@@ -9,19 +9,6 @@ from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.simulator.worlds.slices import Slice
 from mapspeak.simulator.worlds.world import BODY_RADIUS_M
 
-__all__ = [
-    "MAX_ACCELERATION_MPS2",
-    "MAX_SPEED_MPS",
-    "MAX_TURN_ACCELERATION_RADPS2",
-    "MAX_TURN_RADPS",
-    "STANDING",
-    "BodyVelocity",
-    "DifferentialDrive",
-    "Odometry",
-    "RobotBody",
-    "move_along_arc",
-]
-
 MAX_SPEED_MPS = 1.0
 MAX_TURN_RADPS = 1.5
 MAX_ACCELERATION_MPS2 = 1.0

@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.simulator.robot.gridmap import CELL_SIZE_M, LogOddsMap
 
-__all__ = ["FinishedField", "Match", "NearestLines", "SurfaceField", "match_scan", "place_points"]
-
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 Mask = NDArray[np.bool_]

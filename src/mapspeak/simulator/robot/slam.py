@@ -26,8 +26,6 @@ from mapspeak.simulator.robot.scanmatch import (
 )
 from mapspeak.spatial import OccupancyGrid
 
-__all__ = ["Localiser", "Mapper", "PoseTracker"]
-
 _PERIOD_S = 1.0
 _LEAST_MOTION = 0.01
 """Metres or radians: a robot that stands still learns nothing from one more scan."""

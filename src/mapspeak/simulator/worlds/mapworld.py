@@ -16,8 +16,6 @@ from mapspeak.simulator.worlds.world import BODY_RADIUS_M, World, WorldWall
 from mapspeak.spatial import Cell, OccupancyGrid
 from mapspeak.spatial.paths import clearance_m
 
-__all__ = ["build_map_world", "find_floor"]
-
 WALL_HEIGHT_M = 2.6
 
 Mask = NDArray[np.bool_]

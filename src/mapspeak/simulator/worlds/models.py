@@ -23,17 +23,6 @@ from numpy.typing import NDArray
 from mapspeak.errors import ConfigError
 from mapspeak.simulator.worlds.world import WorldObject
 
-__all__ = [
-    "Mesh",
-    "ObjectCategory",
-    "ObjectKind",
-    "Surface",
-    "base_height_m",
-    "build_parts",
-    "find_kind",
-    "kind_names",
-]
-
 FloatArray = NDArray[np.float64]
 Colour = tuple[int, int, int]
 """Red, green and blue, 0 to 255, as in a picture (sRGB)."""

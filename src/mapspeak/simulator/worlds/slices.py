@@ -16,8 +16,6 @@ from mapspeak.geometry import Point, Pose
 from mapspeak.simulator.worlds.models import Mesh, base_height_m, build_parts, find_kind
 from mapspeak.simulator.worlds.world import World, WorldObject, WorldWall
 
-__all__ = ["Slice", "fill_outlines", "footprint", "slice_world"]
-
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 Contour = NDArray[np.float32]

@@ -5,16 +5,6 @@ from dataclasses import dataclass
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial.rooms import RoomClass
 
-__all__ = [
-    "BODY_BAND_M",
-    "BODY_RADIUS_M",
-    "TrueRoom",
-    "World",
-    "WorldDoor",
-    "WorldObject",
-    "WorldWall",
-]
-
 BODY_RADIUS_M = 0.28
 """Of the robot: a world must have room for it."""
 BODY_BAND_M = (0.02, 1.2)

@@ -34,8 +34,6 @@ from mapspeak.simulator.worlds.world import (
 from mapspeak.spatial.mapfiles import load_map
 from mapspeak.spatial.rooms import RoomClass
 
-__all__ = ["load_world", "parse_world", "read_world_text", "world_names", "write_with_more"]
-
 _DOOR_REACH_M = 0.05
 """How far beside a wall's centre line, beyond half its thickness, a door may be written."""
 

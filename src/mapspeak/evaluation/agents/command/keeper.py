@@ -11,8 +11,6 @@ import subprocess
 import sys
 import threading
 
-__all__: list[str] = []
-
 
 def main() -> int:
     """Run the program that its arguments name, and return its exit status."""

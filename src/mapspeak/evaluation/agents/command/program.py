@@ -16,8 +16,6 @@ from mapspeak.errors import ConfigError
 from mapspeak.evaluation.agents.models import Thinking
 from mapspeak.settings import read_settings
 
-__all__ = ["AnswerForm", "Program", "Start", "find_program"]
-
 SERVER = "robot"
 """What the server is called in the programs' own settings."""
 ALWAYS = ("PATH", "HOME", "USER", "LANG", "TMPDIR")

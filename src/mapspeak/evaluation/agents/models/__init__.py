@@ -4,13 +4,13 @@ from mapspeak.evaluation.agents.models.loop import ModelAgent
 from mapspeak.evaluation.agents.models.mind import (
     Ending,
     Mind,
+    MockMind,
     Reply,
     Talk,
     Thinking,
     ToolCallRequest,
     Usage,
 )
-from mapspeak.evaluation.agents.models.mock import MockMind
 
 __all__ = [
     "Ending",

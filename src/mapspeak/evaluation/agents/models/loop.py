@@ -17,8 +17,6 @@ from mapspeak.evaluation.client import OutOfBudgetError, Picture, ToolAnswer, To
 from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess
 from mapspeak.evaluation.trials.trial import TrialState
 
-__all__ = ["ModelAgent", "estimate_picture_tokens"]
-
 PIXELS_PER_TOKEN = 750
 """Anthropic's published rule for pictures of up to 1568 px; other APIs count otherwise."""
 REFUSED = "The model refused to answer."

@@ -20,16 +20,15 @@ from mapspeak.evaluation.agents.models.mind import (
     Thinking,
     ToolCallRequest,
     Usage,
+    count_mock_tokens,
+    decide,
 )
-from mapspeak.evaluation.agents.models.mock import count_mock_tokens, decide
 from mapspeak.evaluation.client import ToolAnswer
 from mapspeak.installation import say_install, shell_command
 
 if TYPE_CHECKING:
     from inspect_ai.model import ChatMessage, GenerateConfig, Model, ModelOutput, ModelUsage
     from inspect_ai.tool import ToolInfo
-
-__all__ = ["InspectMind", "find_client", "open_mind"]
 
 MOCK = "mockllm/"
 CLIENT = "openai"
