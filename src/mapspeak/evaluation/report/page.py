@@ -13,7 +13,6 @@ from urllib.parse import quote
 
 from mapspeak.evaluation.report.paper import PAPER_NOTE, PAPER_ROWS, PAPER_TASKS, PaperRow
 from mapspeak.evaluation.report.replay import build_replay, show_standing
-from mapspeak.evaluation.report.way import PICTURES, TURNS, read_course
 from mapspeak.evaluation.report.sheet import (
     Album,
     Html,
@@ -23,6 +22,7 @@ from mapspeak.evaluation.report.sheet import (
     table,
     text,
 )
+from mapspeak.evaluation.report.way import PICTURES, TURNS, read_course
 from mapspeak.evaluation.scores import Interval, TableRow, count_rows, wilson_interval
 from mapspeak.evaluation.trials import TrialResult, trial_folder
 

@@ -5,10 +5,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mapspeak.evaluation.report.sheet import Album, find_picture
-from mapspeak.evaluation.report.way import PICTURES, Course
-from mapspeak.evaluation.report.sheet import Html, element, joined, text
-from mapspeak.evaluation.report.way import StepMark, draw_way, lay_out_way
+from mapspeak.evaluation.report.sheet import Album, Html, element, find_picture, joined, text
+from mapspeak.evaluation.report.way import PICTURES, Course, StepMark, draw_way, lay_out_way
 from mapspeak.evaluation.trials import TrialResult, Turn
 
 

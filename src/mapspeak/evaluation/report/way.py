@@ -1,21 +1,21 @@
 """The way a robot drove, drawn over its map: all of it, the part so far, and where it stood."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import TypeVar
+
+import numpy as np
+
 from mapspeak.errors import MapError
+from mapspeak.evaluation.report.sheet import Album, Html, Sheet, draw_sheet, element, joined, text
 from mapspeak.evaluation.trials import Trial, Turn, read_turns, say_fault, trial_folder
+from mapspeak.geometry import Pose
 from mapspeak.simulator import StateRecord, read_state_log
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.spatial.mapfiles import load_map
-from collections.abc import Sequence
-from itertools import pairwise
-import numpy as np
-from mapspeak.evaluation.report.sheet import Album, Html, Sheet, draw_sheet, element, joined, text
-from mapspeak.geometry import Pose
-from mapspeak.simulator import StateRecord
 from mapspeak.spatial.grid import FloatArray
+from mapspeak.spatial.mapfiles import load_map
 
 TURNS = "turns.jsonl"
 STATES = "state.jsonl"
