@@ -115,6 +115,17 @@ def test_maps_of_the_same_folder_name_and_stem_get_names_of_their_own(
     assert len(names_in(folder / "out")) == 3
 
 
+def test_files_of_one_folder_and_stem_do_not_overwrite_each_other(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    put_map(folder / "map.yaml")
+    (folder / "map.yml").write_bytes((folder / "map.yaml").read_bytes())
+
+    assert run_map(monkeypatch, "map.yaml", "map.yml", "--out", "out", "--json", "out") == 0
+
+    assert len(names_in(folder / "out")) == 4
+
+
 def test_a_map_keeps_its_name_when_others_come_and_go(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -9,7 +9,6 @@ from PIL import Image
 
 from mapspeak.cli.mapjobs import MapJob, Output, is_description
 from mapspeak.errors import ConfigError
-from mapspeak.server.mapview.drawing import draw_rooms
 from mapspeak.server.mapview.facts import MapFacts, RegionFacts
 from mapspeak.server.text.maps import say_size
 from mapspeak.spatial.areagraph import (
@@ -47,6 +46,8 @@ def _content(
 ) -> bytes:
     match output:
         case Output.PICTURE:
+            from mapspeak.server.mapview.drawing import draw_rooms  # noqa: PLC0415 - heavy
+
             return draw_rooms(rooms).png
         case Output.FACTS:
             return (facts.model_dump_json(indent=2) + "\n").encode()
