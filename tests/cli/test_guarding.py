@@ -64,9 +64,9 @@ def test_what_a_person_asks_for_by_name_has_the_usual_permissions(
     out.mkdir()
     wanted = ("--out", out / "map.png", "--json", out / "map.json")
     run_main(monkeypatch, "map", tmp_path / "map.yaml", *wanted)
-    named = ("--semantic-map", memory, "--out", out / "places.csv")
+    named = ("--semantic-map", memory, "--out", out / "places.geojson")
     run_main(monkeypatch, "memory", "export", *named)
-    assert modes_under(out) == dict.fromkeys(("map.png", "map.json", "places.csv"), "0o644")
+    assert modes_under(out) == dict.fromkeys(("map.png", "map.json", "places.geojson"), "0o644")
 
 
 @pytest.mark.usefixtures("umask")

@@ -203,7 +203,7 @@ async def test_a_drive_that_somebody_else_has_begun_is_told(tmp_path: Path) -> N
     async with connect(robot, tmp_path) as client:
         answer = await client.call_tool("wait_for_goal", {"wait_s": 0})
     assert answer.is_error
-    assert "it follows another goal: driving" in text_of(answer)
+    assert "follows a goal that was not sent from here: driving" in text_of(answer)
 
 
 async def test_a_robot_that_another_client_drives_on_does_not_stand_at_the_goal(

@@ -242,8 +242,9 @@ async def test_waits_for_a_robot_that_has_gone_do_not_add_up() -> None:
         assert client.lost_for_s is not None
         server.hangs_up = False
         await client.call_service("/add", timeout_s=PATIENCE_S)
+        while client.lost_for_s is not None:
+            await anyio.lowlevel.checkpoint()
         await client.wait_until_connected()
-        assert client.lost_for_s is None
 
 
 async def test_a_hundred_losses_leave_no_socket_behind() -> None:
