@@ -43,7 +43,7 @@ LOOK_S = 0.05
 """Wall time between two looks for a hold, and at where a drive leads."""
 WATCH_S = 0.5
 """Wall time between two looks at the clients and at how a drive stands."""
-MAP_S = 1.0
+MAP_S = 3.0
 """Wall time for a map to come, where only the name of a room is wanted of it."""
 ANY_EPISODE = EpisodeQuery(words="anything", limit=1)
 T = TypeVar("T")

@@ -207,7 +207,7 @@ class GuardedConnection:
     async def _guarded(
         self, command: Command, work: Coroutine[Any, Any, T], objection: Refused | None = None
     ) -> T:
-        """Do what was decided to be allowed, and notes how it ended."""
+        """Do what was decided to be allowed, and note how it ended."""
         try:
             permit = self._guard.clear(command, robot_s=self._now_s(), objection=objection)
         except BaseException:

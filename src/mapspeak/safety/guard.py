@@ -106,7 +106,7 @@ class Guard:
     def clear(
         self, command: Command, *, robot_s: float, objection: Refused | None = None
     ) -> Permit:
-        """Allow a command, and notes that; between this and the command nothing may wait.
+        """Allow a command, and note that; between this and the command nothing may wait.
 
         Args:
             command: What is wanted.

@@ -99,7 +99,7 @@ def can_think(name: str) -> bool:
 
 
 def check_other(name: str, thinking: str | None = None) -> bool:
-    """Return True where there is an agent of a name; looks for what it needs, and asks it nothing.
+    """Return True where there is an agent of a name, by what it needs; it is asked nothing.
 
     Raises:
         ConfigError: There is one, but something that it needs is missing.

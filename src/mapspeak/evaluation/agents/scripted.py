@@ -103,7 +103,7 @@ async def _go_to_region(driver: ToolDriver, place: str) -> AgentEnd:
 
 
 async def _go_into_room_around(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
-    """Drive to a point of a room, else beside it; where no way leads there, says so."""
+    """Drive to a point of a room, else beside it; where no way leads there, say so."""
     middle = Point(float(match["x"]), float(match["y"]))
     if await driver.drive(x=middle.x, y=middle.y) == ARRIVED:
         return AgentEnd(answer="ANSWER: there")

@@ -88,7 +88,7 @@ class DdsTopics(NativeLink[DdsTopicRequest]):
         if not writers:
             return
         if not self.types.knows(writers[0].type_name):
-            self._learn(request, writers[0])
+            self._learn(request)
             return
         quality = Quality(
             is_reliable=all(each.is_reliable for each in writers),
@@ -108,27 +108,28 @@ class DdsTopics(NativeLink[DdsTopicRequest]):
             take=partial(self._take, request),
         )
 
-    def _learn(self, request: DdsTopicRequest, writer: Endpoint) -> None:
+    def _learn(self, request: DdsTopicRequest) -> None:
         """Ask for a type that we do not know, or know in another version, until it is told once."""
         if not request.has_learned:
             request.has_learned = True
-            self.start_soon(partial(self._learn_and_arrange, request, writer))
+            self.start_soon(partial(self._learn_and_renew, request))
 
-    async def _learn_and_arrange(self, request: DdsTopicRequest, writer: Endpoint) -> None:
+    async def _learn_and_renew(self, request: DdsTopicRequest) -> None:
         # A node's services may be found after its topics, and a busy node may answer too late.
         topic = request.subscription.topic
         pause_s = FIRST_PAUSE_S
         while self.requests.get(topic) is request:
             try:
-                await self.ask_type(writer)
+                # Whoever writes now: the node that was asked before may have gone.
+                for writer in self.discovery.writers_of(dds_topic(topic))[:1]:
+                    await self.ask_type(writer)
+                    self.renew(request.subscription)
+                    return
             except LinkError as error:
                 if pause_s == FIRST_PAUSE_S:
                     logger.warning("%s cannot be read: %s", topic, error)
-                await anyio.sleep(pause_s)
-                pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
-            else:
-                self.renew(request.subscription)
-                return
+            await anyio.sleep(pause_s)
+            pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
 
     def _end(self, request: DdsTopicRequest) -> None:
         if request.raw_reader is not None:
@@ -137,8 +138,7 @@ class DdsTopics(NativeLink[DdsTopicRequest]):
 
     def _take(self, request: DdsTopicRequest, sample: Sample) -> None:
         if sample.refusal is not None:
-            for writer in self.discovery.writers_of(dds_topic(request.subscription.topic))[:1]:
-                self._learn(request, writer)
+            self._learn(request)
             return
         now_s = anyio.current_time()
         if now_s - request.taken_s < request.throttle_ms / 1e3:

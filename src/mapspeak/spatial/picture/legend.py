@@ -93,7 +93,7 @@ class Legend:
         return replace(self, entries=tuple(kept))
 
     def draw(self, canvas: Canvas, view: PictureView, top: int) -> int:
-        """Draw the rows that have room from a row of the canvas on; gives the row below them."""
+        """Draw the rows that have room from a row of the canvas on; return the row below."""
         for row in break_rows(self, view):
             if top + ROW_PX > view.height_px:
                 break

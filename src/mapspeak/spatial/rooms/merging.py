@@ -249,7 +249,7 @@ def _join_equal_widths(forest: _Forest, saddles: list[Saddle], same_ratio: float
 def _join_open_borders(
     forest: _Forest, saddles: list[Saddle], frames: Frames, settings: RoomSettings
 ) -> list[_Border]:
-    """Join across every saddle that divides nothing, from the highest down; gives the others."""
+    """Join across every saddle that divides nothing, from the highest down; return the others."""
     borders = []
     for saddle in saddles:
         narrow, wide = forest.sides(saddle)
