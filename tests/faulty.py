@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from causes import navigation_said
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.robot import (
@@ -312,7 +313,9 @@ class FaultyRobot:
 
     def _end(self, state: GoalState, reason: str = "") -> None:
         if self._current is not None:
-            self._goals[self._current].status = GoalStatus(state=state, reason=reason)
+            self._goals[self._current].status = GoalStatus(
+                state=state, cause=navigation_said(reason)
+            )
             self._current = None
             self.publish_velocity(AT_REST)
 

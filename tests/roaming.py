@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from causes import CRATE
 from drawing import grid_from_text
 from mapspeak.geometry import Pose
 from mapspeak.links.simulated import SimulatedRobot
@@ -41,7 +42,7 @@ class RoamingRobot(SimulatedRobot):
 
     async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
         if robot_goal_id in self._failed:
-            return GoalStatus(state=GoalState.BLOCKED, reason="A crate stands in the way.")
+            return GoalStatus(state=GoalState.BLOCKED, cause=CRATE)
         return await super().fetch_goal_status(robot_goal_id)
 
 

@@ -178,6 +178,74 @@ class GoalState(StrEnum):
         return self not in (GoalState.PLANNED, GoalState.ACCEPTED, GoalState.DRIVING)
 
 
+class CauseCode(StrEnum):
+    """What ended a drive, or keeps it waiting.
+
+    The first are words from outside the robot, then what is seen of it from outside, then what is
+    closed, then what its own navigation does and says.
+    """
+
+    CANCELLED = "cancelled"
+    STOPPED = "stopped"
+    REPLACED = "replaced"
+    REPLACED_BY_OTHERS = "replaced_by_others"
+    CLIENT_GONE = "client_gone"
+    CLIENT_SILENT = "client_silent"
+    SERVER_ENDED = "server_ended"
+    HELD = "held"
+    REFUSED = "refused"
+    WAITING = "waiting"
+    PREVIOUS_ENDED = "previous_ended"
+    POSE_JUMPED = "pose_jumped"
+    POSE_UNKNOWN = "pose_unknown"
+    ROBOT_SILENT = "robot_silent"
+    NOT_BEGUN = "not_begun"
+    NOT_MOVED = "not_moved"
+    STOOD_STILL = "stood_still"
+    GOAL_CLOSED = "goal_closed"
+    GOAL_OFF_MAP = "goal_off_map"
+    GOAL_OCCUPIED = "goal_occupied"
+    NAVIGATION_AT_AREA = "navigation_at_area"
+    VELOCITY_AT_AREA = "velocity_at_area"
+    OTHERS_AT_AREA = "others_at_area"
+    NOT_TAKEN = "not_taken"
+    REJECTED = "rejected"
+    NAVIGATION_LOST = "navigation_lost"
+    NAVIGATION_MUTE = "navigation_mute"
+    NAVIGATION_SAID = "navigation_said"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cause:
+    """Why a drive ended as it did, or why it waits.
+
+    Attributes:
+        code: What it was.
+        after_s: How long something had lasted by then.
+        distance_m: To the goal or area, or of the jump.
+        name: Of the area, or of the kind of navigation.
+        quote: What the robot's software or the operator said, or the error, word for word.
+        previous: Why the drive before it ended.
+    """
+
+    code: CauseCode
+    after_s: float | None = None
+    distance_m: float | None = None
+    name: str = ""
+    quote: str = ""
+    previous: "Cause | None" = None
+
+    def __str__(self) -> str:
+        """Return the code and its numbers, or the quotation where that is all; for logs."""
+        if self.code in (CauseCode.NAVIGATION_SAID, CauseCode.REFUSED):
+            return self.quote
+        after = "" if self.after_s is None else f"{self.after_s:.1f} s"
+        distance = "" if self.distance_m is None else f"{self.distance_m:.2f} m"
+        previous = "" if self.previous is None else str(self.previous)
+        details = ", ".join(filter(None, (self.name, distance, after, self.quote, previous)))
+        return f"{self.code} ({details})" if details else str(self.code)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GoalStatus:
     """How a drive stands now.
@@ -186,16 +254,14 @@ class GoalStatus:
         state: See `GoalState`.
         distance_left_m: Along the planned path; None where the robot does not say.
         n_recoveries: How often it had to try again.
-        reason: Why it ended as it did; empty while it drives.
-        is_unanswered: It is rejected because the navigation has not answered at all.
+        cause: Why it ended as it did, or waits; None while it drives and where nobody said.
         afterwards: What became of it after its end, where navigation took it up after all.
     """
 
     state: GoalState
     distance_left_m: float | None = None
     n_recoveries: int = 0
-    reason: str = ""
-    is_unanswered: bool = False
+    cause: Cause | None = None
     afterwards: str = ""
 
 

@@ -31,7 +31,7 @@ from mapspeak.memory.episodes import (
 from mapspeak.memory.events import Event
 from mapspeak.memory.search import Embedder, find_model
 from mapspeak.places.relations.choosing import CheckedGoal, choose_goal
-from mapspeak.robot import CameraPicture, Robot
+from mapspeak.robot import CameraPicture, Cause, CauseCode, Robot
 from mapspeak.ros import RosConnection, started_over
 from mapspeak.safety import Guard, GuardedConnection, GuardedRobot, Surveyor, WhenBusy
 from mapspeak.spatial import OccupancyGrid
@@ -129,7 +129,7 @@ class Session:
         is_drivers = self.drives.is_busy and (drive is None or drive.client == client)
         if is_drivers or client in started_over(self.ros).owners:
             logger.warning("The client hung up during its drive: stopping the robot.")
-            await self.drives.stop("The client that sent the robot hung up.")
+            await self.drives.stop(Cause(code=CauseCode.CLIENT_GONE))
 
     @property
     def _is_busy(self) -> bool:
@@ -374,7 +374,8 @@ class Session:
     async def _watch(self) -> None:
         if self._lease.is_over and self._is_busy:
             logger.warning("No client for %.0f s: stopping the robot.", self._lease.duration_s)
-            await self.drives.stop(f"No client was heard for {self._lease.duration_s:.0f} s.")
+            silent_s = self._lease.duration_s
+            await self.drives.stop(Cause(code=CauseCode.CLIENT_SILENT, after_s=silent_s))
         await self.drives.watch()
 
     async def close(self) -> None:
@@ -383,7 +384,7 @@ class Session:
             self.guard.approvals.close()
         with anyio.CancelScope(shield=True):
             if self._is_busy:
-                await self.drives.stop("The server ended.")
+                await self.drives.stop(Cause(code=CauseCode.SERVER_ENDED))
 
 
 def _prepare(world: WorldModel) -> None:

@@ -9,6 +9,7 @@ import anyio.to_thread
 import pytest
 from click.testing import CliRunner, Result
 
+from causes import quote_of
 from fakes import FakeRobot, two_rooms
 from guarding import make_guard
 from mapspeak.cli import cli
@@ -43,7 +44,7 @@ async def test_a_stop_reaches_a_server_that_watches_and_says_which_robot_stands(
     assert "Stopped and held: fake robot" in result.output
     assert robot.n_stops == 1
     report = await session.drives.report(drive.goal_id)
-    assert "smoke" in report.status.reason
+    assert "smoke" in quote_of(report.status)
 
 
 @pytest.mark.anyio

@@ -3,13 +3,14 @@ from pathlib import Path
 import anyio
 import pytest
 
+from causes import code_of, quote_of
 from fakes import FakeRobot, two_rooms
 from mapspeak.driving.drive import DriveBook
 from mapspeak.driving.drivereport import Drive
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMapStore
-from mapspeak.robot import GoalState, GoalStatus
+from mapspeak.robot import CauseCode, GoalState, GoalStatus
 from mapspeak.safety import WhenBusy
 from mapspeak.session import Session
 
@@ -117,7 +118,8 @@ async def test_a_drive_that_waited_and_is_refused_then_says_why() -> None:
     robot.refuses = True
     ended = await drives.wait(second.goal_id, wait_s=25.0, on_progress=tell_nobody)
     assert ended.status.state is GoalState.REJECTED
-    assert "Not there." in ended.status.reason
+    assert code_of(ended.status) is CauseCode.REFUSED
+    assert "Not there." in quote_of(ended.status)
 
 
 class StuckRobot(FakeRobot):
@@ -137,7 +139,7 @@ async def test_a_navigation_that_never_begins_times_out_and_is_stopped() -> None
     drive = await start(drives, FAR)
     ended = await drives.wait(drive.goal_id, wait_s=25.0, on_progress=tell_nobody)
     assert ended.status.state is GoalState.TIMED_OUT
-    assert "has not begun for 10 s" in ended.status.reason
+    assert code_of(ended.status) is CauseCode.NOT_BEGUN
     assert ended.elapsed_s < 11.0
     assert robot.n_stops == 1
 

@@ -4,6 +4,7 @@ from pathlib import Path
 import anyio
 import pytest
 
+from causes import CRATE
 from drawing import grid_from_text
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.exploration import (
@@ -222,7 +223,7 @@ async def test_a_robot_that_cannot_drive_says_what_is_left_and_why(tmp_path: Pat
     robot.n_to_fail = 1000
     progress = await _explore(Explorer(session_of(robot, tmp_path)))
     assert progress.state is ExplorationState.REST_UNREACHABLE
-    assert {place.end.message for place in progress.blocked} == {"A crate stands in the way."}
+    assert {place.end.cause for place in progress.blocked} == {CRATE}
     assert len(robot.goals) < 40
 
 
@@ -231,14 +232,14 @@ async def test_a_frontier_that_the_policy_forbids_is_left_out_and_named(tmp_path
     session = session_of(robot, tmp_path)
     progress = await _explore(Explorer(session))
     assert progress.state is ExplorationState.REST_UNREACHABLE
-    assert "keep out" in progress.blocked[0].end.message
+    assert "keep out" in str(progress.blocked[0].end.cause)
 
 
 async def test_a_policy_that_forbids_everything_ends_the_exploration(tmp_path: Path) -> None:
     robot = ForbiddingRobot(world_from_text(THREE_ROOMS, start=START), farthest_y=-100.0)
     progress = await _explore(Explorer(session_of(robot, tmp_path)))
     assert progress.state is ExplorationState.REST_UNREACHABLE
-    assert all("keep out" in place.end.message for place in progress.blocked)
+    assert all("keep out" in str(place.end.cause) for place in progress.blocked)
     assert robot.simulation.truth.driven_m == 0.0
 
 
@@ -313,9 +314,7 @@ def test_a_blocked_place_is_open_again_when_the_map_has_changed_there() -> None:
     opened = grid_from_text("..........\n..........\n....##....", resolution_m=0.5)
     places = BlockedPlaces()
     goal = Pose(4.0, 0.8)
-    places.remember(
-        "F1", goal, stuck=Pose(1.5, 0.8).point, end=TripEnd(message="a crate"), grid=closed
-    )
+    places.remember("F1", goal, stuck=Pose(1.5, 0.8).point, end=TripEnd(cause=CRATE), grid=closed)
     assert places.is_closed(goal.point, closed)
     assert not places.is_closed(goal.point, opened)
 
@@ -325,6 +324,6 @@ def test_a_place_that_was_blocked_twice_is_tried_no_more_while_nothing_changes()
     places = BlockedPlaces()
     goal = Pose(4.0, 0.5)
     for _ in range(2):
-        places.remember("F1", goal, stuck=goal.point, end=TripEnd(message="a crate"), grid=grid)
+        places.remember("F1", goal, stuck=goal.point, end=TripEnd(cause=CRATE), grid=grid)
     assert not places.worth_another_try(grid)
     assert [place.n_tries for place in places] == [2]

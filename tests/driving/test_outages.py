@@ -5,13 +5,14 @@ from dataclasses import replace
 import anyio
 import pytest
 
+from causes import code_of, quote_of
 from failing_robot import FailingRobot
 from fakes import FakeRobot, two_rooms
 from mapspeak.driving.drive import DriveBook
 from mapspeak.driving.drivereport import Drive, DriveReport
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
-from mapspeak.robot import GoalState, GoalStatus, PoseDoubt, StampedPose
+from mapspeak.robot import CauseCode, GoalState, GoalStatus, PoseDoubt, StampedPose
 
 pytestmark = pytest.mark.anyio
 
@@ -148,7 +149,8 @@ async def test_while_the_pose_is_missing_a_drive_tells_so_and_before_long_is_sto
     await watched.pass_time(6.0)
     told = await watched.drives.report(drive.goal_id)
     assert told.status.state is GoalState.LOST
-    assert "No transform has come." in told.status.reason
+    assert code_of(told.status) is CauseCode.ROBOT_SILENT
+    assert "No transform has come." in quote_of(told.status)
     assert not watched.is_driving
 
 
@@ -204,7 +206,9 @@ async def test_a_pose_that_jumps_stops_the_robot_and_what_waits_does_not_start()
     await watched.pass_time(1.0)
     told = await watched.drives.report(drive.goal_id)
     assert told.status.state is GoalState.LOST
-    assert "jumped by 4.4 m" in told.status.reason
+    assert told.status.cause is not None
+    assert told.status.cause.code is CauseCode.POSE_JUMPED
+    assert told.status.cause.distance_m == pytest.approx(4.4, abs=0.05)
     assert watched.robot.n_stops == 1
 
 

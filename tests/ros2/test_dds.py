@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from causes import quote_of
 from drawing import grid_from_text
 from mapspeak.cli.robots import read_network
 from mapspeak.errors import LinkError
@@ -106,7 +107,7 @@ async def test_goals_arrive_and_walls_stop_them(robot: RobotProcess) -> None:
         assert robot.pose.x == pytest.approx(NEXT_ROOM.x)
         blocked = await until_over(opened, await opened.send_goal(INSIDE_THE_WALL))
     assert blocked.state is GoalState.BLOCKED
-    assert blocked.reason == "The way is blocked."
+    assert quote_of(blocked) == "The way is blocked."
 
 
 async def test_stop_ends_a_drive_and_commands_a_stand(robot: RobotProcess) -> None:

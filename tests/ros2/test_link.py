@@ -9,6 +9,7 @@ import anyio
 import numpy as np
 import pytest
 
+from causes import quote_of
 from drawing import grid_from_text
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
@@ -146,7 +147,7 @@ async def test_goals_arrive_and_walls_stop_them(robot: RobotProcess) -> None:
         assert robot.pose.x == pytest.approx(NEXT_ROOM.x)
         blocked = await until_over(link, await link.send_goal(INSIDE_THE_WALL))
     assert blocked.state is GoalState.BLOCKED
-    assert blocked.reason == "The way is blocked."
+    assert quote_of(blocked) == "The way is blocked."
 
 
 async def test_a_goal_tells_its_id_its_acceptance_and_its_feedback(robot: RobotProcess) -> None:

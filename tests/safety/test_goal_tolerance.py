@@ -84,7 +84,7 @@ async def test_a_robot_that_ends_each_leg_early_still_gets_round_and_keeps_off(
             break
         nearest_m = min(nearest_m, area.distance_to(fake.pose.point))
         await robot.sleep(0.1)
-    assert (status.state, status.reason) == (GoalState.ARRIVED, "")
+    assert (status.state, status.cause) == (GoalState.ARRIVED, None)
     assert fake.pose.point.distance_to(Point(goal.x, goal.y)) <= TOLERANCE_M
     assert nearest_m >= RADIUS_M + KEEP_M
     assert [line.event for line in audit_of(tmp_path)].count("leg") <= 12

@@ -5,6 +5,7 @@ from pathlib import Path
 import anyio
 import pytest
 
+from causes import code_of, quote_of
 from drawing import grid_from_text
 from fakes import FakeRobot, scan_of, two_rooms
 from guarding import WallClock, audit_of, corners, make_guard, rectangle
@@ -12,7 +13,7 @@ from mapspeak.errors import GoalError, LinkError, PolicyError
 from mapspeak.geometry import Pose
 from mapspeak.installation import shell_command
 from mapspeak.memory import SemanticMapStore
-from mapspeak.robot import GoalState, StampedPose
+from mapspeak.robot import CauseCode, GoalState, StampedPose
 from mapspeak.safety import (
     Approval,
     ApprovalNeededError,
@@ -235,7 +236,9 @@ async def test_a_robot_that_goes_another_way_is_stopped_before_it_enters_an_area
     await robot.sleep(20.0)
     status = await robot.fetch_goal_status(goal_id)
     assert status.state is GoalState.BLOCKED
-    assert "keep-out area 'pit'" in status.reason
+    assert status.cause is not None
+    assert status.cause.code is CauseCode.NAVIGATION_AT_AREA
+    assert status.cause.name == "keep-out area 'pit'"
     assert fake.pose.x < 5.0 - fake.description.radius_m
     assert fake.n_stops == 1
     assert [line.event for line in audit_of(tmp_path)][-2:] == ["stop", "ended"]
@@ -344,7 +347,9 @@ async def test_a_drive_ends_when_its_goal_is_closed_meanwhile(tmp_path: Path) ->
     await robot.sleep(3.0)
     status = await robot.fetch_goal_status(goal_id)
     assert status.state is GoalState.BLOCKED
-    assert "closed until 14:00" in status.reason
+    assert status.cause is not None
+    assert status.cause.code is CauseCode.GOAL_CLOSED
+    assert "closed until 14:00" in status.cause.name
 
 
 async def test_a_drive_ends_when_an_obstacle_stays_on_its_goal(tmp_path: Path) -> None:
@@ -356,7 +361,7 @@ async def test_a_drive_ends_when_an_obstacle_stays_on_its_goal(tmp_path: Path) -
     await robot.sleep(7.0)
     status = await robot.fetch_goal_status(goal_id)
     assert status.state is GoalState.BLOCKED
-    assert "The map has changed" in status.reason
+    assert code_of(status) is CauseCode.GOAL_OCCUPIED
 
 
 async def test_an_obstacle_that_passes_over_the_goal_ends_nothing(tmp_path: Path) -> None:
@@ -383,7 +388,8 @@ async def test_a_hold_stops_the_robot_and_answers(tmp_path: Path) -> None:
     assert guard.hold.answers() == ("fake robot",)
     status = await robot.fetch_goal_status(goal_id)
     assert status.state is GoalState.CANCELLED
-    assert "somebody fell" in status.reason
+    assert code_of(status) is CauseCode.HELD
+    assert "somebody fell" in quote_of(status)
     assert "somebody fell" in await refusal_of(robot, NEAR)
     assert guard.hold.lift()
     await robot.send_goal(NEAR)
@@ -454,7 +460,7 @@ async def test_a_goal_of_another_client_is_stopped_before_an_area(tmp_path: Path
     await robot.sleep(10.0)
     assert fake.n_stops == 1
     assert 2.0 - fake.pose.x >= 0.2 + KEEP_M
-    assert "'pit': something that mapspeak did not start" in audit_of(tmp_path)[-1].said
+    assert "others_at_area (keep-out area 'pit'" in audit_of(tmp_path)[-1].said
 
 
 async def test_a_robot_that_others_drive_away_from_areas_is_left_alone(tmp_path: Path) -> None:

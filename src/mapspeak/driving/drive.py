@@ -20,12 +20,13 @@ from mapspeak.driving.drivereport import JUST_SENT, Drive, DriveReport, find_tri
 from mapspeak.driving.stops import NEEDS_NO_STOP, OwedStop
 from mapspeak.errors import GoalError, LinkError, MapspeakError, NextStep
 from mapspeak.geometry import Point, Pose
-from mapspeak.robot import GoalState, GoalStatus, PoseDoubt, Robot
+from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus, PoseDoubt, Robot
 from mapspeak.safety import WhenBusy
 
 POLL_S = 0.2
 PROGRESS_S = 1.0
 N_KEPT = 200
+WAS_STOPPED = Cause(code=CauseCode.STOPPED)
 
 
 OnProgress = Callable[[DriveReport], Awaitable[None]]
@@ -132,7 +133,7 @@ class DriveBook:
             drive = self._make(goal, place, client)
             if busy is None or self._choose(busy, client, when_busy) is WhenBusy.REPLACE:
                 drive = await self._send(replace(drive, begun_at=self._monitor.here.point))
-                self._end_all("A newer goal took its place.", but=drive)
+                self._end_all(Cause(code=CauseCode.REPLACED), but=drive)
                 return drive
             if self._choose(busy, client, when_busy) is WhenBusy.WAIT:
                 return self._keep(drive)
@@ -223,14 +224,15 @@ class DriveBook:
         if report.status.state.is_final:
             return report
         if report.drive.robot_goal_id is None:
-            status = GoalStatus(state=GoalState.CANCELLED, reason="It was cancelled.")
+            cause = Cause(code=CauseCode.CANCELLED)
+            status = GoalStatus(state=GoalState.CANCELLED, cause=cause)
             self._end(report.drive, status)
         else:
             with anyio.CancelScope(shield=True):
                 await self._robot.cancel_goal(report.drive.robot_goal_id)
         return await self.report(report.drive.goal_id)
 
-    async def stop(self, reason: str = "The robot was stopped.") -> None:
+    async def stop(self, cause: Cause = WAS_STOPPED) -> None:
         """Stop the robot and end what was under way; what is being prepared does not start.
 
         Raises:
@@ -238,7 +240,7 @@ class DriveBook:
         """
         self._n_stops += 1
         with anyio.CancelScope(shield=True):
-            self._dismiss(reason)
+            self._dismiss(cause)
             if (drive := self.under_way) is not None:
                 self._owed.owe(drive.goal_id)
             await self._robot.stop()
@@ -246,7 +248,7 @@ class DriveBook:
             if (drive := self.under_way) is not None:
                 report = await self.report(drive.goal_id)
                 if report.status.state is GoalState.CANCELLED:
-                    self._keep(replace(report.drive, final=replace(report.status, reason=reason)))
+                    self._keep(replace(report.drive, final=replace(report.status, cause=cause)))
 
     # --- inside ---
 
@@ -258,10 +260,10 @@ class DriveBook:
         """Return the drives that wait their turn, in their order."""
         return [each for each in self._open() if each.robot_goal_id is None]
 
-    def _dismiss(self, reason: str) -> None:
+    def _dismiss(self, cause: Cause | None) -> None:
         """End the drives that wait."""
         for drive in self._waiting():
-            self._end(drive, GoalStatus(state=GoalState.CANCELLED, reason=reason))
+            self._end(drive, GoalStatus(state=GoalState.CANCELLED, cause=cause))
 
     async def _find_busy(self) -> Drive | None:
         """Find the drive that is under way, after asking the robot whether it has ended."""
@@ -302,9 +304,9 @@ class DriveBook:
         self._monitor.begin()
         return self._keep(replace(drive, heard=JUST_SENT))
 
-    def _end_all(self, reason: str, *, but: Drive) -> None:
+    def _end_all(self, cause: Cause, *, but: Drive) -> None:
         """Note that all drives but one are over: the robot has one goal."""
-        status = GoalStatus(state=GoalState.PREEMPTED, reason=reason)
+        status = GoalStatus(state=GoalState.PREEMPTED, cause=cause)
         for drive in self._open():
             if drive.goal_id != but.goal_id:
                 self._end(drive, status)
@@ -320,7 +322,8 @@ class DriveBook:
             try:
                 await self._send(drive)
             except MapspeakError as error:
-                self._end(drive, GoalStatus(state=GoalState.REJECTED, reason=str(error)))
+                cause = Cause(code=CauseCode.REFUSED, quote=str(error))
+                self._end(drive, GoalStatus(state=GoalState.REJECTED, cause=cause))
 
     async def _note(self, drive: Drive, look: Look) -> None:
         """Note what a look has shown of a drive, and end one that is over or must not go on."""
@@ -329,7 +332,7 @@ class DriveBook:
         if end is None and drive.robot_goal_id is not None:
             end = self._monitor.judge(look)
             if end is not None:
-                self._dismiss(f"The drive before it has ended: {end.reason}")
+                self._dismiss(Cause(code=CauseCode.PREVIOUS_ENDED, previous=end.cause))
         if end is None:
             return
         self._end(drive, end)

@@ -9,7 +9,7 @@ import anyio
 from mapspeak.driving.drivereport import Drive, DriveReport
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.geometry import Pose, wrap_angle
-from mapspeak.robot import GoalState, GoalStatus, PoseDoubt, Robot, StampedPose
+from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus, PoseDoubt, Robot, StampedPose
 
 MOVED_M = 0.1
 TURNED_RAD = math.radians(10)
@@ -95,11 +95,8 @@ class DriveWatchdog:
             self._moved_at = None
         self._heard_s, self._is_silent = self._wall_s() - here.silent_s, False
         if jump_m is not None:
-            reason = (
-                f"The pose jumped by {jump_m:.1f} m: the robot was carried away, or has lost its "
-                "place."
-            )
-            return GoalStatus(state=GoalState.LOST, reason=reason)
+            cause = Cause(code=CauseCode.POSE_JUMPED, distance_m=jump_m)
+            return GoalStatus(state=GoalState.LOST, cause=cause)
         return self._judge_progress(status, here.pose, now_s)
 
     def note_silence(self, error: LinkError) -> GoalStatus | None:
@@ -110,8 +107,9 @@ class DriveWatchdog:
         silent_s = now_s - self._heard_s
         if silent_s < SILENT_FOR_S:
             return None
-        reason = f"The robot was silent for {silent_s:.0f} s. {error.message}"
-        return GoalStatus(state=GoalState.LOST, reason=reason)
+        code = CauseCode.ROBOT_SILENT
+        cause = Cause(code=code, after_s=silent_s, quote=error.message)
+        return GoalStatus(state=GoalState.LOST, cause=cause)
 
     def _judge_progress(self, status: GoalStatus, pose: Pose, now_s: float) -> GoalStatus | None:
         at = self._moved_at
@@ -120,13 +118,13 @@ class DriveWatchdog:
         still_s = now_s - self._moved_s
         if still_s < self._patience_s:
             return None
-        what = "has not begun" if status.state is GoalState.ACCEPTED else "has not moved the robot"
-        reason = f"The navigation {what} for {still_s:.0f} s; the goal was withdrawn."
+        has_begun = status.state is not GoalState.ACCEPTED
+        code = CauseCode.NOT_MOVED if has_begun else CauseCode.NOT_BEGUN
         return GoalStatus(
             state=GoalState.TIMED_OUT,
             distance_left_m=status.distance_left_m,
             n_recoveries=status.n_recoveries,
-            reason=reason,
+            cause=Cause(code=code, after_s=still_s),
         )
 
 
@@ -136,7 +134,7 @@ def _has_moved(one: Pose, other: Pose) -> bool:
 
 
 STALE = (PoseDoubt.OLD_POSE, PoseDoubt.SILENT_POSE, PoseDoubt.CLOCK_STANDS)
-WAITS = GoalStatus(state=GoalState.PLANNED, reason="It waits for the drive before it.")
+WAITS = GoalStatus(state=GoalState.PLANNED, cause=Cause(code=CauseCode.WAITING))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,6 +15,8 @@ from mapspeak.geometry import Pose
 from mapspeak.robot import (
     SCAN_PATIENCE_S,
     CameraPicture,
+    Cause,
+    CauseCode,
     Detection,
     GoalState,
     GoalStatus,
@@ -174,11 +176,13 @@ class SimulatedRobot:
 
     def _goal_status(self, robot_goal_id: str) -> GoalStatus:
         status = self._simulation.goal_status(_number(robot_goal_id))
+        said = status.error_msg
+        cause = Cause(code=CauseCode.NAVIGATION_SAID, quote=said) if said else None
         return GoalStatus(
             state=STATE_OF_DRIVE[status.state],
             distance_left_m=status.distance_left_m,
             n_recoveries=status.n_recoveries,
-            reason=status.reason,
+            cause=cause,
         )
 
     def _take_picture(self) -> CameraPicture:

@@ -8,7 +8,7 @@ import anyio
 
 from mapspeak.errors import GoalError, MapspeakError
 from mapspeak.geometry import Pose
-from mapspeak.robot import GoalState, GoalStatus, Robot
+from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus, Robot
 from mapspeak.ros.messages import FramedPose
 from mapspeak.rosbridge_server.graph import BASE_FRAME
 
@@ -70,7 +70,8 @@ class Drives:
             await self._look_at_all()
             status = await self._robot.fetch_goal_status(robot_goal_id)
             if status.state is GoalState.REJECTED:
-                raise GoalError(f"Goal rejected: {status.reason}", hint="Choose another.")
+                said = "" if status.cause is None else status.cause.quote
+                raise GoalError(f"Goal rejected: {said}", hint="Choose another.")
             return self._note(goal_id, robot_goal_id, status)
 
     def wait_for_ever(self, *, goal_id: str | None = None) -> ServedDrive:
@@ -83,7 +84,7 @@ class Drives:
             return
         drive.is_cancelling = True
         if drive.robot_goal_id is None:
-            self._renew(drive, GoalStatus(state=GoalState.CANCELLED, reason="It was cancelled."))
+            self._renew(drive, GoalStatus(state=GoalState.CANCELLED))
             return
         await self._robot.cancel_goal(drive.robot_goal_id)
         await self.look()
@@ -101,7 +102,8 @@ class Drives:
             try:
                 status = await self._robot.fetch_goal_status(drive.robot_goal_id)
             except MapspeakError as error:
-                status = GoalStatus(state=GoalState.LOST, reason=error.message)
+                cause = Cause(code=CauseCode.REFUSED, quote=error.message)
+                status = GoalStatus(state=GoalState.LOST, cause=cause)
             self._renew(drive, status)
 
     def _renew(self, drive: ServedDrive, status: GoalStatus) -> None:

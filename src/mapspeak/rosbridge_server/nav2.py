@@ -136,10 +136,11 @@ def status_of(drive: ServedDrive) -> int:
 
 def result_of(drive: ServedDrive) -> dict[str, Any]:
     """Return the action's result of a drive that has ended."""
+    cause = drive.status.cause
     is_failed = drive.status.state in (GoalState.BLOCKED, GoalState.LOST)
     return {
         "error_code": FAILED_TO_MAKE_PROGRESS if is_failed else 0,
-        "error_msg": drive.status.reason if is_failed else "",
+        "error_msg": cause.quote if is_failed and cause is not None else "",
     }
 
 

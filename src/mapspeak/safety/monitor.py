@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from enum import StrEnum
 
 from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.robot import Cause, CauseCode
 from mapspeak.worldmodel.closures import ClosedArea
 from mapspeak.worldmodel.revision import MapRevision
 
@@ -27,17 +28,17 @@ N_STEPS = 8
 
 
 class Mover(StrEnum):
-    """What moves a robot, in words."""
+    """What moves a robot: its own navigation, a published velocity, or nothing of ours."""
 
-    NAVIGATION = "its own navigation"
-    VELOCITY = "a published velocity"
-    OTHERS = "something that mapspeak did not start"
+    NAVIGATION = "navigation"
+    VELOCITY = "velocity"
+    OTHERS = "others"
 
 
-ADVICE = {
-    Mover.NAVIGATION: "Lead it round by goals on the way.",
-    Mover.VELOCITY: "Drive it away from there, or send it to a goal: ways lead round.",
-    Mover.OTHERS: "Find out what drives it: another client's goal, or velocities of its own.",
+AT_AREA = {
+    Mover.NAVIGATION: CauseCode.NAVIGATION_AT_AREA,
+    Mover.VELOCITY: CauseCode.VELOCITY_AT_AREA,
+    Mover.OTHERS: CauseCode.OTHERS_AT_AREA,
 }
 
 
@@ -54,14 +55,14 @@ class GoalMonitor:
         self._radius_m = radius_m
         self._occupied_since_s: float | None = None
 
-    def judge(self, revision: MapRevision, *, now_s: float) -> str | None:
+    def judge(self, revision: MapRevision, *, now_s: float) -> Cause | None:
         """Return why the goal is no longer a goal; None while it is one."""
         here = self._goal.point
         # The way to the goal was checked; only what closes or fills up since then matters here.
         near = (area for area in revision.areas if area.distance_to(here) < self._radius_m)
         area = next(near, None)
         if area is not None:
-            return f"The goal now lies in the {area.title}; the robot was stopped."
+            return Cause(code=CauseCode.GOAL_CLOSED, name=area.title)
         cell = revision.grid.cell_at(here)
         is_off = not revision.grid.contains(cell)
         if not is_off and not revision.grid.is_occupied(cell):
@@ -70,8 +71,7 @@ class GoalMonitor:
         self._occupied_since_s = now_s if self._occupied_since_s is None else self._occupied_since_s
         if now_s - self._occupied_since_s < OCCUPIED_FOR_S:
             return None
-        what = "is off the map now" if is_off else "has an obstacle on it now"
-        return f"The map has changed: the goal {what}; the robot was stopped."
+        return Cause(code=CauseCode.GOAL_OFF_MAP if is_off else CauseCode.GOAL_OCCUPIED)
 
 
 class KeepOutMonitor:
@@ -86,7 +86,9 @@ class KeepOutMonitor:
         self._before = (here, now_s)
         self._least_m = {}
 
-    def judge(self, revision: MapRevision, here: Pose, *, now_s: float, mover: Mover) -> str | None:
+    def judge(
+        self, revision: MapRevision, here: Pose, *, now_s: float, mover: Mover
+    ) -> Cause | None:
         """Return which closed area the robot is about to enter; None when it enters none.
 
         One that stands too near may drive along the area and away, and no nearer.
@@ -97,10 +99,7 @@ class KeepOutMonitor:
             least_m = self._find_least(area, min(revision.radius_m + KEEP_M, left_m - WAVER_M))
             if any(area.distance_to_border(each) < least_m for each in way):
                 edge_m = max(left_m - revision.radius_m, 0.0)
-                return (
-                    f"The robot was stopped {edge_m:.2f} m before the {area.title}: "
-                    f"{mover} was about to drive into it. {ADVICE[mover]}"
-                )
+                return Cause(code=AT_AREA[mover], name=area.title, distance_m=edge_m)
         return None
 
     def _find_least(self, area: ClosedArea, least_m: float) -> float:

@@ -11,6 +11,8 @@ from mapspeak.geometry import Pose
 from mapspeak.hold import say_hold
 from mapspeak.robot import (
     CameraPicture,
+    Cause,
+    CauseCode,
     Detection,
     GoalState,
     GoalStatus,
@@ -170,7 +172,7 @@ class GuardedRobot:
         leg_id = robot_goal_id
         if drive is not None and drive.goal_id == robot_goal_id:
             leg_id = drive.leg_id
-            self._give_up_legs(drive, "It was cancelled.")
+            self._give_up_legs(drive, CauseCode.CANCELLED)
         try:
             await self._robot.cancel_goal(leg_id)
         finally:
@@ -205,9 +207,9 @@ class GuardedRobot:
             elif drive is not None:
                 await self._end(drive, GoalState.BLOCKED, fault)
             else:
-                logger.warning("%s", fault)
+                logger.warning("The robot is stopped: %s.", fault)
                 with anyio.CancelScope(shield=True):
-                    await self._stop(fault)
+                    await self._stop(str(fault))
 
     async def watch_map(self) -> None:
         """Notice what closes, and stop the robot when its goal is closed or full by now.
@@ -282,7 +284,7 @@ class GuardedRobot:
             with anyio.CancelScope(shield=True):
                 await self.stop()
 
-    async def _find_fault(self, mover: Mover) -> str | None:
+    async def _find_fault(self, mover: Mover) -> Cause | None:
         """Return why the robot must not go on; that nothing can be seen is a reason after a while.
 
         The blind robot is stopped on a drive of ours only: what others do with it is not known.
@@ -296,20 +298,20 @@ class GuardedRobot:
             blind_s = anyio.current_time() - self._seen_at_s
             if mover is not Mover.NAVIGATION or blind_s < BLIND_S:
                 return None
-            return f"The robot was stopped: where it is was unknown for {blind_s:.0f} s. {error}"
+            return Cause(code=CauseCode.POSE_UNKNOWN, after_s=blind_s, quote=str(error))
         self._seen_at_s = anyio.current_time()
         fault = self._monitor.judge(revision, pose, now_s=self.now_s, mover=mover)
         if fault is not None:
             self._monitor.begin_at(pose, now_s=self.now_s)
         return fault
 
-    async def _end(self, drive: GuardedDrive, state: GoalState, reason: str) -> None:
+    async def _end(self, drive: GuardedDrive, state: GoalState, cause: Cause) -> None:
         """Stop the robot and remember why, whatever its navigation will say of the drive."""
-        self._verdicts[drive.goal_id] = GoalStatus(state=state, reason=reason)
-        logger.warning("%s", reason)
+        self._verdicts[drive.goal_id] = GoalStatus(state=state, cause=cause)
+        logger.warning("The robot is stopped: %s.", cause)
         with anyio.CancelScope(shield=True):
             try:
-                await self._stop(reason)
+                await self._stop(str(cause))
             except MapspeakError:
                 # It may still drive: nobody may take the drive for ended, and it is stopped again.
                 del self._verdicts[drive.goal_id]
@@ -320,8 +322,8 @@ class GuardedRobot:
         if self._drive is None:
             await self._stop("held")
             return
-        reason = f"The robot is held: {say_hold(held_by)}."
-        await self._end(self._drive, GoalState.CANCELLED, reason)
+        cause = Cause(code=CauseCode.HELD, quote=say_hold(held_by))
+        await self._end(self._drive, GoalState.CANCELLED, cause)
 
     async def _repeat_stop(self) -> None:
         self.by_hand.stand()
@@ -331,7 +333,7 @@ class GuardedRobot:
         self._n_stops += 1
         self._guard.end_errands()
         if self._drive is not None:
-            self._give_up_legs(self._drive, "The robot was stopped.")
+            self._give_up_legs(self._drive, CauseCode.STOPPED)
         try:
             await self._repeat_stop()
         except MapspeakError as error:
@@ -361,19 +363,20 @@ class GuardedRobot:
         self._verdicts[robot_goal_id] = status
         while len(self._verdicts) > N_KEPT:
             self._verdicts.popitem(last=False)
-        said = f"{status.state}: {status.reason}" if status.reason else str(status.state)
+        said = str(status.state) if status.cause is None else f"{status.state}: {status.cause}"
         self._guard.note_end(drive.permit, said, robot_s=self.now_s)
 
-    def _give_up_legs(self, drive: GuardedDrive, reason: str) -> None:
+    def _give_up_legs(self, drive: GuardedDrive, code: CauseCode) -> None:
         """End a drive that was to go on after its present leg: its end is not the goal."""
         if drive.legs:
             drive.legs.clear()
-            status = GoalStatus(state=GoalState.CANCELLED, reason=reason)
+            status = GoalStatus(state=GoalState.CANCELLED, cause=Cause(code=code))
             self._verdicts.setdefault(drive.goal_id, status)
 
     def _note_replaced(self) -> None:
         if self._drive is not None:
-            status = GoalStatus(state=GoalState.PREEMPTED, reason="A newer goal took its place.")
+            cause = Cause(code=CauseCode.REPLACED)
+            status = GoalStatus(state=GoalState.PREEMPTED, cause=cause)
             self._note_end(self._drive.goal_id, status)
 
     def _overtaken(self, permit: Permit) -> PolicyError:

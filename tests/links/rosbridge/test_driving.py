@@ -6,10 +6,11 @@ from typing import Any
 import anyio
 import pytest
 
+from causes import code_of, quote_of
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import Timing
-from mapspeak.robot import GoalState, GoalStatus
+from mapspeak.robot import CauseCode, GoalState, GoalStatus
 from mapspeak.ros.messages import (
     Dialect,
     FramedPose,
@@ -91,7 +92,7 @@ async def test_a_goal_of_move_base_carries_our_id_and_ros_1_stamps() -> None:
 
 
 @pytest.mark.parametrize(
-    ("code", "text", "state", "reason"),
+    ("code", "text", "state", "quote"),
     [
         (SUCCEEDED, "Goal reached.", GoalState.ARRIVED, ""),
         (ABORTED, "Failed to find a valid plan.", GoalState.BLOCKED, "Failed to find"),
@@ -102,7 +103,7 @@ async def test_a_goal_of_move_base_carries_our_id_and_ros_1_stamps() -> None:
     ],
 )
 async def test_the_ways_a_goal_of_move_base_ends_are_told_apart(
-    code: int, text: str, state: GoalState, reason: str
+    code: int, text: str, state: GoalState, quote: str
 ) -> None:
     scripted = ScriptedRobot(ros=1)
     async with connected(scripted) as robot:
@@ -110,7 +111,7 @@ async def test_the_ways_a_goal_of_move_base_ends_are_told_apart(
         result = {"status": status_of(goal_id, code, text), "result": {}}
         await scripted.publish("/move_base/result", result)
         status = await until_state(robot, goal_id, state)
-    assert status.reason.startswith(reason)
+    assert quote_of(status).startswith(quote)
 
 
 async def test_the_result_of_an_older_goal_is_not_taken_for_that_of_the_newer() -> None:
@@ -145,7 +146,7 @@ async def test_a_move_base_that_forgets_a_goal_has_lost_it() -> None:
         goal_id = await send(scripted, robot)
         await tell(scripted)
         status = await until_state(robot, goal_id, GoalState.LOST)
-    assert "restarted" in status.reason
+    assert code_of(status) is CauseCode.NAVIGATION_LOST
 
 
 async def test_a_goal_that_ended_while_the_connection_was_lost_is_told_after_it() -> None:
@@ -162,7 +163,7 @@ async def test_a_goal_that_move_base_does_not_take_is_rejected() -> None:
         goal_id = await robot.send_goal(GOAL)
         status = await robot.fetch_goal_status(goal_id)
     assert status.state is GoalState.REJECTED
-    assert "no sign" in status.reason
+    assert code_of(status) is CauseCode.NOT_TAKEN
 
 
 async def test_a_goal_whose_sender_gave_up_waiting_does_not_drive_on() -> None:
@@ -269,7 +270,9 @@ async def test_a_robot_that_only_takes_poses_is_blocked_when_it_stands_elsewhere
         await be_at(scripted, robot, Pose(1.0, 2.0, 0.5), second=30)
         status = await robot.fetch_goal_status(goal_id)
     assert status.state is GoalState.BLOCKED
-    assert "3.00 m from the goal" in status.reason
+    assert status.cause is not None
+    assert status.cause.code is CauseCode.STOOD_STILL
+    assert status.cause.distance_m == pytest.approx(3.0)
 
 
 async def test_a_robot_that_only_takes_poses_is_stopped_by_its_own_pose() -> None:

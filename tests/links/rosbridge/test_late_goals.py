@@ -6,10 +6,11 @@ from typing import Any
 import anyio
 import pytest
 
+from causes import code_of
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import Timing
-from mapspeak.robot import GoalState
+from mapspeak.robot import CauseCode, GoalState
 from mapspeak.ros.actions import ActionClient, SentGoal
 from mapspeak.ros.messages import Dialect, write_stamp
 from mapspeak.ros.robot import RosRobot
@@ -93,7 +94,7 @@ async def test_a_goal_that_is_taken_too_late_over_rosbridge_is_cancelled_at_once
         await eventually_so(lambda: OURS in nav2.cancelled)
         await eventually_says(robot, goal_id, "cancelled at once")
         after = await robot.fetch_goal_status(goal_id)
-    assert (before.state, before.is_unanswered) == (GoalState.REJECTED, True)
+    assert (before.state, code_of(before)) == (GoalState.REJECTED, CauseCode.NOT_TAKEN)
     assert after.state is GoalState.REJECTED
     assert nav2.cancelled[0] == OURS
 

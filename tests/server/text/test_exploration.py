@@ -1,10 +1,11 @@
+from causes import CRATE
 from mapspeak.driving.exploration import TripEnd
 from mapspeak.robot import GoalState
 from mapspeak.server.text.exploration import say_trip_end
 
 
 def test_the_end_of_a_trip_is_told_as_the_robot_tells_it() -> None:
-    end = TripEnd(goal_id="G1", goal_state=GoalState.BLOCKED, message="A crate stands in the way.")
+    end = TripEnd(goal_id="G1", goal_state=GoalState.BLOCKED, cause=CRATE)
     assert say_trip_end(end) == "A crate stands in the way."
 
 

@@ -125,7 +125,7 @@ def test_a_goal_that_cannot_be_reached_is_blocked_at_once_with_the_reason(
     status = course.drive_to(goal)
 
     assert status.state is DriveState.BLOCKED
-    assert reason in status.reason
+    assert reason in status.error_msg
     assert course.body.driven_m == 0
 
 
@@ -146,7 +146,7 @@ def test_a_door_that_is_shut_against_the_map_blocks_the_drive_without_a_collisio
 
     assert status.state is DriveState.BLOCKED
     assert status.n_recoveries > 0
-    assert "no progress" in status.reason
+    assert "no progress" in status.error_msg
     assert course.body.n_collisions == 0
 
 
@@ -204,7 +204,7 @@ def test_a_drive_that_is_given_up_ends_with_the_reason_and_stands() -> None:
     course.navigator.give_up(DriveState.CANCELLED, "Enough.")
 
     assert course.navigator.status.state is DriveState.CANCELLED
-    assert course.navigator.status.reason == "Enough."
+    assert course.navigator.status.error_msg == "Enough."
     assert not course.navigator.is_driving
 
 

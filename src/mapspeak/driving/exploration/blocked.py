@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.robot import GoalState
+from mapspeak.robot import Cause, GoalState
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 from mapspeak.spatial.paths import clearance_m
 
@@ -56,12 +56,12 @@ class TripEnd:
     Attributes:
         goal_id: Its drive; None where the robot was not sent at all.
         goal_state: How the drive ended; None likewise.
-        message: What the robot or the refusal says of it; may be empty.
+        cause: Why; None where nobody said.
     """
 
     goal_id: str | None = None
     goal_state: GoalState | None = None
-    message: str = ""
+    cause: Cause | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

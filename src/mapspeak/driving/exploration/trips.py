@@ -13,7 +13,7 @@ from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.exploration.blocked import BlockedPlace, BlockedPlaces, TripEnd
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose, wrap_angle
-from mapspeak.robot import GoalState, Robot
+from mapspeak.robot import Cause, CauseCode, GoalState, Robot
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.worldmodel.model import WorldModel
@@ -208,7 +208,7 @@ class Trips:
             self.n_arrived += 1
             self.blocked.forget(trip.target.pose.point)
             return TripState.ARRIVED
-        self.end = TripEnd(goal_id=trip.goal_id, goal_state=status.state, message=status.reason)
+        self.end = TripEnd(goal_id=trip.goal_id, goal_state=status.state, cause=status.cause)
         if status.state in (GoalState.CANCELLED, GoalState.PREEMPTED):
             return TripState.INTERRUPTED
         self.n_blocked += 1
@@ -219,7 +219,7 @@ class Trips:
         self, target: Target, why: str, *, ticket: int, grid: OccupancyGrid
     ) -> TripState:
         """Take a refusal for one of the place, unless the robot belongs to somebody else now."""
-        self.end = TripEnd(message=why)
+        self.end = TripEnd(cause=Cause(code=CauseCode.REFUSED, quote=why))
         if self._is_not_ours(ticket):
             self.current = None
             return TripState.INTERRUPTED

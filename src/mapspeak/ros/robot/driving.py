@@ -9,7 +9,7 @@ import anyio
 
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
-from mapspeak.robot import GoalState, GoalStatus
+from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus
 from mapspeak.ros import RosConnection
 from mapspeak.ros.actions import ActionPatience, ActionState, SentGoal, open_action
 from mapspeak.ros.messages import (
@@ -51,21 +51,15 @@ class GoalRecord:
             now, state=GoalState.DRIVING, distance_left_m=left_m, n_recoveries=n_recoveries
         )
 
-    def end(self, state: GoalState, reason: str = "", *, is_unanswered: bool = False) -> None:
+    def end(self, state: GoalState, cause: Cause | None = None) -> None:
         """Note how it ended; the first word counts."""
         if self.is_over:
             return
         if self.is_replaced and state in (GoalState.BLOCKED, GoalState.CANCELLED):
             # Navigation tells a replaced goal as aborted or cancelled.
-            state, reason = GoalState.PREEMPTED, "A newer goal replaced it."
+            state, cause = GoalState.PREEMPTED, Cause(code=CauseCode.REPLACED)
         left_m = 0.0 if state is GoalState.ARRIVED else self.status.distance_left_m
-        self.status = replace(
-            self.status,
-            state=state,
-            reason=reason,
-            is_unanswered=is_unanswered,
-            distance_left_m=left_m,
-        )
+        self.status = replace(self.status, state=state, cause=cause, distance_left_m=left_m)
 
 
 class _Drive(GoalRecord):
@@ -128,7 +122,6 @@ STATE_OF = {
 }
 REPLACED = "another goal was received"
 """actionlib's words for a goal that gave way, where the number says only that it was ended."""
-RESTARTED = "{} hangs, or it or the robot was restarted, or has ended. {}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -138,7 +131,6 @@ class Navigation:
     Attributes:
         write_goal: Gives the goal's fields for a pose.
         read_feedback: Gives how far is left, and how often it had to try again, for a goal.
-        hint: What to check when it does not answer.
         feedback_s: Robot time within which it gives feedback as long as it works.
     """
 
@@ -147,7 +139,6 @@ class Navigation:
     type_name: str
     write_goal: Callable[[FramedPose], Message]
     read_feedback: Callable[[Message, Pose], tuple[float | None, int]]
-    hint: str
     feedback_s: float = 10.0
 
 
@@ -262,30 +253,33 @@ class ActionDriver:
         return is_behind and ended_s < self._patience.result_s
 
     def _end(self, drive: _Drive) -> None:
-        sent, navigation = drive.sent, self._navigation
-        state, reason = STATE_OF[sent.state], sent.reason
-        is_unanswered = sent.is_withdrawn and state is GoalState.REJECTED
-        if state is GoalState.ARRIVED:
-            reason = ""
-        elif is_unanswered:
-            reason = (
-                f"{navigation.title} gave no sign of taking the goal within "
-                f"{self._patience.acceptance_s:g} s: it was withdrawn, and is cancelled should it "
-                f"be taken later. {navigation.hint}"
-            )
-        elif state is GoalState.REJECTED and navigation.dialect is Dialect.ROS2:
-            reason = f"{navigation.title} rejected the goal. {reason}"
-        elif sent.is_withdrawn and state is GoalState.LOST:
-            reason = f"{reason} {RESTARTED.format(navigation.title, navigation.hint)}"
-        elif state is GoalState.CANCELLED and REPLACED in reason:
-            state = GoalState.PREEMPTED
-        elif state is GoalState.BLOCKED and not drive.is_replaced and self._client.others:
-            state, reason = GoalState.PREEMPTED, "Another client sent a newer goal."
-        elif state is GoalState.BLOCKED and not reason:
-            reason = f"{navigation.title} gave up and did not say why."
-        drive.end(state, reason, is_unanswered=is_unanswered)
+        state, cause = self._judge_end(drive)
+        drive.end(state, cause)
         if state is GoalState.LOST:
             self._on_lost()
+
+    def _judge_end(self, drive: _Drive) -> tuple[GoalState, Cause | None]:
+        """Return how a drive ended by what its action's goal and those of others say."""
+        sent, navigation = drive.sent, self._navigation
+        state, code = STATE_OF[sent.state], CauseCode.NAVIGATION_SAID
+        if state is GoalState.ARRIVED:
+            return state, None
+        if sent.is_withdrawn and state is GoalState.REJECTED:
+            waited_s = self._patience.acceptance_s
+            return state, Cause(code=CauseCode.NOT_TAKEN, name=navigation.title, after_s=waited_s)
+        if state is GoalState.REJECTED and navigation.dialect is Dialect.ROS2:
+            code = CauseCode.REJECTED
+        elif sent.is_withdrawn and state is GoalState.LOST:
+            code = CauseCode.NAVIGATION_LOST
+        elif state is GoalState.CANCELLED and REPLACED in sent.reason:
+            state = GoalState.PREEMPTED
+        elif state is GoalState.BLOCKED and not drive.is_replaced and self._client.others:
+            return GoalState.PREEMPTED, Cause(code=CauseCode.REPLACED_BY_OTHERS)
+        elif state is GoalState.BLOCKED and not sent.reason:
+            code = CauseCode.NAVIGATION_MUTE
+        elif not sent.reason:
+            return state, None
+        return state, Cause(code=code, name=navigation.title, quote=sent.reason)
 
 
 def _write_move_base_goal(pose: FramedPose) -> Message:
@@ -307,7 +301,6 @@ MOVE_BASE = Navigation(
     type_name="move_base_msgs/MoveBase",
     write_goal=_write_move_base_goal,
     read_feedback=_read_move_base_feedback,
-    hint="Check that move_base runs and that the robot knows where it is.",
     # It gives none while a recovery turns the robot once round.
     feedback_s=20.0,
 )
@@ -338,6 +331,4 @@ NAV2 = Navigation(
     type_name="nav2_msgs/action/NavigateToPose",
     write_goal=_write_nav2_goal,
     read_feedback=_read_nav2_feedback,
-    hint="Check that Nav2 is active (`ros2 lifecycle get /bt_navigator`), that the robot knows "
-    "where it is, and that the goal lies on the map.",
 )

@@ -3,7 +3,7 @@
 from collections.abc import Awaitable, Callable
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.robot import GoalState, StampedPose
+from mapspeak.robot import Cause, CauseCode, GoalState, StampedPose
 from mapspeak.ros import RosConnection, has_listeners, new_id
 from mapspeak.ros.messages import Dialect, FramedPose, write_pose_stamped
 from mapspeak.ros.robot.driving import LATEST_S, GoalRecord
@@ -64,7 +64,7 @@ class GoalTopicDriver:
         self._connection.started.n_begun += 1
         await self._publish(goal)
         if self._current is not None:
-            self._current.end(GoalState.PREEMPTED, "A newer goal replaced it.")
+            self._current.end(GoalState.PREEMPTED, Cause(code=CauseCode.REPLACED))
         self._current = record
         self._moved = None
         record.drive()
@@ -81,10 +81,9 @@ class GoalTopicDriver:
         if left_m <= ARRIVAL_M and stood_s > 0.0:
             record.end(GoalState.ARRIVED)
         elif stood_s > GIVEN_UP_S:
-            record.end(
-                GoalState.BLOCKED,
-                f"The robot has stood still for {stood_s:.0f} s, {left_m:.2f} m from the goal.",
-            )
+            code = CauseCode.STOOD_STILL
+            cause = Cause(code=code, after_s=stood_s, distance_m=left_m)
+            record.end(GoalState.BLOCKED, cause)
 
     async def cancel(self, record: GoalRecord) -> None:
         """Send the robot to where it is; it has no other way to end a goal."""

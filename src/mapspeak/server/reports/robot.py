@@ -13,7 +13,8 @@ from mapspeak.memory import Landmark, Merge, SemanticMap, WriteReceipt, name_key
 from mapspeak.memory.quoting import quote_name
 from mapspeak.places.goalcheck import GoalVerdict
 from mapspeak.places.relations.choosing import CheckedGoal
-from mapspeak.robot import GoalState, StampedPose
+from mapspeak.robot import CauseCode, GoalState, StampedPose
+from mapspeak.server.text.drives import say_end
 from mapspeak.server.text.memory import say_landmarks, say_replaced
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.worldmodel.recollection import RememberedPlace, number_places
@@ -127,7 +128,7 @@ class DriveAnswer(Report):
             pose_uncertain=say_pose_doubt(report.pose_doubt, report.pose_age_s, report.silence),
             distance_left_m=None if left_m is None else round(left_m, 2),
             elapsed_s=round(report.elapsed_s, 1),
-            reason=" ".join(filter(None, (report.status.reason, report.status.afterwards))),
+            reason=say_end(report.status),
             next_step=FOREIGN_DRIVE if foreign_goals else _say_next_step(report),
         )
 
@@ -141,7 +142,8 @@ def _distance_left_m(report: DriveReport) -> float | None:
 def _say_next_step(report: DriveReport) -> str:
     if report.is_stop_owed:
         return STOP_OWED
-    if report.status.is_unanswered:
+    cause = report.status.cause
+    if cause is not None and cause.code is CauseCode.NOT_TAKEN:
         return UNANSWERED
     if report.status.state is not GoalState.ARRIVED:
         return NEXT_STEP[report.status.state]

@@ -11,6 +11,7 @@ from mapspeak.driving.exploration import (
     TripEnd,
 )
 from mapspeak.robot import GoalState
+from mapspeak.server.text.drives import say_cause
 from mapspeak.server.text.frontiers import say_merits, say_refusal
 from mapspeak.server.text.wording import say_point
 from mapspeak.spatial.frontiers import RefusalReason, RefusedFrontier
@@ -100,8 +101,8 @@ def say_unreachable(border: RefusedFrontier) -> str:
 
 def say_trip_end(end: TripEnd | None) -> str:
     """Say why a trip ended before its target: as the robot says it, else how its drive ended."""
-    if end is None or end.message or end.goal_state is None:
-        return "" if end is None else end.message
+    if end is None or end.cause is not None or end.goal_state is None:
+        return "" if end is None else say_cause(end.cause)
     if end.goal_state in (GoalState.CANCELLED, GoalState.PREEMPTED):
         return f"{end.goal_id} was {end.goal_state}."
     return f"The drive ended as {end.goal_state}."

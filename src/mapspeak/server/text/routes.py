@@ -3,6 +3,7 @@
 from mapspeak.driving.routes import RouteProgress, RouteState, RouteStop, StopState
 from mapspeak.places.goalcheck import say_check
 from mapspeak.robot import GoalStatus
+from mapspeak.server.text.drives import say_cause
 
 
 def say_route(progress: RouteProgress) -> str:
@@ -17,7 +18,10 @@ def say_route(progress: RouteProgress) -> str:
     if progress.state is RouteState.AT_STOP:
         return f"The robot stands at stop {number}, {words}."
     if progress.ended is not None:
-        return progress.ended.reason or f"The drive to stop {number} was {progress.ended.state}."
+        return (
+            say_cause(progress.ended.cause)
+            or f"The drive to stop {number} was {progress.ended.state}."
+        )
     return f"Stop {number}, {words}: {say_obstacle(progress.stops[progress.number])}"
 
 
@@ -33,5 +37,5 @@ def say_obstacle(stop: RouteStop) -> str:
     if stop.obstacle is None:
         return ""
     if isinstance(stop.obstacle, GoalStatus):
-        return stop.obstacle.reason or f"the drive was {stop.obstacle.state}"
+        return say_cause(stop.obstacle.cause) or f"the drive was {stop.obstacle.state}"
     return say_check(stop.obstacle)

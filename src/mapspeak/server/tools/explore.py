@@ -24,6 +24,7 @@ from mapspeak.robot import CameraPicture, GoalState
 from mapspeak.safety import Errand, on_errand
 from mapspeak.server.reports.exploring import ExploreAnswer, SearchAnswer
 from mapspeak.server.reports.robot import DriveAnswer, Report
+from mapspeak.server.text.drives import say_cause
 from mapspeak.server.text.wording import shorten
 from mapspeak.server.tools.asking import (
     AT_MOST_LONGEST_WAIT,
@@ -240,7 +241,7 @@ class ExploreTools:
                 report = await self._turn(context, yaw_rad, left_s)
             if report.status.state is not GoalState.ARRIVED:
                 await self._session.drives.cancel(report.drive.goal_id)
-                why = report.status.reason or f"the turn is {report.status.state}"
+                why = say_cause(report.status.cause) or f"the turn is {report.status.state}"
                 return [*shown, _say_rest(yaw_rad, why)]
             sighting = await look_ahead(self._session)
             shown += [sighting.text, sighting.image]

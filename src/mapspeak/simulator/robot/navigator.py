@@ -53,13 +53,14 @@ class DriveStatus:
         state: See `DriveState`.
         distance_left_m: Along the latest path; None before there was one.
         n_recoveries: How often the robot backed off or turned to get free.
-        reason: Why it ended as it did; empty while it drives and when it has arrived.
+        error_msg: What a client is told of its end, as Nav2 does; empty while it drives and when
+            it has arrived.
     """
 
     state: DriveState
     distance_left_m: float | None = None
     n_recoveries: int = 0
-    reason: str = ""
+    error_msg: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,7 +109,7 @@ class Navigator:
         self._checked_map: OccupancyGrid | None = None
         self._recovery: _Recovery | None = None
         self._milestone: _Milestone | None = None
-        self._status = DriveStatus(state=DriveState.CANCELLED, reason="There was no goal yet.")
+        self._status = DriveStatus(state=DriveState.CANCELLED, error_msg="There was no goal yet.")
 
     @property
     def status(self) -> DriveStatus:
@@ -240,7 +241,7 @@ class Navigator:
         self._goal = None
         self._follower = None
         self._recovery = None
-        self._status = replace(self._status, state=state, reason=reason)
+        self._status = replace(self._status, state=state, error_msg=reason)
 
 
 def _fault_of(grid: OccupancyGrid, goal: Point) -> str | None:
