@@ -27,7 +27,7 @@ from websockets.exceptions import ConnectionClosed
 from benchmarks.figure import Figure
 from benchmarks.mutations import Frame, as_png, mutate, pieces_of, seed_frames
 from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, open_client
-from mapspeak.ros.messages import read_grid
+from mapspeak.ros.messages.grids import read_grid
 
 __all__ = ["measure"]
 

@@ -32,7 +32,7 @@ from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.memory import SemanticMapStore
 from mapspeak.robot import GoalState
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 from mapspeak.session import Session
 from mapspeak.spatial import OccupancyGrid
 

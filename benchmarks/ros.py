@@ -19,7 +19,8 @@ from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.links.rosbridge.protocol import Conversation, Published
 from mapspeak.links.rosbridge.protocol.codec import to_cbor, to_json
 from mapspeak.links.simulated import Clock, open_simulated_robot
-from mapspeak.ros.messages import Dialect, read_grid, write_grid
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.grids import read_grid, write_grid
 from mapspeak.ros.robot import RosRobot
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.simulator import Simulation, load_world

@@ -24,8 +24,9 @@ from benchmarks.figure import Figure
 from mapspeak.errors import LinkError
 from mapspeak.links.rclpy import open_ros2_connection
 from mapspeak.links.rosbridge import RobotAddress, open_client
-from mapspeak.ros import RosConnection
-from mapspeak.ros.messages import Dialect, read_grid, write_grid
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.grids import read_grid, write_grid
+from mapspeak.ros.port import RosConnection
 from mapspeak.spatial import OccupancyGrid
 
 __all__ = ["measure"]

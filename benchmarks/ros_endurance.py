@@ -24,7 +24,8 @@ from mapspeak.links.rosbridge import RosbridgeClient, Timing, open_rosbridge_rob
 from mapspeak.links.rosbridge.protocol import Conversation, FrameRefused, Published
 from mapspeak.links.rosbridge.protocol.codec import to_cbor, to_json
 from mapspeak.robot import GoalState
-from mapspeak.ros.messages import Dialect, read_grid, write_grid
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.grids import read_grid, write_grid
 from mapspeak.ros.robot import RosRobot
 from mapspeak.spatial import OccupancyGrid
 

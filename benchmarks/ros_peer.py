@@ -27,7 +27,7 @@ from benchmarks.talking import HELLO
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.links.simulated import Clock, open_simulated_robot
 from mapspeak.memory import SemanticMapStore
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.server.app import build_server
 from mapspeak.session import Session

@@ -27,7 +27,7 @@ from mcp.client import Client
 from benchmarks.figure import Figure
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.memory import SemanticMapStore
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.robot import RosRobot
 from mapspeak.server.app import build_server
 from mapspeak.session import Session

@@ -10,7 +10,7 @@ from websockets.asyncio.client import ClientConnection, connect
 
 from fakes import FakeRobot, two_rooms
 from mapspeak.links.rosbridge.protocol.codec import decode_cbor
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 from mapspeak.rosbridge_server import open_rosbridge_server
 
 STEP_S = 0.05

@@ -34,7 +34,7 @@ from mapspeak.links.dds.endpoints import (
 from mapspeak.links.dds.network import DdsNetwork
 from mapspeak.links.dds.participant import DdsParticipant
 from mapspeak.links.dds.types import HUMBLE, Types, build_type_book
-from mapspeak.ros.definitions import hash_type
+from mapspeak.ros.definitions.typestore import hash_type
 
 RELIABLE = Quality(is_reliable=True, is_latched=False, depth=10)
 LATCHED = Quality(is_reliable=True, is_latched=True, depth=10)

@@ -11,7 +11,8 @@ from fakes import two_rooms
 from faulty import Faults, FaultyRobot, Velocity
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
-from mapspeak.ros.messages import Dialect, Message, Twist, read_twist, write_twist
+from mapspeak.ros.messages.fields import Dialect, Message
+from mapspeak.ros.messages.poses import Twist, read_twist, write_twist
 from mapspeak.rosbridge_server.drives import Drives, ServedDrive
 from mapspeak.rosbridge_server.graph import SLAM_NODES, navigator_of, topics_of
 from mapspeak.rosbridge_server.hub import Hub, Publication, Topic

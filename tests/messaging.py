@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from mapspeak.ros.definitions import FLOATS, WHOLES, Field, TypeBook
+from mapspeak.ros.definitions.types import FLOATS, WHOLES, Field, TypeBook
 
 MOST_LISTED = 3
 MOST_LETTERS = 6

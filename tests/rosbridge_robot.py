@@ -9,13 +9,10 @@ import anyio
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import Timing, open_rosbridge_robot
 from mapspeak.links.rosbridge.protocol.codec import to_cbor
-from mapspeak.ros.discovery import RobotOverrides
-from mapspeak.ros.messages import (
-    Dialect,
-    FrameTransform,
-    write_grid,
-    write_transforms,
-)
+from mapspeak.ros.discovery.overrides import RobotOverrides
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.grids import write_grid
+from mapspeak.ros.messages.poses import FrameTransform, write_transforms
 from mapspeak.ros.robot import RosRobot
 from mapspeak.ros.robot.driving import DrivingPatience
 from mapspeak.spatial import OccupancyGrid

@@ -13,8 +13,8 @@ from bridging import SteppedRobot
 from fakes import FakeRobot, two_rooms
 from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, Timing, open_client
 from mapspeak.memory import SemanticMapStore
-from mapspeak.ros import RosConnection
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.port import RosConnection
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.safety import Guard
 from mapspeak.server.app import build_server

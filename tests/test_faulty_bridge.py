@@ -12,7 +12,8 @@ from websockets.asyncio.client import connect
 from bridging import RawClient
 from faulty import Faults
 from faulty_bridge import NEXT_ROOM, FaultyBridge, open_faulty_bridge
-from mapspeak.ros.messages import Dialect, FramedPose, write_pose_stamped
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.poses import FramedPose, write_pose_stamped
 
 pytestmark = pytest.mark.anyio
 

@@ -32,7 +32,7 @@ from mapspeak.memory.events import Event
 from mapspeak.memory.search import Embedder, find_model
 from mapspeak.places.relations.choosing import CheckedGoal, choose_goal
 from mapspeak.robot import CameraPicture, Cause, CauseCode, Robot
-from mapspeak.ros import RosConnection, started_over
+from mapspeak.ros.port import RosConnection, started_over
 from mapspeak.safety import Guard, GuardedConnection, GuardedRobot, Surveyor, WhenBusy
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.worldmodel.model import WorldModel

@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 
 from mapspeak.cli.checkup import Finding, Health, describe_profile
-from mapspeak.ros import LinkKind, LinkName
-from mapspeak.ros.discovery import NavigationKind, RobotProfile
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.discovery.profile import NavigationKind, RobotProfile
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.port import LinkKind, LinkName
 
 DDS = LinkName(LinkKind.DDS, "ROS domain 41")
 ROBOT = RobotProfile(name="robot", dialect=Dialect.ROS2, distro="kilted", map_topic="/map")

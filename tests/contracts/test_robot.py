@@ -20,7 +20,7 @@ from mapspeak.links.rclpy import open_ros2_robot
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.links.simulated import Clock, open_simulated_robot
 from mapspeak.robot import GoalState, GoalStatus, Robot
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.simulator import Simulation, load_world
 from mapspeak.spatial import OccupancyGrid

@@ -8,7 +8,7 @@ from bridging import SteppedRobot
 from fakes import two_rooms
 from goldens.transcript import Transcript, playing
 from mapspeak.links.rosbridge import RobotAddress, open_client
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 from mapspeak.rosbridge_server import open_rosbridge_server
 from rosserved import QUICK
 

@@ -16,7 +16,7 @@ from goldens.transcript import playing
 from guarding import rectangle
 from mapspeak.geometry import Pose
 from mapspeak.links.simulated import SoloRobot
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 from mapspeak.safety import Policy
 from mapspeak.simulator import Simulation, load_world, world_names
 from mapspeak.spatial.mapfiles import load_map

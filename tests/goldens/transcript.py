@@ -17,7 +17,7 @@ from PIL import Image
 from guarding import audit_of, make_guard
 from mapspeak.memory import SemanticMapStore
 from mapspeak.robot import Robot
-from mapspeak.ros import RosConnection
+from mapspeak.ros.port import RosConnection
 from mapspeak.safety import Policy
 from mapspeak.server.app import build_server
 from mapspeak.session import Session

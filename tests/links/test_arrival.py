@@ -15,7 +15,7 @@ from mapspeak.errors import ConfigError
 from mapspeak.links.arrival import Arrival
 from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.memory import SemanticMapStore
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.robot.driving import DrivingPatience
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.server.app import build_server

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.outages import Course, Part, list_cases, run_all
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 
 
 def die_until(n_deaths: int, folder: Path, course: Course) -> Course:

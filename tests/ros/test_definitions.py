@@ -8,19 +8,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mapspeak.errors import LinkError
-from mapspeak.ros import find_nearest
-from mapspeak.ros.definitions import (
-    Field,
-    TypeBook,
-    check_message,
-    describe_type,
+from mapspeak.ros.definitions.checking import check_message, describe_type
+from mapspeak.ros.definitions.texts import (
     known_definitions,
-    parse_definition,
     split_definition,
     split_parts,
     write_definition,
 )
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.definitions.types import Field, TypeBook, parse_definition
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.port import find_nearest
 
 KNOWN = {dialect: TypeBook(known_definitions(dialect)) for dialect in Dialect}
 

@@ -6,18 +6,11 @@ from typing import Any
 import pytest
 
 from mapspeak.errors import ConfigError
-from mapspeak.ros import RosGraph
-from mapspeak.ros.discovery import (
-    NavigationKind,
-    PoseSource,
-    RobotOverrides,
-    RobotProfile,
-    RosSettings,
-    choose_profile,
-    load_robot_file,
-)
+from mapspeak.ros.discovery.overrides import RobotOverrides, RosSettings, load_robot_file
 from mapspeak.ros.discovery.parts import NAVIGATION
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.discovery.profile import NavigationKind, PoseSource, RobotProfile, choose_profile
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.port import RosGraph
 
 GRID = "nav_msgs/OccupancyGrid"
 TURTLEBOT_4 = {

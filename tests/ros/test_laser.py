@@ -12,8 +12,10 @@ import pytest
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import Timing
 from mapspeak.robot import RangeScan
-from mapspeak.ros.discovery import RobotOverrides
-from mapspeak.ros.messages import Dialect, FrameTransform, LaserScan, write_scan, write_transforms
+from mapspeak.ros.discovery.overrides import RobotOverrides
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.poses import FrameTransform, write_transforms
+from mapspeak.ros.messages.scans import LaserScan, write_scan
 from mapspeak.ros.robot.driving import DrivingPatience
 from mapspeak.ros.robot.sensors import Laser
 from rosbridge_robot import ScriptedRobot, connect_scripted, eventually

@@ -13,34 +13,31 @@ from drawing import grid_from_text, text_from_grid
 from mapspeak.errors import LinkError, MapError
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.links.rosbridge.protocol.codec import decode_cbor, decode_json, to_cbor, to_json
-from mapspeak.ros.messages import (
-    CameraInfo,
-    Dialect,
+from mapspeak.ros.messages.fields import Dialect, read_stamp, write_header, write_stamp
+from mapspeak.ros.messages.grids import apply_grid_update, read_grid, write_grid
+from mapspeak.ros.messages.poses import (
     FramedPose,
     FrameTransform,
-    LaserScan,
     Twist,
-    apply_grid_update,
-    read_camera_info,
-    read_grid,
     read_pose,
     read_pose_stamped,
     read_pose_with_covariance,
-    read_scan,
-    read_stamp,
     read_transforms,
     read_twist,
-    write_camera_info,
-    write_grid,
-    write_header,
     write_odometry,
     write_pose,
     write_pose_stamped,
     write_pose_with_covariance,
-    write_scan,
-    write_stamp,
     write_transforms,
     write_twist,
+)
+from mapspeak.ros.messages.scans import (
+    CameraInfo,
+    LaserScan,
+    read_camera_info,
+    read_scan,
+    write_camera_info,
+    write_scan,
 )
 from mapspeak.spatial import OccupancyGrid
 

@@ -15,30 +15,29 @@ from mapspeak.errors import LinkError, MapError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge.protocol.bounds import FrameError
 from mapspeak.links.rosbridge.protocol.codec import decode_json, to_json
-from mapspeak.ros.messages import (
-    CameraInfo,
-    Dialect,
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.grids import apply_grid_update, read_grid, write_grid
+from mapspeak.ros.messages.pictures import read_compressed_image, read_image
+from mapspeak.ros.messages.poses import (
     FramedPose,
     FrameTransform,
-    LaserScan,
     Twist,
-    apply_grid_update,
-    read_camera_info,
-    read_compressed_image,
-    read_grid,
-    read_image,
     read_pose_stamped,
     read_pose_with_covariance,
-    read_scan,
     read_transforms,
     read_twist,
-    write_camera_info,
-    write_grid,
     write_pose_stamped,
     write_pose_with_covariance,
-    write_scan,
     write_transforms,
     write_twist,
+)
+from mapspeak.ros.messages.scans import (
+    CameraInfo,
+    LaserScan,
+    read_camera_info,
+    read_scan,
+    write_camera_info,
+    write_scan,
 )
 from mapspeak.spatial import OccupancyGrid
 

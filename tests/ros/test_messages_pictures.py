@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.messages import (
-    Dialect,
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.pictures import (
     EncodedPicture,
     read_compressed_image,
-    read_depth,
     read_image,
     write_compressed_image,
 )
+from mapspeak.ros.messages.pixels import read_depth
 
 HEADER = {"stamp": {"secs": 3, "nsecs": 0}, "frame_id": "camera"}
 ORANGE = (230, 120, 20)

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from mapspeak.ros.discovery import NavigationKind, PoseSource, RobotProfile
 from mapspeak.ros.discovery.parts import find_missing, improve
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.discovery.profile import NavigationKind, PoseSource, RobotProfile
+from mapspeak.ros.messages.fields import Dialect
 
 WHOLE = RobotProfile(
     name="robot",

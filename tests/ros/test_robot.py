@@ -10,8 +10,9 @@ from mapspeak.cli.checkup import Health, describe_profile
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import Timing
-from mapspeak.ros.discovery import NavigationKind, PoseSource, RobotOverrides
-from mapspeak.ros.messages import Dialect, write_header
+from mapspeak.ros.discovery.overrides import RobotOverrides
+from mapspeak.ros.discovery.profile import NavigationKind, PoseSource
+from mapspeak.ros.messages.fields import Dialect, write_header
 from mapspeak.ros.robot import RosRobot
 from mapspeak.ros.robot.driving import DrivingPatience
 from rosbridge_robot import CANCEL_SERVICE, ScriptedRobot, connect_scripted

@@ -6,7 +6,7 @@ import pytest
 
 from mapspeak.errors import LinkError
 from mapspeak.ros.discovery.watch import find_radius_m
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 
 pytestmark = pytest.mark.anyio
 GLOBAL_2 = "/global_costmap/global_costmap"

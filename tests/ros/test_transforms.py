@@ -6,7 +6,7 @@ import pytest
 
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
-from mapspeak.ros.messages import FrameTransform
+from mapspeak.ros.messages.poses import FrameTransform
 from mapspeak.ros.transforms import TransformTree
 
 

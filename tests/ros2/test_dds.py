@@ -16,7 +16,7 @@ from mapspeak.cli.robots import read_network
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState, GoalStatus, Robot
-from mapspeak.ros import ActionGoal
+from mapspeak.ros.activity import ActionGoal
 from ros2.conftest import START, TWO_ROOMS
 from ros2.robot_process import RobotProcess
 

@@ -16,8 +16,9 @@ from mapspeak.geometry import Pose
 from mapspeak.links.arrival import Arrival
 from mapspeak.links.rclpy import open_ros2_connection, open_ros2_robot
 from mapspeak.robot import GoalState, GoalStatus, Robot
-from mapspeak.ros import NodeLinks, RosConnection, RosGraph
-from mapspeak.ros.messages import Dialect, FramedPose, write_pose_stamped
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.poses import FramedPose, write_pose_stamped
+from mapspeak.ros.port import NodeLinks, RosConnection, RosGraph
 from mapspeak.ros.robot import RosRobot
 from ros2.conftest import START, TWO_ROOMS
 from ros2.robot_process import RobotProcess, open_robot_process

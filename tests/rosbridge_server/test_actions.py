@@ -9,12 +9,8 @@ from fakes import two_rooms
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState
-from mapspeak.ros.messages import (
-    Dialect,
-    FramedPose,
-    read_pose_stamped,
-    write_pose_stamped,
-)
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.poses import FramedPose, read_pose_stamped, write_pose_stamped
 
 pytestmark = pytest.mark.anyio
 

@@ -9,7 +9,8 @@ import pytest
 from bridging import SteppedRobot, bridge
 from fakes import two_rooms
 from mapspeak.geometry import Pose
-from mapspeak.ros.messages import Dialect, FramedPose, write_pose_stamped
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.poses import FramedPose, write_pose_stamped
 
 pytestmark = pytest.mark.anyio
 

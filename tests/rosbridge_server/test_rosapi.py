@@ -5,7 +5,8 @@ from typing import Any
 import pytest
 
 from bridging import bridge
-from mapspeak.ros.messages import Dialect, read_grid
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.grids import read_grid
 
 pytestmark = pytest.mark.anyio
 both = pytest.mark.parametrize("dialect", Dialect)

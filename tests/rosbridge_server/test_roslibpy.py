@@ -11,7 +11,7 @@ import anyio
 import pytest
 
 from mapspeak.links.simulated import Clock, open_simulated_robot
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.simulator import Simulation, load_world
 

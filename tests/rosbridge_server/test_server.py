@@ -13,14 +13,10 @@ from fakes import two_rooms
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge.protocol.codec import decode_png
-from mapspeak.ros.messages import (
-    Dialect,
-    read_compressed_image,
-    read_grid,
-    read_pose_with_covariance,
-    read_transforms,
-    read_twist,
-)
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.grids import read_grid
+from mapspeak.ros.messages.pictures import read_compressed_image
+from mapspeak.ros.messages.poses import read_pose_with_covariance, read_transforms, read_twist
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.spatial import OccupancyGrid
 

@@ -9,7 +9,8 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 from bridging import SteppedRobot, bridge
-from mapspeak.ros.messages import Dialect, read_grid
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.grids import read_grid
 from mapspeak.spatial import OccupancyGrid
 
 pytestmark = pytest.mark.anyio

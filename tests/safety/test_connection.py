@@ -7,7 +7,7 @@ from fakes import FakeRobot, two_rooms
 from guarding import audit_of, make_guard
 from mapspeak.errors import LinkError, PolicyError
 from mapspeak.memory import SemanticMapStore
-from mapspeak.ros import RosConnection
+from mapspeak.ros.port import RosConnection
 from mapspeak.safety import Approval, CommandKind, GuardedConnection, Policy
 from mapspeak.session import Session
 

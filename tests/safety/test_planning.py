@@ -12,7 +12,7 @@ from guarding import audit_of, make_guard, rectangle
 from mapspeak.errors import GoalError, LinkError, PolicyError
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMapStore
-from mapspeak.ros import RosConnection
+from mapspeak.ros.port import RosConnection
 from mapspeak.safety import AreaRule, Policy
 from mapspeak.safety.planning import NO_FRAME, find_poses
 from mapspeak.session import Session

@@ -13,7 +13,7 @@ from mapspeak.errors import LinkError, PolicyError
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMapStore
 from mapspeak.robot import StampedPose
-from mapspeak.ros import RosConnection
+from mapspeak.ros.port import RosConnection
 from mapspeak.safety import AreaRule, Hours, Policy, publishing_for
 from mapspeak.session import Session
 

@@ -13,7 +13,7 @@ from faulty import Faults
 from faulty_bridge import NEXT_ROOM, FaultyBridge, open_faulty_bridge
 from mapspeak.links.rosbridge import Timing, open_rosbridge_robot
 from mapspeak.memory import SemanticMapStore
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.robot.driving import DrivingPatience
 from mapspeak.server.app import build_server
 from mapspeak.session import Session

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from mapspeak.geometry import Pose
-from mapspeak.ros.messages import Dialect, FrameTransform, write_transforms
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.poses import FrameTransform, write_transforms
 from mapspeak.server.tools.ros.measuring import FrameLink, say_frames
 from rosbridge_robot import ScriptedRobot
 from rosserved import at_time, on_script, publishing

@@ -14,7 +14,8 @@ from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, open_client
 from mapspeak.memory import SemanticMapStore
 from mapspeak.ros.actions import ActionPatience, ActionState, SentGoal
-from mapspeak.ros.messages import Dialect, write_header, write_pose
+from mapspeak.ros.messages.fields import Dialect, write_header
+from mapspeak.ros.messages.poses import write_pose
 from mapspeak.safety import CommandKind, Policy
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.goals import ActionBook

@@ -12,7 +12,7 @@ from bridging import SteppedRobot
 from fakes import two_rooms
 from guarding import make_guard
 from mapspeak.links.rosbridge import RobotAddress, open_client
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 from mapspeak.rosbridge_server import open_rosbridge_server
 from mapspeak.safety import Policy
 from rosbridge_robot import ScriptedRobot

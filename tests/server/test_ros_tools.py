@@ -14,7 +14,7 @@ from bridging import SteppedRobot
 from drawing import grid_from_text
 from fakes import FakeRobot, two_rooms
 from mapspeak.links.rosbridge import RobotAddress, Timing, open_client
-from mapspeak.ros.messages import Dialect, write_header
+from mapspeak.ros.messages.fields import Dialect, write_header
 from mapspeak.server.tools.ros.reading import hear
 from mapspeak.spatial import OccupancyGrid
 from rosbridge_robot import ScriptedRobot

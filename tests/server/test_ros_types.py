@@ -9,7 +9,7 @@ import pytest
 from bridging import SteppedRobot
 from fakes import FakeRobot, two_rooms
 from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, open_client
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 from mapspeak.rosbridge_server import open_rosbridge_server
 from rosserved import QUICK, on_our_server, served
 

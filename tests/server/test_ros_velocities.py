@@ -5,7 +5,7 @@ from pathlib import Path
 import anyio
 import pytest
 
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 from rosbridge_robot import ScriptedRobot
 from rosserved import Caller, on_our_server, on_script
 

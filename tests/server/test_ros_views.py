@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mapspeak.ros.messages import Dialect, write_header
+from mapspeak.ros.messages.fields import Dialect, write_header
 from rosbridge_robot import ScriptedRobot
 from rosserved import on_script
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from mapspeak.errors import LinkError, MapError, MapspeakError
 from mapspeak.robot import RangeScan, Robot
-from mapspeak.ros import LinkKind, LinkName
 from mapspeak.ros.discovery.parts import CAMERA, LASER, MAP, NAVIGATION, VELOCITY, RobotPart, Worth
 from mapspeak.ros.discovery.profile import NavigationKind, PoseSource, RobotProfile
+from mapspeak.ros.port import LinkKind, LinkName
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import clearance_m
 

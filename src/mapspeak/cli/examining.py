@@ -48,7 +48,7 @@ def doctor(
 async def examine_choice(choice: RobotChoice) -> "list[Finding]":
     """Return what the robot offers, once all of it has been found, and what it really gives."""
     from mapspeak.cli.checkup import describe_profile, examine  # noqa: PLC0415 - heavy
-    from mapspeak.ros import LinkKind  # noqa: PLC0415
+    from mapspeak.ros.port import LinkKind  # noqa: PLC0415
     from mapspeak.ros.robot import RosRobot  # noqa: PLC0415 - heavy; help must be quick
 
     async with open_robot(choice) as robot:

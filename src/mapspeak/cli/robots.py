@@ -21,8 +21,8 @@ from mapspeak.installation import say_install
 if TYPE_CHECKING:
     from mapspeak.links.dds import DdsNetwork
     from mapspeak.robot import Robot
-    from mapspeak.ros import RosConnection
-    from mapspeak.ros.discovery import RobotOverrides
+    from mapspeak.ros.discovery.overrides import RobotOverrides
+    from mapspeak.ros.port import RosConnection
     from mapspeak.ros.robot import RosRobot
 
     OpenLink = Callable[[], AbstractAsyncContextManager[RosRobot]]
@@ -207,7 +207,7 @@ def choose_link(choice: RobotChoice) -> "tuple[OpenLink, RobotOverrides]":
     Raises:
         ConfigError: There is no such link, or something was asked of it that it has not.
     """
-    from mapspeak.ros.discovery import RobotOverrides, load_robot_file  # noqa: PLC0415 - heavy
+    from mapspeak.ros.discovery.overrides import RobotOverrides, load_robot_file  # noqa: PLC0415 - heavy
 
     kind, _, domain = choice.robot.partition(":")
     is_rosbridge = choice.robot.startswith(ROSBRIDGE_SCHEMES)

@@ -31,7 +31,7 @@ DEFAULT_ROSBRIDGE = "127.0.0.1:9090"
 def simulate(address: str, ros: str, world: str, seed: int, goals_in_new_thread: bool) -> None:  # noqa: FBT001 - a flag
     """Offer the simulated robot to any rosbridge client, as a robot with ROS 1 or ROS 2."""
     from mapspeak.links.simulated import Clock, open_simulated_robot  # noqa: PLC0415
-    from mapspeak.ros.messages import Dialect  # noqa: PLC0415
+    from mapspeak.ros.messages.fields import Dialect  # noqa: PLC0415
     from mapspeak.rosbridge_server import run_rosbridge_server  # noqa: PLC0415
     from mapspeak.simulator import Simulation, load_world  # noqa: PLC0415
 

@@ -14,7 +14,8 @@ import anyio
 
 from mapspeak.errors import LinkError
 from mapspeak.robot import Robot
-from mapspeak.ros import RosConnection, Started
+from mapspeak.ros.activity import Started
+from mapspeak.ros.port import RosConnection
 from mapspeak.ros.robot import RosRobot
 
 PAUSE_S = 2.0

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.messages import Message
+from mapspeak.ros.messages.fields import Message
 
 Listener = Callable[[Message], None]
 

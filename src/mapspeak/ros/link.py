@@ -11,9 +11,10 @@ from typing import Any, Generic, TypeVar
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.ros import NAME, ActionGoal, OwnEnds, Started, Subscription
-from mapspeak.ros.messages import Message, bare_type
+from mapspeak.ros.activity import ActionGoal, Started, Subscription
+from mapspeak.ros.messages.fields import NAME, Message, bare_type
 from mapspeak.ros.parameters import ParameterServices
+from mapspeak.ros.port import OwnEnds
 
 NOTICE_S = 0.3
 """From a topic's first announcement until the robot's nodes listen, in wall time."""

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 from mapspeak.errors import LinkError
 from mapspeak.ros.activity import ActionGoal, Started, Subscription
-from mapspeak.ros.messages import Dialect, Message
+from mapspeak.ros.messages.fields import Dialect, Message
 
 
 def new_id() -> str:

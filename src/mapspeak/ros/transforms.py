@@ -8,8 +8,10 @@ import anyio
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.robot import StampedPose
-from mapspeak.ros import RosConnection, Subscription
-from mapspeak.ros.messages import Dialect, FrameTransform, Message, read_transforms
+from mapspeak.ros.activity import Subscription
+from mapspeak.ros.messages.fields import Dialect, Message
+from mapspeak.ros.messages.poses import FrameTransform, read_transforms
+from mapspeak.ros.port import RosConnection
 
 MAX_FRAMES = 10_000
 CLOCK_JUMP_S = 10.0

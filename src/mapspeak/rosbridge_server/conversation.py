@@ -11,7 +11,7 @@ from anyio.abc import TaskGroup
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.links.rosbridge.protocol.bounds import FrameError
 from mapspeak.links.rosbridge.protocol.codec import decode_json
-from mapspeak.ros.messages import Dialect, bare_type
+from mapspeak.ros.messages.fields import Dialect, bare_type
 from mapspeak.rosbridge_server.drives import ServedDrive
 from mapspeak.rosbridge_server.hub import Compression, Frame, Publication, answer_frame
 from mapspeak.rosbridge_server.interfaces import RosSystem, refusal

@@ -9,7 +9,7 @@ import anyio
 from mapspeak.errors import GoalError, MapspeakError
 from mapspeak.geometry import Pose
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus, Robot
-from mapspeak.ros.messages import FramedPose
+from mapspeak.ros.messages.poses import FramedPose
 from mapspeak.rosbridge_server.graph import BASE_FRAME
 
 MOST_ENDED = 10

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mapspeak.robot import RobotDescription
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 from mapspeak.rosbridge_server.hub import ROSBRIDGE_NODE, Topic
 
 BASE_FRAME = "base_footprint"

@@ -11,7 +11,7 @@ from functools import cached_property
 from PIL import Image
 
 from mapspeak.links.rosbridge.protocol.codec import to_cbor, to_json
-from mapspeak.ros.messages import Message, bare_type
+from mapspeak.ros.messages.fields import Message, bare_type
 
 
 class Compression(StrEnum):

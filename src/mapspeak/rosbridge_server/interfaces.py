@@ -7,17 +7,9 @@ from typing import Any
 import numpy as np
 
 from mapspeak.errors import LinkError, MapspeakError
-from mapspeak.ros.definitions import (
-    FLOATS,
-    GENERATED,
-    TIMES,
-    WHOLES,
-    Field,
-    TypeBook,
-    known_definitions,
-    write_definition,
-)
-from mapspeak.ros.messages import Dialect, bare_type
+from mapspeak.ros.definitions.texts import GENERATED, known_definitions, write_definition
+from mapspeak.ros.definitions.types import FLOATS, TIMES, WHOLES, Field, TypeBook
+from mapspeak.ros.messages.fields import Dialect, bare_type
 from mapspeak.rosbridge_server.graph import Services
 from mapspeak.rosbridge_server.hub import Hub
 from mapspeak.rosbridge_server.nav2 import Nav2

@@ -5,16 +5,8 @@ from typing import Any
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState, Robot
-from mapspeak.ros.messages import (
-    Dialect,
-    FramedPose,
-    Message,
-    read_pose_stamped,
-    read_stamp,
-    write_header,
-    write_pose_stamped,
-    write_stamp,
-)
+from mapspeak.ros.messages.fields import Dialect, Message, read_stamp, write_header, write_stamp
+from mapspeak.ros.messages.poses import FramedPose, read_pose_stamped, write_pose_stamped
 from mapspeak.rosbridge_server.drives import Drives, ServedDrive
 from mapspeak.rosbridge_server.hub import Hub, Publication
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 from mapspeak.rosbridge_server.graph import (
     BASE_FRAME,
     BASE_NODE,

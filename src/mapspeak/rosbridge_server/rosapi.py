@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.messages import Dialect, bare_type, write_stamp
+from mapspeak.ros.messages.fields import Dialect, bare_type, write_stamp
 from mapspeak.rosbridge_server.graph import ROSAPI_NODE, Service
 from mapspeak.rosbridge_server.hub import ROSBRIDGE_NODE, Topic
 from mapspeak.rosbridge_server.interfaces import ROS2_DISTRIBUTION, RosSystem

@@ -13,7 +13,7 @@ from anyio.streams.memory import MemoryObjectReceiveStream
 
 from mapspeak.errors import ConfigError
 from mapspeak.robot import Robot
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 from mapspeak.rosbridge_server.conversation import ClientConversation
 from mapspeak.rosbridge_server.hub import Frame, fragments_of
 from mapspeak.rosbridge_server.interfaces import RosSystem

@@ -10,23 +10,18 @@ from anyio.abc import TaskGroup
 from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Pose
 from mapspeak.robot import RangeScan, Robot, StampedPose
-from mapspeak.ros.messages import (
-    CameraInfo,
-    Dialect,
-    EncodedPicture,
+from mapspeak.ros.messages.fields import Dialect, write_stamp
+from mapspeak.ros.messages.grids import write_grid
+from mapspeak.ros.messages.pictures import EncodedPicture, write_compressed_image
+from mapspeak.ros.messages.poses import (
     FramedPose,
     FrameTransform,
-    LaserScan,
     Twist,
-    write_camera_info,
-    write_compressed_image,
-    write_grid,
     write_odometry,
     write_pose_with_covariance,
-    write_scan,
-    write_stamp,
     write_transforms,
 )
+from mapspeak.ros.messages.scans import CameraInfo, LaserScan, write_camera_info, write_scan
 from mapspeak.rosbridge_server.graph import BASE_FRAME
 from mapspeak.rosbridge_server.hub import Hub
 from mapspeak.spatial import OccupancyGrid

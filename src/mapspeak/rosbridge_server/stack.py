@@ -9,7 +9,9 @@ from anyio.abc import TaskGroup
 
 from mapspeak.errors import MapspeakError
 from mapspeak.robot import Robot
-from mapspeak.ros.messages import Dialect, read_twist, write_grid
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.grids import write_grid
+from mapspeak.ros.messages.poses import read_twist
 from mapspeak.rosbridge_server.drives import Drives
 from mapspeak.rosbridge_server.graph import SLAM_NODES, Service, navigator_of, topics_of
 from mapspeak.rosbridge_server.hub import Hub, Publication

@@ -6,17 +6,9 @@ from contextlib import suppress
 from typing import Any, TypeVar
 
 from mapspeak.errors import LinkError
-from mapspeak.ros import (
-    ActionGoal,
-    LinkName,
-    NodeLinks,
-    OwnEnds,
-    RosConnection,
-    RosGraph,
-    Started,
-    Subscription,
-)
-from mapspeak.ros.messages import Message
+from mapspeak.ros.activity import ActionGoal, Started, Subscription
+from mapspeak.ros.messages.fields import Message
+from mapspeak.ros.port import LinkName, NodeLinks, OwnEnds, RosConnection, RosGraph
 from mapspeak.safety.commands import (
     Act,
     Call,

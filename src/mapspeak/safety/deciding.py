@@ -10,7 +10,7 @@ from mapspeak.errors import GoalError, NextStep, PolicyError
 from mapspeak.hold import say_hold
 from mapspeak.installation import shell_command
 from mapspeak.places.goalcheck import GoalCheck, GoalVerdict, say_check
-from mapspeak.ros.messages import bare_type
+from mapspeak.ros.messages.fields import bare_type
 from mapspeak.safety.commands import (
     Act,
     Call,

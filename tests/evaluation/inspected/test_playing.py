@@ -22,7 +22,9 @@ from mapspeak.evaluation.inspected import (
     without_node,
 )
 from mapspeak.links.rosbridge import RobotAddress, open_client
-from mapspeak.ros.messages import Dialect, read_grid, read_header, read_transforms
+from mapspeak.ros.messages.fields import Dialect, read_header
+from mapspeak.ros.messages.grids import read_grid
+from mapspeak.ros.messages.poses import read_transforms
 
 pytestmark = pytest.mark.anyio
 DIALECTS = tuple(Dialect)

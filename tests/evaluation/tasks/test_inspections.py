@@ -12,7 +12,7 @@ from mapspeak.evaluation.runs.inspecting import open_inspection
 from mapspeak.evaluation.scores import Evidence, GroundTruth
 from mapspeak.evaluation.tasks import FAMILIES, find_task
 from mapspeak.evaluation.trials import Assignment, Score, ServerAccess, Setting
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 from sites import make_flat
 
 pytestmark = pytest.mark.anyio

@@ -14,9 +14,9 @@ from dds_node import until as until_so
 from mapspeak.errors import LinkError
 from mapspeak.links.dds import DdsConnection
 from mapspeak.links.dds.discovery import Framing
-from mapspeak.ros import ActionGoal
 from mapspeak.ros.actions import ActionPatience, ActionState, open_action
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.activity import ActionGoal
+from mapspeak.ros.messages.fields import Dialect
 
 pytestmark = pytest.mark.anyio
 

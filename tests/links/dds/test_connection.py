@@ -24,7 +24,7 @@ from dds_node import (
 from mapspeak.errors import LinkError
 from mapspeak.links.dds import DdsNetwork, DdsTiming, open_dds_connection
 from mapspeak.links.dds.types import Types
-from mapspeak.ros.messages import read_grid
+from mapspeak.ros.messages.grids import read_grid
 
 pytestmark = pytest.mark.anyio
 

@@ -14,8 +14,9 @@ from dds_node import DdsNode, Reply, Request, open_dds_node, open_here, some_net
 from mapspeak.errors import LinkError
 from mapspeak.links.dds import DdsConnection
 from mapspeak.links.dds.types import Types, build_type_book
-from mapspeak.ros import ActionGoal
-from mapspeak.ros.definitions import DISTROS, hash_type
+from mapspeak.ros.activity import ActionGoal
+from mapspeak.ros.definitions.texts import DISTROS
+from mapspeak.ros.definitions.typestore import hash_type
 
 pytestmark = pytest.mark.anyio
 

@@ -11,12 +11,8 @@ from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import Timing
 from mapspeak.robot import CauseCode, GoalState, GoalStatus
-from mapspeak.ros.messages import (
-    Dialect,
-    FramedPose,
-    write_pose_stamped,
-    write_stamp,
-)
+from mapspeak.ros.messages.fields import Dialect, write_stamp
+from mapspeak.ros.messages.poses import FramedPose, write_pose_stamped
 from mapspeak.ros.robot import RosRobot
 from mapspeak.ros.robot.driving import DrivingPatience
 from rosbridge_robot import STATUS_TOPIC, ScriptedRobot, connect_scripted, eventually

@@ -12,7 +12,7 @@ from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import Timing
 from mapspeak.robot import CauseCode, GoalState
 from mapspeak.ros.actions import ActionClient, SentGoal
-from mapspeak.ros.messages import Dialect, write_stamp
+from mapspeak.ros.messages.fields import Dialect, write_stamp
 from mapspeak.ros.robot import RosRobot
 from mapspeak.ros.robot.driving import DrivingPatience
 from rosbridge_robot import (

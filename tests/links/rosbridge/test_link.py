@@ -17,8 +17,10 @@ from mapspeak.errors import GoalError, LinkError, MapError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import RosbridgeClient, Timing, open_rosbridge_robot
 from mapspeak.robot import CauseCode, GoalState, GoalStatus
-from mapspeak.ros.discovery import PoseSource, RobotOverrides, RosSettings
-from mapspeak.ros.messages import Dialect, write_header, write_pose
+from mapspeak.ros.discovery.overrides import RobotOverrides, RosSettings
+from mapspeak.ros.discovery.profile import PoseSource
+from mapspeak.ros.messages.fields import Dialect, write_header
+from mapspeak.ros.messages.poses import write_pose
 from mapspeak.ros.robot import RosRobot
 from mapspeak.ros.robot.driving import DrivingPatience
 from mapspeak.ros.robot.maps import MapSubscriber

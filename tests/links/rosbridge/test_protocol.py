@@ -31,7 +31,7 @@ from mapspeak.links.rosbridge.protocol import (
     write_operation,
 )
 from mapspeak.links.rosbridge.protocol.codec import BARE_NUMBER
-from mapspeak.ros import new_id
+from mapspeak.ros.port import new_id
 
 
 def frame(operation: dict[str, Any]) -> bytes:

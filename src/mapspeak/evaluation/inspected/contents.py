@@ -5,14 +5,9 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from mapspeak.geometry import Pose
-from mapspeak.ros.messages import (
-    Dialect,
-    FrameTransform,
-    Message,
-    write_grid,
-    write_header,
-    write_transforms,
-)
+from mapspeak.ros.messages.fields import Dialect, Message, write_header
+from mapspeak.ros.messages.grids import write_grid
+from mapspeak.ros.messages.poses import FrameTransform, write_transforms
 from mapspeak.spatial import OccupancyGrid
 
 

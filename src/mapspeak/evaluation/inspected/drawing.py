@@ -14,7 +14,7 @@ from mapspeak.evaluation.inspected.playing import (
     Stream,
 )
 from mapspeak.geometry import Pose
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 from mapspeak.spatial import OccupancyGrid
 
 SCAN, IMU, ODOMETRY = "sensor_msgs/LaserScan", "sensor_msgs/Imu", "nav_msgs/Odometry"

@@ -8,7 +8,7 @@ from typing import Any
 import anyio
 
 from mapspeak.evaluation.inspected.contents import Content, Transforms
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
 from mapspeak.rosbridge_server import (
     Hub,
     Interfaces,

@@ -12,7 +12,7 @@ from mapspeak.evaluation.inspected import InspectedSystem, Names, draw_names, dr
 from mapspeak.evaluation.scores import Evidence, GroundTruth, no_answer, read_said
 from mapspeak.evaluation.tasks.task import dice
 from mapspeak.evaluation.trials import Failure, Limits, Score, Setting
-from mapspeak.ros.messages import Dialect, bare_type
+from mapspeak.ros.messages.fields import Dialect, bare_type
 from mapspeak.spatial import OccupancyGrid
 
 QUOTES = " \t'\"`*"

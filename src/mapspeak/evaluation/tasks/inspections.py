@@ -23,7 +23,7 @@ from mapspeak.evaluation.tasks.inspecting import (
     one_of,
     shuffled,
 )
-from mapspeak.ros.definitions import parse_definition
+from mapspeak.ros.definitions.types import parse_definition
 
 OFF_BY = (0.4, 0.5, 2.0, 3.0)
 DEEDS = {

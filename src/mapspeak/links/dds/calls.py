@@ -18,9 +18,9 @@ from mapspeak.links.dds.endpoints import (
 from mapspeak.links.dds.graph import DdsGraph
 from mapspeak.links.dds.participant import DdsParticipant
 from mapspeak.links.dds.services import DdsActionClient, ServiceClient
-from mapspeak.ros import ActionGoal
+from mapspeak.ros.activity import ActionGoal
 from mapspeak.ros.link import check_name, wrong_type
-from mapspeak.ros.messages import Message, bare_type
+from mapspeak.ros.messages.fields import Message, bare_type
 
 APPEARANCE_S = 1.0
 """For a service to be found that is asked for, in wall time."""

@@ -13,16 +13,10 @@ from rosbags.serde import SerdeError
 from rosbags.typesys.store import Typestore
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.definitions import (
-    NOTHING,
-    Field,
-    MessageType,
-    TypeBook,
-    check_message,
-    describe_field,
-    look_up,
-)
-from mapspeak.ros.messages import Message
+from mapspeak.ros.definitions.checking import check_message
+from mapspeak.ros.definitions.types import Field, MessageType, TypeBook
+from mapspeak.ros.definitions.typestore import NOTHING, describe_field, look_up
+from mapspeak.ros.messages.fields import Message
 
 HEADER_BYTES = 4
 """They tell the byte order, and stand before what is encoded."""

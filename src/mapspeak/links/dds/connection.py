@@ -15,10 +15,11 @@ from mapspeak.links.dds.graph import DdsGraph
 from mapspeak.links.dds.network import DdsNetwork, DdsTiming
 from mapspeak.links.dds.participant import DdsParticipant
 from mapspeak.links.dds.types import Types
-from mapspeak.ros import ActionGoal, LinkKind, LinkName
-from mapspeak.ros.discovery import RobotOverrides
+from mapspeak.ros.activity import ActionGoal
+from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.link import plain_errors
-from mapspeak.ros.messages import Message
+from mapspeak.ros.messages.fields import Message
+from mapspeak.ros.port import LinkKind, LinkName
 from mapspeak.ros.robot import NOTHING_SAID, USUAL_PATIENCE, RosRobot, build_ros_robot
 from mapspeak.ros.robot.driving import DrivingPatience
 

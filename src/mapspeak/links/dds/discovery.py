@@ -22,8 +22,8 @@ from mapspeak.links.dds.endpoints import (
     service_type_of,
     topic_of,
 )
-from mapspeak.ros import NodeLinks
-from mapspeak.ros.messages import Message, bare_type
+from mapspeak.ros.messages.fields import Message, bare_type
+from mapspeak.ros.port import NodeLinks
 
 TYPE_HASH = re.compile(rb"typehash=(RIHS\d+_[0-9a-f]+)")
 PREFIX_BYTES = 12

@@ -13,7 +13,7 @@ from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.messages import bare_type
+from mapspeak.ros.messages.fields import bare_type
 
 TOPIC, REQUEST, REPLY = "rt", "rq", "rr"
 DISCOVERY_TOPIC = "ros_discovery_info"

@@ -8,8 +8,8 @@ from mapspeak.errors import LinkError
 from mapspeak.links.dds.discovery import Endpoint
 from mapspeak.links.dds.endpoints import SERVICE_PART, Sample, is_hidden
 from mapspeak.links.dds.topics import DdsTopics
-from mapspeak.ros import NodeLinks, RosGraph
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.port import NodeLinks, RosGraph
 
 DESCRIBE = "get_type_description"
 DESCRIBE_TYPE = "type_description_interfaces/srv/GetTypeDescription"

@@ -23,8 +23,9 @@ from mapspeak.links.dds.discovery import Framing
 from mapspeak.links.dds.endpoints import Quality, RawWriter, Sample, reply_topic, request_topic
 from mapspeak.links.dds.participant import DdsParticipant
 from mapspeak.links.dds.types import Types
-from mapspeak.ros import REFUSED, ActionEnd, ActionGoal, new_id
-from mapspeak.ros.messages import Message
+from mapspeak.ros.activity import REFUSED, ActionEnd, ActionGoal
+from mapspeak.ros.messages.fields import Message
+from mapspeak.ros.port import new_id
 
 QUALITY = Quality(is_reliable=True, is_latched=False, depth=100)
 NUMBER = struct.Struct("<Qq")

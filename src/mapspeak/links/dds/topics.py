@@ -13,9 +13,8 @@ from mapspeak.links.dds.discovery import Discovery, Endpoint
 from mapspeak.links.dds.endpoints import Quality, RawReader, RawWriter, Sample, dds_topic, full_type
 from mapspeak.links.dds.participant import DdsParticipant
 from mapspeak.links.dds.types import Types
-from mapspeak.ros import TYPE
 from mapspeak.ros.link import NativeLink, TopicRequest, check_name, wrong_type
-from mapspeak.ros.messages import Message, bare_type
+from mapspeak.ros.messages.fields import TYPE, Message, bare_type
 
 logger = logging.getLogger(__name__)
 

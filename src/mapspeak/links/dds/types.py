@@ -7,8 +7,10 @@ from typing import Any
 
 from mapspeak.errors import LinkError
 from mapspeak.links.dds.cdr import Codec
-from mapspeak.ros.definitions import DISTROS, TypeBook, hash_type, known_definitions, name_parts
-from mapspeak.ros.messages import Dialect, Message, bare_type
+from mapspeak.ros.definitions.texts import DISTROS, known_definitions, name_parts
+from mapspeak.ros.definitions.types import TypeBook
+from mapspeak.ros.definitions.typestore import hash_type
+from mapspeak.ros.messages.fields import Dialect, Message, bare_type
 
 _NODES = (
     "string<=256 node_namespace\nstring<=256 node_name\n"

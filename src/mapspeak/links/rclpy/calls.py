@@ -14,9 +14,10 @@ import anyio
 from mapspeak.errors import LinkError
 from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wait_until
 from mapspeak.links.rclpy.types import find_message, name_of, read_message, write_message
-from mapspeak.ros import REFUSED, ActionEnd, ActionGoal, new_id
+from mapspeak.ros.activity import REFUSED, ActionEnd, ActionGoal
 from mapspeak.ros.link import check_name, wrong_type
-from mapspeak.ros.messages import Message, bare_type
+from mapspeak.ros.messages.fields import Message, bare_type
+from mapspeak.ros.port import new_id
 
 SERVER_S = 2.0
 """For somebody who serves to be found: right after connecting, not all are known."""

@@ -13,9 +13,10 @@ from mapspeak.links.rclpy.calls import Goals, RclpyServices
 from mapspeak.links.rclpy.graph import RclpyGraph
 from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wait_until
 from mapspeak.links.rclpy.topics import RclpyTopics
-from mapspeak.ros import ActionGoal, LinkKind, LinkName, NodeLinks, RosGraph
+from mapspeak.ros.activity import ActionGoal
 from mapspeak.ros.link import plain_errors
-from mapspeak.ros.messages import Message
+from mapspeak.ros.messages.fields import Message
+from mapspeak.ros.port import LinkKind, LinkName, NodeLinks, RosGraph
 
 ANSWER_S = 5.0
 """For a service's answer, where the caller says nothing else, and for a first node."""

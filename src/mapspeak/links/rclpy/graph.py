@@ -8,9 +8,9 @@ from rclpy.exceptions import NameValidationException
 from mapspeak.errors import LinkError
 from mapspeak.links.rclpy.participant import RclpyParticipant
 from mapspeak.links.rclpy.types import find_definitions
-from mapspeak.ros import NodeLinks, RosGraph
 from mapspeak.ros.link import check_name
-from mapspeak.ros.messages import Dialect, bare_type
+from mapspeak.ros.messages.fields import Dialect, bare_type
+from mapspeak.ros.port import NodeLinks, RosGraph
 
 UNNAMED = "_NODE_NAME_UNKNOWN_"
 """A node of which more is not known yet."""

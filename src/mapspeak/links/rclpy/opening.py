@@ -5,8 +5,8 @@ from contextlib import asynccontextmanager
 from types import MappingProxyType
 
 from mapspeak.errors import ConfigError
-from mapspeak.ros import RosConnection
-from mapspeak.ros.discovery import RobotOverrides
+from mapspeak.ros.discovery.overrides import RobotOverrides
+from mapspeak.ros.port import RosConnection
 from mapspeak.ros.robot import NOTHING_SAID, USUAL_PATIENCE, RosRobot, build_ros_robot
 from mapspeak.ros.robot.driving import DrivingPatience
 

@@ -18,8 +18,8 @@ from rclpy.task import Future
 from rclpy.utilities import get_rmw_implementation_identifier
 
 from mapspeak.errors import LinkError
-from mapspeak.ros import new_id
 from mapspeak.ros.link import environment_with
+from mapspeak.ros.port import new_id
 
 LOG = logging.getLogger(__name__)
 N_DIGITS = 8

@@ -15,7 +15,7 @@ from mapspeak.errors import LinkError
 from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wait_until
 from mapspeak.links.rclpy.types import find_message, read_message, write_message
 from mapspeak.ros.link import NativeLink, TopicRequest, check_name, wrong_type
-from mapspeak.ros.messages import Message, bare_type
+from mapspeak.ros.messages.fields import Message, bare_type
 
 DEPTH, BULKY_DEPTH = 200, 5
 """How many messages ROS keeps until we take them."""

@@ -14,20 +14,11 @@ from typing import Any
 import numpy as np
 
 from mapspeak.errors import LinkError
-from mapspeak.ros import TYPE
-from mapspeak.ros.definitions import (
-    ACTION_PARTS,
-    FLOATS,
-    NOTHING,
-    SERVICE_PARTS,
-    WHOLES,
-    Field,
-    TypeBook,
-    check_message,
-    parse_definition,
-    split_parts,
-)
-from mapspeak.ros.messages import bare_type
+from mapspeak.ros.definitions.checking import check_message
+from mapspeak.ros.definitions.texts import ACTION_PARTS, SERVICE_PARTS, split_parts
+from mapspeak.ros.definitions.types import FLOATS, WHOLES, Field, TypeBook, parse_definition
+from mapspeak.ros.definitions.typestore import NOTHING
+from mapspeak.ros.messages.fields import TYPE, bare_type
 
 FIELD = re.compile(
     r"sequence<(?P<any>.+?)(?:, (?P<most>\d+))?>|(?P<each>[^\[\]]+)\[(?P<length>\d+)\]|(?P<one>.+)"

@@ -11,7 +11,7 @@ from websockets.exceptions import InvalidURI
 from websockets.uri import WebSocketURI, parse_uri
 
 from mapspeak.errors import ConfigError, say_cause
-from mapspeak.ros import LinkKind, LinkName
+from mapspeak.ros.port import LinkKind, LinkName
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,8 +15,8 @@ from mapspeak.links.rosbridge.address import RobotAddress, Timing
 from mapspeak.links.rosbridge.connection import SocketConnection
 from mapspeak.links.rosbridge.protocol import Encoding, Event, ServiceAnswered, write_operation
 from mapspeak.links.rosbridge.websocket import open_websocket
-from mapspeak.ros import new_id
 from mapspeak.ros.link import TopicRequest
+from mapspeak.ros.port import new_id
 
 logger = logging.getLogger(__name__)
 

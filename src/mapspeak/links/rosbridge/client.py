@@ -23,10 +23,11 @@ from mapspeak.links.rosbridge.protocol import (
     write_operation,
 )
 from mapspeak.links.rosbridge.rosapi import Rosapi
-from mapspeak.ros import ActionEnd, ActionGoal, LinkName, OwnEnds, new_id
-from mapspeak.ros.discovery import RobotOverrides
+from mapspeak.ros.activity import ActionEnd, ActionGoal
+from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.link import NOTICE_S, plain_errors
-from mapspeak.ros.messages import Message
+from mapspeak.ros.messages.fields import Message
+from mapspeak.ros.port import LinkName, OwnEnds, new_id
 from mapspeak.ros.robot import NOTHING_SAID, USUAL_PATIENCE, RosRobot, build_ros_robot
 from mapspeak.ros.robot.driving import DrivingPatience
 

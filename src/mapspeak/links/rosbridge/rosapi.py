@@ -6,16 +6,16 @@ from typing import Any
 
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge.channel import RosbridgeTopicRequest
-from mapspeak.ros import NodeLinks, RosGraph
-from mapspeak.ros.definitions import (
-    TypeBook,
+from mapspeak.ros.definitions.texts import (
     find_actions_of_ros1,
     known_definitions,
     name_parts,
     split_definition,
 )
+from mapspeak.ros.definitions.types import TypeBook
 from mapspeak.ros.link import RosLink
-from mapspeak.ros.messages import Dialect, bare_type, read_stamp
+from mapspeak.ros.messages.fields import Dialect, bare_type, read_stamp
+from mapspeak.ros.port import NodeLinks, RosGraph
 
 Call = Callable[[str, Mapping[str, Any]], Awaitable[dict[str, Any]]]
 KINDS = ("msg", "srv", "action")

@@ -11,9 +11,9 @@ from typing import Generic, TypeVar
 import anyio
 
 from mapspeak.errors import GoalError, LinkError
-from mapspeak.ros import RosConnection
 from mapspeak.ros.actions.goal import ActionState, SentGoal
-from mapspeak.ros.messages import Message
+from mapspeak.ros.messages.fields import Message
+from mapspeak.ros.port import RosConnection
 
 NOT_TAKEN = "The action server gave no sign of taking the goal within {:g} s; it was withdrawn."
 GIVEN_UP = "Its sender gave up waiting."

@@ -7,8 +7,8 @@ from enum import StrEnum
 
 import anyio
 
-from mapspeak.ros import RosConnection
-from mapspeak.ros.messages import Message
+from mapspeak.ros.messages.fields import Message
+from mapspeak.ros.port import RosConnection
 
 LONGEST_REASON = 300
 

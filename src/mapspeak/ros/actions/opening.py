@@ -2,11 +2,11 @@
 
 from typing import Any
 
-from mapspeak.ros import RosConnection
 from mapspeak.ros.actions.client import ActionClient, ActionPatience
 from mapspeak.ros.actions.ros1 import Ros1ActionClient
 from mapspeak.ros.actions.ros2 import Ros2ActionClient
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.port import RosConnection
 
 USUAL_PATIENCE = ActionPatience()
 

@@ -5,7 +5,6 @@ from collections.abc import Iterator, Mapping
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.ros import Listener, RosConnection, Subscription, has_listeners, new_id
 from mapspeak.ros.actions.client import (
     GONE,
     RESULT_LATE,
@@ -14,7 +13,9 @@ from mapspeak.ros.actions.client import (
     ActionPatience,
 )
 from mapspeak.ros.actions.goal import ActionState, SentGoal
-from mapspeak.ros.messages import Dialect, Message, write_header, write_stamp
+from mapspeak.ros.activity import Listener, Subscription
+from mapspeak.ros.messages.fields import Dialect, Message, write_header, write_stamp
+from mapspeak.ros.port import RosConnection, has_listeners, new_id
 
 CANCEL_TYPE, STATUS_TYPE = "actionlib_msgs/GoalID", "actionlib_msgs/GoalStatusArray"
 STATES = {

@@ -6,7 +6,6 @@ from functools import partial
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.ros import ActionEnd, ActionGoal, RosConnection
 from mapspeak.ros.actions.client import (
     GONE,
     RESULT_LATE,
@@ -15,7 +14,9 @@ from mapspeak.ros.actions.client import (
     ActionPatience,
 )
 from mapspeak.ros.actions.goal import STATES, ActionState, SentGoal, read_statuses
-from mapspeak.ros.messages import Message
+from mapspeak.ros.activity import ActionEnd, ActionGoal
+from mapspeak.ros.messages.fields import Message
+from mapspeak.ros.port import RosConnection
 
 CANCEL_TYPE, STATUS_TYPE = "action_msgs/srv/CancelGoal", "action_msgs/msg/GoalStatusArray"
 REFUSED = 1

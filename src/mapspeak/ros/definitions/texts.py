@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from importlib.resources import files
 
-from mapspeak.ros.messages import Dialect, bare_type
+from mapspeak.ros.messages.fields import Dialect, bare_type
 
 RULER_LINE = "=" * 80
 RULER = re.compile(r"^=+\nMSG: (?P<name>\S+)\n?", re.MULTILINE)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from mapspeak.ros.messages import bare_type
+from mapspeak.ros.messages.fields import bare_type
 
 LINE = re.compile(
     r"(?P<type>[\w/]+)(?:<=(?P<most_letters>\d+))?"

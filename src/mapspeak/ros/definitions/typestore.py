@@ -4,7 +4,7 @@ from typing import Any
 
 from mapspeak.errors import LinkError
 from mapspeak.ros.definitions.types import MOST_NESTED, Field, MessageType, TypeBook
-from mapspeak.ros.messages import bare_type
+from mapspeak.ros.messages.fields import bare_type
 
 NOTHING = Field(name="structure_needs_at_least_one_member", type="uint8")
 """What ROS 2 puts in a message without fields."""

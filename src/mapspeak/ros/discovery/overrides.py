@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from mapspeak.ros import NAME, TYPE
+from mapspeak.ros.messages.fields import NAME, TYPE
 from mapspeak.settings import read_settings
 
 TopicName = Annotated[str, Field(pattern=rf"^{NAME.pattern}$")]

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
-from mapspeak.ros import RosGraph
 from mapspeak.ros.discovery import ranking
 from mapspeak.ros.discovery.overrides import RobotOverrides
-from mapspeak.ros.messages import Dialect, bare_type
+from mapspeak.ros.messages.fields import Dialect, bare_type
+from mapspeak.ros.port import RosGraph
 
 USUAL_RADIUS_M = 0.2
 """Where nobody says: between a TurtleBot 3 (0.11 m) and a delivery robot (0.35 m)."""

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from mapspeak.ros import RosGraph
+from mapspeak.ros.port import RosGraph
 
 MAP = "nav_msgs/OccupancyGrid"
 MAP_UPDATE = "map_msgs/OccupancyGridUpdate"

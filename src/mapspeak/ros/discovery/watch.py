@@ -9,12 +9,12 @@ from dataclasses import replace
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.ros import RosConnection, RosGraph
 from mapspeak.ros.discovery import ranking
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.discovery.parts import PARTS, RADIUS, RobotPart, find_missing, improve
 from mapspeak.ros.discovery.profile import RobotProfile, choose_profile
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.port import RosConnection, RosGraph
 from mapspeak.ros.transforms import FrameListener
 
 

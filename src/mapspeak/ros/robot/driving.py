@@ -10,15 +10,10 @@ import anyio
 from mapspeak.errors import LinkError
 from mapspeak.geometry import Pose
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus
-from mapspeak.ros import RosConnection
 from mapspeak.ros.actions import ActionPatience, ActionState, SentGoal, open_action
-from mapspeak.ros.messages import (
-    Dialect,
-    FramedPose,
-    Message,
-    read_pose_stamped,
-    write_pose_stamped,
-)
+from mapspeak.ros.messages.fields import Dialect, Message
+from mapspeak.ros.messages.poses import FramedPose, read_pose_stamped, write_pose_stamped
+from mapspeak.ros.port import RosConnection
 
 
 class GoalRecord:

@@ -4,8 +4,9 @@ from collections.abc import Awaitable, Callable
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import Cause, CauseCode, GoalState, StampedPose
-from mapspeak.ros import RosConnection, has_listeners, new_id
-from mapspeak.ros.messages import Dialect, FramedPose, write_pose_stamped
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.poses import FramedPose, write_pose_stamped
+from mapspeak.ros.port import RosConnection, has_listeners, new_id
 from mapspeak.ros.robot.driving import LATEST_S, GoalRecord
 
 ARRIVAL_M = 0.35

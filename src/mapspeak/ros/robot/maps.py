@@ -6,11 +6,13 @@ from contextlib import suppress
 import anyio.to_thread
 
 from mapspeak.errors import LinkError, MapspeakError
-from mapspeak.ros import LinkKind, RosConnection, Subscription
-from mapspeak.ros.discovery import RobotProfile
+from mapspeak.ros.activity import Subscription
 from mapspeak.ros.discovery.parts import MAP as MAP_PART
+from mapspeak.ros.discovery.profile import RobotProfile
 from mapspeak.ros.discovery.ranking import MAP, MAP_UPDATE
-from mapspeak.ros.messages import Message, apply_grid_update, read_grid, read_stamp
+from mapspeak.ros.messages.fields import Message, read_stamp
+from mapspeak.ros.messages.grids import apply_grid_update, read_grid
+from mapspeak.ros.port import LinkKind, RosConnection
 from mapspeak.spatial import OccupancyGrid
 
 MAP_HINT = (

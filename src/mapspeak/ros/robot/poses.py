@@ -6,16 +6,16 @@ import anyio
 
 from mapspeak.errors import LinkError
 from mapspeak.robot import StampedPose
-from mapspeak.ros import RosConnection, Subscription
-from mapspeak.ros.discovery import PoseSource, RobotProfile
-from mapspeak.ros.discovery.profile import POSE_STAMPED, POSE_WITH_COVARIANCE
-from mapspeak.ros.messages import (
-    FramedPose,
-    Message,
-    read_pose_stamped,
-    read_pose_with_covariance,
-    read_stamp,
+from mapspeak.ros.activity import Subscription
+from mapspeak.ros.discovery.profile import (
+    POSE_STAMPED,
+    POSE_WITH_COVARIANCE,
+    PoseSource,
+    RobotProfile,
 )
+from mapspeak.ros.messages.fields import Message, read_stamp
+from mapspeak.ros.messages.poses import FramedPose, read_pose_stamped, read_pose_with_covariance
+from mapspeak.ros.port import RosConnection
 from mapspeak.ros.transforms import FrameListener
 
 STANDSTILL_S = 5.0

@@ -16,14 +16,7 @@ from mapspeak.robot import (
     RobotDescription,
     StampedPose,
 )
-from mapspeak.ros import RosConnection
-from mapspeak.ros.discovery import (
-    FRAMES_S,
-    NavigationKind,
-    RobotOverrides,
-    RobotProfile,
-    RobotWatch,
-)
+from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.discovery.parts import (
     CAMERA,
     LASER,
@@ -34,6 +27,9 @@ from mapspeak.ros.discovery.parts import (
     VELOCITY,
     RobotPart,
 )
+from mapspeak.ros.discovery.profile import NavigationKind, RobotProfile
+from mapspeak.ros.discovery.watch import FRAMES_S, RobotWatch
+from mapspeak.ros.port import RosConnection
 from mapspeak.ros.robot.driving import (
     MOVE_BASE,
     NAV2,

@@ -13,20 +13,14 @@ from numpy.typing import NDArray
 
 from mapspeak.errors import LinkError
 from mapspeak.robot import SCAN_PATIENCE_S, RangeScan
-from mapspeak.ros import RosConnection, Subscription
-from mapspeak.ros.discovery import RobotProfile
+from mapspeak.ros.activity import Subscription
 from mapspeak.ros.discovery.parts import CAMERA
-from mapspeak.ros.discovery.profile import COMPRESSED_IMAGE, RAW_IMAGE
-from mapspeak.ros.messages import (
-    EncodedPicture,
-    FrameTransform,
-    LaserScan,
-    Message,
-    read_camera_info,
-    read_compressed_image,
-    read_image,
-    read_scan,
-)
+from mapspeak.ros.discovery.profile import COMPRESSED_IMAGE, RAW_IMAGE, RobotProfile
+from mapspeak.ros.messages.fields import Message
+from mapspeak.ros.messages.pictures import EncodedPicture, read_compressed_image, read_image
+from mapspeak.ros.messages.poses import FrameTransform
+from mapspeak.ros.messages.scans import LaserScan, read_camera_info, read_scan
+from mapspeak.ros.port import RosConnection
 from mapspeak.ros.robot.poses import PoseKeeper, RobotClock
 from mapspeak.ros.transforms import FrameListener, TransformTree
 

@@ -9,10 +9,11 @@ import anyio
 from mapspeak.errors import LinkError
 from mapspeak.geometry import wrap_angle
 from mapspeak.robot import StampedPose
-from mapspeak.ros import RosConnection, Startable, has_listeners
-from mapspeak.ros.discovery import RobotProfile
-from mapspeak.ros.discovery.profile import TWIST, TWIST_STAMPED
-from mapspeak.ros.messages import Message, Twist, write_header, write_twist
+from mapspeak.ros.activity import Startable
+from mapspeak.ros.discovery.profile import TWIST, TWIST_STAMPED, RobotProfile
+from mapspeak.ros.messages.fields import Message, write_header
+from mapspeak.ros.messages.poses import Twist, write_twist
+from mapspeak.ros.port import RosConnection, has_listeners
 from mapspeak.ros.robot.driving import LATEST_S
 
 PAUSE_S = 0.05

@@ -11,7 +11,7 @@ import orjson
 
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge.protocol.bounds import FrameFault
-from mapspeak.ros.messages import NAME, TYPE, Message
+from mapspeak.ros.messages.fields import NAME, TYPE, Message
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

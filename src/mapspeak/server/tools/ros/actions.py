@@ -8,8 +8,8 @@ from pydantic import Field
 
 from mapspeak.errors import GoalError, LinkError
 from mapspeak.ros.actions import ActionState, SentGoal
-from mapspeak.ros.definitions import check_message
-from mapspeak.ros.messages import Message, bare_type
+from mapspeak.ros.definitions.checking import check_message
+from mapspeak.ros.messages.fields import Message, bare_type
 from mapspeak.safety import Act
 from mapspeak.server.text.wording import say_count
 from mapspeak.server.tools.asking import LONGEST_WAIT_S, client_of

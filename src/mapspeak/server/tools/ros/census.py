@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.ros import NodeLinks, OwnEnds, RosConnection
+from mapspeak.ros.port import NodeLinks, OwnEnds, RosConnection
 from mapspeak.server.text.wording import list_some
 
 MOST_AT_ONCE = 8

@@ -8,8 +8,8 @@ from typing import Any
 import anyio
 
 from mapspeak.errors import GoalError, LinkError
-from mapspeak.ros import RosConnection
-from mapspeak.ros.messages import Message
+from mapspeak.ros.messages.fields import Message
+from mapspeak.ros.port import RosConnection
 from mapspeak.safety import (
     Act,
     Call,

@@ -14,7 +14,7 @@ from mapspeak.ros.actions import (
     SentGoal,
     open_action,
 )
-from mapspeak.ros.messages import Dialect, Message
+from mapspeak.ros.messages.fields import Dialect, Message
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.inquiry import RosInquiry
 

@@ -7,18 +7,11 @@ import anyio
 
 from mapspeak.errors import ConfigError, LinkError
 from mapspeak.installation import shell_command
-from mapspeak.ros import NAME, TYPE, RosConnection, RosGraph, find_nearest
-from mapspeak.ros.definitions import (
-    TypeBook,
-    describe_type,
-    find_odd_lines,
-    kinds_of,
-    known_definitions,
-    name_parts,
-    parse_definition,
-    split_parts,
-)
-from mapspeak.ros.messages import Dialect, bare_type
+from mapspeak.ros.definitions.checking import describe_type
+from mapspeak.ros.definitions.texts import kinds_of, known_definitions, name_parts, split_parts
+from mapspeak.ros.definitions.types import TypeBook, find_odd_lines, parse_definition
+from mapspeak.ros.messages.fields import NAME, TYPE, Dialect, bare_type
+from mapspeak.ros.port import RosConnection, RosGraph, find_nearest
 from mapspeak.session import Session
 
 NO_ROS = "This robot is no ROS robot: the simulated one is none."

@@ -9,8 +9,9 @@ import anyio
 from pydantic import Field
 
 from mapspeak.errors import LinkError
-from mapspeak.ros import RosConnection, find_nearest
-from mapspeak.ros.messages import Message, read_transforms
+from mapspeak.ros.messages.fields import Message
+from mapspeak.ros.messages.poses import read_transforms
+from mapspeak.ros.port import RosConnection, find_nearest
 from mapspeak.server.text.wording import list_some, say_count
 from mapspeak.server.tools.ros.census import fetch_publishers
 from mapspeak.server.tools.ros.inquiry import RosInquiry, full_name

@@ -7,8 +7,8 @@ import anyio
 from pydantic import Field
 
 from mapspeak.errors import LinkError, MapspeakError
-from mapspeak.ros import RosGraph, find_nearest
-from mapspeak.ros.messages import Dialect
+from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.port import RosGraph, find_nearest
 from mapspeak.safety import SetParameter
 from mapspeak.server.text.wording import list_some
 from mapspeak.server.tools.ros.census import mark_ours

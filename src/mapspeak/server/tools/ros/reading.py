@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.ros import RosConnection, Subscription
-from mapspeak.ros.messages import Message, read_stamp
+from mapspeak.ros.activity import Subscription
+from mapspeak.ros.messages.fields import Message, read_stamp
+from mapspeak.ros.port import RosConnection
 
 RENEW_S = (2.0, 3.0)
 """For a first message, in wall time, before a topic is asked for anew: a latched one may have been

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from mapspeak.ros import RosConnection
+from mapspeak.ros.port import RosConnection
 
 LONGEST_ANSWER = 20_000
 """No answer has more letters; most have a tenth of that."""

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from mcp.server.mcpserver import Image
 from pydantic import Field
 
-from mapspeak.ros.definitions import check_message
+from mapspeak.ros.definitions.checking import check_message
 from mapspeak.safety import Call
 from mapspeak.server.tools.ros.census import find_server
 from mapspeak.server.tools.ros.commands import RosCommands

@@ -9,8 +9,8 @@ from mcp.server.mcpserver import Image
 from pydantic import Field
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.definitions import check_message
-from mapspeak.ros.messages import Message, bare_type
+from mapspeak.ros.definitions.checking import check_message
+from mapspeak.ros.messages.fields import Message, bare_type
 from mapspeak.safety import Publish, zero_velocity_of
 from mapspeak.server.text.wording import list_some
 from mapspeak.server.tools.ros.census import Census, fetch_hearers, fetch_publishers, take_census

@@ -16,20 +16,12 @@ from PIL import Image as Picture
 
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.geometry import Point
-from mapspeak.ros.definitions import Field
-from mapspeak.ros.messages import (
-    EncodedPicture,
-    LaserScan,
-    Message,
-    mend_scan,
-    read_compressed_image,
-    read_grid,
-    read_header,
-    read_image,
-    read_pose_stamped,
-    read_scan,
-    read_transforms,
-)
+from mapspeak.ros.definitions.types import Field
+from mapspeak.ros.messages.fields import Message, read_header
+from mapspeak.ros.messages.grids import read_grid
+from mapspeak.ros.messages.pictures import EncodedPicture, read_compressed_image, read_image
+from mapspeak.ros.messages.poses import read_pose_stamped, read_transforms
+from mapspeak.ros.messages.scans import LaserScan, mend_scan, read_scan
 from mapspeak.server.text.wording import say_point, say_pose
 from mapspeak.server.tools.ros.reports import show_message
 from mapspeak.spatial.picture import draw_map_axis
