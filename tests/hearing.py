@@ -3,6 +3,7 @@
 from typing import Any
 
 from mapspeak.evaluation.client import OutOfBudgetError, ToolAnswer
+from mapspeak.evaluation.trials import ToolCall
 
 
 class Hearing:
@@ -10,18 +11,21 @@ class Hearing:
 
     def __init__(self, most: int = 100) -> None:
         self.most = most
-        self.calls: list[str] = []
+        self.made: list[ToolCall] = []
         self.answers: list[ToolAnswer] = []
         self.words: list[tuple[str, dict[str, int | None]]] = []
 
-    def hear_call(self, tool: str, arguments: dict[str, Any]) -> None:
-        del arguments
-        if len(self.calls) >= self.most:
-            raise OutOfBudgetError(f"More than {self.most} calls.", hint="Call less.")
-        self.calls.append(tool)
+    @property
+    def calls(self) -> list[str]:
+        return [call.tool for call in self.made]
 
-    def hear_answer(self, tool: str, arguments: dict[str, Any], answer: ToolAnswer) -> None:
-        del tool, arguments
+    def hear_call(self, tool: str, arguments: dict[str, Any]) -> None:
+        if len(self.made) >= self.most:
+            raise OutOfBudgetError(f"More than {self.most} calls.", hint="Call less.")
+        self.made.append(ToolCall(tool=tool, arguments=arguments))
+
+    def hear_answer(self, tool: str, answer: ToolAnswer) -> None:
+        del tool
         self.answers.append(answer)
 
     def hear_words(self, role: str, text: str, **n_tokens: int | None) -> None:

@@ -18,9 +18,9 @@ from mapspeak.evaluation.trials import (
     TrialState,
     Turn,
     trial_folder,
+    turn_line,
     write_result,
 )
-from mapspeak.evaluation.trials.records import turn_line
 from mapspeak.geometry import Pose
 from mapspeak.spatial.mapfiles import write_map
 

@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
-from mapspeak.evaluation.runs.workplace import MAP, MEMORY
 from mapspeak.evaluation.scores import Evidence, GroundTruth
 from mapspeak.evaluation.trials import (
+    MAP,
+    MEMORY,
     Score,
     Trial,
     TrialResult,

@@ -1,8 +1,7 @@
 """An MCP client of a trial: every call goes past a witness, who hears the answer too."""
 
 import base64
-import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from mcp.client import Client
@@ -50,27 +49,8 @@ class ToolAnswer:
     is_error: bool
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CallRecord:
-    """One call as it happened.
-
-    Attributes:
-        tool: Its name.
-        arguments: What it was called with.
-        text: What it answered.
-        is_error: It answered with an error.
-        wall_s: How long it took by the wall clock.
-    """
-
-    tool: str
-    arguments: dict[str, Any]
-    text: str
-    is_error: bool
-    wall_s: float
-
-
 class Witness(Protocol):
-    """Whoever hears every call, and may refuse one."""
+    """Hears every call, and may refuse one."""
 
     def hear_call(self, tool: str, arguments: dict[str, Any]) -> None:
         """Hear of a call before it is made.
@@ -80,7 +60,7 @@ class Witness(Protocol):
         """
         ...
 
-    def hear_answer(self, tool: str, arguments: dict[str, Any], answer: ToolAnswer) -> None:
+    def hear_answer(self, tool: str, answer: ToolAnswer) -> None:
         """Hear what was answered."""
         ...
 
@@ -97,53 +77,13 @@ class Witness(Protocol):
         ...
 
 
-@dataclass(slots=True)
-class Ledger:
-    """A witness that remembers every call, and refuses none.
-
-    Attributes:
-        calls: All that were answered so far.
-    """
-
-    calls: list[CallRecord] = field(default_factory=list)
-    _begun_s: float = 0.0
-
-    def hear_call(self, tool: str, arguments: dict[str, Any]) -> None:
-        """Note when a call begins."""
-        del tool, arguments
-        self._begun_s = time.perf_counter()
-
-    def hear_answer(self, tool: str, arguments: dict[str, Any], answer: ToolAnswer) -> None:
-        """Remember a call and what was answered."""
-        self.calls.append(
-            CallRecord(
-                tool=tool,
-                arguments=arguments,
-                text=answer.text,
-                is_error=answer.is_error,
-                wall_s=time.perf_counter() - self._begun_s,
-            )
-        )
-
-    def hear_words(
-        self,
-        role: str,
-        text: str,
-        *,
-        n_input_tokens: int | None = None,
-        n_output_tokens: int | None = None,
-        n_picture_tokens: int | None = None,
-    ) -> None:
-        """Forget what was said besides calls."""
-
-
 @dataclass(frozen=True, slots=True)
 class ToolClient:
     """Calls tools over MCP.
 
     Attributes:
         client: The connected MCP client; None where the agent reaches the server by itself.
-        witness: Hears every call and answer; None where nobody does.
+        witness: Hears every call and answer.
     """
 
     client: Client | None
@@ -161,7 +101,7 @@ class ToolClient:
             self.witness.hear_call(tool, arguments)
         answer = _read(await client.call_tool(tool, arguments))
         if self.witness is not None:
-            self.witness.hear_answer(tool, arguments, answer)
+            self.witness.hear_answer(tool, answer)
         return answer
 
     async def list_tools(self) -> list[Tool]:

@@ -4,8 +4,9 @@ import pytest
 
 from drawing import grid_from_text
 from fakes import FakeRobot
+from hearing import Hearing
 from mapspeak.evaluation.agents.exploring import NearestFrontierAgent, PaperLoopAgent
-from mapspeak.evaluation.client import Ledger, ToolClient
+from mapspeak.evaluation.client import ToolClient
 from mapspeak.evaluation.trials import Agent, AgentEnd, Assignment, Limits, TrialState
 from mapspeak.geometry import Pose
 from served import connect
@@ -26,23 +27,23 @@ UNSEEN_M = 13.5
 """The unknown begins so far to the right."""
 
 
-async def run(agent: Agent, prompt: str, folder: Path) -> tuple[AgentEnd, Ledger]:
+async def run(agent: Agent, prompt: str, folder: Path) -> tuple[AgentEnd, Hearing]:
     """Lets an agent work in a building whose right end nobody has seen."""
     robot = FakeRobot(grid_from_text(HALF_SEEN, resolution_m=0.5), pose=Pose(1.8, 1.8))
     task = Assignment(prompt=prompt, system="", limits=Limits(), seed=0, server=(), folder=folder)
     async with connect(robot, folder) as client:
-        ledger = Ledger()
+        ledger = Hearing()
         return await agent.run(task, ToolClient(client, ledger)), ledger
 
 
-def goals_of(ledger: Ledger) -> list[dict[str, object]]:
-    return [call.arguments for call in ledger.calls if call.tool == "navigate_to"]
+def goals_of(ledger: Hearing) -> list[dict[str, object]]:
+    return [call.arguments for call in ledger.made if call.tool == "navigate_to"]
 
 
 async def test_the_nearest_frontier_is_driven_to_by_its_id(tmp_path: Path) -> None:
     _, ledger = await run(NearestFrontierAgent(), "Update the map while moving.", tmp_path)
     assert str(goals_of(ledger)[0]["place"]).startswith("F")
-    assert {"look_through_camera", "write_semantic_data"} <= {call.tool for call in ledger.calls}
+    assert {"look_through_camera", "write_semantic_data"} <= {call.tool for call in ledger.made}
 
 
 async def test_the_nearest_frontier_gives_up_on_what_is_no_exploration(tmp_path: Path) -> None:
@@ -59,7 +60,7 @@ async def test_the_papers_loop_goes_toward_the_unknown_by_the_picture_alone(
     assert isinstance(first["x"], float)
     assert first["x"] > UNSEEN_M - 4.5
     assert end.answer == "No unexplored area is left."
-    assert "look_at_map" not in {call.tool for call in ledger.calls}
+    assert "look_at_map" not in {call.tool for call in ledger.made}
 
 
 async def test_the_papers_loop_takes_the_smallest_patch_of_floor_for_a_room(

@@ -9,7 +9,7 @@ from PIL import Image
 from fakes import FakeRobot, two_rooms
 from hearing import Hearing
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.agents.finding import check_other, find_other
+from mapspeak.evaluation.agents.finding import check_agent, find_agent
 from mapspeak.evaluation.agents.models import (
     Ending,
     MockMind,
@@ -20,7 +20,7 @@ from mapspeak.evaluation.agents.models import (
     Usage,
 )
 from mapspeak.evaluation.agents.models.loop import estimate_picture_tokens
-from mapspeak.evaluation.client import Ledger, Picture, ToolAnswer, ToolClient, Witness
+from mapspeak.evaluation.client import Picture, ToolAnswer, ToolClient, Witness
 from mapspeak.evaluation.trials import AgentEnd, Assignment, Limits, TrialState
 from mapspeak.server.mapview.representations import Representation
 from served import connect
@@ -85,9 +85,9 @@ async def test_the_mock_model_comes_to_an_end_however_the_map_is_shown(
 async def test_the_same_seed_gives_the_same_conversation(tmp_path: Path) -> None:
     async def calls_with(seed: int) -> list[tuple[str, str]]:
         task = assignment(tmp_path, seed=seed)
-        ledger = Ledger()
+        ledger = Hearing()
         await run(ModelAgent(MockMind(), "mock"), task, ledger)
-        return [(call.tool, str(call.arguments)) for call in ledger.calls]
+        return [(call.tool, str(call.arguments)) for call in ledger.made]
 
     assert await calls_with(1) == await calls_with(1)
     assert len({tuple(await calls_with(seed)) for seed in range(4)}) > 1
@@ -168,11 +168,11 @@ def test_a_picture_is_estimated_by_its_pixels() -> None:
 
 
 def test_a_model_cannot_think_in_any_way_but_the_known_ones() -> None:
-    assert find_other("mock", "high") is not None
+    assert find_agent("mock", "high").name == "mock"
     with pytest.raises(ConfigError, match="think 'hard'"):
-        check_other("mock", "hard")
+        check_agent("mock", "hard")
 
 
-def test_a_name_that_is_none_is_left_to_others() -> None:
-    assert find_other("nobody", None) is None
-    assert not check_other("nobody")
+def test_a_name_of_no_agent_is_told() -> None:
+    with pytest.raises(ConfigError, match="no agent 'nobody'"):
+        check_agent("nobody")

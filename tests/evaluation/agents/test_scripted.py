@@ -4,8 +4,9 @@ import pytest
 
 from drawing import grid_from_text
 from fakes import FakeRobot
+from hearing import Hearing
 from mapspeak.evaluation.agents.scripted import ScriptedAgent
-from mapspeak.evaluation.client import Ledger, ToolClient
+from mapspeak.evaluation.client import ToolClient
 from mapspeak.evaluation.trials import AgentEnd, Assignment, Limits, TrialState
 from mapspeak.geometry import Pose
 from served import connect
@@ -22,23 +23,23 @@ ROOM = """
 PROMPT = "Fire detected nearby. Navigate to the tool used for it."
 
 
-async def run(folder: Path, *tools: str) -> tuple[AgentEnd, Ledger]:
+async def run(folder: Path, *tools: str) -> tuple[AgentEnd, Hearing]:
     """Lets the policy look for what nobody remembers, with some tools besides the usual ones."""
     robot = FakeRobot(grid_from_text(ROOM, resolution_m=0.5), pose=Pose(1.8, 1.2))
     task = Assignment(prompt=PROMPT, system="", limits=Limits(), seed=0, server=(), folder=folder)
     async with connect(robot, folder, tools=tools) as client:
-        ledger = Ledger()
+        ledger = Hearing()
         return await ScriptedAgent().run(task, ToolClient(client, ledger)), ledger
 
 
 async def test_a_search_is_not_begun_where_none_is_offered(tmp_path: Path) -> None:
     end, ledger = await run(tmp_path)
     assert end.state is TrialState.GAVE_UP
-    assert "search_for" not in {call.tool for call in ledger.calls}
-    assert not any(call.is_error for call in ledger.calls)
+    assert "search_for" not in {call.tool for call in ledger.made}
+    assert not any(answer.is_error for answer in ledger.answers)
     assert end.answer == "I know no way to a fire extinguisher, and am offered no search."
 
 
 async def test_a_search_is_begun_where_one_is_offered(tmp_path: Path) -> None:
     _, ledger = await run(tmp_path, "search_for")
-    assert "search_for" in {call.tool for call in ledger.calls}
+    assert "search_for" in {call.tool for call in ledger.made}

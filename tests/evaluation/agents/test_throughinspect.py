@@ -13,9 +13,9 @@ import pytest
 from fakes import FakeRobot, two_rooms
 from hearing import Hearing
 from mapspeak.errors import ConfigError, LinkError
-from mapspeak.evaluation.agents.finding import check_other, find_other, find_versions
+from mapspeak.evaluation.agents.finding import check_agent, find_agent, find_versions
 from mapspeak.evaluation.client import ToolClient
-from mapspeak.evaluation.trials import Agent, AgentEnd, Assignment, Limits, TrialState
+from mapspeak.evaluation.trials import AgentEnd, Assignment, Limits, TrialState
 from modelserver import N_READ, N_WRITTEN, ModelServer, Speech, Trouble, serve_model
 from modelspeech import SPEECHES, AnthropicMessages, GoogleContents, OpenAIChat
 from served import connect
@@ -55,8 +55,7 @@ async def run(
     wall_s: float = Limits().wall_s,
 ) -> AgentEnd:
     """Lets a model work in a building of two rooms; errors come as they are, in no group."""
-    agent: Agent | None = find_other(name, thinking)
-    assert agent is not None
+    agent = find_agent(name, thinking)
     limits = Limits(wall_s=wall_s)
     task = Assignment(
         prompt="Go there.", system="Be quick.", limits=limits, seed=1, server=(), folder=folder
@@ -73,9 +72,9 @@ async def run(
 @pytest.mark.skipif(HAS_INSPECT, reason="needs to be without the extra eval")
 def test_without_the_extra_it_is_said_what_to_install() -> None:
     with pytest.raises(ConfigError, match=r"pip install .*inspect-ai\S+ 'openai"):
-        check_other("openai/any")
+        check_agent("openai/any")
     with pytest.raises(ConfigError, match=r"inspect-ai\S+ 'openai\S+ google-genai,"):
-        check_other("google/any")
+        check_agent("google/any")
 
 
 @needs_inspect
@@ -211,7 +210,7 @@ def test_a_missing_key_is_told_before_the_first_trial(
     monkeypatch.delenv("GEMINI_API_KEY", raising=False)
     monkeypatch.delenv("ANTHROPIC_AUTH_TOKEN", raising=False)
     with pytest.raises(ConfigError, match=rf"cannot be asked: .*{speech.key}"):
-        check_other(speech.model)
+        check_agent(speech.model)
 
 
 @needs_inspect

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mapspeak.evaluation.runs.attempt import attempt
-from mapspeak.evaluation.runs.inspecting import open_inspection
+from mapspeak.evaluation.runs.workplace import open_inspection
 from mapspeak.evaluation.scores import GroundTruth
 from mapspeak.evaluation.tasks import find_task
 from mapspeak.evaluation.trials import (

@@ -8,7 +8,7 @@ import pytest
 from mapspeak.evaluation.agents.baselines import RandomAgent
 from mapspeak.evaluation.agents.scripted import ScriptedAgent
 from mapspeak.evaluation.client import ToolClient
-from mapspeak.evaluation.runs.inspecting import open_inspection
+from mapspeak.evaluation.runs.workplace import open_inspection
 from mapspeak.evaluation.scores import Evidence, GroundTruth
 from mapspeak.evaluation.tasks import FAMILIES, find_task
 from mapspeak.evaluation.trials import Assignment, Score, ServerAccess, Setting
@@ -148,4 +148,3 @@ async def test_what_is_offered_only_reads(site: GroundTruth, tmp_path: Path) -> 
         names = {tool.name for tool in (await opened.client.list_tools()).tools}
     assert "ros_read" in names
     assert not {"ros_publish", "ros_call", "ros_set_parameter", "ros_send_goal"} & names
-    assert "--read-only" in opened.command

@@ -10,8 +10,7 @@ from mapspeak.evaluation.agents.driver import ARRIVED, ToolDriver, find_label
 from mapspeak.evaluation.client import ToolClient
 from mapspeak.evaluation.observer import describe_view
 from mapspeak.evaluation.reading import read_map_picture
-from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess
-from mapspeak.evaluation.trials.trial import TrialState
+from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess, TrialState
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, Mask

@@ -1,116 +1,91 @@
 """Agents by their names: scripts, models and client programs, and what they need."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 
 from mapspeak.errors import ConfigError
 from mapspeak.evaluation.agents.baselines import OracleAgent, RandomAgent
-from mapspeak.evaluation.agents.command import CommandAgent, find_program
+from mapspeak.evaluation.agents.command.agent import CommandAgent
+from mapspeak.evaluation.agents.command.program import find_program
 from mapspeak.evaluation.agents.exploring import NearestFrontierAgent, PaperLoopAgent
-from mapspeak.evaluation.agents.models import MockMind, ModelAgent, Thinking
+from mapspeak.evaluation.agents.models.loop import ModelAgent
+from mapspeak.evaluation.agents.models.mind import MockMind, Thinking
 from mapspeak.evaluation.agents.models.throughinspect import find_client, open_mind
 from mapspeak.evaluation.agents.scripted import ScriptedAgent
 from mapspeak.evaluation.scores import GroundTruth
-from mapspeak.evaluation.trials import Agent, Setting, Trial
+from mapspeak.evaluation.trials import Agent, Setting
 
-_NAMES = ("scripted", "oracle", "random")
-MORE = "PROVIDER/MODEL for a model, command:PROGRAM for a client program"
+ORACLE, MOCK = "oracle", "mock"
+COMMAND = "command:"
+SCRIPTS: dict[str, Callable[[], Agent]] = {
+    "scripted": ScriptedAgent,
+    "random": RandomAgent,
+    "nearest-frontier": NearestFrontierAgent,
+    "paper-loop": PaperLoopAgent,
+}
 
 
 def agent_names() -> tuple[str, ...]:
     """Return the names of the agents that need nothing else."""
-    return (*_NAMES, *OTHER_NAMES)
+    return (*SCRIPTS, ORACLE, MOCK)
 
 
 def check_agent(name: str, thinking: str | None = None) -> None:
-    """Look whether there is an agent of a name, and all that it needs.
+    """Check that an agent exists and has all that it needs, without asking it anything.
 
     Raises:
-        ConfigError: There is none, or something is missing.
+        ConfigError: There is no such agent, or something that it needs is missing.
     """
-    if name not in _NAMES and not check_other(name, thinking):
-        raise _unknown(name)
+    if name == ORACLE:
+        return
+    if _is_model(name):
+        open_mind(name, read_thinking(thinking)).check()
+        return
+    agent = find_agent(name, thinking)
+    if isinstance(agent, CommandAgent):
+        agent.check()
 
 
-def find_agent(trial: Trial, setting: Setting, site: GroundTruth) -> Agent:
-    """Return who answers a trial.
+def find_agent(
+    name: str, thinking: str | None = None, truth: tuple[Setting, GroundTruth] | None = None
+) -> Agent:
+    """Return an agent by its name.
 
     Args:
-        trial: Names the agent, and how much it may think.
-        setting: For the oracle alone.
-        site: The world as it is set, for the oracle alone.
-
-    Raises:
-        ConfigError: There is no such agent.
-    """
-    if trial.agent == "oracle":
-        return OracleAgent(setting, site)
-    if trial.agent in _NAMES:
-        return RandomAgent() if trial.agent == "random" else ScriptedAgent()
-    other = find_other(trial.agent, trial.thinking)
-    if other is None:
-        raise _unknown(trial.agent)
-    return other
-
-
-def _unknown(name: str) -> ConfigError:
-    return ConfigError(
-        f"There is no agent {name[:80]!r}.",
-        hint=f"There are: {', '.join(agent_names())}; {MORE}.",
-    )
-
-
-MOCK = "mock"
-OTHER_NAMES = ("nearest-frontier", "paper-loop", MOCK)
-COMMAND = "command:"
-INSPECT = "inspect-ai"
-
-
-def find_other(name: str, thinking: str | None) -> Agent | None:
-    """Return an agent by its name; None where it is no name of one.
-
-    Args:
-        name: "nearest-frontier", "paper-loop", "mock", "PROVIDER/MODEL" or "command:PROGRAM".
+        name: One of `agent_names`, "PROVIDER/MODEL" or "command:PROGRAM".
         thinking: How much a model may think, as `Thinking`; None where nothing was said.
+        truth: For the oracle alone: the trial's setting, and the world as it is set.
 
     Raises:
-        ConfigError: The model or program cannot be had, or there is no such way to think.
+        ConfigError: There is none, the model or program cannot be had, or there is no such way to
+            think.
     """
     amount = read_thinking(thinking)
-    if name == "nearest-frontier":
-        return NearestFrontierAgent()
-    if name == "paper-loop":
-        return PaperLoopAgent()
+    if name == ORACLE and truth is not None:
+        return OracleAgent(*truth)
+    if name in SCRIPTS:
+        return SCRIPTS[name]()
     if name == MOCK:
         return ModelAgent(MockMind(), name)
     if name.startswith(COMMAND):
         return CommandAgent(find_program(name.removeprefix(COMMAND)), name, amount)
-    return ModelAgent(open_mind(name, amount), name) if "/" in name else None
+    if _is_model(name):
+        return ModelAgent(open_mind(name, amount), name)
+    raise ConfigError(
+        f"There is no agent {name[:80]!r}.",
+        hint=f"There are: {', '.join(agent_names())}; "
+        "PROVIDER/MODEL for a model, command:PROGRAM for a client program.",
+    )
 
 
 def can_think(name: str) -> bool:
-    """Return True for models, their mock and client programs, which take time to think.
-
-    Args:
-        name: An agent's, whether it is there or not.
-    """
+    """Return True for models, their mock and client programs, which take time to think."""
     return name == MOCK or "/" in name or name.startswith(COMMAND)
 
 
-def check_other(name: str, thinking: str | None = None) -> bool:
-    """Return True where there is an agent of a name, by what it needs; it is asked nothing.
-
-    Raises:
-        ConfigError: There is one, but something that it needs is missing.
-    """
-    if "/" in name and not name.startswith(COMMAND):
-        open_mind(name, read_thinking(thinking)).check()
-        return True
-    agent = find_other(name, thinking)
-    if isinstance(agent, CommandAgent):
-        agent.check()
-    return agent is not None
+def _is_model(name: str) -> bool:
+    return "/" in name and not name.startswith(COMMAND)
 
 
 def find_versions(names: Iterable[str]) -> dict[str, str]:
@@ -125,8 +100,8 @@ def find_versions(names: Iterable[str]) -> dict[str, str]:
             said = find_program(name.removeprefix(COMMAND)).find_version()
             if said is not None:
                 versions[name] = said
-        elif "/" in name:
-            for package in (INSPECT, find_client(name)):
+        elif _is_model(name):
+            for package in ("inspect-ai", find_client(name)):
                 with suppress(PackageNotFoundError):
                     versions[package] = version(package)
     return versions

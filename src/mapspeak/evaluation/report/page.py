@@ -5,9 +5,9 @@ All else that is to be seen of a run, `inspect view` shows of its log.
 
 import base64
 import hashlib
-import os
 from collections.abc import Iterable, Iterator, Sequence
 from importlib import resources
+from itertools import chain
 from pathlib import Path
 from urllib.parse import quote
 
@@ -22,9 +22,9 @@ from mapspeak.evaluation.report.sheet import (
     table,
     text,
 )
-from mapspeak.evaluation.report.way import PICTURES, TURNS, read_course
+from mapspeak.evaluation.report.way import read_course
 from mapspeak.evaluation.scores import Interval, TableRow, count_rows, wilson_interval
-from mapspeak.evaluation.trials import TrialResult, trial_folder
+from mapspeak.evaluation.trials import PICTURES, TURNS, TrialResult, trial_folder, write_whole
 
 PAGE_LIMIT_BYTES = 24_000_000
 """A page larger than this is slow to open on a phone."""
@@ -61,7 +61,7 @@ def write_page(
         *_list_trials(results, links),
     ]
     replays = () if is_apart else _replays(run, results, album)
-    _write(page, _document("mapspeak: an evaluation", _with_album((*body, *replays), album)))
+    write_whole(page, _document("mapspeak: an evaluation", _with_album((*body, *replays), album)))
     if is_apart:
         for result in results:
             _write_apart(run, result)
@@ -89,7 +89,7 @@ def _write_apart(run: Path, result: TrialResult) -> None:
     back = element("p", {}, element("a", {"href": f"{up}{PAGE}"}, text("All trials")))
     parts = _with_album([back, *_replays(run, [result], album)], album)
     title = f"mapspeak: {result.trial.id}"
-    _write(folder / REPLAY, _document(title, parts, has_links=True))
+    write_whole(folder / REPLAY, _document(title, parts, has_links=True))
 
 
 def _with_album(parts: Iterable[Html], album: Album) -> Iterator[Html]:
@@ -227,7 +227,7 @@ def _cell(said: str, small: str = "") -> Html:
 # --- the document --------------------------------------------------------------------------------
 
 
-def _document(title: str, body: Iterable[Html], *, has_links: bool = False) -> Iterator[str]:
+def _document(title: str, body: Iterable[Html], *, has_links: bool = False) -> Iterator[bytes]:
     """Yield a whole page, piece by piece; it loads nothing that is not its own."""
     style, script = _read("page.css"), _read("replay.js")
     pictures = "data: 'self' file:" if has_links else "data:"
@@ -243,10 +243,10 @@ def _document(title: str, body: Iterable[Html], *, has_links: bool = False) -> I
         element("title", {}, text(title)),
         Html(f"<style>{style}</style>"),
     ]
-    yield f'<!doctype html>\n<html lang="en"><head>{joined(head)}</head><body>\n'
-    for part in body:
-        yield f"{part}\n"
-    yield f"<script>{script}</script>\n</body></html>\n"
+    opening = Html(f'<!doctype html>\n<html lang="en"><head>{joined(head)}</head><body>')
+    closing = Html(f"<script>{script}</script>\n</body></html>")
+    for part in chain([opening], body, [closing]):
+        yield f"{part}\n".encode(errors="replace")
 
 
 def _read(name: str) -> str:
@@ -256,14 +256,3 @@ def _read(name: str) -> str:
 def _hash(inline: str) -> str:
     """Return the hash by which a page's policy allows this text and no other."""
     return f"sha256-{base64.b64encode(hashlib.sha256(inline.encode()).digest()).decode()}"
-
-
-def _write(path: Path, parts: Iterable[str]) -> None:
-    """Write a file so that it is there whole or not at all."""
-    new = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        with new.open("w", encoding="utf-8", errors="replace", newline="\n") as file:
-            file.writelines(parts)
-        new.replace(path)
-    finally:
-        new.unlink(missing_ok=True)

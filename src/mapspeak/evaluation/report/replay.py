@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mapspeak.evaluation.report.sheet import Album, Html, element, find_picture, joined, text
-from mapspeak.evaluation.report.way import PICTURES, Course, StepMark, draw_way, lay_out_way
-from mapspeak.evaluation.trials import TrialResult, Turn
+from mapspeak.evaluation.report.way import Course, StepMark, draw_way, lay_out_way
+from mapspeak.evaluation.trials import PICTURES, TrialResult, Turn
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,17 +10,21 @@ import numpy as np
 
 from mapspeak.errors import MapError
 from mapspeak.evaluation.report.sheet import Album, Html, Sheet, draw_sheet, element, joined, text
-from mapspeak.evaluation.trials import Trial, Turn, read_turns, say_fault, trial_folder
+from mapspeak.evaluation.trials import (
+    MAP,
+    STATES,
+    TURNS,
+    Trial,
+    Turn,
+    read_turns,
+    say_fault,
+    trial_folder,
+)
 from mapspeak.geometry import Pose
 from mapspeak.simulator import StateRecord, read_state_log
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.mapfiles import load_map
-
-TURNS = "turns.jsonl"
-STATES = "state.jsonl"
-MAP = "map.yaml"
-PICTURES = "pictures"
 
 _Value = TypeVar("_Value")
 

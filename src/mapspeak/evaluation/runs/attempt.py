@@ -2,7 +2,8 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,21 +13,20 @@ import cv2
 from mapspeak.errors import ConfigError
 from mapspeak.evaluation.agents import find_agent
 from mapspeak.evaluation.client import OutOfBudgetError, ToolAnswer, ToolClient
-from mapspeak.evaluation.runs.workplace import (
-    CONTROL,
+from mapspeak.evaluation.runs.workplace import CONTROL, Workshop, open_workplace
+from mapspeak.evaluation.scores import Evidence, GroundTruth
+from mapspeak.evaluation.tasks import find_task
+from mapspeak.evaluation.trials import (
     MAP,
     MEMORY,
+    PICTURES,
     STATES,
-    Workshop,
-    open_workplace,
-)
-from mapspeak.evaluation.scores import Evidence, GroundTruth
-from mapspeak.evaluation.tasks import Task, find_task
-from mapspeak.evaluation.trials import (
+    TURNS,
     Agent,
     AgentEnd,
     Assignment,
     Limits,
+    Score,
     ServerAccess,
     Setting,
     ToolCall,
@@ -35,9 +35,9 @@ from mapspeak.evaluation.trials import (
     TrialState,
     Turn,
     trial_folder,
+    turn_line,
     write_result,
 )
-from mapspeak.evaluation.trials.records import TURNS, turn_line
 from mapspeak.simulator import StateRecord, World, read_state_log
 from mapspeak.spatial.mapfiles import load_map
 
@@ -48,16 +48,12 @@ class Transcript:
     Args:
         folder: The trial's.
         limits: What it may cost; wall time is watched from outside.
-        look: Gives how the simulation truly stands.
-        on_turn: Told of every turn; None for nobody.
+        look: Return how the simulation truly stands.
+        on_turn: Told of every turn.
 
     Attributes:
-        n_turns: Written so far.
-        n_calls: Tool calls so far.
         n_errors: Calls that were answered with an error.
-        n_words: Times that the agent spoke besides calls.
         n_tokens: Read and written by a model so far.
-        calls: Every call in its order.
     """
 
     def __init__(
@@ -68,7 +64,6 @@ class Transcript:
         on_turn: Callable[[Turn], None] | None = None,
     ) -> None:
         self.n_turns = 0
-        self.n_calls = 0
         self.n_errors = 0
         self.n_tokens = 0
         self.calls: list[ToolCall] = []
@@ -76,7 +71,7 @@ class Transcript:
         self._look = look
         self._on_turn = on_turn
         self._begun_s = time.perf_counter()
-        self._pictures = folder / "pictures"
+        self._pictures = folder / PICTURES
         self._turns = (folder / TURNS).open("wb")
 
     def hear_call(self, tool: str, arguments: dict[str, Any]) -> None:
@@ -85,13 +80,20 @@ class Transcript:
         Raises:
             OutOfBudgetError: It would be one too many, or comes too late.
         """
-        self._check_limits()
-        self.n_calls += 1
+        limits = self._limits
+        if len(self.calls) >= limits.n_calls:
+            raise OutOfBudgetError(
+                f"More than {limits.n_calls} calls.", hint="Decide with fewer calls."
+            )
+        if self._look().time_s > limits.robot_time_s:
+            raise OutOfBudgetError(
+                f"More than {limits.robot_time_s:.0f} s of robot time.", hint="Drive less."
+            )
         call = ToolCall(tool=tool, arguments=arguments)
         self.calls.append(call)
         self._write("agent", call=call)
 
-    def hear_answer(self, tool: str, arguments: dict[str, Any], answer: ToolAnswer) -> None:
+    def hear_answer(self, tool: str, answer: ToolAnswer) -> None:
         """Write an answer down and keep its pictures."""
         self.n_errors += answer.is_error
         names = [self._keep(picture.data, picture.suffix) for picture in answer.pictures]
@@ -102,7 +104,6 @@ class Transcript:
             is_error=answer.is_error,
             pictures=tuple(names),
         )
-        del arguments
 
     def hear_words(
         self,
@@ -136,17 +137,6 @@ class Transcript:
         """End the file."""
         self._turns.close()
 
-    def _check_limits(self) -> None:
-        limits = self._limits
-        if self.n_calls >= limits.n_calls:
-            raise OutOfBudgetError(
-                f"More than {limits.n_calls} calls.", hint="Decide with fewer calls."
-            )
-        if self._look().time_s > limits.robot_time_s:
-            raise OutOfBudgetError(
-                f"More than {limits.robot_time_s:.0f} s of robot time.", hint="Drive less."
-            )
-
     def _write(self, role: str, text: str = "", **more: Any) -> None:  # noqa: ANN401 - fields of Turn
         state = self._look()
         turn = Turn(
@@ -172,17 +162,6 @@ class Transcript:
         return name
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Course:
-    """How a trial went, before anybody judges it."""
-
-    end: AgentEnd
-    n_turns: int
-    n_errors: int
-    evidence: Evidence
-    wall_s: float
-
-
 def attempt(
     run: Path,
     trial: Trial,
@@ -204,7 +183,7 @@ def attempt(
         control: Where the robot is held and released; None for a folder of the trial.
         on_turn: Told of each piece of the conversation, a call before it is made.
     """
-    begun_s = time.process_time()
+    begun_cpu_s = time.process_time()
     # Trials share the machine: one thread each costs least.
     cv2.setNumThreads(1)
     folder = trial_folder(run, trial)
@@ -217,19 +196,28 @@ def attempt(
         raise ConfigError(
             f"The task {trial.task} starts from a finished map.", hint="Explore the world first."
         )
+    known_map = prepared / MAP if prepared is not None and setting.is_known else None
     shop = Workshop(
         trial=trial,
         setting=setting,
         world=world,
-        known_map=prepared / MAP if prepared is not None and setting.is_known else None,
+        known_map=known_map,
         folder=folder,
         control=control or folder / CONTROL,
     )
     as_set = _as_set(site, setting)
-    agent = find_agent(trial, setting, as_set)
-    course = anyio.run(_work, shop, agent, connection or agent.connection, on_turn)
-    result = _judge(trial, setting, task, as_set, course)
-    result = replace(result, cpu_s=round(time.process_time() - begun_s, 3))
+    agent = find_agent(trial.agent, trial.thinking, (setting, as_set))
+    begun_s = time.perf_counter()
+    end, transcript = anyio.run(_work, shop, agent, connection or agent.connection, on_turn)
+    wall_s = time.perf_counter() - begun_s
+    evidence = _gather(folder, transcript, end)
+    result = _sum_up(trial, setting, evidence, end, task.score(as_set, setting, evidence))
+    result = replace(
+        result,
+        n_turns=transcript.n_turns,
+        wall_s=round(wall_s, 3),
+        cpu_s=round(time.process_time() - begun_cpu_s, 3),
+    )
     write_result(run, result)
     return result
 
@@ -246,8 +234,7 @@ async def _work(
     agent: Agent,
     connection: ServerAccess,
     on_turn: Callable[[Turn], None] | None,
-) -> _Course:
-    begun_s = time.perf_counter()
+) -> tuple[AgentEnd, Transcript]:
     setting = shop.setting
     async with open_workplace(shop, connection) as place:
         transcript = Transcript(shop.folder, setting.limits, place.look, on_turn)
@@ -260,38 +247,23 @@ async def _work(
             server=place.command,
             folder=shop.folder,
         )
-        transcript.hear_words("system", system)
-        transcript.hear_words("user", setting.prompt)
-        try:
-            end = await _run_agent(agent, assignment, ToolClient(place.client, transcript))
+        end = AgentEnd(answer="It took too long.", state=TrialState.OUT_OF_BUDGET)
+        with closing(transcript):
+            transcript.hear_words("system", system)
+            transcript.hear_words("user", setting.prompt)
+            try:
+                with anyio.move_on_after(setting.limits.wall_s):
+                    end = await agent.run(assignment, ToolClient(place.client, transcript))
+            except* OutOfBudgetError as group:
+                end = AgentEnd(answer=str(group.exceptions[0]), state=TrialState.OUT_OF_BUDGET)
             transcript.hear_words("agent", end.answer)
-        finally:
-            transcript.close()
-    return _Course(
-        end=end,
-        n_turns=transcript.n_turns,
-        n_errors=transcript.n_errors,
-        evidence=_gather(shop.folder, transcript, end),
-        wall_s=time.perf_counter() - begun_s,
-    )
-
-
-async def _run_agent(agent: Agent, assignment: Assignment, tools: ToolClient) -> AgentEnd:
-    end = AgentEnd(answer="It took too long.", state=TrialState.OUT_OF_BUDGET)
-    try:
-        with anyio.move_on_after(assignment.limits.wall_s):
-            end = await agent.run(assignment, tools)
-    except* OutOfBudgetError as group:
-        end = AgentEnd(answer=str(group.exceptions[0]), state=TrialState.OUT_OF_BUDGET)
-    return end
+    return end, transcript
 
 
 def _gather(folder: Path, transcript: Transcript, end: AgentEnd) -> Evidence:
-    states = read_state_log(folder / STATES) if (folder / STATES).exists() else ()
-    grid = load_map(folder / MAP).grid if (folder / MAP).exists() else None
     return Evidence(
-        states=states,
-        grid=grid,
+        states=read_state_log(folder / STATES) if (folder / STATES).exists() else (),
+        grid=load_map(folder / MAP).grid if (folder / MAP).exists() else None,
         memory=_read_if_there(folder / MEMORY),
         answer=end.answer,
         state=end.state,
@@ -300,27 +272,25 @@ def _gather(folder: Path, transcript: Transcript, end: AgentEnd) -> Evidence:
     )
 
 
-def _judge(
-    trial: Trial, setting: Setting, task: Task, site: GroundTruth, course: _Course
+def _sum_up(
+    trial: Trial, setting: Setting, evidence: Evidence, end: AgentEnd, score: Score
 ) -> TrialResult:
-    evidence, end = course.evidence, course.end
+    n_calls = len(evidence.calls)
     return TrialResult(
         trial=trial,
         prompt=setting.prompt,
         answer=end.answer,
         state=end.state,
-        score=task.score(site, setting, evidence),
+        score=score,
         driven_m=round(evidence.last.driven_m, 3),
         shortest_m=setting.truth.get("shortest_m"),
-        n_turns=course.n_turns,
-        n_calls=len(evidence.calls),
-        n_decisions=len(evidence.calls) if end.n_decisions is None else end.n_decisions,
-        n_errors=course.n_errors,
+        n_calls=n_calls,
+        n_decisions=n_calls if end.n_decisions is None else end.n_decisions,
+        n_errors=evidence.n_errors,
         n_input_tokens=end.n_input_tokens,
         n_output_tokens=end.n_output_tokens,
         n_picture_tokens=end.n_picture_tokens,
         robot_s=evidence.last.time_s,
-        wall_s=round(course.wall_s, 3),
         n_collisions=evidence.last.n_collisions,
     )
 

@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from mapspeak.evaluation.trials import Trial, TrialResult, Turn, read_turns, trial_folder
+from mapspeak.evaluation.trials import PICTURES, Trial, TrialResult, Turn, read_turns, trial_folder
 
 LOG = "inspect.eval"
 SCORER = "truth"
@@ -141,7 +141,7 @@ def _summary(sample: Mapping[str, Any]) -> dict[str, Any]:
 
 def _messages(run: Path, trial: Trial) -> Iterator[dict[str, Any]]:
     """Yield the conversation; a call and its answer have the same id."""
-    pictures = trial_folder(run, trial) / "pictures"
+    pictures = trial_folder(run, trial) / PICTURES
     for number, turn in enumerate(read_turns(run, trial)):
         message_id = _id_of(f"{trial.id} {number}")
         if turn.role in ("system", "user"):

@@ -12,11 +12,12 @@ from pathlib import Path
 
 from mcp.client import Client
 from mcp.client.stdio import StdioServerParameters
+from mcp.server.mcpserver import MCPServer
 
-from mapspeak.evaluation.inspected import InspectedSystem
-from mapspeak.evaluation.runs.inspecting import open_inspection
+from mapspeak.evaluation.inspected import InspectedSystem, play
 from mapspeak.evaluation.scores.answers import NOWHERE
-from mapspeak.evaluation.trials import ServerAccess, Setting, Trial
+from mapspeak.evaluation.trials import MAP, MEMORY, STATES, ServerAccess, Setting, Trial
+from mapspeak.links.rosbridge import open_rosbridge_robot
 from mapspeak.links.simulated import SimulatedRobot, SoloRobot
 from mapspeak.memory import SemanticMapStore
 from mapspeak.safety import Approvals, AuditLog, Guard, Hold, Policy, WaitingRoom
@@ -25,15 +26,11 @@ from mapspeak.server.mapview.representations import Representation
 from mapspeak.session import Session
 from mapspeak.simulator import Simulation, StateLog, StateRecord, World
 from mapspeak.simulator.worlds.worldfiles import write_with_more
-from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import MapMode, load_map, write_map
 
 ANSWER_WITHIN_S = 120.0
-STATES = "state.jsonl"
-AUDIT = "audit.jsonl"
-CONTROL = "control"
-MEMORY = "semantic_map.yaml"
-MAP = "map.yaml"
+AUDIT, CONTROL = "audit.jsonl", "control"
+SERVE = (sys.executable, "-m", "mapspeak", "serve")
 CLOCK_ZERO = datetime(2000, 1, 1, tzinfo=UTC)
 """What the clock on the wall shows when a robot of a trial in memory begins."""
 LINE_BYTES = 2000
@@ -45,8 +42,6 @@ class Workshop:
     """What a workplace is made from.
 
     Attributes:
-        trial: Which attempt.
-        setting: How it is set.
         world: The world of the trial, without what the setting adds.
         known_map: A finished map (.yaml) for the robot; None where it has none.
         folder: The trial's.
@@ -77,19 +72,25 @@ class Workshop:
         known = () if self.known_map is None else ("--map", str(self.known_map))
         tools = ("--tools", ",".join(setting.tools)) if setting.tools else ()
         return (
-            *(sys.executable, "-m", "mapspeak", "serve", "--robot", f"sim:{world}"),
+            *(*SERVE, "--robot", f"sim:{world}"),
             *("--seed", str(self.trial.seed), "--clock", "virtual", "--detector"),
             f"--start={start.x!r},{start.y!r},{start.yaw_deg!r}",
             *known,
-            *("--toolsets", ",".join(self.toolsets)),
             *tools,
             *("--representation", self.trial.representation),
-            *("--memory", str(self.folder / MEMORY)),
             *("--state-log", str(self.folder / STATES)),
             *("--final-map", str(self.folder / MAP)),
-            *("--audit", str(self.folder / AUDIT)),
-            *("--control", str(self.control)),
+            *_usual_options(self.toolsets, self.folder, self.control),
         )
+
+
+def _usual_options(toolsets: tuple[str, ...], folder: Path, control: Path) -> tuple[str, ...]:
+    return (
+        *("--toolsets", ",".join(toolsets)),
+        *("--memory", str(folder / MEMORY)),
+        *("--audit", str(folder / AUDIT)),
+        *("--control", str(control)),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,15 +99,18 @@ class Workplace:
 
     Attributes:
         client: To its server; None where the agent brings its own.
-        instructions: What the server tells any model first.
-        look: Gives how the simulation truly stands.
+        look: Return how the simulation truly stands.
         command: Starts its server, for agents that do so themselves.
     """
 
     client: Client | None
-    instructions: str
     look: Callable[[], StateRecord]
     command: tuple[str, ...] = ()
+
+    @property
+    def instructions(self) -> str:
+        """What the server tells any model first."""
+        return "" if self.client is None else self.client.instructions or ""
 
 
 @asynccontextmanager
@@ -117,13 +121,14 @@ async def open_workplace(shop: Workshop, connection: ServerAccess) -> AsyncGener
     if shop.setting.memory is not None:
         (shop.folder / MEMORY).write_text(shop.setting.memory, encoding="utf-8")
     if shop.setting.inspected is not None:
-        opened = _open_inspected(shop, shop.setting.inspected, connection)
+        opened = open_inspection(
+            shop.setting.inspected, connection, toolsets=shop.toolsets, folder=shop.folder
+        )
     elif connection is ServerAccess.MEMORY:
         opened = _open_in_memory(shop)
-    elif connection is ServerAccess.STDIO:
-        opened = _open_over_stdio(shop)
     else:
-        opened = _open_for_another(shop)
+        log = shop.folder / STATES
+        opened = _open_apart(shop.command(), connection, lambda: _last_state(log))
     async with opened as place:
         yield place
 
@@ -132,7 +137,7 @@ async def open_workplace(shop: Workshop, connection: ServerAccess) -> AsyncGener
 async def _open_in_memory(shop: Workshop) -> AsyncGenerator[Workplace]:
     setting = shop.setting
     world = replace(shop.world, objects=(*shop.world.objects, *setting.added))
-    known = _read_known(shop.known_map)
+    known = None if shop.known_map is None else load_map(shop.known_map).grid
     simulation = Simulation(world, seed=shop.trial.seed, known=known, start=setting.start)
     log = StateLog(simulation, shop.folder / STATES)
     robot = SoloRobot(simulation, has_detector=True, after_step=log.note)
@@ -145,15 +150,32 @@ async def _open_in_memory(shop: Workshop) -> AsyncGenerator[Workplace]:
         representation=Representation(shop.trial.representation),
     )
     try:
-        async with Client(server, read_timeout_seconds=ANSWER_WITHIN_S) as client:
-            yield Workplace(
-                client=client,
-                instructions=server.instructions or "",
-                look=lambda: StateRecord.of(simulation),
-            )
+        async with _connect(server, lambda: StateRecord.of(simulation)) as place:
+            yield place
     finally:
         log.close()
         write_map(simulation.map(), shop.folder / MAP, mode=MapMode.RAW)
+
+
+@asynccontextmanager
+async def _connect(
+    server: MCPServer | StdioServerParameters, look: Callable[[], StateRecord]
+) -> AsyncGenerator[Workplace]:
+    async with Client(server, read_timeout_seconds=ANSWER_WITHIN_S) as client:
+        yield Workplace(client=client, look=look)
+
+
+@asynccontextmanager
+async def _open_apart(
+    command: tuple[str, ...], connection: ServerAccess, look: Callable[[], StateRecord]
+) -> AsyncGenerator[Workplace]:
+    """Start a server as a process of its own, or leave that to the agent."""
+    if connection is ServerAccess.COMMAND:
+        yield Workplace(client=None, look=look, command=command)
+        return
+    parameters = StdioServerParameters(command=command[0], args=list(command[1:]))
+    async with _connect(parameters, look) as place:
+        yield place
 
 
 def _build_guard(shop: Workshop, robot: SimulatedRobot) -> Guard:
@@ -177,47 +199,31 @@ def _build_guard(shop: Workshop, robot: SimulatedRobot) -> Guard:
     )
 
 
-def _read_known(path: Path | None) -> OccupancyGrid | None:
-    return None if path is None else load_map(path).grid
-
-
 @asynccontextmanager
-async def _open_over_stdio(shop: Workshop) -> AsyncGenerator[Workplace]:
-    command, *arguments = shop.command()
-    parameters = StdioServerParameters(command=command, args=arguments)
-    async with Client(parameters, read_timeout_seconds=ANSWER_WITHIN_S) as client:
-        yield Workplace(
-            client=client,
-            instructions=client.instructions or "",
-            look=lambda: _last_state(shop.folder / STATES),
-        )
-
-
-@asynccontextmanager
-async def _open_for_another(shop: Workshop) -> AsyncGenerator[Workplace]:
-    """Leave it to the agent to start the server."""
-    yield Workplace(
-        client=None,
-        instructions="",
-        look=lambda: _last_state(shop.folder / STATES),
-        command=shop.command(),
-    )
-
-
-@asynccontextmanager
-async def _open_inspected(
-    shop: Workshop, system: InspectedSystem, connection: ServerAccess
+async def open_inspection(
+    system: InspectedSystem, connection: ServerAccess, *, toolsets: tuple[str, ...], folder: Path
 ) -> AsyncGenerator[Workplace]:
-    """There is no simulated robot here, and nobody drives."""
-    async with open_inspection(
-        system, connection, toolsets=shop.toolsets, folder=shop.folder
-    ) as opened:
-        yield Workplace(
-            client=opened.client,
-            instructions=opened.instructions,
-            look=lambda: NOWHERE,
-            command=opened.command,
-        )
+    """Play a ROS system and connect to it as an agent wants it, read-only; nothing can drive.
+
+    Args:
+        system: What is played, for as long as the context lasts.
+        connection: How the agent reaches the server.
+        toolsets: Groups of tools to offer.
+        folder: Where the server keeps what it writes.
+    """
+    async with play(system) as url:
+        if connection is not ServerAccess.MEMORY:
+            options = _usual_options(toolsets, folder, folder / CONTROL)
+            command = (*SERVE, "--robot", url, "--read-only", *options)
+            async with _open_apart(command, connection, lambda: NOWHERE) as place:
+                yield place
+            return
+        async with open_rosbridge_robot(url) as robot:
+            memory = SemanticMapStore(folder / MEMORY)
+            session = Session(robot, memory, lease_s=math.inf, ros=robot.connection)
+            server = build_server(session, toolsets=toolsets, is_read_only=True)
+            async with _connect(server, lambda: NOWHERE) as place:
+                yield place
 
 
 def _last_state(log: Path) -> StateRecord:

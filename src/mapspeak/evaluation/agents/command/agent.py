@@ -18,8 +18,7 @@ from mapspeak.evaluation.agents.command import keeper
 from mapspeak.evaluation.agents.command.program import ALWAYS, AnswerForm, Program, Start
 from mapspeak.evaluation.agents.models import Thinking
 from mapspeak.evaluation.client import OutOfBudgetError, Picture, ToolAnswer, ToolClient, Witness
-from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess
-from mapspeak.evaluation.trials.trial import TrialState
+from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess, TrialState
 
 EVERY_S = 0.1
 
@@ -76,7 +75,7 @@ class Listener:
             is_error=line["is_error"],
         )
         self.witness.hear_call(line["tool"], line["arguments"])
-        self.witness.hear_answer(line["tool"], line["arguments"], answer)
+        self.witness.hear_answer(line["tool"], answer)
 
     def _read_picture(self, name: str) -> Picture:
         path = self.log.with_suffix("") / name

@@ -14,8 +14,7 @@ from PIL import Image
 from mapspeak.errors import LinkError
 from mapspeak.evaluation.agents.models.mind import Ending, Mind, Reply, Talk, ToolCallRequest
 from mapspeak.evaluation.client import OutOfBudgetError, Picture, ToolAnswer, ToolClient
-from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess
-from mapspeak.evaluation.trials.trial import TrialState
+from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess, TrialState
 
 PIXELS_PER_TOKEN = 750
 """Anthropic's published rule for pictures of up to 1568 px; other APIs count otherwise."""
@@ -147,5 +146,5 @@ async def _fulfil(tools: ToolClient, wish: ToolCallRequest) -> ToolAnswer:
     answer = ToolAnswer(text=wish.mistake, pictures=(), report={}, is_error=True)
     if tools.witness is not None:
         tools.witness.hear_call(wish.tool, wish.arguments)
-        tools.witness.hear_answer(wish.tool, wish.arguments, answer)
+        tools.witness.hear_answer(wish.tool, answer)
     return answer
