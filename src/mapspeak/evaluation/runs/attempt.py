@@ -186,25 +186,9 @@ def attempt(
     begun_cpu_s = time.process_time()
     # Trials share the machine: one thread each costs least.
     cv2.setNumThreads(1)
-    folder = trial_folder(run, trial)
-    folder.mkdir(parents=True, exist_ok=True)
-    prepared = None if preparation is None else trial_folder(run, preparation)
     site, task = GroundTruth(world), find_task(trial.task)
-    memory = _read_if_there(prepared / MEMORY) if prepared is not None else None
-    setting = task.make_setting(site, seed=trial.seed, memory=memory)
-    if setting.is_known and prepared is None:
-        raise ConfigError(
-            f"The task {trial.task} starts from a finished map.", hint="Explore the world first."
-        )
-    known_map = prepared / MAP if prepared is not None and setting.is_known else None
-    shop = Workshop(
-        trial=trial,
-        setting=setting,
-        world=world,
-        known_map=known_map,
-        folder=folder,
-        control=control or folder / CONTROL,
-    )
+    shop = _prepare(run, trial, site, preparation, control)
+    setting, folder = shop.setting, shop.folder
     as_set = _as_set(site, setting)
     agent = find_agent(trial.agent, trial.thinking, (setting, as_set))
     begun_s = time.perf_counter()
@@ -220,6 +204,28 @@ def attempt(
     )
     write_result(run, result)
     return result
+
+
+def _prepare(
+    run: Path, trial: Trial, site: GroundTruth, preparation: Trial | None, control: Path | None
+) -> Workshop:
+    folder = trial_folder(run, trial)
+    folder.mkdir(parents=True, exist_ok=True)
+    prepared = None if preparation is None else trial_folder(run, preparation)
+    memory = _read_if_there(prepared / MEMORY) if prepared is not None else None
+    setting = find_task(trial.task).make_setting(site, seed=trial.seed, memory=memory)
+    if setting.is_known and prepared is None:
+        raise ConfigError(
+            f"The task {trial.task} starts from a finished map.", hint="Explore the world first."
+        )
+    return Workshop(
+        trial=trial,
+        setting=setting,
+        world=site.world,
+        known_map=prepared / MAP if prepared is not None and setting.is_known else None,
+        folder=folder,
+        control=control or folder / CONTROL,
+    )
 
 
 def _as_set(site: GroundTruth, setting: Setting) -> GroundTruth:
