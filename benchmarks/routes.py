@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks.figure import Figure
 from benchmarks.relations.sites import Site, build_sites
 from benchmarks.relations.truth import Truth, away
-from mapspeak.driving.routes import RoutePlan, plan_route
+from mapspeak.driving.routes.planning import RoutePlan, plan_route
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint
 from mapspeak.worldmodel.model import WorldModel
@@ -140,7 +140,7 @@ def _choose_greedily(ways: Ways, choices: Sequence[Sequence[int]]) -> list[int]:
 
 def _is_right(ways: Ways, plan: RoutePlan, case: Case) -> bool:
     """Return True where the route chosen is as short as can be, by the benchmark's own measure."""
-    length_m = ways.length_m([int(each.name[1:]) for each in plan.chosen])
+    length_m = ways.length_m([int(each.goal.name[1:]) for each in plan.stops])
     is_shortest = length_m <= case.best_m * (1 + SAME_RATIO) + SAME_M
     is_told = abs(plan.total_m - length_m) <= length_m * SAME_RATIO * 2 + 2 * SAME_M
     return is_shortest and is_told

@@ -14,8 +14,7 @@ from benchmarks.memory.sites import Site, TrueThing
 from mapspeak.geometry import wrap_angle
 from mapspeak.memory.search import EntryKind, Verdict
 from mapspeak.places.goalcheck import judge_goal
-from mapspeak.places.recall import SURE_RATIO, RecallCandidate
-from mapspeak.places.recall.answer import Recall
+from mapspeak.places.recall.asking import SURE_RATIO, Recall, RecallCandidate
 from mapspeak.worldmodel.model import WorldModel
 
 __all__ = ["Facing", "Fault", "Judged", "Outcome", "choose", "judge_all"]

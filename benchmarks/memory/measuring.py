@@ -220,5 +220,6 @@ def _say_wrong(judged: Judged) -> str:
         f'{judged.site}: "{judged.request.words}" got {first.id} "{first.name}" in '
         f"{' or '.join(first.room_ids)}, {len(first.seen_from)} views, trust "
         f"{first.trust.ratio:.3f}, good to {first.uncertainty_m or 0.0:.1f} m, score "
-        f"{first.score_ratio:.2f}, {judged.off_m:.1f} m from the nearest: {judged.fault}"
+        f"{first.match.score_ratio if first.match else 1.0:.2f}, "
+        f"{judged.off_m:.1f} m from the nearest: {judged.fault}"
     )

@@ -19,6 +19,7 @@ class NextStep(StrEnum):
     DRIVE_THERE = "drive_there"
     SEE_PLACES = "see_places"
     MEASURE = "measure"
+    MEASURE_BETWEEN = "measure_between"
     READ_MORE = "read_more"
     LOOK_AROUND = "look_around"
     LOOK_FROM = "look_from"

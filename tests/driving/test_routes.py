@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drawing import grid_from_text
-from mapspeak.driving.routes import RoutePlan, find_candidates, plan_route
+from mapspeak.driving.routes.planning import RoutePlan, find_candidates, plan_route
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint
@@ -40,20 +40,20 @@ def _world(*waypoints: Waypoint, text: str = CORRIDOR) -> WorldModel:
 
 
 def _names(plan: RoutePlan) -> list[str]:
-    return [candidate.name for candidate in plan.chosen]
+    return [stop.goal.name for stop in plan.stops]
 
 
 def test_words_that_fit_several_places_are_taken_where_the_whole_route_is_shortest() -> None:
     plan = plan_route(_world(), ["extinguisher", "exit sign"])
     assert _names(plan) == ["T2", "exit sign"]
-    assert plan.n_candidates == (2, 1)
+    assert [stop.n_candidates for stop in plan.stops] == [2, 1]
     assert plan.total_m == pytest.approx(5.0, abs=0.3)
     assert plan.greedy_m == pytest.approx(7.0, abs=0.3)
 
 
 def test_the_legs_are_path_lengths_from_the_robot_on() -> None:
     plan = plan_route(_world(), ["W1", "west end", "9.0, 0.7", "0.5 m west of W3"])
-    assert plan.legs_m == pytest.approx((1.0, 0.0, 5.0, 0.6), abs=0.3)
+    assert [stop.leg_m for stop in plan.stops] == pytest.approx([1.0, 0.0, 5.0, 0.6], abs=0.3)
     assert plan.greedy_m == pytest.approx(plan.total_m)
 
 
@@ -66,13 +66,13 @@ def test_a_relation_to_an_ambiguous_thing_is_a_choice_too() -> None:
     chairs = [Landmark(label="chair", bearing_rad=0.0, range_m=range_m) for range_m in (0.5, 5.5)]
     seen = Waypoint(name="hall", pose=Pose(2.5, 0.7), functional_landmarks=tuple(chairs))
     plan = plan_route(_world(seen, EXIT), ["next to the chair", "W2"])
-    assert plan.n_candidates[0] == 2
-    assert plan.chosen[0].pose.x > 6.0
+    assert plan.stops[0].n_candidates == 2
+    assert plan.stops[0].goal.pose.x > 6.0
 
 
 def test_the_nearest_of_a_kind_is_the_nearest_on_the_route() -> None:
     plan = plan_route(_world(), ["nearest remembered place", "W3"])
-    assert plan.n_candidates == (3, 1)
+    assert [stop.n_candidates for stop in plan.stops] == [3, 1]
     assert plan.total_m == pytest.approx(5.0, abs=0.3)
 
 

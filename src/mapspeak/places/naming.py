@@ -224,12 +224,7 @@ def find_thing(world: WorldModel, words: str) -> Place | None:
     """
     nearest = NEAREST.fullmatch(words)
     wanted = words if nearest is None else nearest["label"]
-    label, room_id = split_room(world, wanted)
-    called = [
-        each
-        for each in world.recollection.find_called(label)
-        if room_id is None or room_id in world.rooms_before(each)
-    ]
+    called = find_things(world, wanted)
     if not called:
         return None
     if len(called) == 1:
@@ -248,6 +243,16 @@ def find_thing(world: WorldModel, words: str) -> Place | None:
         words=words,
         meanings=[each.id for each in called],
     )
+
+
+def find_things(world: WorldModel, words: str) -> list[RememberedThing]:
+    """Return all things that are called so: "ladder", or "ladder in R2"."""
+    label, room_id = split_room(world, words)
+    return [
+        each
+        for each in world.recollection.find_called(label)
+        if room_id is None or room_id in world.rooms_before(each)
+    ]
 
 
 def place_of(world: WorldModel, remembered: RememberedThing, *, name: str | None = None) -> Place:

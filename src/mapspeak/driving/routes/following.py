@@ -13,24 +13,17 @@ import anyio
 from mapspeak.driving.drive import OnProgress
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.exploration import TripContext
-from mapspeak.driving.routes.planning import RoutePlan, StopCandidate, plan_route
+from mapspeak.driving.routes.planning import RoutePlan, StopState, plan_route
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Pose
 from mapspeak.places.goalcheck import GoalCheck, check_goal
+from mapspeak.places.relations.choosing import CheckedGoal
 from mapspeak.places.standing import arrival_pose
 from mapspeak.robot import GoalState, GoalStatus, PoseDoubt
 from mapspeak.worldmodel.model import WorldModel
 
 SLACK_S = 0.01
 ENDED_ELSEWHERE = (GoalState.CANCELLED, GoalState.PREEMPTED)
-
-
-class StopState(StrEnum):
-    """How it stands with one stop."""
-
-    AHEAD = "ahead"
-    DONE = "done"
-    SKIPPED = "skipped"
 
 
 class RouteState(StrEnum):
@@ -51,33 +44,12 @@ class WhenBlocked(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RouteStop:
-    """One stop of a route.
-
-    Attributes:
-        goal: What it is taken for.
-        leg_m: The path to it from the stop before, as planned.
-        state: How it stands.
-        obstacle: Why it was left out, or could not be reached yet: the check of its pose, or how
-            the drive there ended.
-    """
-
-    goal: StopCandidate
-    leg_m: float
-    state: StopState = StopState.AHEAD
-    obstacle: GoalCheck | GoalStatus | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class RouteProgress:
     """How a route stands.
 
     Attributes:
-        state: At the end of the call.
-        plan: The route as planned.
-        stops: All of them.
-        pose: Where the robot is.
-        pose_doubt: Why it may be elsewhere.
+        plan: The route as planned, and how it stands with each stop.
+        pose_doubt: Why the robot may be elsewhere.
         left_m: Of the path to the stop under way; None where none is.
         number: The stop that the robot stands at, or that the call ended for; counted from 0.
         is_pausing: The call ended while the robot stood at a stop as long as was asked for.
@@ -86,7 +58,6 @@ class RouteProgress:
 
     state: RouteState
     plan: RoutePlan
-    stops: tuple[RouteStop, ...]
     pose: Pose
     pose_doubt: PoseDoubt | None
     left_m: float | None = None
@@ -104,8 +75,7 @@ class RouteBook:
 
     def __init__(self, site: TripContext) -> None:
         self._site = site
-        self._plan: RoutePlan | None = None
-        self._stops: list[RouteStop] = []
+        self._plan = RoutePlan(stops=(), greedy_m=0.0)
         self._goal_id: str | None = None
         self._pause_until_s: float | None = None
         self._pause_s = 0.0
@@ -128,10 +98,6 @@ class RouteBook:
         async with self._advancing:
             await self._give_up()
             self._plan = plan
-            self._stops = [
-                RouteStop(goal=goal, leg_m=leg_m)
-                for goal, leg_m in zip(plan.chosen, plan.legs_m, strict=True)
-            ]
             self._pause_s, self._is_looking, self._pause_until_s = pause_s, is_looking, None
 
     async def advance(
@@ -151,7 +117,7 @@ class RouteBook:
             GoalError: There is no route, or the robot was stopped while a goal was being checked.
             PolicyError: The robot must not drive now, or not there.
         """
-        if self._plan is None:
+        if not self._plan.stops:
             raise GoalError(
                 "There is no route to go on with.",
                 hint="Begin one with its stops.",
@@ -184,12 +150,12 @@ class RouteBook:
                 self._goal_id = None
 
     def _find_next(self) -> int | None:
-        ahead = (n for n, stop in enumerate(self._stops) if stop.state is StopState.AHEAD)
+        ahead = (n for n, stop in enumerate(self._plan.stops) if stop.state is StopState.AHEAD)
         return next(ahead, None)
 
     async def _set_out(self, number: int, client: str) -> GoalCheck | None:
         """Start the drive to a stop; return the check of its pose where it cannot be driven to."""
-        goal, drives = self._stops[number].goal, self._site.drives
+        goal, drives = self._plan.stops[number].goal, self._site.drives
         with drives.preparing() as ticket:
             world = await self._site.fetch_world_model()
             pose, check = await self._site.compute(lambda: _check(world, goal))
@@ -248,7 +214,9 @@ class RouteBook:
     def _mark(
         self, number: int, state: StopState, obstacle: GoalCheck | GoalStatus | None = None
     ) -> None:
-        self._stops[number] = replace(self._stops[number], state=state, obstacle=obstacle)
+        stops = list(self._plan.stops)
+        stops[number] = replace(stops[number], state=state, obstacle=obstacle)
+        self._plan = replace(self._plan, stops=tuple(stops))
 
     async def _give_up(self) -> None:
         """End the drive of an older route, so that none of it goes on."""
@@ -266,7 +234,6 @@ class RouteBook:
         is_pausing: bool = False,
         ended: GoalStatus | None = None,
     ) -> RouteProgress:
-        assert self._plan is not None  # noqa: S101 - only a route that was begun is told of
         if report is not None:
             pose, doubt = report.pose, report.pose_doubt
         else:
@@ -275,7 +242,6 @@ class RouteBook:
         return RouteProgress(
             state=state,
             plan=self._plan,
-            stops=tuple(self._stops),
             pose=pose,
             pose_doubt=doubt,
             left_m=None if report is None else report.status.distance_left_m,
@@ -285,7 +251,7 @@ class RouteBook:
         )
 
 
-def _check(world: WorldModel, goal: StopCandidate) -> tuple[Pose, GoalCheck]:
+def _check(world: WorldModel, goal: CheckedGoal) -> tuple[Pose, GoalCheck]:
     """Return the pose for a stop as the robot comes to it from where it is, and judge it."""
     pose = arrival_pose(world, goal.pose.point) if goal.comes_straight_on else goal.pose
     return pose, check_goal(world.grid, world.distances, pose)

@@ -3,13 +3,15 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 
 from mapspeak.errors import GoalError, NextStep
-from mapspeak.geometry import Point, Pose
-from mapspeak.places.goalcheck import say_refusal
+from mapspeak.geometry import Point
+from mapspeak.places.goalcheck import GoalCheck, say_refusal
 from mapspeak.places.naming import AmbiguousPlaceError, Place
 from mapspeak.places.relations import Nearest, find_all_near, parse_relation
 from mapspeak.places.relations.choosing import CheckedGoal, check_place, find_place
+from mapspeak.robot import GoalStatus
 from mapspeak.spatial.paths import DistanceField
 from mapspeak.worldmodel.model import WorldModel
 
@@ -20,25 +22,7 @@ SAME_SAID_RATIO = 0.9
 """What says so nearly as much of them as the best may be meant too."""
 
 
-@dataclass(frozen=True, slots=True)
-class StopCandidate:
-    """One thing that a stop may mean, where the robot can stand.
-
-    Attributes:
-        name: Such as "W3".
-        pose: Where to stand.
-        title: The name with the reason, where words had to be read for it.
-        comes_straight_on: Nobody asked for a heading: it is that of the way from where the robot
-            will be, and not of the way from where it was when the route was planned.
-    """
-
-    name: str
-    pose: Pose
-    title: str
-    comes_straight_on: bool = False
-
-
-def find_candidates(world: WorldModel, words: str) -> tuple[StopCandidate, ...]:
+def find_candidates(world: WorldModel, words: str) -> tuple[CheckedGoal, ...]:
     """Find all that words may mean and the robot can get to.
 
     Raises:
@@ -52,12 +36,8 @@ def find_candidates(world: WorldModel, words: str) -> tuple[StopCandidate, ...]:
             hint="Leave this stop out.",
             step=NextStep.CHECK_NEAR,
         )
-    unique = {(goal.pose.x, goal.pose.y): _candidate_of(goal) for goal in reversed(good)}
+    unique = {goal.pose.point: goal for goal in reversed(good)}
     return tuple(reversed(unique.values()))[:MOST_CANDIDATES]
-
-
-def _candidate_of(goal: CheckedGoal) -> StopCandidate:
-    return StopCandidate(goal.name, goal.pose, goal.title, goal.comes_straight_on)
 
 
 def _find_places(world: WorldModel, words: str) -> list[Place]:
@@ -106,28 +86,51 @@ def _find_remembered(world: WorldModel, words: str) -> Iterator[Place]:
 MOST_STOPS = 20
 
 
+class StopState(StrEnum):
+    """How it stands with one stop."""
+
+    AHEAD = "ahead"
+    DONE = "done"
+    SKIPPED = "skipped"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RouteStop:
+    """One stop of a route.
+
+    Attributes:
+        asked: The words for it.
+        goal: What it is taken for.
+        n_candidates: Among how many.
+        leg_m: The path to it from the stop before, the first from the robot, as planned.
+        obstacle: Why it was left out, or could not be reached yet: the check of its pose, or how
+            the drive there ended.
+    """
+
+    asked: str
+    goal: CheckedGoal
+    n_candidates: int
+    leg_m: float
+    state: StopState = StopState.AHEAD
+    obstacle: GoalCheck | GoalStatus | None = None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RoutePlan:
     """A route as a whole.
 
     Attributes:
-        stops: The words for each stop, in their order.
-        chosen: What each of them is taken for.
-        n_candidates: Among how many.
-        legs_m: The path to each from the one before, the first from the robot.
+        stops: In their order.
         greedy_m: The whole length if the nearest candidate were taken each time.
     """
 
-    stops: tuple[str, ...]
-    chosen: tuple[StopCandidate, ...]
-    n_candidates: tuple[int, ...]
-    legs_m: tuple[float, ...]
+    stops: tuple[RouteStop, ...]
     greedy_m: float
 
     @property
     def total_m(self) -> float:
         """The whole length by path."""
-        return math.fsum(self.legs_m)
+        return math.fsum(stop.leg_m for stop in self.stops)
 
 
 def plan_route(world: WorldModel, stops: Sequence[str]) -> RoutePlan:
@@ -142,33 +145,9 @@ def plan_route(world: WorldModel, stops: Sequence[str]) -> RoutePlan:
             f"A route has 1 to {MOST_STOPS} stops; this one has {len(stops)}.",
             hint="Give the stops in order, as ids, names or phrases.",
         )
-    return plan_among(
-        world, stops, [_find(world, number, stop) for number, stop in enumerate(stops)]
-    )
-
-
-def _find(world: WorldModel, number: int, stop: str) -> tuple[StopCandidate, ...]:
-    try:
-        return find_candidates(world, stop)
-    except GoalError as error:
-        raise GoalError(
-            f"Stop {number + 1}: {error.message}",
-            hint=error.hint,
-            step=error.step,
-            about=error.about,
-        ) from error
-
-
-def plan_among(
-    world: WorldModel, stops: Sequence[str], choices: Sequence[tuple[StopCandidate, ...]]
-) -> RoutePlan:
-    """Plan a route past stops whose candidates are known.
-
-    Raises:
-        GoalError: No way leads from one stop to the next.
-    """
+    choices = [_find(world, number, words) for number, words in enumerate(stops)]
     legs_m = _Legs(world)
-    best: list[tuple[float, tuple[StopCandidate, ...]]] = [(0.0, ())]
+    best: list[tuple[float, tuple[CheckedGoal, ...]]] = [(0.0, ())]
     for number, candidates in enumerate(choices):
         best = [
             min(
@@ -180,22 +159,36 @@ def plan_among(
         if all(math.isinf(spent_m) for spent_m, _ in best):
             raise GoalError(
                 f"No way leads from stop {number} to stop {number + 1}, {stops[number]}.",
-                hint="Call measure between the two, and leave one of them out.",
+                hint="Leave one of them out.",
+                step=NextStep.MEASURE_BETWEEN,
             )
     _, chosen = min(best, key=lambda found: found[0])
+    legs = zip(stops, chosen, choices, legs_m.along(chosen), strict=True)
     return RoutePlan(
-        stops=tuple(stops),
-        chosen=chosen,
-        n_candidates=tuple(len(candidates) for candidates in choices),
-        legs_m=legs_m.along(chosen),
+        stops=tuple(
+            RouteStop(asked=words, goal=goal, n_candidates=len(candidates), leg_m=leg_m)
+            for words, goal, candidates, leg_m in legs
+        ),
         greedy_m=math.fsum(legs_m.along(_choose_greedily(legs_m, choices))),
     )
 
 
+def _find(world: WorldModel, number: int, words: str) -> tuple[CheckedGoal, ...]:
+    try:
+        return find_candidates(world, words)
+    except GoalError as error:
+        raise GoalError(
+            f"Stop {number + 1}: {error.message}",
+            hint=error.hint,
+            step=error.step,
+            about=error.about,
+        ) from error
+
+
 def _choose_greedily(
-    legs_m: "_Legs", choices: Sequence[tuple[StopCandidate, ...]]
-) -> tuple[StopCandidate, ...]:
-    way: tuple[StopCandidate, ...] = ()
+    legs_m: "_Legs", choices: Sequence[tuple[CheckedGoal, ...]]
+) -> tuple[CheckedGoal, ...]:
+    way: tuple[CheckedGoal, ...] = ()
     for candidates in choices:
         here = way
         way = (*way, min(candidates, key=lambda each: legs_m.between(here, each)))
@@ -209,16 +202,16 @@ class _Legs:
         self._world = world
         self._fields: dict[Point, DistanceField] = {}
 
-    def between(self, way: tuple[StopCandidate, ...], goal: StopCandidate) -> float:
+    def between(self, way: tuple[CheckedGoal, ...], goal: CheckedGoal) -> float:
         """Return the metres from the end of a way, the robot where it is empty, to a candidate."""
         found_m = self._field(way).distance_to(goal.pose.point)
         return math.inf if found_m is None else found_m
 
-    def along(self, way: tuple[StopCandidate, ...]) -> tuple[float, ...]:
+    def along(self, way: tuple[CheckedGoal, ...]) -> tuple[float, ...]:
         """Return the metres of each leg."""
         return tuple(self.between(way[:n], each) for n, each in enumerate(way))
 
-    def _field(self, way: tuple[StopCandidate, ...]) -> DistanceField:
+    def _field(self, way: tuple[CheckedGoal, ...]) -> DistanceField:
         if not way:
             return self._world.distances
         start = way[-1].pose.point

@@ -1,90 +1,208 @@
-"""From a request in words to candidates with their evidence, their place and a checked goal."""
+"""From a request in words to what is remembered of it: where, how sure, and where to stand."""
 
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import datetime
+from enum import StrEnum
 from heapq import heapify, heappop, heappush
 from itertools import islice
 
-from mapspeak.geometry import Point
+from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark
+from mapspeak.memory.consistency import Trust
 from mapspeak.memory.search import Answer, Basis, EntryCandidate, EntryKind, Verdict
-from mapspeak.places.goalcheck import judge_goal
+from mapspeak.places.goalcheck import GoalCheck, judge_goal
 from mapspeak.places.naming import Place, split_room
-from mapspeak.places.recall.answer import (
-    Recall,
-    RecallCandidate,
-    RecallQuery,
-    find_doubt,
-)
 from mapspeak.places.relations.choosing import stand_at
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import Remembered, RememberedPlace, RememberedThing
 
+NEAR_M = 5.0
 
-def find_passing(world: WorldModel, query: RecallQuery) -> Iterator[Remembered]:
-    """Return the places, then the things, that pass every filter of a request."""
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecallQuery:
+    """What is looked for among what passes every filter that is given.
+
+    Attributes:
+        words: What people say: a name, a thing, what it is for, what is the matter.
+        near: Not farther than `near_m` from this point, straight.
+        room_id: In this room or corridor.
+        since: Last seen at this moment or later.
+        until: Last seen before.
+        n: How many candidates, at most.
+    """
+
+    words: str
+    near: Point | None = None
+    near_m: float = NEAR_M
+    room_id: str | None = None
+    since: datetime | None = None
+    until: datetime | None = None
+    kind: EntryKind | None = None
+    n: int = 5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecallCandidate:
+    """A place or a thing that may be meant.
+
+    Attributes:
+        id: "T1" or "W1": a goal for the robot.
+        match: How it matches the request; None where nothing was asked.
+        away_m: From the point that the request is near to, straight; None where it has none.
+        seen_from: Ids of the places that it was seen from; of a place, its own.
+        pictures: That it was seen in, by their relative names.
+        position: Where it is; None where nobody noted a direction.
+        uncertainty_m: The radius around that which holds it with 90 %; None without a position,
+            and for a place.
+        room_ids: The rooms it may be in.
+        pose: Where the robot would stand: of a thing, near it and facing it where it can.
+        is_faced: True when it would stand near it and face it.
+        faced_ratio: The share of where a thing may be that it would face there.
+        last_seen: By the calendar; None where nobody noted it.
+    """
+
+    id: str
+    kind: EntryKind
+    name: str
+    match: EntryCandidate | None
+    away_m: float | None
+    seen_from: tuple[str, ...]
+    pictures: tuple[str, ...]
+    position: Point | None
+    uncertainty_m: float | None
+    room_ids: tuple[str, ...]
+    pose: Pose
+    is_faced: bool
+    faced_ratio: float
+    check: GoalCheck
+    last_seen: datetime | None
+    trust: Trust
+
+
+class RecallDoubt(StrEnum):
+    """Why what was found may still be wrong."""
+
+    DOUBTFUL_RECORD = "doubtful_record"
+    NOT_NOTED = "not_noted"
+    CONTRADICTED = "contradicted"
+    FEW_VIEWS = "few_views"
+    IMPRECISE = "imprecise"
+    OTHER_ROOM = "other_room"
+    OUT_OF_SIGHT = "out_of_sight"
+    HARDLY_IN_SIGHT = "hardly_in_sight"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recall:
+    """What is remembered of a request.
+
+    Attributes:
+        query: The request; a room that its words named is a filter.
+        answer: What the search found among all that passes the filters.
+        candidates: The likeliest first; of equally likely ones the nearest by path. Where nothing
+            is remembered they are the nearest in meaning, and probably none is meant.
+        n_searched: How many places and things pass the filters.
+        is_empty: Nothing is remembered at all.
+        doubt: Why the first candidate may still be wrong; None where nothing speaks for that.
+    """
+
+    query: RecallQuery
+    answer: Answer
+    candidates: tuple[RecallCandidate, ...]
+    n_searched: int
+    is_empty: bool
+    doubt: RecallDoubt | None
+
+    @property
+    def verdict(self) -> Verdict:
+        """How far the first candidate may be taken for what is meant."""
+        return Verdict.LIKELY if self.doubt else self.answer.verdict
+
+
+MOST_TIED = 30
+"""So many equally likely ones are sorted by their way; of more, the first by their ids."""
+
+
+def recall(world: WorldModel, query: RecallQuery) -> Recall:
+    """Return what is remembered of a request; the same for the same memory, map and pose."""
+    if query.room_id is None:
+        words, room_id = split_room(world, query.words)
+        query = replace(query, words=words, room_id=room_id)
     everything: list[Remembered] = [*world.recollection.places, *world.things]
-    return (each for each in everything if _passes(world, each, query))
+    passing = {each.id: each for each in everything if _passes(world, each, query)}
+    among = frozenset(passing)
+    answer = world.recollection.find(query.words, among=among, limit=max(query.n, MOST_TIED))
+    is_tied = 1 < answer.n_meant <= MOST_TIED
+    best = _find_best_known(world, answer, passing, query.room_id) if is_tied else None
+    if best is not None:
+        answer = replace(answer, verdict=Verdict.FOUND)
+    ranked = _rank(world, answer.candidates, passing, best=best, is_tied=is_tied)
+    candidates = tuple(
+        describe_candidate(world, passing[each.entry.id], match=each, near=query.near)
+        for each in islice(ranked, query.n)
+    )
+    is_found = answer.verdict is Verdict.FOUND
+    return Recall(
+        query=query,
+        answer=answer,
+        candidates=candidates,
+        n_searched=len(among),
+        is_empty=not (world.recollection.places or world.things),
+        doubt=find_doubt(candidates[0], room_id=query.room_id) if is_found else None,
+    )
 
 
-def kind_of(remembered: Remembered) -> EntryKind:
-    """Say whether it is a place or a thing."""
+def _passes(world: WorldModel, remembered: Remembered, query: RecallQuery) -> bool:
+    if query.kind not in (None, _kind_of(remembered)):
+        return False
+    if query.near is not None and _point_of(remembered).distance_to(query.near) > query.near_m:
+        return False
+    if query.since is not None or query.until is not None:
+        seen_at = last_seen(world, remembered)
+        if seen_at is None or (query.since is not None and seen_at < query.since):
+            return False
+        if query.until is not None and seen_at >= query.until:
+            return False
+    return query.room_id is None or query.room_id in _find_rooms(world, remembered)
+
+
+def _kind_of(remembered: Remembered) -> EntryKind:
     return EntryKind.PLACE if isinstance(remembered, RememberedPlace) else EntryKind.THING
 
 
-def point_of(remembered: Remembered) -> Point:
+def _point_of(remembered: Remembered) -> Point:
     """Return where it is; of a thing without a position, where it was seen from."""
     if isinstance(remembered, RememberedPlace):
         return remembered.waypoint.pose.point
     return remembered.point
 
 
-def find_rooms(world: WorldModel, remembered: Remembered) -> tuple[str, ...]:
+def _find_rooms(world: WorldModel, remembered: Remembered) -> tuple[str, ...]:
     """Return the rooms it may be in, by id."""
-    if isinstance(remembered, RememberedPlace):
-        room_id = world.find_room_id(point_of(remembered))
-        return () if room_id is None else (room_id,)
-    return world.rooms_before(remembered)
+    if isinstance(remembered, RememberedThing):
+        return world.rooms_before(remembered)
+    room_id = world.find_room_id(remembered.waypoint.pose.point)
+    return () if room_id is None else (room_id,)
 
 
 def last_seen(world: WorldModel, remembered: Remembered) -> datetime | None:
     """Return when it was seen last, by the calendar; None where nobody noted it."""
     if isinstance(remembered, RememberedPlace):
         return remembered.waypoint.recorded_at
-    times = (view.recorded_at for _, view in list_views(world, remembered))
+    times = (view.recorded_at for _, view in _list_views(world, remembered))
     return max(filter(None, times), default=None)
 
 
-def list_views(
-    world: WorldModel, remembered: Remembered
-) -> Iterator[tuple[RememberedPlace, Landmark]]:
-    """Return what was seen of a thing, each with its time and picture, and from where."""
-    if isinstance(remembered, RememberedPlace):
-        return
-    for view in remembered.thing.supporting:
+def _list_views(world: WorldModel, thing: RememberedThing) -> Iterator[tuple[str, Landmark]]:
+    """Return what was seen of a thing, each with its time and picture, and from which place."""
+    for view in thing.thing.supporting:
         place = world.recollection.find_place(view.waypoint)
         if place is not None:
-            yield place, place.waypoint.dated(view.landmark)
-
-
-def _passes(world: WorldModel, remembered: Remembered, query: RecallQuery) -> bool:
-    if query.kind not in (None, kind_of(remembered)):
-        return False
-    if query.near is not None and point_of(remembered).distance_to(query.near) > query.near_m:
-        return False
-    if query.since is not None or query.until is not None:
-        seen_at = last_seen(world, remembered)
-        if seen_at is None or not _is_between(seen_at, query):
-            return False
-    return query.room_id is None or query.room_id in find_rooms(world, remembered)
-
-
-def _is_between(moment: datetime, query: RecallQuery) -> bool:
-    is_late = query.since is None or moment >= query.since
-    return is_late and (query.until is None or moment < query.until)
+            yield place.id, place.waypoint.dated(view.landmark)
 
 
 def describe_candidate(
@@ -102,65 +220,70 @@ def describe_candidate(
         match: How it matches a request; None where nothing was asked.
         near: The point that the request is near to.
     """
+    position: Point | None
     if isinstance(remembered, RememberedPlace):
-        return _describe_place(world, remembered, match, near)
-    return _describe_thing(world, remembered, match, near)
-
-
-def _describe_place(
-    world: WorldModel, remembered: RememberedPlace, match: EntryCandidate | None, near: Point | None
-) -> RecallCandidate:
-    waypoint = remembered.waypoint
+        waypoint = remembered.waypoint
+        name, position, uncertainty_m = waypoint.name, waypoint.pose.point, None
+        seen_from, pictures = [remembered.id], [waypoint.picture]
+        is_faced, faced_ratio = False, 0.0
+        trust = world.judge.judge_place(remembered)
+    else:
+        thing, views = remembered.thing, list(_list_views(world, remembered))
+        name, position, uncertainty_m = thing.label, thing.position, thing.uncertainty_m
+        seen_from, pictures = [each for each, _ in views], [view.picture for _, view in views]
+        is_faced = world.find_approach(remembered) is not None
+        faced_ratio = world.measure_faced(remembered)
+        trust = world.judge.judge_thing(remembered)
     pose = stand_at(world, Place(remembered.id, remembered))
-    check = judge_goal(world.grid, world.distances, pose, opened=world.map.open.distances_from)
     return RecallCandidate(
         id=remembered.id,
-        kind=EntryKind.PLACE,
-        name=waypoint.name,
-        score_ratio=1.0 if match is None else match.score_ratio,
+        kind=_kind_of(remembered),
+        name=name,
         match=match,
-        away_m=None if near is None else point_of(remembered).distance_to(near),
-        seen_from=(remembered.id,),
-        pictures=() if waypoint.picture is None else (waypoint.picture,),
-        position=waypoint.pose.point,
-        uncertainty_m=None,
-        room_ids=find_rooms(world, remembered),
-        pose=pose,
-        is_faced=False,
-        faced_ratio=0.0,
-        check=check,
-        last_seen=last_seen(world, remembered),
-        trust=world.judge.judge_place(remembered),
-    )
-
-
-def _describe_thing(
-    world: WorldModel, remembered: RememberedThing, match: EntryCandidate | None, near: Point | None
-) -> RecallCandidate:
-    thing = remembered.thing
-    pose = stand_at(world, Place(remembered.id, remembered))
-    check = judge_goal(world.grid, world.distances, pose, opened=world.map.open.distances_from)
-    views = list(list_views(world, remembered))
-    pictures = (view.picture for _, view in views)
-    return RecallCandidate(
-        id=remembered.id,
-        kind=EntryKind.THING,
-        name=thing.label,
-        score_ratio=1.0 if match is None else match.score_ratio,
-        match=match,
-        away_m=None if near is None else point_of(remembered).distance_to(near),
-        seen_from=tuple(dict.fromkeys(place.id for place, _ in views)),
+        away_m=None if near is None else _point_of(remembered).distance_to(near),
+        seen_from=tuple(dict.fromkeys(seen_from)),
         pictures=tuple(dict.fromkeys(filter(None, pictures))),
-        position=thing.position,
-        uncertainty_m=thing.uncertainty_m,
-        room_ids=find_rooms(world, remembered),
+        position=position,
+        uncertainty_m=uncertainty_m,
+        room_ids=_find_rooms(world, remembered),
         pose=pose,
-        is_faced=world.find_approach(remembered) is not None,
-        faced_ratio=world.measure_faced(remembered),
-        check=check,
+        is_faced=is_faced,
+        faced_ratio=faced_ratio,
+        check=judge_goal(world.grid, world.distances, pose, opened=world.map.open.distances_from),
         last_seen=last_seen(world, remembered),
-        trust=world.judge.judge_thing(remembered),
+        trust=trust,
     )
+
+
+SURE_RATIO = 0.98
+"""A thing that two good views agree on is surer than that, and one view alone is not."""
+DOUBTFUL_RATIO = 0.5
+LARGEST_OFF_M = 1.2
+"""A thing whose place is known no better is not sure to be ahead of who goes there."""
+LEAST_FACED_RATIO = 0.3
+"""Of where a thing may be, less than that ahead is too little to promise that it will be faced."""
+
+
+def find_doubt(first: RecallCandidate, *, room_id: str | None) -> RecallDoubt | None:
+    """Return why what was found may still be wrong; None where nothing speaks for that.
+
+    Args:
+        first: The only one that is meant.
+        room_id: Where it was asked for.
+    """
+    if first.kind is EntryKind.PLACE:
+        return RecallDoubt.DOUBTFUL_RECORD if first.trust.ratio < DOUBTFUL_RATIO else None
+    if first.position is None or first.uncertainty_m is None:
+        return RecallDoubt.NOT_NOTED
+    doubts = {
+        RecallDoubt.CONTRADICTED: first.trust.ratio < DOUBTFUL_RATIO,
+        RecallDoubt.FEW_VIEWS: first.trust.ratio < SURE_RATIO,
+        RecallDoubt.IMPRECISE: first.uncertainty_m > LARGEST_OFF_M,
+        RecallDoubt.OTHER_ROOM: room_id is not None and set(first.room_ids) != {room_id},
+        RecallDoubt.OUT_OF_SIGHT: first.check.is_ok and not first.is_faced,
+        RecallDoubt.HARDLY_IN_SIGHT: first.check.is_ok and first.faced_ratio < LEAST_FACED_RATIO,
+    }
+    return next((doubt for doubt, is_so in doubts.items() if is_so), None)
 
 
 LEAST_VIEWS = 3
@@ -169,88 +292,31 @@ APART_M = 2.0
 """Of things of one name that stand nearer to each other, views may have been mixed up."""
 
 
-def find_best_known(
-    world: WorldModel, meant: Sequence[Remembered], *, room_id: str | None
-) -> RememberedThing | None:
+def _find_best_known(
+    world: WorldModel, answer: Answer, passing: Mapping[str, Remembered], room_id: str | None
+) -> str | None:
     """Find the one thing that views from three places agree on, with no other of its name near.
 
-    Args:
-        world: The map with the memory.
-        meant: Of one name.
-        room_id: Where it was asked for.
-
     Returns:
-        None where there is none, or several, or where anything else speaks against it.
+        Its id; None where there is none, or several, or where anything else speaks against it.
     """
-    things = [each for each in meant if isinstance(each, RememberedThing)]
+    meant = answer.candidates[: answer.n_meant]
+    named = [passing[each.entry.id] for each in meant if each.basis is Basis.NAME]
+    things = [each for each in named if isinstance(each, RememberedThing)]
     if len(things) < len(meant):
         return None
-    known = (each for each in things if each.thing.n_agreeing >= LEAST_VIEWS)
     sure = (
-        each for each in known if not find_doubt(describe_candidate(world, each), room_id=room_id)
+        each
+        for each in things
+        if each.thing.n_agreeing >= LEAST_VIEWS
+        and not find_doubt(describe_candidate(world, each), room_id=room_id)
     )
     # To describe one costs much, and with a second one it is settled.
     best, second = next(sure, None), next(sure, None)
     if best is None or second is not None:
         return None
     near = [each for each in things if each.point.distance_to(best.point) < APART_M]
-    return best if near == [best] else None
-
-
-MOST_TIED = 30
-"""So many equally likely ones are sorted by their way; of more, the first by their ids."""
-
-
-def recall(world: WorldModel, query: RecallQuery) -> Recall:
-    """Return what is remembered of a request; the same for the same memory, map and pose."""
-    query = _with_room(world, query)
-    passing = {each.id: each for each in find_passing(world, query)}
-    among = frozenset(passing)
-    answer = world.recollection.find(query.words, among=among, limit=max(query.n, MOST_TIED))
-    is_tied = 1 < answer.n_meant <= MOST_TIED
-    best = _find_best(world, answer, passing, room_id=query.room_id) if is_tied else None
-    if best is not None:
-        answer = replace(answer, verdict=Verdict.FOUND)
-    ranked = _rank(world, answer.candidates, passing, best=best, is_tied=is_tied)
-    candidates = tuple(
-        describe_candidate(
-            world,
-            passing[each.entry.id],
-            match=each,
-            near=query.near,
-        )
-        for each in islice(ranked, query.n)
-    )
-    doubt = None
-    if answer.verdict is Verdict.FOUND:
-        doubt = find_doubt(candidates[0], room_id=query.room_id)
-    return Recall(
-        query=query,
-        answer=answer,
-        candidates=candidates,
-        n_searched=len(among),
-        is_empty=not (world.recollection.places or world.things),
-        doubt=doubt,
-    )
-
-
-def _find_best(
-    world: WorldModel, answer: Answer, passing: Mapping[str, Remembered], *, room_id: str | None
-) -> str | None:
-    """Return the id of the one that is known best of all that are called so; None where none is."""
-    meant = answer.candidates[: answer.n_meant]
-    if any(each.basis is not Basis.NAME for each in meant):
-        return None
-    best = find_best_known(world, [passing[each.entry.id] for each in meant], room_id=room_id)
-    return None if best is None else best.id
-
-
-def _with_room(world: WorldModel, query: RecallQuery) -> RecallQuery:
-    """Take the room out of words such as "ladder in R2", so that it is a filter."""
-    if query.room_id is not None:
-        return query
-    words, room_id = split_room(world, query.words)
-    return replace(query, words=words, room_id=room_id)
+    return best.id if near == [best] else None
 
 
 def find_speaking_places(
@@ -285,34 +351,25 @@ def _rank(
         best: The id of the one that comes first whatever its likeness and way.
         is_tied: Several are called what was asked for.
     """
-    n_alike = Counter(map(_likeness, found))
+    likeness = [round(each.score_ratio, 3) for each in found]
+    n_alike = Counter(likeness)
     queue: list[tuple[bool, float, float, int, bool, int]] = []
     for i, each in enumerate(found):
-        needs_way = is_tied if each.basis is Basis.NAME else n_alike[_likeness(each)] > 1
-        least_m = _find_least_m(world, passing[each.entry.id]) if needs_way else math.inf
+        needs_way = is_tied if each.basis is Basis.NAME else n_alike[likeness[i]] > 1
+        remembered, least_m = passing[each.entry.id], math.inf
+        if needs_way:
+            least_m = 0.0
+            if isinstance(remembered, RememberedThing):
+                least_m = world.find_least_path_m(remembered)
         number = int(each.entry.id[1:])
-        queue.append((each.entry.id != best, -_likeness(each), least_m, number, needs_way, i))
+        queue.append((each.entry.id != best, -likeness[i], least_m, number, needs_way, i))
     heapify(queue)
     while queue:
         is_other, unlikeness, _, number, needs_way, i = heappop(queue)
         if not needs_way:
             yield found[i]
             continue
-        way_m = _find_way_m(world, passing[found[i].entry.id])
-        heappush(queue, (is_other, unlikeness, way_m, number, False, i))
-
-
-def _find_least_m(world: WorldModel, remembered: Remembered) -> float:
-    if isinstance(remembered, RememberedThing):
-        return world.find_least_path_m(remembered)
-    return 0.0
-
-
-def _find_way_m(world: WorldModel, remembered: Remembered) -> float:
-    way_m = world.path_m(stand_at(world, Place(remembered.id, remembered)).point)
-    return math.inf if way_m is None else way_m
-
-
-def _likeness(found: EntryCandidate) -> float:
-    """Return how alike a candidate is, as far as that tells two of them apart."""
-    return round(found.score_ratio, 3)
+        remembered = passing[found[i].entry.id]
+        way_m = world.path_m(stand_at(world, Place(remembered.id, remembered)).point)
+        far_m = math.inf if way_m is None else way_m
+        heappush(queue, (is_other, unlikeness, far_m, number, False, i))

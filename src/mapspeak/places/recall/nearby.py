@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from mapspeak.places.naming import no_such_place, split_room
+from mapspeak.places.naming import find_things, no_such_place
 from mapspeak.places.recall.asking import last_seen
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedThing
@@ -52,25 +52,21 @@ def find_nearby(
         for each in world.things
         if each.id != first.id and each.thing.position is not None
     ]
-    nearest = [
+    nearest = tuple(
         (each, away_m)
         for each, away_m in sorted(away, key=lambda pair: pair[1])
         if (radius_m is None or away_m <= radius_m)
         and (room_id is None or room_id in world.rooms_before(each))
-    ]
-    return Nearby(thing=first, others=tuple(others), nearest=tuple(nearest))
+    )
+    return Nearby(thing=first, others=tuple(others), nearest=nearest)
 
 
 def _find_called(world: WorldModel, words: str) -> list[RememberedThing]:
+    """Return the things of a name or an id, those seen last first."""
     if THING_ID.fullmatch(words):
         found = world.recollection.find_thing(words.upper())
         if found is None:
             raise no_such_place(world, words)
         return [found]
-    label, room_id = split_room(world, words)
-    called = [
-        each
-        for each in world.recollection.find_called(label)
-        if room_id is None or room_id in world.rooms_before(each)
-    ]
+    called = find_things(world, words)
     return sorted(called, key=lambda each: last_seen(world, each) or NEVER, reverse=True)

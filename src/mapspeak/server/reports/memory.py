@@ -12,7 +12,7 @@ from mapspeak.memory.episodes import EpisodeQuery, EpisodeStore, Observation, Ob
 from mapspeak.memory.quoting import quote_name
 from mapspeak.memory.search import EntryKind, Verdict, calls_by_name
 from mapspeak.places.goalcheck import say_check
-from mapspeak.places.recall import Recall, RecallCandidate, RecallQuery
+from mapspeak.places.recall.asking import Recall, RecallCandidate, RecallQuery
 from mapspeak.server.reports.robot import PoseReport, Report
 from mapspeak.server.text.findings import say_trust
 from mapspeak.server.text.memory import say_age
@@ -125,7 +125,7 @@ class CandidateReport(Report):
             id=candidate.id,
             name=candidate.name,
             kind=candidate.kind,
-            score=round(candidate.score_ratio, 2),
+            score=1.0 if candidate.match is None else round(candidate.match.score_ratio, 2),
             why=say_evidence(candidate, near=near),
             seen_from=list(candidate.seen_from),
             pictures=list(candidate.pictures),

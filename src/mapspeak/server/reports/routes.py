@@ -4,7 +4,8 @@ from typing import Self
 
 from pydantic import Field
 
-from mapspeak.driving.routes import RoutePlan, RouteProgress, RouteState, RouteStop, StopState
+from mapspeak.driving.routes.following import RouteProgress, RouteState
+from mapspeak.driving.routes.planning import RoutePlan, RouteStop, StopState
 from mapspeak.server.reports.robot import PoseReport, Report
 from mapspeak.server.text.routes import say_obstacle, say_route
 from mapspeak.server.text.wording import say_pose_doubt
@@ -46,21 +47,20 @@ class RouteAnswer(Report):
     def of(cls, progress: RouteProgress) -> Self:
         """Make the report of a route."""
         plan = progress.plan
-        stops = [*zip(progress.stops, plan.stops, strict=True)]
-        ahead = [each for each in stops if each[0].state is StopState.AHEAD]
+        ahead = [stop for stop in plan.stops if stop.state is StopState.AHEAD]
         return cls(
             state=progress.state,
             reason=say_route(progress),
-            done=[_say(stop, words) for stop, words in stops if stop.state is StopState.DONE],
+            done=[_say(stop) for stop in plan.stops if stop.state is StopState.DONE],
             skipped=[
-                f"{_say(stop, words)}: {say_obstacle(stop)}"
-                for stop, words in stops
+                f"{_say(stop)}: {say_obstacle(stop)}"
+                for stop in plan.stops
                 if stop.state is StopState.SKIPPED
             ],
-            next=_say_in_full(*ahead[0]) if ahead else "",
-            remaining=[_say(*each) for each in ahead[1:]],
+            next=_say_in_full(ahead[0]) if ahead else "",
+            remaining=[_say(stop) for stop in ahead[1:]],
             left_m=None if progress.left_m is None else round(progress.left_m, 1),
-            legs_m=[round(leg_m, 1) for leg_m in plan.legs_m],
+            legs_m=[round(stop.leg_m, 1) for stop in plan.stops],
             total_m=round(plan.total_m, 1),
             greedy_m=round(plan.greedy_m, 1) if _is_better(plan) else None,
             robot=PoseReport.of(progress.pose),
@@ -73,12 +73,12 @@ def _is_better(plan: RoutePlan) -> bool:
     return plan.greedy_m > plan.total_m + DETOUR_M
 
 
-def _say(stop: RouteStop, words: str) -> str:
+def _say(stop: RouteStop) -> str:
     """Return the words of a stop, with what they are taken for where that is something else."""
-    name, words = stop.goal.name, " ".join(words.split())
+    name, words = stop.goal.name, " ".join(stop.asked.split())
     is_point = name.startswith("(")
     return name if is_point or name.casefold() == words.casefold() else f"{words} ({name})"
 
 
-def _say_in_full(stop: RouteStop, words: str) -> str:
-    return stop.goal.title if stop.goal.title.startswith(words) else _say(stop, words)
+def _say_in_full(stop: RouteStop) -> str:
+    return stop.goal.title if stop.goal.title.startswith(stop.asked) else _say(stop)

@@ -7,6 +7,7 @@ STEPS = {
     NextStep.DRIVE_THERE: "{hint}; call navigate_to with it, or call look_at_map.",
     NextStep.SEE_PLACES: "{hint}. Call look_at_map to see them.",
     NextStep.MEASURE: "Call look_at_map, or measure, and name another place.",
+    NextStep.MEASURE_BETWEEN: "Call measure between the two, and leave one of them out.",
     NextStep.READ_MORE: "{hint}; find_place says more.",
     NextStep.LOOK_AROUND: "Call describe_place with {about}, then choose another place.",
     NextStep.LOOK_FROM: "Call navigate_to with {about} and look from there.",

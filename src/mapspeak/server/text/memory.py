@@ -11,7 +11,7 @@ from mapspeak.memory import Confidence, Landmark, Merge, Reunion, Waypoint
 from mapspeak.memory.consistency import MemoryFinding
 from mapspeak.memory.episodes import EpisodeMatch, EpisodePage
 from mapspeak.memory.quoting import quote, quote_name, tell_name
-from mapspeak.places.recall import Nearby
+from mapspeak.places.recall.nearby import Nearby
 from mapspeak.server.text.episodes import say_evidence
 from mapspeak.server.text.findings import say_finding, say_trust
 from mapspeak.server.text.wording import say_count, say_point, say_pose, shorten

@@ -7,7 +7,7 @@ from mapspeak.memory.quoting import name_key, quote
 from mapspeak.memory.search import Answer, Basis, EntryCandidate, MatchEvidence, Verdict
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import say_spot
-from mapspeak.places.recall import Recall, RecallCandidate, RecallDoubt
+from mapspeak.places.recall.asking import Recall, RecallCandidate, RecallDoubt
 
 LONGEST_QUOTE = 120
 DOUBTS = {

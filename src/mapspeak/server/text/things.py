@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from mapspeak.memory import Landmark
 from mapspeak.memory.consistency import Trust
 from mapspeak.memory.quoting import quote, tell_name
-from mapspeak.places.recall import SURE_RATIO, describe_candidate
+from mapspeak.places.recall.asking import SURE_RATIO, describe_candidate
 from mapspeak.server.text.findings import say_conflict, say_finding, say_support
 from mapspeak.server.text.wording import say_path, say_point, say_pose
 from mapspeak.spatial.rooms import Region

@@ -9,7 +9,7 @@ from mapspeak.errors import GoalError
 from mapspeak.geometry import Point
 from mapspeak.memory.search import EntryKind
 from mapspeak.places.naming import split_room
-from mapspeak.places.recall import RecallQuery, recall
+from mapspeak.places.recall.asking import RecallQuery, recall
 from mapspeak.places.relations.choosing import find_place
 from mapspeak.server.reports.memory import RecallAnswer, say_reported
 from mapspeak.server.text.maps import say_moved

@@ -19,7 +19,8 @@ from mapspeak.memory.episodes import (
 from mapspeak.memory.events import Effect as EventEffect
 from mapspeak.memory.events import is_name_of_robot
 from mapspeak.memory.things import name_the_same
-from mapspeak.places.recall import find_nearby, notices
+from mapspeak.places.recall import notices
+from mapspeak.places.recall.nearby import find_nearby
 from mapspeak.server.text.maps import say_moved, say_receipt
 from mapspeak.server.text.memory import (
     AHEAD,

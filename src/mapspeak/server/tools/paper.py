@@ -11,7 +11,7 @@ from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.memory import TakenPicture, Waypoint, WriteReceipt
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.places.naming import is_taken_name
-from mapspeak.places.recall import find_speaking_places
+from mapspeak.places.recall.asking import find_speaking_places
 from mapspeak.robot import PoseDoubt
 from mapspeak.server.mapview.drawing import say_axes, say_plain
 from mapspeak.server.reports.robot import MemoryAnswer, WriteAnswer

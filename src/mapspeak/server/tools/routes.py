@@ -7,7 +7,7 @@ from mcp.server.mcpserver import Context
 from mcp_types import CallToolResult, ImageContent, TextContent
 from pydantic import Field
 
-from mapspeak.driving.routes import RouteBook, RouteState, WhenBlocked
+from mapspeak.driving.routes.following import RouteBook, RouteState, WhenBlocked
 from mapspeak.safety import Errand, on_errand
 from mapspeak.server.reports.routes import RouteAnswer
 from mapspeak.server.text.wording import shorten

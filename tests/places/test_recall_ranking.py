@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import SemanticMap
-from mapspeak.places.recall import RecallCandidate, RecallQuery, recall
+from mapspeak.places.recall.asking import RecallCandidate, RecallQuery, recall
 from mapspeak.worldmodel.model import WorldModel
 from remembering import look
 

@@ -3,8 +3,7 @@
 from dataclasses import replace
 
 from mapspeak.places.goalcheck import GoalVerdict
-from mapspeak.places.recall import RecallDoubt, RecallQuery, recall
-from mapspeak.places.recall.answer import find_doubt
+from mapspeak.places.recall.asking import RecallDoubt, RecallQuery, find_doubt, recall
 from remembering import EXTINGUISHER, looks_at, world_of
 
 LOOKS = looks_at("fire extinguisher", EXTINGUISHER)
