@@ -19,6 +19,7 @@ PAPER_TOOLS = {
     "get_semantic_data",
 }
 MOST_BYTES = 12_000
+EVERYTHING = ("look", "places", "drive", "paper", "explore", "routes", "memory", "ros")
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -111,3 +112,23 @@ async def test_an_unknown_prompt_is_answered_with_those_there_are(
         with pytest.raises(MCPError, match="there are: exploration, semantic_policy") as raised:
             await client.get_prompt("explore")
     assert raised.value.error.code == INVALID_PARAMS
+
+
+@pytest.mark.parametrize("given", ["R1", '["R1"]', ["R1"]])
+async def test_a_list_is_also_taken_as_its_only_element_or_as_json(
+    tmp_path: Path, given: str | list[str]
+) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path) as client:
+        answer = await client.call_tool("measure", {"places": given})
+    assert "R1 |" in text_of(answer)
+    assert "R2 |" not in text_of(answer)
+
+
+async def test_schemas_are_flat_and_say_null_as_an_alternative(tmp_path: Path) -> None:
+    async with connect(FakeRobot(two_rooms()), tmp_path, toolsets=EVERYTHING) as client:
+        tools = (await client.list_tools()).tools
+    schemas = [schema for tool in tools for schema in (tool.input_schema, tool.output_schema)]
+    told = json.dumps(schemas)
+    assert "$ref" not in told
+    assert "$defs" not in told
+    assert '"type": [' not in told

@@ -173,7 +173,7 @@ async def test_what_only_the_detector_has_seen_is_not_remembered_but_told(tmp_pa
     assert ladder["verdict"] == "not_remembered"
     assert re.fullmatch(
         r"the robot's detector reported \"red ladder\" in 4 pictures from 3 places, last "
-        r"10 min ago from x 5\.00, y 1\.00, yaw 0 deg \(o\w+\)\. Nobody has checked that; "
+        r"10 min ago from x 5\.00, y 1\.00, yaw 0 deg \(o\w+\)\. Nobody has checked that\. "
         r"recall_episodes shows them\.",
         told,
     )

@@ -13,7 +13,7 @@ from guarding import make_guard
 from mapspeak.geometry import Pose
 from mapspeak.robot import Detection
 from mapspeak.server.app import DEFAULT_TOOLSETS
-from mapspeak.server.offering import tell_offered
+from mapspeak.server.text.offered import lead, offering
 from served import connect, text_of
 
 pytestmark = pytest.mark.anyio
@@ -104,18 +104,18 @@ async def test_a_tool_that_is_offered_is_led_to(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("template", "told"),
     [
-        ("Say it anew, or search_for it.", "Say it anew."),
-        ("Off by 1 m: realign_memory moves it.", "Off by 1 m."),
-        ("Call search_for. Look: it is there.", "Look: it is there."),
-        ("Wait; search_for ends it; go on.", "Wait; go on."),
-        ("It is 'search_for'. Seen.", "It is 'search_for'. Seen."),
-        ('Note "a. Call search_for now" it says.', 'Note "a. Call search_for now" it says.'),
-        ("Turn left; a search_for\nrow | 2", "Turn left.\nrow | 2"),
-        ("/robot/search_for is a topic", "/robot/search_for is a topic"),
-        ("a\n\nCall search_for.\nb", "a\n\nb"),
+        ("Say it anew. {search_for} looks for it.", "Say it anew."),
+        ("Call {turn}. {stop_robot} or {search_for} ends it.", "Call turn."),
+        ("It is {what}! Call {turn}.", "It is a {map}. Call {turn}! Call turn."),
+        ("{search_for} finds it.", ""),
     ],
 )
-def test_only_the_parts_that_lead_to_missing_tools_are_left_out(text: str, told: str) -> None:
-    assert tell_offered(text, {"search_for", "realign_memory", "turn"}) == told
+def test_a_sentence_that_leads_to_a_missing_tool_is_left_out(template: str, told: str) -> None:
+    with offering({"turn", "stop_robot"}):
+        assert lead(template, what="a {map}. Call {turn}") == told
+
+
+def test_where_nobody_has_said_what_is_offered_every_sentence_is_told() -> None:
+    assert lead("Call {turn}. {search_for} finds it.") == "Call turn. search_for finds it."

@@ -12,7 +12,6 @@ from fakes import FakeRobot, two_rooms
 from mapspeak.memory import SemanticMapStore
 from mapspeak.server.app import build_server
 from mapspeak.server.mapview.representations import Representation
-from mapspeak.server.offering import keep_offered, write_instructions
 from mapspeak.server.toolsets import build_toolsets
 from mapspeak.session import Session
 
@@ -69,20 +68,6 @@ async def test_a_client_of_the_ros_tools_alone_is_told_to_start_with_the_overvie
 async def test_by_default_the_map_comes_first_and_ros_is_not_spoken_of(tmp_path: Path) -> None:
     instructions, _, _ = await offered(tmp_path, DEFAULT, is_read_only=False)
     assert "Start with look_at_map" in instructions
-    assert "navigate_to takes such an id" in instructions
+    assert "navigate_to also takes x, y, yaw" in instructions
     assert "ros_" not in instructions
     assert "Nothing here moves" not in instructions
-
-
-def test_only_the_clause_that_names_a_missing_tool_is_left_out() -> None:
-    text = "Looks. Use it to see; then drive_on moves. Ask stop_now; it ends all. Or drive_on."
-    assert keep_offered(text, {"drive_on"}) == "Looks. Use it to see. Ask stop_now; it ends all."
-    assert keep_offered(text, {"stop_now"}) == (
-        "Looks. Use it to see; then drive_on moves. It ends all. Or drive_on."
-    )
-
-
-def test_a_line_whose_beginning_is_left_out_says_nothing_more() -> None:
-    assert "The same ids" not in write_instructions(
-        {"ros_overview"}, known={"look_at_map"}, moves=False
-    )

@@ -36,9 +36,9 @@ async def test_a_second_velocity_is_refused_while_the_first_moves_the_robot(
         second = await caller.refuse("ros_publish", topic="/cmd_vel", fields=FORWARD, duration_s=1)
         stand = await caller.ask("ros_publish", topic="/cmd_vel", fields=STAND)
         await caller.ask("stop_robot")
-    assert "Another ros_publish moves the robot on /cmd_vel for 1" in second
-    assert "end it with stop_robot" in second
-    assert "Published once on /cmd_vel. Another ros_publish goes on there for 1" in stand
+    assert "Another publication moves the robot on /cmd_vel for 1" in second
+    assert "stop_robot ends it" in second
+    assert "Published once on /cmd_vel. Another publication goes on there for 1" in stand
     assert "until the robot was stopped, then a stand on /cmd_vel." in said[0]
 
 

@@ -363,7 +363,7 @@ def _build_server(
 ) -> "MapspeakServer":
     from mapspeak.server.app import DEFAULT_TOOLSETS, build_server  # noqa: PLC0415 - heavy; help must be quick
     from mapspeak.server.mapview.representations import Representation  # noqa: PLC0415 - heavy; help must be quick
-    from mapspeak.server.tools.ros import require_ros  # noqa: PLC0415
+    from mapspeak.server.tools.ros.inquiry import require_ros  # noqa: PLC0415
 
     named = options.toolsets or ()
     added = tuple(name.removeprefix("+") for name in named if name.startswith("+"))

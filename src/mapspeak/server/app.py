@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from mcp.server import MCPServer
@@ -19,14 +19,10 @@ from mapspeak.memory.quoting import clean_line
 from mapspeak.safety import ApprovalNeededError, Caller, calling
 from mapspeak.server.calllog import CallLog
 from mapspeak.server.mapview.representations import Representation
-from mapspeak.server.offering import (
-    keep_offered,
-    tell_offered,
-    tell_offered_in,
-    write_instructions,
-)
 from mapspeak.server.prompts import add_prompts
 from mapspeak.server.text.errors import say_error
+from mapspeak.server.text.instructions import write_instructions
+from mapspeak.server.text.offered import offering
 from mapspeak.server.text.visible import show_controls, show_controls_of
 from mapspeak.server.tools.asking import Asking
 from mapspeak.server.tools.toolset import Tool, ToolEffect, lean_input, lean_output
@@ -51,7 +47,6 @@ class MapspeakServer(MCPServer[Any]):
         session: What the tools work on.
         instructions: What a model reads before its first call.
         call_log: Where every call is noted; None for nowhere.
-        missing: The names of tools that are not offered: no answer leads to them.
     """
 
     def __init__(
@@ -60,7 +55,6 @@ class MapspeakServer(MCPServer[Any]):
         *,
         instructions: str,
         call_log: CallLog | None = None,
-        missing: Collection[str] = (),
     ) -> None:
         super().__init__(
             "mapspeak",
@@ -71,9 +65,9 @@ class MapspeakServer(MCPServer[Any]):
         )
         self._session = session
         self._call_log = call_log
-        self._missing = frozenset(missing)
         self._arguments: dict[str, frozenset[str]] = {}
         self._numbers: dict[str, frozenset[str]] = {}
+        self._lists: dict[str, frozenset[str]] = {}
         self._former: dict[str, Mapping[str, str]] = {}
         self._remembering: set[str] = set()
 
@@ -91,6 +85,11 @@ class MapspeakServer(MCPServer[Any]):
             key if former.get(key, key) in arguments else former[key]: value
             for key, value in arguments.items()
         }
+        arguments |= {
+            key: _read_list(value)
+            for key in self._lists.get(name, frozenset()) & arguments.keys()
+            if isinstance(value := arguments[key], str)
+        }
         if self._call_log is None:
             return await self._call_readably(name, arguments, context)
         with self._call_log.noting(name, arguments) as note:
@@ -106,7 +105,7 @@ class MapspeakServer(MCPServer[Any]):
         self, name: str, arguments: dict[str, Any], context: Context[Any, Any] | None
     ) -> CallToolResult | InputRequiredResult:
         caller = Caller(client=name_client(context), tool=name)
-        with self._session.client_is_heard(), calling(caller):
+        with self._session.client_is_heard(), calling(caller), offering(self._arguments):
             self._check_arguments(name, arguments)
             try:
                 answer = await self._call_with_approval(name, arguments, context)
@@ -114,14 +113,11 @@ class MapspeakServer(MCPServer[Any]):
                 readable = _explain(name, error.__cause__)
                 if readable is None:
                     raise
-                told = tell_offered(readable, self._missing) or readable
-                raise ToolError(show_controls(told)) from error.__cause__
+                raise ToolError(show_controls(readable)) from error.__cause__
             self._note_memory(name, arguments)
             if not isinstance(answer, CallToolResult):
                 return answer
-            # What is read off a robot's ROS is the robot's own, whatever its things are called.
-            is_own = not name.startswith("ros_")
-            return show_controls_of(tell_offered_in(answer, self._missing) if is_own else answer)
+            return show_controls_of(answer)
 
     def _note_memory(self, name: str, arguments: dict[str, Any]) -> None:
         """Note in the audit log that a tool has changed what is remembered."""
@@ -155,16 +151,17 @@ class MapspeakServer(MCPServer[Any]):
         return await super().call_tool(name, arguments, context)
 
     def offer(self, tool: Tool) -> None:
-        """Add a tool to those that can be called; its description leads to no missing one."""
+        """Add a tool to those that can be called."""
         self._arguments[tool.name] = tool.arguments
         self._numbers[tool.name] = tool.numbers
+        self._lists[tool.name] = tool.lists
         self._former[tool.name] = tool.former
         if tool.effect is ToolEffect.REMEMBERS:
             self._remembering.add(tool.name)
         self.add_tool(
             tool.function,
             title=tool.title,
-            description=keep_offered(tool.description, self._missing),
+            description=tool.description,
             annotations=tool.annotations,
             meta=tool.meta,
             structured_output=tool.has_report,
@@ -220,6 +217,15 @@ class MapspeakServer(MCPServer[Any]):
         ]
 
 
+def _read_list(text: str) -> list[Any]:
+    """Return a list that a client wrote as text: as JSON, or its only element."""
+    try:
+        read = json.loads(text)
+    except (ValueError, RecursionError):
+        return [text]
+    return read if isinstance(read, list) else [text]
+
+
 def name_client(context: Context[Any, Any] | None) -> str:
     """Return who calls, for the audit log: the client's own name and its HTTP session."""
     if context is None:
@@ -259,15 +265,12 @@ def build_server(
         session.ros.advertise_early()
     known = build_toolsets(session, representation)
     chosen = choose_tools(known, toolsets=toolsets, tools=tools, is_read_only=is_read_only)
-    names = {tool.name for group in known.values() for tool in group}
-    offered = {tool.name for tool in chosen}
     moves = any(tool.effect is ToolEffect.MOVES for tool in chosen)
-    instructions = write_instructions(offered, known=names, moves=moves)
-    server = MapspeakServer(
-        session, instructions=instructions, call_log=call_log, missing=names - offered
-    )
-    for tool in chosen:
-        server.offer(tool)
+    with offering({tool.name for tool in chosen}):
+        instructions = write_instructions(moves=moves)
+        server = MapspeakServer(session, instructions=instructions, call_log=call_log)
+        for tool in chosen:
+            server.offer(tool)
     add_prompts(server)
     return server
 

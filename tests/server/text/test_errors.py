@@ -13,38 +13,38 @@ NEAR = "The nearest pose that works is x=1.00, y=2.00"
         (
             NextStep.DRIVE_THERE,
             f"{NEAR}.",
-            f"{NEAR}; call navigate_to with it, or call look_at_map.",
+            f"{NEAR}. Call navigate_to with it. look_at_map shows other places.",
         ),
         (
             NextStep.CHOOSE_ON_MAP,
             "No place near it works either.",
-            "No place near it works either; call look_at_map and choose another one.",
+            "No place near it works either. Call look_at_map and choose another one.",
         ),
         (
             NextStep.SEE_PLACES,
             "Known are rooms and corridors R1.",
-            "Known are rooms and corridors R1. Call look_at_map to see them.",
+            "Known are rooms and corridors R1. look_at_map shows them.",
         ),
-        (NextStep.READ_MORE, "Use T1.", "Use T1; find_place says more."),
+        (NextStep.READ_MORE, "Use T1.", "Use T1. find_place says more."),
         (
             NextStep.MEASURE,
             "Name another place.",
-            "Call look_at_map, or measure, and name another place.",
+            "Name another place. look_at_map shows them.",
         ),
         (
             NextStep.LOOK_AROUND,
             "Choose another place.",
-            "Call describe_place with W1, then choose another place.",
+            "Choose another place. describe_place tells of W1.",
         ),
         (
             NextStep.LOOK_FROM,
             "Drive to W1 and look from there.",
-            "Call navigate_to with W1 and look from there.",
+            "Look from W1. navigate_to goes there.",
         ),
         (
             NextStep.CHECK_NEAR,
             "Leave this stop out.",
-            "Leave this stop out, or call check_goal to find a pose near it that works.",
+            "Leave this stop out. check_goal finds a pose near it that works.",
         ),
     ],
 )

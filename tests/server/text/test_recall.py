@@ -30,9 +30,9 @@ def ask(*places: Waypoint, words: str = "fire extinguisher") -> Recall:
 
 def list_answers() -> Iterator[tuple[Recall, str]]:
     yield ask(*LOOKS), 'Found: T1 "fire extinguisher". navigate_to takes T1.'
-    yield ask(LOOKS[0]), "no two good views of it agree so far. navigate_to takes T1; look before"
+    yield ask(LOOKS[0]), "no two good views of it agree so far. navigate_to takes T1. Look before"
     yield ask(UNPLACED), "not sure: where it is was not noted. navigate_to T1 goes where it was"
-    yield ask(*LOOKS, words="a helicopter"), "or look for it with search_for."
+    yield ask(*LOOKS, words="a helicopter"), "Look for it with search_for."
     yield ask(), "Not remembered: nothing is remembered yet. Look for it with search_for."
     yield ask(*LOOKS, NEAR), "Ambiguous: 2 are called so; T2 is the nearest by path. Choose by room"
     yield ask(*LOOKS, THIRD, NEAR), " 1 other is called so, of which fewer views agree."

@@ -14,22 +14,25 @@ from mapspeak.server.text.exploration import (
     say_unreachable,
 )
 from mapspeak.server.text.frontiers import say_merits
+from mapspeak.server.text.offered import lead
 from mapspeak.server.text.search import say_candidate, say_standing
 from mapspeak.server.text.wording import say_pose_doubt
 
 MOST_NAMED = 8
 
 NEXT_STEP = {
-    ExplorationState.DRIVING: "Call explore again to go on; stop_robot ends it.",
-    ExplorationState.AT_GOAL: "Look at the picture, record what matters, call explore to go on.",
-    ExplorationState.BOUND_REACHED: "Call explore again for more.",
-    ExplorationState.NOTHING_LEFT: "The map is complete; call look_at_map.",
+    ExplorationState.DRIVING: "Call {explore} again to go on. {stop_robot} ends it.",
+    ExplorationState.AT_GOAL: "Look at the picture, record what matters, call {explore} to go on.",
+    ExplorationState.BOUND_REACHED: "Call {explore} again for more.",
+    ExplorationState.NOTHING_LEFT: "The map is complete. Call {look_at_map}.",
     ExplorationState.REST_UNREACHABLE: (
         "All that can be reached is known. Open what is in the way, or wait until it is no longer "
-        "closed, then call explore again."
+        "closed, then call {explore} again."
     ),
     ExplorationState.NOTHING_KNOWN: "Start SLAM, or wait until the first map has floor on it.",
-    ExplorationState.INTERRUPTED: "The robot was stopped or sent elsewhere. Call explore to go on.",
+    ExplorationState.INTERRUPTED: (
+        "The robot was stopped or sent elsewhere. Call {explore} to go on."
+    ),
 }
 
 
@@ -77,7 +80,7 @@ class ExploreAnswer(Report):
             robot=PoseReport.of(progress.pose),
             pose_uncertain=say_pose_doubt(progress.pose_doubt),
             cannot_reach=_say_rest(progress),
-            next_step=NEXT_STEP[progress.state],
+            next_step=lead(NEXT_STEP[progress.state]),
         )
 
 
@@ -98,13 +101,13 @@ def _say_rest(progress: Progress) -> list[str]:
 
 
 SEARCH_STEP = {
-    SearchState.DRIVING: "Call search_for again to go on; stop_robot ends it.",
-    SearchState.LOOK: "Judge the picture, then call search_for with seen and, if not, likely.",
-    SearchState.REPORTED: "Judge the picture, then call search_for with seen.",
-    SearchState.FOUND: "Remember the place with write_semantic_data.",
+    SearchState.DRIVING: "Call {search_for} again to go on. {stop_robot} ends it.",
+    SearchState.LOOK: "Judge the picture, then call {search_for} with seen and, if not, likely.",
+    SearchState.REPORTED: "Judge the picture, then call {search_for} with seen.",
+    SearchState.FOUND: "Remember the place with {write_semantic_data}.",
     SearchState.NOT_FOUND: "It is in none of the places seen, as far as pictures showed them.",
-    SearchState.BUDGET_SPENT: "Call search_for again for a new search, or look elsewhere.",
-    SearchState.INTERRUPTED: "The robot was stopped or sent elsewhere. Call search_for to go on.",
+    SearchState.BUDGET_SPENT: "Call {search_for} again for a new search, or look elsewhere.",
+    SearchState.INTERRUPTED: "The robot was stopped or sent elsewhere. Call {search_for} to go on.",
 }
 
 
@@ -147,5 +150,5 @@ class SearchAnswer(Report):
             cannot_reach=[say_blocked(place) for place in standing.blocked][:MOST_NAMED],
             robot=PoseReport.of(standing.pose),
             pose_uncertain=say_pose_doubt(standing.pose_doubt),
-            next_step=SEARCH_STEP[standing.state],
+            next_step=lead(SEARCH_STEP[standing.state]),
         )

@@ -16,6 +16,7 @@ from mapspeak.places.recall.asking import Recall, RecallCandidate, RecallQuery
 from mapspeak.server.reports.robot import PoseReport, Report
 from mapspeak.server.text.findings import say_trust
 from mapspeak.server.text.memory import say_age
+from mapspeak.server.text.offered import lead
 from mapspeak.server.text.recall import say_advice, say_evidence
 from mapspeak.server.text.wording import say_count, say_pose
 
@@ -51,12 +52,13 @@ def say_reported(
         return ""
     label, last = max(seen, key=lambda pair: pair[1].recorded_at)
     n_places = _count_places([each.pose.point for _, each in seen])
-    return (
+    said = (
         f"Not written down, but seen: the robot's detector reported {quote_name(label)} in "
         f"{say_count(len(seen), 'picture')} from {say_count(n_places, 'place')}, last "
         f"{say_age(last.recorded_at, now)} from {say_pose(last.pose)} ({last.id}). Nobody has "
-        "checked that; recall_episodes shows them."
+        "checked that."
     )
+    return f"{said} {lead('{recall_episodes} shows them.')}".rstrip()
 
 
 def _find_pictures(

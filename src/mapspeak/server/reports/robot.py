@@ -16,6 +16,7 @@ from mapspeak.places.relations.choosing import CheckedGoal
 from mapspeak.robot import CauseCode, GoalState, StampedPose
 from mapspeak.server.text.drives import say_end
 from mapspeak.server.text.memory import say_landmarks, say_replaced
+from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.worldmodel.recollection import RememberedPlace, number_places
 
@@ -70,13 +71,13 @@ class PoseAnswer(Report):
 
 
 NEXT_STEP = {
-    GoalState.PLANNED: "Call wait_for_goal; it starts when the drive before it has ended.",
-    GoalState.ACCEPTED: "Call wait_for_goal; stop_robot or cancel_goal end it.",
-    GoalState.DRIVING: "Call wait_for_goal; stop_robot or cancel_goal end it.",
-    GoalState.BLOCKED: "Call look_at_map, then choose another place or another way.",
+    GoalState.PLANNED: "It starts when the drive before it has ended. Call {wait_for_goal}.",
+    GoalState.ACCEPTED: "Call {wait_for_goal}. {stop_robot} or {cancel_goal} end it.",
+    GoalState.DRIVING: "Call {wait_for_goal}. {stop_robot} or {cancel_goal} end it.",
+    GoalState.BLOCKED: "Call {look_at_map}. Choose another place or another way.",
     GoalState.CANCELLED: "The robot stands still; send a new goal when ready.",
     GoalState.PREEMPTED: "A newer goal is under way; ask for that one.",
-    GoalState.REJECTED: "Call look_at_map and choose a place inside known free space.",
+    GoalState.REJECTED: "Call {look_at_map}. Choose a place inside known free space.",
     GoalState.TIMED_OUT: "The robot was told to stop. Check its navigation, then send a new goal.",
     GoalState.LOST: "The robot was told to stop. Check where it is, then send a new goal.",
 }
@@ -90,8 +91,7 @@ UNANSWERED = (
     "is active, then send the same goal again."
 )
 FOREIGN_DRIVE = (
-    "Another client's goal drives the robot now: wait for its end, or call stop_robot, which ends "
-    "it too."
+    "Another client's goal drives the robot now: wait for its end. {stop_robot} ends it too."
 )
 
 
@@ -129,7 +129,7 @@ class DriveAnswer(Report):
             distance_left_m=None if left_m is None else round(left_m, 2),
             elapsed_s=round(report.elapsed_s, 1),
             reason=say_end(report.status),
-            next_step=FOREIGN_DRIVE if foreign_goals else _say_next_step(report),
+            next_step=lead(FOREIGN_DRIVE) if foreign_goals else _say_next_step(report),
         )
 
 
@@ -146,7 +146,7 @@ def _say_next_step(report: DriveReport) -> str:
     if cause is not None and cause.code is CauseCode.NOT_TAKEN:
         return UNANSWERED
     if report.status.state is not GoalState.ARRIVED:
-        return NEXT_STEP[report.status.state]
+        return lead(NEXT_STEP[report.status.state])
     off_m = report.pose.point.distance_to(report.drive.goal.point)
     if report.pose_doubt is not None:
         return "Navigation says that it arrived, but the pose is uncertain: look before going on."

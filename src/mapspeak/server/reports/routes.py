@@ -7,18 +7,19 @@ from pydantic import Field
 from mapspeak.driving.routes.following import RouteProgress, RouteState
 from mapspeak.driving.routes.planning import RoutePlan, RouteStop, StopState
 from mapspeak.server.reports.robot import PoseReport, Report
+from mapspeak.server.text.offered import lead
 from mapspeak.server.text.routes import say_obstacle, say_route
 from mapspeak.server.text.wording import say_pose_doubt
 
 DETOUR_M = 0.05
 NEXT_STEP = {
-    RouteState.DRIVING: "Call follow_route without stops to go on; stop_robot ends it.",
-    RouteState.AT_STOP: "Look, record what matters, then call follow_route without stops.",
+    RouteState.DRIVING: "Call {follow_route} without stops to go on. {stop_robot} ends it.",
+    RouteState.AT_STOP: "Look, record what matters, then call {follow_route} without stops.",
     RouteState.BLOCKED: (
-        "Call follow_route without stops to try again, or with when_blocked=skip to leave it out."
+        "Call {follow_route} without stops to try again, or with when_blocked=skip to leave it out."
     ),
     RouteState.INTERRUPTED: (
-        "The robot was stopped or sent elsewhere. Call follow_route without stops to go on."
+        "The robot was stopped or sent elsewhere. Call {follow_route} without stops to go on."
     ),
     RouteState.DONE: "The route is over.",
 }
@@ -65,7 +66,7 @@ class RouteAnswer(Report):
             greedy_m=round(plan.greedy_m, 1) if _is_better(plan) else None,
             robot=PoseReport.of(progress.pose),
             pose_uncertain=say_pose_doubt(progress.pose_doubt),
-            next_step=NEXT_STEP[progress.state],
+            next_step=lead(NEXT_STEP[progress.state]),
         )
 
 

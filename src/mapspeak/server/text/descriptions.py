@@ -11,6 +11,7 @@ from mapspeak.places.relations.choosing import CheckedGoal, check_place
 from mapspeak.places.ways import standing_point
 from mapspeak.server.text.frontiers import say_merits
 from mapspeak.server.text.maps import say_size
+from mapspeak.server.text.offered import lead
 from mapspeak.server.text.roomtables import say_walk
 from mapspeak.server.text.things import say_landmark, say_things_from, say_things_in, thing_lines
 from mapspeak.server.text.wording import (
@@ -53,7 +54,8 @@ def describe_place(world: WorldModel, place: Place) -> str:
 def _way_lines(world: WorldModel, place: Place, goal: CheckedGoal) -> Iterator[str]:
     yield f"From the robot: {say_direction(world, standing_point(world, place))}."
     if goal.check.is_ok:
-        yield f"To go there: navigate_to takes {place.name}; {say_check(goal.check)}"
+        way = lead("To go there: {navigate_to} takes {place}.", place=place.name)
+        yield " ".join(filter(None, (way, say_check(goal.check))))
         yield f"The robot would stand at {say_pose(goal.pose)}."
         return
     yield f"The robot cannot go there: {say_check(goal.check)}"

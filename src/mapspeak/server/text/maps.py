@@ -5,6 +5,7 @@ from collections.abc import Awaitable
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.memory.alignment import MapComparison, MapRelation, RealignReceipt, say_comparison
+from mapspeak.server.text.offered import lead
 from mapspeak.spatial.mapfiles import MapFileWarning, MapOddity
 from mapspeak.spatial.rooms import Region, RoomClass
 
@@ -50,14 +51,15 @@ async def say_moved(comparing: Awaitable[MapComparison | None]) -> str:
         return str(error)
     if comparison is None or comparison.relation is MapRelation.SAME:
         return ""
-    unsure = "Remembered poses may be off: let the robot see more, then call realign_memory."
-    return f"{say_comparison(comparison)} {AFTER_MOVE.get(comparison.relation, unsure)}"
+    todo = lead(AFTER_MOVE.get(comparison.relation, UNSURE))
+    return f"{say_comparison(comparison)} {todo}"
 
 
 AFTER_MOVE = {
-    MapRelation.MOVED: "Remembered poses are off by as much: realign_memory moves them.",
+    MapRelation.MOVED: "Remembered poses are off by as much. {realign_memory} moves them.",
     MapRelation.OTHER: "Remembered poses mean nothing here: another memory belongs to it.",
 }
+UNSURE = "Remembered poses may be off. Let the robot see more, then call {realign_memory}."
 
 
 def say_receipt(receipt: RealignReceipt) -> str:

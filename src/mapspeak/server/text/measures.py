@@ -8,6 +8,7 @@ from mapspeak.places.goalcheck import GoalVerdict, say_check
 from mapspeak.places.naming import Place, Spot
 from mapspeak.places.relations.choosing import check_place, find_place
 from mapspeak.places.ways import Way, find_way, measure_path, standing_point
+from mapspeak.server.text.offered import lead
 from mapspeak.server.text.roomtables import say_sizes
 from mapspeak.server.text.wording import build_table, join_words, say_kind, say_path, say_point
 from mapspeak.spatial.rooms import Door, Region
@@ -45,7 +46,7 @@ def _find_others(world: WorldModel, begin: Place, places: Sequence[str] | None) 
         return list(by_name.values())
     raise GoalError(
         f"There is nothing to measure from {begin.name} to.",
-        hint="Name other places than the start, or explore: call look_at_map.",
+        hint=lead("Name other places than the start, or explore. {look_at_map} shows more."),
     )
 
 

@@ -8,8 +8,10 @@ from mapspeak.memory.search import Answer, Basis, EntryCandidate, MatchEvidence,
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import say_spot
 from mapspeak.places.recall.asking import Recall, RecallCandidate, RecallDoubt
+from mapspeak.server.text.offered import lead
 
 LONGEST_QUOTE = 120
+LOOK_FOR = "Look for it with {search_for}."
 DOUBTS = {
     RecallDoubt.DOUBTFUL_RECORD: "its record is doubtful",
     RecallDoubt.NOT_NOTED: "where it is was not noted",
@@ -63,18 +65,16 @@ def say_advice(recalled: Recall) -> str:
     answer, candidates = recalled.answer, recalled.candidates
     if not recalled.n_searched:
         if recalled.is_empty:
-            return "Not remembered: nothing is remembered yet. Look for it with search_for."
-        return "Not remembered: nothing passes these filters. Leave filters out, or search_for it."
+            return lead(f"Not remembered: nothing is remembered yet. {LOOK_FOR}")
+        return lead(f"Not remembered: nothing passes these filters. Leave filters out. {LOOK_FOR}")
     match answer.verdict:
         case Verdict.NOT_REMEMBERED:
             missing = answer.missing
             kind = f" (it sounds like {quote(missing)}, and none is)" if missing else ""
             first = _name(candidates[0]) if candidates else ""
             nearest = f"; the nearest is {first}, which is probably not meant" if first else ""
-            return (
-                f"Not remembered{kind}{nearest}. Say it in other words, or look for it with "
-                "search_for."
-            )
+            said = f"Not remembered{kind}{nearest}. Say it in other words."
+            return " ".join(filter(None, (said, lead(LOOK_FOR))))
         case Verdict.AMBIGUOUS:
             return _say_ambiguous(answer, candidates)
         case Verdict.FOUND | Verdict.LIKELY:
@@ -88,9 +88,11 @@ def _say_found(first: RecallCandidate, doubt: RecallDoubt | None) -> str:
     if not first.check.is_ok:
         return f"{said} But the robot cannot go there: {say_check(first.check)}"
     if doubt and first.position is None:
-        return f"{said} navigate_to {first.id} goes where it was seen."
-    look = "; look before you rely on it" if doubt else ""
-    return f"{said} navigate_to takes {first.id}{look}."
+        way = lead("{navigate_to} {id} goes where it was seen.", id=first.id)
+    else:
+        way = lead("{navigate_to} takes {id}.", id=first.id)
+    look = "Look before you rely on it." if doubt and first.position is not None else ""
+    return " ".join(filter(None, (said, way, look)))
 
 
 def _say_doubt(first: RecallCandidate, doubt: RecallDoubt) -> str:
@@ -112,16 +114,17 @@ def _say_ambiguous(answer: Answer, candidates: Sequence[RecallCandidate]) -> str
         nearest = f"; {first.id} is the nearest by path" if first.check.path_m is not None else ""
         return (
             f"Ambiguous: {answer.n_meant} are called so{nearest}. Choose by room, or ask which is "
-            "meant, then navigate_to its id."
+            "meant, then take its id."
         )
     kind = f" (it is more like {quote(answer.missing)})" if answer.missing else ""
     n_same = sum(name_key(each.entry.name) == name_key(first.name) for each in answer.candidates)
     of_several = f", of {n_same} the nearest by path" if n_same > 1 else ""
-    return (
+    said = (
         f"Ambiguous: nothing is called so{kind}. The likeliest is {_name(first)}{of_several}; what "
-        "is meant may also not be remembered. See why each is listed, and navigate_to an id only "
-        "if it fits; else say it in other words, or search_for it."
+        "is meant may also not be remembered. See why each is listed, and take an id only if it "
+        "fits; else say it in other words."
     )
+    return " ".join(filter(None, (said, lead(LOOK_FOR))))
 
 
 def _name(candidate: RecallCandidate) -> str:

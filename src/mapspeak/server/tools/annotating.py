@@ -26,6 +26,7 @@ from mapspeak.memory import (
     tells_what_to_do,
 )
 from mapspeak.memory.things import name_the_same
+from mapspeak.server.text.offered import lead
 
 SAME_VIEW_RAD = math.radians(15.0)
 """A picture of a heading that much off still shows nearly all that is seen along the other."""
@@ -226,7 +227,7 @@ class Annotator:
         latest = self.pictures.latest
         known = "none was taken yet" if latest is None else f"the last one is {latest.id}"
         return SemanticMapError(
-            f"There is no picture {said!r}; {known}.", hint="Call look_through_camera."
+            f"There is no picture {said!r}; {known}.", hint=lead("Call {look_through_camera}.")
         )
 
 
@@ -246,7 +247,7 @@ def _bearing_rad(thing: LandmarkInput, picture: TakenPicture | None) -> float | 
     if picture is None:
         raise SemanticMapError(
             "No picture was taken that image_column_px could be a column of.",
-            hint="Call look_through_camera first, or give bearing_deg.",
+            hint=lead("Give bearing_deg. {look_through_camera} takes a picture."),
         )
     return picture.bearing_of(thing.image_column_px)
 

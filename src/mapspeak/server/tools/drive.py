@@ -7,6 +7,7 @@ from pydantic import Field
 
 from mapspeak.errors import LinkError
 from mapspeak.server.reports.robot import DriveAnswer
+from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.server.tools.asking import (
     AT_MOST_LONGEST_WAIT,
@@ -14,7 +15,7 @@ from mapspeak.server.tools.asking import (
     client_of,
     tell_progress,
 )
-from mapspeak.server.tools.toolset import Tool, ToolEffect
+from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 
 Place = Annotated[
@@ -46,35 +47,13 @@ class DriveTools:
     def __init__(self, session: Session) -> None:
         self._session = session
 
-    def tools(self) -> list[Tool]:
-        """Return the tools in their order."""
-        return [
-            Tool(
-                function=self.navigate_to,
-                title="Drive to a place",
-                effect=ToolEffect.MOVES,
-                has_report=True,
-                is_entry=True,
-            ),
-            Tool(
-                function=self.wait_for_goal,
-                title="Wait for a drive",
-                effect=ToolEffect.READS,
-                has_report=True,
-            ),
-            Tool(
-                function=self.cancel_goal,
-                title="Cancel a drive",
-                effect=ToolEffect.STOPS,
-            ),
-            Tool(
-                function=self.stop_robot,
-                title="Stop the robot",
-                effect=ToolEffect.STOPS,
-                is_entry=True,
-            ),
-        ]
-
+    @tool(
+        "Drive to a place",
+        ToolEffect.MOVES,
+        has_report=True,
+        is_entry=True,
+        leads="Use {wait_for_goal} to wait on.",
+    )
     async def navigate_to(
         self,
         context: Context,
@@ -87,8 +66,7 @@ class DriveTools:
         """Drive the robot to a place: an id, a remembered name, or x and y.
 
         Use it to go anywhere. The goal is checked first; a refused goal comes with one that works.
-        Answers `arrived` or, after wait_s, a goal_id for wait_for_goal. A newer goal replaces the
-        older.
+        Answers `arrived` or, after wait_s, a goal_id. A newer goal replaces the older.
         """
         drives = self._session.drives
         with drives.preparing() as ticket:
@@ -98,20 +76,24 @@ class DriveTools:
             )
         return await self._wait(context, drive.goal_id, wait_s)
 
+    @tool(
+        "Wait for a drive",
+        ToolEffect.READS,
+        has_report=True,
+        leads="Use it after {navigate_to}.",
+    )
     async def wait_for_goal(
         self, context: Context, goal_id: GoalId = None, wait_s: Wait = 20.0
     ) -> DriveAnswer:
         """Wait for a drive's end, at most wait_s; say how it stands.
 
-        Use it after navigate_to; wait_s=0 only asks.
+        With wait_s=0 it only asks.
         """
         return await self._wait(context, goal_id, wait_s)
 
+    @tool("Cancel a drive", ToolEffect.STOPS, leads="Use {stop_robot} when anything is urgent.")
     async def cancel_goal(self, goal_id: GoalId = None) -> str:
-        """End one drive; the robot comes to a stand.
-
-        Use stop_robot when anything is urgent.
-        """
+        """End one drive; the robot comes to a stand."""
         report = await self._session.drives.cancel(goal_id)
         lines = [
             f"{report.drive.goal_id} to {report.drive.place}: {report.status.state}.",
@@ -119,9 +101,10 @@ class DriveTools:
             say_pose_doubt(report.pose_doubt, report.pose_age_s, report.silence),
         ]
         if not report.status.state.is_final:
-            lines.append("NOT CANCELLED: navigation goes on with it. Call stop_robot.")
+            lines.append(lead("NOT CANCELLED: navigation goes on with it. Call {stop_robot}."))
         return " ".join(filter(None, lines))
 
+    @tool("Stop the robot", ToolEffect.STOPS, is_entry=True)
     async def stop_robot(self) -> str:
         """Stop the robot at once and end every drive.
 

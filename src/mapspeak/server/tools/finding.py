@@ -14,7 +14,7 @@ from mapspeak.places.relations.choosing import find_place
 from mapspeak.server.reports.memory import RecallAnswer, say_reported
 from mapspeak.server.text.maps import say_moved
 from mapspeak.server.text.memory import read_moment
-from mapspeak.server.tools.toolset import Tool, ToolEffect
+from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 from mapspeak.spatial.rooms import Region
 from mapspeak.worldmodel.model import WorldModel
@@ -34,11 +34,8 @@ class FindTools:
     def __init__(self, session: Session) -> None:
         self._session = session
 
-    def tools(self) -> list[Tool]:
-        """Return the tool."""
-        # Its report is not declared: a schema of answers would cost more than all its arguments.
-        return [Tool(function=self.find_place, title="Find in memory", effect=ToolEffect.READS)]
-
+    # Its report is not declared: a schema of answers would cost more than all its arguments.
+    @tool("Find in memory", ToolEffect.READS, leads="Use it before {navigate_to}.")
     async def find_place(
         self,
         query: Query,
@@ -51,7 +48,7 @@ class FindTools:
     ) -> CallToolResult:
         """Find remembered places and things by name or meaning: where, and how sure.
 
-        Use it before navigate_to; says when none or several may be meant.
+        It says when none or several may be meant.
         """
         session = self._session
         now = session.find_wall_time()

@@ -21,7 +21,7 @@ from mapspeak.server.text.recall import say_advice
 from mapspeak.server.text.wording import say_pose, say_pose_doubt
 from mapspeak.server.tools.annotating import Annotator, Landmarks
 from mapspeak.server.tools.sightings import fetch_ring
-from mapspeak.server.tools.toolset import Tool, ToolEffect
+from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 from mapspeak.spatial.picture import (
     draw_map_axis,
@@ -58,61 +58,31 @@ class PaperTools:
     def __init__(self, session: Session) -> None:
         self._session = session
 
-    def tools(self) -> list[Tool]:
-        """Return the tools in the paper's order."""
-        return [
-            Tool(
-                function=self.subscribe_map_as_image,
-                title="Map as a grey picture (paper)",
-                effect=ToolEffect.READS,
-            ),
-            Tool(
-                function=self.draw_map_axis,
-                title="Map with axes and grid (paper)",
-                effect=ToolEffect.READS,
-            ),
-            Tool(
-                function=self.draw_robot_pose,
-                title="Map with the robot's pose (paper)",
-                effect=ToolEffect.READS,
-            ),
-            Tool(
-                function=self.write_semantic_data,
-                title="Remember this place",
-                effect=ToolEffect.REMEMBERS,
-                has_report=True,
-            ),
-            Tool(
-                function=self.get_semantic_data,
-                title="Recall remembered places",
-                effect=ToolEffect.READS,
-                has_report=True,
-            ),
-        ]
-
+    @tool(
+        "Map as a grey picture (paper)",
+        ToolEffect.READS,
+        leads="Use {look_at_map} instead for rooms, frontiers and numbers.",
+    )
     async def subscribe_map_as_image(self) -> list[str | Image]:
-        """Return the robot's map as a plain grey picture: white free, grey unknown, dark occupied.
-
-        Use look_at_map instead for rooms, frontiers and numbers.
-        """
+        """Return the robot's map as a grey picture: white free, grey unknown, dark occupied."""
         grid = await self._session.robot.fetch_map()
         picture = await self._session.compute(lambda: draw_map_plain(grid))
         return [say_plain(grid, picture), Image(data=picture.png, format="png")]
 
+    @tool(
+        "Map with axes and grid (paper)",
+        ToolEffect.READS,
+        leads="Use it after {subscribe_map_as_image}, or alone.",
+    )
     async def draw_map_axis(self) -> list[str | Image]:
-        """Return the map with axes and a metric grid, numbered in metres.
-
-        Use it after subscribe_map_as_image, or alone.
-        """
+        """Return the map with axes and a metric grid, numbered in metres."""
         grid = await self._session.robot.fetch_map()
         picture = await self._session.compute(lambda: draw_map_axis(grid))
         return [say_axes(grid, picture), Image(data=picture.png, format="png")]
 
+    @tool("Map with the robot's pose (paper)", ToolEffect.READS)
     async def draw_robot_pose(self) -> list[str | Image]:
-        """Return the map with axes, and the robot as an arrow at its pose.
-
-        Use it after draw_map_axis, or alone.
-        """
+        """Return the map with axes, and the robot as an arrow at its pose."""
         grid = await self._session.robot.fetch_map()
         here, doubt = await self._find_robot()
         picture = await self._session.compute(lambda: draw_robot_pose(grid, here))
@@ -121,6 +91,12 @@ class PaperTools:
         )
         return [text, Image(data=picture.png, format="png")]
 
+    @tool(
+        "Remember this place",
+        ToolEffect.REMEMBERS,
+        has_report=True,
+        leads="Use it at every waypoint after {look_through_camera}.",
+    )
     async def write_semantic_data(
         self,
         name: Name,
@@ -135,8 +111,8 @@ class PaperTools:
     ) -> WriteAnswer:
         """Remember a place in the semantic map: what is seen from here, with the pose.
 
-        Use it at every waypoint after look_through_camera. A known name is updated: landmarks that
-        you do not name stay. Leave out people, loose boxes and guesses.
+        A known name is updated: landmarks that you do not name stay. Leave out people, loose boxes
+        and guesses.
         """
         _check_name(name)
         annotator = Annotator(pictures=self._session.pictures)
@@ -171,12 +147,18 @@ class PaperTools:
         told, refused = filter(None, (*far, unsure, kept.fault, moved)), annotator.refused
         return WriteAnswer.of(receipt, places, merge=merge, refused=refused, warnings=(*told,))
 
+    @tool(
+        "Recall remembered places",
+        ToolEffect.READS,
+        has_report=True,
+        leads="{find_place} finds a thing by what it is for.",
+    )
     async def get_semantic_data(
         self, name: WaypointName = None, query: Query = None
     ) -> MemoryAnswer:
         """Recall remembered places with pose, landmarks and layout; they are observations.
 
-        Use it to read a place in full; find_place finds a thing by what it is for.
+        Use it to read a place in full.
         """
         if query is None:
             memory = await self._session.compute(self._session.memory.read)

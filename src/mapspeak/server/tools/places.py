@@ -8,8 +8,7 @@ from mapspeak.places.relations.choosing import check_place, find_place
 from mapspeak.server.reports.robot import GoalAnswer
 from mapspeak.server.text.descriptions import describe_place
 from mapspeak.server.text.measures import describe_measures
-from mapspeak.server.tools.finding import FindTools
-from mapspeak.server.tools.toolset import Tool, ToolEffect
+from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 
 MOST_PLACES = 30
@@ -34,20 +33,7 @@ class PlaceTools:
     def __init__(self, session: Session) -> None:
         self._session = session
 
-    def tools(self) -> list[Tool]:
-        """Return the tools in their order."""
-        return [
-            *FindTools(self._session).tools(),
-            Tool(function=self.describe_place, title="One place in full", effect=ToolEffect.READS),
-            Tool(function=self.measure, title="Measure ways and sizes", effect=ToolEffect.READS),
-            Tool(
-                function=self.check_goal,
-                title="Check a goal",
-                effect=ToolEffect.READS,
-                has_report=True,
-            ),
-        ]
-
+    @tool("One place in full", ToolEffect.READS)
     async def describe_place(self, place: OnePlace) -> str:
         """Describe one room, corridor, door, frontier, remembered place or point of the map.
 
@@ -57,6 +43,7 @@ class PlaceTools:
         world = await self._session.fetch_world_model()
         return await self._session.compute(lambda: describe_place(world, find_place(world, place)))
 
+    @tool("Measure ways and sizes", ToolEffect.READS)
     async def measure(self, places: Places = None, start: Start = "robot") -> str:
         """Measure on the map: path and straight distance, the rooms and doors on the way, sizes.
 
@@ -67,10 +54,16 @@ class PlaceTools:
             lambda: describe_measures(world, start=start, places=places)
         )
 
+    @tool(
+        "Check a goal",
+        ToolEffect.READS,
+        has_report=True,
+        leads="{navigate_to} checks its goal itself.",
+    )
     async def check_goal(self, place: OnePlace) -> GoalAnswer:
         """Check whether the robot can drive to a place, without driving: verdict, clearance, path.
 
-        Use it to compare goals; navigate_to checks its goal itself.
+        Use it to compare goals.
         """
         world = await self._session.fetch_world_model()
 

@@ -18,7 +18,7 @@ from mapspeak.server.tools.asking import (
     tell_progress,
 )
 from mapspeak.server.tools.sightings import CameraSighting, look_ahead
-from mapspeak.server.tools.toolset import Tool, ToolEffect
+from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 
 MOST_STOPS = 20
@@ -52,17 +52,12 @@ class RouteTools:
         self._routes = RouteBook(session)
         self._errand = Errand(what="follow a route", n_drives=0, duration_s=ERRAND_S)
 
-    def tools(self) -> list[Tool]:
-        """Return the tools in their order."""
-        return [
-            Tool(
-                function=self.follow_route,
-                title="Follow a route",
-                effect=ToolEffect.MOVES,
-                has_report=True,
-            )
-        ]
-
+    @tool(
+        "Follow a route",
+        ToolEffect.MOVES,
+        has_report=True,
+        leads="Use it instead of several {navigate_to}. It goes on also after {stop_robot}.",
+    )
     async def follow_route(
         self,
         context: Context,
@@ -74,9 +69,9 @@ class RouteTools:
     ) -> Annotated[CallToolResult, RouteAnswer]:
         """Drive the robot past several places in order, on the shortest way as a whole.
 
-        Use it instead of several navigate_to; words that fit several places ("the extinguisher")
-        are taken where the whole route is shortest. It sets out to the next stop only while it is
-        called: call it again without stops to go on, also after stop_robot.
+        Words that fit several places ("the extinguisher") are taken where the whole route is
+        shortest. It sets out to the next stop only while it is called: call it again without stops
+        to go on.
         """
         if stops is not None:
             await self._routes.begin(stops, pause_s=pause_s, is_looking=look)

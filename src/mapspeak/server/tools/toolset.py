@@ -1,13 +1,17 @@
 """A tool as mapspeak declares it: a function, what it does to the world, a schema without waste."""
 
 import inspect
-import json
 from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import Any, get_args, get_type_hints
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from mcp_types import ToolAnnotations
+from pydantic import RootModel
+
+from mapspeak.server.text.offered import lead
+
+MARK = "mapspeak_tool"
 
 
 class ToolEffect(StrEnum):
@@ -29,6 +33,7 @@ class Tool:
         effect: What it changes.
         has_report: It answers with a pydantic report; else with text and pictures.
         is_entry: A model should see it at once, even where tools are searched for.
+        leads: Sentences about other tools, which follow the description where these are offered.
         former: The names that its arguments had before, which are taken too, with today's.
     """
 
@@ -37,6 +42,7 @@ class Tool:
     effect: ToolEffect
     has_report: bool = False
     is_entry: bool = False
+    leads: str = ""
     former: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -58,10 +64,21 @@ class Tool:
         )
 
     @property
+    def lists(self) -> frozenset[str]:
+        """The names of the arguments that are lists."""
+        hints = get_type_hints(self.function)
+        return frozenset(
+            name
+            for name in self.arguments
+            if any(map(_is_list, (hints[name], *get_args(hints[name]))))
+        )
+
+    @property
     def description(self) -> str:
-        """What a model reads: the docstring, a line for each of its paragraphs."""
+        """What a model reads: the docstring, a line for each of its paragraphs, and the leads."""
         paragraphs = inspect.cleandoc(self.function.__doc__ or "").split("\n\n")
-        return "\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
+        lines = [" ".join(paragraph.split()) for paragraph in paragraphs]
+        return "\n".join(filter(None, [*lines, lead(self.leads)]))
 
     @property
     def annotations(self) -> ToolAnnotations:
@@ -81,6 +98,51 @@ class Tool:
         return {"anthropic/alwaysLoad": True} if self.is_entry else None
 
 
+def _is_list(kind: object) -> bool:
+    is_model = isinstance(kind, type) and issubclass(kind, RootModel)
+    return is_model or get_origin(kind) is list
+
+
+T = TypeVar("T", bound=Callable[..., Awaitable[Any]])
+
+
+def tool(
+    title: str,
+    effect: ToolEffect,
+    *,
+    has_report: bool = False,
+    is_entry: bool = False,
+    leads: str = "",
+    former: Mapping[str, str] | None = None,
+) -> Callable[[T], T]:
+    """Make a method a tool of its class; the arguments are those of `Tool`."""
+
+    def mark(method: T) -> T:
+        declared = Tool(
+            function=method,
+            title=title,
+            effect=effect,
+            has_report=has_report,
+            is_entry=is_entry,
+            leads=leads,
+            former=former or {},
+        )
+        setattr(method, MARK, declared)
+        return method
+
+    return mark
+
+
+def tools_of(*owners: object) -> list[Tool]:
+    """Return the tools of some objects, in the order in which their classes define them."""
+    return [
+        replace(member.mapspeak_tool, function=getattr(owner, name))
+        for owner in owners
+        for name, member in vars(type(owner)).items()
+        if hasattr(member, MARK)
+    ]
+
+
 Schema = Any
 """JSON of any shape."""
 
@@ -91,18 +153,33 @@ CHECKED = ("title", "minLength", "maxLength", "maxItems", "additionalProperties"
 
 def lean_input(schema: Schema) -> Schema:
     """Return the schema of a tool's arguments: what may be left out need not be null as well."""
-    return _inline(_rewrite(_rewrite(schema, _without(CHECKED)), _short_optional))
+    return _rewrite(_rewrite(_flatten(schema), _without(CHECKED)), _short_optional)
 
 
 def lean_output(schema: Schema) -> Schema:
     """Return the schema of a report: names carry units, and every field is always there.
 
-    What stands in a list is promised its type only: its fields have their names in every answer.
+    Of what lies within a field only the type is promised: its names stand in every answer.
     """
     if schema is None:
         return None
-    lean = _rewrite(schema, _without(("title", "description", "required", "default")))
-    return _inline(_prune(_rewrite(_plain_items(lean), _short_nullable)))
+    lean = _rewrite(_flatten(schema), _without(("title", "description", "required", "default")))
+    fields = _rewrite(list(lean["properties"].values()), _without(("properties",)))
+    return {**lean, "properties": dict(zip(lean["properties"], fields, strict=True))}
+
+
+def _flatten(schema: Schema) -> Schema:
+    """Put every definition where it is used: some clients read none. Ours never hold themselves."""
+    definitions = schema.get("$defs", {})
+
+    def place(part: dict[str, Schema]) -> dict[str, Schema]:
+        if "$ref" not in part:
+            return part
+        # What a class is says nothing to a model that its field does not.
+        named = _without(("description",))(definitions[part["$ref"].removeprefix(REF)])
+        return place({**named, **_without(("$ref",))(part)})
+
+    return _rewrite(_without(("$defs",))(schema), place)
 
 
 def _rewrite(schema: Schema, change: Callable[[dict[str, Schema]], dict[str, Schema]]) -> Schema:
@@ -113,7 +190,7 @@ def _rewrite(schema: Schema, change: Callable[[dict[str, Schema]], dict[str, Sch
         return schema
     return {
         key: {name: _rewrite(part, change) for name, part in value.items()}
-        if key in ("properties", "$defs")
+        if key == "properties"
         else _rewrite(value, change)
         for key, value in change(schema).items()
     }
@@ -130,62 +207,3 @@ def _short_optional(schema: dict[str, Schema]) -> dict[str, Schema]:
         return schema
     rest = {key: value for key, value in schema.items() if key not in ("anyOf", "default")}
     return {**options[0], **rest}
-
-
-def _short_nullable(schema: dict[str, Schema]) -> dict[str, Schema]:
-    """Write `anyOf: [number, null]` as `type: [number, null]`."""
-    options = schema.get("anyOf", [])
-    if len(options) != 2 or options[1] != {"type": "null"} or "type" not in options[0]:
-        return schema
-    rest = {key: value for key, value in schema.items() if key != "anyOf"}
-    return {**options[0], **rest, "type": [options[0]["type"], "null"]}
-
-
-def _plain_items(schema: Schema) -> Schema:
-    """Write lists of reports as lists of objects."""
-    reports = {
-        f"{REF}{name}"
-        for name, part in schema.get("$defs", {}).items()
-        if part.get("type") == "object"
-    }
-
-    def plain(part: dict[str, Schema]) -> dict[str, Schema]:
-        is_of_reports = part.get("items", {}).get("$ref") in reports
-        return {**part, "items": {"type": "object"}} if is_of_reports else part
-
-    return _rewrite(schema, plain)
-
-
-def _prune(schema: Schema) -> Schema:
-    """Drop the definitions that nothing leads to."""
-    definitions = schema.get("$defs", {})
-    body = _without(("$defs",))(schema)
-    used: dict[str, Schema] = {}
-    left = [body]
-    while left:
-        text = json.dumps(left.pop())
-        for name, part in definitions.items():
-            if name not in used and f'"{REF}{name}"' in text:
-                used[name] = part
-                left.append(part)
-    return {**body, "$defs": used} if used else body
-
-
-def _inline(schema: Schema) -> Schema:
-    """Put definitions that are used once where they are used, and drop notes on classes."""
-    if not isinstance(schema, dict) or "$defs" not in schema:
-        return schema
-    definitions = {
-        name: {key: value for key, value in part.items() if key != "description"}
-        for name, part in schema["$defs"].items()
-    }
-    text = json.dumps(schema)
-    once = {name for name in definitions if text.count(f'"{REF}{name}"') == 1}
-    rest = {name: part for name, part in definitions.items() if name not in once}
-    body = {**schema, "$defs": rest} if rest else _without(("$defs",))(schema)
-
-    def place(part: dict[str, Schema]) -> dict[str, Schema]:
-        name = str(part.get("$ref", "")).removeprefix(REF)
-        return {**definitions[name], **_without(("$ref",))(part)} if name in once else part
-
-    return _rewrite(body, place)

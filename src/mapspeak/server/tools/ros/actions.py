@@ -11,6 +11,7 @@ from mapspeak.ros.actions import ActionState, SentGoal
 from mapspeak.ros.definitions.checking import check_message
 from mapspeak.ros.messages.fields import Message, bare_type
 from mapspeak.safety import Act
+from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_count
 from mapspeak.server.tools.asking import LONGEST_WAIT_S, client_of
 from mapspeak.server.tools.ros.commands import RosCommands
@@ -27,7 +28,7 @@ from mapspeak.server.tools.ros.reports import (
     show_message,
 )
 from mapspeak.server.tools.ros.views import view_fields
-from mapspeak.server.tools.toolset import Tool, ToolEffect
+from mapspeak.server.tools.toolset import ToolEffect, tool
 
 MOST_LISTED = 20
 
@@ -59,7 +60,7 @@ UNANSWERED = (
     "Should it be taken later, it is cancelled at once. Check that the server is active; what has "
     "just started may not be found yet by all: then send it again."
 )
-GOES_ON = "It goes on: ros_goal_status waits for it, ros_cancel_goal ends it."
+GOES_ON = "It goes on. {ros_goal_status} waits for it, {ros_cancel_goal} ends it."
 
 
 class ActionTools:
@@ -71,29 +72,11 @@ class ActionTools:
         self._book = book
         self._described: dict[str, Described] = {}
 
-    def tools(self) -> list[Tool]:
-        """Return the tools in their order."""
-        return [
-            Tool(function=self.ros_actions, title="List ROS actions", effect=ToolEffect.READS),
-            Tool(function=self.ros_action, title="One ROS action", effect=ToolEffect.READS),
-            Tool(
-                function=self.ros_send_goal,
-                title="Send a ROS goal",
-                effect=ToolEffect.MOVES,
-                former={"goal": "fields"},
-            ),
-            Tool(
-                function=self.ros_goal_status,
-                title="How a ROS goal stands",
-                effect=ToolEffect.READS,
-            ),
-            Tool(function=self.ros_cancel_goal, title="Cancel a ROS goal", effect=ToolEffect.STOPS),
-        ]
-
+    @tool("List ROS actions", ToolEffect.READS, leads="{ros_action} tells its fields.")
     async def ros_actions(self, filter: Filter = None, page: Page = 1) -> str:  # noqa: A002
         """List the robot's ROS actions with their types.
 
-        Use it to find one; ros_action tells its fields.
+        Use it to find one.
         """
         actions = await self._inquiry.fetch_actions()
         types = {name: await self._say_type(name) for name in actions}
@@ -106,15 +89,19 @@ class ActionTools:
             n_all=len(actions),
         )
 
+    @tool("One ROS action", ToolEffect.READS, leads="Use it before {ros_send_goal}.")
     async def ros_action(self, action: Action, type: ActionType = None) -> str:  # noqa: A002
-        """Tell a ROS action's type, and the fields of its goal, result and feedback.
-
-        Use it before ros_send_goal.
-        """
+        """Tell a ROS action's type, and the fields of its goal, result and feedback."""
         name = full_name(action)
         said = await self._find_type(name, type)
         return cut(f"{name} {said}\n{(await self._inquiry.describe(said)).say()}")
 
+    @tool(
+        "Send a ROS goal",
+        ToolEffect.MOVES,
+        former={"goal": "fields"},
+        leads="Use {navigate_to} to drive somewhere. Call {ros_action} first for the fields.",
+    )
     async def ros_send_goal(
         self,
         context: Context,
@@ -125,8 +112,7 @@ class ActionTools:
     ) -> str:
         """Send a goal to a ROS action, which may move the robot, and wait for its end.
 
-        Use navigate_to to drive somewhere. Answers how it ended or, after wait_s, its goal_id; a
-        refused goal is told as rejected. Call ros_action first for the fields.
+        Answers how it ended or, after wait_s, its goal_id; a refused goal is told as rejected.
         """
         n_stops = self._inquiry.connection.started.n_stops
         name = full_name(action)
@@ -149,6 +135,7 @@ class ActionTools:
             raise
         return self._say_job(job)
 
+    @tool("How a ROS goal stands", ToolEffect.READS)
     async def ros_goal_status(
         self, goal_id: Handle = None, wait_s: Wait = 0.0, action: AnyAction = None
     ) -> str:
@@ -162,15 +149,17 @@ class ActionTools:
         await self._book.wait(job, wait_s=wait_s)
         return self._say_job(job)
 
+    @tool(
+        "Cancel a ROS goal",
+        ToolEffect.STOPS,
+        leads="Use {stop_robot} instead when anything is urgent.",
+    )
     async def ros_cancel_goal(self, goal_id: CancelHandle = None, action: AnyAction = None) -> str:
-        """Cancel one goal by its goal_id, or every goal of a ROS action.
-
-        Use stop_robot instead when anything is urgent.
-        """
+        """Cancel one goal by its goal_id, or every goal of a ROS action."""
         if (goal_id is None) == (action is None):
             raise GoalError(
                 "Give either goal_id or action.",
-                hint="goal_id ends one goal of ros_send_goal, action every goal of that action.",
+                hint="goal_id ends one goal that was sent here, action every goal of that action.",
             )
         if action is not None:
             n_cancelled = await self._book.cancel_all(full_name(action))
@@ -228,4 +217,4 @@ class ActionTools:
 def _say_next_step(goal: SentGoal) -> str:
     if goal.state is ActionState.REJECTED and goal.is_withdrawn:
         return UNANSWERED
-    return NEXT_STEP.get(goal.state, GOES_ON)
+    return NEXT_STEP[goal.state] if goal.state in NEXT_STEP else lead(GOES_ON)

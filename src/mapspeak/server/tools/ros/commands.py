@@ -19,6 +19,7 @@ from mapspeak.safety import (
     publishing_for,
     zero_velocity_of,
 )
+from mapspeak.server.text.offered import lead
 from mapspeak.session import Session
 
 SETTLE_S = 0.3
@@ -133,7 +134,10 @@ class RosCommands:
         await self._connection().set_parameter(node, name, value)
 
 
-BY_HAND = "If the robot still moves, stop it by hand; stop_robot works once the connection is back."
+STOP = "{stop_robot} ends it."
+BY_HAND = (
+    "If the robot still moves, stop it by hand. {stop_robot} works once the connection is back."
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -277,14 +281,13 @@ class Publisher:
             raise GoalError(
                 f"{drive.goal_id} to {drive.place} is under way: a velocity on {topic} would work "
                 "against it.",
-                hint="Wait for its end with wait_for_goal, or end it with cancel_goal or "
-                "stop_robot.",
+                hint=lead(f"Wait for its end, or end it. {{wait_for_goal}} waits. {STOP}"),
             )
         left_s = self._left_s(topic)
         if left_s is not None:
             raise GoalError(
-                f"Another ros_publish moves the robot on {topic} for {left_s:.1f} s more.",
-                hint="Wait for its end, or end it with stop_robot.",
+                f"Another publication moves the robot on {topic} for {left_s:.1f} s more.",
+                hint=lead(f"Wait for its end, or end it. {STOP}"),
             )
 
     def _say_what_moves(self, topic: str) -> str:
@@ -292,7 +295,7 @@ class Publisher:
         left_s = self._left_s(topic)
         if left_s is None:
             return "."
-        return f". Another ros_publish goes on there for {left_s:.1f} s; stop_robot ends it."
+        return f". Another publication goes on there for {left_s:.1f} s. {lead(STOP)}".rstrip()
 
     def _left_s(self, topic: str) -> float | None:
         until_s = self._moving_until_s.get(topic)
@@ -306,8 +309,8 @@ def _cut_off(wanted: PublishRequest, run: _Run, *, has_stood: bool) -> LinkError
             f"{said}: whether the latest arrived is not known.", hint="Publish it again."
         )
     if has_stood:
-        return LinkError(f"{said}; it is back, and a stand was sent.", hint=BY_HAND)
+        return LinkError(f"{said}; it is back, and a stand was sent.", hint=lead(BY_HAND))
     return LinkError(
         f"{said}. The stand could not be sent: whether the robot stands is not known.",
-        hint=BY_HAND,
+        hint=lead(BY_HAND),
     )

@@ -15,6 +15,7 @@ from mapspeak.ros.actions import (
     open_action,
 )
 from mapspeak.ros.messages.fields import Dialect, Message
+from mapspeak.server.text.offered import lead
 from mapspeak.server.tools.ros.commands import RosCommands
 from mapspeak.server.tools.ros.inquiry import RosInquiry
 
@@ -127,7 +128,7 @@ class ActionBook:
             known = ", ".join(self.handles[-5:])
             raise GoalError(
                 f"There is no goal {handle[:40]!r}." if handle else "No goal has been sent yet.",
-                hint=f"The latest are {known}." if known else "ros_send_goal sends one.",
+                hint=f"The latest are {known}." if known else lead("{ros_send_goal} sends one."),
             )
         job.action.look()
         return job

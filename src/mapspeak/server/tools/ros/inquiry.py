@@ -12,6 +12,7 @@ from mapspeak.ros.definitions.texts import kinds_of, known_definitions, name_par
 from mapspeak.ros.definitions.types import TypeBook, find_odd_lines, parse_definition
 from mapspeak.ros.messages.fields import NAME, TYPE, Dialect, bare_type
 from mapspeak.ros.port import RosConnection, RosGraph, find_nearest
+from mapspeak.server.text.offered import lead
 from mapspeak.session import Session
 
 NO_ROS = "This robot is no ROS robot: the simulated one is none."
@@ -216,8 +217,10 @@ class RosInquiry:
         meant = f" The nearest that are known: {', '.join(near)}." if near else ""
         return LinkError(
             f"Unknown type {type_name}: neither the robot nor mapspeak describes it.{meant}",
-            hint="Give its definition to ros_type, as `ros2 interface show` (ROS 1: `rosmsg "
-            "show -r`, `rossrv show -r`) prints it on the robot, with --- between the parts.",
+            hint=lead(
+                "Give its definition to {ros_type}, as `ros2 interface show` (ROS 1: `rosmsg "
+                "show -r`, `rossrv show -r`) prints it on the robot, with --- between the parts."
+            ),
         )
 
     async def teach(self, type_name: str, definition: str) -> None:
@@ -231,7 +234,7 @@ class RosInquiry:
         if await self.connection.fetch_definitions(type_name):
             raise LinkError(
                 f"What a {type_name} looks like is known already.",
-                hint="Call ros_type without a definition to see it.",
+                hint=lead("Call {ros_type} without a definition to see it."),
             )
         texts = split_parts(type_name, definition)
         for name, text in texts.items():
@@ -268,7 +271,7 @@ class RosInquiry:
             if not is_known:
                 raise LinkError(
                     f"The definition of {name} holds the type {kind}, which nobody knows.",
-                    hint=f"Give the definition of {kind} to ros_type first.",
+                    hint=lead("Give the definition of {kind} to {ros_type} first.", kind=kind),
                 )
 
     async def _find_types(self, wanted: str) -> list[str]:

@@ -12,13 +12,14 @@ from mapspeak.errors import LinkError
 from mapspeak.ros.messages.fields import Message
 from mapspeak.ros.messages.poses import read_transforms
 from mapspeak.ros.port import RosConnection, find_nearest
+from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import list_some, say_count
 from mapspeak.server.tools.ros.census import fetch_publishers
 from mapspeak.server.tools.ros.inquiry import RosInquiry, full_name
 from mapspeak.server.tools.ros.reading import Heard, hear, say_lag, say_rate, say_stamp
 from mapspeak.server.tools.ros.reports import cut
 from mapspeak.server.tools.ros.views import BULKY
-from mapspeak.server.tools.toolset import Tool, ToolEffect
+from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 
 TRANSFORMS = "tf2_msgs/TFMessage"
@@ -156,7 +157,11 @@ async def check_frames(inquiry: RosInquiry, message: Message) -> None:
         near = find_nearest(strangers[0], known) or known[:MOST_NAMED]
         raise LinkError(
             f"TF has no frame {strangers[0][:80]!r}: a goal given in it would never be reached.",
-            hint=f"Its {len(known)} frames are such as {', '.join(near)}; ros_frames lists all.",
+            hint=lead(
+                "Its {n} frames are such as {near}. {ros_frames} lists all.",
+                n=len(known),
+                near=", ".join(near),
+            ),
         )
 
 
@@ -275,17 +280,11 @@ class MeasuringTools:
         self._session = session
         self._inquiry = inquiry
 
-    def tools(self) -> list[Tool]:
-        """Return the tools in their order."""
-        return [
-            Tool(function=self.ros_rates, title="Rates of ROS topics", effect=ToolEffect.READS),
-            Tool(function=self.ros_frames, title="The tree of TF frames", effect=ToolEffect.READS),
-        ]
-
+    @tool("Rates of ROS topics", ToolEffect.READS, leads="{ros_read} shows the messages.")
     async def ros_rates(self, topics: Topics, duration_s: Listen = 3.0) -> str:
         """Measure several ROS topics at once: rate, age of the stamps, which are silent.
 
-        Use it to find what has died, is slow or late; ros_read shows the messages.
+        Use it to find what has died, is slow or late.
         """
         said: dict[str, str] = {}
 
@@ -301,6 +300,7 @@ class MeasuringTools:
                 tasks.start_soon(measure, name)
         return cut("\n".join([f"listened for {duration_s:g} s", *(said[name] for name in names)]))
 
+    @tool("The tree of TF frames", ToolEffect.READS)
     async def ros_frames(self, topic: FramesTopic = "/tf", duration_s: Listen = 3.0) -> str:
         """Tell the tree of TF frames: each transform's rate and age, static or not, who sends it.
 

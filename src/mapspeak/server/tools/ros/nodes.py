@@ -10,6 +10,7 @@ from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.port import RosGraph, find_nearest
 from mapspeak.safety import SetParameter
+from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import list_some
 from mapspeak.server.tools.ros.census import mark_ours
 from mapspeak.server.tools.ros.commands import RosCommands
@@ -23,7 +24,7 @@ from mapspeak.server.tools.ros.reports import (
     say_page,
     show_value,
 )
-from mapspeak.server.tools.toolset import Tool, ToolEffect
+from mapspeak.server.tools.toolset import ToolEffect, tool
 
 MOST_DESCRIBED = 5
 MOST_AT_ONCE = 8
@@ -63,19 +64,7 @@ class NodeTools:
         self._inquiry = inquiry
         self._commands = commands
 
-    def tools(self) -> list[Tool]:
-        """Return the tools in their order."""
-        return [
-            Tool(function=self.ros_nodes, title="List ROS nodes", effect=ToolEffect.READS),
-            Tool(function=self.ros_node, title="One ROS node", effect=ToolEffect.READS),
-            Tool(function=self.ros_parameters, title="ROS parameters", effect=ToolEffect.READS),
-            Tool(
-                function=self.ros_set_parameter,
-                title="Set a ROS parameter",
-                effect=ToolEffect.MOVES,
-            ),
-        ]
-
+    @tool("The ROS system at a glance", ToolEffect.READS, is_entry=True)
     async def ros_overview(self) -> str:
         """Tell which ROS the robot runs and what there is: topics, services, actions, nodes.
 
@@ -101,19 +90,21 @@ class NodeTools:
             return self._inquiry.now_s
         return await self._inquiry.connection.fetch_time_s()
 
+    @tool("List ROS nodes", ToolEffect.READS, leads="{ros_node} tells what one does.")
     async def ros_nodes(self, filter: Filter = None, page: Page = 1) -> str:  # noqa: A002
         """List the robot's ROS nodes.
 
-        Use it to see what runs; ros_node tells what one does.
+        Use it to see what runs.
         """
         nodes = await self._inquiry.connection.fetch_nodes()
         chosen = choose(nodes, filter, texts=lambda name: [name])
         return say_page("nodes", chosen, page, line=lambda name: name, n_all=len(nodes))
 
+    @tool("One ROS node", ToolEffect.READS, leads="{ros_parameters} gives its settings.")
     async def ros_node(self, node: Node) -> str:
         """Tell what a ROS node publishes, hears and serves.
 
-        Use it to find out who does what; ros_parameters gives its settings.
+        Use it to find out who does what.
         """
         name = full_name(node)
         await self._inquiry.check_node(name)
@@ -128,6 +119,7 @@ class NodeTools:
             f"serves: {list_some(links.serves, most=MOST_NAMED) or 'nothing'}"
         )
 
+    @tool("ROS parameters", ToolEffect.READS)
     async def ros_parameters(
         self,
         node: ParameterNode,
@@ -154,13 +146,15 @@ class NodeTools:
             )
         )
 
+    @tool(
+        "Set a ROS parameter",
+        ToolEffect.MOVES,
+        leads="Use {ros_parameters} first for its value and kind.",
+    )
     async def ros_set_parameter(
         self, node: ParameterNode, parameter: Parameter, value: Value
     ) -> str:
-        """Set or delete a ROS node's parameter, which may change how the robot moves.
-
-        Use ros_parameters first for its value and kind.
-        """
+        """Set or delete a ROS node's parameter, which may change how the robot moves."""
         name = _node_name(node)
         self._commands.check_name(SetParameter(node=name, name=parameter, value=value))
         if value is None:
@@ -206,7 +200,8 @@ class NodeTools:
     async def _delete(self, node: str, parameter: str) -> None:
         if await self._inquiry.connection.fetch_parameter(node, parameter) is None:
             raise LinkError(
-                f"{node} has no parameter {parameter[:80]!r}.", hint="ros_parameters lists them."
+                f"{node} has no parameter {parameter[:80]!r}.",
+                hint=lead("{ros_parameters} lists them."),
             )
         await self._commands.set_parameter(node, parameter, None)
 

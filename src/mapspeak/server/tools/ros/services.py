@@ -16,7 +16,7 @@ from mapspeak.server.tools.ros.inquiry import Described, RosInquiry, full_name
 from mapspeak.server.tools.ros.reading import say_stamp
 from mapspeak.server.tools.ros.reports import Filter, Page, choose, cut, say_page, show_message
 from mapspeak.server.tools.ros.views import view_fields
-from mapspeak.server.tools.toolset import Tool, ToolEffect
+from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 
 Service = Annotated[str, Field(description="full name, such as /reset", max_length=200)]
@@ -47,23 +47,15 @@ class ServiceTools:
         self._inquiry = inquiry
         self._commands = commands
 
-    def tools(self) -> list[Tool]:
-        """Return the tools in their order."""
-        return [
-            Tool(function=self.ros_services, title="List ROS services", effect=ToolEffect.READS),
-            Tool(function=self.ros_service, title="One ROS service", effect=ToolEffect.READS),
-            Tool(
-                function=self.ros_call,
-                title="Call a ROS service",
-                effect=ToolEffect.MOVES,
-                former={"arguments": "fields"},
-            ),
-        ]
-
+    @tool(
+        "List ROS services",
+        ToolEffect.READS,
+        leads="{ros_service} tells its type, fields and node. {ros_call} calls it.",
+    )
     async def ros_services(self, filter: Filter = None, page: Page = 1) -> str:  # noqa: A002
         """List the robot's ROS services.
 
-        Use it to find one; ros_service tells its type, fields and node; ros_call calls it.
+        Use it to find one.
         """
         services = await self._inquiry.connection.fetch_services()
         chosen = choose(services, filter, texts=lambda name: [name])
@@ -73,11 +65,9 @@ class ServiceTools:
         text = say_page("services", chosen, page, line=lambda name: name, n_all=len(services))
         return "\n".join([text, *folded])
 
+    @tool("One ROS service", ToolEffect.READS, leads="Use it before {ros_call}.")
     async def ros_service(self, service: Service) -> str:
-        """Tell a ROS service's type, the node that offers it, and the fields it takes and returns.
-
-        Use it before ros_call.
-        """
+        """Tell a ROS service's type, the node that offers it, its fields and those it returns."""
         name = full_name(service)
         type_name = await self._inquiry.fetch_service_type(name)
         said = await self._inquiry.said(type_name, kind="srv")
@@ -85,12 +75,18 @@ class ServiceTools:
         fields = (await self._inquiry.describe(said)).say()
         return cut(f"{name} {said}\noffered by: {node}\n{fields}")
 
+    @tool(
+        "Call a ROS service",
+        ToolEffect.MOVES,
+        former={"arguments": "fields"},
+        leads="Use {ros_service} first for its fields.",
+    )
     async def ros_call(
         self, service: Service, fields: RequestFields = None, timeout_s: Timeout = 5.0
     ) -> list[str | Image]:
         """Call a ROS service, which may move the robot or change it, and return its response.
 
-        Use ros_service first for its fields: the request is checked against its type.
+        The request is checked against its type.
         """
         name = full_name(service)
         self._commands.check_name(Call(service=name, type="", arguments=fields or {}))

@@ -20,7 +20,7 @@ from mapspeak.server.tools.ros.measuring import check_frames, say_silence
 from mapspeak.server.tools.ros.reading import Heard, hear, say_rate, say_stamp
 from mapspeak.server.tools.ros.reports import Filter, Page, choose, cut, say_loss, say_page
 from mapspeak.server.tools.ros.views import BULKY, MessageView, view_message
-from mapspeak.server.tools.toolset import Tool, ToolEffect
+from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session
 
 LONGEST_S = 25.0
@@ -75,23 +75,11 @@ class TopicTools:
         self._publisher = Publisher(session, commands)
         self._viewed: dict[str, tuple[Message, MessageView]] = {}
 
-    def tools(self) -> list[Tool]:
-        """Return the tools in their order."""
-        return [
-            Tool(function=self.ros_topics, title="List ROS topics", effect=ToolEffect.READS),
-            Tool(function=self.ros_topic, title="One ROS topic", effect=ToolEffect.READS),
-            Tool(
-                function=self.ros_type, title="What a ROS type looks like", effect=ToolEffect.READS
-            ),
-            Tool(function=self.ros_read, title="Read a ROS topic", effect=ToolEffect.READS),
-            Tool(
-                function=self.ros_publish,
-                title="Publish on a ROS topic",
-                effect=ToolEffect.MOVES,
-                former={"message": "fields"},
-            ),
-        ]
-
+    @tool(
+        "List ROS topics",
+        ToolEffect.READS,
+        leads="{ros_topic} tells more of one. {ros_read} reads it.",
+    )
     async def ros_topics(
         self,
         filter: Filter = None,  # noqa: A002
@@ -100,7 +88,7 @@ class TopicTools:
     ) -> str:
         """List the robot's ROS topics with their types.
 
-        Use it to find a topic, by its name or type; ros_topic tells more of one, ros_read reads it.
+        Use it to find a topic, by its name or type.
         """
         graph = await self._inquiry.fetch_topics()
         topics = sorted(graph.types.items())
@@ -119,10 +107,11 @@ class TopicTools:
         )
         return cut("\n".join([text, *_say_loose_ends(census, [name for name, _ in chosen])]))
 
+    @tool("One ROS topic", ToolEffect.READS, leads="Use it before {ros_publish} too.")
     async def ros_topic(self, topic: Topic) -> str:
         """Tell a ROS topic's type, its fields, who publishes it and who listens.
 
-        Use it when nothing comes; before ros_publish too.
+        Use it when nothing comes.
         """
         name = full_name(topic)
         type_name = await self._inquiry.fetch_topic_type(name)
@@ -134,17 +123,23 @@ class TopicTools:
             f"{await self._say_fields(type_name)}"
         )
 
+    @tool(
+        "What a ROS type looks like",
+        ToolEffect.READS,
+        leads=(
+            "Use it to fill in the fields of {ros_publish}. Use it to fill in the fields of "
+            "{ros_call} and {ros_send_goal}."
+        ),
+    )
     async def ros_type(self, type: TypeName, definition: Definition = None) -> str:  # noqa: A002
-        """Tell what a ROS message, service or action type looks like, nested types included.
-
-        Use it to fill in the fields of ros_publish, ros_call and ros_send_goal.
-        """
+        """Tell what a ROS message, service or action type looks like, nested types included."""
         if definition is not None:
             await self._inquiry.teach(type, definition)
         described = await self._inquiry.describe(type)
         said = await self._inquiry.said(described.type, kind=described.kind)
         return cut(f"{said}\n{described.say()}")
 
+    @tool("Read a ROS topic", ToolEffect.READS)
     async def ros_read(
         self, topic: Topic, n: N = 1, wait_s: Wait = 10.0, duration_s: Duration = 0.0
     ) -> list[str | Image]:
@@ -173,6 +168,12 @@ class TopicTools:
         head += f"\n{loss}" if loss else ""
         return await self._show(name, type_name, heard, head)
 
+    @tool(
+        "Publish on a ROS topic",
+        ToolEffect.MOVES,
+        former={"message": "fields"},
+        leads="Use {navigate_to} to drive somewhere. {stop_robot} ends it too.",
+    )
     async def ros_publish(
         self,
         topic: Topic,
@@ -183,8 +184,8 @@ class TopicTools:
     ) -> str:
         """Publish on a ROS topic, once or for a time, which may move the robot.
 
-        Use navigate_to to drive somewhere. The message is checked against its type first. A
-        velocity needs duration_s, goes out alone and ends with a stand; stop_robot ends it too.
+        The message is checked against its type first. A velocity needs duration_s, goes out alone
+        and ends with a stand.
         """
         name = full_name(topic)
         known = await self._inquiry.find_topic_type(name)
