@@ -57,6 +57,9 @@ def main() -> None:
         path.write_text(text, encoding="utf-8")
 
 
+FIELD = re.compile(r"\{(\w+)[^}]*\}")
+
+
 def write_documents() -> dict[Path, str]:
     """Return the text of each generated document."""
     session = Session(FakeRobot(two_rooms()), SemanticMapStore(Path("unused.yaml")), lease_s=60.0)
@@ -103,6 +106,10 @@ def _say(node: ast.expr | None, texts: dict[str, ast.expr]) -> str:
     if isinstance(node, ast.Name):
         node = texts.get(node.id)
     match node:
+        case ast.Call(func=ast.Name(id="lead"), args=[template], keywords=given):
+            details = {each.arg for each in given}
+            said = _say(template, texts)
+            return FIELD.sub(lambda field: "…" if field[1] in details else field[1], said)
         case ast.Constant(value=str(text)):
             return text.replace("|", "\\|").replace("<", "&lt;")
         case ast.JoinedStr(values=parts):
