@@ -10,7 +10,7 @@ import asyncio
 import json
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -103,25 +103,28 @@ def _messages(group: str) -> Iterator[tuple[str, str]]:
 
 def _say(node: ast.expr | None, texts: dict[str, ast.expr]) -> str:
     """Return what an expression says; what only a run knows is left out."""
+    if isinstance(node, ast.FormattedValue):
+        node = node.value
     if isinstance(node, ast.Name):
         node = texts.get(node.id)
     match node:
         case ast.Call(func=ast.Name(id="lead"), args=[template], keywords=given):
-            details = {each.arg for each in given}
-            said = _say(template, texts)
-            return FIELD.sub(lambda field: "…" if field[1] in details else field[1], said)
+            return _say_template(_say(template, texts), {each.arg for each in given})
         case ast.Constant(value=str(text)):
             return text.replace("|", "\\|").replace("<", "&lt;")
         case ast.JoinedStr(values=parts):
             return "".join(_say(part, texts) for part in parts)
-        case ast.FormattedValue(value=ast.Call(func=ast.Name(id="shell_command"), args=[words])):
+        case ast.Call(func=ast.Name(id="shell_command"), args=[words]):
             return f"mapspeak {_say(words, texts)}"
-        case ast.FormattedValue(value=ast.Call(func=ast.Name(id="say_install"))):
+        case ast.Call(func=ast.Name(id="say_install")):
             return "(the exact command)"
-        case ast.FormattedValue(value=value):
-            return _say(value, texts)
         case _:
             return LEFT_OUT
+
+
+def _say_template(template: str, details: Collection[str | None]) -> str:
+    """Return a template with the names of tools in it."""
+    return FIELD.sub(lambda field: LEFT_OUT if field[1] in details else field[1], template)
 
 
 def _table(toolsets: dict[str, list[Tool]]) -> str:
