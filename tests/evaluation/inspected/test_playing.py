@@ -5,21 +5,17 @@ import pytest
 
 from fakes import two_rooms
 from mapspeak.errors import LinkError
-from mapspeak.evaluation.inspected import (
-    InspectedSystem,
-    Names,
-    draw_names,
-    draw_system,
-    play,
+from mapspeak.evaluation.inspected import InspectedSystem, Names, draw_names, draw_system, play
+from mapspeak.evaluation.inspected.playing import (
     with_cut_transform,
     with_dead_stream,
     with_late_stream,
     with_late_transform,
-    with_lost_hearer,
+    with_lost_subscriber,
     with_parameter,
     with_second_publisher,
-    without_hearers,
     without_node,
+    without_subscribers,
 )
 from mapspeak.links.rosbridge import RobotAddress, open_client
 from mapspeak.ros.messages.fields import Dialect, read_header
@@ -127,20 +123,20 @@ def test_faults_of_the_graph_change_what_they_are_named_after() -> None:
     names, system = drawn(Dialect.ROS2)
     fighting = with_second_publisher(system, names.velocity, names.joystick)
     assert fighting.publishers_of(names.velocity) == tuple(sorted((names.smoother, names.joystick)))
-    assert without_hearers(system, names.range).hearers_of(names.range) == ()
-    lost = with_lost_hearer(system, names.locator, names.scan, "/elsewhere")
-    assert lost.hearers_of("/elsewhere") == (names.locator,)
-    assert names.locator not in lost.hearers_of(names.scan)
+    assert without_subscribers(system, names.range).subscribers_of(names.range) == ()
+    lost = with_lost_subscriber(system, names.locator, names.scan, "/elsewhere")
+    assert lost.subscribers_of("/elsewhere") == (names.locator,)
+    assert names.locator not in lost.subscribers_of(names.scan)
     gone = without_node(system, names.sonar)
     assert names.sonar not in gone.nodes
     assert gone.publishers_of(names.range) == ()
-    assert gone.hearers_of(names.range) == (names.watcher,)
+    assert gone.subscribers_of(names.range) == (names.watcher,)
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_in_good_order_somebody_hears_every_topic_and_somebody_publishes_it(seed: int) -> None:
     _, system = drawn(Dialect.ROS1, seed)
-    assert all(system.hearers_of(topic) for topic in system.topics)
+    assert all(system.subscribers_of(topic) for topic in system.topics)
     assert all(system.publishers_of(topic) for topic in system.topics)
     assert len({*system.topics}) == len(system.topics)
 

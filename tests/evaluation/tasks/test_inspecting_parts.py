@@ -78,7 +78,3 @@ def test_a_link_is_two_frames_in_their_order() -> None:
     assert judged("ANSWER: map -> odom", link)[0]
     assert judged("ANSWER: map to odom", link)[0]
     assert not judged("ANSWER: odom -> map", link)[0]
-
-
-def test_a_part_is_the_same_after_it_was_written_as_json() -> None:
-    assert [InspectionPart.of(part.as_json()) for part in MAP] == list(MAP)

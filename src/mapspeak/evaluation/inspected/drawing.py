@@ -1,20 +1,21 @@
 """A robot's ROS in good order, of which all names and figures are drawn."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 
-from mapspeak.evaluation.inspected.contents import Beams, Cells, Fields, Transform, Transforms
 from mapspeak.evaluation.inspected.playing import (
-    Hearing,
     InspectedSystem,
     OfferedService,
     Stream,
+    Subscription,
 )
 from mapspeak.geometry import Pose
 from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.grids import write_grid
+from mapspeak.ros.messages.poses import FrameTransform
 from mapspeak.spatial import OccupancyGrid
 
 SCAN, IMU, ODOMETRY = "sensor_msgs/LaserScan", "sensor_msgs/Imu", "nav_msgs/Odometry"
@@ -33,85 +34,59 @@ MEASURED = (
 )  # fmt: skip
 
 
+def _one_of(*choices: str) -> Any:  # noqa: ANN401 - as dataclasses.field
+    return field(metadata={"choices": choices})
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Names:
     """What the parts of one robot's ROS are called: nodes, topics, frames, and a type of its own.
 
-    Attributes:
-        laser: The node of the laser scanner; others likewise.
-        motors: Drives the wheels and tells the odometry.
-        locator: Finds the robot's place on the map.
-        smoother: Hands velocities on to the motors.
-        watcher: Looks after sensors and battery.
-        device: What the robot carries; its type is `device_type`.
-        scan: The topic of the scans; others likewise.
-        velocity: The topic that the motors listen to.
-        wish: The topic of the velocities that navigation wants.
-        base_frame: The robot's frame on the floor.
-        laser_frame: The scanner's.
+    `motors` drives the wheels and publishes the odometry, `smoother` hands velocities on to it,
+    `locator` finds the robot's place on the map, and `watcher` looks after sensors and battery.
+    `velocity` is the topic that the motors subscribe to, `wish` that of the navigation's
+    velocities. `device` is what the robot carries; it publishes `status`, of `device_type`.
     """
 
-    laser: str
-    motors: str
-    imu: str
-    sonar: str
-    battery: str
-    joints: str
-    map_server: str
-    locator: str
-    navigator: str
-    smoother: str
-    joystick: str
-    describer: str
-    watcher: str
-    device: str
-    scan: str
-    imu_data: str
-    range: str
-    charge: str
-    joint_states: str
-    map: str
-    velocity: str
-    wish: str
-    status: str
-    device_type: str
-    base_frame: str
-    laser_frame: str
-
-
-CHOICES: Mapping[str, Sequence[str]] = {
-    "laser": ("/rplidar_node", "/sick_tim", "/hokuyo_node", "/ydlidar_driver", "/urg_node"),
-    "motors": ("/kobuki_node", "/wheel_driver", "/husky_base", "/chassis", "/motor_bridge"),
-    "imu": ("/imu_driver", "/bno055", "/xsens_driver", "/phidgets_imu"),
-    "sonar": ("/sonar_node", "/ultrasound_driver", "/range_board"),
-    "battery": ("/battery_monitor", "/bms", "/power_board"),
-    "joints": ("/arm_driver", "/joint_publisher", "/gripper_driver"),
-    "map_server": ("/map_server", "/map_keeper", "/floor_plan"),
-    "locator": ("/amcl", "/localizer", "/cartographer_node", "/slam_toolbox"),
-    "navigator": ("/controller_server", "/local_planner", "/path_follower", "/pilot"),
-    "smoother": ("/velocity_smoother", "/twist_mux", "/collision_monitor", "/speed_limiter"),
-    "joystick": ("/teleop_node", "/gamepad", "/joy_teleop", "/remote_control"),
-    "describer": ("/robot_state_publisher",),
-    "watcher": ("/health_monitor", "/watchdog", "/diagnostics_collector"),
-    "device": ("/lift_node", "/docking_agent", "/conveyor_node", "/tray_node"),
-    "scan": ("/scan", "/front_scan", "/lidar/scan", "/base_scan"),
-    "imu_data": ("/imu/data", "/imu", "/imu/raw"),
-    "range": ("/sonar", "/range/front", "/ultrasound"),
-    "charge": ("/battery_state", "/battery", "/power/battery"),
-    "joint_states": ("/joint_states", "/arm/joint_states"),
-    "map": ("/map", "/floor_map", "/building/map", "/static_map"),
-    "velocity": ("/cmd_vel", "/base/cmd_vel", "/mobile_base/velocity"),
-    "wish": ("/nav_vel", "/cmd_vel_raw", "/planner/cmd_vel"),
-    "status": ("/device/status", "/load/state", "/payload"),
-    "device_type": ("lift_msgs/LiftStatus", "tray_msgs/TrayState", "dock_msgs/DockReport"),
-    "base_frame": ("base_footprint", "base_link", "chassis_link"),
-    "laser_frame": ("laser", "laser_link", "lidar_frame"),
-}
+    laser: str = _one_of(
+        "/rplidar_node", "/sick_tim", "/hokuyo_node", "/ydlidar_driver", "/urg_node"
+    )
+    motors: str = _one_of(
+        "/kobuki_node", "/wheel_driver", "/husky_base", "/chassis", "/motor_bridge"
+    )
+    imu: str = _one_of("/imu_driver", "/bno055", "/xsens_driver", "/phidgets_imu")
+    sonar: str = _one_of("/sonar_node", "/ultrasound_driver", "/range_board")
+    battery: str = _one_of("/battery_monitor", "/bms", "/power_board")
+    joints: str = _one_of("/arm_driver", "/joint_publisher", "/gripper_driver")
+    map_server: str = _one_of("/map_server", "/map_keeper", "/floor_plan")
+    locator: str = _one_of("/amcl", "/localizer", "/cartographer_node", "/slam_toolbox")
+    navigator: str = _one_of("/controller_server", "/local_planner", "/path_follower", "/pilot")
+    smoother: str = _one_of(
+        "/velocity_smoother", "/twist_mux", "/collision_monitor", "/speed_limiter"
+    )
+    joystick: str = _one_of("/teleop_node", "/gamepad", "/joy_teleop", "/remote_control")
+    describer: str = _one_of("/robot_state_publisher")
+    watcher: str = _one_of("/health_monitor", "/watchdog", "/diagnostics_collector")
+    device: str = _one_of("/lift_node", "/docking_agent", "/conveyor_node", "/tray_node")
+    scan: str = _one_of("/scan", "/front_scan", "/lidar/scan", "/base_scan")
+    imu_data: str = _one_of("/imu/data", "/imu", "/imu/raw")
+    range: str = _one_of("/sonar", "/range/front", "/ultrasound")
+    charge: str = _one_of("/battery_state", "/battery", "/power/battery")
+    joint_states: str = _one_of("/joint_states", "/arm/joint_states")
+    map: str = _one_of("/map", "/floor_map", "/building/map", "/static_map")
+    velocity: str = _one_of("/cmd_vel", "/base/cmd_vel", "/mobile_base/velocity")
+    wish: str = _one_of("/nav_vel", "/cmd_vel_raw", "/planner/cmd_vel")
+    status: str = _one_of("/device/status", "/load/state", "/payload")
+    device_type: str = _one_of(
+        "lift_msgs/LiftStatus", "tray_msgs/TrayState", "dock_msgs/DockReport"
+    )
+    base_frame: str = _one_of("base_footprint", "base_link", "chassis_link")
+    laser_frame: str = _one_of("laser", "laser_link", "lidar_frame")
 
 
 def draw_names(random: np.random.Generator) -> Names:
     """Draw what everything is called."""
-    return Names(**{each.name: _one(random, CHOICES[each.name]) for each in fields(Names)})
+    return Names(**{each.name: _one(random, each.metadata["choices"]) for each in fields(Names)})
 
 
 def draw_system(
@@ -128,8 +103,8 @@ def draw_system(
     bare = InspectedSystem(
         dialect=dialect,
         started_s=float(random.integers(FIRST_S, LAST_S)),
-        streams=(*_sensors(random, names), *_maps(names, grid), *_motion(names)),
-        hearings=_hearings(names),
+        streams=(*_sensors(random, names), *_maps(names, grid, dialect), *_motion(names)),
+        subscriptions=_subscriptions(names),
         services=_services(random, names),
         types={names.device_type: _draw_type(random)},
     )
@@ -144,16 +119,24 @@ def _sensors(random: np.random.Generator, names: Names) -> tuple[Stream, ...]:
     laser_hz = round(2 * SLOWEST_HZ * FASTER ** random.random()) / 2
     walls_m = round(float(random.uniform(1.0, 6.0)), 2)
     said = _figures(random, names)
+    said["scan"] = {
+        "angle_min": -3.14,
+        "angle_max": 3.14,
+        "angle_increment": 6.28 / (N_BEAMS - 1),
+        "range_min": 0.05,
+        "range_max": 12.0,
+        "ranges": [walls_m] * N_BEAMS,
+    }
     return tuple(
-        Stream(node=node, topic=topic, type=kind, content=content, rate_hz=rate_hz)
-        for node, topic, kind, content, rate_hz in (
-            (names.laser, names.scan, SCAN, Beams(names.laser_frame, N_BEAMS, walls_m), laser_hz),
-            (names.motors, "/odom", ODOMETRY, Fields(said["odometry"], "odom"), 10.0),
-            (names.imu, names.imu_data, IMU, Fields(said["imu"], "imu_link"), 20.0),
-            (names.sonar, names.range, SONAR, Fields(said["sonar"], "sonar_link"), 5.0),
-            (names.battery, names.charge, BATTERY, Fields(said["battery"], names.base_frame), 2.0),
-            (names.joints, names.joint_states, JOINTS, Fields(said["joints"], ""), 10.0),
-            (names.device, names.status, names.device_type, Fields(), 2.0),
+        Stream(node=node, topic=topic, type=kind, values=values, frame_id=frame, rate_hz=rate_hz)
+        for node, topic, kind, values, frame, rate_hz in (
+            (names.laser, names.scan, SCAN, said["scan"], names.laser_frame, laser_hz),
+            (names.motors, "/odom", ODOMETRY, said["odometry"], "odom", 10.0),
+            (names.imu, names.imu_data, IMU, said["imu"], "imu_link", 20.0),
+            (names.sonar, names.range, SONAR, said["sonar"], "sonar_link", 5.0),
+            (names.battery, names.charge, BATTERY, said["battery"], names.base_frame, 2.0),
+            (names.joints, names.joint_states, JOINTS, said["joints"], "", 10.0),
+            (names.device, names.status, names.device_type, {}, None, 2.0),
         )
     )
 
@@ -192,44 +175,52 @@ def _figures(random: np.random.Generator, names: Names) -> dict[str, dict[str, A
     }
 
 
-def _maps(names: Names, grid: OccupancyGrid) -> tuple[Stream, ...]:
-    around = OccupancyGrid(
-        cells=np.zeros((LOCAL_CELLS, LOCAL_CELLS), dtype=np.int8), resolution_m=0.05
-    )
+def _maps(names: Names, grid: OccupancyGrid, dialect: Dialect) -> tuple[Stream, ...]:
+    cells = np.zeros((LOCAL_CELLS, LOCAL_CELLS), dtype=np.int8)
+    around = OccupancyGrid(cells=cells, resolution_m=0.05)
     local = f"{names.navigator}/local_costmap"
-    return (
-        Stream(node=names.map_server, topic=names.map, type=GRID, content=Cells(grid),
-               rate_hz=None),
-        Stream(node=names.navigator, topic=local, type=GRID, content=Cells(around), rate_hz=2.0),
-    )  # fmt: skip
+    return tuple(
+        Stream(node=node, topic=topic, type=GRID, values=values, rate_hz=rate_hz)
+        for node, topic, values, rate_hz in (
+            (names.map_server, names.map, write_grid(grid, dialect=dialect), None),
+            (names.navigator, local, write_grid(around, dialect=dialect), 2.0),
+        )
+    )
 
 
 def _motion(names: Names) -> tuple[Stream, ...]:
-    place = Transforms((Transform("map", "odom", Pose(0.4, -0.2, 0.1)),))
-    wheels = Transforms((Transform("odom", names.base_frame, Pose(1.5, 0.7, 0.4)),))
-    fixed = Transforms(
-        (
-            Transform(names.base_frame, "body", Pose(0.0, 0.0)),
-            Transform("body", names.laser_frame, Pose(0.2, 0.0)),
+    place = (_transform("map", "odom", Pose(0.4, -0.2, 0.1)),)
+    wheels = (_transform("odom", names.base_frame, Pose(1.5, 0.7, 0.4)),)
+    fixed = (
+        _transform(names.base_frame, "body", Pose(0.0, 0.0)),
+        _transform("body", names.laser_frame, Pose(0.2, 0.0)),
+    )
+    tf = tuple(
+        Stream(node=node, topic=topic, type=TRANSFORMS, transforms=transforms, rate_hz=rate_hz)
+        for node, topic, transforms, rate_hz in (
+            (names.locator, "/tf", place, 10.0),
+            (names.motors, "/tf", wheels, 20.0),
+            (names.describer, "/tf_static", fixed, None),
         )
     )
-    still = Fields()
-    return tuple(
-        Stream(node=node, topic=topic, type=kind, content=content, rate_hz=rate_hz)
-        for node, topic, kind, content, rate_hz in (
-            (names.locator, "/tf", TRANSFORMS, place, 10.0),
-            (names.motors, "/tf", TRANSFORMS, wheels, 20.0),
-            (names.describer, "/tf_static", TRANSFORMS, fixed, None),
-            (names.navigator, names.wish, TWIST, still, 10.0),
-            (names.smoother, names.velocity, TWIST, still, 10.0),
-            (names.joystick, "/joy", JOY, Fields({"axes": [0.0, 0.0]}, ""), 5.0),
-            (names.navigator, "/plan", PATH, Fields({}, "map"), 1.0),
+    commands = tuple(
+        Stream(node=node, topic=topic, type=kind, values=values, frame_id=frame, rate_hz=rate_hz)
+        for node, topic, kind, values, frame, rate_hz in (
+            (names.navigator, names.wish, TWIST, {}, None, 10.0),
+            (names.smoother, names.velocity, TWIST, {}, None, 10.0),
+            (names.joystick, "/joy", JOY, {"axes": [0.0, 0.0]}, "", 5.0),
+            (names.navigator, "/plan", PATH, {}, "map", 1.0),
         )
     )
+    return (*tf, *commands)
 
 
-def _hearings(names: Names) -> tuple[Hearing, ...]:
-    heard: dict[str, tuple[tuple[str, str], ...]] = {
+def _transform(parent: str, child: str, pose: Pose) -> FrameTransform:
+    return FrameTransform(parent_from_child=pose, parent=parent, child=child, stamp_s=0.0)
+
+
+def _subscriptions(names: Names) -> tuple[Subscription, ...]:
+    wanted: dict[str, tuple[tuple[str, str], ...]] = {
         names.locator: ((names.map, GRID), (names.scan, SCAN), ("/tf_static", TRANSFORMS)),
         names.navigator: (
             (names.map, GRID), (names.scan, SCAN), ("/odom", ODOMETRY), ("/tf", TRANSFORMS),
@@ -244,8 +235,8 @@ def _hearings(names: Names) -> tuple[Hearing, ...]:
         ),
     }  # fmt: skip
     return tuple(
-        Hearing(node=node, topic=topic, type=kind)
-        for node, topics in heard.items()
+        Subscription(node=node, topic=topic, type=kind)
+        for node, topics in wanted.items()
         for topic, kind in topics
     )
 

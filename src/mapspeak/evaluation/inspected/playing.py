@@ -7,8 +7,8 @@ from typing import Any
 
 import anyio
 
-from mapspeak.evaluation.inspected.contents import Content, Transforms
-from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.fields import Dialect, Message, write_header
+from mapspeak.ros.messages.poses import FrameTransform, write_transforms
 from mapspeak.rosbridge_server import (
     Hub,
     Interfaces,
@@ -22,15 +22,14 @@ from mapspeak.rosbridge_server import (
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stream:
-    """What one node publishes on one topic.
+    """What one node publishes on one topic; types are written as "package/Type".
 
     Attributes:
-        node: Its full name.
-        topic: Likewise.
-        type: Of the messages, as "package/Type".
-        content: What they say.
+        values: The fields of each message, but for those with their defaults.
+        frame_id: Of the header that is written with each stamp; None for a message without one.
+        transforms: What tf messages carry, in place of `values`; each message has its own stamp.
         rate_hz: Messages in a second of the wall clock; 0 for a stream that has died, None for one
             message, which is kept for all who come later.
         lag_s: How far its stamps lie behind the robot's clock.
@@ -39,20 +38,25 @@ class Stream:
     node: str
     topic: str
     type: str
-    content: Content
+    values: Message = field(default_factory=dict)
+    frame_id: str | None = None
+    transforms: tuple[FrameTransform, ...] = ()
     rate_hz: float | None
     lag_s: float = 0.0
 
+    def message(self, stamp_s: float, dialect: Dialect) -> Message:
+        """Return the message of a time by the robot's clock."""
+        if self.transforms:
+            stamped = [replace(each, stamp_s=stamp_s) for each in self.transforms]
+            return write_transforms(stamped, dialect=dialect)
+        if self.frame_id is None:
+            return self.values
+        return {"header": write_header(self.frame_id, stamp_s, dialect=dialect), **self.values}
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Hearing:
-    """One node that listens to one topic.
-
-    Attributes:
-        node: Its full name.
-        topic: Likewise.
-        type: Of the messages that it expects, as "package/Type".
-    """
+class Subscription:
+    """One node that subscribes to one topic, and the type that it expects."""
 
     node: str
     topic: str
@@ -61,13 +65,7 @@ class Hearing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OfferedService:
-    """One service; whoever calls it gets an empty answer.
-
-    Attributes:
-        node: Which offers it.
-        service: Its full name.
-        type: As "package/Type".
-    """
+    """One service of a node; its answer is always empty."""
 
     node: str
     service: str
@@ -79,10 +77,7 @@ class InspectedSystem:
     """All that the robot's ROS consists of.
 
     Attributes:
-        dialect: Which ROS it is.
-        started_s: The robot's clock in the beginning, in seconds.
-        streams: What is published.
-        hearings: What is heard.
+        started_s: The robot's clock in the beginning.
         services: What is offered, besides what every ROS offers.
         parameters: Values by nodes and their own names; each node is named here.
         types: The texts of types that no ROS comes with, by "package/Type".
@@ -91,7 +86,7 @@ class InspectedSystem:
     dialect: Dialect
     started_s: float
     streams: tuple[Stream, ...]
-    hearings: tuple[Hearing, ...]
+    subscriptions: tuple[Subscription, ...]
     services: tuple[OfferedService, ...] = ()
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     types: Mapping[str, str] = field(default_factory=dict)
@@ -99,21 +94,22 @@ class InspectedSystem:
     @property
     def nodes(self) -> tuple[str, ...]:
         """All nodes by name."""
-        named = {each.node for group in (self.streams, self.hearings) for each in group}
-        return tuple(sorted(named | set(self.parameters) | {each.node for each in self.services}))
+        groups = (self.streams, self.subscriptions, self.services)
+        named = {each.node for group in groups for each in group}
+        return tuple(sorted(named | set(self.parameters)))
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """All topics that somebody publishes or hears, by name."""
+        """All topics that are published or subscribed to, by name."""
         return tuple(sorted(self._types()))
 
     def publishers_of(self, topic: str) -> tuple[str, ...]:
         """Return the nodes that publish a topic, by name."""
         return tuple(sorted({each.node for each in self.streams if each.topic == topic}))
 
-    def hearers_of(self, topic: str) -> tuple[str, ...]:
-        """Return the nodes that hear a topic, by name."""
-        return tuple(sorted({each.node for each in self.hearings if each.topic == topic}))
+    def subscribers_of(self, topic: str) -> tuple[str, ...]:
+        """Return the nodes that subscribe to a topic, by name."""
+        return tuple(sorted({each.node for each in self.subscriptions if each.topic == topic}))
 
     def stream_on(self, topic: str) -> Stream:
         """Return the stream on a topic that has one."""
@@ -124,8 +120,8 @@ class InspectedSystem:
         return self._types()[topic]
 
     def _types(self) -> dict[str, str]:
-        heard = {each.topic: each.type for each in self.hearings}
-        return heard | {each.topic: each.type for each in self.streams}
+        wanted = {each.topic: each.type for each in self.subscriptions}
+        return wanted | {each.topic: each.type for each in self.streams}
 
 
 ROSOUT = "/rosout"
@@ -161,20 +157,14 @@ def _build(system: InspectedSystem, clock: Callable[[], float]) -> RosSystem:
     parameters = Parameters(
         system.dialect, {node: dict(values) for node, values in system.parameters.items()}
     )
-    _use_own_clock(system, parameters)
-    if system.dialect is Dialect.ROS2:
+    # No node runs by /clock, which is not there; ROS 1 says that once for all.
+    is_ros2 = system.dialect is Dialect.ROS2
+    for prefix in [f"{node}:" for node in system.parameters] if is_ros2 else ["/"]:
+        parameters.put(f"{prefix}use_sim_time", value=False)
+    if is_ros2:
         add_parameter_services(played.services, parameters, interfaces)
     add_rosapi(played, parameters, clock)
     return played
-
-
-def _use_own_clock(system: InspectedSystem, parameters: Parameters) -> None:
-    """Say of all nodes that they do not run by /clock, which is not there."""
-    if system.dialect is Dialect.ROS1:
-        parameters.put("/use_sim_time", value=False)
-    else:
-        for node in system.parameters:
-            parameters.put(f"{node}:use_sim_time", value=False)
 
 
 def _topics_of(system: InspectedSystem) -> list[Topic]:
@@ -184,7 +174,7 @@ def _topics_of(system: InspectedSystem) -> list[Topic]:
             type=system.type_of(name),
             is_latched=any(each.topic == name and each.rate_hz is None for each in system.streams),
             publishers=system.publishers_of(name),
-            subscribers=system.hearers_of(name),
+            subscribers=system.subscribers_of(name),
         )
         for name in system.topics
     ]
@@ -221,34 +211,32 @@ async def _keep_publishing(
 
 
 def _publish(played: RosSystem, stream: Stream, now_s: float) -> None:
-    message = stream.content.write(now_s - stream.lag_s, played.dialect)
+    message = stream.message(now_s - stream.lag_s, played.dialect)
     played.hub.publish(stream.topic, played.interfaces.fill(stream.type, message))
 
 
 def with_dead_stream(system: InspectedSystem, topic: str) -> InspectedSystem:
     """Let a topic fall silent; its node still says that it publishes it."""
-    return _with_streams(
-        system, lambda each: replace(each, rate_hz=0.0) if each.topic == topic else each
-    )
+    return _change(system, lambda each: each.topic == topic, rate_hz=0.0)
 
 
 def with_late_stream(system: InspectedSystem, topic: str, lag_s: float) -> InspectedSystem:
     """Set back the clock by which a topic's messages are stamped, by some seconds."""
-    return _with_streams(
-        system, lambda each: replace(each, lag_s=lag_s) if each.topic == topic else each
-    )
+    return _change(system, lambda each: each.topic == topic, lag_s=lag_s)
 
 
 def with_late_transform(system: InspectedSystem, child: str, lag_s: float) -> InspectedSystem:
     """Set back the stamps of the transform to a frame, by some seconds."""
-    return _with_streams(
-        system, lambda each: replace(each, lag_s=lag_s) if _tells_of(each, child) else each
-    )
+    return _change(system, lambda each: _carries(each, child), lag_s=lag_s)
 
 
 def with_cut_transform(system: InspectedSystem, child: str) -> InspectedSystem:
     """End the transform to a frame, and leave those that are told together with it."""
-    return _with_streams(system, lambda each: _cut(each, child) if _tells_of(each, child) else each)
+    stream = next(each for each in system.streams if _carries(each, child))
+    left = tuple(each for each in stream.transforms if each.child != child)
+    if not left:
+        return _change(system, lambda each: each is stream, rate_hz=0.0)
+    return _change(system, lambda each: each is stream, transforms=left)
 
 
 def with_second_publisher(system: InspectedSystem, topic: str, node: str) -> InspectedSystem:
@@ -257,15 +245,15 @@ def with_second_publisher(system: InspectedSystem, topic: str, node: str) -> Ins
     return replace(system, streams=(*system.streams, second))
 
 
-def with_lost_hearer(
+def with_lost_subscriber(
     system: InspectedSystem, node: str, topic: str, instead: str
 ) -> InspectedSystem:
-    """Let a node listen to another topic instead of the right one, which nobody publishes."""
-    hearings = tuple(
+    """Let a node subscribe to another topic, without a publisher, instead of the right one."""
+    changed = tuple(
         replace(each, topic=instead) if (each.node, each.topic) == (node, topic) else each
-        for each in system.hearings
+        for each in system.subscriptions
     )
-    return replace(system, hearings=hearings)
+    return replace(system, subscriptions=changed)
 
 
 def with_parameter(system: InspectedSystem, node: str, name: str, value: float) -> InspectedSystem:
@@ -274,9 +262,10 @@ def with_parameter(system: InspectedSystem, node: str, name: str, value: float) 
     return replace(system, parameters={**system.parameters, node: changed})
 
 
-def without_hearers(system: InspectedSystem, topic: str) -> InspectedSystem:
-    """Take away all who hear a topic."""
-    return replace(system, hearings=tuple(each for each in system.hearings if each.topic != topic))
+def without_subscribers(system: InspectedSystem, topic: str) -> InspectedSystem:
+    """Take away all subscriptions of a topic."""
+    left = tuple(each for each in system.subscriptions if each.topic != topic)
+    return replace(system, subscriptions=left)
 
 
 def without_node(system: InspectedSystem, node: str) -> InspectedSystem:
@@ -284,22 +273,20 @@ def without_node(system: InspectedSystem, node: str) -> InspectedSystem:
     return replace(
         system,
         streams=tuple(each for each in system.streams if each.node != node),
-        hearings=tuple(each for each in system.hearings if each.node != node),
+        subscriptions=tuple(each for each in system.subscriptions if each.node != node),
         services=tuple(each for each in system.services if each.node != node),
         parameters={name: each for name, each in system.parameters.items() if name != node},
     )
 
 
-def _with_streams(system: InspectedSystem, change: Callable[[Stream], Stream]) -> InspectedSystem:
-    return replace(system, streams=tuple(change(each) for each in system.streams))
+def _carries(stream: Stream, child: str) -> bool:
+    return any(each.child == child for each in stream.transforms)
 
 
-def _tells_of(stream: Stream, child: str) -> bool:
-    content = stream.content
-    return isinstance(content, Transforms) and any(each.child == child for each in content.all)
-
-
-def _cut(stream: Stream, child: str) -> Stream:
-    told = stream.content.all if isinstance(stream.content, Transforms) else ()
-    left = tuple(each for each in told if each.child != child)
-    return replace(stream, content=Transforms(left)) if left else replace(stream, rate_hz=0.0)
+def _change(
+    system: InspectedSystem,
+    is_meant: Callable[[Stream], bool],
+    **changes: Any,  # noqa: ANN401 - fields of Stream
+) -> InspectedSystem:
+    streams = (replace(each, **changes) if is_meant(each) else each for each in system.streams)
+    return replace(system, streams=tuple(streams))

@@ -10,8 +10,10 @@ from mapspeak.evaluation.scores.answers import (
     read_point,
     read_said,
     read_word,
+    verdict,
 )
 from mapspeak.evaluation.scores.judging import (
+    count_known,
     judge_coverage,
     judge_near,
     judge_pose,
@@ -37,6 +39,7 @@ __all__ = [
     "TableRow",
     "TruePassage",
     "bootstrap_interval",
+    "count_known",
     "count_rows",
     "judge_choice",
     "judge_coverage",
@@ -53,5 +56,6 @@ __all__ = [
     "read_said",
     "read_word",
     "spl",
+    "verdict",
     "wilson_interval",
 ]

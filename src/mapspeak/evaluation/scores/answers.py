@@ -91,9 +91,8 @@ def judge_number(evidence: Evidence, truth: float, *, unit: str, tolerance: floa
         return no_answer(evidence)
     figures = {"off": round(abs(said - truth), 3), "truth": round(truth, 3)}
     reason = f"It said {said:g} {unit}, true are {truth:.2f} {unit}.".replace(" .", ".")
-    if abs(said - truth) <= tolerance:
-        return Score(is_success=True, figures=figures, reason=reason)
-    return Score(is_success=False, failure=Failure.WRONG_ANSWER, figures=figures, reason=reason)
+    is_right = abs(said - truth) <= tolerance
+    return verdict(reason, figures, failure=None if is_right else Failure.WRONG_ANSWER)
 
 
 def judge_choice(evidence: Evidence, truth: Collection[str]) -> Score:
@@ -103,10 +102,8 @@ def judge_choice(evidence: Evidence, truth: Collection[str]) -> Score:
         return no_answer(evidence)
     wrong = len(said ^ set(truth))
     reason = f"It said {_listed(said)}, true is {_listed(truth)}."
-    figures = {"n_wrong": float(wrong)}
-    if not wrong:
-        return Score(is_success=True, figures=figures, reason=reason)
-    return Score(is_success=False, failure=Failure.WRONG_ANSWER, figures=figures, reason=reason)
+    failure = Failure.WRONG_ANSWER if wrong else None
+    return verdict(reason, {"n_wrong": float(wrong)}, failure=failure)
 
 
 def _listed(letters: Collection[str]) -> str:
@@ -116,11 +113,13 @@ def _listed(letters: Collection[str]) -> str:
 def no_answer(evidence: Evidence) -> Score:
     """Return the score of a trial that ended without an answer in the form asked for."""
     gave_up = evidence.state is TrialState.GAVE_UP
-    return Score(
-        is_success=False,
-        failure=Failure.GAVE_UP if gave_up else Failure.NO_ANSWER,
-        reason="There is no answer in the form that was asked for.",
-    )
+    reason = "There is no answer in the form that was asked for."
+    return verdict(reason, {}, failure=Failure.GAVE_UP if gave_up else Failure.NO_ANSWER)
+
+
+def verdict(reason: str, figures: dict[str, float], *, failure: Failure | None = None) -> Score:
+    """Return a score: a success unless a failure is named."""
+    return Score(is_success=failure is None, failure=failure, figures=figures, reason=reason)
 
 
 def read_said(text: str) -> str | None:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 
-from mapspeak.evaluation.scores.answers import Evidence
+from mapspeak.evaluation.scores.answers import Evidence, verdict
 from mapspeak.evaluation.scores.site import BESIDE_M, GroundTruth
 from mapspeak.evaluation.trials import Failure, Score, TrialState
 from mapspeak.geometry import Point, wrap_angle
@@ -50,36 +50,37 @@ def judge_coverage(site: GroundTruth, evidence: Evidence) -> Score:
     `coverage_paper_ratio` the paper's: free area over free area, wherever it lies.
     """
     if evidence.grid is None:
-        return _failed(evidence, Failure.INCOMPLETE, "The robot has left no map.", {})
+        return _judged(evidence, "The robot has left no map.", {}, Failure.INCOMPLETE)
     seeable = site.floor.visible
     whole = measure_coverage(evidence.grid, seeable)
     reachable = measure_coverage(evidence.grid, seeable, reachable=site.reachable)
+    wanted = site.reachable & seeable.free
+    n_wanted = int(wanted.sum())
+    known_ratio = count_known(evidence.grid, seeable, wanted) / n_wanted if n_wanted else 1.0
     n_recorded = len(RECORD.findall(evidence.memory or ""))
     figures = {
         "coverage_recall": whole.recall,
         "coverage_reachable_recall": reachable.recall,
-        "coverage_known_ratio": known_ratio(evidence.grid, seeable, site.reachable & seeable.free),
+        "coverage_known_ratio": known_ratio,
         "coverage_precision": whole.precision,
         "coverage_paper_ratio": whole.paper_ratio,
         "n_waypoints": float(n_recorded),
     }
     said = (
         f"{100 * whole.recall:.2f} % of the floor in sight shown as free, "
-        f"{100 * figures['coverage_known_ratio']:.2f} % of the reachable floor known, "
+        f"{100 * known_ratio:.2f} % of the reachable floor known, "
         f"{n_recorded} places remembered."
     )
     if whole.recall < ENOUGH_COVERAGE or not n_recorded:
-        return _failed(evidence, Failure.INCOMPLETE, said, figures)
-    return Score(is_success=True, figures=_rounded(figures), reason=said)
+        return _judged(evidence, said, figures, Failure.INCOMPLETE)
+    return verdict(said, _rounded(figures))
 
 
-def known_ratio(grid: OccupancyGrid, reference: OccupancyGrid, wanted: Mask) -> float:
-    """Return the share of some cells of a reference that a map knows; 1 where there are none."""
-    rows, cols = np.nonzero(wanted)
-    there_rows, there_cols = grid.cells_at(reference.points_at(rows, cols))
-    is_inside = grid.contains_cells(there_rows, there_cols)
-    n_known = (~grid.unknown[there_rows[is_inside], there_cols[is_inside]]).sum()
-    return float(n_known) / rows.size if rows.size else 1.0
+def count_known(grid: OccupancyGrid, reference: OccupancyGrid, wanted: Mask) -> int:
+    """Return how many of some cells of a reference a map knows."""
+    rows, cols = grid.cells_at(reference.points_at(*np.nonzero(wanted)))
+    is_inside = grid.contains_cells(rows, cols)
+    return int((~grid.unknown[rows[is_inside], cols[is_inside]]).sum())
 
 
 def judge_room(site: GroundTruth, evidence: Evidence, wanted: Collection[str]) -> Score:
@@ -87,19 +88,16 @@ def judge_room(site: GroundTruth, evidence: Evidence, wanted: Collection[str]) -
     here = site.room_at(evidence.end)
     named = " or ".join(sorted(wanted))
     if here is None:
-        return _failed(evidence, Failure.WRONG_PLACE, f"It stands in no room, not in {named}.", {})
+        said = f"It stands in no room, not in {named}."
+        return _judged(evidence, said, {}, Failure.WRONG_PLACE)
     figures = {"room_area_m2": here.free_area_m2}
     name = here.room.name
     if name in wanted:
-        return _succeeded(site, evidence, f"It stands in {name}.", figures)
-    is_corridor = here.room.room_class is RoomClass.CORRIDOR
-    is_corridor_wanted = any(
-        site.room_named(each).room.room_class is RoomClass.CORRIDOR for each in wanted
-    )
-    kind = (
-        Failure.CORRIDOR_FOR_ROOM if is_corridor and not is_corridor_wanted else Failure.WRONG_SIZE
-    )
-    return _failed(evidence, kind, f"It stands in {name}, not in {named}.", figures)
+        return _judged(evidence, f"It stands in {name}.", figures)
+    classes = {site.room_named(each).room.room_class for each in wanted}
+    is_corridor = here.room.room_class is RoomClass.CORRIDOR and RoomClass.CORRIDOR not in classes
+    kind = Failure.CORRIDOR_FOR_ROOM if is_corridor else Failure.WRONG_SIZE
+    return _judged(evidence, f"It stands in {name}, not in {named}.", figures, kind)
 
 
 def judge_thing(site: GroundTruth, evidence: Evidence, things: Sequence[WorldObject]) -> Score:
@@ -109,23 +107,19 @@ def judge_thing(site: GroundTruth, evidence: Evidence, things: Sequence[WorldObj
     in_sight = [thing for thing in things if site.is_in_sight(here, thing)]
     nearest = min(in_sight or things, key=lambda thing: away_m[thing.name])
     distance_m = away_m[nearest.name]
-    figures = {"distance_to_object_m": distance_m}
-    if in_sight and distance_m <= BESIDE_M:
-        said = f"{distance_m:.1f} m from {nearest.name}, in sight."
-        return _succeeded(site, evidence, said, figures)
     seen = "in sight" if in_sight else "out of sight"
     said = f"{distance_m:.1f} m from {nearest.name}, {seen}."
-    return _failed(evidence, Failure.WRONG_OBJECT, said, figures)
+    is_there = bool(in_sight) and distance_m <= BESIDE_M
+    failure = None if is_there else Failure.WRONG_OBJECT
+    return _judged(evidence, said, {"distance_to_object_m": distance_m}, failure)
 
 
-def judge_near(site: GroundTruth, evidence: Evidence, goal: Point, *, within_m: float) -> Score:
+def judge_near(evidence: Evidence, goal: Point, *, within_m: float) -> Score:
     """Judge whether the robot stands where it should, to so many metres."""
     away_m = evidence.end.distance_to(goal)
     said = f"It stands {away_m:.2f} m from where it should."
-    figures = {"distance_to_goal_m": away_m}
-    if away_m <= within_m:
-        return _succeeded(site, evidence, said, figures)
-    return _failed(evidence, Failure.WRONG_PLACE, said, figures)
+    failure = None if away_m <= within_m else Failure.WRONG_PLACE
+    return _judged(evidence, said, {"distance_to_goal_m": away_m}, failure)
 
 
 def judge_pose(
@@ -137,10 +131,9 @@ def judge_pose(
     off_rad = abs(wrap_angle(here.point.bearing_to(place) - here.yaw_rad))
     figures = {"distance_to_object_m": away_m, "heading_off_deg": math.degrees(off_rad)}
     said = f"{away_m:.1f} m from {thing.name}, {math.degrees(off_rad):.0f} deg off."
-    is_right = away_m <= within_m and off_rad <= facing_rad
-    if is_right and site.is_in_sight(here.point, thing):
-        return _succeeded(site, evidence, said, figures)
-    return _failed(evidence, Failure.WRONG_PLACE, said, figures)
+    is_posed = away_m <= within_m and off_rad <= facing_rad
+    is_right = is_posed and site.is_in_sight(here.point, thing)
+    return _judged(evidence, said, figures, None if is_right else Failure.WRONG_PLACE)
 
 
 def judge_route(
@@ -154,11 +147,11 @@ def judge_route(
     figures = {"n_stops_reached": float(n_reached), "n_stops": float(len(stops))}
     said = f"It came to {n_reached} of {len(stops)} stops in their order."
     if n_reached < len(stops):
-        return _failed(evidence, Failure.INCOMPLETE, said, figures)
+        return _judged(evidence, said, figures, Failure.INCOMPLETE)
     if not _is_at(site, evidence.end, stops[-1]):
         said = "It went on after the last stop."
-        return _failed(evidence, Failure.WRONG_PLACE, said, figures)
-    return _succeeded(site, evidence, said, figures)
+        return _judged(evidence, said, figures, Failure.WRONG_PLACE)
+    return _judged(evidence, said, figures)
 
 
 def _is_at(site: GroundTruth, point: Point, things: Iterable[WorldObject]) -> bool:
@@ -168,22 +161,16 @@ def _is_at(site: GroundTruth, point: Point, things: Iterable[WorldObject]) -> bo
     )
 
 
-def _succeeded(
-    site: GroundTruth, evidence: Evidence, reason: str, figures: dict[str, float]
+def _judged(
+    evidence: Evidence, reason: str, figures: dict[str, float], failure: Failure | None = None
 ) -> Score:
-    del site
-    figures = {**figures, "n_collisions": float(evidence.last.n_collisions)}
-    return Score(is_success=True, figures=_rounded(figures), reason=reason)
-
-
-def _failed(evidence: Evidence, failure: Failure, reason: str, figures: dict[str, float]) -> Score:
-    """Return the score of a failure; one that never set out has another reason than its place."""
-    figures = {**figures, "n_collisions": float(evidence.last.n_collisions)}
-    if evidence.state is TrialState.GAVE_UP:
+    """Return the score of a drive; where it never set out, its place is not what went wrong."""
+    figures = _rounded({**figures, "n_collisions": float(evidence.last.n_collisions)})
+    if failure is not None and evidence.state is TrialState.GAVE_UP:
         failure = Failure.GAVE_UP
-    elif failure is not Failure.INCOMPLETE and evidence.last.driven_m < HARDLY_MOVED_M:
+    elif failure not in (None, Failure.INCOMPLETE) and evidence.last.driven_m < HARDLY_MOVED_M:
         failure = Failure.GOAL_REFUSED if evidence.n_errors else Failure.NO_ANSWER
-    return Score(is_success=False, failure=failure, figures=_rounded(figures), reason=reason)
+    return verdict(reason, figures, failure=failure)
 
 
 def _rounded(figures: dict[str, float]) -> dict[str, float]:

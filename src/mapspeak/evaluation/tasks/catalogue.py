@@ -4,29 +4,23 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.tasks.blocked import BlockedWay, StaleMap
-from mapspeak.evaluation.tasks.inspections import GRAPH_TASKS, MESSAGE_TASKS
+from mapspeak.evaluation.tasks.blocked import BLOCKED_TASKS
+from mapspeak.evaluation.tasks.inspections import INSPECTION_TASKS
 from mapspeak.evaluation.tasks.objects import OBJECT_TASKS
-from mapspeak.evaluation.tasks.paper import EXPLORE, Explore
+from mapspeak.evaluation.tasks.paper import EXPLORE, EXPLORE_TASK
 from mapspeak.evaluation.tasks.questions import QUESTION_TASKS
-from mapspeak.evaluation.tasks.relations import RELATION_TASKS, RouteTask
+from mapspeak.evaluation.tasks.relations import RELATION_TASKS, ROUTE_TASK
 from mapspeak.evaluation.tasks.rooms import ROOM_TASKS
-from mapspeak.evaluation.tasks.spoiled import SpoiledMemory, Spoiling
+from mapspeak.evaluation.tasks.spoiled import MEMORY_TASKS
 from mapspeak.evaluation.tasks.task import Task
 
-FAILURE_TASKS: tuple[Task, ...] = (
-    BlockedWay(),
-    StaleMap(),
-    *(SpoiledMemory(spoiling) for spoiling in Spoiling),
-)
-INSPECTION_TASKS: tuple[Task, ...] = (*GRAPH_TASKS, *MESSAGE_TASKS)
-
-_ALL: tuple[Task, ...] = (
-    Explore(),
+FAILURE_TASKS = (*BLOCKED_TASKS, *MEMORY_TASKS)
+_ALL = (
+    EXPLORE_TASK,
     *ROOM_TASKS,
     *OBJECT_TASKS,
     *RELATION_TASKS,
-    RouteTask(),
+    ROUTE_TASK,
     *QUESTION_TASKS,
     *FAILURE_TASKS,
     *INSPECTION_TASKS,

@@ -1,16 +1,13 @@
 """Things to go to: by name, by what they are for, with and without a memory of them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Protocol
 
 import numpy as np
 
 from mapspeak.evaluation.scores import BESIDE_M, Evidence, GroundTruth, judge_thing
-from mapspeak.evaluation.tasks.task import dice, draw_start
+from mapspeak.evaluation.tasks.task import Draw, Task, Truth
 from mapspeak.evaluation.trials import Limits, Score, Setting
-from mapspeak.geometry import Pose
 
 FIRE = "fire_extinguisher"
 FIRE_WISH = "Fire detected nearby. Navigate to the tool used for it."
@@ -76,131 +73,73 @@ SEARCH_LIMITS = Limits(n_calls=200, robot_time_s=2400.0, wall_s=900.0)
 OUT_OF_THE_WAY_M = 1.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ObjectRequest:
-    """A thing as it is asked for.
-
-    Attributes:
-        prompt: The words.
-        kind: What is meant.
-    """
-
-    prompt: str
-    kind: str
-
-
-class Draw(Protocol):
-    """Draws a wish that a world can fulfil."""
-
-    def __call__(self, site: GroundTruth, random: np.random.Generator) -> ObjectRequest:
-        """Return the wish."""
-        ...
-
-
 def findable_kinds(site: GroundTruth) -> tuple[str, ...]:
     """Return the kinds one can wish for of which the robot can get to all things of the world."""
     kinds = sorted({thing.kind for thing in site.world.objects} & set(WISHES))
     return tuple(kind for kind in kinds if site.beside(kind).any())
 
 
-def draw_wish(site: GroundTruth, random: np.random.Generator) -> ObjectRequest:
-    """Draw a kind that the world has, and words for it."""
-    kind = str(random.choice(findable_kinds(site)))
-    words = WISHES[kind]
-    return ObjectRequest(prompt=words[int(random.integers(len(words)))], kind=kind)
+def has_findable_kinds(site: GroundTruth) -> bool:
+    """Return True where the world has things to go to."""
+    return bool(findable_kinds(site))
 
 
-def ask_for_fire_tool(site: GroundTruth, random: np.random.Generator) -> ObjectRequest:
-    """Return the paper's Task 3."""
-    del site, random
-    return ObjectRequest(prompt=FIRE_WISH, kind=FIRE)
+def draw_wish(draw: Draw) -> tuple[str, str]:
+    """Draw a kind that the world has; return words for it, and the kind."""
+    kind = str(draw.random.choice(findable_kinds(draw.site)))
+    return draw.one_of(WISHES[kind]), kind
 
 
-def name_thing(site: GroundTruth, random: np.random.Generator) -> ObjectRequest:
-    """Draw a kind that the world has, and names it."""
-    kind = str(random.choice(findable_kinds(site)))
-    return ObjectRequest(
-        prompt=f"Find the nearest {site.label_of(kind)} and stop beside it.", kind=kind
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class ObjectTask:
-    """The robot goes to a thing that it remembers."""
-
-    name: str
-    draw: Draw
-    needs_map: bool = True
-
-    def is_offered(self, site: GroundTruth) -> bool:
-        """Return True where the world has such things."""
-        if self.draw is ask_for_fire_tool:
-            return bool(site.beside(FIRE).any())
-        return bool(findable_kinds(site))
-
-    def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
-        """Start anywhere but beside such a thing."""
-        random = dice(self.name, site, seed)
-        wish = self.draw(site, random)
-        start, shortest_m = draw_start_apart(site, random, wish.kind)
-        return Setting(
-            prompt=wish.prompt,
-            start=site.in_world(start),
-            is_known=True,
-            memory=memory,
-            truth={"kind": wish.kind, "shortest_m": shortest_m},
-        )
-
-    def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
-        """Score what the robot stands beside."""
-        return judge_thing(site, evidence, site.things(setting.truth["kind"]))
-
-
-@dataclass(frozen=True, slots=True)
-class SearchTask:
-    """The robot finds a named thing in a building that it has never seen."""
-
-    name: str = "search"
-    needs_map: bool = False
-
-    def is_offered(self, site: GroundTruth) -> bool:
-        """Return True where the world has such things."""
-        return bool(findable_kinds(site))
-
-    def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
-        """Start anywhere but beside such a thing, without map and memory."""
-        del memory
-        random = dice(self.name, site, seed)
-        wish = name_thing(site, random)
-        start, shortest_m = draw_start_apart(site, random, wish.kind)
-        return Setting(
-            prompt=wish.prompt,
-            start=site.in_world(start),
-            is_known=False,
-            tools=(*SEARCH_TOOLS, "explore"),
-            limits=SEARCH_LIMITS,
-            truth={"kind": wish.kind, "shortest_m": shortest_m},
-        )
-
-    def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
-        """Score what the robot stands beside."""
-        return judge_thing(site, evidence, site.things(setting.truth["kind"]))
-
-
-def draw_start_apart(
-    site: GroundTruth, random: np.random.Generator, kind: str
-) -> tuple[Pose, float]:
-    """Draw where the robot starts, and return the shortest way from there to a thing in sight."""
-    beside = site.beside(kind)
+def thing_setting(
+    draw: Draw,
+    prompt: str,
+    kind: str,
+    *,
+    is_known: bool = True,
+    tools: tuple[str, ...] = (),
+    limits: Limits | None = None,
+) -> Setting:
+    """Return the setting of a drive to a thing of a kind, from anywhere but beside one."""
+    site = draw.site
     around = np.logical_or.reduce(
         [site.near(site.place_of(t), BESIDE_M + OUT_OF_THE_WAY_M) for t in site.things(kind)]
     )
-    start = draw_start(site, random, without=around)
-    return start, round(site.shortest_to_any_m(start.point, beside), 3)
+    start = draw.start(without=around)
+    truth = {"kind": kind, "shortest_m": draw.shortest_m(start, site.beside(kind))}
+    return draw.setting(prompt, start, truth, is_known=is_known, tools=tools, limits=limits)
+
+
+def judge_kind(site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
+    """Score what the robot stands beside."""
+    return judge_thing(site, evidence, site.things(truth["kind"]))
+
+
+def _draw_search(draw: Draw) -> Setting:
+    """Name a thing in a building that the robot has never seen, without map and memory."""
+    kind = str(draw.random.choice(findable_kinds(draw.site)))
+    prompt = f"Find the nearest {draw.site.label_of(kind)} and stop beside it."
+    tools = (*SEARCH_TOOLS, "explore")
+    return thing_setting(draw, prompt, kind, is_known=False, tools=tools, limits=SEARCH_LIMITS)
 
 
 OBJECT_TASKS = (
-    ObjectTask("fire-tool", ask_for_fire_tool),
-    ObjectTask("object", draw_wish),
-    SearchTask(),
+    Task(
+        name="fire-tool",
+        draw=lambda draw: thing_setting(draw, FIRE_WISH, FIRE),
+        judge=judge_kind,
+        is_offered=lambda site: bool(site.beside(FIRE).any()),
+    ),
+    Task(
+        name="object",
+        draw=lambda draw: thing_setting(draw, *draw_wish(draw)),
+        judge=judge_kind,
+        is_offered=has_findable_kinds,
+    ),
+    Task(
+        name="search",
+        draw=_draw_search,
+        judge=judge_kind,
+        is_offered=has_findable_kinds,
+        needs_map=False,
+    ),
 )

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,18 +14,18 @@ from mapspeak.evaluation.scores import (
     judge_route,
 )
 from mapspeak.evaluation.tasks.objects import findable_kinds
-from mapspeak.evaluation.tasks.task import dice, draw_start, drive_setting, point_text
+from mapspeak.evaluation.tasks.task import Draw, Task, Truth, point_text
 from mapspeak.evaluation.trials import Limits, Score, Setting
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.simulator import WorldObject
 
-SIDES = {"left": 90.0, "right": -90.0, "front": 0.0, "back": 180.0}
-SIDE_WORDS = {
-    "left": "to the left of",
-    "right": "to the right of",
-    "front": "in front of",
-    "back": "behind",
+SIDES = {
+    "left": ("to the left of", 90.0),
+    "right": ("to the right of", -90.0),
+    "front": ("in front of", 0.0),
+    "back": ("behind", 180.0),
 }
+"""Sides of a pose: the words, and the heading from its own, in degrees."""
 COMPASS = {"east": 0.0, "north": 90.0, "west": 180.0, "south": -90.0}
 DISTANCES_M = (1.0, 1.5, 2.0)
 POSE_TOLERANCE_M = 0.4
@@ -36,125 +35,70 @@ THING_TOLERANCE_M = 0.8
 FACING_WITHIN_M = 3.5
 FACING_RAD = math.radians(30.0)
 MOST_TRIES = 200
-NORTH_IS_UP = "On the map +y is north."
+LEAST_STOPS, MOST_STOPS = 2, 4
+ROUTE_LIMITS = Limits(n_calls=80, robot_time_s=1800.0, wall_s=900.0)
 
 
-@dataclass(frozen=True, slots=True)
-class RelationGoal:
-    """A place as it is asked for.
-
-    Attributes:
-        prompt: The words.
-        goal: Where it is, in the map frame.
-    """
-
-    prompt: str
-    goal: Point
+# --- places beside a pose or a thing -------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PlaceTask:
-    """The robot goes to a place that is told by what it lies beside.
-
-    Attributes:
-        name: Of the task.
-        draw: Draws the place.
-        is_offered_in: True for worlds that have such places.
-        within_m: How far from it the robot may stand.
-        needs_map: It does.
-    """
-
-    name: str
-    draw: Callable[[GroundTruth, np.random.Generator], RelationGoal]
-    is_offered_in: Callable[[GroundTruth], bool]
-    within_m: float
-    needs_map: bool = True
-
-    def is_offered(self, site: GroundTruth) -> bool:
-        """Return True where the world has such places."""
-        return self.is_offered_in(site)
-
-    def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
-        """Draw the place, and start away from it."""
-        random = dice(self.name, site, seed)
-        aim = self.draw(site, random)
-        start = draw_start(site, random, without=site.near(aim.goal, 3 * THING_TOLERANCE_M))
-        return drive_setting(
-            site,
-            prompt=aim.prompt,
-            start=start,
-            right=site.near(aim.goal, POSE_TOLERANCE_M),
-            memory=memory,
-            goal=[round(aim.goal.x, 3), round(aim.goal.y, 3)],
-        )
-
-    def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
-        """Score how far the robot stands from there."""
-        goal = Point(*setting.truth["goal"])
-        return judge_near(site, evidence, goal, within_m=self.within_m)
+def _place_setting(draw: Draw, prompt: str, goal: Point) -> Setting:
+    """Start away from a place that the prompt tells."""
+    start = draw.start(without=draw.site.near(goal, 3 * THING_TOLERANCE_M))
+    shortest_m = draw.shortest_m(start, draw.site.near(goal, POSE_TOLERANCE_M))
+    truth = {"goal": [round(goal.x, 3), round(goal.y, 3)], "shortest_m": shortest_m}
+    return draw.setting(prompt, start, truth)
 
 
-def _aim_beside_pose(site: GroundTruth, random: np.random.Generator) -> RelationGoal:
+def _judge_within(within_m: float) -> Callable[[GroundTruth, Truth, Evidence], Score]:
+    def judge(_site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
+        return judge_near(evidence, Point(*truth["goal"]), within_m=within_m)
+
+    return judge
+
+
+def _draw_beside_pose(draw: Draw) -> Setting:
     """Draw a pose that is given by numbers, a side of it and a distance."""
-    aim = RelationGoal("", Point(0.0, 0.0))
+    site, random = draw.site, draw.random
     for _ in range(MOST_TRIES):
         pose = site.draw_pose(random)
         yaw_deg = float(random.integers(-17, 19) * 10)
-        side = str(random.choice(list(SIDES)))
+        words, side_deg = SIDES[str(random.choice(list(SIDES)))]
         away_m = float(random.choice(DISTANCES_M))
-        goal = _step(pose.point, math.radians(yaw_deg + SIDES[side]), away_m)
-        prompt = (
-            f"Think of somebody who stands at {point_text(pose.point)} and looks along a yaw "
-            f"of {yaw_deg:.0f} deg. Go to the place {away_m:g} m {SIDE_WORDS[side]} them."
-        )
-        aim = RelationGoal(prompt, goal)
+        goal = _step(pose.point, math.radians(yaw_deg + side_deg), away_m)
         if _is_roomy(site, goal) and _is_open(site, pose.point, goal):
             break
-    return aim
-
-
-def _aim_beside_thing(site: GroundTruth, random: np.random.Generator) -> RelationGoal:
-    """Draw the only thing of its kind, a direction of the map and a distance."""
-    places = _places_beside(site)
-    thing, direction, away_m, goal = places[int(random.integers(len(places)))]
-    label = site.label_of(thing.kind)
-    return RelationGoal(
-        f"Go to the place {away_m:g} m {direction} of the {label}. {NORTH_IS_UP}", goal
+    prompt = (
+        f"Think of somebody who stands at {point_text(pose.point)} and looks along a yaw "
+        f"of {yaw_deg:.0f} deg. Go to the place {away_m:g} m {words} them."
     )
+    return _place_setting(draw, prompt, goal)
 
 
-@dataclass(frozen=True, slots=True)
-class FacingTask:
-    """The robot stands in front of the only thing of its kind and looks at it."""
+def _draw_beside_thing(draw: Draw) -> Setting:
+    """Draw the only thing of its kind, a direction of the map and a distance."""
+    thing, direction, away_m, goal = draw.one_of(_places_beside(draw.site))
+    label = draw.site.label_of(thing.kind)
+    prompt = f"Go to the place {away_m:g} m {direction} of the {label}. On the map +y is north."
+    return _place_setting(draw, prompt, goal)
 
-    name: str = "facing-thing"
-    needs_map: bool = True
 
-    def is_offered(self, site: GroundTruth) -> bool:
-        """Return True where the world has a single thing that can be looked at."""
-        return bool(_single_things(site))
+def _draw_facing(draw: Draw) -> Setting:
+    """Draw the only thing of its kind, in front of which the robot shall stand and look at it."""
+    thing = draw.one_of(_single_things(draw.site))
+    near = draw.site.seen_around(thing, FACING_WITHIN_M)
+    start = draw.start(without=near)
+    prompt = (
+        f"Go to the {draw.site.label_of(thing.kind)}, stop at most {FACING_WITHIN_M:g} m "
+        "from it and look straight at it."
+    )
+    truth = {"kind": thing.kind, "shortest_m": draw.shortest_m(start, near)}
+    return draw.setting(prompt, start, truth)
 
-    def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
-        """Draw the thing."""
-        random = dice(self.name, site, seed)
-        things = _single_things(site)
-        thing = things[int(random.integers(len(things)))]
-        near = site.seen_around(thing, FACING_WITHIN_M)
-        start = draw_start(site, random, without=near)
-        return drive_setting(
-            site,
-            prompt=f"Go to the {site.label_of(thing.kind)}, stop at most {FACING_WITHIN_M:g} m "
-            "from it and look straight at it.",
-            start=start,
-            right=near,
-            memory=memory,
-            kind=thing.kind,
-        )
 
-    def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
-        """Score distance, heading and sight."""
-        (thing,) = site.things(setting.truth["kind"])
-        return judge_pose(site, evidence, thing, within_m=FACING_WITHIN_M, facing_rad=FACING_RAD)
+def _judge_facing(site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
+    (thing,) = site.things(truth["kind"])
+    return judge_pose(site, evidence, thing, within_m=FACING_WITHIN_M, facing_rad=FACING_RAD)
 
 
 def _single_things(site: GroundTruth) -> list[WorldObject]:
@@ -190,68 +134,55 @@ def _is_open(site: GroundTruth, one: Point, other: Point) -> bool:
     return bool(site.drivable[site.grid.cells_at(way)].all())
 
 
-def _always(site: GroundTruth) -> bool:
-    return bool(site.roomy.any())
-
-
-def _has_places_beside(site: GroundTruth) -> bool:
-    return bool(_places_beside(site))
-
-
 RELATION_TASKS = (
-    PlaceTask(
+    Task(
         name="side-of-pose",
-        draw=_aim_beside_pose,
-        is_offered_in=_always,
-        within_m=POSE_TOLERANCE_M,
+        draw=_draw_beside_pose,
+        judge=_judge_within(POSE_TOLERANCE_M),
+        is_offered=lambda site: bool(site.roomy.any()),
     ),
-    PlaceTask(
+    Task(
         name="side-of-thing",
-        draw=_aim_beside_thing,
-        is_offered_in=_has_places_beside,
-        within_m=THING_TOLERANCE_M,
+        draw=_draw_beside_thing,
+        judge=_judge_within(THING_TOLERANCE_M),
+        is_offered=lambda site: bool(_places_beside(site)),
     ),
-    FacingTask(),
+    Task(
+        name="facing-thing",
+        draw=_draw_facing,
+        judge=_judge_facing,
+        is_offered=lambda site: bool(_single_things(site)),
+    ),
 )
 
 
-MOST_STOPS = 4
-LEAST_STOPS = 2
-LIMITS = Limits(n_calls=80, robot_time_s=1800.0, wall_s=900.0)
+# --- routes --------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class RouteTask:
-    """The robot goes to several things in the order that is given; any thing of a kind will do."""
+def _draw_route(draw: Draw) -> Setting:
+    """Draw kinds and their order; any thing of a kind will do."""
+    site, random, kinds = draw.site, draw.random, findable_kinds(draw.site)
+    n_stops = int(random.integers(LEAST_STOPS, min(MOST_STOPS, len(kinds)) + 1))
+    chosen = [str(kind) for kind in random.choice(kinds, size=n_stops, replace=False)]
+    start = draw.start(without=site.beside(chosen[0]))
+    first, *others = (f"any {site.label_of(kind)}" for kind in chosen)
+    steps = ", then ".join((f"first to {first}", *(f"to {other}" for other in others)))
+    prompt = (
+        f"Go {steps}. Keep to this order and stop at each, at most {BESIDE_M:g} m from "
+        "it with a free view of it. Stay at the last one."
+    )
+    return draw.setting(
+        prompt, start, {"kinds": chosen}, tools=("follow_route",), limits=ROUTE_LIMITS
+    )
 
-    name: str = "route"
-    needs_map: bool = True
 
-    def is_offered(self, site: GroundTruth) -> bool:
-        """Return True where the world has things of two kinds to go to."""
-        return len(findable_kinds(site)) >= LEAST_STOPS
+def _judge_stops(site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
+    return judge_route(site, evidence, [site.things(kind) for kind in truth["kinds"]])
 
-    def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
-        """Draw the kinds and their order."""
-        random = dice(self.name, site, seed)
-        kinds = findable_kinds(site)
-        most = min(MOST_STOPS, len(kinds))
-        n_stops = int(random.integers(LEAST_STOPS, most + 1))
-        chosen = [str(kind) for kind in random.choice(kinds, size=n_stops, replace=False)]
-        start = draw_start(site, random, without=site.beside(chosen[0]))
-        first, *others = (f"any {site.label_of(kind)}" for kind in chosen)
-        steps = ", then ".join((f"first to {first}", *(f"to {other}" for other in others)))
-        return Setting(
-            prompt=f"Go {steps}. Keep to this order and stop at each, at most {BESIDE_M:g} m from "
-            "it with a free view of it. Stay at the last one.",
-            start=site.in_world(start),
-            is_known=True,
-            memory=memory,
-            tools=("follow_route",),
-            limits=LIMITS,
-            truth={"kinds": chosen},
-        )
 
-    def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
-        """Score the way that was driven."""
-        return judge_route(site, evidence, [site.things(kind) for kind in setting.truth["kinds"]])
+ROUTE_TASK = Task(
+    name="route",
+    draw=_draw_route,
+    judge=_judge_stops,
+    is_offered=lambda site: len(findable_kinds(site)) >= LEAST_STOPS,
+)

@@ -2,12 +2,11 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from mapspeak.evaluation.scores import Evidence, GroundTruth, judge_room
-from mapspeak.evaluation.tasks.task import dice, draw_start, drive_setting
+from mapspeak.evaluation.tasks.task import Draw, Task, Truth
 from mapspeak.evaluation.trials import Score, Setting
 from mapspeak.simulator import MeasuredRoom
 from mapspeak.spatial.rooms import RoomClass
@@ -18,89 +17,66 @@ CLEARLY_DIFFERENT = 1.15
 HALLS_COUNT = "Halls and other open spaces count as rooms, corridors do not."
 ORDINALS = {2: "second", 3: "third", 4: "fourth"}
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Choice:
-    """A question for a room, and the rooms that are right.
-
-    Attributes:
-        prompt: The question.
-        rooms: Any of them is right.
-    """
-
-    prompt: str
-    rooms: tuple[MeasuredRoom, ...]
-
-
+Choice = tuple[str, tuple[MeasuredRoom, ...]]
+"""A question for a room, and the rooms of which any is right."""
 Choose = Callable[[GroundTruth, np.random.Generator | None], Choice | None]
+"""Draws a question; None where the world has no clear answer."""
 
 
-@dataclass(frozen=True, slots=True)
-class RoomTask:
-    """The robot goes to the room that has a size.
+def _room_task(name: str, choose: Choose) -> Task:
+    """Return the task of driving to the room that has a size, from anywhere but in it."""
 
-    Attributes:
-        name: Of the task.
-        choose: Draws a question; None where the world has no clear answer.
-        needs_map: It does.
-    """
-
-    name: str
-    choose: Choose
-    needs_map: bool = True
-
-    def is_offered(self, site: GroundTruth) -> bool:
-        """Return True where the world has a room that is clearly the right one."""
-        return self.choose(site, None) is not None
-
-    def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
-        """Start anywhere but in the right room."""
-        random = dice(self.name, site, seed)
-        choice = self.choose(site, random)
+    def draw(draw: Draw) -> Setting:
+        choice = choose(draw.site, draw.random)
         if choice is None:
             raise AssertionError("the task is offered here")
-        goal = np.logical_or.reduce([site.cells_of(room) for room in choice.rooms])
-        start = draw_start(site, random, without=goal)
-        return drive_setting(
-            site,
-            prompt=choice.prompt,
-            start=start,
-            right=goal,
-            memory=memory,
-            rooms=[room.room.name for room in choice.rooms],
-        )
+        prompt, rooms = choice
+        goal = np.logical_or.reduce([draw.site.cells_of(room) for room in rooms])
+        start = draw.start(without=goal)
+        names = [room.room.name for room in rooms]
+        truth = {"rooms": names, "shortest_m": draw.shortest_m(start, goal)}
+        return draw.setting(prompt, start, truth)
 
-    def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
-        """Score the room that the robot stands in."""
-        return judge_room(site, evidence, setting.truth["rooms"])
+    return Task(
+        name=name,
+        draw=draw,
+        judge=_judge,
+        is_offered=lambda site: choose(site, None) is not None,
+    )
 
 
-def _smallest(site: GroundTruth, random: np.random.Generator | None) -> Choice | None:
+def _judge(site: GroundTruth, truth: Truth, evidence: Evidence) -> Score:
+    return judge_room(site, evidence, truth["rooms"])
+
+
+def _smallest(site: GroundTruth, _random: np.random.Generator | None) -> Choice | None:
     """Return the paper's Task 2: the least floor, whether or not furniture counts as floor."""
-    del random
     rooms = _of_class(site, RoomClass.ROOM)
     if len(rooms) < 2:
         return None
+    areas: tuple[Callable[[MeasuredRoom], float], ...] = (
+        site.floor_area_m2,
+        lambda room: room.free_area_m2,
+    )
     right = {
         room.room.name: room
-        for area in (site.floor_area_m2, _free_area_m2)
+        for area in areas
         for room in rooms
         if area(room) <= SAME_SIZE * min(map(area, rooms))
     }
-    return Choice(prompt="Go to the smallest room.", rooms=tuple(right.values()))
+    return "Go to the smallest room.", tuple(right.values())
 
 
-def _largest(site: GroundTruth, random: np.random.Generator | None) -> Choice | None:
-    del random
-    rooms = sorted(_rooms_and_halls(site), key=site.floor_area_m2)
+def _largest(site: GroundTruth, _random: np.random.Generator | None) -> Choice | None:
+    rooms = _rooms_and_halls(site)
     if len(rooms) < 2 or not _is_clear(site, rooms, len(rooms) - 1):
         return None
-    return Choice(prompt=f"Go to the largest room. {HALLS_COUNT}", rooms=(rooms[-1],))
+    return f"Go to the largest room. {HALLS_COUNT}", (rooms[-1],)
 
 
 def _nth(site: GroundTruth, random: np.random.Generator | None) -> Choice | None:
     """Return the second to fourth from either end, where its size is clearly its own."""
-    rooms = sorted(_rooms_and_halls(site), key=site.floor_area_m2)
+    rooms = _rooms_and_halls(site)
     found = [
         (f"{ORDINALS[number]} {word}", rooms[at])
         for number in ORDINALS
@@ -110,18 +86,17 @@ def _nth(site: GroundTruth, random: np.random.Generator | None) -> Choice | None
     if not found:
         return None
     words, room = found[0 if random is None else int(random.integers(len(found)))]
-    return Choice(prompt=f"Go to the {words} room. {HALLS_COUNT}", rooms=(room,))
+    return f"Go to the {words} room. {HALLS_COUNT}", (room,)
 
 
-def _longest_corridor(site: GroundTruth, random: np.random.Generator | None) -> Choice | None:
-    del random
+def _longest_corridor(site: GroundTruth, _random: np.random.Generator | None) -> Choice | None:
     corridors = sorted(_of_class(site, RoomClass.CORRIDOR), key=_length_m)
     is_clear = len(corridors) < 2 or (
         _length_m(corridors[-1]) >= CLEARLY_DIFFERENT * _length_m(corridors[-2])
     )
     if not corridors or not is_clear:
         return None
-    return Choice(prompt="Go to the longest corridor.", rooms=(corridors[-1],))
+    return "Go to the longest corridor.", (corridors[-1],)
 
 
 def _of_class(site: GroundTruth, wanted: RoomClass) -> list[MeasuredRoom]:
@@ -129,11 +104,8 @@ def _of_class(site: GroundTruth, wanted: RoomClass) -> list[MeasuredRoom]:
 
 
 def _rooms_and_halls(site: GroundTruth) -> list[MeasuredRoom]:
-    return [room for room in site.rooms if room.room.room_class is not RoomClass.CORRIDOR]
-
-
-def _free_area_m2(room: MeasuredRoom) -> float:
-    return room.free_area_m2
+    rooms = [room for room in site.rooms if room.room.room_class is not RoomClass.CORRIDOR]
+    return sorted(rooms, key=site.floor_area_m2)
 
 
 def _is_clear(site: GroundTruth, ordered: Sequence[MeasuredRoom], at: int) -> bool:
@@ -153,8 +125,8 @@ def _length_m(room: MeasuredRoom) -> float:
 
 
 ROOM_TASKS = (
-    RoomTask("smallest-room", _smallest),
-    RoomTask("largest-room", _largest),
-    RoomTask("nth-room", _nth),
-    RoomTask("longest-corridor", _longest_corridor),
+    _room_task("smallest-room", _smallest),
+    _room_task("largest-room", _largest),
+    _room_task("nth-room", _nth),
+    _room_task("longest-corridor", _longest_corridor),
 )

@@ -1,86 +1,118 @@
-"""The port of tasks: what is asked of a world, and how the answer is scored."""
+"""What a task is: how a question is drawn for a world, and how the answer is scored."""
 
 import zlib
-from typing import Protocol
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 
 from mapspeak.evaluation.scores import Evidence, GroundTruth
-from mapspeak.evaluation.trials import Score, Setting
+from mapspeak.evaluation.trials import Limits, Score, Setting
 from mapspeak.geometry import Point, Pose
+from mapspeak.simulator import WorldObject
 from mapspeak.spatial.grid import Mask
 
+Truth = Mapping[str, Any]
+NO_DRIVING = "Answer without driving."
 
-class Task(Protocol):
-    """A kind of question; the same world, seed and memory give the same setting."""
+_Item = TypeVar("_Item")
 
-    @property
-    def name(self) -> str:
-        """Return its name, such as "smallest-room"."""
-        ...
 
-    @property
-    def needs_map(self) -> bool:
-        """True where it starts from the map and memory of an exploration."""
-        ...
+@dataclass(frozen=True, slots=True)
+class Draw:
+    """What a trial's setting is drawn from.
 
-    def is_offered(self, site: GroundTruth) -> bool:
-        """Return True where the world has what it asks about."""
-        ...
+    Attributes:
+        site: A world in which the task is offered.
+        random: Of all draws: another for each task, world and seed.
+        memory: The semantic map that an exploration of the world has left, as YAML.
+    """
+
+    site: GroundTruth
+    random: np.random.Generator
+    seed: int
+    memory: str | None
+
+    def one_of(self, items: Sequence[_Item]) -> _Item:
+        """Draw one of some items."""
+        return items[int(self.random.integers(len(items)))]
+
+    def shuffled(self, items: Sequence[_Item]) -> list[_Item]:
+        """Return all of some items in a drawn order."""
+        return [items[at] for at in self.random.permutation(len(items)).tolist()]
+
+    def start(self, *, without: Mask | None = None) -> Pose:
+        """Draw where the robot starts, in the map frame: where there is room, not in some cells."""
+        elsewhere = None if without is None else ~without
+        is_left = elsewhere is not None and bool((self.site.roomy & elsewhere).any())
+        return self.site.draw_pose(self.random, elsewhere if is_left else None)
+
+    def shortest_m(self, start: Pose, right: Mask) -> float:
+        """Return the way to the nearest of some cells, as it is kept as truth."""
+        return round(self.site.shortest_to_any_m(start.point, right), 3)
+
+    def setting(
+        self,
+        prompt: str,
+        start: Pose,
+        truth: Truth,
+        *,
+        is_known: bool = True,
+        tools: tuple[str, ...] = (),
+        limits: Limits | None = None,
+        added: tuple[WorldObject, ...] = (),
+    ) -> Setting:
+        """Return a setting whose start is given in the map frame; memory comes with the map."""
+        return Setting(
+            prompt=prompt,
+            start=self.site.in_world(start),
+            is_known=is_known,
+            memory=self.memory if is_known else None,
+            added=added,
+            tools=tools,
+            limits=limits or Limits(),
+            truth=dict(truth),
+        )
+
+
+def _always(_site: GroundTruth) -> bool:
+    return True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """A kind of question; the same world, seed and memory give the same setting.
+
+    Attributes:
+        name: Such as "smallest-room".
+        draw: Draws one trial's setting.
+        judge: Scores a trial by the truth of its setting and of the world with what was added.
+        is_offered: True for worlds that have what it asks about.
+        needs_map: It starts from the map and memory of an exploration.
+    """
+
+    name: str
+    draw: Callable[[Draw], Setting]
+    judge: Callable[[GroundTruth, Truth, Evidence], Score]
+    is_offered: Callable[[GroundTruth], bool] = _always
+    needs_map: bool = True
 
     def make_setting(self, site: GroundTruth, *, seed: int, memory: str | None) -> Setting:
-        """Make one trial's setting.
-
-        Args:
-            site: A world in which it is offered.
-            seed: Of everything that is drawn.
-            memory: The semantic map that an exploration of the world has left, as YAML.
-        """
-        ...
+        """Draw one trial's setting from a seed."""
+        names = (zlib.crc32(text.encode()) for text in (self.name, site.world.name))
+        return self.draw(Draw(site, np.random.default_rng([seed, *names]), seed, memory))
 
     def score(self, site: GroundTruth, setting: Setting, evidence: Evidence) -> Score:
         """Score a trial by the truth of the world as it was set: with what was added to it."""
-        ...
-
-
-def dice(task: str, site: GroundTruth, seed: int) -> np.random.Generator:
-    """Return the generator of a trial's draws: another for each task, world and seed."""
-    names = (zlib.crc32(text.encode()) for text in (task, site.world.name))
-    return np.random.default_rng([seed, *names])
-
-
-def draw_start(
-    site: GroundTruth, random: np.random.Generator, *, without: Mask | None = None
-) -> Pose:
-    """Draw where the robot starts, in the map frame: somewhere roomy, not where it is to go."""
-    elsewhere = None if without is None else ~without
-    is_left = elsewhere is not None and bool((site.roomy & elsewhere).any())
-    return site.draw_pose(random, elsewhere if is_left else None)
-
-
-def drive_setting(
-    site: GroundTruth, *, prompt: str, start: Pose, right: Mask, memory: str | None, **truth: object
-) -> Setting:
-    """Return the setting of a drive on a finished map.
-
-    Args:
-        site: The world.
-        prompt: What is asked.
-        start: Where the robot stands, in the map frame.
-        right: Cells of the map any of which will do; `shortest_m` is the way to the nearest.
-        memory: What the robot remembers.
-        truth: What else the scorer has to know.
-    """
-    shortest_m = round(site.shortest_to_any_m(start.point, right), 3)
-    return Setting(
-        prompt=prompt,
-        start=site.in_world(start),
-        is_known=True,
-        memory=memory,
-        truth={**truth, "shortest_m": shortest_m},
-    )
+        return self.judge(site, setting.truth, evidence)
 
 
 def point_text(point: Point) -> str:
     """Return a point as prompts and answers write it."""
     return f"({point.x:.2f}, {point.y:.2f})"
+
+
+def pair(point: Point) -> list[float]:
+    """Return a point as it is kept as truth."""
+    return [round(point.x, 2), round(point.y, 2)]
