@@ -15,7 +15,7 @@ from enum import StrEnum
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Protocol
 
-from mapspeak.evaluation.agents.models.mind import Move, decide
+from mapspeak.evaluation.agents.models.chat import Reply, decide
 
 N_READ, N_CACHED, N_WRITTEN, N_THOUGHT = 100, 40, 10, 4
 """Tokens of every answer: all read, and of it from a cache; all written, and of it thoughts."""
@@ -83,7 +83,7 @@ class Speech(Protocol):
         """Reads a request, and fails where a strict provider would refuse it."""
         ...
 
-    def answer(self, moves: list[Move], n_heard: int) -> dict[str, Any]:
+    def answer(self, replies: list[Reply], n_heard: int) -> dict[str, Any]:
         """Gives an answer that calls what the moves call, or says the words of the only one."""
         ...
 
@@ -140,11 +140,11 @@ class ModelServer:
         if trouble in (Trouble.REFUSED, Trouble.CUT_OFF):
             answer = self.speech.stop(trouble)
         else:
-            answer = self.speech.answer(list(_moves(heard)), len(heard.answers))
+            answer = self.speech.answer(list(_replies(heard)), len(heard.answers))
         return 200, self.speech.stream(answer) if heard.wants_stream else json.dumps(answer)
 
 
-def _moves(heard: Heard) -> Iterator[Move]:
+def _replies(heard: Heard) -> Iterator[Reply]:
     """Gives what comes next; the first two calls come at once, as models call things."""
     begun = [heard.answers] if heard.answers else [(), ("",)]
     for answers in begun:

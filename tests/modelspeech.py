@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from mapspeak.evaluation.agents.models.mind import Move
+from mapspeak.evaluation.agents.models.chat import Reply
 from modelserver import (
     N_CACHED,
     N_READ,
@@ -58,16 +58,16 @@ class OpenAIChat:
             wants_stream=request.get("stream", False),
         )
 
-    def answer(self, moves: list[Move], n_heard: int) -> dict[str, Any]:
-        said: dict[str, Any] = {"role": "assistant", "content": moves[0].text}
+    def answer(self, replies: list[Reply], n_heard: int) -> dict[str, Any]:
+        said: dict[str, Any] = {"role": "assistant", "content": replies[0].text}
         calls = [
             {
                 "id": f"c{n_heard + number}",
                 "type": "function",
-                "function": {"name": move.tool, "arguments": json.dumps(move.arguments)},
+                "function": {"name": call.tool, "arguments": json.dumps(call.arguments)},
             }
-            for number, move in enumerate(moves)
-            if move.tool is not None
+            for number, reply in enumerate(replies)
+            for call in reply.calls
         ]
         if calls:
             said["tool_calls"] = calls
@@ -138,19 +138,19 @@ class AnthropicMessages:
             wants_stream=request.get("stream", False),
         )
 
-    def answer(self, moves: list[Move], n_heard: int) -> dict[str, Any]:
+    def answer(self, replies: list[Reply], n_heard: int) -> dict[str, Any]:
         calls = [
             {
                 "type": "tool_use",
                 "id": f"toolu_{n_heard + number}",
-                "name": move.tool,
-                "input": move.arguments,
+                "name": call.tool,
+                "input": call.arguments,
             }
-            for number, move in enumerate(moves)
-            if move.tool is not None
+            for number, reply in enumerate(replies)
+            for call in reply.calls
         ]
         thought = {"type": "thinking", "thinking": THOUGHT, "signature": SIGNATURE}
-        words = {"type": "text", "text": moves[0].text}
+        words = {"type": "text", "text": replies[0].text}
         return self._whole([thought, words, *calls], "tool_use" if calls else "end_turn")
 
     def stop(self, trouble: Trouble) -> dict[str, Any]:
@@ -260,17 +260,17 @@ class GoogleContents:
             seed=configuration.get("seed", 0),
         )
 
-    def answer(self, moves: list[Move], n_heard: int) -> dict[str, Any]:
+    def answer(self, replies: list[Reply], n_heard: int) -> dict[str, Any]:
         del n_heard
         calls = [
-            {"functionCall": {"name": move.tool, "args": move.arguments}}
-            for move in moves
-            if move.tool is not None
+            {"functionCall": {"name": call.tool, "args": call.arguments}}
+            for reply in replies
+            for call in reply.calls
         ]
         if calls:
             calls[0]["thoughtSignature"] = SIGNATURE  # type: ignore[assignment]  # JSON
         thought = {"text": THOUGHT, "thought": True}
-        return self._whole([thought, {"text": moves[0].text}, *calls], "STOP")
+        return self._whole([thought, {"text": replies[0].text}, *calls], "STOP")
 
     def stop(self, trouble: Trouble) -> dict[str, Any]:
         if trouble is Trouble.REFUSED:

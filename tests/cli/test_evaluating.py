@@ -7,7 +7,7 @@ from filelock import FileLock
 from mapspeak.cli.evaluating import evaluate
 from mapspeak.errors import ConfigError
 from mapspeak.evaluation.agents import agent_names
-from mapspeak.evaluation.agents.models import Thinking
+from mapspeak.evaluation.agents.models.chat import Thinking
 from mapspeak.evaluation.tasks import FAMILIES
 from mapspeak.evaluation.trials import read_results, trial_folder, write_result
 from mapspeak.server.mapview.representations import Representation

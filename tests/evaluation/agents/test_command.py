@@ -12,7 +12,7 @@ from mapspeak.errors import ConfigError, LinkError
 from mapspeak.evaluation.agents.command import AnswerForm, CommandAgent, Program, find_program
 from mapspeak.evaluation.agents.command.program import Start
 from mapspeak.evaluation.agents.finding import find_versions
-from mapspeak.evaluation.agents.models import Thinking
+from mapspeak.evaluation.agents.models.chat import Thinking
 from mapspeak.evaluation.client import ToolClient
 from mapspeak.evaluation.trials import Assignment, Limits, TrialState
 

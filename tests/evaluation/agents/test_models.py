@@ -10,16 +10,14 @@ from fakes import FakeRobot, two_rooms
 from hearing import Hearing
 from mapspeak.errors import ConfigError
 from mapspeak.evaluation.agents.finding import check_agent, find_agent
-from mapspeak.evaluation.agents.models import (
+from mapspeak.evaluation.agents.models.chat import (
+    Conversation,
     Ending,
-    MockMind,
-    ModelAgent,
+    MockModel,
     Reply,
-    Talk,
     ToolCallRequest,
-    Usage,
 )
-from mapspeak.evaluation.agents.models.loop import estimate_picture_tokens
+from mapspeak.evaluation.agents.models.loop import ModelAgent, estimate_picture_tokens
 from mapspeak.evaluation.client import Picture, ToolAnswer, ToolClient, Witness
 from mapspeak.evaluation.trials import AgentEnd, Assignment, Limits, TrialState
 from mapspeak.server.mapview.representations import Representation
@@ -54,7 +52,7 @@ class Scripted:
         self.replies = list(replies)
         self.heard: list[tuple[ToolCallRequest, ToolAnswer]] = []
 
-    def begin(self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int) -> Talk:
+    def begin(self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int) -> Conversation:
         assert (system, prompt, seed) == ("Be quick.", "Go there.", 0)
         assert "look_at_map" in {tool.name for tool in tools}
         return self
@@ -62,8 +60,8 @@ class Scripted:
     async def ask(self) -> Reply:
         return self.replies.pop(0)
 
-    def tell(self, wish: ToolCallRequest, answer: ToolAnswer) -> None:
-        self.heard.append((wish, answer))
+    def tell(self, call: ToolCallRequest, answer: ToolAnswer) -> None:
+        self.heard.append((call, answer))
 
 
 LOOK = ToolCallRequest(id="1", tool="look_at_map")
@@ -74,7 +72,7 @@ async def test_the_mock_model_comes_to_an_end_however_the_map_is_shown(
     tmp_path: Path, representation: Representation
 ) -> None:
     witness = Hearing()
-    agent = ModelAgent(MockMind(), "mock")
+    agent = ModelAgent(MockModel(), "mock")
     end, _ = await run(agent, assignment(tmp_path), witness, representation)
     assert (end.state, end.answer) == (TrialState.FINISHED, "ANSWER: there")
     assert witness.calls[:3] == ["look_at_map", "look_through_camera", "describe_place"]
@@ -86,7 +84,7 @@ async def test_the_same_seed_gives_the_same_conversation(tmp_path: Path) -> None
     async def calls_with(seed: int) -> list[tuple[str, str]]:
         task = assignment(tmp_path, seed=seed)
         ledger = Hearing()
-        await run(ModelAgent(MockMind(), "mock"), task, ledger)
+        await run(ModelAgent(MockModel(), "mock"), task, ledger)
         return [(call.tool, str(call.arguments)) for call in ledger.made]
 
     assert await calls_with(1) == await calls_with(1)
@@ -96,13 +94,13 @@ async def test_the_same_seed_gives_the_same_conversation(tmp_path: Path) -> None
 async def test_tokens_are_summed_and_pictures_count_in_every_request_after_them(
     tmp_path: Path,
 ) -> None:
-    mind = Scripted(
-        Reply(text="I look.", wishes=(LOOK,), usage=Usage(100, 5)),
-        Reply(text="Again.", wishes=(LOOK,), usage=Usage(1500, 5)),
-        Reply(text="Done.", usage=Usage(3000, 2)),
+    model = Scripted(
+        Reply(text="I look.", calls=(LOOK,), n_input_tokens=100, n_output_tokens=5),
+        Reply(text="Again.", calls=(LOOK,), n_input_tokens=1500, n_output_tokens=5),
+        Reply(text="Done.", n_input_tokens=3000, n_output_tokens=2),
     )
     witness = Hearing()
-    end, _ = await run(ModelAgent(mind, "x/y"), assignment(tmp_path), witness)
+    end, _ = await run(ModelAgent(model, "x/y"), assignment(tmp_path), witness)
     one = estimate_picture_tokens(witness.answers[0].pictures[0])
     assert (end.n_input_tokens, end.n_output_tokens, end.n_picture_tokens) == (4600, 12, 3 * one)
     counted = [tokens["n_picture_tokens"] for _, tokens in witness.words]
@@ -121,17 +119,19 @@ async def test_errors_reach_the_model_as_errors_and_it_may_go_on(tmp_path: Path)
     wrong = ToolCallRequest(id="1", tool="describe_place", arguments={"place": "R99"})
     unknown = ToolCallRequest(id="2", tool="fly", arguments={"tool": "wings", "self": 1})
     garbled = ToolCallRequest(id="3", tool="measure", mistake="The arguments are no JSON.")
-    mind = Scripted(Reply(text="", wishes=(wrong, unknown, garbled)), Reply(text="Done."))
+    model = Scripted(Reply(text="", calls=(wrong, unknown, garbled)), Reply(text="Done."))
     witness = Hearing()
-    end, _ = await run(ModelAgent(mind, "x/y"), assignment(tmp_path), witness)
+    end, _ = await run(ModelAgent(model, "x/y"), assignment(tmp_path), witness)
     assert end.state is TrialState.FINISHED
-    assert [wish for wish, _ in mind.heard] == [wrong, unknown, garbled]
-    assert [answer.is_error for _, answer in mind.heard] == [True, True, True]
+    assert [call for call, _ in model.heard] == [wrong, unknown, garbled]
+    assert [answer.is_error for _, answer in model.heard] == [True, True, True]
     assert witness.calls == ["describe_place", "fly", "measure"]
 
 
 async def test_out_of_budget_it_still_says_what_it_has_cost(tmp_path: Path) -> None:
-    looking = [Reply(text="", wishes=(LOOK,), usage=Usage(10, 1)) for _ in range(3)]
+    looking = [
+        Reply(text="", calls=(LOOK,), n_input_tokens=10, n_output_tokens=1) for _ in range(3)
+    ]
     end, _ = await run(ModelAgent(Scripted(*looking), "x/y"), assignment(tmp_path), Hearing(most=2))
     assert end.state is TrialState.OUT_OF_BUDGET
     assert (end.n_decisions, end.n_input_tokens) == (3, 30)
@@ -148,13 +148,13 @@ async def test_out_of_budget_it_still_says_what_it_has_cost(tmp_path: Path) -> N
 async def test_a_model_that_did_not_end_by_itself_has_not_finished(
     tmp_path: Path, ending: Ending, said: str, state: TrialState, answer: str
 ) -> None:
-    mind = Scripted(Reply(text=said, ending=ending))
-    end, _ = await run(ModelAgent(mind, "x/y"), assignment(tmp_path), Hearing())
+    model = Scripted(Reply(text=said, ending=ending))
+    end, _ = await run(ModelAgent(model, "x/y"), assignment(tmp_path), Hearing())
     assert (end.state, end.answer) == (state, answer)
 
 
 async def test_a_call_that_came_before_the_cut_is_made(tmp_path: Path) -> None:
-    cut = Reply(text="", wishes=(LOOK,), ending=Ending.CUT_OFF)
+    cut = Reply(text="", calls=(LOOK,), ending=Ending.CUT_OFF)
     witness = Hearing()
     agent = ModelAgent(Scripted(cut, Reply(text="Done.")), "x/y")
     end, _ = await run(agent, assignment(tmp_path), witness)

@@ -211,13 +211,3 @@ def test_a_missing_key_is_told_before_the_first_trial(
     monkeypatch.delenv("ANTHROPIC_AUTH_TOKEN", raising=False)
     with pytest.raises(ConfigError, match=rf"cannot be asked: .*{speech.key}"):
         check_agent(speech.model)
-
-
-@needs_inspect
-async def test_the_librarys_own_mock_needs_no_server(tmp_path: Path) -> None:
-    first, second = Hearing(), Hearing()
-    end = await run("mockllm/model", tmp_path, first)
-    await run("mockllm/model", tmp_path, second)
-    assert end.state is TrialState.FINISHED
-    assert first.calls == second.calls
-    assert first.answers[0].pictures

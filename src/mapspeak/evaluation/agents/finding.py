@@ -9,9 +9,9 @@ from mapspeak.evaluation.agents.baselines import OracleAgent, RandomAgent
 from mapspeak.evaluation.agents.command.agent import CommandAgent
 from mapspeak.evaluation.agents.command.program import find_program
 from mapspeak.evaluation.agents.exploring import NearestFrontierAgent, PaperLoopAgent
+from mapspeak.evaluation.agents.models.chat import MockModel, Thinking
 from mapspeak.evaluation.agents.models.loop import ModelAgent
-from mapspeak.evaluation.agents.models.mind import MockMind, Thinking
-from mapspeak.evaluation.agents.models.throughinspect import find_client, open_mind
+from mapspeak.evaluation.agents.models.throughinspect import find_client, open_model
 from mapspeak.evaluation.agents.scripted import ScriptedAgent
 from mapspeak.evaluation.scores import GroundTruth
 from mapspeak.evaluation.trials import Agent, Setting
@@ -40,7 +40,7 @@ def check_agent(name: str, thinking: str | None = None) -> None:
     if name == ORACLE:
         return
     if _is_model(name):
-        open_mind(name, read_thinking(thinking)).check()
+        open_model(name, read_thinking(thinking)).open()
         return
     agent = find_agent(name, thinking)
     if isinstance(agent, CommandAgent):
@@ -67,11 +67,11 @@ def find_agent(
     if name in SCRIPTS:
         return SCRIPTS[name]()
     if name == MOCK:
-        return ModelAgent(MockMind(), name)
+        return ModelAgent(MockModel(), name)
     if name.startswith(COMMAND):
         return CommandAgent(find_program(name.removeprefix(COMMAND)), name, amount)
     if _is_model(name):
-        return ModelAgent(open_mind(name, amount), name)
+        return ModelAgent(open_model(name, amount), name)
     raise ConfigError(
         f"There is no agent {name[:80]!r}.",
         hint=f"There are: {', '.join(agent_names())}; "

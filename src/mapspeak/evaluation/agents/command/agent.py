@@ -16,7 +16,7 @@ from anyio.abc import ByteReceiveStream, Process
 from mapspeak.errors import LinkError
 from mapspeak.evaluation.agents.command import keeper
 from mapspeak.evaluation.agents.command.program import ALWAYS, AnswerForm, Program, Start
-from mapspeak.evaluation.agents.models import Thinking
+from mapspeak.evaluation.agents.models.chat import Thinking
 from mapspeak.evaluation.client import OutOfBudgetError, Picture, ToolAnswer, ToolClient, Witness
 from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess, TrialState
 

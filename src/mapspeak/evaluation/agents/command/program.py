@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.agents.models import Thinking
+from mapspeak.evaluation.agents.models.chat import Thinking
 from mapspeak.settings import read_settings
 
 SERVER = "robot"

@@ -12,14 +12,27 @@ import anyio
 from PIL import Image
 
 from mapspeak.errors import LinkError
-from mapspeak.evaluation.agents.models.mind import Ending, Mind, Reply, Talk, ToolCallRequest
+from mapspeak.evaluation.agents.models.chat import (
+    ChatModel,
+    Conversation,
+    Ending,
+    Reply,
+    ToolCallRequest,
+)
 from mapspeak.evaluation.client import OutOfBudgetError, Picture, ToolAnswer, ToolClient
 from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess, TrialState
 
 PIXELS_PER_TOKEN = 750
 """Anthropic's published rule for pictures of up to 1568 px; other APIs count otherwise."""
-REFUSED = "The model refused to answer."
-CUT_OFF = "The model was cut off: it wrote as much as it may, or had too much to read."
+ENDINGS = {
+    Ending.ITS_OWN: (TrialState.FINISHED, ""),
+    Ending.REFUSED: (TrialState.GAVE_UP, "The model refused to answer."),
+    Ending.CUT_OFF: (
+        TrialState.OUT_OF_BUDGET,
+        "The model was cut off: it wrote as much as it may, or had too much to read.",
+    ),
+}
+"""The state that an ending leads to, and the answer of a model that says nothing."""
 WRAP_UP_S = 1.0
 """So long before its time is up it ends by itself, so that what it has cost is not lost."""
 
@@ -52,9 +65,10 @@ class _Account:
     def note(self, reply: Reply) -> None:
         self.n_turns += 1
         self.n_picture_tokens += self.n_pictures_cost
-        if reply.usage is not None:
-            self.n_input_tokens = (self.n_input_tokens or 0) + reply.usage.n_input_tokens
-            self.n_output_tokens = (self.n_output_tokens or 0) + reply.usage.n_output_tokens
+        if reply.n_input_tokens is not None:
+            self.n_input_tokens = (self.n_input_tokens or 0) + reply.n_input_tokens
+        if reply.n_output_tokens is not None:
+            self.n_output_tokens = (self.n_output_tokens or 0) + reply.n_output_tokens
 
     def end(self, answer: str, state: TrialState) -> AgentEnd:
         return AgentEnd(
@@ -69,15 +83,9 @@ class _Account:
 
 @dataclass(frozen=True, slots=True)
 class ModelAgent:
-    """Lets a model work with the tools until it has nothing more to call.
+    """Lets a model work with the tools until it has nothing more to call."""
 
-    Attributes:
-        mind: The model.
-        name: As in `Trial.agent`.
-        connection: How it reaches the server.
-    """
-
-    mind: Mind
+    model: ChatModel
     name: str
     connection: ServerAccess = field(default=ServerAccess.STDIO, kw_only=True)
 
@@ -90,11 +98,13 @@ class ModelAgent:
         listed = await tools.list_tools()
         if not listed:
             raise LinkError("The server offers no tools.", hint="Look at --toolsets.")
-        talk = self.mind.begin(system=task.system, prompt=task.prompt, tools=listed, seed=task.seed)
+        conversation = self.model.begin(
+            system=task.system, prompt=task.prompt, tools=listed, seed=task.seed
+        )
         account = _Account()
         try:
             with anyio.move_on_after(task.limits.wall_s - WRAP_UP_S):
-                return await _converse(talk, tools, account)
+                return await _converse(conversation, tools, account)
         except OutOfBudgetError as error:
             return account.end(str(error), TrialState.OUT_OF_BUDGET)
         if not account.n_turns:
@@ -105,46 +115,34 @@ class ModelAgent:
         return account.end("It took too long.", TrialState.OUT_OF_BUDGET)
 
 
-async def _converse(talk: Talk, tools: ToolClient, account: _Account) -> AgentEnd:
+async def _converse(conversation: Conversation, tools: ToolClient, account: _Account) -> AgentEnd:
     while True:
-        reply = await talk.ask()
+        reply = await conversation.ask()
         account.note(reply)
-        # The last words are noted by whoever asked for them.
-        _tell_witness(tools, reply.text if reply.wishes else "", reply, account)
-        if not reply.wishes:
-            return _end(reply, account)
-        for wish in reply.wishes:
-            answer = await _fulfil(tools, wish)
+        if tools.witness is not None:
+            tools.witness.hear_words(
+                "agent",
+                # The trial notes the last words.
+                reply.text if reply.calls else "",
+                n_input_tokens=reply.n_input_tokens,
+                n_output_tokens=reply.n_output_tokens,
+                n_picture_tokens=account.n_pictures_cost,
+            )
+        if not reply.calls:
+            state, instead = ENDINGS[reply.ending]
+            return account.end(reply.text or instead, state)
+        for call in reply.calls:
+            answer = await _make(tools, call)
             account.n_pictures_cost += sum(map(estimate_picture_tokens, answer.pictures))
-            talk.tell(wish, answer)
+            conversation.tell(call, answer)
 
 
-def _end(reply: Reply, account: _Account) -> AgentEnd:
-    if reply.ending is Ending.REFUSED:
-        return account.end(reply.text or REFUSED, TrialState.GAVE_UP)
-    if reply.ending is Ending.CUT_OFF:
-        return account.end(reply.text or CUT_OFF, TrialState.OUT_OF_BUDGET)
-    return account.end(reply.text, TrialState.FINISHED)
-
-
-def _tell_witness(tools: ToolClient, text: str, reply: Reply, account: _Account) -> None:
-    if tools.witness is None:
-        return
-    tools.witness.hear_words(
-        "agent",
-        text,
-        n_input_tokens=None if reply.usage is None else reply.usage.n_input_tokens,
-        n_output_tokens=None if reply.usage is None else reply.usage.n_output_tokens,
-        n_picture_tokens=account.n_pictures_cost,
-    )
-
-
-async def _fulfil(tools: ToolClient, wish: ToolCallRequest) -> ToolAnswer:
+async def _make(tools: ToolClient, call: ToolCallRequest) -> ToolAnswer:
     """Make a call; one that was not written properly counts, and is answered with why."""
-    if wish.mistake is None:
-        return await tools.call(wish.tool, **wish.arguments)
-    answer = ToolAnswer(text=wish.mistake, pictures=(), report={}, is_error=True)
+    if call.mistake is None:
+        return await tools.call(call.tool, **call.arguments)
+    answer = ToolAnswer(text=call.mistake, pictures=(), report={}, is_error=True)
     if tools.witness is not None:
-        tools.witness.hear_call(wish.tool, wish.arguments)
-        tools.witness.hear_answer(wish.tool, answer)
+        tools.witness.hear_call(call.tool, call.arguments)
+        tools.witness.hear_answer(call.tool, answer)
     return answer

@@ -1,4 +1,4 @@
-"""Models through the library `inspect-ai`: OpenAI, Anthropic, Google, local servers, its own mock.
+"""Models through the library `inspect-ai`: OpenAI, Anthropic, Google, local servers.
 
 It speaks each provider's protocol and retries; what is said, called and counted stays ours. The
 library is imported only when a model is asked for: it is the optional extra `eval`.
@@ -13,24 +13,20 @@ from typing import TYPE_CHECKING, Any
 from mcp_types import Tool
 
 from mapspeak.errors import ConfigError, LinkError
-from mapspeak.evaluation.agents.models.mind import (
+from mapspeak.evaluation.agents.models.chat import (
+    Conversation,
     Ending,
     Reply,
-    Talk,
     Thinking,
     ToolCallRequest,
-    Usage,
-    count_mock_tokens,
-    decide,
 )
 from mapspeak.evaluation.client import ToolAnswer
 from mapspeak.installation import say_install, shell_command
 
 if TYPE_CHECKING:
-    from inspect_ai.model import ChatMessage, GenerateConfig, Model, ModelOutput, ModelUsage
+    from inspect_ai.model import ChatMessage, GenerateConfig, Model, ModelOutput
     from inspect_ai.tool import ToolInfo
 
-MOCK = "mockllm/"
 CLIENT = "openai"
 """The package that the library speaks through where there is no other; the extra brings it."""
 CLIENTS = {"anthropic": "anthropic", "google": "google-genai"}
@@ -42,7 +38,7 @@ MOST_SAID = 300
 """Characters of a provider's error that are passed on: some repeat the whole request."""
 
 
-def open_mind(name: str, thinking: Thinking | None) -> "InspectMind":
+def open_model(name: str, thinking: Thinking | None) -> "InspectModel":
     """Return a model by the library's name for it, such as "anthropic/claude-opus-4-1".
 
     Args:
@@ -59,7 +55,7 @@ def open_mind(name: str, thinking: Thinking | None) -> "InspectMind":
             f"{name} is asked through inspect-ai, which is not installed.",
             hint=f"{_say_install(name)}, or take the agent mock.",
         ) from error
-    return InspectMind(name, thinking)
+    return InspectModel(name, thinking)
 
 
 def _say_install(name: str) -> str:
@@ -73,7 +69,7 @@ def find_client(name: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class InspectMind:
+class InspectModel:
     """A model behind the library.
 
     Attributes:
@@ -84,7 +80,7 @@ class InspectMind:
     name: str
     thinking: Thinking | None
 
-    def begin(self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int) -> Talk:
+    def begin(self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int) -> Conversation:
         """Begin a conversation.
 
         Raises:
@@ -103,29 +99,25 @@ class InspectMind:
             # The library makes a budget of it where a provider counts thoughts in tokens.
             reasoning_effort=None if self.thinking is None else self.thinking.value,
         )
-        return _InspectTalk(
-            model=self._open(seed),
+        return _InspectConversation(
+            model=self.open(),
             messages=[ChatMessageSystem(content=system), ChatMessageUser(content=prompt)],
             tools=[_as_info(tool) for tool in tools],
             config=config,
         )
 
-    def check(self) -> None:
-        """Return when the model can be asked, without asking it.
+    def open(self) -> "Model":
+        """Return the library's model, without asking it.
 
         Raises:
             ConfigError: A package, a key or an address is missing.
         """
-        self._open(0)
-
-    def _open(self, seed: int) -> "Model":
         # It has no public name, and is what a missing package or key is told with.
         from inspect_ai._util.error import PrerequisiteError  # noqa: PLC0415
         from inspect_ai.model import get_model  # noqa: PLC0415 - an optional extra
 
-        more = {"custom_outputs": _MockAnswers(seed)} if self.name.startswith(MOCK) else {}
         try:
-            return get_model(self.name, memoize=False, **more)
+            return get_model(self.name, memoize=False)
         except (PrerequisiteError, ValueError) as error:
             raise ConfigError(
                 f"The model {self.name} cannot be asked: {_plain(error)}",
@@ -140,7 +132,7 @@ def _plain(error: Exception) -> str:
 
 
 @dataclass(slots=True)
-class _InspectTalk:
+class _InspectConversation:
     model: "Model"
     messages: "list[ChatMessage]"
     tools: "list[ToolInfo]"
@@ -150,9 +142,10 @@ class _InspectTalk:
         output = await self._generate()
         # Said again as it is: some providers want their own thoughts back, signed.
         self.messages.append(output.message)
+        usage = output.usage
         return Reply(
             text=output.completion,
-            wishes=tuple(
+            calls=tuple(
                 ToolCallRequest(
                     id=call.id,
                     tool=call.function,
@@ -161,7 +154,13 @@ class _InspectTalk:
                 )
                 for call in output.message.tool_calls or ()
             ),
-            usage=_read_usage(output.usage),
+            # The library counts cached tokens apart.
+            n_input_tokens=None
+            if usage is None
+            else usage.input_tokens
+            + (usage.input_tokens_cache_read or 0)
+            + (usage.input_tokens_cache_write or 0),
+            n_output_tokens=None if usage is None else usage.output_tokens,
             ending=_ENDINGS.get(output.stop_reason, Ending.ITS_OWN),
         )
 
@@ -175,7 +174,7 @@ class _InspectTalk:
                 f"`{shell_command('eval --retry')}` runs what broke again.",
             ) from error
 
-    def tell(self, wish: ToolCallRequest, answer: ToolAnswer) -> None:
+    def tell(self, call: ToolCallRequest, answer: ToolAnswer) -> None:
         from inspect_ai.model import (  # noqa: PLC0415 - an optional extra
             ChatMessageTool,
             Content,
@@ -190,7 +189,7 @@ class _InspectTalk:
             content.append(ContentImage(image=f"data:{picture.media_type};base64,{data}"))
         error = ToolCallError("unknown", answer.text) if answer.is_error else None
         self.messages.append(
-            ChatMessageTool(content=content, tool_call_id=wish.id, function=wish.tool, error=error)
+            ChatMessageTool(content=content, tool_call_id=call.id, function=call.tool, error=error)
         )
 
 
@@ -221,54 +220,3 @@ def _as_info(tool: Tool) -> "ToolInfo":
             {"properties": schema.get("properties", {}), "required": schema.get("required", [])}
         ),
     )
-
-
-def _read_usage(usage: "ModelUsage | None") -> Usage | None:
-    """Return all that was read: the library counts cached tokens apart."""
-    if usage is None:
-        return None
-    cached = (usage.input_tokens_cache_read or 0) + (usage.input_tokens_cache_write or 0)
-    return Usage(usage.input_tokens + cached, usage.output_tokens)
-
-
-@dataclass(frozen=True, slots=True)
-class _MockAnswers:
-    """The library's mock, answering by our script."""
-
-    seed: int
-
-    def __call__(
-        self,
-        messages: "list[ChatMessage]",
-        tools: "list[ToolInfo]",
-        _choice: object,
-        _config: object,
-    ) -> "ModelOutput":
-        from inspect_ai.model import ModelOutput, ModelUsage  # noqa: PLC0415 - an optional extra
-
-        move = decide(
-            self.seed,
-            prompt=next(message.text for message in messages if message.role == "user"),
-            heard=[message.text for message in messages if message.role == "tool"],
-            tools=[tool.name for tool in tools],
-        )
-        output = (
-            ModelOutput.from_content(self.name, move.text)
-            if move.tool is None
-            else ModelOutput.for_tool_call(
-                self.name,
-                move.tool,
-                move.arguments,
-                content=move.text,
-                tool_call_id=f"call-{len(messages)}",
-            )
-        )
-        # Else the library would count, with a table that it fetches from the network.
-        n_read = sum(count_mock_tokens(message.text) for message in messages)
-        n_written = count_mock_tokens(move.text)
-        output.usage = ModelUsage(input_tokens=n_read, output_tokens=n_written)
-        return output
-
-    @property
-    def name(self) -> str:
-        return f"{MOCK}model"
