@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from mapspeak.evaluation.scores import Evidence, GroundTruth
+from mapspeak.evaluation.scores.answers import Evidence
+from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.trials import (
     MAP,
     MEMORY,

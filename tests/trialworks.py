@@ -8,7 +8,7 @@ import threading
 from functools import partial
 from pathlib import Path
 
-from mapspeak.evaluation.runs import TrialJob, run_jobs
+from mapspeak.evaluation.runs.runner import TrialJob, run_jobs
 from mapspeak.evaluation.trials import Score, Trial, TrialResult, TrialState, write_result
 
 LOG = "log.txt"

@@ -14,7 +14,7 @@ from mapspeak.cli.keys import StopKeys, Tell, stop_keys
 from mapspeak.cli.options import SEED_OPTION, WORLD_OPTION
 
 if TYPE_CHECKING:
-    from mapspeak.evaluation.runs import TrialBar
+    from mapspeak.evaluation.runs.showing import TrialBar
     from mapspeak.evaluation.trials import TrialResult, Turn
     from mapspeak.safety import Hold
 
@@ -42,8 +42,9 @@ def demo(world: str, seed: int, folder: Path | None, is_quiet: bool) -> None:  #
     """
     from rich.console import Console  # noqa: PLC0415 - heavy; help must be quick
 
-    from mapspeak.evaluation.report import write_page  # noqa: PLC0415
-    from mapspeak.evaluation.runs import say_result, show_trials, write_log  # noqa: PLC0415
+    from mapspeak.evaluation.report.page import write_page  # noqa: PLC0415
+    from mapspeak.evaluation.runs.inspectlog import write_log  # noqa: PLC0415
+    from mapspeak.evaluation.runs.showing import say_result, show_trials  # noqa: PLC0415
 
     folder = folder or Path("out") / f"demo-{Path(world).stem}-{seed}"
     console = Console(soft_wrap=True, highlight=False)
@@ -63,13 +64,9 @@ def demo(world: str, seed: int, folder: Path | None, is_quiet: bool) -> None:  #
 
 def _run_trials(world: str, seed: int, folder: Path, bar: "TrialBar") -> "list[TrialResult]":
     """Run the trials one after the other in this process, each with a server over stdio."""
-    from mapspeak.evaluation.runs import (  # noqa: PLC0415
-        RunOptions,
-        attempt,
-        make_jobs,
-        plan_run,
-        writing_to,
-    )
+    from mapspeak.evaluation.runs.attempt import attempt  # noqa: PLC0415
+    from mapspeak.evaluation.runs.plan import RunOptions, plan_run  # noqa: PLC0415
+    from mapspeak.evaluation.runs.runner import make_jobs, writing_to  # noqa: PLC0415
     from mapspeak.evaluation.trials import ServerAccess, trial_folder  # noqa: PLC0415
     from mapspeak.safety import Hold  # noqa: PLC0415
 

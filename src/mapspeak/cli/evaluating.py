@@ -11,7 +11,7 @@ from mapspeak.errors import ConfigError
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from mapspeak.evaluation.runs import RunOptions, RunPlan
+    from mapspeak.evaluation.runs.plan import RunOptions, RunPlan
     from mapspeak.evaluation.trials import TrialResult
 
 TABLE_WIDTH = 180
@@ -142,8 +142,8 @@ def evaluate(
     every trial came to a result, whatever the result is; 1 when one crashed or hung; 2 when
     something that was asked for does not exist; 130 after Ctrl-C.
     """
-    from mapspeak.evaluation.agents import check_agent  # noqa: PLC0415 - heavy; help must be quick
-    from mapspeak.evaluation.runs import RunOptions  # noqa: PLC0415
+    from mapspeak.evaluation.agents.finding import check_agent  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.evaluation.runs.plan import RunOptions  # noqa: PLC0415
 
     if is_report_only:
         _report(folder)
@@ -169,7 +169,7 @@ def evaluate(
 
 def _report(folder: Path) -> None:
     """Make page and log of a run's folder from all results in it."""
-    from mapspeak.evaluation.runs import writing_to  # noqa: PLC0415 - heavy
+    from mapspeak.evaluation.runs.runner import writing_to  # noqa: PLC0415 - heavy
     from mapspeak.evaluation.trials import read_results  # noqa: PLC0415
 
     results = read_results(folder)
@@ -189,8 +189,8 @@ def _write_report(
     *,
     is_whole: bool,
 ) -> None:
-    from mapspeak.evaluation.report import write_page  # noqa: PLC0415 - heavy
-    from mapspeak.evaluation.runs import write_log  # noqa: PLC0415
+    from mapspeak.evaluation.report.page import write_page  # noqa: PLC0415 - heavy
+    from mapspeak.evaluation.runs.inspectlog import write_log  # noqa: PLC0415
 
     log = write_log(folder, results, versions, is_whole=is_whole)
     click.echo(f"The trials can be replayed in {write_page(folder, results)}; the log is {log}.")
@@ -200,13 +200,9 @@ def _run(options: "RunOptions", *, is_quiet: bool) -> int:
     """Run an evaluation, print its table, and return the exit status."""
     from rich.console import Console  # noqa: PLC0415 - heavy; help must be quick
 
-    from mapspeak.evaluation.runs import (  # noqa: PLC0415
-        announce,
-        build_table,
-        run_evaluation,
-        show_run,
-    )
-    from mapspeak.evaluation.scores import count_rows  # noqa: PLC0415
+    from mapspeak.evaluation.runs.runner import run_evaluation  # noqa: PLC0415
+    from mapspeak.evaluation.runs.showing import announce, build_table, show_run  # noqa: PLC0415
+    from mapspeak.evaluation.scores.rows import count_rows  # noqa: PLC0415
 
     done: list[TrialResult] = []
     with show_run(is_quiet=is_quiet) as bar:

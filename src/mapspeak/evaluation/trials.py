@@ -17,7 +17,7 @@ from typing import Any, Protocol
 from pydantic import TypeAdapter, ValidationError
 
 from mapspeak.evaluation.client import ToolClient
-from mapspeak.evaluation.inspected import InspectedSystem
+from mapspeak.evaluation.inspected.playing import InspectedSystem
 from mapspeak.geometry import Pose
 from mapspeak.simulator import WorldObject
 

@@ -9,8 +9,8 @@ import pytest
 import clientprogram
 from hearing import Hearing
 from mapspeak.errors import ConfigError, LinkError
-from mapspeak.evaluation.agents.command import AnswerForm, CommandAgent, Program, find_program
-from mapspeak.evaluation.agents.command.program import Start
+from mapspeak.evaluation.agents.command.agent import CommandAgent
+from mapspeak.evaluation.agents.command.program import AnswerForm, Program, Start, find_program
 from mapspeak.evaluation.agents.finding import find_versions
 from mapspeak.evaluation.agents.models.chat import Thinking
 from mapspeak.evaluation.client import ToolClient

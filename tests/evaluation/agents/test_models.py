@@ -11,9 +11,9 @@ from hearing import Hearing
 from mapspeak.errors import ConfigError
 from mapspeak.evaluation.agents.finding import check_agent, find_agent
 from mapspeak.evaluation.agents.models.chat import (
-    Conversation,
     Ending,
     MockModel,
+    ModelConversation,
     Reply,
     ToolCallRequest,
 )
@@ -52,7 +52,9 @@ class Scripted:
         self.replies = list(replies)
         self.heard: list[tuple[ToolCallRequest, ToolAnswer]] = []
 
-    def begin(self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int) -> Conversation:
+    def begin(
+        self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int
+    ) -> ModelConversation:
         assert (system, prompt, seed) == ("Be quick.", "Go there.", 0)
         assert "look_at_map" in {tool.name for tool in tools}
         return self

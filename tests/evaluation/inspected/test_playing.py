@@ -5,8 +5,10 @@ import pytest
 
 from fakes import two_rooms
 from mapspeak.errors import LinkError
-from mapspeak.evaluation.inspected import InspectedSystem, Names, draw_names, draw_system, play
+from mapspeak.evaluation.inspected.drawing import Names, draw_names, draw_system
 from mapspeak.evaluation.inspected.playing import (
+    InspectedSystem,
+    play,
     with_cut_transform,
     with_dead_stream,
     with_late_stream,

@@ -4,9 +4,9 @@ from urllib.parse import unquote
 
 import pytest
 
-from mapspeak.evaluation.report import write_page
+from mapspeak.evaluation.report.page import write_page
 from mapspeak.evaluation.report.paper import PAPER_TASKS
-from mapspeak.evaluation.tasks import FAMILIES
+from mapspeak.evaluation.tasks.catalogue import FAMILIES
 from mapspeak.evaluation.trials import (
     Failure,
     Score,

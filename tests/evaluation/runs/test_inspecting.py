@@ -6,8 +6,8 @@ import pytest
 
 from mapspeak.evaluation.runs.attempt import attempt
 from mapspeak.evaluation.runs.workplace import open_inspection
-from mapspeak.evaluation.scores import GroundTruth
-from mapspeak.evaluation.tasks import find_task
+from mapspeak.evaluation.scores.site import GroundTruth
+from mapspeak.evaluation.tasks.catalogue import find_task
 from mapspeak.evaluation.trials import (
     Failure,
     ServerAccess,

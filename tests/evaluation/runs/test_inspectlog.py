@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mapspeak.evaluation.runs import write_log
+from mapspeak.evaluation.runs.inspectlog import write_log
 from mapspeak.evaluation.trials import Failure, TrialState, read_results, write_result
 from reportmaking import make_result, make_trial, write_trial
 

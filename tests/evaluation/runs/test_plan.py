@@ -3,7 +3,8 @@ from pathlib import Path
 import pytest
 
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.runs import RunOptions, make_jobs, plan_run
+from mapspeak.evaluation.runs.plan import RunOptions, plan_run
+from mapspeak.evaluation.runs.runner import make_jobs
 from mapspeak.evaluation.runs.showing import announce
 from sites import make_flat
 

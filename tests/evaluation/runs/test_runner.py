@@ -10,7 +10,8 @@ import pytest
 
 import trialworks
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.runs import RunOptions, TrialJob, run_evaluation, run_jobs, writing_to
+from mapspeak.evaluation.runs.plan import RunOptions
+from mapspeak.evaluation.runs.runner import TrialJob, run_evaluation, run_jobs, writing_to
 from mapspeak.evaluation.trials import (
     Failure,
     Trial,

@@ -4,7 +4,8 @@ import io
 
 from rich.console import Console
 
-from mapspeak.evaluation.runs import RunPlan, say_result, show_run, show_trials
+from mapspeak.evaluation.runs.plan import RunPlan
+from mapspeak.evaluation.runs.showing import say_result, show_run, show_trials
 from mapspeak.evaluation.trials import Failure, ToolCall, TrialState, Turn
 from reportmaking import make_result, make_trial
 

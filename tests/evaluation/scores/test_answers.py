@@ -1,6 +1,6 @@
 import pytest
 
-from mapspeak.evaluation.scores import (
+from mapspeak.evaluation.scores.answers import (
     judge_choice,
     judge_number,
     read_letters,

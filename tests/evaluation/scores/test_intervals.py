@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import stats  # type: ignore[import-untyped]  # it ships no types
 
-from mapspeak.evaluation.scores import bootstrap_interval, wilson_interval
+from mapspeak.evaluation.scores.rows import bootstrap_interval, wilson_interval
 
 
 @pytest.mark.parametrize(("n_successes", "n_trials"), [(0, 30), (26, 30), (30, 30), (1, 2)])

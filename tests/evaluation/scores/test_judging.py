@@ -3,9 +3,8 @@ from dataclasses import replace
 
 import pytest
 
-from mapspeak.evaluation.scores import (
-    Evidence,
-    GroundTruth,
+from mapspeak.evaluation.scores.answers import Evidence
+from mapspeak.evaluation.scores.judging import (
     judge_coverage,
     judge_near,
     judge_pose,
@@ -14,6 +13,7 @@ from mapspeak.evaluation.scores import (
     judge_thing,
     spl,
 )
+from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.trials import Failure, TrialState
 from mapspeak.geometry import Point
 from mapspeak.spatial import OccupancyGrid

@@ -9,8 +9,9 @@ from mapspeak.evaluation.agents.baselines import RandomAgent
 from mapspeak.evaluation.agents.scripted import ScriptedAgent
 from mapspeak.evaluation.client import ToolClient
 from mapspeak.evaluation.runs.workplace import open_inspection
-from mapspeak.evaluation.scores import Evidence, GroundTruth
-from mapspeak.evaluation.tasks import FAMILIES, find_task
+from mapspeak.evaluation.scores.answers import Evidence
+from mapspeak.evaluation.scores.site import GroundTruth
+from mapspeak.evaluation.tasks.catalogue import FAMILIES, find_task
 from mapspeak.evaluation.trials import Assignment, Score, ServerAccess, Setting
 from mapspeak.ros.messages.fields import Dialect
 from sites import make_flat

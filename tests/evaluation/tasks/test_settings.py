@@ -2,8 +2,8 @@ import math
 
 import pytest
 
-from mapspeak.evaluation.scores import GroundTruth
-from mapspeak.evaluation.tasks import FAMILIES, find_task, task_names
+from mapspeak.evaluation.scores.site import GroundTruth
+from mapspeak.evaluation.tasks.catalogue import FAMILIES, find_task, task_names
 from mapspeak.geometry import Pose
 from mapspeak.server.prompts import read_text
 from mapspeak.simulator import load_world, world_names

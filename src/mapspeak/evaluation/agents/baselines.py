@@ -10,7 +10,7 @@ import numpy as np
 from mapspeak.evaluation.agents.driver import ARRIVED, ToolDriver
 from mapspeak.evaluation.agents.scripted import ScriptedAgent
 from mapspeak.evaluation.client import ToolClient
-from mapspeak.evaluation.scores import GroundTruth
+from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.trials import Agent, AgentEnd, Assignment, ServerAccess, Setting
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import Cell

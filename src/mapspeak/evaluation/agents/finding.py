@@ -13,7 +13,7 @@ from mapspeak.evaluation.agents.models.chat import MockModel, Thinking
 from mapspeak.evaluation.agents.models.loop import ModelAgent
 from mapspeak.evaluation.agents.models.throughinspect import find_client, open_model
 from mapspeak.evaluation.agents.scripted import ScriptedAgent
-from mapspeak.evaluation.scores import GroundTruth
+from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.trials import Agent, Setting
 
 ORACLE, MOCK = "oracle", "mock"

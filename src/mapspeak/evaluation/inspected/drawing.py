@@ -8,9 +8,9 @@ import numpy as np
 
 from mapspeak.evaluation.inspected.playing import (
     InspectedSystem,
+    NodeSubscription,
     OfferedService,
     Stream,
-    Subscription,
 )
 from mapspeak.geometry import Pose
 from mapspeak.ros.messages.fields import Dialect
@@ -219,7 +219,7 @@ def _transform(parent: str, child: str, pose: Pose) -> FrameTransform:
     return FrameTransform(parent_from_child=pose, parent=parent, child=child, stamp_s=0.0)
 
 
-def _subscriptions(names: Names) -> tuple[Subscription, ...]:
+def _subscriptions(names: Names) -> tuple[NodeSubscription, ...]:
     wanted: dict[str, tuple[tuple[str, str], ...]] = {
         names.locator: ((names.map, GRID), (names.scan, SCAN), ("/tf_static", TRANSFORMS)),
         names.navigator: (
@@ -235,7 +235,7 @@ def _subscriptions(names: Names) -> tuple[Subscription, ...]:
         ),
     }  # fmt: skip
     return tuple(
-        Subscription(node=node, topic=topic, type=kind)
+        NodeSubscription(node=node, topic=topic, type=kind)
         for node, topics in wanted.items()
         for topic, kind in topics
     )

@@ -55,7 +55,7 @@ class Stream:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Subscription:
+class NodeSubscription:
     """One node that subscribes to one topic, and the type that it expects."""
 
     node: str
@@ -86,7 +86,7 @@ class InspectedSystem:
     dialect: Dialect
     started_s: float
     streams: tuple[Stream, ...]
-    subscriptions: tuple[Subscription, ...]
+    subscriptions: tuple[NodeSubscription, ...]
     services: tuple[OfferedService, ...] = ()
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     types: Mapping[str, str] = field(default_factory=dict)

@@ -23,7 +23,7 @@ from mapspeak.evaluation.report.sheet import (
     text,
 )
 from mapspeak.evaluation.report.way import read_course
-from mapspeak.evaluation.scores import Interval, TableRow, count_rows, wilson_interval
+from mapspeak.evaluation.scores.rows import Interval, TableRow, count_rows, wilson_interval
 from mapspeak.evaluation.trials import PICTURES, TURNS, TrialResult, trial_folder, write_whole
 
 PAGE_LIMIT_BYTES = 24_000_000

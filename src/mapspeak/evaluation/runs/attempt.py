@@ -11,11 +11,12 @@ import anyio
 import cv2
 
 from mapspeak.errors import ConfigError
-from mapspeak.evaluation.agents import find_agent
+from mapspeak.evaluation.agents.finding import find_agent
 from mapspeak.evaluation.client import OutOfBudgetError, ToolAnswer, ToolClient
 from mapspeak.evaluation.runs.workplace import CONTROL, Workshop, open_workplace
-from mapspeak.evaluation.scores import Evidence, GroundTruth
-from mapspeak.evaluation.tasks import find_task
+from mapspeak.evaluation.scores.answers import Evidence
+from mapspeak.evaluation.scores.site import GroundTruth
+from mapspeak.evaluation.tasks.catalogue import find_task
 from mapspeak.evaluation.trials import (
     MAP,
     MEMORY,

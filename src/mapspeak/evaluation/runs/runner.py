@@ -27,7 +27,8 @@ from pydantic import ValidationError
 from mapspeak.errors import ConfigError, MapspeakError
 from mapspeak.evaluation.runs.attempt import attempt
 from mapspeak.evaluation.runs.plan import RunOptions, RunPlan, plan_run, prepare_world
-from mapspeak.evaluation.tasks import EXPLORE, find_task
+from mapspeak.evaluation.tasks.catalogue import find_task
+from mapspeak.evaluation.tasks.paper import EXPLORE
 from mapspeak.evaluation.trials import (
     Failure,
     Score,
@@ -43,7 +44,7 @@ from mapspeak.simulator import World
 
 ERRORS = "errors.txt"
 LOCK = ".run.lock"
-PRELOAD = ("mapspeak.evaluation.runs", "mapspeak.evaluation.runs.preload", "mapspeak.cli")
+PRELOAD = ("mapspeak.evaluation.runs.runner", "mapspeak.evaluation.runs.preload", "mapspeak.cli")
 """What every trial needs; imported once, before processes are forked."""
 LAST_WORDS = 2000
 """Characters of a crash that its result keeps."""

@@ -23,8 +23,8 @@ from rich.table import Column, Table
 
 from mapspeak.evaluation.agents.finding import can_think
 from mapspeak.evaluation.runs.plan import RunOptions, RunPlan
-from mapspeak.evaluation.scores import TableRow
-from mapspeak.evaluation.tasks import EXPLORE
+from mapspeak.evaluation.scores.rows import TableRow
+from mapspeak.evaluation.tasks.paper import EXPLORE
 from mapspeak.evaluation.trials import TrialResult, Turn
 
 SHOWN = {

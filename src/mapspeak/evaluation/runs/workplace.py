@@ -14,7 +14,7 @@ from mcp.client import Client
 from mcp.client.stdio import StdioServerParameters
 from mcp.server.mcpserver import MCPServer
 
-from mapspeak.evaluation.inspected import InspectedSystem, play
+from mapspeak.evaluation.inspected.playing import InspectedSystem, play
 from mapspeak.evaluation.scores.answers import NOWHERE
 from mapspeak.evaluation.trials import MAP, MEMORY, STATES, ServerAccess, Setting, Trial
 from mapspeak.links.rosbridge import open_rosbridge_robot

@@ -6,14 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from mapspeak.evaluation.scores import (
-    Evidence,
-    GroundTruth,
-    TruePassage,
-    judge_room,
-    read_word,
-    verdict,
-)
+from mapspeak.evaluation.scores.answers import Evidence, read_word, verdict
+from mapspeak.evaluation.scores.judging import judge_room
+from mapspeak.evaluation.scores.site import GroundTruth, TruePassage
 from mapspeak.evaluation.tasks.task import Draw, Task, Truth, pair, point_text
 from mapspeak.evaluation.trials import Failure, Limits, Score, Setting
 from mapspeak.geometry import Pose

@@ -5,8 +5,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from mapspeak.evaluation.inspected import InspectedSystem, Names, draw_names, draw_system
-from mapspeak.evaluation.scores import Evidence, GroundTruth, no_answer, read_said, verdict
+from mapspeak.evaluation.inspected.drawing import Names, draw_names, draw_system
+from mapspeak.evaluation.inspected.playing import InspectedSystem
+from mapspeak.evaluation.scores.answers import Evidence, no_answer, read_said, verdict
+from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.tasks.task import NO_DRIVING, Draw, Task, Truth
 from mapspeak.evaluation.trials import Failure, Limits, Score, Setting
 from mapspeak.ros.messages.fields import Dialect, bare_type

@@ -5,7 +5,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from mapspeak.evaluation.scores import BESIDE_M, Evidence, GroundTruth, judge_thing
+from mapspeak.evaluation.scores.answers import Evidence
+from mapspeak.evaluation.scores.judging import judge_thing
+from mapspeak.evaluation.scores.site import BESIDE_M, GroundTruth
 from mapspeak.evaluation.tasks.task import Draw, Task, Truth
 from mapspeak.evaluation.trials import Limits, Score, Setting
 

@@ -4,7 +4,7 @@ The prompts are those of its Table "User prompts for each evaluation task", word
 guidance is the prompt of its appendix with the semantic filtering policy.
 """
 
-from mapspeak.evaluation.scores import judge_coverage
+from mapspeak.evaluation.scores.judging import judge_coverage
 from mapspeak.evaluation.tasks.task import Draw, Task
 from mapspeak.evaluation.trials import Limits, Setting
 from mapspeak.server.prompts import read_text

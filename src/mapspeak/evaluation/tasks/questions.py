@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from mapspeak.evaluation.scores import (
+from mapspeak.evaluation.scores.answers import (
     Evidence,
-    GroundTruth,
-    count_known,
     judge_choice,
     judge_number,
     read_point,
     verdict,
 )
+from mapspeak.evaluation.scores.judging import count_known
+from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.tasks.task import NO_DRIVING, Draw, Task, Truth, pair, point_text
 from mapspeak.evaluation.trials import Failure, Limits, Score, Setting
 from mapspeak.geometry import Point, Pose

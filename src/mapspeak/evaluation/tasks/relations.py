@@ -5,14 +5,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mapspeak.evaluation.scores import (
-    BESIDE_M,
-    Evidence,
-    GroundTruth,
-    judge_near,
-    judge_pose,
-    judge_route,
-)
+from mapspeak.evaluation.scores.answers import Evidence
+from mapspeak.evaluation.scores.judging import judge_near, judge_pose, judge_route
+from mapspeak.evaluation.scores.site import BESIDE_M, GroundTruth
 from mapspeak.evaluation.tasks.objects import findable_kinds
 from mapspeak.evaluation.tasks.task import Draw, Task, Truth, point_text
 from mapspeak.evaluation.trials import Limits, Score, Setting

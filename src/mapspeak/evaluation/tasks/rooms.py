@@ -5,7 +5,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from mapspeak.evaluation.scores import Evidence, GroundTruth, judge_room
+from mapspeak.evaluation.scores.answers import Evidence
+from mapspeak.evaluation.scores.judging import judge_room
+from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.tasks.task import Draw, Task, Truth
 from mapspeak.evaluation.trials import Score, Setting
 from mapspeak.simulator import MeasuredRoom

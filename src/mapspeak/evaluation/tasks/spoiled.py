@@ -6,7 +6,8 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
-from mapspeak.evaluation.scores import Evidence, GroundTruth
+from mapspeak.evaluation.scores.answers import Evidence
+from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.tasks.objects import (
     SEARCH_LIMITS,
     SEARCH_TOOLS,

@@ -7,7 +7,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from mapspeak.evaluation.scores import Evidence, GroundTruth
+from mapspeak.evaluation.scores.answers import Evidence
+from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.trials import Limits, Score, Setting
 from mapspeak.geometry import Point, Pose
 from mapspeak.simulator import WorldObject

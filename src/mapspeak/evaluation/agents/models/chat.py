@@ -66,7 +66,7 @@ class Reply:
     ending: Ending = Ending.ITS_OWN
 
 
-class Conversation(Protocol):
+class ModelConversation(Protocol):
     """One conversation, which keeps all that was said in it."""
 
     async def ask(self) -> Reply:
@@ -85,7 +85,9 @@ class Conversation(Protocol):
 class ChatModel(Protocol):
     """A model that can be talked to."""
 
-    def begin(self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int) -> Conversation:
+    def begin(
+        self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int
+    ) -> ModelConversation:
         """Begin a conversation.
 
         Args:
@@ -160,7 +162,9 @@ class MockModel:
     _n_read: int = 0
     _heard: list[str] = field(default_factory=list)
 
-    def begin(self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int) -> Conversation:
+    def begin(
+        self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int
+    ) -> ModelConversation:
         """Begin a conversation."""
         names = tuple(tool.name for tool in tools)
         return MockModel(seed, prompt, names, _count_tokens(system) + _count_tokens(prompt))

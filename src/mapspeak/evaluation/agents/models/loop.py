@@ -14,8 +14,8 @@ from PIL import Image
 from mapspeak.errors import LinkError
 from mapspeak.evaluation.agents.models.chat import (
     ChatModel,
-    Conversation,
     Ending,
+    ModelConversation,
     Reply,
     ToolCallRequest,
 )
@@ -115,7 +115,9 @@ class ModelAgent:
         return account.end("It took too long.", TrialState.OUT_OF_BUDGET)
 
 
-async def _converse(conversation: Conversation, tools: ToolClient, account: _Account) -> AgentEnd:
+async def _converse(
+    conversation: ModelConversation, tools: ToolClient, account: _Account
+) -> AgentEnd:
     while True:
         reply = await conversation.ask()
         account.note(reply)

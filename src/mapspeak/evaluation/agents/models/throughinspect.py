@@ -14,8 +14,8 @@ from mcp_types import Tool
 
 from mapspeak.errors import ConfigError, LinkError
 from mapspeak.evaluation.agents.models.chat import (
-    Conversation,
     Ending,
+    ModelConversation,
     Reply,
     Thinking,
     ToolCallRequest,
@@ -80,7 +80,9 @@ class InspectModel:
     name: str
     thinking: Thinking | None
 
-    def begin(self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int) -> Conversation:
+    def begin(
+        self, *, system: str, prompt: str, tools: Sequence[Tool], seed: int
+    ) -> ModelConversation:
         """Begin a conversation.
 
         Raises:
