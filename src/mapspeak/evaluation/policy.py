@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
+from mapspeak.evaluation.agents.driver import ARRIVED, ToolDriver
 from mapspeak.evaluation.client import ToolClient
-from mapspeak.evaluation.observer import describe_view, read_sightings
 from mapspeak.evaluation.reading import MapReading, Row, read_map_picture, read_map_text
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import OccupancyGrid
@@ -26,10 +26,7 @@ def find_viewpoint(
     grid: OccupancyGrid, robot: Point, looked_from: Sequence[Point], *, radius_m: float
 ) -> Point | None:
     """Find the middle of the nearest piece of floor that is still to be looked at, or None."""
-    distances = distances_from(grid, robot, radius_m=radius_m)
-    rows, cols = np.nonzero(grid.free)
-    ways_m = np.full(grid.cells.shape, np.inf)
-    ways_m[rows, cols] = distances.distances_at(rows, cols)
+    ways_m = ways_to_floor_m(grid, robot, radius_m=radius_m)
     is_left = np.isfinite(ways_m)
     for place in looked_from:
         is_left &= ~_near_in_sight(grid, place)
@@ -40,6 +37,14 @@ def find_viewpoint(
     row, col = np.unravel_index(int(middle), piece.shape)
     x, y = grid.points_at(np.array([row]), np.array([col]))[0]
     return Point(float(x), float(y))
+
+
+def ways_to_floor_m(grid: OccupancyGrid, robot: Point, *, radius_m: float) -> FloatArray:
+    """Return the way to each free cell; infinite for all others and where there is none."""
+    rows, cols = np.nonzero(grid.free)
+    ways_m = np.full(grid.cells.shape, np.inf)
+    ways_m[rows, cols] = distances_from(grid, robot, radius_m=radius_m).distances_at(rows, cols)
+    return ways_m
 
 
 def _near_in_sight(grid: OccupancyGrid, place: Point) -> Mask:
@@ -89,22 +94,20 @@ MARGIN_M = 0.45
 """A viewpoint keeps this clear of walls: as much as the robot needs and a little more."""
 LOOK_AROUND_EVERY_M = 4.0
 LOOK_AROUND_DEG = (90.0, 180.0, 270.0)
-FINAL_STATES = ("arrived", "blocked", "cancelled", "preempted", "rejected", "lost")
 
 
 @dataclass(slots=True)
 class ExplorationPolicy:
-    """Explores, and records what is seen on the way.
-
-    Attributes:
-        tools: Where calls go.
-    """
+    """Explores, and records what is seen on the way."""
 
     tools: ToolClient
+    _driver: ToolDriver = field(init=False)
     _n_goals: int = 0
-    _n_records: int = 0
     _looked_at: list[Point] = field(default_factory=list)
     _grid: OccupancyGrid = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._driver = ToolDriver(self.tools, wait_s=WAIT_S)
 
     async def explore(self) -> None:
         """Drive to frontiers and record what is seen, until none is left to reach.
@@ -139,9 +142,9 @@ class ExplorationPolicy:
             point = find_viewpoint(self._grid, pose.point, self._looked_at, radius_m=MARGIN_M)
             if point is None:
                 return
-            answer = await self._drive_to_point(point)
+            state = await self._driver.drive(x=point.x, y=point.y)
             pose = (await self._look()).pose
-            if answer == "arrived":
+            if state == ARRIVED:
                 await self._record_surroundings(pose)
             self._looked_at.append(point)
 
@@ -150,15 +153,6 @@ class ExplorationPolicy:
         answer = await self.tools.demand("look_at_map")
         self._grid = read_map_picture(plain.text, plain.pictures[0].data)
         return read_map_text(answer.text)
-
-    async def _drive_to_point(self, point: Point) -> str:
-        """Drive to a point, wait until that has ended, and return how."""
-        answer = await self.tools.call("navigate_to", x=point.x, y=point.y, wait_s=WAIT_S)
-        while not answer.is_error and answer.report["state"] not in FINAL_STATES:
-            answer = await self.tools.call(
-                "wait_for_goal", goal_id=answer.report["goal_id"], wait_s=WAIT_S
-            )
-        return "refused" if answer.is_error else str(answer.report["state"])
 
     async def _record_surroundings(self, pose: Pose) -> None:
         """Record what is ahead and, where it has not looked around near by, to all sides."""
@@ -172,11 +166,9 @@ class ExplorationPolicy:
             await self._record()
 
     async def _record(self) -> None:
-        sightings = read_sightings((await self.tools.demand("look_through_camera")).text)
+        sightings = await self._driver.see()
         place = (await self.tools.demand("get_robot_pose")).report
-        self._n_records += 1
-        record = describe_view(self._n_records, place["place"], sightings)
-        await self.tools.demand("write_semantic_data", **record)
+        await self._driver.record(place["place"], sightings)
 
 
 def is_room(row: Row, doors: tuple[Row, ...]) -> bool:

@@ -1,9 +1,14 @@
-"""Reading the text of `look_at_map` as a model does: the tables, the pose, the picture's scale."""
+"""What tools answer, read by scripts as a model does: tables, pose, the picture's scale, sightings.
+
+A language model looks at the picture itself. A script cannot, so it reads what the robot's detector
+(in the simulator: the *simulated detector*) reports, and sorts it by the paper's filtering policy.
+"""
 
 import io
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -23,12 +28,7 @@ HEADING = re.compile(r"^## (\w+)")
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One line of a table.
-
-    Attributes:
-        id: The first column.
-        cells: Every column by its heading.
-    """
+    """One line of a table: its first column, and every column by its heading."""
 
     id: str
     cells: dict[str, str]
@@ -108,3 +108,55 @@ def read_map_picture(text: str, picture: bytes) -> OccupancyGrid:
         resolution_m=resolution_m,
         origin=Pose(x, y),
     )
+
+
+# --- the detector --------------------------------------------------------------------------------
+
+SIGHTING = re.compile(
+    r"^- (?P<label>[^,]+), bearing (?P<bearing>[+-]?[\d.]+) deg, range (?P<range>[\d.]+) m",
+    re.MULTILINE,
+)
+CLEAR_RANGE_M = 6.0
+"""Farther things are left to a waypoint that is nearer to them."""
+
+SAFETY_WORDS = ("extinguisher", "first-aid", "first aid", "exit", "eye", "hose", "fire")
+"""Fixed safety equipment, by the paper's first category."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DetectedThing:
+    """One thing the detector reported; the bearing is from the robot's heading, left positive."""
+
+    label: str
+    bearing_deg: float
+    range_m: float
+
+
+def read_sightings(text: str) -> tuple[DetectedThing, ...]:
+    """Read the detector's lines in the answer of `look_through_camera`, nearest first."""
+    sightings = (
+        DetectedThing(
+            label=match["label"],
+            bearing_deg=float(match["bearing"]),
+            range_m=float(match["range"]),
+        )
+        for match in SIGHTING.finditer(text)
+    )
+    return tuple(sorted(sightings, key=lambda sighting: sighting.range_m))
+
+
+def describe_view(number: int, place: str, sightings: tuple[DetectedThing, ...]) -> dict[str, Any]:
+    """Return the arguments of `write_semantic_data` for what is seen from here."""
+    clear = [sighting for sighting in sightings if sighting.range_m <= CLEAR_RANGE_M]
+    names = ", ".join(dict.fromkeys(sighting.label for sighting in clear))
+    seen = f"The simulated detector reports: {names}." if names else "Nothing it knows is near."
+    landmarks: dict[bool, list[dict[str, Any]]] = {True: [], False: []}
+    for thing in clear:
+        landmarks[any(word in thing.label for word in SAFETY_WORDS)].append(asdict(thing))
+    return {
+        "name": f"view {number}",
+        "description": f"View from {place}. {seen}",
+        "safety_landmarks": landmarks[True],
+        "functional_landmarks": landmarks[False],
+        "geometric_features": [f"stands in {place}"],
+    }

@@ -5,10 +5,16 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from mapspeak.evaluation.client import ToolAnswer, ToolClient
-from mapspeak.evaluation.observer import DetectedThing, read_sightings
-from mapspeak.evaluation.reading import MapReading, read_map_text
-from mapspeak.geometry import Point, Pose
+from mapspeak.evaluation.client import ToolClient
+from mapspeak.evaluation.reading import (
+    DetectedThing,
+    MapReading,
+    describe_view,
+    read_map_text,
+    read_sightings,
+)
+from mapspeak.evaluation.trials import AgentEnd, TrialState
+from mapspeak.geometry import Point, Pose, wrap_angle
 
 WAIT_S = 25.0
 REGION = re.compile(r"\b[RCO]\d+\b")
@@ -22,14 +28,12 @@ class Seen:
     """One thing as one remembered place has seen it.
 
     Attributes:
-        label: What it was taken for.
         place: The id of the remembered place.
         view: Where that is.
         bearing_rad: From the place's heading; None where it was not noted.
         range_m: From the place; infinite where it was not noted.
     """
 
-    label: str
     place: str
     view: Pose
     bearing_rad: float | None
@@ -40,22 +44,20 @@ class Seen:
         """Where the thing is; None where bearing or range are not known."""
         if self.bearing_rad is None or math.isinf(self.range_m):
             return None
-        heading_rad = self.view.yaw_rad + self.bearing_rad
-        return Point(
-            self.view.x + self.range_m * math.cos(heading_rad),
-            self.view.y + self.range_m * math.sin(heading_rad),
-        )
+        return step(self.view.point, self.view.yaw_rad + self.bearing_rad, self.range_m)
 
 
+@dataclass(slots=True)
 class ToolDriver:
     """Calls tools in a script's name.
 
-    Args:
-        tools: Where calls go.
+    Attributes:
+        wait_s: How long each call waits for the end of a drive, in robot time.
     """
 
-    def __init__(self, tools: ToolClient) -> None:
-        self.tools = tools
+    tools: ToolClient
+    wait_s: float = WAIT_S
+    _n_views: int = 0
 
     async def is_offered(self, tool: str) -> bool:
         """Return True where the server offers a tool of that name."""
@@ -84,8 +86,12 @@ class ToolDriver:
 
     async def drive(self, **goal: object) -> str:
         """Drive to a `place`, or to `x`, `y` and perhaps `yaw_deg`; return how it ended."""
-        answer = await self.tools.call("navigate_to", **goal, wait_s=WAIT_S)
-        return await self._see_through(answer)
+        answer = await self.tools.call("navigate_to", **goal, wait_s=self.wait_s)
+        while not answer.is_error and answer.report["state"] not in FINAL_STATES:
+            answer = await self.tools.call(
+                "wait_for_goal", goal_id=answer.report["goal_id"], wait_s=self.wait_s
+            )
+        return REFUSED if answer.is_error else str(answer.report["state"])
 
     async def find_nearest(self, places: list[str]) -> str | None:
         """Return which of some places is the nearest by path; None where no way leads to any."""
@@ -104,18 +110,26 @@ class ToolDriver:
         """Take a picture and return what the detector reports of it."""
         return read_sightings((await self.tools.demand("look_through_camera")).text)
 
-    async def _see_through(self, answer: ToolAnswer) -> str:
-        while not answer.is_error and answer.report["state"] not in FINAL_STATES:
-            answer = await self.tools.call(
-                "wait_for_goal", goal_id=answer.report["goal_id"], wait_s=WAIT_S
-            )
-        return REFUSED if answer.is_error else str(answer.report["state"])
+    async def record(self, place: str, sightings: tuple[DetectedThing, ...]) -> None:
+        """Remember what is seen from here, under a number."""
+        self._n_views += 1
+        record = describe_view(self._n_views, place, sightings)
+        await self.tools.demand("write_semantic_data", **record)
+
+
+def gave_up(why: str) -> AgentEnd:
+    """Return the end of an agent that cannot go on."""
+    return AgentEnd(answer=why, state=TrialState.GAVE_UP)
+
+
+def step(point: Point, heading_rad: float, away_m: float) -> Point:
+    """Return the point so far from another one, in a direction."""
+    return Pose(point.x, point.y, wrap_angle(heading_rad)).transform(Point(away_m, 0.0))
 
 
 def _seen(record: dict[str, Any], landmark: dict[str, Any]) -> Seen:
     pose, bearing_deg = record["pose"], landmark["bearing_deg"]
     return Seen(
-        label=landmark["label"],
         place=record["id"],
         view=Pose(pose["x"], pose["y"], math.radians(pose["yaw_deg"])),
         bearing_rad=None if bearing_deg is None else math.radians(bearing_deg),

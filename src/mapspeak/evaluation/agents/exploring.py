@@ -1,20 +1,20 @@
 """Two explorers to compare with: the nearest frontier, and the paper's loop from pictures alone."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from mapspeak.evaluation.agents.driver import ARRIVED, ToolDriver, find_label
+from mapspeak.evaluation.agents.driver import ARRIVED, ToolDriver, find_label, gave_up
 from mapspeak.evaluation.client import ToolClient
-from mapspeak.evaluation.observer import describe_view
-from mapspeak.evaluation.reading import read_map_picture
-from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess, TrialState
+from mapspeak.evaluation.policy import MARGIN_M, SIGHT_M, ways_to_floor_m
+from mapspeak.evaluation.reading import Row, read_map_picture
+from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, Mask
-from mapspeak.spatial.paths import clearance_m, distances_from
+from mapspeak.spatial.paths import clearance_m
 
 EXPLORING = "Update the map"
 SMALLEST = "Go to the smallest room"
@@ -25,10 +25,6 @@ STEP_M = 5.0
 """The paper's prompt asks for waypoints at least so far away, ..."""
 BACK_M = 3.0
 """... and for none so near to one that was visited."""
-MARGIN_M = 0.45
-"""A goal keeps this clear of walls: as much as the robot needs and a little more."""
-SIGHT_M = 4.0
-"""So much around a goal counts as what would be seen from it."""
 LEAST_EDGE_M = 0.6
 """A border with the unknown that is shorter is a crack."""
 DOOR_M = 1.2
@@ -36,21 +32,12 @@ DOOR_M = 1.2
 LEAST_ROOM_M2 = 1.0
 
 
-@dataclass(slots=True)
-class _Log:
-    """Takes a picture at each stop and remembers what the detector sees, under a number."""
-
-    driver: ToolDriver
-    n_views: int = 0
-
-    async def record(self) -> Pose:
-        """Record what is ahead, and return where that was."""
-        sightings = await self.driver.see()
-        pose = await self.driver.find_pose()
-        self.n_views += 1
-        record = describe_view(self.n_views, f"{pose.x:.1f}, {pose.y:.1f}", sightings)
-        await self.driver.tools.demand("write_semantic_data", **record)
-        return pose
+async def _record(driver: ToolDriver) -> Pose:
+    """Record what is ahead, and return where that was."""
+    sightings = await driver.see()
+    pose = await driver.find_pose()
+    await driver.record(f"{pose.x:.1f}, {pose.y:.1f}", sightings)
+    return pose
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,25 +53,25 @@ class NearestFrontierAgent:
     async def run(self, task: Assignment, tools: ToolClient) -> AgentEnd:
         """Carry out the assignment."""
         if not task.prompt.startswith(EXPLORING):
-            return _gave_up("I only explore.")
+            return gave_up("I only explore.")
         driver, missed = ToolDriver(tools), list[Point]()
-        log = _Log(driver)
-        await log.record()
+        await _record(driver)
         for _ in range(MOST_GOALS):
             rows = (await driver.look()).rows("Frontiers")
-            goals = [
-                (row.number("path m"), row.id, _first_point(row.cells["go to x, y, yaw"]))
-                for row in rows
+            goals = [(row.number("path m"), row.id, _point_of(row)) for row in rows]
+            left = [
+                goal
+                for goal in goals
+                if all(goal[2].distance_to(place) >= FARTHEST_MISS_M for place in missed)
             ]
-            left = [goal for goal in goals if _is_far_from(goal[2], missed, FARTHEST_MISS_M)]
             if not left:
                 return AgentEnd(answer="No frontier is left that I can reach.")
             _, frontier, point = min(left, key=lambda goal: goal[:2])
             if await driver.drive(place=frontier) == ARRIVED:
-                await log.record()
+                await _record(driver)
             else:
                 missed.append(point)
-        return _gave_up("There are too many frontiers.")
+        return gave_up("There are too many frontiers.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,33 +95,24 @@ class PaperLoopAgent:
         if task.prompt.startswith(SMALLEST):
             return await _go_to_smallest_patch(driver)
         label = find_label(task.prompt)
-        return _gave_up("I do not know how.") if label is None else await _recall(driver, label)
-
-
-@dataclass(slots=True)
-class _Tour:
-    """Where the loop has been, and where it failed to get."""
-
-    visited: list[Point] = field(default_factory=list)
-    missed: list[Point] = field(default_factory=list)
+        return gave_up("I do not know how.") if label is None else await _recall(driver, label)
 
 
 async def _explore_by_picture(driver: ToolDriver) -> AgentEnd:
-    log, tour = _Log(driver), _Tour()
-    pose = await log.record()
-    tour.visited.append(pose.point)
+    pose = await _record(driver)
+    visited, missed = [pose.point], list[Point]()
     for _ in range(MOST_GOALS):
         grid = await _see_map(driver)
-        goal = _choose_waypoint(grid, pose.point, tour)
+        goal = _choose_waypoint(grid, pose.point, visited, missed)
         if goal is None:
             return AgentEnd(answer="No unexplored area is left.")
         state = await driver.drive(x=goal.x, y=goal.y, yaw_deg=goal.yaw_deg)
         if state == ARRIVED:
-            pose = await log.record()
-            tour.visited.append(pose.point)
+            pose = await _record(driver)
+            visited.append(pose.point)
         else:
-            tour.missed.append(goal.point)
-    return _gave_up("There is always something left to explore.")
+            missed.append(goal.point)
+    return gave_up("There is always something left to explore.")
 
 
 async def _see_map(driver: ToolDriver) -> OccupancyGrid:
@@ -145,7 +123,9 @@ async def _see_map(driver: ToolDriver) -> OccupancyGrid:
     return read_map_picture(plain.text, plain.pictures[0].data)
 
 
-def _choose_waypoint(grid: OccupancyGrid, robot: Point, tour: _Tour) -> Pose | None:
+def _choose_waypoint(
+    grid: OccupancyGrid, robot: Point, visited: Sequence[Point], missed: Sequence[Point]
+) -> Pose | None:
     """Find the place that sees most of the border with the unknown, by the prompt's rules.
 
     A place at least 5 m away comes first; where there is none, one that is nearer.
@@ -153,15 +133,15 @@ def _choose_waypoint(grid: OccupancyGrid, robot: Point, tour: _Tour) -> Pose | N
     edge = _edge_of_unknown(grid)
     cells = round(2 * SIGHT_M / grid.resolution_m) | 1
     in_sight = cv2.blur(edge.astype(np.float32), (cells, cells), borderType=cv2.BORDER_CONSTANT)
-    rows, cols = np.nonzero(_reachable(grid, robot))
+    rows, cols = np.nonzero(np.isfinite(ways_to_floor_m(grid, robot, radius_m=MARGIN_M)))
     if not rows.size:
         return None
     points = grid.points_at(rows, cols)
     worth = in_sight[rows, cols].astype(np.float64) * cells**2 * grid.resolution_m
     worth[worth < LEAST_EDGE_M] = 0.0
-    for place in tour.visited:
+    for place in visited:
         worth[_ways_m(points, place) < BACK_M] = 0.0
-    for place in tour.missed:
+    for place in missed:
         worth[_ways_m(points, place) < FARTHEST_MISS_M] = 0.0
     is_far = _ways_m(points, robot) >= STEP_M
     chosen = worth * is_far if (worth * is_far).any() else worth
@@ -175,14 +155,6 @@ def _edge_of_unknown(grid: OccupancyGrid) -> Mask:
     """Return free cells beside unknown ones."""
     beside = cv2.dilate(grid.unknown.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     return np.asarray(grid.free & beside)
-
-
-def _reachable(grid: OccupancyGrid, robot: Point) -> Mask:
-    distances = distances_from(grid, robot, radius_m=MARGIN_M)
-    rows, cols = np.nonzero(grid.free)
-    is_reachable = np.zeros(grid.cells.shape, dtype=bool)
-    is_reachable[rows, cols] = np.isfinite(distances.distances_at(rows, cols))
-    return is_reachable
 
 
 def _nearest(grid: OccupancyGrid, cells: Mask, point: Point) -> Point:
@@ -210,26 +182,18 @@ async def _go_to_smallest_patch(driver: ToolDriver) -> AgentEnd:
         x, y = grid.points_at(np.array([row]), np.array([col]))[0].tolist()
         if await driver.drive(x=x, y=y) == ARRIVED:
             return AgentEnd(answer="This looks like the smallest room.")
-    return _gave_up("I see no room that I can get to.")
+    return gave_up("I see no room that I can get to.")
 
 
 async def _recall(driver: ToolDriver, label: str) -> AgentEnd:
     """Go to the nearest waypoint, in a straight line, that remembers the thing."""
     seen, pose = await driver.recall(label), await driver.find_pose()
     if not seen:
-        return _gave_up(f"I remember no {label}.")
+        return gave_up(f"I remember no {label}.")
     nearest = min(seen, key=lambda each: each.view.point.distance_to(pose.point))
     return AgentEnd(answer=f"{nearest.place}: {await driver.drive(place=nearest.place)}.")
 
 
-def _first_point(text: str) -> Point:
-    x, y = text.split(",")[:2]
+def _point_of(frontier: Row) -> Point:
+    x, y = frontier.cells["go to x, y, yaw"].split(",")[:2]
     return Point(float(x), float(y))
-
-
-def _is_far_from(point: Point, places: Sequence[Point], least_m: float) -> bool:
-    return all(point.distance_to(place) >= least_m for place in places)
-
-
-def _gave_up(why: str) -> AgentEnd:
-    return AgentEnd(answer=why, state=TrialState.GAVE_UP)

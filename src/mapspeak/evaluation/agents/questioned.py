@@ -2,12 +2,13 @@
 
 import re
 
-from mapspeak.evaluation.agents.driver import ToolDriver
+from mapspeak.evaluation.agents.driver import ToolDriver, gave_up
 from mapspeak.evaluation.reading import MapReading, Row
-from mapspeak.evaluation.trials import AgentEnd, TrialState
+from mapspeak.evaluation.trials import AgentEnd
 from mapspeak.geometry import Point
 
 POINT = re.compile(r"\((-?\d+\.\d+), (-?\d+\.\d+)\)")
+UNTOLD = "The map does not say."
 CHOICE = re.compile(r"\b([A-H]) \((-?\d+\.\d+), (-?\d+\.\d+)\)")
 
 
@@ -23,7 +24,7 @@ async def answer_question(driver: ToolDriver, question: str) -> AgentEnd:
     region = await _region_at(driver, asked)
     row = _row_of(view, region)
     if row is None:
-        return _gave_up()
+        return gave_up(UNTOLD)
     if "square metres" in question:
         return _answer(f"{row.number('free m2'):.1f} m2")
     doors = _ways_out(view, row)
@@ -40,7 +41,7 @@ async def answer_question(driver: ToolDriver, question: str) -> AgentEnd:
 async def _say_where_to_explore(driver: ToolDriver) -> AgentEnd:
     frontiers = (await driver.look()).rows("Frontiers")
     if not frontiers:
-        return _gave_up()
+        return gave_up(UNTOLD)
     x, y, *_ = frontiers[0].cells["go to x, y, yaw"].split(", ")
     return _answer(f"{x}, {y}")
 
@@ -49,7 +50,7 @@ async def _say_way(driver: ToolDriver, question: str) -> AgentEnd:
     x, y = next(iter(POINT.findall(question)))
     text = (await driver.tools.demand("describe_place", place=f"{x}, {y}")).text
     match = re.search(r"is (\d+(?:\.\d+)?) m away by path", text)
-    return _gave_up() if match is None else _answer(f"{match[1]} m")
+    return gave_up(UNTOLD) if match is None else _answer(f"{match[1]} m")
 
 
 async def _region_at(driver: ToolDriver, point: tuple[str, str]) -> str:
@@ -70,7 +71,3 @@ def _ways_out(view: MapReading, row: Row) -> dict[str, str]:
 
 def _answer(said: str) -> AgentEnd:
     return AgentEnd(answer=f"ANSWER: {said}")
-
-
-def _gave_up() -> AgentEnd:
-    return AgentEnd(answer="The map does not say.", state=TrialState.GAVE_UP)

@@ -6,15 +6,22 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
 from mapspeak.errors import MapspeakError
-from mapspeak.evaluation.agents.driver import ARRIVED, WAIT_S, Seen, ToolDriver, find_label
+from mapspeak.evaluation.agents.driver import (
+    ARRIVED,
+    WAIT_S,
+    Seen,
+    ToolDriver,
+    find_label,
+    gave_up,
+    step,
+)
 from mapspeak.evaluation.agents.inspecting import diagnose
 from mapspeak.evaluation.agents.questioned import answer_question
 from mapspeak.evaluation.client import OutOfBudgetError, ToolAnswer, ToolClient
-from mapspeak.evaluation.observer import read_sightings
 from mapspeak.evaluation.policy import ExplorationPolicy, is_room
-from mapspeak.evaluation.reading import MapReading, Row
+from mapspeak.evaluation.reading import read_sightings
 from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess, TrialState
-from mapspeak.geometry import Point, Pose, wrap_angle
+from mapspeak.geometry import Point, wrap_angle
 
 NEAR_M = 4.5
 """A place that saw a thing from no farther leads to it."""
@@ -47,7 +54,7 @@ class ScriptedAgent:
         except OutOfBudgetError:
             raise
         except MapspeakError as error:
-            return _gave_up(f"A tool did not give what I need: {error}")
+            return gave_up(f"A tool did not give what I need: {error}")
 
 
 async def _do(driver: ToolDriver, prompt: str) -> AgentEnd:
@@ -57,7 +64,7 @@ async def _do(driver: ToolDriver, prompt: str) -> AgentEnd:
             return await deed(driver, match)
     label = find_label(prompt)
     if label is None:
-        return _gave_up("I know no word of this.")
+        return gave_up("I know no word of this.")
     return await _go_to_thing(driver, label)
 
 
@@ -75,11 +82,13 @@ async def _explore(driver: ToolDriver, _: re.Match[str]) -> AgentEnd:
 async def _go_to_room_by_size(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
     view = await driver.look()
     is_from_below = match["end"] == "smallest"
-    rows = _rooms_of(view) if is_from_below else list(view.rows("Rooms"))
+    rows = view.rows("Rooms")
+    if is_from_below:
+        rows = tuple(row for row in rows if is_room(row, view.rows("Doors")))
     rooms = sorted(rows, key=lambda row: row.number("floor m2"))
     number = ORDINALS.get(match["ordinal"] or "", 1)
     if len(rooms) < number:
-        return _gave_up("There are not so many rooms.")
+        return gave_up("There are not so many rooms.")
     chosen = rooms[number - 1] if is_from_below else rooms[-number]
     return await _go_to_region(driver, chosen.id)
 
@@ -87,14 +96,9 @@ async def _go_to_room_by_size(driver: ToolDriver, match: re.Match[str]) -> Agent
 async def _go_to_longest_corridor(driver: ToolDriver, _: re.Match[str]) -> AgentEnd:
     corridors = (await driver.look()).rows("Corridors")
     if not corridors:
-        return _gave_up("There is no corridor.")
+        return gave_up("There is no corridor.")
     longest = max(corridors, key=lambda row: row.number("size m"))
     return await _go_to_region(driver, longest.id)
-
-
-def _rooms_of(view: MapReading) -> list[Row]:
-    """Return the rooms that are rooms and no nooks."""
-    return [row for row in view.rows("Rooms") if is_room(row, view.rows("Doors"))]
 
 
 async def _go_to_region(driver: ToolDriver, place: str) -> AgentEnd:
@@ -117,7 +121,7 @@ async def _aside(driver: ToolDriver, middle: Point) -> list[Point]:
     """Return some points beside another one in the same room."""
     room = await driver.find_region(middle)
     points = [
-        Pose(middle.x, middle.y, math.radians(heading_deg)).transform(Point(away_m, 0.0))
+        step(middle, math.radians(heading_deg), away_m)
         for away_m in ASIDE_M
         for heading_deg in (0.0, 90.0, 180.0, -90.0)
     ]
@@ -125,10 +129,6 @@ async def _aside(driver: ToolDriver, middle: Point) -> list[Point]:
 
 
 # --- things --------------------------------------------------------------------------------------
-
-
-async def _find_nearest(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
-    return await _go_to_thing(driver, match["label"])
 
 
 async def _go_to_thing(driver: ToolDriver, label: str) -> AgentEnd:
@@ -157,18 +157,18 @@ async def _is_here(driver: ToolDriver, label: str) -> bool:
 async def _search(driver: ToolDriver, label: str) -> AgentEnd:
     """Let the robot look about until the detector reports the thing, and goes there."""
     if not await driver.is_offered(SEARCH):
-        return _gave_up(f"I know no way to a {label}, and am offered no search.")
+        return gave_up(f"I know no way to a {label}, and am offered no search.")
     answer = await driver.tools.call(SEARCH, thing=label, wait_s=WAIT_S)
     for _ in range(MOST_STEPS):
         if answer.is_error:
-            return _gave_up(answer.text)
+            return gave_up(answer.text)
         found = [each for each in read_sightings(answer.text) if label in each.label]
         if found:
             return await _approach(driver, label, found[0].bearing_deg, found[0].range_m)
         if answer.report["state"] not in ("driving", "look", "reported"):
-            return _gave_up(f"There is no {label} to be found: {answer.report['reason']}")
+            return gave_up(f"There is no {label} to be found: {answer.report['reason']}")
         answer = await _search_on(driver, label, answer)
-    return _gave_up(f"I have looked long enough for a {label}.")
+    return gave_up(f"I have looked long enough for a {label}.")
 
 
 async def _search_on(driver: ToolDriver, label: str, answer: ToolAnswer) -> ToolAnswer:
@@ -185,7 +185,7 @@ async def _approach(driver: ToolDriver, label: str, bearing_deg: float, range_m:
     for left_m in (BESIDE_M, 2 * BESIDE_M, range_m / 2):
         if range_m <= left_m:
             break
-        way = Pose(pose.x, pose.y, heading_rad).transform(Point(range_m - left_m, 0.0))
+        way = step(pose.point, heading_rad, range_m - left_m)
         yaw_deg = math.degrees(wrap_angle(heading_rad))
         if await driver.drive(x=way.x, y=way.y, yaw_deg=yaw_deg) == ARRIVED:
             break
@@ -197,24 +197,24 @@ async def _approach(driver: ToolDriver, label: str, bearing_deg: float, range_m:
 
 async def _go_beside_pose(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
     heading_rad = math.radians(float(match["yaw"]) + SIDES_DEG[match["side"]])
-    person = Pose(float(match["x"]), float(match["y"]), heading_rad)
-    goal = person.transform(Point(float(match["away"]), 0.0))
+    person = Point(float(match["x"]), float(match["y"]))
+    goal = step(person, heading_rad, float(match["away"]))
     return AgentEnd(answer=f"It {await driver.drive(x=goal.x, y=goal.y)}.")
 
 
 async def _go_beside_thing(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
     thing = _place_of(await driver.recall(match["label"]))
     if thing is None:
-        return _gave_up(f"I remember no {match['label']}.")
+        return gave_up(f"I remember no {match['label']}.")
     heading_rad = math.radians(COMPASS_DEG[match["direction"]])
-    goal = Pose(thing.x, thing.y, heading_rad).transform(Point(float(match["away"]), 0.0))
+    goal = step(thing, heading_rad, float(match["away"]))
     return AgentEnd(answer=f"It {await driver.drive(x=goal.x, y=goal.y)}.")
 
 
 async def _face_thing(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
     thing = _place_of(await driver.recall(match["label"]))
     if thing is None:
-        return _gave_up(f"I remember no {match['label']}.")
+        return gave_up(f"I remember no {match['label']}.")
     return AgentEnd(
         answer=f"It {await driver.drive(place=f'facing {thing.x:.2f}, {thing.y:.2f}')}."
     )
@@ -233,26 +233,14 @@ async def _follow(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
     return AgentEnd(answer="I have been everywhere.")
 
 
-async def _inspect(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
-    return await diagnose(driver.tools, match.string)
-
-
-async def _answer(driver: ToolDriver, match: re.Match[str]) -> AgentEnd:
-    return await answer_question(driver, match.string)
-
-
-def _gave_up(why: str) -> AgentEnd:
-    return AgentEnd(answer=why, state=TrialState.GAVE_UP)
-
-
 BESIDE_POSE = (
     rf"stands at \((?P<x>{NUMBER}), (?P<y>{NUMBER})\) and looks along a yaw of "
     rf"(?P<yaw>{NUMBER}) deg\. Go to the place (?P<away>{NUMBER}) m "
     r"(?P<side>to the left of|to the right of|in front of|behind)"
 )
 DEEDS: tuple[tuple[str, Deed], ...] = (
-    (r"^Inspect the robot's ROS\.", _inspect),
-    (r"Answer without driving\.", _answer),
+    (r"^Inspect the robot's ROS\.", lambda driver, match: diagnose(driver.tools, match.string)),
+    (r"Answer without driving\.", lambda driver, match: answer_question(driver, match.string)),
     (r"^Update the map", _explore),
     (r"^Go to the (?:(?P<ordinal>\w+) )?(?P<end>smallest|largest) room", _go_to_room_by_size),
     (r"^Go to the longest corridor", _go_to_longest_corridor),
@@ -260,7 +248,10 @@ DEEDS: tuple[tuple[str, Deed], ...] = (
         rf"^Go (?:in)?to the room around \((?P<x>{NUMBER}), (?P<y>{NUMBER})\)",
         _go_into_room_around,
     ),
-    (r"^Find the nearest (?P<label>.+?) and stop", _find_nearest),
+    (
+        r"^Find the nearest (?P<label>.+?) and stop",
+        lambda driver, match: _go_to_thing(driver, match["label"]),
+    ),
     (BESIDE_POSE, _go_beside_pose),
     (
         rf"^Go to the place (?P<away>{NUMBER}) m (?P<direction>\w+) of the (?P<label>.+?)\.",
