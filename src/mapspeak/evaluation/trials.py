@@ -71,16 +71,12 @@ class Limits:
     """What a trial may cost before it is ended.
 
     Attributes:
-        n_calls: Tool calls.
-        robot_time_s: Of the robot's clock.
         wall_s: Of the wall clock; a trial that needs more is killed and counts as hung.
-        n_tokens: Read and written by a model, together; None for any number.
     """
 
     n_calls: int = 60
     robot_time_s: float = 900.0
     wall_s: float = 900.0
-    n_tokens: int | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,6 @@ import base64
 import hashlib
 from collections.abc import Iterable, Iterator, Sequence
 from importlib import resources
-from itertools import chain
 from pathlib import Path
 from urllib.parse import quote
 
@@ -19,6 +18,7 @@ from mapspeak.evaluation.report.sheet import (
     count_picture_bytes,
     element,
     joined,
+    paragraph,
     table,
     text,
 )
@@ -61,7 +61,7 @@ def write_page(
         *_list_trials(results, links),
     ]
     replays = () if is_apart else _replays(run, results, album)
-    write_whole(page, _document("mapspeak: an evaluation", _with_album((*body, *replays), album)))
+    write_whole(page, _document("mapspeak: an evaluation", (*body, *replays), album))
     if is_apart:
         for result in results:
             _write_apart(run, result)
@@ -87,14 +87,9 @@ def _write_apart(run: Path, result: TrialResult) -> None:
     album = Album(is_inside=False, root=folder)
     up = "../" * (result.trial.id.count("/") + 2)
     back = element("p", {}, element("a", {"href": f"{up}{PAGE}"}, text("All trials")))
-    parts = _with_album([back, *_replays(run, [result], album)], album)
+    parts = (back, *_replays(run, [result], album))
     title = f"mapspeak: {result.trial.id}"
-    write_whole(folder / REPLAY, _document(title, parts, has_links=True))
-
-
-def _with_album(parts: Iterable[Html], album: Album) -> Iterator[Html]:
-    yield from parts
-    yield album.definitions()
+    write_whole(folder / REPLAY, _document(title, parts, album))
 
 
 # --- tables --------------------------------------------------------------------------------------
@@ -109,7 +104,7 @@ def _show_paper(rows: Sequence[TableRow]) -> Iterator[Html]:
     ours = (_our_row(agent, how, rows) for agent, how in keys)
     yield element("h2", {"id": "paper"}, text("Beside the paper"))
     yield table(heading, [*map(_paper_row, PAPER_ROWS), *ours], kind="paper")
-    yield element("p", {"class": "note"}, text(PAPER_NOTE))
+    yield paragraph("note", PAPER_NOTE)
 
 
 def _paper_row(row: PaperRow) -> list[Html]:
@@ -227,10 +222,10 @@ def _cell(said: str, small: str = "") -> Html:
 # --- the document --------------------------------------------------------------------------------
 
 
-def _document(title: str, body: Iterable[Html], *, has_links: bool = False) -> Iterator[bytes]:
+def _document(title: str, body: Iterable[Html], album: Album) -> Iterator[bytes]:
     """Yield a whole page, piece by piece; it loads nothing that is not its own."""
     style, script = _read("page.css"), _read("replay.js")
-    pictures = "data: 'self' file:" if has_links else "data:"
+    pictures = "data:" if album.is_inside else "data: 'self' file:"
     policy = (
         f"default-src 'none'; img-src {pictures}; style-src '{_hash(style)}'; "
         f"script-src '{_hash(script)}'; base-uri 'none'; form-action 'none'"
@@ -245,7 +240,7 @@ def _document(title: str, body: Iterable[Html], *, has_links: bool = False) -> I
     ]
     opening = Html(f'<!doctype html>\n<html lang="en"><head>{joined(head)}</head><body>')
     closing = Html(f"<script>{script}</script>\n</body></html>")
-    for part in chain([opening], body, [closing]):
+    for part in (opening, *body, album.definitions(), closing):
         yield f"{part}\n".encode(errors="replace")
 
 

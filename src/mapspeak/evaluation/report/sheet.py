@@ -41,35 +41,24 @@ def joined(parts: Iterable[Html]) -> Html:
 
 
 def element(name: str, attributes: Mapping[str, object], *children: Html) -> Html:
-    """Return an element.
-
-    Args:
-        name: Of the tag.
-        attributes: Their values are escaped; True stands for a bare attribute, None for none.
-        children: What stands in it.
-    """
-    inside = "".join(_attribute(key, value) for key, value in attributes.items())
+    """Return an element; the values of its attributes are escaped."""
+    inside = "".join(f' {key}="{text(value)}"' for key, value in attributes.items())
     if name in VOID:
         return Html(f"<{name}{inside}>")
     return Html(f"<{name}{inside}>{''.join(children)}</{name}>")
 
 
-def _attribute(key: str, value: object) -> str:
-    if value is None:
-        return ""
-    return f" {key}" if value is True else f' {key}="{text(value)}"'
+def paragraph(kind: str, said: str) -> Html:
+    """Return text in a paragraph of a class."""
+    return element("p", {"class": kind}, text(said))
 
 
-def table(heading: Sequence[str], rows: Iterable[Sequence[Html]], *, kind: str = "") -> Html:
+def table(heading: Sequence[str], rows: Iterable[Sequence[Html]], *, kind: str) -> Html:
     """Return a table that scrolls sideways where the screen is narrow; cells come as <td>."""
     head = joined(element("th", {"scope": "col"}, text(cell)) for cell in heading)
     body = joined(element("tr", {}, *row) for row in rows)
-    whole = element(
-        "table",
-        {"class": kind or None},
-        element("thead", {}, element("tr", {}, head)),
-        element("tbody", {}, body),
-    )
+    parts = (element("thead", {}, element("tr", {}, head)), element("tbody", {}, body))
+    whole = element("table", {"class": kind}, *parts)
     return element("div", {"class": "wide", "tabindex": "0"}, whole)
 
 
@@ -82,15 +71,7 @@ LONGEST_PX = 1200
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Sheet:
-    """A map as a picture with y up.
-
-    Attributes:
-        png: The picture.
-        width_px: Its width.
-        height_px: Its height.
-        grid: The part of the map that it shows.
-        cells_per_px: How many cells a pixel's side is.
-    """
+    """A map as a picture with y up; a pixel's side is some cells of the part that it shows."""
 
     png: bytes
     width_px: int
@@ -155,14 +136,9 @@ def find_picture(pictures: Path, name: str) -> Path | None:
 
 def count_picture_bytes(folders: Iterable[Path]) -> int:
     """Return the size of all pictures in some folders, each counted once."""
-    sizes = {
-        hashlib.sha256(data).digest(): len(data)
-        for folder in folders
-        for path in sorted(folder.glob("*"))
-        if path.is_file()
-        for data in [path.read_bytes()]
-    }
-    return sum(sizes.values())
+    paths = (path for folder in folders for path in folder.glob("*") if path.is_file())
+    pictures = (path.read_bytes() for path in paths)
+    return sum({hashlib.sha256(data).digest(): len(data) for data in pictures}.values())
 
 
 @dataclass(slots=True)
@@ -183,7 +159,7 @@ class Album:
         data = path.read_bytes()
         found = _measure(data)
         if found is None:
-            return element("p", {"class": "none"}, text(f"{path.name} is no picture."))
+            return paragraph("none", f"{path.name} is no picture.")
         media_type, width, height = found
         if self.is_inside:
             name = self.keep(data, media_type, width, height)

@@ -1,6 +1,6 @@
 """The way a robot drove, drawn over its map: all of it, the part so far, and where it stood."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from mapspeak.errors import MapError
-from mapspeak.evaluation.report.sheet import Album, Html, Sheet, draw_sheet, element, joined, text
+from mapspeak.evaluation.report.sheet import Album, Html, Sheet, draw_sheet, element, text
 from mapspeak.evaluation.trials import (
     MAP,
     STATES,
@@ -28,13 +28,16 @@ from mapspeak.spatial.mapfiles import load_map
 
 _Value = TypeVar("_Value")
 
+MOST_POINTS = 500
+APART_M = 0.3
+"""Stops nearer than this to the last one get no mark of their own."""
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Course:
     """How a trial went, as far as it can be read.
 
     Attributes:
-        turns: The conversation.
         states: The simulator's truth; poses in a map without errors.
         grid: The robot's map in the end; None where there is none.
         problems: What could not be read, one sentence each.
@@ -67,11 +70,6 @@ def read_course(run: Path, trial: Trial) -> Course:
     )
 
 
-MOST_POINTS = 500
-APART_M = 0.3
-"""Stops nearer than this to the last one get no mark of their own."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StepMark:
     """Where the robot stood at a step of the replay, on the picture of its map.
@@ -92,32 +90,16 @@ class StepMark:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Track:
-    """The line of a way.
-
-    Attributes:
-        points: As SVG writes them.
-        times_s: Robot time at each.
-        ratios: The share of the line up to each, from 0 to 1.
-    """
-
-    points: str
-    times_s: FloatArray
-    ratios: FloatArray
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class DrivenPath:
     """A way on a map.
 
     Attributes:
-        sheet: The map.
-        track: The line; None for a robot that never moved.
+        line: As SVG writes it; empty for a robot that never moved.
         stops: Where the robot stood, by the ids of the steps.
     """
 
     sheet: Sheet
-    track: Track | None
+    line: str
     stops: dict[str, StepMark]
 
 
@@ -133,47 +115,38 @@ def lay_out_way(
     sheet = None if course.grid is None else draw_sheet(course.grid)
     if sheet is None:
         return None
-    track = _lay_track(sheet, course.states)
-    stops = {
-        anchor: _stop(anchor, pose, sheet, _ratio_at(track, robot_s))
-        for anchor, pose, robot_s in poses
-        if pose is not None
-    }
-    return DrivenPath(sheet=sheet, track=track, stops=stops)
+    line, times_s, ratios = _lay_line(sheet, course.states)
+    stops = {}
+    for anchor, pose, robot_s in poses:
+        if pose is None:
+            continue
+        driven_ratio = np.interp(robot_s, times_s, ratios) if line and robot_s is not None else 0.0
+        u, v = sheet.pixels_at(np.array([[pose.x, pose.y]]))[0].tolist()
+        stops[anchor] = StepMark(
+            anchor=anchor,
+            u=round(u, 1),
+            v=round(v, 1),
+            heading_deg=round(sheet.heading_deg(pose), 1),
+            driven_ratio=round(float(driven_ratio), 4),
+        )
+    return DrivenPath(sheet=sheet, line=line, stops=stops)
 
 
-def _stop(anchor: str, pose: Pose, sheet: Sheet, driven_ratio: float) -> StepMark:
-    u, v = sheet.pixels_at(np.array([[pose.x, pose.y]]))[0].tolist()
-    return StepMark(
-        anchor=anchor,
-        u=round(u, 1),
-        v=round(v, 1),
-        heading_deg=round(sheet.heading_deg(pose), 1),
-        driven_ratio=driven_ratio,
-    )
+def _lay_line(sheet: Sheet, states: Sequence[StateRecord]) -> tuple[str, FloatArray, FloatArray]:
+    """Return the line of a way, robot times along it, and the share of the line up to each.
 
-
-def _lay_track(sheet: Sheet, states: Sequence[StateRecord]) -> Track | None:
-    """Return the line of a way, without the moments at which the robot only turned."""
+    The moments at which the robot only turned are left out.
+    """
     moved = [now for before, now in pairwise(states) if now.driven_m > before.driven_m]
     if not moved:
-        return None
-    step = -(-len(moved) // MOST_POINTS)
-    chosen = [states[0], *moved[::step], moved[-1]]
+        return "", np.zeros(0), np.zeros(0)
+    every = -(-len(moved) // MOST_POINTS)
+    chosen = [states[0], *moved[::every], moved[-1]]
     pixels = sheet.pixels_at(np.array([[state.x, state.y] for state in chosen]))
     lengths = np.cumsum([0.0, *np.linalg.norm(np.diff(pixels, axis=0), axis=1)])
-    return Track(
-        points=" ".join(f"{u:.1f},{v:.1f}" for u, v in pixels.tolist()),
-        times_s=np.array([state.time_s for state in chosen]),
-        ratios=lengths / max(float(lengths[-1]), 1e-9),
-    )
-
-
-def _ratio_at(track: Track | None, robot_s: float | None) -> float:
-    """Return the share of the line that lies behind the robot."""
-    if track is None or robot_s is None:
-        return 0.0
-    return round(float(np.interp(robot_s, track.times_s, track.ratios)), 4)
+    line = " ".join(f"{u:.1f},{v:.1f}" for u, v in pixels.tolist())
+    times_s = np.array([state.time_s for state in chosen])
+    return line, times_s, lengths / max(float(lengths[-1]), 1e-9)
 
 
 def draw_way(way: DrivenPath, album: Album) -> Html:
@@ -182,11 +155,10 @@ def draw_way(way: DrivenPath, album: Album) -> Html:
     name = album.keep(sheet.png, "image/png", sheet.width_px, sheet.height_px)
     size_px = 0.012 * (sheet.width_px + sheet.height_px)
     drawn = [element("use", {"href": f"#{name}"})]
-    if way.track is not None:
-        points = way.track.points
-        drawn.append(element("polyline", {"class": "way", "points": points}))
-        drawn.append(element("polyline", {"class": "so-far", "points": points, "pathLength": 1}))
-    drawn += (_mark(stop, size_px * 0.55) for stop in _apart(stops, APART_M * sheet.px_per_m))
+    if way.line:
+        drawn.append(element("polyline", {"class": "way", "points": way.line}))
+        drawn.append(element("polyline", {"class": "so-far", "points": way.line, "pathLength": 1}))
+    drawn += _marks(stops, APART_M * sheet.px_per_m, size_px * 0.55)
     if stops:
         drawn.append(_robot(stops[-1], size_px))
     box = f"0 0 {sheet.width_px} {sheet.height_px}"
@@ -194,26 +166,20 @@ def draw_way(way: DrivenPath, album: Album) -> Html:
     return element("svg", {"class": "sheet", "viewBox": box, "aria-label": label}, *drawn)
 
 
-def _apart(stops: Sequence[StepMark], least_px: float) -> list[StepMark]:
-    chosen: list[StepMark] = []
+def _marks(stops: Sequence[StepMark], least_px: float, radius_px: float) -> Iterator[Html]:
+    last: StepMark | None = None
     for stop in stops:
-        last = chosen[-1] if chosen else None
-        if last is None or (stop.u - last.u) ** 2 + (stop.v - last.v) ** 2 >= least_px**2:
-            chosen.append(stop)
-    return chosen
-
-
-def _mark(stop: StepMark, radius_px: float) -> Html:
-    dot = {"class": "stop", "cx": stop.u, "cy": stop.v, "r": f"{radius_px:.1f}"}
-    title = element("title", {}, text(f"To step {stop.anchor.rpartition('-')[2]}"))
-    return element("a", {"href": f"#{stop.anchor}"}, element("circle", dot, title))
+        if last is not None and (stop.u - last.u) ** 2 + (stop.v - last.v) ** 2 < least_px**2:
+            continue
+        last = stop
+        dot = {"class": "stop", "cx": stop.u, "cy": stop.v, "r": f"{radius_px:.1f}"}
+        title = element("title", {}, text(f"To step {stop.anchor.rpartition('-')[2]}"))
+        yield element("a", {"href": f"#{stop.anchor}"}, element("circle", dot, title))
 
 
 def _robot(stop: StepMark, size_px: float) -> Html:
     place = f"translate({stop.u} {stop.v}) rotate({stop.heading_deg})"
-    arrow = " ".join(
-        f"{x * size_px:.1f},{y * size_px:.1f}"
-        for x, y in ((1.5, 0), (-1.0, 0.9), (-0.5, 0), (-1.0, -0.9))
-    )
+    corners = ((1.5, 0), (-1.0, 0.9), (-0.5, 0), (-1.0, -0.9))
+    arrow = " ".join(f"{x * size_px:.1f},{y * size_px:.1f}" for x, y in corners)
     shape = element("polygon", {"points": arrow})
-    return element("g", {"class": "robot", "transform": place}, joined([shape]))
+    return element("g", {"class": "robot", "transform": place}, shape)

@@ -54,7 +54,6 @@ class Transcript:
 
     Attributes:
         n_errors: Calls that were answered with an error.
-        n_tokens: Read and written by a model so far.
     """
 
     def __init__(
@@ -66,7 +65,6 @@ class Transcript:
     ) -> None:
         self.n_turns = 0
         self.n_errors = 0
-        self.n_tokens = 0
         self.calls: list[ToolCall] = []
         self._limits = limits
         self._look = look
@@ -115,12 +113,7 @@ class Transcript:
         n_output_tokens: int | None = None,
         n_picture_tokens: int | None = None,
     ) -> None:
-        """Write down what was said besides calls.
-
-        Raises:
-            OutOfBudgetError: The model has read and written more than it may.
-        """
-        self.n_tokens += (n_input_tokens or 0) + (n_output_tokens or 0)
+        """Write down what was said besides calls."""
         self._write(
             role,
             text,
@@ -128,11 +121,6 @@ class Transcript:
             n_output_tokens=n_output_tokens,
             n_picture_tokens=n_picture_tokens,
         )
-        most = self._limits.n_tokens
-        if most is not None and self.n_tokens > most:
-            raise OutOfBudgetError(
-                f"{self.n_tokens} tokens are more than {most}.", hint="Raise the limit."
-            )
 
     def close(self) -> None:
         """End the file."""

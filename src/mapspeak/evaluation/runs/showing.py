@@ -23,7 +23,7 @@ from rich.table import Column, Table
 
 from mapspeak.evaluation.agents.finding import can_think
 from mapspeak.evaluation.runs.plan import RunOptions, RunPlan
-from mapspeak.evaluation.scores.rows import TableRow
+from mapspeak.evaluation.scores.rows import TableRow, wilson_interval
 from mapspeak.evaluation.tasks.paper import EXPLORE
 from mapspeak.evaluation.trials import TrialResult, Turn
 
@@ -199,11 +199,11 @@ def build_table(rows: Sequence[TableRow]) -> Table:
 
 
 def _cells_of(row: TableRow) -> tuple[str, ...]:
-    success = row.success
+    success = wilson_interval(row.n_successes, row.n_trials)
     span = "" if success is None else f"{100 * success.low:.0f} to {100 * success.high:.0f} %"
     figures = (row.figures.get(name) for name in SHOWN)
     return (
-        row.task if row.world is None else f"{row.task} in {row.world}",
+        row.task,
         row.agent,
         row.representation,
         f"{row.n_successes}/{row.n_trials}",

@@ -17,13 +17,7 @@ N_RESAMPLES = 2000
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """A figure and where the true one lies with 95 % confidence.
-
-    Attributes:
-        value: The figure.
-        low: The lower end.
-        high: The upper end.
-    """
+    """A figure, and the ends between which the true one lies with 95 % confidence."""
 
     value: float
     low: float
@@ -57,70 +51,50 @@ class TableRow:
     """What came of the trials of one kind.
 
     Attributes:
-        task: Which task.
-        world: Which world; None for all together.
         agent: Who answered, with how much it may think where that was said.
         representation: How the map was shown.
-        n_trials: How many there are.
-        n_successes: How many were done.
         n_broken: How many crashed or hung; they count as trials.
-        success: The share of successes; None without trials.
         figures: Means of everything that scores and results hold, by name.
         failures: How often each kind of mistake was made.
     """
 
     task: str
-    world: str | None
     agent: str
     representation: str
     n_trials: int
     n_successes: int
     n_broken: int
-    success: Interval | None
     figures: dict[str, Interval]
     failures: dict[Failure, int]
 
 
-def count_rows(results: Iterable[TrialResult], *, by_world: bool = False) -> tuple[TableRow, ...]:
-    """Count results: a row for each task, agent and representation, and each world if asked."""
-    groups: dict[tuple[str, str | None, str, str], list[TrialResult]] = {}
+def count_rows(results: Iterable[TrialResult]) -> tuple[TableRow, ...]:
+    """Count results: a row for each task, agent and representation."""
+    groups: dict[tuple[str, str, str], list[TrialResult]] = {}
     for result in results:
         trial = result.trial
-        world = trial.world if by_world else None
-        groups.setdefault((trial.task, world, trial.answerer, trial.representation), []).append(
-            result
-        )
+        key = (trial.task, trial.answerer, trial.representation)
+        groups.setdefault(key, []).append(result)
     return tuple(_count(*key, results=group) for key, group in groups.items())
 
 
-def _count(
-    task: str,
-    world: str | None,
-    agent: str,
-    representation: str,
-    *,
-    results: list[TrialResult],
-) -> TableRow:
-    n_successes = sum(result.score.is_success for result in results)
-    values: dict[str, list[float]] = {}
-    for result in results:
-        if not result.state.is_broken:
-            for name, value in _figures_of(result).items():
-                values.setdefault(name, []).append(value)
-    intervals = {name: bootstrap_interval(each) for name, each in values.items()}
+def _count(task: str, agent: str, representation: str, *, results: list[TrialResult]) -> TableRow:
+    whole = [_figures_of(result) for result in results if not result.state.is_broken]
+    names = dict.fromkeys(name for figures in whole for name in figures)
+    intervals = {
+        name: bootstrap_interval([figures[name] for figures in whole if name in figures])
+        for name in names
+    }
+    failures = (result.score.failure for result in results)
     return TableRow(
         task=task,
-        world=world,
         agent=agent,
         representation=representation,
         n_trials=len(results),
-        n_successes=n_successes,
-        n_broken=sum(result.state.is_broken for result in results),
-        success=wilson_interval(n_successes, len(results)),
+        n_successes=sum(result.score.is_success for result in results),
+        n_broken=len(results) - len(whole),
         figures={name: each for name, each in intervals.items() if each is not None},
-        failures=dict(
-            Counter(result.score.failure for result in results if result.score.failure is not None)
-        ),
+        failures=dict(Counter(failure for failure in failures if failure is not None)),
     )
 
 

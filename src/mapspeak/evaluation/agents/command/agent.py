@@ -21,49 +21,89 @@ from mapspeak.evaluation.client import OutOfBudgetError, Picture, ToolAnswer, To
 from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess, TrialState
 
 EVERY_S = 0.1
+MOST_BYTES = 4_000_000
+"""Of what a program writes; only the last of it is kept."""
+WRAP_UP_S = 10.0
+"""So long before its time is up a program is ended, so that its server can write the map."""
+CONTROL, SERVED = "control", "served"
+"""Where in a trial's folder servers write down that they serve."""
+GRACE_S = 5.0
+LAST_WORDS = 500
+LEAST_SECRET = 6
+"""Characters; what is shorter is no secret, and would be struck out all over the text."""
 
 
 @dataclass(slots=True)
-class Listener:
-    """Reads a growing call log, and tells a witness of each call in it.
+class ProgramRun:
+    """One run of a program: what it writes, and the calls in the growing log of its server.
 
     Attributes:
-        log: The file; it may not be there yet.
-        witness: Who is told; None for nobody.
+        log: The server's call log; it may not be there yet.
+        over: Why the witness let no more calls be made.
         n_heard: Calls so far.
     """
 
     log: Path
     witness: Witness | None
-    n_heard: int = field(default=0, init=False)
-    _n_read: int = field(default=0, init=False)
+    said: bytearray = field(default_factory=bytearray)
+    complained: bytearray = field(default_factory=bytearray)
+    exit_code: int | None = None
+    over: OutOfBudgetError | None = None
+    n_heard: int = 0
+    _n_read: int = 0
 
-    async def listen(self) -> None:
-        """Listen until it is cancelled.
+    async def carry_out(
+        self, command: list[str], *, folder: Path, variables: Mapping[str, str], wall_s: float
+    ) -> None:
+        """Run a program to its end, or until time or budget is up; leave nothing running."""
+        process = await anyio.open_process(
+            [sys.executable, str(keeper.__file__), *command],
+            cwd=folder,
+            env=dict(variables),
+            start_new_session=True,
+        )
+        try:
+            with anyio.move_on_after(wall_s):
+                async with anyio.create_task_group() as tasks:
+                    tasks.start_soon(_collect, process.stdout, self.said)
+                    tasks.start_soon(_collect, process.stderr, self.complained)
+                    tasks.start_soon(self._listen, tasks.cancel_scope)
+                    self.exit_code = await process.wait()
+                    tasks.cancel_scope.cancel()
+        finally:
+            with anyio.CancelScope(shield=True):
+                # It forgets itself before it has ended, so it is looked for first.
+                servers = _find_servers(folder.parent)
+                await _end_group(process)
+                await _await_end(servers)
+                # What was written last: nobody is left who could write more.
+                with anyio.move_on_after(1.0):
+                    await _collect(process.stdout, self.said)
+                    await _collect(process.stderr, self.complained)
+                await process.aclose()
+                self._hear_new()
 
-        Raises:
-            OutOfBudgetError: The witness has heard more than may be.
-        """
-        while True:
-            self.hear_new()
+    async def _listen(self, scope: anyio.CancelScope) -> None:
+        while self.over is None:
+            self._hear_new()
             # A file has no event that every system would tell us of.
             await anyio.sleep(EVERY_S)
+        scope.cancel()
 
-    def hear_new(self) -> None:
-        """Tell of every whole line that was not there before.
-
-        Raises:
-            OutOfBudgetError: The witness has heard more than may be.
-        """
+    def _hear_new(self) -> None:
+        """Tell the witness of every whole line that was not there before."""
         if not self.log.exists():
             return
         with self.log.open("rb") as file:
             file.seek(self._n_read)
             lines = file.read().rpartition(b"\n")[0]
-        for line in lines.split(b"\n") if lines else ():
-            self._n_read += len(line) + 1
-            self.n_heard += 1
-            self._tell(json.loads(line))
+        try:
+            for line in lines.split(b"\n") if lines else ():
+                self._n_read += len(line) + 1
+                self.n_heard += 1
+                self._tell(json.loads(line))
+        except OutOfBudgetError as error:
+            self.over = self.over or error
 
     def _tell(self, line: dict[str, Any]) -> None:
         if self.witness is None:
@@ -82,26 +122,12 @@ class Listener:
         return Picture(path.read_bytes(), "image/jpeg" if path.suffix == ".jpg" else "image/png")
 
 
-MOST_BYTES = 4_000_000
-"""Of what a program writes; only the last of it is kept."""
-WRAP_UP_S = 10.0
-"""So long before its time is up a program is ended, so that its server can write the map."""
-CONTROL, SERVED = "control", "served"
-"""Where in a trial's folder servers write down that they serve."""
-GRACE_S = 5.0
-LAST_WORDS = 500
-LEAST_SECRET = 6
-"""Characters; what is shorter is no secret, and would be struck out all over the text."""
-
-
-@dataclass(slots=True)
-class _Course:
-    """What a run of a program has come to."""
-
-    said: bytearray = field(default_factory=bytearray)
-    complained: bytearray = field(default_factory=bytearray)
-    exit_code: int | None = None
-    over: OutOfBudgetError | None = None
+async def _collect(stream: ByteReceiveStream | None, into: bytearray) -> None:
+    if stream is None:
+        return
+    async for data in stream:
+        into += data
+        del into[:-MOST_BYTES]
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,10 +135,7 @@ class CommandAgent:
     """Runs a program in a folder of the trial; its variables are passed by name, never written.
 
     Attributes:
-        program: Which one.
-        name: As in `Trial.agent`.
         thinking: How much it may think; None for as it likes.
-        connection: It starts the server itself.
     """
 
     program: Program
@@ -121,7 +144,7 @@ class CommandAgent:
     connection: ServerAccess = field(default=ServerAccess.COMMAND, kw_only=True)
 
     def check(self) -> None:
-        """Return when the program is there.
+        """Check that the program is there.
 
         Raises:
             ConfigError: It is not.
@@ -146,121 +169,54 @@ class CommandAgent:
         start.write_config(self.program)
         log.unlink(missing_ok=True)
         start.answer.unlink(missing_ok=True)
-        course, variables = _Course(), _choose_variables(self.program)
-        listener = Listener(log, tools.witness)
+        run, variables = ProgramRun(log, tools.witness), _choose_variables(self.program)
+        hidden = _secrets(variables)
         try:
-            await _run(
+            await run.carry_out(
                 start.command(self.program),
-                start=start,
+                folder=folder,
                 variables={**variables, **self.program.settings},
-                listener=listener,
-                course=course,
                 wall_s=task.limits.wall_s - WRAP_UP_S,
             )
         finally:
-            hidden = _secrets(variables)
-            (folder / "stdout.txt").write_text(_plain(course.said, hidden), encoding="utf-8")
-            (folder / "stderr.txt").write_text(_plain(course.complained, hidden), encoding="utf-8")
-        if course.exit_code == 0 and not listener.n_heard:
-            raise LinkError(
-                f"{self.program.command[0]} has called no tool.",
-                hint="It may not have found the server; see what it said in the folder client.",
-            )
-        return self._read(course, start, hidden)
-
-    def _read(self, course: _Course, start: Start, hidden: Mapping[str, str]) -> AgentEnd:
-        if course.over is not None:
-            return AgentEnd(answer=str(course.over), state=TrialState.OUT_OF_BUDGET)
-        if course.exit_code is None:
+            said, complained = _plain(run.said, hidden), _plain(run.complained, hidden)
+            (folder / "stdout.txt").write_text(said, encoding="utf-8")
+            (folder / "stderr.txt").write_text(complained, encoding="utf-8")
+        if run.over is not None:
+            return AgentEnd(answer=str(run.over), state=TrialState.OUT_OF_BUDGET)
+        if run.exit_code is None:
             return AgentEnd(answer="It took too long.", state=TrialState.OUT_OF_BUDGET)
-        text = _plain(course.said, hidden)
-        if course.exit_code != 0:
-            complaint = _plain(course.complained, hidden).strip() or text.strip()
+        self._check_end(run, complained.strip() or said.strip())
+        return self._read(said, start.answer, hidden)
+
+    def _check_end(self, run: ProgramRun, complaint: str) -> None:
+        name = self.program.command[0]
+        if run.exit_code != 0:
             raise LinkError(
-                f"{self.program.command[0]} ended with status {course.exit_code}: "
-                f"{complaint[-LAST_WORDS:]}",
+                f"{name} ended with status {run.exit_code}: {complaint[-LAST_WORDS:]}",
                 hint="Run it by hand once; it may want a login or other options.",
             )
-        said = _read_json(text) if self.program.answer is AnswerForm.JSON else None
-        numbers = self.program.find_numbers
+        if not run.n_heard:
+            raise LinkError(
+                f"{name} has called no tool.",
+                hint="It may not have found the server; see what it said in the folder client.",
+            )
+
+    def _read(self, text: str, file: Path, hidden: Mapping[str, str]) -> AgentEnd:
+        program, said = self.program, None
+        if program.answer is AnswerForm.JSON:
+            said = _read_json(text)
+            answer = program.find_answer(said)
+        elif program.answer is AnswerForm.TEXT:
+            answer = text.strip()
+        else:
+            answer = _plain(file.read_bytes(), hidden).strip() if file.exists() else ""
         return AgentEnd(
-            answer=self._last_words(text, said, start.answer, hidden),
-            n_decisions=numbers(said, self.program.turns),
-            n_input_tokens=numbers(said, self.program.input_tokens),
-            n_output_tokens=numbers(said, self.program.output_tokens),
+            answer=answer,
+            n_decisions=program.find_numbers(said, program.turns),
+            n_input_tokens=program.find_numbers(said, program.input_tokens),
+            n_output_tokens=program.find_numbers(said, program.output_tokens),
         )
-
-    def _last_words(self, text: str, said: object, file: Path, hidden: Mapping[str, str]) -> str:
-        if self.program.answer is AnswerForm.JSON:
-            return self.program.find_answer(said)
-        if self.program.answer is AnswerForm.TEXT:
-            return text.strip()
-        return _plain(file.read_bytes(), hidden).strip() if file.exists() else ""
-
-
-async def _run(
-    command: list[str],
-    *,
-    start: Start,
-    variables: Mapping[str, str],
-    listener: Listener,
-    course: _Course,
-    wall_s: float,
-) -> None:
-    """Run a program to its end, or until its time or its budget is up; leaves nothing running."""
-    process = await anyio.open_process(
-        [sys.executable, str(keeper.__file__), *command],
-        cwd=start.folder,
-        env=dict(variables),
-        start_new_session=True,
-    )
-    try:
-        with anyio.move_on_after(wall_s):
-            async with anyio.create_task_group() as tasks:
-                tasks.start_soon(_collect, process.stdout, course.said)
-                tasks.start_soon(_collect, process.stderr, course.complained)
-                tasks.start_soon(_listen, listener, course, tasks.cancel_scope)
-                course.exit_code = await process.wait()
-                tasks.cancel_scope.cancel()
-    finally:
-        with anyio.CancelScope(shield=True):
-            # It forgets itself before it has ended, so it is looked for first.
-            servers = _find_servers(start.folder.parent)
-            await _end_group(process)
-            await _await_end(servers)
-            await _take_rest(process, course)
-            _hear_rest(listener, course)
-
-
-async def _collect(stream: ByteReceiveStream | None, into: bytearray) -> None:
-    if stream is None:
-        return
-    async for data in stream:
-        into += data
-        del into[:-MOST_BYTES]
-
-
-async def _listen(listener: Listener, course: _Course, scope: anyio.CancelScope) -> None:
-    try:
-        await listener.listen()
-    except OutOfBudgetError as error:
-        course.over = error
-        scope.cancel()
-
-
-def _hear_rest(listener: Listener, course: _Course) -> None:
-    try:
-        listener.hear_new()
-    except OutOfBudgetError as error:
-        course.over = course.over or error
-
-
-async def _take_rest(process: Process, course: _Course) -> None:
-    """Take what was written last; nobody is left who could write more."""
-    with anyio.move_on_after(1.0):
-        await _collect(process.stdout, course.said)
-        await _collect(process.stderr, course.complained)
-    await process.aclose()
 
 
 def _find_servers(folder: Path) -> tuple[int, ...]:

@@ -113,13 +113,9 @@ class Program(BaseModel):
 
     def find_numbers(self, said: object, keys: Iterable[str]) -> int | None:
         """Return the sum of the numbers under some keys; None where there is none."""
-        found = [
-            each
-            for key in keys
-            for each in _find(said, key.split("."))
-            if isinstance(each, int | float)
-        ]
-        return int(sum(found)) if found else None
+        found = [each for key in keys for each in _find(said, key.split("."))]
+        numbers = [each for each in found if isinstance(each, int | float)]
+        return int(sum(numbers)) if numbers else None
 
     def find_answer(self, said: object) -> str:
         """Return the text under the answer's key; empty where there is none."""
@@ -128,14 +124,7 @@ class Program(BaseModel):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
-    """What one run of a program is started with.
-
-    Attributes:
-        prompt: What it is asked.
-        server: The command line of its MCP server.
-        folder: Where it is run.
-        thinking: How much it may think; None for as it likes.
-    """
+    """What one run of a program is started with: the server is a command line."""
 
     prompt: str
     server: tuple[str, ...]
