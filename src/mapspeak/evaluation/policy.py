@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
-from mapspeak.evaluation.agents.driver import ARRIVED, ToolDriver
 from mapspeak.evaluation.client import ToolClient
+from mapspeak.evaluation.driver import ARRIVED, ToolDriver
 from mapspeak.evaluation.reading import MapReading, Row, read_map_picture, read_map_text
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import OccupancyGrid

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from mapspeak.evaluation.agents.driver import ARRIVED, ToolDriver
 from mapspeak.evaluation.agents.scripted import ScriptedAgent
 from mapspeak.evaluation.client import ToolClient
+from mapspeak.evaluation.driver import ARRIVED, ToolDriver
 from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.trials import Agent, AgentEnd, Assignment, ServerAccess, Setting
 from mapspeak.geometry import Point, Pose

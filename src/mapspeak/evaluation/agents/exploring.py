@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from mapspeak.evaluation.agents.driver import ARRIVED, ToolDriver, find_label, gave_up
 from mapspeak.evaluation.client import ToolClient
+from mapspeak.evaluation.driver import ARRIVED, ToolDriver, find_label, gave_up
 from mapspeak.evaluation.policy import MARGIN_M, SIGHT_M, ways_to_floor_m
 from mapspeak.evaluation.reading import Row, read_map_picture
 from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess

@@ -2,7 +2,7 @@
 
 import re
 
-from mapspeak.evaluation.agents.driver import ToolDriver, gave_up
+from mapspeak.evaluation.driver import ToolDriver, gave_up
 from mapspeak.evaluation.reading import MapReading, Row
 from mapspeak.evaluation.trials import AgentEnd
 from mapspeak.geometry import Point

@@ -6,7 +6,10 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
 from mapspeak.errors import MapspeakError
-from mapspeak.evaluation.agents.driver import (
+from mapspeak.evaluation.agents.inspecting import diagnose
+from mapspeak.evaluation.agents.questioned import answer_question
+from mapspeak.evaluation.client import OutOfBudgetError, ToolAnswer, ToolClient
+from mapspeak.evaluation.driver import (
     ARRIVED,
     WAIT_S,
     Seen,
@@ -15,9 +18,6 @@ from mapspeak.evaluation.agents.driver import (
     gave_up,
     step,
 )
-from mapspeak.evaluation.agents.inspecting import diagnose
-from mapspeak.evaluation.agents.questioned import answer_question
-from mapspeak.evaluation.client import OutOfBudgetError, ToolAnswer, ToolClient
 from mapspeak.evaluation.policy import ExplorationPolicy, is_room
 from mapspeak.evaluation.reading import read_sightings
 from mapspeak.evaluation.trials import AgentEnd, Assignment, ServerAccess, TrialState
