@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from mapspeak.errors import GoalError, NextStep
@@ -264,11 +264,6 @@ def place_of(world: WorldModel, remembered: RememberedThing, *, name: str | None
         name: The words that were used for it; its id where None.
     """
     thing = remembered.thing
-    seen_from = " ".join(
-        dict.fromkeys(
-            place.id for each in thing.waypoints if (place := world.recollection.find_place(each))
-        )
-    )
     said = [f"the {quote_name(thing.label)} {remembered.id}"]
     if thing.position is None:
         said.append("nobody noted where it is, so the goal is where it was seen from")
@@ -276,10 +271,16 @@ def place_of(world: WorldModel, remembered: RememberedThing, *, name: str | None
         said[0] += f" at {say_spot(thing.position)}, good to {thing.uncertainty_m:.1f} m"
         if world.find_approach(remembered) is None:
             said.append("no floor near it can be reached, so the goal is where it was seen from")
-    said.append(f"seen from {seen_from}")
+    said.append(f"seen from {' '.join(find_place_ids(world, thing.waypoints))}")
     if thing.conflicting:
         said.append(f"{len(thing.conflicting)} of the places in sight of it say otherwise")
     return Place(name or remembered.id, remembered, "; ".join(said))
+
+
+def find_place_ids(world: WorldModel, names: Iterable[str]) -> list[str]:
+    """Return the ids of the remembered places of some names, each once."""
+    found = map(world.recollection.find_place, names)
+    return list(dict.fromkeys(place.id for place in found if place is not None))
 
 
 def split_room(world: WorldModel, words: str) -> tuple[str, str | None]:

@@ -2,14 +2,14 @@
 
 import itertools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.spatial import Cell
-from mapspeak.spatial.grid import FloatArray, IntArray
-from mapspeak.spatial.paths import Path
+from mapspeak.spatial.grid import IntArray
 from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap
 from mapspeak.spatial.visibility import cast_rays
 from mapspeak.worldmodel.model import WorldModel, find_crossing
@@ -64,7 +64,7 @@ def _search(world: WorldModel, revision: MapRevision, region: Region) -> Point |
     is_roomy = revision.clearance_m[cell.row, cell.col] >= comfortable_m
     if is_roomy and distances.is_reachable(middle):
         return middle
-    rows, cols = _cells_of(world.rooms, region)
+    rows, cols = cells_of(world.rooms, region)
     distances_m = distances.distances_at(rows, cols)
     clear_m = revision.clearance_m[rows, cols]
     reachable = np.flatnonzero(np.isfinite(distances_m))
@@ -80,17 +80,33 @@ def _search(world: WorldModel, revision: MapRevision, region: Region) -> Point |
 
 def _roomiest(world: WorldModel, revision: MapRevision, region: Region) -> Point:
     """Return the point of a region that is farthest from what stands in it."""
-    rows, cols = _cells_of(world.rooms, region)
+    rows, cols = cells_of(world.rooms, region)
     clear_m = np.where(world.grid.free[rows, cols], revision.clearance_m[rows, cols], -1.0)
     best = int(np.argmax(clear_m))
     return world.grid.point_at(Cell(int(rows[best]), int(cols[best])))
 
 
-def _cells_of(rooms: RoomMap, region: Region) -> tuple[IntArray, IntArray]:
+def cells_of(rooms: RoomMap, region: Region) -> tuple[IntArray, IntArray]:
     """Return the rows and the columns of a region's cells."""
     window = rooms.window_of(region)
     rows, cols = np.nonzero(rooms.labels[window] == region.index)
     return rows + window[0].start, cols + window[1].start
+
+
+def point_ahead(point: Point, heading_rad: float, away_m: float) -> Point:
+    """Return the point so far from another in a direction."""
+    return Pose(point.x, point.y, heading_rad).transform(Point(away_m, 0.0))
+
+
+def point_along(points: Sequence[Point], away_m: float) -> Point:
+    """Return the point so far along a line, or its end where it is shorter."""
+    for start, end in itertools.pairwise(points):
+        leg_m = start.distance_to(end)
+        if leg_m >= away_m > 0:
+            share = away_m / leg_m
+            return Point(start.x + share * (end.x - start.x), start.y + share * (end.y - start.y))
+        away_m -= leg_m
+    return points[-1]
 
 
 def _middle_of(world: WorldModel, region: Region) -> Point:
@@ -107,21 +123,12 @@ def arrival_pose(world: WorldModel, point: Point) -> Pose:
     """
     is_near = max(abs(point.x), abs(point.y)) < FARTHEST_M
     path = world.map.find_path_over(world.distances, point) if is_near else None
-    before = None if path is None else _back_from_end(path, 2 * world.radius_m)
-    yaw_rad = world.robot.yaw_rad if before is None else before.bearing_to(point)
+    if path is None:
+        return Pose(point.x, point.y, world.robot.yaw_rad)
+    before = point_along(path.points[::-1], 2 * world.radius_m)
+    has_length = before != path.points[-1]
+    yaw_rad = before.bearing_to(point) if has_length else world.robot.yaw_rad
     return Pose(point.x, point.y, yaw_rad)
-
-
-def _back_from_end(path: Path, away_m: float) -> Point | None:
-    """Return point of a way so far before its end, or its start; None where it has no length."""
-    backwards = path.points[::-1]
-    for end, start in itertools.pairwise(backwards):
-        leg_m = start.distance_to(end)
-        if leg_m >= away_m:
-            share = away_m / leg_m
-            return Point(end.x + share * (start.x - end.x), end.y + share * (start.y - end.y))
-        away_m -= leg_m
-    return backwards[-1] if backwards[-1] != backwards[0] else None
 
 
 def stand_before(world: WorldModel, remembered: RememberedThing) -> Pose:
@@ -141,18 +148,9 @@ def stand_before(world: WorldModel, remembered: RememberedThing) -> Pose:
 def facing_in(world: WorldModel, region: Region, point: Point) -> float:
     """Return the heading, in radians, in which most of a region lies before a robot at a point."""
     angles = np.linspace(0.0, math.tau, N_RAYS, endpoint=False)
-    sights_m = _sights_in(world, region, point, angles)
-    half = round(HALF_VIEW_RAD / (math.tau / N_RAYS))
-    around = np.concatenate([sights_m[-half:], sights_m, sights_m[:half]])
-    seen = np.convolve(around, np.ones(2 * half + 1), mode="valid")
-    return math.remainder(float(angles[int(np.argmax(seen))]), math.tau)
-
-
-def _sights_in(world: WorldModel, region: Region, point: Point, angles: FloatArray) -> FloatArray:
-    """Return how far one sees over free floor of the region along each angle, in metres."""
-    step_m = world.grid.resolution_m
-    steps_m = np.arange(1, math.ceil(math.hypot(region.length_m, region.width_m) / step_m)) * step_m
     grid = world.grid
+    step_m = grid.resolution_m
+    steps_m = np.arange(1, math.ceil(math.hypot(region.length_m, region.width_m) / step_m)) * step_m
     rays = cast_rays(
         grid.cells.shape,
         grid.fractional_cells_at(np.array([[point.x, point.y]])),
@@ -160,4 +158,8 @@ def _sights_in(world: WorldModel, region: Region, point: Point, angles: FloatArr
         steps=steps_m / step_m,
     )
     is_seen = rays.follow((world.rooms.labels == region.index) & grid.free)[0]
-    return np.asarray(is_seen.sum(axis=1) * step_m, dtype=np.float64)
+    sights_m = is_seen.sum(axis=1) * step_m
+    half = round(HALF_VIEW_RAD / (math.tau / N_RAYS))
+    around = np.concatenate([sights_m[-half:], sights_m, sights_m[:half]])
+    seen = np.convolve(around, np.ones(2 * half + 1), mode="valid")
+    return math.remainder(float(angles[int(np.argmax(seen))]), math.tau)

@@ -8,9 +8,18 @@ import numpy as np
 
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point
-from mapspeak.places.relations.grammar import Compass, Side, Towards, say_heading
-from mapspeak.places.relations.placement import Footing, Stand, find_footing, refuse, tolerance_m
-from mapspeak.places.relations.referents import Referent, find_near_side, find_normal
+from mapspeak.places.naming import Place
+from mapspeak.places.relations.grammar import Compass, Side, Towards, read_heading
+from mapspeak.places.relations.placement import find_footing, refuse, stand, tolerance_m
+from mapspeak.places.relations.referents import (
+    ROBOT,
+    Referent,
+    find_near_side,
+    find_normal,
+    other_side,
+    point_before,
+    refer_to_door,
+)
 from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel
 
@@ -28,22 +37,20 @@ TURNS = {Side.FRONT: 0.0, Side.LEFT: math.pi / 2, Side.BEHIND: math.pi, Side.RIG
 """From a thing's own front to its sides; who looks at it has left and right the other way."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Aim:
     """Where to look for a place.
 
     Attributes:
         heading_rad: The direction from the thing.
         away_m: How far from its edge it should be.
-        is_asked: True where somebody said how far.
         home: The region it has to lie in; None for any.
         sees: What nothing may stand before; None where that does not matter.
         how: What to say of the point of view.
     """
 
     heading_rad: float
-    away_m: float
-    is_asked: bool
+    away_m: float = AWAY_M
     home: Region | None = None
     sees: Point | None = None
     how: str = ""
@@ -51,7 +58,7 @@ class Aim:
 
 def stand_towards(
     world: WorldModel, thing: Referent, wanted: Towards, seen_from: Referent | None
-) -> Stand:
+) -> Place:
     """Find where to stand in some direction from a thing.
 
     Raises:
@@ -60,7 +67,7 @@ def stand_towards(
     if wanted.direction is Side.FRONT and thing.region is not None and seen_from is None:
         thing = front_of_region(world, thing.region)
     aim = _aim_at(world, thing, wanted, seen_from)
-    found = _search(world, thing, aim)
+    found = _search(world, thing, aim, is_asked=wanted.away_m is not None)
     if found is None:
         far = "" if wanted.away_m is None else f" {wanted.away_m:g} m"
         raise refuse(
@@ -69,11 +76,8 @@ def stand_towards(
         )
     point, away_m = found
     edge = "" if thing.is_point else ", measured from its edge"
-    return Stand(
-        point=point,
-        yaw_rad=point.bearing_to(thing.anchor),
-        reason=f"{away_m:.1f} m {_say(wanted)} {thing.name}{aim.how}{edge}, facing it",
-    )
+    reason = f"{away_m:.1f} m {_say(wanted)} {thing.name}{aim.how}{edge}, facing it"
+    return stand(point, reason, point.bearing_to(thing.anchor))
 
 
 def front_of_region(world: WorldModel, region: Region) -> Referent:
@@ -92,19 +96,8 @@ def front_of_region(world: WorldModel, region: Region) -> Referent:
             [f"north of {region.id}", f"next to {region.id}"],
         )
     door = min(reached, key=lambda each: each[:2])[2]
-    other_id = next(each for each in door.region_ids if each != region.id)
-    return Referent(
-        name=f"{region.id} (its door {door.id})",
-        anchor=door.place,
-        extent=_extent_of(door, find_normal(world, door, world.rooms.region(other_id))),
-        home=world.rooms.region(other_id),
-        door=door,
-    )
-
-
-def _extent_of(door: Door, normal_rad: float) -> np.ndarray:
-    along = np.array([-math.sin(normal_rad), math.cos(normal_rad)]) * door.width_m / 2
-    return np.array([door.place.x, door.place.y]) + np.linspace(-1, 1, 9)[:, None] * along
+    name = f"{region.id} (its door {door.id})"
+    return refer_to_door(world, door, other_side(world, door, region), name=name)
 
 
 def _say(wanted: Towards) -> str:
@@ -112,31 +105,27 @@ def _say(wanted: Towards) -> str:
 
 
 def _aim_at(world: WorldModel, thing: Referent, wanted: Towards, seen_from: Referent | None) -> Aim:
-    away_m = AWAY_M if wanted.away_m is None else wanted.away_m
-    aim = Aim(heading_rad=0.0, away_m=away_m, is_asked=wanted.away_m is not None)
-    match wanted.direction:
-        case Compass() as compass if thing.door is not None:
-            return _aim_past_door(world, thing, thing.door, compass, aim)
-        case Compass() as compass:
-            sees = thing.anchor if thing.is_point else None
-            home = thing.home if thing.is_point else None
-            return replace(aim, heading_rad=compass.heading_rad, home=home, sees=sees)
-        case side if thing.door is not None:
-            return _aim_at_door(world, thing, thing.door, side, aim, seen_from)
-        case side:
-            return _aim_at_thing(world, thing, side, aim, seen_from)
+    door, direction = thing.door, wanted.direction
+    if isinstance(direction, Compass) and door is not None:
+        aim = _aim_past_door(world, thing, door, direction)
+    elif isinstance(direction, Compass):
+        aim = Aim(direction.heading_rad, home=thing.home if thing.is_point else None)
+    elif door is not None:
+        aim = _aim_at_door(world, thing, door, direction, seen_from)
+    else:
+        aim = _aim_at_thing(world, thing, direction, seen_from)
+    sees = thing.anchor if thing.is_point else aim.sees
+    return replace(aim, sees=sees, away_m=wanted.away_m or aim.away_m)
 
 
 def _aim_at_thing(
-    world: WorldModel, thing: Referent, side: Side, aim: Aim, seen_from: Referent | None
+    world: WorldModel, thing: Referent, side: Side, seen_from: Referent | None
 ) -> Aim:
-    sees = thing.anchor if thing.is_point else None
     if seen_from is None and thing.front_rad is not None:
         heading_rad = thing.front_rad + TURNS[side]
-        how = " by its own heading"
-        return replace(aim, heading_rad=heading_rad, home=thing.home, sees=sees, how=how)
+        return Aim(heading_rad, home=thing.home, how=" by its own heading")
     viewer = world.robot.point if seen_from is None else seen_from.anchor
-    who = "the robot" if seen_from is None else seen_from.name
+    who = ROBOT if seen_from is None else seen_from.name
     if thing.region is not None and world.rooms.find_region_at(viewer) is thing.region:
         raise refuse(
             f"{side.capitalize()} {thing.name} means nothing from inside it, where {who} is.",
@@ -145,56 +134,39 @@ def _aim_at_thing(
     if viewer.distance_to(thing.anchor) < HERE_M:
         if seen_from is not None:
             raise refuse(f"{who} is too near to {thing.name} to see it from a side.")
-        heading_rad = world.robot.yaw_rad + TURNS[side]
         how = " by the heading of the robot, which is there"
-        return replace(aim, heading_rad=heading_rad, home=thing.home, sees=sees, how=how)
+        return Aim(world.robot.yaw_rad + TURNS[side], home=thing.home, how=how)
     look_rad = viewer.bearing_to(thing.anchor)
     turn_rad = math.pi - TURNS[side] if side in (Side.FRONT, Side.BEHIND) else TURNS[side]
-    how = f" as seen from {who}, looking {say_heading(look_rad)}"
-    return replace(aim, heading_rad=look_rad + turn_rad, home=thing.home, sees=sees, how=how)
+    how = f" as seen from {who}, looking {read_heading(look_rad)}"
+    return Aim(look_rad + turn_rad, home=thing.home, how=how)
 
 
 def _aim_at_door(
-    world: WorldModel, thing: Referent, door: Door, side: Side, aim: Aim, seen_from: Referent | None
+    world: WorldModel, thing: Referent, door: Door, side: Side, seen_from: Referent | None
 ) -> Aim:
-    near, who = thing.home or find_near_side(world, door), "the robot"
+    near, who = thing.home or find_near_side(world, door), ROBOT
     if seen_from is not None:
         near, who = _side_seen_from(world, door, seen_from), seen_from.name
-    normal_rad = find_normal(world, door, near)
-    far_id = next(each for each in door.region_ids if each != near.id)
-    home = world.rooms.region(far_id) if side is Side.BEHIND else near
-    turn_rad = TURNS[side] if side in (Side.FRONT, Side.BEHIND) else -TURNS[side]
+    home = other_side(world, door, near) if side is Side.BEHIND else near
     is_beside = side in (Side.LEFT, Side.RIGHT)
-    before_rad = normal_rad + (math.pi if side is Side.BEHIND else 0.0)
-    step_m = world.radius_m
-    return replace(
-        aim,
-        heading_rad=normal_rad + turn_rad,
-        away_m=BESIDE_DOOR_M if is_beside and not aim.is_asked else aim.away_m,
+    return Aim(
+        find_normal(world, door, near) + (-TURNS[side] if is_beside else TURNS[side]),
+        away_m=BESIDE_DOOR_M if is_beside else AWAY_M,
         home=home,
-        sees=Point(
-            door.place.x + step_m * math.cos(before_rad),
-            door.place.y + step_m * math.sin(before_rad),
-        ),
+        sees=point_before(world, door, home),
         how=f" as seen from {who} in {near.id}" if side is not Side.FRONT else f" in {home.id}",
     )
 
 
-def _aim_past_door(
-    world: WorldModel, thing: Referent, door: Door, compass: Compass, aim: Aim
-) -> Aim:
+def _aim_past_door(world: WorldModel, thing: Referent, door: Door, compass: Compass) -> Aim:
     """Aim into the region that lies that way; along the wall, on the robot's side of it."""
-    near = thing.home or find_near_side(world, door)
-    far_id = next(each for each in door.region_ids if each != near.id)
-    home = near
-    if math.cos(find_normal(world, door, near) - compass.heading_rad) < -math.cos(BEYOND_RAD):
-        home = world.rooms.region(far_id)
-    before_rad = find_normal(world, door, home)
-    sees = Point(
-        door.place.x + world.radius_m * math.cos(before_rad),
-        door.place.y + world.radius_m * math.sin(before_rad),
-    )
-    return replace(aim, heading_rad=compass.heading_rad, home=home, sees=sees, how=f" in {home.id}")
+    home = thing.home or find_near_side(world, door)
+    off_rad = find_normal(world, door, home) - compass.heading_rad
+    if math.cos(off_rad) < -math.cos(BEYOND_RAD):
+        home = other_side(world, door, home)
+    sees = point_before(world, door, home)
+    return Aim(compass.heading_rad, home=home, sees=sees, how=f" in {home.id}")
 
 
 def _side_seen_from(world: WorldModel, door: Door, viewer: Referent) -> Region:
@@ -211,8 +183,17 @@ def _side_seen_from(world: WorldModel, door: Door, viewer: Referent) -> Region:
     return max(sides, key=ahead)
 
 
-def _search(world: WorldModel, thing: Referent, aim: Aim) -> tuple[Point, float] | None:
-    """Find the place nearest to what is aimed at, and how far from the thing it is."""
+def _search(
+    world: WorldModel, thing: Referent, aim: Aim, *, is_asked: bool
+) -> tuple[Point, float] | None:
+    """Find the place nearest to what is aimed at, and how far from the thing it is.
+
+    Args:
+        world: The map.
+        thing: What it is to be on a side of.
+        aim: Where to look.
+        is_asked: Somebody said how far.
+    """
     along = np.array([math.cos(aim.heading_rad), math.sin(aim.heading_rad)])
     offsets = thing.extent - np.array([thing.anchor.x, thing.anchor.y])
     edge_m = float((offsets @ along).max())
@@ -226,27 +207,14 @@ def _search(world: WorldModel, thing: Referent, aim: Aim) -> tuple[Point, float]
     )
     away_m = np.hypot(forward_m, outside_m)
     allowed = (forward_m > 0) & (outside_m <= math.tan(SECTOR_RAD) * forward_m)
-    allowed &= _is_far_enough(world, away_m, aim) & _is_at_home(footing, thing, aim)
+    allowed &= footing.is_beside(aim.home, thing.region)
+    if is_asked:
+        allowed &= np.abs(away_m - aim.away_m) <= tolerance_m(world.grid.resolution_m)
+    else:
+        allowed &= (away_m >= 0.4 * aim.away_m) & (away_m <= FARTHEST_M)
     costs = np.hypot(forward_m - aim.away_m, outside_m) + 0.1 * np.abs(lateral_m)
     point = footing.choose(world, allowed, costs, in_sight_of=aim.sees)
-    if point is None:
-        return None
-    return point, float(away_m[int(np.argmin(footing.away_m(point)))])
-
-
-def _is_far_enough(world: WorldModel, away_m: np.ndarray, aim: Aim) -> np.ndarray:
-    if aim.is_asked:
-        allowed = np.abs(away_m - aim.away_m) <= tolerance_m(world.grid.resolution_m)
-        return np.asarray(allowed)
-    return np.asarray((away_m >= 0.4 * aim.away_m) & (away_m <= FARTHEST_M))
-
-
-def _is_at_home(footing: Footing, thing: Referent, aim: Aim) -> np.ndarray:
-    if aim.home is not None:
-        return np.asarray(footing.regions == aim.home.index)
-    if thing.region is not None:
-        return np.asarray(footing.regions != thing.region.index)
-    return np.ones(len(footing.points), dtype=np.bool_)
+    return None if point is None else (point, footing.at(away_m, point))
 
 
 def _what_works(
@@ -259,8 +227,9 @@ def _what_works(
     for direction in (wanted.direction, *(each for each in around if each != wanted.direction)):
         other = replace(wanted, direction=direction, away_m=None)
         try:
-            found = _search(world, thing, _aim_at(world, thing, other, seen_from))
+            aim = _aim_at(world, thing, other, seen_from)
         except GoalError:
             continue
+        found = _search(world, thing, aim, is_asked=False)
         if found is not None:
             yield f"{found[1]:.1f} m {_say(other)} {thing.name}"

@@ -96,11 +96,6 @@ def read_heading(heading_rad: float) -> Compass:
     return list(Compass)[round(heading_rad / (math.tau / 8)) % 8]
 
 
-def say_heading(heading_rad: float) -> str:
-    """Return the nearest of eight directions of the map as a word."""
-    return read_heading(heading_rad).value
-
-
 class Kind(StrEnum):
     """What one can ask for the nearest of."""
 

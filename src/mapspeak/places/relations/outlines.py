@@ -1,15 +1,21 @@
-"""The outline of a room as straight walls and the corners between them."""
+"""Walls, corners and the middle of a room, and where to stand at them."""
 
 import itertools
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
 from mapspeak.geometry import Point, wrap_angle
+from mapspeak.places.naming import Place, say_spot
+from mapspeak.places.relations.grammar import Compass, read_heading
+from mapspeak.places.relations.placement import find_footing, join_or, refuse, stand
+from mapspeak.places.standing import cells_of, facing_in
+from mapspeak.spatial import Cell
 from mapspeak.spatial.grid import Mask
-from mapspeak.spatial.rooms import Region
+from mapspeak.spatial.rooms import Region, RoomClass
 from mapspeak.worldmodel.model import WorldModel
 
 ROUGHNESS_M = 0.25
@@ -22,19 +28,26 @@ BEHIND_M = 0.35
 RECTANGLE_RATIO = 0.75
 LEAST_WALL_RATIO = 0.5
 """So much of a side must be wall; the rest may be doors and openings."""
+AT_CORNER_M = 1.5
+AT_WALL_M = 0.8
+"""Who stands at a wall has at most so much room between it and the robot's own circle."""
+MIDDLE_M = 2.0
+SAME_SIDE_RAD = math.radians(46)
+LONG_RATIO = 0.3
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Wall:
-    """A straight side of a region.
+    """A straight side of a region, between two points on its floor, counter-clockwise around it."""
 
-    Attributes:
-        start: One end, on the floor.
-        end: The other end, counter-clockwise around the region.
-    """
-
+    region: Region
     start: Point
     end: Point
+
+    @property
+    def name(self) -> str:
+        """Such as "the north wall of R2"."""
+        return f"the {read_heading(self.outward_rad)} wall of {self.region.id}"
 
     @property
     def length_m(self) -> float:
@@ -44,7 +57,7 @@ class Wall:
     @property
     def middle(self) -> Point:
         """Half way along."""
-        return Point((self.start.x + self.end.x) / 2, (self.start.y + self.end.y) / 2)
+        return _mean((self.start, self.end))
 
     @property
     def heading_rad(self) -> float:
@@ -58,92 +71,220 @@ class Wall:
 
 
 @dataclass(frozen=True, slots=True)
-class BareCorner:
-    """Where two walls meet.
+class RoomCorner:
+    """A point of a region's floor where two walls meet, and where in the region that is."""
 
-    Attributes:
-        point: On the floor.
-        outward_rad: Out of the room, half way between the walls' directions.
-    """
-
+    region: Region
     point: Point
-    outward_rad: float
+    compass: Compass
+
+    @property
+    def name(self) -> str:
+        """Such as "the north-east corner of R2"."""
+        return f"the {self.compass} corner of {self.region.id}"
 
 
-@dataclass(frozen=True, slots=True)
-class Outline:
-    """A region's corners that point outwards, and its walls.
+def find_corners(
+    world: WorldModel, region: Region, compass: Compass | None = None
+) -> tuple[RoomCorner, ...]:
+    """Find the corners of a region that point outwards, or the one in a direction.
 
-    Attributes:
-        corners: Where two walls meet.
-        walls: The straight ones.
-        middle: Of the rectangle that it fills, or the mean of the floor.
+    Raises:
+        GoalError: There is none, or there are several.
     """
+    sides, _ = find_sides(world, region)
+    found = [
+        RoomCorner(region, one.end, read_heading(_between(one.outward_rad, other.outward_rad)))
+        for one, other in itertools.pairwise([*sides, *sides[:1]])
+        if _is_corner(one, other)
+    ]
+    if not found:
+        raise refuse(f"{region.id} has no clear corners.", [f"the middle of {region.id}"])
+    there = [each for each in found if compass in (None, each.compass)]
+    if not there:
+        raise refuse(f"{region.id} has no corner in the {compass}.", _names(found))
+    if compass is not None and len(there) > 1:
+        at = join_or([say_spot(each.point) for each in there])
+        raise refuse(
+            f"{region.id} has {len(there)} {compass} corners.",
+            else_hint=f"Say which by x, y: {at}.",
+        )
+    return tuple(there)
 
-    corners: tuple[BareCorner, ...]
-    walls: tuple[Wall, ...]
-    middle: Point
+
+def find_walls(
+    world: WorldModel, region: Region, compass: Compass | None = None
+) -> tuple[Wall, ...]:
+    """Find the walls of a region, or the outermost long one on a side.
+
+    Raises:
+        GoalError: There is none.
+    """
+    found = [side for side in find_sides(world, region)[0] if _is_wall(world, side)]
+    if not found:
+        raise refuse(f"{region.id} has no straight walls.", [f"the middle of {region.id}"])
+    if compass is None:
+        return tuple(found)
+    north_rad = compass.heading_rad
+    there = [
+        each for each in found if abs(wrap_angle(each.outward_rad - north_rad)) <= SAME_SIDE_RAD
+    ]
+    if not there:
+        raise refuse(f"{region.id} has no straight wall in the {compass}.", _names(found))
+
+    def ahead_m(wall: Wall) -> float:
+        return wall.middle.x * math.cos(north_rad) + wall.middle.y * math.sin(north_rad)
+
+    longest_m = max(each.length_m for each in there)
+    return (max((w for w in there if w.length_m >= LONG_RATIO * longest_m), key=ahead_m),)
 
 
-def find_outline(world: WorldModel, region: Region) -> Outline:
-    """Find the walls and corners of a region's floor.
+def _names(found: Sequence[RoomCorner] | Sequence[Wall]) -> list[str]:
+    return list(dict.fromkeys(each.name for each in found))
 
-    A room that nearly fills a rectangle has its four corners, whatever furniture stands in them.
+
+def find_middle(world: WorldModel, region: Region) -> Point:
+    """Return the middle of a room's floor, and of a corridor half the way along it."""
+    walk = world.map.walk_along(region) if region.room_class is RoomClass.CORRIDOR else None
+    return find_sides(world, region)[1] if walk is None else walk.middle
+
+
+def stand_in_middle(world: WorldModel, region: Region) -> Place:
+    """Find the place nearest to the middle of a region.
+
+    Raises:
+        GoalError: The robot gets nowhere near it.
+    """
+    middle = find_middle(world, region)
+    footing = find_footing(world, middle, MIDDLE_M)
+    away_m = footing.away_m(middle)
+    is_here = (footing.regions == region.index) & (away_m <= MIDDLE_M)
+    point = footing.choose(world, is_here, away_m)
+    if point is None:
+        raise refuse(
+            f"The robot can stand nowhere within {MIDDLE_M:.0f} m of the middle of {region.id}."
+        )
+    off_m = point.distance_to(middle)
+    reason = f"{off_m:.1f} m from the middle of {region.id}, looking where most of it lies"
+    return stand(point, reason, facing_in(world, region, point))
+
+
+def stand_in_corner(world: WorldModel, corners: Sequence[RoomCorner]) -> Place:
+    """Find where to stand in the first of some corners in which the robot can.
+
+    Raises:
+        GoalError: It can in none.
+    """
+    for corner in corners:
+        footing = find_footing(world, corner.point, AT_CORNER_M + 1.0)
+        away_m = footing.away_m(corner.point)
+        is_here = (footing.regions == corner.region.index) & (away_m <= AT_CORNER_M)
+        point = footing.choose(world, is_here, away_m, in_sight_of=corner.point)
+        if point is not None:
+            off_m = point.distance_to(corner.point)
+            reason = f"{off_m:.1f} m from {corner.name}, facing it"
+            return stand(point, reason, point.bearing_to(corner.point))
+    raise refuse(
+        f"The robot can stand nowhere within {AT_CORNER_M:.1f} m of {corners[0].name}.",
+        list(_corners_that_work(world, corners)),
+    )
+
+
+def _corners_that_work(world: WorldModel, tried: Sequence[RoomCorner]) -> Iterator[str]:
+    for corner in find_corners(world, tried[0].region):
+        footing = find_footing(world, corner.point, AT_CORNER_M)
+        is_here = footing.regions == corner.region.index
+        is_near = footing.away_m(corner.point) <= AT_CORNER_M
+        if corner not in tried and (is_here & is_near).any():
+            yield corner.name
+
+
+def stand_at_wall(world: WorldModel, walls: Sequence[Wall], *, is_along: bool) -> Place:
+    """Find where to stand at the first of some walls at which the robot can.
+
+    Raises:
+        GoalError: It can at none.
+    """
+    found = (_stand_at(world, wall, is_along=is_along) for wall in walls)
+    place = next(filter(None, found), None)
+    if place is None:
+        raise refuse(f"The robot can stand nowhere at {walls[0].name}: something is in the way.")
+    return place
+
+
+def _stand_at(world: WorldModel, wall: Wall, *, is_along: bool) -> Place | None:
+    footing = find_footing(world, wall.middle, wall.length_m / 2 + world.radius_m + AT_WALL_M)
+    off_m = -footing.along_m(wall.start, wall.outward_rad)
+    aside_m = np.abs(footing.along_m(wall.middle, wall.heading_rad))
+    allowed = (footing.regions == wall.region.index) & (aside_m <= wall.length_m / 2)
+    least_m = world.radius_m - world.grid.resolution_m
+    allowed &= (off_m >= least_m) & (off_m <= world.radius_m + AT_WALL_M)
+    point = footing.choose(world, allowed, off_m + 0.5 * aside_m)
+    if point is None:
+        return None
+    beside = f"{footing.at(off_m, point):.1f} m from {wall.name}"
+    if not is_along:
+        return stand(point, f"{beside}, facing it", wall.outward_rad)
+    yaw_rad = wall.heading_rad
+    if math.cos(world.robot.point.bearing_to(point) - yaw_rad) < 0:
+        yaw_rad = wrap_angle(yaw_rad + math.pi)
+    return stand(point, f"{beside}, heading {read_heading(yaw_rad)} along it", yaw_rad)
+
+
+def find_sides(world: WorldModel, region: Region) -> tuple[list[Wall], Point]:
+    """Find the sides of a region's floor, counter-clockwise, and its middle.
+
+    A room that nearly fills a rectangle has its four sides, whatever furniture stands at them.
     """
     window = world.rooms.window_of(region)
     inside = world.rooms.labels[window] == region.index
-    cells = _trace_rectangle(inside)
-    corner = window[0].start, window[1].start
-    points = None if cells is None else [_point_at(world, corner, *cell) for cell in cells]
-    if points is None or not _is_own(world, region, points):
-        points = [_point_at(world, corner, *cell) for cell in _trace(world, inside)]
-        middle = _mean_of(world, inside, corner)
+
+    def points_of(polygon: np.ndarray) -> list[Point]:
+        # Rows grow upwards on the map, so that what is positive there runs counter-clockwise.
+        area = cv2.contourArea(polygon.astype(np.float32).reshape(-1, 1, 2), oriented=True)
+        cells = polygon[::-1] if area < 0 else polygon
+        low_row, low_col = window[0].start, window[1].start
+        return [world.grid.point_at(Cell(int(y) + low_row, int(x) + low_col)) for x, y in cells]
+
+    rectangle = _trace_rectangle(inside)
+    points = None if rectangle is None else points_of(rectangle)
+    if points is not None and _is_own(world, region, points):
+        middle = _mean(points)
     else:
-        middle = Point(sum(p.x for p in points) / 4, sum(p.y for p in points) / 4)
-    sides = [
-        Wall(start=one, end=other)
-        for one, other in zip(points, points[1:] + points[:1], strict=True)
-    ]
-    return Outline(
-        corners=tuple(
-            BareCorner(one.end, _between(one.outward_rad, other.outward_rad))
-            for one, other in itertools.pairwise([*sides, *sides[:1]])
-            if _is_corner(one, other)
-        ),
-        walls=tuple(side for side in sides if _is_wall(world, side)),
-        middle=middle,
-    )
+        points = points_of(_trace(world, inside))
+        floor = world.grid.points_at(*cells_of(world.rooms, region))
+        middle = Point(*floor.mean(axis=0).tolist())
+    ends = [*points[1:], *points[:1]]
+    return [Wall(region, *pair) for pair in zip(points, ends, strict=True)], middle
+
+
+def _mean(points: Sequence[Point]) -> Point:
+    return Point(sum(p.x for p in points) / len(points), sum(p.y for p in points) / len(points))
 
 
 def _between(one_rad: float, other_rad: float) -> float:
     return wrap_angle(one_rad + wrap_angle(other_rad - one_rad) / 2)
 
 
-def _mean_of(world: WorldModel, inside: Mask, corner: tuple[int, int]) -> Point:
-    rows, cols = np.nonzero(inside)
-    x, y = world.grid.points_at(rows + corner[0], cols + corner[1]).mean(axis=0).tolist()
-    return Point(x, y)
-
-
-def _trace_rectangle(inside: Mask) -> list[tuple[int, int]] | None:
+def _trace_rectangle(inside: Mask) -> np.ndarray | None:
     """Return the corners of the rectangle that a region nearly fills; None where it does not."""
     found, _ = cv2.findContours(inside.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     rectangle = cv2.minAreaRect(np.concatenate(found))
     (_, (one, other), _) = rectangle
     if float(inside.sum()) < RECTANGLE_RATIO * (one + 1) * (other + 1):
         return None
-    return _ordered(np.rint(cv2.boxPoints(rectangle)))
+    return np.rint(cv2.boxPoints(rectangle))
 
 
 def _is_own(world: WorldModel, region: Region, corners: list[Point]) -> bool:
     """Return True where no corner lies in another region."""
-    middle = Point(sum(p.x for p in corners) / 4, sum(p.y for p in corners) / 4)
+    middle = _mean(corners)
     inner = (Point(p.x + 0.05 * (middle.x - p.x), p.y + 0.05 * (middle.y - p.y)) for p in corners)
     return all(world.find_room_id(point) in (region.id, None) for point in inner)
 
 
-def _trace(world: WorldModel, inside: Mask) -> list[tuple[int, int]]:
-    """Return the corners of the outline as (col, row), counter-clockwise on the map."""
+def _trace(world: WorldModel, inside: Mask) -> np.ndarray:
+    """Return the corners of the outline as (col, row)."""
     n = 2 * max(round(ROUGHNESS_M / world.grid.resolution_m / 2), 0) + 1
     framed = np.pad(inside.astype(np.uint8), n)
     kernel = cv2.getStructuringElement(cv2.MORPH_RECT, (n, n))
@@ -154,20 +295,7 @@ def _trace(world: WorldModel, inside: Mask) -> list[tuple[int, int]]:
     )
     longest = max(found, key=cv2.contourArea)
     rough = max(ROUGHNESS_M / world.grid.resolution_m, 1.5)
-    return _ordered(cv2.approxPolyDP(longest, rough, closed=True)[:, 0, :] - n)
-
-
-def _ordered(polygon: np.ndarray) -> list[tuple[int, int]]:
-    """Return the corners of a polygon counter-clockwise; rows grow upwards on the map."""
-    area = cv2.contourArea(polygon.astype(np.float32).reshape(-1, 1, 2), oriented=True)
-    return [(int(col), int(row)) for col, row in (polygon[::-1] if area < 0 else polygon)]
-
-
-def _point_at(world: WorldModel, corner: tuple[int, int], col: int, row: int) -> Point:
-    x, y = world.grid.points_at(np.array([row + corner[0]]), np.array([col + corner[1]]))[
-        0
-    ].tolist()
-    return Point(x, y)
+    return np.asarray(cv2.approxPolyDP(longest, rough, closed=True)[:, 0, :] - n)
 
 
 def _is_corner(one: Wall, other: Wall) -> bool:
@@ -182,13 +310,8 @@ def _is_wall(world: WorldModel, side: Wall) -> bool:
         return False
     grid = world.grid
     shares = np.linspace(0.05, 0.95, max(math.ceil(side.length_m / grid.resolution_m), 2))
-    along = np.stack(
-        [
-            side.start.x + shares * (side.end.x - side.start.x),
-            side.start.y + shares * (side.end.y - side.start.y),
-        ],
-        axis=1,
-    )
+    start = np.array([side.start.x, side.start.y])
+    along = start + shares[:, None] * (np.array([side.end.x, side.end.y]) - start)
     out = np.array([math.cos(side.outward_rad), math.sin(side.outward_rad)])
     is_solid = np.zeros(shares.size, dtype=np.bool_)
     reach_m = max(BEHIND_M, 2 * grid.resolution_m)

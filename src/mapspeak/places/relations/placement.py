@@ -8,13 +8,16 @@ import numpy as np
 
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point
+from mapspeak.places.naming import Place, Spot
 from mapspeak.places.standing import COMFORT_M
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
+from mapspeak.spatial.rooms import Region
 from mapspeak.worldmodel.model import WorldModel
 
 IN_DOOR_M = 0.5
 AT_ONCE = 512
 """So many lines of sight are looked along together."""
+MOST_EXTENT = 256
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -43,6 +46,25 @@ class Footing:
         """Return how far each cell is from a point in a direction; negative behind it."""
         dx, dy = self.points[:, 0] - origin.x, self.points[:, 1] - origin.y
         return np.asarray(dx * math.cos(heading_rad) + dy * math.sin(heading_rad))
+
+    def at(self, values: FloatArray, point: Point) -> float:
+        """Return the value, of one for each cell, at the cell nearest to a point."""
+        return float(values[int(np.argmin(self.away_m(point)))])
+
+    def extent_away_m(self, extent: FloatArray) -> FloatArray:
+        """Return how far each cell is from the nearest of some points, as the crow flies."""
+        away_m = np.full(len(self.points), np.inf)
+        for x, y in extent[:: -(-len(extent) // MOST_EXTENT)].tolist():
+            np.minimum(away_m, self.away_m(Point(x, y)), out=away_m)
+        return away_m
+
+    def is_beside(self, home: Region | None, region: Region | None) -> Mask:
+        """Return True for the cells of one region, or else outside another."""
+        if home is not None:
+            return np.asarray(self.regions == home.index)
+        if region is not None:
+            return np.asarray(self.regions != region.index)
+        return np.ones(len(self.points), dtype=np.bool_)
 
     def choose(
         self,
@@ -121,33 +143,21 @@ def is_in_sight(world: WorldModel, points: FloatArray, thing: Point) -> Mask:
     return np.asarray(~(is_blocked & is_floor).any(axis=1), dtype=np.bool_)
 
 
-MOST_EXTENT = 256
-TOLERANCE_M = 0.1
-FALLBACK = "Name another place."
+def stand(point: Point, reason: str, yaw_rad: float | None = None) -> Place:
+    """Return a place to stand that fits a relation; without a heading, it is that of the arrival.
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Stand:
-    """A place that fits a relation.
-
-    Attributes:
-        point: Where to stand.
-        yaw_rad: The heading there; None for that of the arrival.
-        reason: What it is, with the distance actually taken.
+    The words of the relation are its name.
     """
-
-    point: Point
-    reason: str
-    yaw_rad: float | None = None
+    return Place("", Spot(point, yaw_rad), reason)
 
 
 def refuse(what: str, works: Sequence[str] = (), *, else_hint: str = "") -> GoalError:
     """Return the error for what nothing fits, with what would."""
     if works:
-        return GoalError(what, hint=f"What would work: {join_or(works)}.")
+        else_hint = f"What would work: {join_or(works)}."
     if else_hint:
         return GoalError(what, hint=else_hint)
-    return GoalError(what, hint=FALLBACK, step=NextStep.MEASURE)
+    return GoalError(what, hint="Name another place.", step=NextStep.MEASURE)
 
 
 def join_or(words: Sequence[str]) -> str:
@@ -157,14 +167,4 @@ def join_or(words: Sequence[str]) -> str:
 
 def tolerance_m(resolution_m: float) -> float:
     """Return how far off a distance may be that somebody asked for."""
-    return max(TOLERANCE_M, 0.75 * resolution_m)
-
-
-def extent_away_m(footing: Footing, extent: FloatArray) -> FloatArray:
-    """Return how far each cell is from the nearest of some points, as the crow flies."""
-    step = -(-len(extent) // MOST_EXTENT)
-    squares = np.full(len(footing.points), np.inf)
-    for x, y in extent[::step]:
-        dx, dy = footing.points[:, 0] - x, footing.points[:, 1] - y
-        np.minimum(squares, dx * dx + dy * dy, out=squares)
-    return np.asarray(np.sqrt(squares), dtype=np.float64)
+    return max(0.1, 0.75 * resolution_m)

@@ -2,14 +2,13 @@
 
 import math
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
 
 from mapspeak.errors import GoalError, NextStep
-from mapspeak.geometry import Point
+from mapspeak.geometry import Point, Pose
 from mapspeak.memory import name_key
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.places.naming import (
@@ -18,17 +17,20 @@ from mapspeak.places.naming import (
     Place,
     Spot,
     find_named,
+    find_place_ids,
     say_spot,
 )
 from mapspeak.places.relations.grammar import GAP, pattern, plain
-from mapspeak.places.relations.outlines import find_outline
+from mapspeak.places.relations.outlines import find_sides
 from mapspeak.places.relations.placement import refuse
+from mapspeak.places.standing import point_ahead
 from mapspeak.spatial.frontiers import Frontier
 from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.rooms import Door, Region, RoomClass
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedPlace, RememberedThing
 
+ROBOT = "the robot"
 AROUND_DOOR_M = 0.6
 """So much floor on both sides of a door says which way it leads."""
 AROUND_THING_M = 1.5
@@ -48,7 +50,6 @@ class Referent:
         region: What it is, if a region.
         door: What it is, if a door.
         front_rad: Where its own front looks; None where it has none.
-        is_robot: True of the robot itself.
     """
 
     name: str
@@ -58,7 +59,6 @@ class Referent:
     region: Region | None = None
     door: Door | None = None
     front_rad: float | None = None
-    is_robot: bool = False
 
     @property
     def is_point(self) -> bool:
@@ -78,26 +78,21 @@ def refer_to(world: WorldModel, place: Place) -> Referent:
         case Region() as region:
             return _refer_to_region(world, region)
         case Door() as door:
-            return _refer_to_door(world, door)
+            return refer_to_door(world, door, find_near_side(world, door))
         case RememberedPlace(id=place_id, waypoint=waypoint):
             name = place.name if place.name == place_id else f"{place_id} ({place.name})"
             return refer_to_point(world, name, waypoint.pose.point, front_rad=waypoint.pose.yaw_rad)
         case RememberedThing(id=thing_id, thing=thing) as remembered:
             rooms = [world.rooms.region(each) for each in world.rooms_before(remembered)]
             home = rooms[0] if len(rooms) == 1 else None
-            name = f"{thing.label} ({thing_id}, seen from {_say_seen_from(world, remembered)})"
+            seen_from = " and ".join(find_place_ids(world, thing.waypoints))
+            name = f"{thing.label} ({thing_id}, seen from {seen_from})"
             return refer_to_point(world, name, remembered.point, home=home)
         case Frontier(pose=pose):
             return refer_to_point(world, place.name, pose.point)
         case Spot(point=point, yaw_rad=yaw_rad):
-            is_robot = place.name == "robot"
-            name = "the robot" if is_robot else place.name
-            return refer_to_point(world, name, point, front_rad=yaw_rad, is_robot=is_robot)
-
-
-def _say_seen_from(world: WorldModel, remembered: RememberedThing) -> str:
-    places = map(world.recollection.find_place, remembered.thing.waypoints)
-    return " and ".join(dict.fromkeys(place.id for place in places if place is not None))
+            name = ROBOT if place.name == "robot" else place.name
+            return refer_to_point(world, name, point, front_rad=yaw_rad)
 
 
 def refer_to_point(
@@ -107,7 +102,6 @@ def refer_to_point(
     *,
     front_rad: float | None = None,
     home: Region | None = None,
-    is_robot: bool = False,
 ) -> Referent:
     """Return a point as something to relate to."""
     return Referent(
@@ -116,21 +110,16 @@ def refer_to_point(
         extent=np.array([[point.x, point.y]]),
         home=home or world.rooms.find_region_at(point) or _find_region_around(world, point),
         front_rad=front_rad,
-        is_robot=is_robot,
     )
 
 
 def _find_region_around(world: WorldModel, point: Point) -> Region | None:
     """Find the region that a thing stands in; None for what is in a wall between two."""
-    window = world.grid.window_around(point, AROUND_THING_M)
-    labels = world.rooms.labels[window]
-    rows, cols = np.nonzero(labels)
-    if not rows.size:
+    offsets, labels = _offsets(world, world.rooms.labels, point, AROUND_THING_M)
+    if not labels.size:
         return None
-    points = world.grid.points_at(rows + window[0].start, cols + window[1].start)
-    away_m = np.hypot(points[:, 0] - point.x, points[:, 1] - point.y)
-    near = away_m <= away_m.min() + BOTH_SIDES_M
-    indices = np.unique(labels[rows, cols][near])
+    away_m = np.hypot(*offsets.T)
+    indices = np.unique(labels[away_m <= away_m.min() + BOTH_SIDES_M])
     return next((each for each in world.rooms.regions if [each.index] == indices.tolist()), None)
 
 
@@ -140,32 +129,47 @@ def find_normal(world: WorldModel, door: Door, side: Region) -> float:
     It is at right angles to the line through its two posts where the floor near it shows no other.
     """
     reach_m = door.width_m / 2 + AROUND_DOOR_M
-    window = world.grid.window_around(door.place, reach_m)
-    labels = world.rooms.labels[window]
+    offsets, labels = _offsets(world, world.rooms.labels, door.place, reach_m)
+    is_near = np.hypot(*offsets.T) <= reach_m
     middles = []
-    for region_id in (side.id, *(each for each in door.region_ids if each != side.id)):
-        rows, cols = np.nonzero(labels == world.rooms.region(region_id).index)
-        points = world.grid.points_at(rows + window[0].start, cols + window[1].start)
-        away_m = np.hypot(points[:, 0] - door.place.x, points[:, 1] - door.place.y)
-        near = points[away_m <= reach_m]
-        middles.append(near.mean(axis=0) if len(near) else np.array([door.place.x, door.place.y]))
+    for region in (side, other_side(world, door, side)):
+        near = offsets[is_near & (labels == region.index)]
+        middles.append(near.mean(axis=0) if len(near) else np.zeros(2))
     into = middles[0] - middles[1]
     return _squared(world, door, math.atan2(float(into[1]), float(into[0])))
 
 
+def _offsets(
+    world: WorldModel, values: np.ndarray, centre: Point, reach_m: float
+) -> tuple[FloatArray, np.ndarray]:
+    """Return where cells that are not 0 lie from a point, in metres, and their values."""
+    window = world.grid.window_around(centre, reach_m)
+    rows, cols = np.nonzero(values[window])
+    points = world.grid.points_at(rows + window[0].start, cols + window[1].start)
+    return points - np.array([centre.x, centre.y]), values[window][rows, cols]
+
+
+def other_side(world: WorldModel, door: Door, side: Region) -> Region:
+    """Return the region beyond a door."""
+    return world.rooms.region(next(each for each in door.region_ids if each != side.id))
+
+
+def point_before(world: WorldModel, door: Door, side: Region) -> Point:
+    """Return the point before a door on one side, as far off as the robot is wide on one side."""
+    return point_ahead(door.place, find_normal(world, door, side), world.radius_m)
+
+
 def _squared(world: WorldModel, door: Door, rough_rad: float) -> float:
     """Turn a direction through a door until the posts beside it lie square to it."""
-    window = world.grid.window_around(door.place, door.width_m / 2 + AROUND_DOOR_M)
-    rows, cols = np.nonzero(world.grid.occupied[window])
-    points = world.grid.points_at(rows + window[0].start, cols + window[1].start)
-    points -= np.array([door.place.x, door.place.y])
+    reach_m = door.width_m / 2 + AROUND_DOOR_M
+    points, _ = _offsets(world, world.grid.occupied, door.place, reach_m)
     across = np.array([-math.sin(rough_rad), math.cos(rough_rad)])
     posts = []
     for sign in (1.0, -1.0):
-        beside = points[(points @ (sign * across)) > 0.5 * np.hypot(points[:, 0], points[:, 1])]
+        beside = points[(points @ (sign * across)) > 0.5 * np.hypot(*points.T)]
         if not len(beside):
             return rough_rad
-        posts.append(beside[int(np.argmin(np.hypot(beside[:, 0], beside[:, 1])))])
+        posts.append(beside[int(np.argmin(np.hypot(*beside.T)))])
     line = posts[0] - posts[1]
     square_rad = math.atan2(float(line[1]), float(line[0])) - math.pi / 2
     off_rad = math.remainder(square_rad - rough_rad, math.tau)
@@ -178,18 +182,17 @@ def _refer_to_region(world: WorldModel, region: Region) -> Referent:
     edges, _ = cv2.findContours(np.pad(inside, 1), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     cells = np.concatenate(edges)[:, 0, :] - 1
     extent = world.grid.points_at(cells[:, 1] + window[0].start, cells[:, 0] + window[1].start)
-    middle = find_outline(world, region).middle
+    _, middle = find_sides(world, region)
     return Referent(name=region.id, anchor=middle, extent=extent, region=region)
 
 
-def _refer_to_door(world: WorldModel, door: Door) -> Referent:
-    near = find_near_side(world, door)
-    along_rad = find_normal(world, door, near) + math.pi / 2
-    half = np.array([math.cos(along_rad), math.sin(along_rad)]) * door.width_m / 2
-    middle = np.array([door.place.x, door.place.y])
-    shares = np.linspace(-1.0, 1.0, 9)[:, None]
-    extent = middle + shares * half
-    return Referent(name=door.id, anchor=door.place, extent=extent, home=near, door=door)
+def refer_to_door(world: WorldModel, door: Door, near: Region, *, name: str = "") -> Referent:
+    """Return a door as seen from one of its sides."""
+    half = door.width_m / 2
+    across = Pose(door.place.x, door.place.y, find_normal(world, door, near))
+    points = [across.transform(Point(0.0, half * share)) for share in np.linspace(-1.0, 1.0, 9)]
+    extent = np.array([[point.x, point.y] for point in points])
+    return Referent(name=name or door.id, anchor=door.place, extent=extent, home=near, door=door)
 
 
 def find_near_side(world: WorldModel, door: Door) -> Region:
@@ -201,13 +204,8 @@ def find_near_side(world: WorldModel, door: Door) -> Region:
         return standing
 
     def path_m(side: Region) -> float:
-        heading_rad = find_normal(world, door, side)
         ahead_m = world.radius_m + AROUND_DOOR_M
-        before = Point(
-            door.place.x + ahead_m * math.cos(heading_rad),
-            door.place.y + ahead_m * math.sin(heading_rad),
-        )
-        found_m = world.path_m(before)
+        found_m = world.path_m(point_ahead(door.place, find_normal(world, door, side), ahead_m))
         return math.inf if found_m is None else found_m
 
     return min(sides, key=path_m)
@@ -311,29 +309,21 @@ def _find_thing(world: WorldModel, wanted: str) -> Referent | None:
         return None
     located = [each for each in called if each.thing.position is not None]
     if not located:
-        seen_from = [name for each in called for name in each.thing.waypoints]
-        places = filter(None, map(world.recollection.find_place, dict.fromkeys(seen_from)))
-        ids = [place.id for place in places]
+        ids = find_place_ids(world, [name for each in called for name in each.thing.waypoints])
         raise GoalError(
             f"{wanted[:80]!r} was seen from {', '.join(ids)}, but not in which direction.",
             hint=f"Drive to {ids[0]} and look from there.",
             step=NextStep.LOOK_FROM,
             about=ids[0],
         )
-    if len(located) > 1:
-        raise _several_things(world, wanted, located)
-    return refer_to(world, Place(located[0].id, located[0]))
-
-
-def _several_things(
-    world: WorldModel, wanted: str, located: Sequence[RememberedThing]
-) -> AmbiguousPlaceError:
+    if len(located) == 1:
+        return refer_to(world, Place(located[0].id, located[0]))
     shown = "; ".join(
         f"{each.id} at {say_spot(each.point)}, in "
         f"{' or '.join(world.rooms_before(each)) or 'no room'}"
         for each in located[:MOST_NAMED]
     )
-    return AmbiguousPlaceError(
+    raise AmbiguousPlaceError(
         f"Several things are called {wanted[:80]!r}.",
         hint=f"They are {shown}. Say which one by its id.",
         words=wanted,

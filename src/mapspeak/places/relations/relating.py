@@ -1,12 +1,13 @@
 """From words that relate a place to others to the place."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point
-from mapspeak.places.naming import Place, Spot, find_named, no_such_place
+from mapspeak.places.naming import Place, find_named, no_such_place
 from mapspeak.places.relations.directions import stand_towards
 from mapspeak.places.relations.grammar import (
     Away,
@@ -23,9 +24,9 @@ from mapspeak.places.relations.grammar import (
     parse_relation,
     plain,
 )
-from mapspeak.places.relations.inside import (
-    FoundCorner,
-    FoundWall,
+from mapspeak.places.relations.outlines import (
+    RoomCorner,
+    Wall,
     find_corners,
     find_middle,
     find_walls,
@@ -33,7 +34,7 @@ from mapspeak.places.relations.inside import (
     stand_in_corner,
     stand_in_middle,
 )
-from mapspeak.places.relations.placement import Stand, find_footing, refuse
+from mapspeak.places.relations.placement import find_footing, refuse, stand
 from mapspeak.places.relations.proximity import (
     find_nearest,
     stand_away,
@@ -71,7 +72,11 @@ def find_related(world: WorldModel, words: str) -> Place | None:
     relation = parse_relation(words)
     if relation is None:
         return find_named(world, plain(words)) or find_by_kind(world, words)
-    return Reader(world).find(relation, " ".join(words.split()), n_left=MOST_RELATIONS - 1)
+    place = Reader(world).find(relation, MOST_RELATIONS - 1)
+    return place if place.name else replace(place, name=" ".join(words.split())[:LONGEST_NAME])
+
+
+STANDS = {NextTo: stand_next_to, Facing: stand_facing}
 
 
 class Reader:
@@ -80,45 +85,34 @@ class Reader:
     def __init__(self, world: WorldModel) -> None:
         self._world = world
 
-    def find(self, relation: Relation, words: str, *, n_left: int) -> Place:
-        """Return the place that a relation means; `n_left` more may stand inside it."""
-        if isinstance(relation, Nearest):
-            start = None if relation.to is None else self._refer(relation.to, n_left)
-            return find_nearest(self._world, relation.kind, start)
-        stand = self._stand(relation, n_left)
-        return Place(words[:LONGEST_NAME], Spot(stand.point, stand.yaw_rad), stand.reason)
+    def find(self, relation: Relation, n_left: int) -> Place:
+        """Return the place that a relation means, without a name where it is one to stand at.
 
-    def _stand(self, relation: Relation, n_left: int) -> Stand:
+        `n_left` more relations may stand inside it.
+        """
+        world = self._world
         match relation:
+            case Nearest(kind, to):
+                return find_nearest(world, kind, None if to is None else self._refer(to, n_left))
             case Towards():
-                stand = self._stand_towards(relation, n_left)
+                place = self._stand_towards(relation, n_left)
             case Away(of=of, away_m=away_m):
                 _check_distance(away_m)
-                stand = stand_away(self._world, self._refer(of, n_left), away_m)
-            case NextTo(of):
-                stand = stand_next_to(self._world, self._refer(of, n_left))
-            case Facing(of):
-                stand = stand_facing(self._world, self._refer(of, n_left))
+                place = stand_away(world, self._refer(of, n_left), away_m)
+            case NextTo(of) | Facing(of):
+                place = STANDS[type(relation)](world, self._refer(of, n_left))
             case Turned():
-                stand = self._stand_turned(relation, n_left)
+                place = self._stand_turned(relation, n_left)
             case Between():
-                stand = stand_between(self._world, *self._refer_to_both(relation, n_left))
-            case _:
-                stand = self._stand_inside(relation, n_left)
-        return stand
-
-    def _stand_inside(self, relation: Corner | WallSide | Middle | Nearest, n_left: int) -> Stand:
-        match relation:
+                place = stand_between(world, *self._refer_to_both(relation, n_left))
             case Corner():
-                return stand_in_corner(self._world, self._find_corners(relation, n_left))
+                place = stand_in_corner(world, self._find_corners(relation, n_left))
             case WallSide(is_along=is_along):
                 walls = self._find_walls(relation, n_left)
-                return stand_at_wall(self._world, walls, is_along=is_along)
+                place = stand_at_wall(world, walls, is_along=is_along)
             case Middle(of):
-                return stand_in_middle(self._world, self._refer(of, n_left))
-            case Nearest():
-                place = self.find(relation, "", n_left=n_left)
-                return Stand(point=standing_point(self._world, place), reason=place.reason)
+                place = self._stand_in_middle(self._refer(of, n_left))
+        return place
 
     def _refer(self, words: str, n_left: int) -> Referent:
         """Return what words inside a phrase mean: a name, or another phrase."""
@@ -139,7 +133,7 @@ class Reader:
         """Return what a phrase is about: the corner itself, say, not where one stands in it."""
         match relation:
             case Nearest():
-                return refer_to(self._world, self.find(relation, words, n_left=n_left))
+                return refer_to(self._world, self.find(relation, n_left))
             case Corner():
                 corner = self._find_corners(relation, n_left)[0]
                 return refer_to_point(self._world, corner.name, corner.point, home=corner.region)
@@ -150,8 +144,8 @@ class Reader:
                 middle = find_middle(self._world, thing.region)
                 return refer_to_point(self._world, name, middle, home=thing.region)
             case _:
-                stand = self._stand(relation, n_left)
-                return refer_to_point(self._world, f"the place {words}", stand.point)
+                place = self.find(relation, n_left)
+                return refer_to_point(self._world, f"the place {words}", place.point)
 
     def _refer_to_both(self, relation: Between, n_left: int) -> tuple[Referent, Referent]:
         """Return the two things of a "between", by the first division of the words that works."""
@@ -173,7 +167,7 @@ class Reader:
         first, _, rest = plain(words).partition(" ")
         if plain(words).casefold() not in ("doors", "two doors") and first.casefold() != "doors":
             return None
-        room = self._room_of(rest.removeprefix("of ")) if first == "doors" and rest else None
+        room = self._region_of(rest.removeprefix("of "), 0) if first == "doors" and rest else None
         room = room or find_room_here(self._world)
         doors = self._world.rooms.doors_of(room)
         if len(doors) != 2:
@@ -185,52 +179,51 @@ class Reader:
         one, other = (refer_to(self._world, Place(door.id, door)) for door in doors)
         return one, other
 
-    def _stand_towards(self, relation: Towards, n_left: int) -> Stand:
+    def _stand_towards(self, relation: Towards, n_left: int) -> Place:
         _check_distance(relation.away_m)
-        thing = self._refer(relation.of, n_left)
-        seen_from = None
-        if relation.seen_from is not None:
-            seen_from = self._refer(relation.seen_from, n_left)
+        thing, viewer = self._refer(relation.of, n_left), relation.seen_from
+        seen_from = None if viewer is None else self._refer(viewer, n_left)
         return stand_towards(self._world, thing, relation, seen_from)
 
-    def _stand_turned(self, relation: Turned, n_left: int) -> Stand:
+    def _stand_in_middle(self, thing: Referent) -> Place:
+        if thing.region is None:
+            raise refuse(
+                f"{thing.name} is no room or corridor, so it has no middle.",
+                [thing.name, f"next to {thing.name}"],
+            )
+        return stand_in_middle(self._world, thing.region)
+
+    def _stand_turned(self, relation: Turned, n_left: int) -> Place:
         thing = self._refer(relation.to, n_left)
         inner = parse_relation(relation.place)
         if inner is not None and find_known(self._world, relation.place) is None:
-            stand = self._stand(inner, n_left)
-            point, why = stand.point, stand.reason.removesuffix(", facing it")
+            place: Place | None = self.find(inner, n_left)
+            why = "" if place is None else place.reason.removesuffix(", facing it")
         else:
             at = self._refer(relation.place, n_left)
-            found = find_named(self._world, plain(relation.place))
-            point, why = standing_point(self._world, found) if found else at.anchor, at.name
+            place, why = find_named(self._world, plain(relation.place)), at.name
+        point = at.anchor if place is None else standing_point(self._world, place)
         if point.distance_to(thing.anchor) < self._world.radius_m:
             raise refuse(f"{relation.place} is where {thing.name} is: it cannot be faced there.")
-        return Stand(
-            point=point,
-            yaw_rad=point.bearing_to(thing.anchor),
-            reason=f"{why}, facing {thing.name}",
-        )
+        return stand(point, f"{why}, facing {thing.name}", point.bearing_to(thing.anchor))
 
-    def _find_corners(self, relation: Corner, n_left: int) -> tuple[FoundCorner, ...]:
+    def _find_corners(self, relation: Corner, n_left: int) -> tuple[RoomCorner, ...]:
         """Return the corners that may be meant, the best first."""
         near = None if relation.near is None else self._refer(relation.near, n_left)
-        region = self._region_beside(relation.of, near, n_left)
+        if relation.of is not None:
+            region = self._region_of(relation.of, n_left)
+        else:
+            region = (near and near.home) or find_room_here(self._world)
         corners = find_corners(self._world, region, relation.compass)
         if near is not None:
             return tuple(sorted(corners, key=lambda each: _away_m(each.point, near)))
         return tuple(sorted(corners, key=lambda each: self._path_m(each.point)))
 
-    def _find_walls(self, relation: WallSide, n_left: int) -> tuple[FoundWall, ...]:
+    def _find_walls(self, relation: WallSide, n_left: int) -> tuple[Wall, ...]:
         """Return the walls that may be meant, the best first."""
         region = self._region_of(relation.of, n_left)
         walls = find_walls(self._world, region, relation.compass)
-        return tuple(sorted(walls, key=lambda each: self._path_m(each.wall.middle)))
-
-    def _region_beside(self, of: str | None, near: Referent | None, n_left: int) -> Region:
-        if of is not None:
-            return self._region_of(of, n_left)
-        home = None if near is None else near.home
-        return home or find_room_here(self._world)
+        return tuple(sorted(walls, key=lambda each: self._path_m(each.middle)))
 
     def _region_of(self, words: str, n_left: int) -> Region:
         thing = self._refer(words, n_left)
@@ -240,9 +233,6 @@ class Reader:
                 [f"next to {thing.name}"],
             )
         return thing.region
-
-    def _room_of(self, words: str) -> Region:
-        return self._region_of(words, 0)
 
     def _path_m(self, point: Point) -> float:
         """Return how far it is to the floor beside a point that the robot cannot stand in."""
@@ -258,19 +248,11 @@ def _check_distance(away_m: float | None) -> None:
 
 
 def _away_m(point: Point, thing: Referent) -> float:
-    x, y = thing.extent[:, 0] - point.x, thing.extent[:, 1] - point.y
-    return float((x * x + y * y).min())
+    return float(np.hypot(thing.extent[:, 0] - point.x, thing.extent[:, 1] - point.y).min())
 
 
-def _refer_to_wall(found: FoundWall) -> Referent:
-    wall, region = found.wall, found.region
-    n = max(math.ceil(wall.length_m / 0.1), 2)
-    shares = [step / (n - 1) for step in range(n)]
-    points = [
-        (
-            wall.start.x + share * (wall.end.x - wall.start.x),
-            wall.start.y + share * (wall.end.y - wall.start.y),
-        )
-        for share in shares
-    ]
-    return Referent(name=found.name, anchor=wall.middle, extent=np.array(points), home=region)
+def _refer_to_wall(wall: Wall) -> Referent:
+    shares = np.linspace(0.0, 1.0, max(math.ceil(wall.length_m / 0.1), 2))[:, None]
+    start, end = (np.array([point.x, point.y]) for point in (wall.start, wall.end))
+    extent = start + shares * (end - start)
+    return Referent(name=wall.name, anchor=wall.middle, extent=extent, home=wall.region)
