@@ -12,9 +12,9 @@ from typing import TypeVar
 import anyio
 import anyio.to_thread
 
-from mapspeak.driving.diary import Diary, Keeping
 from mapspeak.driving.doorlearning import learn_from_drive
 from mapspeak.driving.drive import DriveBook
+from mapspeak.driving.episodewriter import EpisodeWriter, Keeping
 from mapspeak.driving.stops import Lease
 from mapspeak.errors import LinkError, MapError, MapspeakError, SemanticMapError
 from mapspeak.geometry import Point
@@ -24,6 +24,7 @@ from mapspeak.memory.episodes import (
     EpisodePage,
     EpisodeQuery,
     EpisodeStore,
+    ObservationKind,
     VectorRank,
     memory_folder,
     named_pictures,
@@ -64,7 +65,7 @@ class Session:
     Attributes:
         robot: The port to the robot, behind the guard.
         pictures: Taken lately, by their ids.
-        diary: Every observation, as it was made.
+        episodes: Every observation, as it was made.
         keeper: The map that the memory belongs to.
         recollector: Keeps what was made of the memory.
     """
@@ -107,7 +108,8 @@ class Session:
         self.pictures = PictureBook()
         folder = memory_folder(memory.path)
         episodes = EpisodeStore(folder, named_pictures=lambda: named_pictures(memory.read()))
-        self.diary = Diary(episodes, wall_clock=None if guard is None else guard.wall_clock)
+        wall_clock = None if guard is None else guard.wall_clock
+        self.episodes = EpisodeWriter(episodes, wall_clock=wall_clock)
         self.keeper = MapKeeper(memory, episodes)
         self._rank: VectorRank | None = None
         self._ranking = threading.Lock()
@@ -198,15 +200,16 @@ class Session:
 
     async def keep_picture(self, picture: CameraPicture, *, labels: tuple[str, ...]) -> Keeping:
         """Keep a picture as an episode, with what the robot's detector reports in it."""
-        if not self.diary.is_kept:
+        if not self.episodes.is_open:
             return Keeping()
         try:
             room_id = await self.find_room_id(picture.pose.point)
         except (LinkError, MapError):
             room_id = None
         return await self.compute(
-            lambda: self.diary.keep_picture(
-                picture.data,
+            lambda: self.episodes.keep(
+                ObservationKind.PICTURE,
+                picture=picture.data,
                 pose=picture.pose,
                 stamp_s=picture.stamp_s,
                 labels=labels,
@@ -221,7 +224,7 @@ class Session:
 
     def find_episodes(self, query: EpisodeQuery) -> EpisodePage:
         """Return the observations that pass a query, compared by meaning where that is possible."""
-        find = self.diary.store.find
+        find = self.episodes.store.find
         compares_words = query.words or isinstance(query.near, EpisodeQuery)
         embedder = self.recollector.embedder if compares_words else None
         if embedder is None:
@@ -229,7 +232,7 @@ class Session:
         # One at a time: a rank learns the texts that it has not met.
         with self._ranking:
             if self._rank is None:
-                self._rank = VectorRank(self.diary.store.database, embedder)
+                self._rank = VectorRank(self.episodes.store.database, embedder)
             return find(query, rank=self._rank)
 
     async def warm_memory(self) -> None:
@@ -240,7 +243,7 @@ class Session:
         # Whoever ends the server does not wait for it.
         in_thread = partial(anyio.to_thread.run_sync, abandon_on_cancel=True)
         with suppress(MapspeakError):
-            if self.diary.is_kept:
+            if self.episodes.is_open:
                 await in_thread(self.keeper.finish_move)
             await in_thread(lambda: self.recollector.warm(self.memory.read()))
             world = await self.fetch_world_model()
@@ -251,7 +254,7 @@ class Session:
 
     async def keep_vectors(self) -> None:
         """Keep the vectors of remembered texts, so that a later session need not make them."""
-        if self.diary.is_kept:
+        if self.episodes.is_open:
             await self.compute(self.recollector.keep)
 
     async def keep_map(self) -> MapComparison | None:

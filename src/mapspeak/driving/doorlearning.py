@@ -34,10 +34,7 @@ def learn_from_drive(
     """Note the door at which a drive gave up, or end what was noted of one it came through.
 
     Args:
-        drive: The last that has ended.
-        store: Where events are remembered.
         revision: The map as it is after it: what that shows as closed needs no event.
-        now: The operator's time.
 
     Returns:
         What was written.

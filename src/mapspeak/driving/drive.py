@@ -38,10 +38,8 @@ class DriveBook:
     """Every drive of one robot, the latest last.
 
     Args:
-        robot: The robot.
         when_busy: What becomes of a drive while one of another client is under way.
         patience_s: Robot time without any movement after which a drive has timed out.
-        wall_s: Tells wall time.
     """
 
     def __init__(
@@ -113,10 +111,7 @@ class DriveBook:
         """Send a goal to the robot, or let it wait its turn.
 
         Args:
-            goal: Where to.
-            place: What it was called.
             ticket: From `preparing`.
-            client: Who asks.
             when_busy: What becomes of it while another drive is under way; by default a newer
                 drive of the same client replaces the older one.
 

@@ -4,8 +4,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import anyio
-
 from mapspeak.driving.drivereport import Drive, DriveReport
 from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.geometry import Pose, wrap_angle
@@ -20,14 +18,12 @@ SILENT_FOR_S = 10.0
 """Wall time without state or pose after which a drive counts as lost."""
 STEP_M = 0.05
 """A pose that has moved less may only have wavered."""
+STALE = (PoseDoubt.OLD_POSE, PoseDoubt.SILENT_POSE, PoseDoubt.CLOCK_STANDS)
+WAITS = GoalStatus(state=GoalState.PLANNED, cause=Cause(code=CauseCode.WAITING))
 
 
 class Odometer:
-    """Adds up how far a robot has come, by the stamps of its poses.
-
-    Attributes:
-        driven_m: So far; jumps are not driven.
-    """
+    """Adds up how far a robot has come, by the stamps of its poses; jumps are not driven."""
 
     def __init__(self) -> None:
         self.driven_m = 0.0
@@ -57,86 +53,6 @@ class Odometer:
         return None
 
 
-class DriveWatchdog:
-    """Watches one drive at a time; it only judges what it is told.
-
-    Args:
-        patience_s: Robot time without any movement after which a drive has timed out.
-        wall_s: Tells wall time.
-    """
-
-    def __init__(
-        self, *, patience_s: float, wall_s: Callable[[], float] = anyio.current_time
-    ) -> None:
-        self._patience_s = patience_s
-        self._wall_s = wall_s
-        self.begin(now_s=0.0)
-
-    def begin(self, *, now_s: float) -> None:
-        """Begin to watch a drive."""
-        self._moved_s = now_s
-        self._moved_at: Pose | None = None
-        self._heard_s: float | None = None
-        self._is_silent = False
-
-    def judge(
-        self, status: GoalStatus, here: StampedPose, *, jump_m: float | None, now_s: float
-    ) -> GoalStatus | None:
-        """Return how the drive has to end; None where it may go on.
-
-        Args:
-            status: How the drive stands.
-            here: Where the robot is.
-            jump_m: How far the pose jumped; None where it did not.
-            now_s: Robot time.
-        """
-        if self._is_silent:
-            # What happened in the silence is unknown: the robot may have moved all the time.
-            self._moved_at = None
-        self._heard_s, self._is_silent = self._wall_s() - here.silent_s, False
-        if jump_m is not None:
-            cause = Cause(code=CauseCode.POSE_JUMPED, distance_m=jump_m)
-            return GoalStatus(state=GoalState.LOST, cause=cause)
-        return self._judge_progress(status, here.pose, now_s)
-
-    def note_silence(self, error: LinkError) -> GoalStatus | None:
-        """Note that state or pose is missing; return how the drive ends when that lasts."""
-        now_s = self._wall_s()
-        self._heard_s = now_s if self._heard_s is None else self._heard_s
-        self._is_silent = True
-        silent_s = now_s - self._heard_s
-        if silent_s < SILENT_FOR_S:
-            return None
-        code = CauseCode.ROBOT_SILENT
-        cause = Cause(code=code, after_s=silent_s, quote=error.message)
-        return GoalStatus(state=GoalState.LOST, cause=cause)
-
-    def _judge_progress(self, status: GoalStatus, pose: Pose, now_s: float) -> GoalStatus | None:
-        at = self._moved_at
-        if at is None or _has_moved(at, pose) or now_s < self._moved_s:
-            self._moved_at, self._moved_s = pose, now_s
-        still_s = now_s - self._moved_s
-        if still_s < self._patience_s:
-            return None
-        has_begun = status.state is not GoalState.ACCEPTED
-        code = CauseCode.NOT_MOVED if has_begun else CauseCode.NOT_BEGUN
-        return GoalStatus(
-            state=GoalState.TIMED_OUT,
-            distance_left_m=status.distance_left_m,
-            n_recoveries=status.n_recoveries,
-            cause=Cause(code=code, after_s=still_s),
-        )
-
-
-def _has_moved(one: Pose, other: Pose) -> bool:
-    turned_rad = abs(wrap_angle(other.yaw_rad - one.yaw_rad))
-    return one.point.distance_to(other.point) > MOVED_M or turned_rad > TURNED_RAD
-
-
-STALE = (PoseDoubt.OLD_POSE, PoseDoubt.SILENT_POSE, PoseDoubt.CLOCK_STANDS)
-WAITS = GoalStatus(state=GoalState.PLANNED, cause=Cause(code=CauseCode.WAITING))
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Look:
     """What one look at a drive has shown.
@@ -155,7 +71,7 @@ class Look:
 
 
 class DriveMonitor:
-    """Looks at one robot; what it saw last is told while the robot is silent.
+    """Looks at one robot and watches its drive; what it saw last is told in a silence.
 
     Args:
         robot: The robot.
@@ -165,11 +81,12 @@ class DriveMonitor:
 
     def __init__(self, robot: Robot, *, patience_s: float, wall_s: Callable[[], float]) -> None:
         self._robot = robot
+        self._patience_s = patience_s
         self._wall_s = wall_s
-        self._watchdog = DriveWatchdog(patience_s=patience_s, wall_s=wall_s)
         self._odometer = Odometer()
         self._seen = StampedPose(Pose(0.0, 0.0), 0.0)
         self._seen_s = 0.0
+        self.begin()
 
     @property
     def here(self) -> Pose:
@@ -183,7 +100,10 @@ class DriveMonitor:
 
     def begin(self) -> None:
         """Begin to watch a drive that was just sent."""
-        self._watchdog.begin(now_s=self._robot.now_s)
+        self._moved_s = self._robot.now_s
+        self._moved_at: Pose | None = None
+        self._heard_s: float | None = None
+        self._is_silent = False
 
     async def find_robot(self) -> float | None:
         """Look where the robot is; return how far its pose jumped.
@@ -204,34 +124,6 @@ class DriveMonitor:
         except LinkError as error:
             return Look(status=status, doubt=doubt, error=error)
 
-    def knows_place(self, look: Look) -> bool:
-        """Return whether a look has shown where the robot is now."""
-        return look.error is None and self._seen.find_doubt(self._robot.now_s) not in STALE
-
-    def judge(self, look: Look) -> GoalStatus | None:
-        """Return how the drive under way has to end; None where it may go on."""
-        if look.error is not None:
-            return self._watchdog.note_silence(look.error)
-        return self._watchdog.judge(
-            look.status, self._seen, jump_m=look.jump_m, now_s=self._robot.now_s
-        )
-
-    def tell(self, drive: Drive, look: Look, *, is_stop_owed: bool) -> DriveReport:
-        """Return what is known of a drive after a look at it."""
-        now_s = self._robot.now_s
-        unseen_s = 0.0 if look.error is None else self._wall_s() - self._seen_s
-        return DriveReport(
-            drive=drive,
-            status=_end_of(drive, look.status),
-            pose=self._seen.pose,
-            pose_age_s=max(self._seen.measure_age_s(now_s), unseen_s),
-            pose_doubt=look.doubt or self._seen.find_doubt(now_s),
-            silence="" if look.error is None else look.error.message,
-            is_stop_owed=is_stop_owed,
-            # A simulation that is begun anew sets its clock back.
-            elapsed_s=max(now_s - drive.started_s, 0.0),
-        )
-
     async def _fetch_status(self, drive: Drive) -> GoalStatus:
         if drive.robot_goal_id is None:
             return drive.final or WAITS
@@ -242,7 +134,70 @@ class DriveMonitor:
                 raise
             return drive.final
 
+    def knows_place(self, look: Look) -> bool:
+        """Return whether a look has shown where the robot is now."""
+        return look.error is None and self._seen.find_doubt(self._robot.now_s) not in STALE
 
-def _end_of(drive: Drive, heard: GoalStatus) -> GoalStatus:
-    """Return how a drive stands: once it has ended as then, with what became of it since."""
-    return heard if drive.final is None else replace(drive.final, afterwards=heard.afterwards)
+    def judge(self, look: Look) -> GoalStatus | None:
+        """Return how the drive under way has to end; None where it may go on."""
+        if look.error is not None:
+            return self._judge_silence(look.error)
+        if self._is_silent:
+            # What happened in the silence is unknown: the robot may have moved all the time.
+            self._moved_at = None
+        self._heard_s, self._is_silent = self._wall_s() - self._seen.silent_s, False
+        if look.jump_m is not None:
+            cause = Cause(code=CauseCode.POSE_JUMPED, distance_m=look.jump_m)
+            return GoalStatus(state=GoalState.LOST, cause=cause)
+        return self._judge_progress(look.status)
+
+    def _judge_silence(self, error: LinkError) -> GoalStatus | None:
+        now_s = self._wall_s()
+        self._heard_s = now_s if self._heard_s is None else self._heard_s
+        self._is_silent = True
+        silent_s = now_s - self._heard_s
+        if silent_s < SILENT_FOR_S:
+            return None
+        code = CauseCode.ROBOT_SILENT
+        cause = Cause(code=code, after_s=silent_s, quote=error.message)
+        return GoalStatus(state=GoalState.LOST, cause=cause)
+
+    def _judge_progress(self, status: GoalStatus) -> GoalStatus | None:
+        at, now_s = self._moved_at, self._robot.now_s
+        if at is None or _has_moved(at, self.here) or now_s < self._moved_s:
+            self._moved_at, self._moved_s = self.here, now_s
+        still_s = now_s - self._moved_s
+        if still_s < self._patience_s:
+            return None
+        has_begun = status.state is not GoalState.ACCEPTED
+        code = CauseCode.NOT_MOVED if has_begun else CauseCode.NOT_BEGUN
+        return GoalStatus(
+            state=GoalState.TIMED_OUT,
+            distance_left_m=status.distance_left_m,
+            n_recoveries=status.n_recoveries,
+            cause=Cause(code=code, after_s=still_s),
+        )
+
+    def tell(self, drive: Drive, look: Look, *, is_stop_owed: bool) -> DriveReport:
+        """Return what is known of a drive after a look at it."""
+        now_s, status = self._robot.now_s, look.status
+        if drive.final is not None:
+            # Once it has ended as then, with what became of it since.
+            status = replace(drive.final, afterwards=status.afterwards)
+        unseen_s = 0.0 if look.error is None else self._wall_s() - self._seen_s
+        return DriveReport(
+            drive=drive,
+            status=status,
+            pose=self._seen.pose,
+            pose_age_s=max(self._seen.measure_age_s(now_s), unseen_s),
+            pose_doubt=look.doubt or self._seen.find_doubt(now_s),
+            silence="" if look.error is None else look.error.message,
+            is_stop_owed=is_stop_owed,
+            # A simulation that is begun anew sets its clock back.
+            elapsed_s=max(now_s - drive.started_s, 0.0),
+        )
+
+
+def _has_moved(one: Pose, other: Pose) -> bool:
+    turned_rad = abs(wrap_angle(other.yaw_rad - one.yaw_rad))
+    return one.point.distance_to(other.point) > MOVED_M or turned_rad > TURNED_RAD

@@ -23,10 +23,6 @@ class OwedStop:
 
     Attributes:
         goal_id: Of the drive it is owed for; None where nothing is owed.
-
-    Args:
-        robot: The robot.
-        wall_s: Tells wall time.
     """
 
     def __init__(self, robot: Robot, *, wall_s: Callable[[], float]) -> None:

@@ -34,12 +34,9 @@ class GoalCheck:
     """A goal judged against a map.
 
     Attributes:
-        verdict: The reason code.
-        goal: Where to stand.
         radius_m: The robot's, around its centre.
         clearance_m: From the goal to the nearest obstacle; 0 in one, off the map and where nobody
             knows.
-        path_m: By path from the robot; None where no way leads there.
         nearest: The nearest pose that would work, by ways from the goal that pass through no wall;
             None for a good goal, and where there is none.
         bounds: The corners of the map with the least and the greatest x and y; None where the goal
@@ -81,9 +78,7 @@ def check_goal(
     """Judge a goal before driving, and find the nearest pose that would work.
 
     Args:
-        grid: The map.
         distances: From the robot, on that map or on its floor without closed areas.
-        goal: Where to stand.
         opened: Gives the distances from a point on the map itself, where somebody keeps them; to
             say which closed area cuts a goal off.
     """

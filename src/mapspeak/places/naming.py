@@ -33,7 +33,6 @@ class Spot:
     """A place by its coordinates.
 
     Attributes:
-        point: Where it is.
         yaw_rad: The heading that was asked for; None where none was.
     """
 
@@ -50,7 +49,6 @@ class Place:
 
     Attributes:
         name: Its id, or the words that were used for it.
-        thing: What it is.
         reason: Why it is there, where words had to be read for it; else empty.
     """
 
@@ -76,7 +74,6 @@ class AmbiguousPlaceError(GoalError):
     """Words that mean several things.
 
     Attributes:
-        words: As they were said.
         meanings: Words for each of the things that mean it alone.
     """
 
@@ -259,8 +256,6 @@ def place_of(world: WorldModel, remembered: RememberedThing, *, name: str | None
     """Return a thing as a place, with where it is known to be and how well.
 
     Args:
-        world: The map.
-        remembered: The thing.
         name: The words that were used for it; its id where None.
     """
     thing = remembered.thing

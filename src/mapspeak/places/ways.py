@@ -18,8 +18,6 @@ class Way:
     """The way a robot would take from one place to another.
 
     Attributes:
-        start: Where it begins.
-        goal: Where it ends.
         end: The point it ends at: in a room, where the robot would stand.
         straight_m: As the crow flies, between the same two points as the path.
         path_m: By path; None where the robot cannot get through.

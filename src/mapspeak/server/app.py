@@ -260,7 +260,7 @@ def build_server(
     """
     is_read_only = is_read_only or (session.guard is not None and session.guard.policy.is_read_only)
     if is_read_only:
-        session.diary.close()
+        session.episodes.close()
     elif session.ros is not None:
         session.ros.advertise_early()
     known = build_toolsets(session, representation)

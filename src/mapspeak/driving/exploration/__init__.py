@@ -9,6 +9,7 @@ from mapspeak.driving.exploration.progress import (
     Progress,
 )
 from mapspeak.driving.exploration.trips import (
+    SLACK_S,
     OnTrip,
     Target,
     Trip,
@@ -20,6 +21,7 @@ from mapspeak.driving.exploration.trips import (
 )
 
 __all__ = [
+    "SLACK_S",
     "BlockedPlace",
     "BlockedPlaces",
     "BoundKind",

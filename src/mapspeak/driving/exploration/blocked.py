@@ -4,11 +4,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.robot import Cause, GoalState
-from mapspeak.spatial import UNKNOWN, OccupancyGrid
+from mapspeak.spatial import OccupancyGrid
+from mapspeak.spatial.grid import FloatArray, IntArray
 from mapspeak.spatial.paths import clearance_m
 
 
@@ -32,32 +32,9 @@ MOST_TRIES = 2
 MOST_KEPT = 50
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Patch:
-    """What the map showed around a place, at points of the world.
-
-    Attributes:
-        points: In metres, shape (n, 2).
-        kinds: 0 free, 1 occupied, -1 unknown, shape (n,).
-    """
-
-    points: NDArray[np.float64] = field(repr=False)
-    kinds: NDArray[np.int8] = field(repr=False)
-
-    def changed_ratio(self, grid: OccupancyGrid) -> float:
-        """Return the share of the points that the map shows as something else now."""
-        return float((_kinds_at(grid, self.points) != self.kinds).mean())
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TripEnd:
-    """Why a trip ended before its target.
-
-    Attributes:
-        goal_id: Its drive; None where the robot was not sent at all.
-        goal_state: How the drive ended; None likewise.
-        cause: Why; None where nobody said.
-    """
+    """Why a trip ended before its target."""
 
     goal_id: str | None = None
     goal_state: GoalState | None = None
@@ -70,20 +47,19 @@ class BlockedPlace:
 
     Attributes:
         id: What it was called when the robot was sent there.
-        pose: Where the robot was to stand.
-        end: Why it did not get there.
-        n_tries: How often it was sent there.
     """
 
     id: str
     pose: Pose
     end: TripEnd
-    n_tries: int = 1
-    _patches: tuple[_Patch, ...] = field(default=(), repr=False)
+    n_tries: int
+    _points: FloatArray = field(repr=False)
+    _kinds: IntArray = field(repr=False)
 
     def has_changed(self, grid: OccupancyGrid) -> bool:
         """Return True when the map now shows something else there, or where the robot got stuck."""
-        return any(patch.changed_ratio(grid) > CHANGED_RATIO for patch in self._patches)
+        is_other = _kinds_at(grid, self._points) != self._kinds
+        return bool((is_other.mean(axis=1) > CHANGED_RATIO).any())
 
 
 class BlockedPlaces:
@@ -101,19 +77,20 @@ class BlockedPlaces:
         """Note that a place could not be reached.
 
         Args:
-            place_id: Of the place.
-            pose: Where the robot was to stand.
             stuck: Where it gave up.
-            end: Why.
-            grid: The map of that moment.
         """
         earlier = self._find(pose.point)
         self.forget(pose.point)
-        patches = (_patch_around(grid, pose.point), _patch_around(grid, stuck))
-        n_tries = 1 if earlier is None else earlier.n_tries + 1
-        self._places.append(
-            BlockedPlace(id=place_id, pose=pose, end=end, n_tries=n_tries, _patches=patches)
+        points = np.stack([_points_around(pose.point), _points_around(stuck)])
+        place = BlockedPlace(
+            id=place_id,
+            pose=pose,
+            end=end,
+            n_tries=1 if earlier is None else earlier.n_tries + 1,
+            _points=points,
+            _kinds=_kinds_at(grid, points),
         )
+        self._places.append(place)
         del self._places[:-MOST_KEPT]
 
     def forget(self, point: Point) -> None:
@@ -139,20 +116,14 @@ def _is_near(place: BlockedPlace, point: Point) -> bool:
     return place.pose.point.distance_to(point) <= SAME_PLACE_M
 
 
-def _patch_around(grid: OccupancyGrid, centre: Point) -> _Patch:
+def _points_around(centre: Point) -> FloatArray:
     steps = np.arange(-AROUND_M, AROUND_M + EVERY_M / 2, EVERY_M)
-    off_x, off_y = (each.ravel() for each in np.meshgrid(steps, steps))
-    is_round = np.hypot(off_x, off_y) <= AROUND_M
-    points = np.stack([centre.x + off_x[is_round], centre.y + off_y[is_round]], axis=1)
-    return _Patch(points, _kinds_at(grid, points))
+    offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    is_round = np.hypot(*offsets.T) <= AROUND_M
+    return np.asarray(np.array([centre.x, centre.y]) + offsets[is_round])
 
 
-def _kinds_at(grid: OccupancyGrid, points: NDArray[np.float64]) -> NDArray[np.int8]:
-    rows, cols = grid.cells_at(points)
-    is_inside = grid.contains_cells(rows, cols)
-    kinds = np.full(len(points), UNKNOWN, dtype=np.int8)
-    rows, cols = rows[is_inside], cols[is_inside]
-    kinds[is_inside] = np.where(
-        grid.free[rows, cols], 0, np.where(grid.unknown[rows, cols], UNKNOWN, 1)
-    )
-    return kinds
+def _kinds_at(grid: OccupancyGrid, points: FloatArray) -> IntArray:
+    """Return what the map shows at points: 1 free, 0 occupied, -1 unknown."""
+    free = grid.look_up(grid.free, points, outside=False).astype(np.intp)
+    return free - grid.look_up(grid.unknown, points, outside=True)

@@ -3,8 +3,6 @@
 import math
 from collections.abc import Callable, Sequence
 
-import anyio
-
 from mapspeak.driving.exploration.blocked import BlockedPlace, has_room_at
 from mapspeak.driving.exploration.progress import (
     BoundKind,
@@ -17,14 +15,18 @@ from mapspeak.driving.exploration.progress import (
     known_area_m2,
     known_ratio,
 )
-from mapspeak.driving.exploration.trips import OnTrip, Target, TripContext, Trips, TripState
-from mapspeak.errors import PolicyError
+from mapspeak.driving.exploration.trips import (
+    SLACK_S,
+    OnTrip,
+    Target,
+    TripContext,
+    Trips,
+    TripState,
+)
 from mapspeak.geometry import Point
 from mapspeak.spatial.frontiers import Frontier, remaining_ratio
 from mapspeak.worldmodel.model import WorldModel
 
-RETHINK_S = 1.0
-"""The map is looked at so often on the way."""
 SEEN_RATIO = 0.3
 """Less than this of what a frontier promised is left: it has been seen from afar.
 
@@ -35,7 +37,6 @@ PAUSE_M = 3.0
 """As the crow flies from the last pause; nearer to it there is not much else to be looked at."""
 BESIDE_M = 1.5
 """A border with the unknown that is this near to a blocked place is what was to be seen there."""
-SLACK_S = 0.01
 
 Pick = Callable[[Sequence[Frontier], WorldModel], Frontier]
 """Chooses one of several frontiers, which come best first."""
@@ -50,7 +51,6 @@ class Explorer:
     """One robot's exploration; it advances only while a call waits.
 
     Args:
-        site: The robot, its drives and its map.
         pick: Chooses among frontiers; the first of the ranking unless told otherwise.
     """
 
@@ -78,27 +78,16 @@ class Explorer:
         Args:
             bounds: Where to end; None for those of the exploration that is going on.
             wait_s: Robot time after which to answer, with the robot still under way.
-            on_trip: Told about the drive, about every second.
-            client: Who asks for it.
 
         Raises:
             PolicyError: The robot must not drive now, wherever to; it comes to a stand.
         """
         if not self.is_going_on:
-            self._begin()
+            self._trips.begin_count()
+            self._paused_at, self._elapsed_s, self._bounds = None, 0.0, Bounds()
         self._bounds = bounds or self._bounds
-        try:
+        async with self._trips.given_up_with_call():
             return await self._advance(wait_s, on_trip, client)
-        except (anyio.get_cancelled_exc_class(), PolicyError):
-            with anyio.CancelScope(shield=True):
-                await self._trips.give_up()
-            raise
-
-    def _begin(self) -> None:
-        self._trips.begin_count()
-        self._paused_at = None
-        self._elapsed_s = 0.0
-        self._bounds = Bounds()
 
     async def _advance(self, wait_s: float, on_trip: OnTrip, client: str) -> Progress:
         begun_s, before_s = self._site.robot.now_s, self._elapsed_s
@@ -114,10 +103,9 @@ class Explorer:
                 state = await self._choose(world, ticket, client)
             if state is None:
                 return await self._end(world, judge_end(world, self._blocked(world)))
-            left_s = wait_s - (self._site.robot.now_s - begun_s)
-            if state is TripState.UNDER_WAY and left_s > SLACK_S:
+            if state is TripState.UNDER_WAY:
                 state = await self._trips.follow(
-                    wait_s=min(RETHINK_S, left_s), grid=world.grid, on_trip=on_trip
+                    until_s=begun_s + wait_s, grid=world.grid, on_trip=on_trip
                 )
             spent_s = self._site.robot.now_s - begun_s
             self._elapsed_s = before_s + spent_s

@@ -54,7 +54,6 @@ class Bounds:
     """Where an exploration ends, whatever is left.
 
     Attributes:
-        n_goals: So many frontiers to drive to.
         duration_s: So much robot time in calls.
         known_ratio: So much of the floor that is to be expected.
         stops_at_goals: It pauses wherever the robot arrives, and where it sees from afar what it
@@ -72,27 +71,14 @@ class Progress:
     """How an exploration stands.
 
     Attributes:
-        state: See `ExplorationState`.
-        bounds: Where it was to end.
         bound: The one that was reached, if one was.
         seen_id: The frontier seen from here, where it pauses for that.
         trip_end: What interrupted it; None where that is not known.
-        n_goals: Frontiers the robot was sent to since the exploration began.
-        n_arrived: How many of them it has come to.
         n_seen: How many it left on the way, since what they were for had been seen from afar.
-        n_blocked: How many it could not get to.
-        driven_m: How far it has driven meanwhile, by its own poses.
         elapsed_s: Robot time of all calls.
-        known_area_m2: Free floor on the map.
         known_ratio: Of the free floor that is to be expected in all.
         frontiers: Where one could still go, best first.
-        trip: The drive under way.
-        pose: Where the robot is.
         pose_doubt: Why it may be elsewhere.
-        unreachable: Borders with the unknown that the robot cannot get to.
-        blocked: Places that it was sent to in vain.
-        not_worth: Borders with the unknown that are not worth a drive.
-        closed: Areas that no way leads through now.
     """
 
     state: ExplorationState

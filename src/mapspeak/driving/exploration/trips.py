@@ -1,7 +1,8 @@
 """Trips: drives to one target after the other that may be given up on the way for a better one."""
 
 import math
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncGenerator, Awaitable, Callable
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol, TypeVar
@@ -11,7 +12,7 @@ import anyio
 from mapspeak.driving.drive import DriveBook, OnProgress
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.exploration.blocked import BlockedPlace, BlockedPlaces, TripEnd
-from mapspeak.errors import GoalError
+from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.robot import Cause, CauseCode, GoalState, Robot
 from mapspeak.spatial import OccupancyGrid
@@ -19,6 +20,9 @@ from mapspeak.spatial.frontiers import Frontier
 from mapspeak.worldmodel.model import WorldModel
 
 T = TypeVar("T")
+RETHINK_S = 1.0
+"""The map is looked at so often on the way."""
+SLACK_S = 0.01
 
 
 class TripContext(Protocol):
@@ -48,13 +52,6 @@ async def turn_to(
 ) -> DriveReport:
     """Turn the robot where it stands, and return how that went.
 
-    Args:
-        site: The robot and its drives.
-        yaw_rad: The heading to end with.
-        wait_s: Robot time to wait for it.
-        on_progress: Told about the turn.
-        client: Who asks for it.
-
     Raises:
         GoalError: The robot was stopped meanwhile.
         LinkError: The robot cannot be reached.
@@ -82,7 +79,6 @@ class Target:
 
     Attributes:
         id: F3, W2, or the words for a place that has no id.
-        pose: Where to stand.
         frontier: The frontier to look over; None where it is none.
         earlier: The try before, where the place was blocked then.
     """
@@ -95,12 +91,7 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Trip:
-    """A target that the robot is on its way to.
-
-    Attributes:
-        target: Where to.
-        goal_id: Its drive in the drive book.
-    """
+    """A target that the robot is on its way to."""
 
     target: Target
     goal_id: str
@@ -120,11 +111,7 @@ class Trips:
 
     Attributes:
         current: The trip under way; None between two.
-        blocked: Places that could not be reached.
-        n_begun: How many trips there were.
-        n_arrived: How many of them ended where they led to.
         n_seen: How many were left on the way, since what they were for had been seen from afar.
-        n_blocked: How many could not be driven to their end.
         end: Why the latest trip ended before its target; None when it did not.
     """
 
@@ -152,10 +139,7 @@ class Trips:
         """Send the robot to a target; one it was on the way to is given up.
 
         Args:
-            target: Where to.
             ticket: Of the drive book, from before the target was chosen.
-            client: Who asks for it.
-            grid: The map by which it was chosen.
 
         Raises:
             PolicyError: The robot must not drive now, wherever to.
@@ -171,27 +155,35 @@ class Trips:
         self.n_begun += 1
         return TripState.UNDER_WAY
 
-    async def follow(self, *, wait_s: float, grid: OccupancyGrid, on_trip: OnTrip) -> TripState:
-        """Wait for the trip under way, so much robot time at most, and say how it stands.
+    async def follow(self, *, until_s: float, grid: OccupancyGrid, on_trip: OnTrip) -> TripState:
+        """Wait until it is time to think again of the trip under way, and say how it stands.
 
         Args:
-            wait_s: At most, in robot time.
+            until_s: Robot time at which to answer in any case.
             grid: The map of that moment; a place that proves blocked is remembered with it.
-            on_trip: Told about the drive.
         """
         trip = self.current
         if trip is None:
             return TripState.INTERRUPTED
+        wait_s = min(RETHINK_S, until_s - self._site.robot.now_s)
+        if wait_s <= SLACK_S:
+            return TripState.UNDER_WAY
         report = await self._site.drives.wait(trip.goal_id, wait_s=wait_s, on_progress=_tell_nobody)
         await on_trip(report)
         return self._take_in(trip, report, grid)
 
-    async def give_up(self, *, is_seen: bool = False) -> None:
-        """Bring the robot to a stand, where it is on a trip.
+    @asynccontextmanager
+    async def given_up_with_call(self) -> AsyncGenerator[None]:
+        """Bring the robot to a stand where who waits gives up, or the policy forbids to drive."""
+        try:
+            yield
+        except (anyio.get_cancelled_exc_class(), PolicyError):
+            with anyio.CancelScope(shield=True):
+                await self.give_up()
+            raise
 
-        Args:
-            is_seen: What the trip was for has been seen from afar.
-        """
+    async def give_up(self, *, is_seen: bool = False) -> None:
+        """Bring the robot to a stand, where it is on a trip."""
         trip, self.current = self.current, None
         if trip is not None:
             self.n_seen += is_seen

@@ -67,11 +67,7 @@ class RouteProgress:
 
 
 class RouteBook:
-    """The route of one robot, if it has one.
-
-    Args:
-        site: The robot, its drives and its map.
-    """
+    """The route of one robot, if it has one."""
 
     def __init__(self, site: TripContext) -> None:
         self._site = site
@@ -86,8 +82,6 @@ class RouteBook:
         """Plan a route that takes the place of the one before.
 
         Args:
-            stops: In their order.
-            pause_s: Robot time to stand at each.
             is_looking: A call ends at each stop, so that somebody can look.
 
         Raises:
@@ -110,8 +104,6 @@ class RouteBook:
         Args:
             wait_s: Robot time after which to answer, with the robot still under way.
             when_blocked: What to do about a stop that cannot be reached.
-            on_progress: Told about the drive, about every second.
-            client: Who asks for it.
 
         Raises:
             GoalError: There is no route, or the robot was stopped while a goal was being checked.

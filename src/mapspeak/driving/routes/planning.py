@@ -99,9 +99,6 @@ class RouteStop:
     """One stop of a route.
 
     Attributes:
-        asked: The words for it.
-        goal: What it is taken for.
-        n_candidates: Among how many.
         leg_m: The path to it from the stop before, the first from the robot, as planned.
         obstacle: Why it was left out, or could not be reached yet: the check of its pose, or how
             the drive there ended.
@@ -120,7 +117,6 @@ class RoutePlan:
     """A route as a whole.
 
     Attributes:
-        stops: In their order.
         greedy_m: The whole length if the nearest candidate were taken each time.
     """
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapspeak.driving.search.evidence import Opinions, weight_of
 from mapspeak.driving.search.seenfloor import REACH_M, SeenFloor
@@ -16,6 +15,7 @@ from mapspeak.memory.search import Verdict
 from mapspeak.places.naming import Place
 from mapspeak.places.relations.choosing import check_place
 from mapspeak.spatial.frontiers import Frontier
+from mapspeak.spatial.grid import FloatArray, Mask
 from mapspeak.spatial.visibility import cast_rays
 from mapspeak.worldmodel.model import WorldModel
 from mapspeak.worldmodel.recollection import RememberedPlace
@@ -39,9 +39,6 @@ LEAST_SAID_RATIO = 0.5
 """Of the words for the thing, a record says at least so much that speaks of it."""
 MOST_REMEMBERED = 12
 
-FloatArray = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
 
 class CandidateKind(StrEnum):
     """What makes a place worth a look."""
@@ -57,14 +54,10 @@ class SearchCandidate:
     """A place to look for the thing from.
 
     Attributes:
-        kind: What makes it worth a look.
         id: W2, T1, P5 or F3; for unseen floor its coordinates.
-        pose: Where to stand and where to look.
         area_m2: Floor that is to come into view for the first time, as far as can be told.
-        path_m: From the robot.
         score: How likely the thing is there, 0.5 where nobody knows.
         rate: What speaks for it: square metres by their likelihood, for each metre of way.
-        frontier: The frontier it is; None where it is none.
         name: What something remembered, or a picture, is known by during the search.
     """
 
@@ -93,10 +86,6 @@ def find_candidates(
     After that come earlier pictures in which the robot's own detector reported such a thing.
 
     Args:
-        world: The map.
-        thing: What is looked for.
-        seen: What was looked at already.
-        opinions: What the model thinks.
         visited: The names of candidates of what is remembered that were looked at already.
         pictures: Those earlier pictures, in the order in which to go there.
     """
@@ -157,16 +146,7 @@ def _remembered(world: WorldModel, place: Place) -> SearchCandidate | None:
     path_m = None if pose is None else world.path_m(pose.point)
     if pose is None or path_m is None:
         return None
-    return SearchCandidate(
-        kind=CandidateKind.REMEMBERED,
-        id=place.name,
-        pose=pose,
-        area_m2=0.0,
-        path_m=path_m,
-        score=1.0,
-        rate=math.inf,
-        name=_key(place),
-    )
+    return _certain(CandidateKind.REMEMBERED, place.name, pose, path_m, name=_key(place))
 
 
 def _pictured(world: WorldModel, picture: TakenPicture) -> SearchCandidate | None:
@@ -174,15 +154,23 @@ def _pictured(world: WorldModel, picture: TakenPicture) -> SearchCandidate | Non
     path_m = world.path_m(picture.pose.point)
     if path_m is None:
         return None
+    kind = CandidateKind.PICTURED
+    return _certain(kind, picture.id, picture.pose, path_m, name=picture.id)
+
+
+def _certain(
+    kind: CandidateKind, candidate_id: str, pose: Pose, path_m: float, *, name: str
+) -> SearchCandidate:
+    """Return a candidate that comes before all that are only likely."""
     return SearchCandidate(
-        kind=CandidateKind.PICTURED,
-        id=picture.id,
-        pose=picture.pose,
+        kind=kind,
+        id=candidate_id,
+        pose=pose,
         area_m2=0.0,
         path_m=path_m,
         score=1.0,
         rate=math.inf,
-        name=picture.id,
+        name=name,
     )
 
 

@@ -93,7 +93,6 @@ def read_earlier(
 
     Args:
         pictures: The oldest first.
-        thing: What will be looked for.
         judged: Looks of an earlier search for the same thing, in which a model saw none.
     """
     taken = list(pictures)
@@ -166,7 +165,6 @@ class Opinions:
     def __init__(self) -> None:
         self._by_id: dict[str, float] = {}
         self._views: list[_ViewOpinion] = []
-        self._company: list[_ViewOpinion] = []
 
     @property
     def speaks_of_rooms(self) -> bool:
@@ -183,10 +181,11 @@ class Opinions:
 
     def add_company(self, point: Point, score: float) -> bool:
         """Take in how likely the thing is near another one; return False where that is no news."""
-        for known in self._company:
-            if known.score == score and known.point.distance_to(point) <= COMPANY_APART_M:
+        for known in self._views:
+            is_alike = known.strength == COMPANY_STRENGTH and known.score == score
+            if is_alike and known.point.distance_to(point) <= COMPANY_APART_M:
                 return False
-        self._company.append(_ViewOpinion(point, score, COMPANY_STRENGTH))
+        self._views.append(_ViewOpinion(point, score, COMPANY_STRENGTH))
         return True
 
     def score_at(self, point: Point, *, ids: tuple[str, ...]) -> float:
@@ -195,7 +194,7 @@ class Opinions:
             if place_id in self._by_id:
                 return self._by_id[place_id]
         total, n = NEUTRAL, 1.0
-        for view in (*self._views, *self._company):
+        for view in self._views:
             nearness = max(1.0 - view.point.distance_to(point) / REACH_M, 0.0)
             weight = view.strength * nearness
             total, n = total + weight * view.score, n + weight

@@ -4,10 +4,10 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-import anyio
 import numpy as np
 
 from mapspeak.driving.exploration import (
+    SLACK_S,
     OnTrip,
     Target,
     TripContext,
@@ -37,14 +37,12 @@ from mapspeak.driving.search.standing import (
     SearchState,
     find_seen_regions,
 )
-from mapspeak.errors import PolicyError
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory import TakenPicture, name_key
 from mapspeak.robot import CameraPicture, Detection
 from mapspeak.spatial.frontiers import remaining_ratio
 from mapspeak.worldmodel.model import WorldModel
 
-RETHINK_S = 1.0
 LEFT_RATIO = 0.3
 """Less than this of what a place had to show is left: it was seen on the way."""
 BETTER_RATIO = 1.5
@@ -58,7 +56,6 @@ MOST_NEXT = 6
 UNKNOWN_RANGE_M = 3.0
 DISMISSED_M = 1.5
 """What the detector reports this near to something that was none is none either."""
-SLACK_S = 0.01
 
 Choose = Callable[[Sequence[SearchCandidate]], SearchCandidate | None]
 """Chooses one of several places to look from, which come best first; None for none of them."""
@@ -71,7 +68,6 @@ class Judgement:
     Attributes:
         is_seen: The thing is in the last picture; None where it does not say.
         likely: How likely the thing is near what the last picture shows, from 0 to 1.
-        scores: How likely it is at places, by their ids.
     """
 
     is_seen: bool | None = None
@@ -88,7 +84,6 @@ class Searcher:
     """One search after the other; each advances only while a call waits.
 
     Args:
-        site: The robot, its drives and its map.
         choose: Chooses where to look next; the best unless told otherwise.
     """
 
@@ -145,11 +140,7 @@ class Searcher:
 
         Args:
             thing: What to look for; another one than before begins a new search.
-            judgement: What the model says of the last picture and of places.
-            budget: What the search may cost in all.
             wait_s: Robot time after which to answer, with the robot still under way.
-            on_trip: Told about the drive, about every second.
-            client: Who asks for it.
             earlier: The pictures so far, the oldest first; a new search begins from them.
 
         Raises:
@@ -161,12 +152,8 @@ class Searcher:
             seen_before = self._judged.get(key, ())
             self._begin(thing, read_earlier(earlier, thing, judged=seen_before))
         self._take_in(judgement)
-        try:
+        async with self._trips.given_up_with_call():
             return await self._advance(judgement, budget, wait_s, on_trip, client)
-        except (anyio.get_cancelled_exc_class(), PolicyError):
-            with anyio.CancelScope(shield=True):
-                await self._trips.give_up()
-            raise
 
     def _take_in(self, judgement: Judgement) -> None:
         if judgement.is_seen is False and self._reported is not None:
@@ -202,11 +189,8 @@ class Searcher:
                 await self._trips.give_up()
                 return SearchState.BUDGET_SPENT
             state = await self._set_out(world, ticket, client)
-        left_s = deadline_s - self._site.robot.now_s
-        if state is TripState.UNDER_WAY and left_s > SLACK_S:
-            state = await self._trips.follow(
-                wait_s=min(RETHINK_S, left_s), grid=world.grid, on_trip=on_trip
-            )
+        if state is TripState.UNDER_WAY:
+            state = await self._trips.follow(until_s=deadline_s, grid=world.grid, on_trip=on_trip)
         match state:
             case None:
                 return SearchState.NOT_FOUND

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,16 +20,9 @@ SAME_PLACE_M = 0.1
 SAME_HEADING_RAD = math.radians(2)
 
 
-@dataclass(frozen=True, slots=True)
-class _View:
-    pose: Pose
-    half_rad: float
-
-    def is_like(self, other: "_View") -> bool:
-        """Return True when there is no need to remember both."""
-        turn_rad = abs(wrap_angle(self.pose.yaw_rad - other.pose.yaw_rad))
-        is_near = self.pose.point.distance_to(other.pose.point) <= SAME_PLACE_M
-        return is_near and turn_rad <= SAME_HEADING_RAD
+def _is_like(one: Pose, other: Pose, near_m: float, turn_rad: float) -> bool:
+    is_near = one.point.distance_to(other.point) <= near_m
+    return is_near and abs(wrap_angle(one.yaw_rad - other.yaw_rad)) <= turn_rad
 
 
 class SeenFloor:
@@ -46,27 +38,21 @@ class SeenFloor:
 
     def __init__(self, *, earlier: Iterable[tuple[Pose, float | None]] = ()) -> None:
         self.half_view_rad = HALF_VIEW_RAD
-        self._views: list[_View] = []
+        self._views: list[tuple[Pose, float]] = []
         self._looks: list[Pose] = []
-        self._earlier: list[_View] = []
-        for pose, fov_rad in earlier:
-            self._earlier.append(self._view(pose, fov_rad))
+        self._earlier = [(pose, self._half_view(fov_rad)) for pose, fov_rad in earlier]
 
     def add(self, pose: Pose, fov_rad: float | None) -> None:
-        """Note a look; one like an earlier one adds nothing.
+        """Note a look by the camera's pose and opening; one like an earlier one adds nothing."""
+        half_rad = self._half_view(fov_rad)
+        known = (each for each, _ in self._views)
+        if not any(_is_like(pose, each, SAME_PLACE_M, SAME_HEADING_RAD) for each in known):
+            self._views.append((pose, half_rad))
 
-        Args:
-            pose: Of the camera, in the map frame.
-            fov_rad: Its opening; None where the robot does not say.
-        """
-        view = self._view(pose, fov_rad)
-        if not any(view.is_like(other) for other in self._views):
-            self._views.append(view)
-
-    def _view(self, pose: Pose, fov_rad: float | None) -> _View:
+    def _half_view(self, fov_rad: float | None) -> float:
         if fov_rad is not None:
             self.half_view_rad = fov_rad / 2
-        return _View(pose, self.half_view_rad)
+        return self.half_view_rad
 
     @property
     def n_earlier(self) -> int:
@@ -79,19 +65,10 @@ class SeenFloor:
 
     def has_look_from(self, pose: Pose) -> bool:
         """Return True when somebody was shown what is to be seen in a pose."""
-        return any(
-            look.point.distance_to(pose.point) <= LOOKED_NEAR_M
-            and abs(wrap_angle(look.yaw_rad - pose.yaw_rad)) <= LOOKED_RAD
-            for look in self._looks
-        )
+        return any(_is_like(look, pose, LOOKED_NEAR_M, LOOKED_RAD) for look in self._looks)
 
     def add_look(self, pose: Pose, fov_rad: float | None) -> None:
-        """Note a picture that somebody was shown.
-
-        Args:
-            pose: Of the camera, in the map frame.
-            fov_rad: Its opening; None where the robot does not say.
-        """
+        """Note a picture that somebody was shown."""
         self._looks.append(pose)
         self.add(pose, fov_rad)
 
@@ -99,24 +76,22 @@ class SeenFloor:
         """Return the free cells of a map that were looked at from near, as a mask.
 
         Args:
-            grid: The map.
             around: Only what can be seen from near here matters; None where all does.
         """
         seen = np.zeros(grid.cells.shape, dtype=np.bool_)
-        for view in (*self._views, *self._earlier):
-            if around is not None and view.pose.point.distance_to(around) > 2 * REACH_M:
-                continue
-            seen.flat[_cells_in_view(grid, view)] = True
+        for pose, half_rad in (*self._views, *self._earlier):
+            if around is None or pose.point.distance_to(around) <= 2 * REACH_M:
+                seen.flat[_cells_in_view(grid, pose, half_rad)] = True
         return seen
 
 
-def _cells_in_view(grid: OccupancyGrid, view: _View) -> IntArray:
+def _cells_in_view(grid: OccupancyGrid, pose: Pose, half_rad: float) -> IntArray:
     """Return flat indices of the free cells that a look shows."""
     # Where rays are furthest apart they are still nearer to each other than cells are.
-    n_rays = math.ceil(2 * view.half_rad * REACH_M / grid.resolution_m * 1.2)
-    angles = view.pose.yaw_rad + np.linspace(-view.half_rad, view.half_rad, n_rays)
+    n_rays = math.ceil(2 * half_rad * REACH_M / grid.resolution_m * 1.2)
+    angles = pose.yaw_rad + np.linspace(-half_rad, half_rad, n_rays)
     steps_m = np.arange(0.0, REACH_M, grid.resolution_m * 0.9)
-    place = np.array([[view.pose.x, view.pose.y]])
+    place = np.array([[pose.x, pose.y]])
     rays = cast_rays(
         grid.cells.shape,
         grid.fractional_cells_at(place),

@@ -45,12 +45,7 @@ class BudgetKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Budget:
-    """What a search may cost.
-
-    Attributes:
-        n_looks: Pictures.
-        driven_m: Metres.
-    """
+    """What a search may cost."""
 
     n_looks: int | None = None
     driven_m: float | None = None
@@ -58,12 +53,7 @@ class Budget:
 
 @dataclass(frozen=True, slots=True)
 class SeenRegion:
-    """A room or corridor, and how much of its floor the camera has looked at.
-
-    Attributes:
-        id: Of the region.
-        seen_ratio: Of its free floor.
-    """
+    """A room or corridor, and how much of its floor the camera has looked at."""
 
     id: str
     seen_ratio: float
@@ -74,24 +64,15 @@ class SearchProgress:
     """How a search stands.
 
     Attributes:
-        state: See `SearchState`.
-        budget: What it may cost.
         spent: The part of the budget that is spent, if one is.
         label: What the robot's detector reports here; None where it reports nothing.
         trip_end: What interrupted it; None where that is not known.
         earlier: The pictures it begins from, in its first answer only.
         looks_anew: What only earlier pictures showed is looked at again, from this answer on.
-        thing: What is looked for.
-        n_looks: Pictures shown so far.
         n_earlier: Pictures from before that count as looked at.
-        driven_m: Metres driven so far.
         here: What the robot looks at now, or is on the way to; None for neither.
-        goal_id: Of the drive under way.
         next: What comes after that, best first.
         regions: What the camera has seen of each room and corridor, in the end; none before.
-        seen_ratio: Of all free floor that is known.
-        blocked: Places that the robot could not get to.
-        pose: Where the robot is.
         pose_doubt: Why it may be elsewhere.
     """
 

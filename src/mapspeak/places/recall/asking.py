@@ -29,10 +29,8 @@ class RecallQuery:
     Attributes:
         words: What people say: a name, a thing, what it is for, what is the matter.
         near: Not farther than `near_m` from this point, straight.
-        room_id: In this room or corridor.
         since: Last seen at this moment or later.
         until: Last seen before.
-        n: How many candidates, at most.
     """
 
     words: str
@@ -58,7 +56,6 @@ class RecallCandidate:
         position: Where it is; None where nobody noted a direction.
         uncertainty_m: The radius around that which holds it with 90 %; None without a position,
             and for a place.
-        room_ids: The rooms it may be in.
         pose: Where the robot would stand: of a thing, near it and facing it where it can.
         is_faced: True when it would stand near it and face it.
         faced_ratio: The share of where a thing may be that it would face there.
@@ -106,7 +103,6 @@ class Recall:
         candidates: The likeliest first; of equally likely ones the nearest by path. Where nothing
             is remembered they are the nearest in meaning, and probably none is meant.
         n_searched: How many places and things pass the filters.
-        is_empty: Nothing is remembered at all.
         doubt: Why the first candidate may still be wrong; None where nothing speaks for that.
     """
 
@@ -212,14 +208,7 @@ def describe_candidate(
     match: EntryCandidate | None = None,
     near: Point | None = None,
 ) -> RecallCandidate:
-    """Return what is known of a place or thing, and the pose in which a robot would stand for it.
-
-    Args:
-        world: The map with the memory.
-        remembered: The place or thing.
-        match: How it matches a request; None where nothing was asked.
-        near: The point that the request is near to.
-    """
+    """Return what is known of a place or thing, and how a robot would stand for it."""
     position: Point | None
     if isinstance(remembered, RememberedPlace):
         waypoint = remembered.waypoint
@@ -345,8 +334,6 @@ def _rank(
     are no nearer.
 
     Args:
-        world: The map with the memory.
-        found: The candidates.
         passing: What they stand for, by id.
         best: The id of the one that comes first whatever its likeness and way.
         is_tied: Several are called what was asked for.

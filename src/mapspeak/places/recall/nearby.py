@@ -35,10 +35,7 @@ def find_nearby(
     """Find the thing that is called so, and what is near to it; None where nothing is.
 
     Args:
-        world: The map with the memory.
         words: "T3", "potted plant", or "potted plant in R3".
-        radius_m: Only what is so near.
-        room_id: Only what is in that room.
 
     Raises:
         GoalError: The words are the id of no thing.

@@ -53,15 +53,7 @@ def note_event(
     """Remember an event, with the outline that its place has now; return it as it was written.
 
     Args:
-        world: The map as it is now.
-        store: Where to write.
-        text: What is the matter.
-        effect: What it means for ways.
-        now: The operator's time.
         place: An id, a name, coordinates, or words as for a goal; a mere note needs none.
-        begins: The first moment; None for now.
-        until: The first moment after; None where nobody knows.
-        source: Who said it.
 
     Raises:
         GoalError: There is no such place.
@@ -105,8 +97,6 @@ def say_consequences(world: WorldModel, event: Event, now: datetime) -> tuple[st
 
     Args:
         world: The map before the event.
-        event: As it was written.
-        now: The operator's time.
     """
     if event.effect is not Effect.CLOSED:
         return ()

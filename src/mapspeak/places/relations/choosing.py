@@ -53,9 +53,6 @@ class CheckedGoal:
     """A pose to drive to, judged against the map.
 
     Attributes:
-        place: What is meant.
-        pose: Where to stand.
-        check: What is to be said of it.
         comes_straight_on: Nobody asked for a heading: it is that of the way from the robot.
     """
 

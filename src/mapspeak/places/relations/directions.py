@@ -189,9 +189,6 @@ def _search(
     """Find the place nearest to what is aimed at, and how far from the thing it is.
 
     Args:
-        world: The map.
-        thing: What it is to be on a side of.
-        aim: Where to look.
         is_asked: Somebody said how far.
     """
     along = np.array([math.cos(aim.heading_rad), math.sin(aim.heading_rad)])

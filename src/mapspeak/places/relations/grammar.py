@@ -113,8 +113,6 @@ class Towards:
 
     Attributes:
         direction: One of its sides, or of the map.
-        of: The thing.
-        away_m: How far; None where nobody said.
         seen_from: From where its sides are meant; None for its own front, or the robot.
     """
 
@@ -160,7 +158,6 @@ class Between:
 
     Attributes:
         ways: In which the words can be divided into two, the likeliest first.
-        of: All of the words.
     """
 
     ways: tuple[tuple[str, str], ...]
@@ -187,8 +184,6 @@ class WallSide:
     """A place at a wall of a room.
 
     Attributes:
-        of: The room.
-        compass: Which wall; None for the nearest one.
         is_along: Heading along it, not looking at it.
     """
 

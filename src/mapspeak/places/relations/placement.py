@@ -79,8 +79,6 @@ class Footing:
         Roomy ones aside from doors go first, then tight ones, then those in doors.
 
         Args:
-            world: The map.
-            allowed: True for the cells that would do.
             costs: Of each cell; the first of equal ones wins.
             in_sight_of: What nothing may stand before.
         """

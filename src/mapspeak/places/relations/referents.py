@@ -43,12 +43,8 @@ class Referent:
     """A thing as relations see it; compared by identity.
 
     Attributes:
-        name: How the answer calls it.
-        anchor: Its middle.
         extent: Points over all of it, in metres, shape (n, 2).
         home: The region to stand in beside it; None where any will do.
-        region: What it is, if a region.
-        door: What it is, if a door.
         front_rad: Where its own front looks; None where it has none.
     """
 

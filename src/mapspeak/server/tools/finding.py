@@ -70,7 +70,7 @@ class FindTools:
             if now is None:
                 return report
             seen = say_reported(
-                session.diary.store, answer, wanted, map_id=session.memory.map_id, now=now
+                session.episodes.store, answer, wanted, map_id=session.memory.map_id, now=now
             )
             advice = f"{report.advice} {seen}".rstrip()
             return report.model_copy(update={"advice": advice})

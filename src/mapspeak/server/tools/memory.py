@@ -266,13 +266,17 @@ class MemoryTools:
     def _keep_note(self, world: WorldModel, text: str) -> str:
         """Keep an event as an episode too; return why it could not, else nothing."""
         here = world.robot
-        keeping = self._session.diary.keep_note(
-            text, pose=here, room_id=world.find_room_id(here.point), map_id=world.memory.map_id
+        keeping = self._session.episodes.keep(
+            ObservationKind.NOTE,
+            text=text,
+            pose=here,
+            room_id=world.find_room_id(here.point),
+            map_id=world.memory.map_id,
         )
         return keeping.fault
 
     async def _show(self, observation_id: str) -> list[str | Image]:
-        store = self._session.diary.store
+        store = self._session.episodes.store
         seen = await self._session.compute(lambda: store.get(observation_id.strip()))
         if seen is None:
             raise SemanticMapError(

@@ -140,7 +140,7 @@ class PaperTools:
         receipt, merge = await self._session.compute(
             lambda: self._session.memory.remember(waypoint, gone=gone or ())
         )
-        kept = await self._session.compute(lambda: self._session.diary.keep_record(waypoint))
+        kept = await self._session.compute(lambda: self._session.episodes.keep_record(waypoint))
         unsure = say_pose_doubt(doubt) if pose.point == here.point else ""
         far, moved = await self._say_far(receipt), await say_moved(self._session.keep_map())
         places = await self._session.compute(self._session.memory.read)
