@@ -15,8 +15,15 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 from mapspeak.errors import MapError
 from mapspeak.geometry import Point
 from mapspeak.installation import shell_command
-from mapspeak.spatial.areagraph.anchor import LatLon, MapAnchor
-from mapspeak.spatial.areagraph.graph import Area, AreaGraph, Passage, Polygon, signed_area_m2
+from mapspeak.spatial.areagraph.graph import (
+    Area,
+    AreaGraph,
+    LatLon,
+    MapAnchor,
+    Passage,
+    Polygon,
+    signed_area_m2,
+)
 from mapspeak.spatial.rooms import Door, Region, RoomClass
 
 FILE_VERSION = 1
