@@ -31,7 +31,7 @@ def test_a_robot_in_a_nook_gets_out_by_a_gap_that_lacks_a_cell_on_each_side() ->
     path = field.path_to(HALL)
     assert path is not None
     assert path.length_m == pytest.approx(2.5, abs=0.3)
-    assert field.build_reachable_mask()[14, 70]
+    assert field.reachable[14, 70]
 
 
 def test_it_stays_in_where_the_gap_is_too_narrow_for_it() -> None:

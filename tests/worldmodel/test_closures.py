@@ -57,7 +57,7 @@ def test_what_lies_around_an_area_within_the_margin_is_closed_too() -> None:
     )
     pit = area((2.02, 2.02), (3.01, 3.01))
     distances = distances_from(close_floor(floor, [pit]), Point(0.5, 0.5), radius_m=0.3)
-    points = floor.points_at(*np.nonzero(distances.build_reachable_mask())).tolist()
+    points = floor.points_at(*np.nonzero(distances.reachable)).tolist()
     nearest_m = min(pit.distance_to(Point(x, y)) for x, y in points)
     assert 0.3 + MARGIN_M <= nearest_m <= 0.3 + MARGIN_M + 0.1
 

@@ -184,13 +184,13 @@ class OccupancyGrid:
 
     def cell_at(self, point: Point) -> Cell:
         """Return the cell a point falls in, which may lie outside the array (see `contains`)."""
-        rows, cols = self.cells_at(np.array([[point.x, point.y]]))
-        return Cell(int(rows[0]), int(cols[0]))
+        row, col = self._in_cells(point.x, point.y)
+        return Cell(math.floor(row), math.floor(col))
 
     def point_at(self, cell: Cell) -> Point:
         """Return the centre of a cell."""
-        xy = self.points_at(np.array([cell.row]), np.array([cell.col]))
-        return Point(float(xy[0, 0]), float(xy[0, 1]))
+        x, y = self._in_metres(cell.row, cell.col)
+        return Point(float(x), float(y))
 
     def cells_at(self, points: FloatArray) -> tuple[IntArray, IntArray]:
         """Return rows and columns for points of shape (n, 2); they may lie outside the array."""
@@ -200,21 +200,27 @@ class OccupancyGrid:
 
     def fractional_cells_at(self, points: FloatArray) -> FloatArray:
         """Return (row, col) of shape (n, 2) as real numbers; a cell's centre is at +0.5, +0.5."""
-        cos, sin = np.cos(self.origin.yaw_rad), np.sin(self.origin.yaw_rad)
-        dx = points[:, 0] - self.origin.x
-        dy = points[:, 1] - self.origin.y
-        col = (cos * dx + sin * dy) / self.resolution_m
-        row = (-sin * dx + cos * dy) / self.resolution_m
-        return np.stack([row, col], axis=1)
+        return np.stack(self._in_cells(points[:, 0], points[:, 1]), axis=1)
 
     def points_at(self, rows: IntArray, cols: IntArray) -> FloatArray:
         """Return the centres of cells in metres, shape (n, 2)."""
+        return np.stack(self._in_metres(rows, cols), axis=1)
+
+    def _in_cells(self, x: Any, y: Any) -> tuple[Any, Any]:  # noqa: ANN401 - numbers or arrays
+        """Return row and column, as real numbers, of one point or of many."""
+        cos, sin = np.cos(self.origin.yaw_rad), np.sin(self.origin.yaw_rad)
+        dx, dy = x - self.origin.x, y - self.origin.y
+        row, col = -sin * dx + cos * dy, cos * dx + sin * dy
+        return row / self.resolution_m, col / self.resolution_m
+
+    def _in_metres(self, rows: Any, cols: Any) -> tuple[Any, Any]:  # noqa: ANN401 - see above
+        """Return x and y of the centres of one cell or of many."""
         cos, sin = np.cos(self.origin.yaw_rad), np.sin(self.origin.yaw_rad)
         along_x = (cols + 0.5) * self.resolution_m
         along_y = (rows + 0.5) * self.resolution_m
         x = self.origin.x + cos * along_x - sin * along_y
         y = self.origin.y + sin * along_x + cos * along_y
-        return np.stack([x, y], axis=1)
+        return x, y
 
 
 def _span(places: IntArray | int, margin: int, size: int) -> slice:

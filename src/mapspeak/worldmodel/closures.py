@@ -11,6 +11,7 @@ from mapspeak.geometry import Point
 from mapspeak.memory.quoting import quote_name
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.grid import FloatArray, Mask
+from mapspeak.spatial.paths.lattice import measure_away
 from mapspeak.spatial.rooms import Door, Region, RoomMap
 
 CLOSED = 100
@@ -151,9 +152,10 @@ def close_floor(grid: OccupancyGrid, areas: Sequence[ClosedArea]) -> OccupancyGr
     """
     if not areas:
         return grid
-    untouched = np.logical_not(mask_areas(grid, areas)).astype(np.uint8)
-    off_cells = cv2.distanceTransform(untouched, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    is_closed = off_cells * grid.resolution_m <= MARGIN_M + math.sqrt(2) * grid.resolution_m
+    is_closed = (
+        measure_away(mask_areas(grid, areas)) * grid.resolution_m
+        <= MARGIN_M + math.sqrt(2) * grid.resolution_m
+    )
     cells = np.where(is_closed & grid.free, CLOSED, grid.cells)
     return ClosedFloor(
         cells=cells.astype(np.int8),

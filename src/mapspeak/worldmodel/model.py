@@ -49,10 +49,12 @@ def find_crossing(rooms: RoomMap, distances: DistanceField, door: Door) -> Point
     rows = np.arange(top, top + labels.shape[0])[:, np.newaxis]
     cols = np.arange(left, left + labels.shape[1])
     is_reached = np.isfinite(distances.distances_at(rows, cols))
-    _, parts = cv2.connectedComponents(is_reached.astype(np.uint8), connectivity=8)
-    sides = [rooms.region(region_id).index for region_id in door.region_ids]
-    one, other = (np.unique(parts[is_reached & (labels == index)]) for index in sides)
-    crossing = np.isin(parts, np.intersect1d(one, other)) & is_reached
+    n_parts, parts = cv2.connectedComponents(is_reached.astype(np.uint8), connectivity=8)
+    is_joining = np.arange(n_parts) > 0
+    for region_id in door.region_ids:
+        inside = is_reached & (labels == rooms.region(region_id).index)
+        is_joining &= np.bincount(parts[inside], minlength=n_parts) > 0
+    crossing = is_joining[parts]
     if not crossing.any():
         return None
     at_rows, at_cols = np.nonzero(crossing)

@@ -255,7 +255,7 @@ def _places_to_stand(world: WorldModel) -> tuple[FloatArray, FloatArray]:
 
     The first one is where the robot is: it may turn there.
     """
-    reachable = world.distances.build_reachable_mask()
+    reachable = world.distances.reachable
     clear_m = np.where(reachable, world.map.clearance_m, 0.0)
     rows, cols = np.nonzero(clear_m >= world.radius_m + COMFORT_M)
     every = max(round(EVERY_M / world.grid.resolution_m), 1)

@@ -126,9 +126,9 @@ def _require_robot_outside(world: WorldModel, event: Event, now: datetime) -> No
 
 def _find_cut_off(world: WorldModel, area: ClosedArea) -> list[str]:
     """Return the rooms beside a closed area that the robot gets to only while it is open."""
-    before = world.distances.build_reachable_mask()
+    before = world.distances.reachable
     closed = world.map.with_areas((*world.map.areas, area), world.map.hindrances)
-    after = closed.distances_from(world.robot.point).build_reachable_mask()
+    after = closed.distances_from(world.robot.point).reachable
     labels = world.rooms.labels
     return [
         region.id

@@ -113,7 +113,7 @@ class _Writer:
         if not area.polygons:
             self._add_node(region.widest, tags)
             return
-        members = []
+        members: list[ET.Element] = []
         for polygon in area.polygons:
             for ring in polygon.rings:
                 way = self._add_way(ring, {} if members else tags)

@@ -8,9 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.spatial.grid import IntArray, Mask, OccupancyGrid
+from mapspeak.spatial.grid import IntArray, OccupancyGrid
 from mapspeak.spatial.paths.distances import DistanceField
-from mapspeak.spatial.paths.lattice import Clearance
 
 THINNEST_UNKNOWN_M = 0.15
 """Thinner unknown is what lies between two beams of a LiDAR, or along a wall: nothing to see."""
@@ -33,20 +32,8 @@ class Border:
     length_m: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Borders:
-    """All borders of a map.
-
-    Attributes:
-        kept: Those long enough to be worth a look.
-    """
-
-    kept: tuple[Border, ...]
-    n_short: int
-
-
-def find_borders(grid: OccupancyGrid, *, least_length_m: float) -> Borders:
-    """Find all borders of the known floor with unknown that is worth a look.
+def find_borders(grid: OccupancyGrid, *, least_length_m: float) -> tuple[tuple[Border, ...], int]:
+    """Find the borders of the known floor with unknown that is worth a look, and count shorter ones.
 
     Only cells that touch by a side count as neighbours, so that nothing is seen between walls
     that touch at a corner. Outside the array everything is unknown.
@@ -59,7 +46,7 @@ def find_borders(grid: OccupancyGrid, *, least_length_m: float) -> Borders:
     order = np.argsort(of_cell, kind="stable")
     starts = np.flatnonzero(np.diff(of_cell[order], prepend=0))
     if not starts.size:
-        return Borders((), 0)
+        return (), 0
     rows, cols = np.divmod(cells[order], grid.n_cols)
     lengths_m = _lengths(rows, cols, starts) * grid.resolution_m
     kept = np.flatnonzero(lengths_m >= least_length_m)
@@ -72,7 +59,7 @@ def find_borders(grid: OccupancyGrid, *, least_length_m: float) -> Borders:
         )
         for index in kept
     )
-    return Borders(tuple(borders), starts.size - kept.size)
+    return tuple(borders), starts.size - kept.size
 
 
 def find_middle(rows: IntArray, cols: IntArray) -> int:
@@ -123,48 +110,13 @@ def _cells(length_m: float, grid: OccupancyGrid) -> int:
     return round(length_m / grid.resolution_m)
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class ReachableFloor:
-    """The floor that the robot can get to, and what matters for looking over its borders.
-
-    Attributes:
-        clearances_m: From every cell to the nearest obstacle.
-    """
-
-    distances: DistanceField
-    free: Mask
-    reachable: Mask
-    clearances_m: Clearance
-
-    @property
-    def grid(self) -> OccupancyGrid:
-        """The map."""
-        return self.distances.lattice.grid
-
-    @property
-    def radius_m(self) -> float:
-        """The robot's."""
-        return self.distances.radius_m
-
-
-def build_reachable_floor(distances: DistanceField) -> ReachableFloor:
-    """Build the floor of the map that the distances belong to, once for all its borders."""
-    grid = distances.lattice.grid
-    return ReachableFloor(
-        distances=distances,
-        free=grid.free,
-        reachable=distances.build_reachable_mask(),
-        clearances_m=distances.lattice.fine_clearance_m,
-    )
-
-
 WIDTH_STEP_M = 0.1
 """Gaps are measured in steps of this."""
 ROUNDING_CELLS = 2
 """By so much the reachable floor of a large map may be off, as its cells are joined."""
 
 
-def find_parts_beyond(floor: ReachableFloor, borders: Sequence[Border]) -> list[Border | None]:
+def find_parts_beyond(distances: DistanceField, borders: Sequence[Border]) -> list[Border | None]:
     """Find of each border the part where the robot does not fit; None where it is the lesser part.
 
     The body of a robot that drives wherever it can covers all floor but slits, what lies behind
@@ -172,8 +124,8 @@ def find_parts_beyond(floor: ReachableFloor, borders: Sequence[Border]) -> list[
     """
     if not borders:
         return []
-    away = cv2.distanceTransform((~floor.reachable).view(np.uint8), cv2.DIST_L2, 5)
-    deepest = math.sqrt(2) * floor.radius_m / floor.grid.resolution_m + ROUNDING_CELLS
+    away = cv2.distanceTransform((~distances.reachable).view(np.uint8), cv2.DIST_L2, 5)
+    deepest = math.sqrt(2) * distances.radius_m / distances.grid.resolution_m + ROUNDING_CELLS
     parts: list[Border | None] = []
     for border in borders:
         is_part = away[border.rows, border.cols] > deepest
@@ -183,22 +135,22 @@ def find_parts_beyond(floor: ReachableFloor, borders: Sequence[Border]) -> list[
     return parts
 
 
-def find_gap_widths_m(floor: ReachableFloor, borders: Sequence[Border]) -> list[float | None]:
+def find_gap_widths_m(distances: DistanceField, borders: Sequence[Border]) -> list[float | None]:
     """Find for each border how wide the widest way to it is at its narrowest; None without a way.
 
     The floor is taken in that has so much room around it, step by step more; a border hangs
     together with where the robot is until its way is too narrow.
     """
     widths_m: list[float | None] = [None] * len(borders)
-    joined = list(range(len(borders))) if floor.reachable.any() else []
-    for width_m in np.arange(0.0, 2 * floor.radius_m - 1e-9, WIDTH_STEP_M):
+    joined = list(range(len(borders))) if distances.reachable.any() else []
+    for width_m in np.arange(0.0, 2 * distances.radius_m - 1e-9, WIDTH_STEP_M):
         if not joined:
             break
         # The pieces of floor that are nowhere narrower, and where the robot is.
-        wide = floor.free & (floor.clearances_m >= width_m / 2 - 1e-6)
-        wide |= floor.reachable
+        wide = distances.grid.free & (distances.clearances_m >= width_m / 2 - 1e-6)
+        wide |= distances.reachable
         _, labels = cv2.connectedComponents(wide.view(np.uint8), connectivity=4)
-        robot = labels.flat[floor.reachable.argmax()]
+        robot = labels.flat[distances.reachable.argmax()]
         joined = [i for i in joined if (labels[borders[i].rows, borders[i].cols] == robot).any()]
         for index in joined:
             widths_m[index] = float(width_m)

@@ -9,8 +9,6 @@ import numpy as np
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.spatial.frontiers.borders import (
     Border,
-    ReachableFloor,
-    build_reachable_floor,
     find_borders,
     find_gap_widths_m,
     find_middle,
@@ -58,11 +56,10 @@ def find_frontiers(
     """
     if distances is None:
         distances = distances_from(grid, position, radius_m=radius_m)
-    borders = find_borders(grid, least_length_m=radius_m)
-    floor = build_reachable_floor(distances)
-    frontiers, refused = _judge(floor, borders.kept, looked_from)
-    n_unlisted = borders.n_short + len(borders.kept) - len(frontiers) - len(refused)
-    ranked, ways = rank(floor, merge_by_place(frontiers))
+    borders, n_short = find_borders(grid, least_length_m=radius_m)
+    frontiers, refused = _judge(distances, borders, looked_from)
+    n_unlisted = n_short + len(borders) - len(frontiers) - len(refused)
+    ranked, ways = rank(distances, merge_by_place(frontiers))
     return FrontierReport(
         frontiers=tuple(
             dataclasses.replace(frontier, id=f"F{number}")
@@ -70,7 +67,7 @@ def find_frontiers(
         ),
         refused=tuple(sorted(refused, key=lambda border: -border.length_m)),
         n_unlisted=n_unlisted,
-        verdict=_verdict(floor, ranked, is_refused=bool(refused or n_unlisted)),
+        verdict=_verdict(distances, ranked, is_refused=bool(refused or n_unlisted)),
         n_named=len(ranked),
         ways=ways,
     )
@@ -92,23 +89,23 @@ def rerank_frontiers(report: FrontierReport, distances: DistanceField) -> Fronti
         if distance_m is None:
             return None
         moved.append(dataclasses.replace(frontier, distance_m=distance_m))
-    ranked, ways = rank(build_reachable_floor(distances), moved, report.ways)
+    ranked, ways = rank(distances, moved, report.ways)
     return dataclasses.replace(report, frontiers=tuple(ranked), ways=ways)
 
 
 def _verdict(
-    floor: ReachableFloor, frontiers: Sequence[Frontier], *, is_refused: bool
+    distances: DistanceField, frontiers: Sequence[Frontier], *, is_refused: bool
 ) -> FrontierVerdict:
     if frontiers:
         return FrontierVerdict.SOME_LEFT
     if is_refused:
-        is_shut_in = not floor.reachable.any()
+        is_shut_in = not distances.reachable.any()
         return FrontierVerdict.NONE_REACHABLE if is_shut_in else FrontierVerdict.ALL_REFUSED
-    return FrontierVerdict.NONE_LEFT if floor.free.any() else FrontierVerdict.NOTHING_KNOWN
+    return FrontierVerdict.NONE_LEFT if distances.grid.free.any() else FrontierVerdict.NOTHING_KNOWN
 
 
 def _judge(
-    floor: ReachableFloor, borders: Sequence[Border], looked_from: Sequence[Point]
+    distances: DistanceField, borders: Sequence[Border], looked_from: Sequence[Point]
 ) -> tuple[list[Frontier], list[RefusedFrontier]]:
     """Return each border as a frontier with its best pose, or as refused.
 
@@ -119,40 +116,40 @@ def _judge(
     poor: list[tuple[Border, float]] = []
     cut_off: list[Border] = []
     open_ones: list[tuple[Border, list[FrontierViewpoint]]] = []
-    for border, viewpoints in zip(borders, find_viewpoints(floor, borders), strict=True):
-        new = _without_looked(floor, viewpoints, looked_from)
+    for border, viewpoints in zip(borders, find_viewpoints(distances, borders), strict=True):
+        new = _without_looked(distances, viewpoints, looked_from)
         if new:
             open_ones.append((border, new))
         elif viewpoints:
-            refused.append(_refuse(floor, border, RefusalReason.LOOKED_ALREADY))
+            refused.append(_refuse(distances, border, RefusalReason.LOOKED_ALREADY))
         elif border.length_m >= NOISE_M:
             cut_off.append(border)
     # One and a half robots' width squared, a hundredth of the floor, or 0.5 m2 are worth a drive:
     # the less, the smaller the robot and the known floor.
-    floor_m2 = int(np.count_nonzero(floor.free)) * floor.grid.resolution_m**2
-    least_m2 = min((3 * floor.radius_m) ** 2, 0.01 * floor_m2, 0.5)
-    for (border, _), frontier in zip(open_ones, _find_poses(floor, open_ones), strict=True):
+    floor_m2 = int(np.count_nonzero(distances.grid.free)) * distances.grid.resolution_m**2
+    least_m2 = min((3 * distances.radius_m) ** 2, 0.01 * floor_m2, 0.5)
+    for (border, _), frontier in zip(open_ones, _find_poses(distances, open_ones), strict=True):
         if frontier.gain_m2 >= least_m2:
             frontiers.append(frontier)
         elif border.length_m >= NOISE_M:
             poor.append((border, frontier.gain_m2))
-    parts_beyond = find_parts_beyond(floor, [border for border, _ in poor])
+    parts_beyond = find_parts_beyond(distances, [border for border, _ in poor])
     for (border, gain_m2), beyond in zip(poor, parts_beyond, strict=True):
         if beyond is None:
-            nothing = _refuse(floor, border, RefusalReason.NOTHING_TO_SEE)
+            nothing = _refuse(distances, border, RefusalReason.NOTHING_TO_SEE)
             refused.append(dataclasses.replace(nothing, gain_m2=gain_m2, least_gain_m2=least_m2))
         else:
             cut_off.append(beyond)
-    return frontiers, refused + _refuse_cut_off(floor, cut_off)
+    return frontiers, refused + _refuse_cut_off(distances, cut_off)
 
 
 def _without_looked(
-    floor: ReachableFloor, viewpoints: list[FrontierViewpoint], looked_from: Sequence[Point]
+    distances: DistanceField, viewpoints: list[FrontierViewpoint], looked_from: Sequence[Point]
 ) -> list[FrontierViewpoint]:
     """Return the viewpoints from which the robot has not looked yet."""
     if not looked_from:
         return viewpoints
-    places = [(viewpoint, floor.grid.point_at(viewpoint.cell)) for viewpoint in viewpoints]
+    places = [(viewpoint, distances.grid.point_at(viewpoint.cell)) for viewpoint in viewpoints]
     return [
         viewpoint
         for viewpoint, place in places
@@ -161,16 +158,16 @@ def _without_looked(
 
 
 def _find_poses(
-    floor: ReachableFloor, borders: Sequence[tuple[Border, list[FrontierViewpoint]]]
+    distances: DistanceField, borders: Sequence[tuple[Border, list[FrontierViewpoint]]]
 ) -> list[Frontier]:
     """Return borders with the pose at the viewpoint that shows most per metre of way to it."""
-    grid = floor.grid
+    grid = distances.grid
     viewpoints = [viewpoint for _, own in borders for viewpoint in own]
     cells = [viewpoint.cell for viewpoint in viewpoints]
-    views = find_views(grid, floor.clearances_m, cells)
+    views = find_views(grid, distances.clearances_m, cells)
     rows = np.array([cell.row for cell in cells], dtype=np.intp)
     cols = np.array([cell.col for cell in cells], dtype=np.intp)
-    distances_m = floor.distances.distances_at(rows, cols).tolist()
+    distances_m = distances.distances_at(rows, cols).tolist()
     options = zip(viewpoints, views.find_gains(), distances_m, strict=True)
     frontiers = []
     for border, own in borders:
@@ -197,23 +194,23 @@ def _find_poses(
     return frontiers
 
 
-def _refuse(floor: ReachableFloor, border: Border, reason: RefusalReason) -> RefusedFrontier:
+def _refuse(distances: DistanceField, border: Border, reason: RefusalReason) -> RefusedFrontier:
     middle = find_middle(border.rows, border.cols)
     anchor = Cell(int(border.rows[middle]), int(border.cols[middle]))
     return RefusedFrontier(
-        anchor=floor.grid.point_at(anchor), length_m=border.length_m, reason=reason
+        anchor=distances.grid.point_at(anchor), length_m=border.length_m, reason=reason
     )
 
 
-def _refuse_cut_off(floor: ReachableFloor, borders: Sequence[Border]) -> list[RefusedFrontier]:
+def _refuse_cut_off(distances: DistanceField, borders: Sequence[Border]) -> list[RefusedFrontier]:
     """Refuse borders that no viewpoint is near to."""
     refused = []
-    for border, width_m in zip(borders, find_gap_widths_m(floor, borders), strict=True):
+    for border, width_m in zip(borders, find_gap_widths_m(distances, borders), strict=True):
         if width_m is None:
-            refused.append(_refuse(floor, border, RefusalReason.NO_WAY))
+            refused.append(_refuse(distances, border, RefusalReason.NO_WAY))
         else:
-            narrow = _refuse(floor, border, RefusalReason.TOO_NARROW)
-            needed_m = 2 * floor.radius_m
+            narrow = _refuse(distances, border, RefusalReason.TOO_NARROW)
+            needed_m = 2 * distances.radius_m
             refused.append(
                 dataclasses.replace(narrow, gap_width_m=width_m, needed_width_m=needed_m)
             )

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from mapspeak.geometry import Point
-from mapspeak.spatial.frontiers.borders import ReachableFloor
 from mapspeak.spatial.frontiers.frontier import Frontier, FrontierMerit, WaysBetween
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask
+from mapspeak.spatial.paths.distances import DistanceField
 from mapspeak.spatial.paths.lattice import moves_within
 from mapspeak.spatial.paths.wavefront import Seeds, spread
 
@@ -29,7 +29,7 @@ def gain_rate(gain_m2: float, distance_m: float) -> float:
 
 
 def rank(
-    floor: ReachableFloor, frontiers: Sequence[Frontier], known_ways: WaysBetween | None = None
+    distances: DistanceField, frontiers: Sequence[Frontier], known_ways: WaysBetween | None = None
 ) -> tuple[list[Frontier], WaysBetween]:
     """Return frontiers in the order in which to think of them, each with its merits.
 
@@ -46,7 +46,7 @@ def rank(
     """
     by_rate = sorted(frontiers, key=lambda each: -gain_rate(each.gain_m2, each.distance_m))
     weighed, others = by_rate[:N_WEIGHED], by_rate[N_WEIGHED:]
-    ways = _find_ways(floor, weighed, known_ways)
+    ways = _find_ways(distances, weighed, known_ways)
     detours_m = _detours_m(weighed, ways)
     scores = []
     for frontier, detour_m in zip(weighed, detours_m, strict=True):
@@ -82,7 +82,7 @@ def _with_merits(ranked: Sequence[Frontier]) -> list[Frontier]:
 
 
 def _find_ways(
-    floor: ReachableFloor, frontiers: list[Frontier], known: WaysBetween | None
+    distances: DistanceField, frontiers: list[Frontier], known: WaysBetween | None
 ) -> WaysBetween:
     """Return the ways between frontiers in their order, out of known ones where these have all."""
     stops = tuple(each.pose.point for each in frontiers)
@@ -91,7 +91,7 @@ def _find_ways(
         return WaysBetween(stops, known.metres[np.ix_(picked, picked)])
     if len(stops) < 2:
         return WaysBetween(stops, np.zeros((len(stops), len(stops))))
-    return WaysBetween(stops, find_ways_between(floor, list(stops)))
+    return WaysBetween(stops, find_ways_between(distances, list(stops)))
 
 
 def _detours_m(frontiers: list[Frontier], ways: WaysBetween) -> list[float]:
@@ -104,20 +104,20 @@ def _detours_m(frontiers: list[Frontier], ways: WaysBetween) -> list[float]:
     return [float(round_m - rounds_m.min()) for round_m in rounds_m]
 
 
-def find_ways_between(floor: ReachableFloor, stops: list[Point]) -> FloatArray:
+def find_ways_between(distances: DistanceField, stops: list[Point]) -> FloatArray:
     """Return the lengths of ways between reachable places, shape (n, n), in metres.
 
     They are estimates: the floor is looked at in cells so coarse that walls, which keep the robot's
     radius on both sides, just do not vanish.
     """
-    grid = floor.grid
-    factor = max(int(floor.radius_m / math.sqrt(2) / grid.resolution_m), 1)
+    grid = distances.grid
+    factor = max(int(distances.radius_m / math.sqrt(2) / grid.resolution_m), 1)
     rows, cols = grid.cells_at(np.array([[stop.x, stop.y] for stop in stops]))
     # By way of the robot's own place there is a way between any two of them: none is longer.
-    from_robot_m = floor.distances.distances_at(rows, cols)
+    from_robot_m = distances.distances_at(rows, cols)
     reach = math.ceil(float(from_robot_m.max()) / grid.resolution_m) + 1
     window = grid.window(rows, cols, margin=reach)
-    coarse = _coarser(floor.reachable[window], factor)
+    coarse = _coarser(distances.reachable[window], factor)
     cells: IntArray = np.ravel_multi_index(
         ((rows - window[0].start) // factor, (cols - window[1].start) // factor), coarse.shape
     )
@@ -129,15 +129,15 @@ def find_ways_between(floor: ReachableFloor, stops: list[Point]) -> FloatArray:
     return np.concatenate(ways) * factor * grid.resolution_m
 
 
-def _spread_together(floor: Mask, starts: IntArray, goals: IntArray) -> FloatArray:
+def _spread_together(distances: Mask, starts: IntArray, goals: IntArray) -> FloatArray:
     """Return the ways in cells from each start to all goals, shape (starts, goals).
 
     Each wave has a copy of the floor of its own, one above the other, as it is the number of steps
     that takes the time.
     """
     n_copies = len(starts)
-    moves = np.tile(moves_within(floor), (n_copies, 1))
-    first = np.arange(n_copies) * floor.size
+    moves = np.tile(moves_within(distances), (n_copies, 1))
+    first = np.arange(n_copies) * distances.size
     seeds = Seeds(first + starts, np.zeros(n_copies, dtype=np.float32))
     ends = first[:, None] + goals
     costs = spread(moves, None, seeds, goals=ends.ravel())
@@ -157,11 +157,12 @@ def find_shortest_rounds(from_start_m: FloatArray, between_m: FloatArray) -> Flo
     bits = 1 << np.arange(n_stops)
     rest_m = np.full((1 << n_stops, n_stops), np.inf)
     rest_m[bits, np.arange(n_stops)] = 0.0
-    for visited in range(1, 1 << n_stops):
-        for first in np.flatnonzero(visited & bits):
-            others = visited & ~bits[first]
-            if others:
-                rest_m[visited, first] = (between_m[first] + rest_m[others]).min()
+    visited = np.arange(1 << n_stops)
+    n_visited = ((visited[:, None] & bits) != 0).sum(axis=1)
+    for n_left in range(2, n_stops + 1):
+        for first, bit in enumerate(bits):
+            sets = visited[(n_visited == n_left) & (visited & bit != 0)]
+            rest_m[sets, first] = (between_m[first] + rest_m[sets ^ bit]).min(axis=1)
     return np.asarray(from_start_m + rest_m[-1], dtype=np.float64)
 
 

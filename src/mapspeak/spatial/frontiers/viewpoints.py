@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.spatial.frontiers.borders import Border, ReachableFloor, find_middle
+from mapspeak.spatial.frontiers.borders import Border, find_middle
 from mapspeak.spatial.frontiers.frontier import Frontier
 from mapspeak.spatial.grid import UNKNOWN, Cell, FloatArray, IntArray, Mask, OccupancyGrid
+from mapspeak.spatial.paths.distances import DistanceField
 from mapspeak.spatial.paths.lattice import Clearance, clearance_m
 from mapspeak.spatial.visibility import cast_rays
 
@@ -63,7 +64,7 @@ class FrontierViewpoint:
 
 
 def find_viewpoints(
-    floor: ReachableFloor, borders: Sequence[Border]
+    distances: DistanceField, borders: Sequence[Border]
 ) -> list[list[FrontierViewpoint]]:
     """Find for each border places to look beyond it from, all along it; none where none is near.
 
@@ -72,10 +73,10 @@ def find_viewpoints(
     """
     if not borders:
         return []
-    targets = [_choose_targets(floor, border) for border in borders]
+    targets = [_choose_targets(distances, border) for border in borders]
     rows = np.concatenate([target[0] for target in targets])
     cols = np.concatenate([target[1] for target in targets])
-    cells = _find_cells(floor, rows, cols)
+    cells = _find_cells(distances, rows, cols)
     found = zip(cells.tolist(), rows.tolist(), cols.tolist(), strict=True)
     viewpoints = []
     for own_rows, _ in targets:
@@ -84,16 +85,16 @@ def find_viewpoints(
         target_of = {cell: Cell(row, col) for cell, row, col in of_border if cell >= 0}
         viewpoints.append(
             [
-                FrontierViewpoint(Cell(*divmod(cell, floor.grid.n_cols)), target)
+                FrontierViewpoint(Cell(*divmod(cell, distances.grid.n_cols)), target)
                 for cell, target in target_of.items()
             ]
         )
     return viewpoints
 
 
-def _choose_targets(floor: ReachableFloor, border: Border) -> tuple[IntArray, IntArray]:
+def _choose_targets(distances: DistanceField, border: Border) -> tuple[IntArray, IntArray]:
     """Pick cells of a border, where the robot can go right to it if there is such a piece."""
-    near = np.flatnonzero(floor.reachable[border.rows, border.cols])
+    near = np.flatnonzero(distances.reachable[border.rows, border.cols])
     every_m = TARGET_EVERY_M if near.size else REACH_M
     rows, cols = (border.rows[near], border.cols[near]) if near.size else (border.rows, border.cols)
     n_targets = min(max(round(border.length_m / every_m), 1), MOST_TARGETS)
@@ -112,33 +113,33 @@ def _spread_out(rows: IntArray, cols: IntArray, n_cells: int) -> list[int]:
     return picked
 
 
-def _find_cells(floor: ReachableFloor, rows: IntArray, cols: IntArray) -> IntArray:
+def _find_cells(distances: DistanceField, rows: IntArray, cols: IntArray) -> IntArray:
     """Return the flat index of the best cell to stand in for each target; -1 for none."""
-    comfort_m = floor.radius_m + COMFORT_M
-    cells = rows * floor.grid.n_cols + cols
-    is_good = floor.reachable[rows, cols] & (floor.clearances_m[rows, cols] >= comfort_m)
+    comfort_m = distances.radius_m + COMFORT_M
+    cells = rows * distances.grid.n_cols + cols
+    is_good = distances.reachable[rows, cols] & (distances.clearances_m[rows, cols] >= comfort_m)
     others = np.flatnonzero(~is_good)
     for start in range(0, others.size, AT_ONCE):
         some = others[start : start + AT_ONCE]
-        cells[some] = _find_cells_off(floor, rows[some], cols[some])
+        cells[some] = _find_cells_off(distances, rows[some], cols[some])
     return cells
 
 
-def _find_cells_off(floor: ReachableFloor, rows: IntArray, cols: IntArray) -> IntArray:
+def _find_cells_off(distances: DistanceField, rows: IntArray, cols: IntArray) -> IntArray:
     """Return the same for targets that the robot cannot stand on well, by looking around them."""
-    reach_m = floor.radius_m + REACH_M
-    n_steps = math.ceil(reach_m / floor.grid.resolution_m)
+    reach_m = distances.radius_m + REACH_M
+    n_steps = math.ceil(reach_m / distances.grid.resolution_m)
     steps = np.arange(n_steps + 1, dtype=np.float64)
     middles = np.stack([rows, cols], axis=1) + 0.5
-    rays = cast_rays(floor.free.shape, middles, angles_rad=_TARGET_ANGLES_RAD, steps=steps)
-    clearances_m = floor.clearances_m.ravel()[rays.cells]
-    is_reachable = floor.reachable.ravel()[rays.cells] & rays.is_inside
+    rays = cast_rays(distances.grid.free.shape, middles, angles_rad=_TARGET_ANGLES_RAD, steps=steps)
+    clearances_m = distances.clearances_m.ravel()[rays.cells]
+    is_reachable = distances.reachable.ravel()[rays.cells] & rays.is_inside
     # Beside an obstacle a ray might slip between two cells of wall that touch at a corner.
-    is_wide = clearances_m > floor.grid.resolution_m
-    is_passed = floor.free.ravel()[rays.cells] & rays.is_inside & (is_wide | is_reachable)
+    is_wide = clearances_m > distances.grid.resolution_m
+    is_passed = distances.grid.free.ravel()[rays.cells] & rays.is_inside & (is_wide | is_reachable)
     is_passed[:, :, 0] = True
     is_seen = np.logical_and.accumulate(is_passed, axis=2)
-    room_m = np.minimum(clearances_m, floor.radius_m + COMFORT_M)
+    room_m = np.minimum(clearances_m, distances.radius_m + COMFORT_M)
     # A step further away must be worth more room than the distance's whole weight.
     worth = np.where(is_seen & is_reachable, room_m - steps * 1e-6, -np.inf)
     flat = worth.reshape(rows.size, -1)

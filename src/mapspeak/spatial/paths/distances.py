@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from mapspeak.geometry import Point
 from mapspeak.spatial.grid import FloatArray, IntArray, Mask, OccupancyGrid
 from mapspeak.spatial.paths.lattice import (
+    Clearance,
     Lattice,
     build_coarse_lattice,
     build_narrow_lattice,
@@ -18,7 +20,7 @@ from mapspeak.spatial.paths.route import Path, find_path_near, find_seeds
 from mapspeak.spatial.paths.wavefront import Costs, descend, spread
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class DistanceField:
     """How far a robot has to drive from one place to every other; compared by identity.
 
@@ -37,6 +39,16 @@ class DistanceField:
     costs: Costs
     leaves_pockets: bool = False
     closed_lattice: Lattice
+
+    @property
+    def grid(self) -> OccupancyGrid:
+        """The map."""
+        return self.lattice.grid
+
+    @property
+    def clearances_m(self) -> Clearance:
+        """From every cell of the map to the nearest obstacle."""
+        return self.lattice.fine_clearance_m
 
     def distance_to(self, point: Point) -> float | None:
         """Return the metres to a point by path; None where the robot cannot get to."""
@@ -97,9 +109,11 @@ class DistanceField:
             self.closed_lattice, start, radius_m=self.radius_m, leaves_pockets=self.leaves_pockets
         )
 
-    def build_reachable_mask(self) -> Mask:
-        """Return where on the map the robot can drive to, as a mask."""
-        return self.lattice.passable & _refined(self.lattice, self.costs)
+    @cached_property
+    def reachable(self) -> Mask:
+        """True where on the map the robot can drive to."""
+        is_reached = np.isfinite(self.costs).reshape(self.lattice.moves.shape)
+        return self.lattice.passable & self.lattice.refined(is_reached)
 
     def distances_at(self, rows: IntArray, cols: IntArray) -> FloatArray:
         """Return the metres by path to cells of the map; infinite where the robot cannot get to."""
@@ -193,20 +207,11 @@ def open_pocket(lattice: Lattice, costs: Costs, start: Point, *, radius_m: float
 def _find_largest(lattice: Lattice, is_reached: Mask, costs: Costs) -> Mask | None:
     """Return the largest piece of passable floor that is reached through narrow gaps only."""
     here = np.isfinite(costs).reshape(lattice.moves.shape)
-    here = here.repeat(lattice.factor, axis=0).repeat(lattice.factor, axis=1)
-    n_rows, n_cols = lattice.passable.shape
-    left = (lattice.passable & is_reached & ~here[:n_rows, :n_cols]).astype(np.uint8)
+    left = (lattice.passable & is_reached & ~lattice.refined(here)).astype(np.uint8)
     n_pieces, pieces, stats, _ = cv2.connectedComponentsWithStats(left, connectivity=4)
     if n_pieces < 2:
         return None
     largest = 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax())
-    is_more = stats[largest, cv2.CC_STAT_AREA] > np.count_nonzero(here)
+    n_here = np.count_nonzero(here) * lattice.factor**2
+    is_more = stats[largest, cv2.CC_STAT_AREA] > n_here
     return np.asarray(pieces == largest) if is_more else None
-
-
-def _refined(lattice: Lattice, costs: Costs) -> Mask:
-    """Return True in the cells of the map whose lattice cell has been reached."""
-    is_reached = np.isfinite(costs).reshape(lattice.moves.shape)
-    fine = is_reached.repeat(lattice.factor, axis=0).repeat(lattice.factor, axis=1)
-    n_rows, n_cols = lattice.passable.shape
-    return np.asarray(fine[:n_rows, :n_cols])

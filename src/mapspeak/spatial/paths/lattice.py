@@ -27,7 +27,7 @@ def clearance_m(grid: OccupancyGrid) -> Clearance:
 
     Unknown cells are no obstacle here: a robot that looks into the unknown stands beside it.
     """
-    return _distance_to(grid.occupied, grid.resolution_m)
+    return measure_away(grid.occupied) * np.float32(grid.resolution_m)
 
 
 def known_clearance_m(grid: OccupancyGrid) -> Clearance:
@@ -36,21 +36,22 @@ def known_clearance_m(grid: OccupancyGrid) -> Clearance:
     Unknown cells and everything outside the array count as obstacles.
     """
     padded = np.pad(~grid.free, 1, constant_values=True)
-    return np.ascontiguousarray(_distance_to(padded, grid.resolution_m)[1:-1, 1:-1])
+    away = np.ascontiguousarray(measure_away(padded)[1:-1, 1:-1])
+    return away * np.float32(grid.resolution_m)
 
 
-def _distance_to(blocked: Mask, resolution_m: float) -> Clearance:
-    if not blocked.any():
-        return np.full(blocked.shape, np.inf, dtype=np.float32)
-    source = np.logical_not(blocked).view(np.uint8)
+def measure_away(mask: Mask) -> Clearance:
+    """Return for every cell the cells to the nearest one in a mask; infinite where there is none."""
+    if not mask.any():
+        return np.full(mask.shape, np.inf, dtype=np.float32)
+    source = np.logical_not(mask).view(np.uint8)
     transformed = cv2.distanceTransform(source, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     distance = np.asarray(transformed, dtype=np.float32)
-    # Its last digit depends on how many threads OpenCV finds free. In cells each distance is the
-    # root of a whole number, so that the right digit is known.
+    # Its last digit differs from run to run, and with the threads that OpenCV finds free. Each
+    # distance is the root of a whole number, so that the right digit is known.
     np.square(distance, out=distance)
     np.rint(distance, out=distance)
     np.sqrt(distance, out=distance)
-    distance *= np.float32(resolution_m)
     return distance
 
 
@@ -96,7 +97,7 @@ class Lattice:
         cell = self.grid.cell_at(point)
         if not (self.grid.contains(cell) and self.passable[cell.row, cell.col]):
             return None
-        index = int(self.indices(np.array([cell.row]), np.array([cell.col]))[0])
+        index = (cell.row // self.factor) * self.n_cols + cell.col // self.factor
         return index if self.is_open.flat[index] else None
 
     def coarsened(self, weights: Costs) -> Costs:
@@ -104,6 +105,12 @@ class Lattice:
         if self.factor == 1:
             return weights
         return functools.reduce(np.maximum, _quarters(weights))
+
+    def refined(self, mask: Mask) -> Mask:
+        """Return a mask of the lattice in the cells of the map."""
+        fine = mask.repeat(self.factor, axis=0).repeat(self.factor, axis=1)
+        n_rows, n_cols = self.passable.shape
+        return fine[:n_rows, :n_cols]
 
     def indices(self, rows: IntArray, cols: IntArray) -> IntArray:
         """Return the flat indices of the lattice cells that hold cells of the map."""

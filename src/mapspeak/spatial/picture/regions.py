@@ -157,7 +157,7 @@ def _find_neighbours(labels: NDArray[np.uint16], grid: OccupancyGrid) -> dict[in
     for n in {max(1, round(apart_m / (step * grid.resolution_m))) for apart_m in _NEIGHBOUR_M}:
         for one, other in ((lattice[:-n], lattice[n:]), (lattice[:, :-n], lattice[:, n:])):
             differ = (one != other) & (one > 0) & (other > 0)
-            for pair in np.unique(one[differ].astype(np.uint32) << 16 | other[differ]).tolist():
+            for pair in set((one[differ].astype(np.uint32) << 16 | other[differ]).tolist()):
                 found.setdefault(pair >> 16, set()).add(pair & 0xFFFF)
                 found.setdefault(pair & 0xFFFF, set()).add(pair >> 16)
     return found

@@ -4,12 +4,12 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-import cv2
 import numpy as np
 
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.spatial.grid import FloatArray, OccupancyGrid
 from mapspeak.spatial.paths import DistanceField, distances_from, known_clearance_m
+from mapspeak.spatial.paths.lattice import measure_away
 from mapspeak.spatial.rooms.room_map import Door, Region, RoomMap
 
 AHEAD_RAD = math.radians(50)
@@ -148,10 +148,10 @@ def _distances_from_end(
     distances = distances_from(floor, one, radius_m=0.0)
     other = _farthest(distances, candidates) or one
     way = distances.way_to(other) or (one,)
-    off_way = np.ones(floor.cells.shape, dtype=np.uint8)
-    off_way[floor.cells_at(np.array([[point.x, point.y] for point in way]))] = 0
-    off_cells = cv2.distanceTransform(off_way, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    rows, cols = np.nonzero(floor.free & (off_cells * floor.resolution_m <= region.width_m))
+    is_way = np.zeros(floor.cells.shape, dtype=np.bool_)
+    is_way[floor.cells_at(np.array([[point.x, point.y] for point in way]))] = True
+    is_near = measure_away(is_way) * floor.resolution_m <= region.width_m
+    rows, cols = np.nonzero(floor.free & is_near)
     away_m = distances.distances_at(rows, cols)
     is_reached = np.isfinite(away_m)
     points, away_m = floor.points_at(rows[is_reached], cols[is_reached]), away_m[is_reached]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mapspeak.geometry import Point
 from mapspeak.spatial.grid import Mask, OccupancyGrid
+from mapspeak.spatial.paths.lattice import measure_away
 from mapspeak.spatial.rooms.identity import match_rooms, sort_key
 from mapspeak.spatial.rooms.raster import Raster, RoomSettings, build_raster, find_cells
 from mapspeak.spatial.rooms.room_map import LETTER, Door, Labels, Region, RoomClass, RoomMap
@@ -115,8 +116,7 @@ def _open_clearance(inside: Mask) -> float:
     is_island[0] = is_island[label[0, 0]] = False
     if not is_island.any():
         return 0.0
-    whole = ((outside == 0) | is_island[label]).astype(np.uint8)
-    return float(cv2.distanceTransform(whole, cv2.DIST_L2, cv2.DIST_MASK_PRECISE).max()) - 0.5
+    return float(measure_away((outside > 0) & ~is_island[label]).max()) - 0.5
 
 
 def _bounding_rectangle(inside: Mask) -> tuple[float, float, float]:
@@ -174,7 +174,7 @@ def find_openings(segmentation: Segmentation) -> list[Opening]:
     """Return every way between two regions, ordered by regions, widest first."""
     row, col, first, second = _border_cells(segmentation.labels)
     openings = []
-    order = np.lexsort((second, first))
+    order = np.lexsort((col, row, second, first))
     starts = np.flatnonzero(np.diff(first[order]) | np.diff(second[order])) + 1
     for here in np.split(order, starts) if order.size else ():
         pair = int(first[here[0]]), int(second[here[0]])
@@ -195,8 +195,7 @@ def _border_cells(labels: NDArray[np.int32]) -> tuple[NDArray[np.intp], ...]:
         higher = a > b
         rows, cols = rows + down * higher, cols + right * higher
         found.append(np.stack([rows, cols, np.minimum(a, b), np.maximum(a, b)]))
-    joined = np.unique(np.concatenate(found, axis=1), axis=1)
-    return tuple(joined.astype(np.intp))
+    return tuple(np.concatenate(found, axis=1).astype(np.intp))
 
 
 def _split(

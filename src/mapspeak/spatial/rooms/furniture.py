@@ -234,7 +234,7 @@ def _choose_blocks(piece: Picture, fixed: Picture, occupied: Picture, cells: _Si
     is_block = (n_contact == 0) | is_at_wall
     is_block &= _count_sides(around, n, floor, piece, cells) == 1
     is_block &= _seen_ratio(numbers, n, floor, occupied) >= _SEEN_RATIO
-    is_block[np.unique(numbers[open_box(piece, cells.thick, cells.thick) > 0])] = False
+    is_block[numbers[open_box(piece, cells.thick, cells.thick) > 0]] = False
     is_block[0] = False
     return np.asarray(is_block[numbers], np.uint8)
 
@@ -281,6 +281,6 @@ def _find_touching(crumbs: Picture, block: Picture) -> Picture:
     """Return the crumbs that touch a block."""
     n, label = cv2.connectedComponents(crumbs, connectivity=8)
     touches = np.zeros(n, np.uint8)
-    touches[np.unique(label[widen(block, 1) > 0])] = 1
+    touches[label[widen(block, 1) > 0]] = 1
     touches[0] = 0
     return np.asarray(touches[label], np.uint8)
