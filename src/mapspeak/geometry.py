@@ -35,8 +35,6 @@ class Pose:
     """A place and a heading; also the rigid transform from its own frame to the outer one.
 
     Attributes:
-        x: Metres along the outer frame's x axis.
-        y: Metres along the outer frame's y axis.
         yaw_rad: Heading, counter-clockwise from the outer x axis.
     """
 

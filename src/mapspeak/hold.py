@@ -26,11 +26,7 @@ SERVED = "served"
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """What keeps robots standing, in a folder that servers and operators share.
-
-    Attributes:
-        folder: Where.
-    """
+    """What keeps robots standing, in a folder that servers and operators share."""
 
     folder: Path
 
@@ -73,7 +69,6 @@ class Hold:
         A server that cannot answer has stopped its robot all the same.
 
         Args:
-            robot: What the operator calls it.
             held_by: What `read` gave.
             failure: Why it could not be stopped; empty when it was.
         """
@@ -100,7 +95,6 @@ class Hold:
         """Tell that a robot is served from here, so that a stop knows whose answer it awaits.
 
         Args:
-            robot: What the operator calls it.
             address: Where it is; empty for one that only this process has.
         """
         told = {"robot": robot, "process": os.getpid(), "address": address}

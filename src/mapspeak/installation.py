@@ -49,9 +49,6 @@ def prefer_own_packages(python_path: str) -> None:
 
     A sourced ROS names folders there with numpy, OpenCV and cbor2 of the system. What only they
     have, such as rclpy, is still found.
-
-    Args:
-        python_path: The variable's value.
     """
     foreign = {str(Path(folder).absolute()) for folder in python_path.split(os.pathsep) if folder}
     sys.path.sort(key=lambda folder: str(Path(folder).absolute()) in foreign)

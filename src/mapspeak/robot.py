@@ -25,10 +25,8 @@ class RobotDescription:
     """What is fixed about a robot while it is connected.
 
     Attributes:
-        name: How people call it.
         radius_m: Of the smallest circle around it.
         map_name: Which map or building it drives in, as far as the robot can tell.
-        has_camera: It can give pictures.
         has_laser: It has a laser that measures along the floor; whether that turns is not said.
         detector: What its own object detector is called; None where it has none.
         map_frame: What ROS calls the frame of its map.
@@ -61,8 +59,6 @@ class StampedPose:
     """Where the robot believes it is, and since when.
 
     Attributes:
-        pose: In the map frame.
-        stamp_s: Robot time of the estimate.
         silent_s: Wall time since its source said anything new; 0 for one that need not.
         is_clock_still: The robot's clock does not move on.
         is_odometry: It was taken from odometry, which drifts, for want of a pose on the map.
@@ -92,10 +88,7 @@ class CameraPicture:
     """One picture of the front camera.
 
     Attributes:
-        data: The encoded picture.
         media_type: Such as "image/jpeg".
-        width_px: Columns.
-        height_px: Rows.
         horizontal_fov_rad: The angle between the left and the right edge; None where unknown.
         pose: Where the robot believed it stood, in the map frame.
         stamp_s: Robot time of the exposure.
@@ -117,8 +110,6 @@ class Detection:
     """One thing that the robot's object detector reports in the current camera view.
 
     Attributes:
-        label: What it takes the thing for.
-        confidence_ratio: Between 0 and 1.
         bearing_rad: From the robot's heading, left positive.
         range_m: From the robot; None where the detector does not measure it.
     """
@@ -251,7 +242,6 @@ class GoalStatus:
     """How a drive stands now.
 
     Attributes:
-        state: See `GoalState`.
         distance_left_m: Along the planned path; None where the robot does not say.
         n_recoveries: How often it had to try again.
         cause: Why it ended as it did, or waits; None while it drives and where nobody said.
@@ -274,32 +264,25 @@ class Robot(Protocol):
     @property
     def description(self) -> RobotDescription:
         """What is fixed about this robot."""
-        ...
 
     @property
     def now_s(self) -> float:
         """Robot time."""
-        ...
 
     async def sleep(self, duration_s: float) -> None:
         """Return when that much robot time has passed."""
-        ...
 
     async def fetch_map(self) -> OccupancyGrid:
         """Return the latest map."""
-        ...
 
     async def fetch_pose(self) -> StampedPose:
         """Return where the robot believes it is."""
-        ...
 
     async def fetch_picture(self) -> CameraPicture:
         """Take a picture with the front camera."""
-        ...
 
     async def fetch_detections(self) -> tuple[Detection, ...]:
         """Return what the robot's own object detector reports in the camera view."""
-        ...
 
     async def fetch_scan(self) -> RangeScan | None:
         """Return what the laser meets now; None without a laser, or where no scan comes in time.
@@ -307,24 +290,18 @@ class Robot(Protocol):
         It is evidence on the side: it takes no longer than `SCAN_PATIENCE_S`, and no laser that is
         silent, late or turned on its side raises.
         """
-        ...
 
     async def send_goal(self, goal: Pose) -> str:
         """Start a drive in the robot's navigation and return the id it is known by."""
-        ...
 
     async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
         """Return how a drive stands, also after it has ended."""
-        ...
 
     async def fetch_foreign_goals(self) -> tuple[GoalState, ...]:
         """Return how goals stand that others have sent and that are under way; empty when none."""
-        ...
 
     async def cancel_goal(self, robot_goal_id: str) -> None:
         """Ask the navigation to end a drive; the robot comes to a stand."""
-        ...
 
     async def stop(self) -> None:
         """End every drive and commands zero velocity, at once."""
-        ...

@@ -56,10 +56,8 @@ class Session:
 
     Args:
         robot: The robot itself; tools never see it where there is a guard.
-        memory: The semantic map's file.
         lease_s: Without a client for so long, a driving robot is stopped.
         guard: What commands are held to; None in tests.
-        ros: The connection of a robot that speaks ROS.
         find_model: Finds what compares meanings; asked once, when it is needed.
 
     Attributes:

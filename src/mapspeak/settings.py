@@ -39,7 +39,6 @@ def read_settings(
     """Read a file into a model; an empty file takes every default.
 
     Args:
-        path: The file.
         model: What may stand in it, all of it with a default.
         name: What people call such a file, as in "robot.yaml".
         advice: What to do about a value that cannot be.

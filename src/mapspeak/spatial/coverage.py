@@ -21,7 +21,6 @@ class Coverage:
         recall: Share of the reference's free floor that is free on the map.
         precision: Share of the map's free floor that is free in the reference; 1 for a map that
             shows none.
-        reference_area_m2: Free floor of the reference.
     """
 
     paper_ratio: float

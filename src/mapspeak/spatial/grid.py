@@ -164,7 +164,6 @@ class OccupancyGrid:
         Args:
             values: One for each cell of the grid.
             points: In metres, shape (..., 2).
-            outside: The value of points outside the array.
         """
         rows, cols = self.cells_at(points.reshape(-1, 2))
         is_inside = self.contains_cells(rows, cols)

@@ -89,7 +89,6 @@ class LoadedMap:
 
     Attributes:
         name: The file's name without its ending.
-        warnings: What deserves a second look.
     """
 
     grid: OccupancyGrid

@@ -23,7 +23,6 @@ class Rays:
 
     Attributes:
         cells: Flat indices into the array; of the nearest cell inside where the ray is outside.
-        is_inside: True where the ray is inside the array.
     """
 
     cells: IntArray

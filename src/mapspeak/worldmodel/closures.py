@@ -32,7 +32,6 @@ class ClosedArea:
     """A part of the floor that no part of the robot may be over.
 
     Attributes:
-        name: What people call it.
         outline: Its corners in order, in the map frame.
         further_outlines: Of its other parts and of the holes in them: what lies within an even
             number of all outlines is outside.
@@ -119,11 +118,7 @@ def distance_to_sides(point: Point, sides: FloatArray) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ClosedFloor(OccupancyGrid):
-    """A map on which closed areas are no floor; for planning, not for showing.
-
-    Attributes:
-        areas: What is closed.
-    """
+    """A map on which closed areas are no floor; for planning, not for showing."""
 
     areas: tuple[ClosedArea, ...]
 

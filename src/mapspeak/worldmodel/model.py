@@ -104,10 +104,6 @@ class WorldModel:
     """A state of the map with everything that has an id; parts are computed when first asked for.
 
     Args:
-        grid: The map.
-        robot: Where the robot is.
-        memory: What is remembered.
-        radius_m: Of the robot.
         looked_from: Places of former frontiers that the robot has been to.
         previous: The one before, whose ids are kept and whose parts are used where they hold.
         revision: The state of the map, where somebody has made it already.
@@ -116,8 +112,6 @@ class WorldModel:
         is_radius_assumed: Nobody has told how large the robot is.
 
     Attributes:
-        map: The state of the map.
-        places: Remembered places.
         warnings: What a reader of the memory should know.
     """
 

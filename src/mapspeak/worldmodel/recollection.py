@@ -69,7 +69,6 @@ class Recollection:
     """All that is remembered, on one map; compared by identity.
 
     Args:
-        memory: The records.
         found: The things made of them.
         things: The same under their ids, in the order of these.
         n_named: How many ids were ever given.
@@ -113,9 +112,7 @@ class Recollection:
         """Find places and things by name, meaning or words; the entries have their ids.
 
         Args:
-            query: What people say.
             among: The ids to choose from; all where None.
-            limit: How many candidates at most.
         """
         self.prepare()
         assert self._index is not None  # noqa: S101 - it was just prepared

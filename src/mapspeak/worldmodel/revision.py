@@ -23,7 +23,6 @@ class Hindrance:
     """A part of the floor that is better not driven over where there is another way.
 
     Attributes:
-        area: Where.
         extra_m: A way across it counts as at least so much longer.
         factor: A metre in it counts as at least so many.
     """
@@ -52,8 +51,6 @@ class MapRevision:
     """A map and what is found on it; each part is computed when first asked for.
 
     Args:
-        grid: The map.
-        radius_m: Of the robot.
         previous: The state before, whose rooms give theirs their ids.
         areas: What is closed of the floor: no way leads over it.
         hindrances: What ways lead round where that is not too far.

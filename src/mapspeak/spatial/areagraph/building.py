@@ -41,8 +41,6 @@ def build_area_graph(
     the area inside an outline is that of its cells.
 
     Args:
-        rooms: A map divided into regions.
-        name: What the map is called.
         texts: What people read about regions, by their ids.
 
     Raises:

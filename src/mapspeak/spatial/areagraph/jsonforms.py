@@ -231,7 +231,6 @@ def to_geojson(graph: AreaGraph, *, anchor: MapAnchor | None = None) -> str:
     """Return the area graph as GeoJSON.
 
     Args:
-        graph: What is written.
         anchor: Where on Earth the map lies; without one, coordinates are metres in the map frame.
 
     Raises:

@@ -67,7 +67,6 @@ def to_osm(graph: AreaGraph, *, anchor: MapAnchor | None = None) -> str:
     """Return the area graph as osmAG; to JOSM all elements are new ones that no server knows.
 
     Args:
-        graph: What is written.
         anchor: Where on Earth the map lies; without one, its (0, 0) is put at latitude 0,
             longitude 0.
 

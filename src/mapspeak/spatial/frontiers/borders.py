@@ -33,7 +33,7 @@ class Border:
 
 
 def find_borders(grid: OccupancyGrid, *, least_length_m: float) -> tuple[tuple[Border, ...], int]:
-    """Find the borders of the known floor with unknown that is worth a look, and count shorter ones.
+    """Find borders of the known floor with unknown that is worth a look; count the shorter ones.
 
     Only cells that touch by a side count as neighbours, so that nothing is seen between walls
     that touch at a corner. Outside the array everything is unknown.

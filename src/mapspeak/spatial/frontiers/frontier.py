@@ -40,7 +40,6 @@ class Frontier:
         distance_m: From the robot to the pose, by path.
         openness_m: What that was reckoned with: how far one sees on this map, on average.
         pose: Where to go: a place the robot can reach and stand in, facing the unknown.
-        merits: What sets it apart from the others of its ranking.
         detour_m: By how much the round through all grows that begins with it; None where that was
             not computed, because others promise more.
     """

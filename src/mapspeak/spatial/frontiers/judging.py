@@ -47,9 +47,6 @@ def find_frontiers(
     """Find where the robot can go to see more, best first, and what is refused and why.
 
     Args:
-        grid: The map.
-        position: Where the robot is.
-        radius_m: Of the robot.
         distances: From that position on that map, where they are known already.
         looked_from: Poses of frontiers that the robot has been to: what is still unknown from
             there cannot be seen, and is refused instead of being offered for ever.

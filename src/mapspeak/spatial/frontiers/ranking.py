@@ -37,8 +37,6 @@ def rank(
     so the metres by which the round through all frontiers grows are set against the gain.
 
     Args:
-        floor: The map, seen from where the robot is.
-        frontiers: In any order.
         known_ways: Between frontiers of the same map; used if they are those that matter.
 
     Returns:

@@ -154,7 +154,6 @@ class ExpectedGain:
     """The unknown that may come into view from a place.
 
     Attributes:
-        area_m2: As much as is to be expected.
         bearing_rad: Towards most of it, from the grid's own x axis; None where it lies all around.
     """
 
@@ -210,9 +209,7 @@ def find_views(grid: OccupancyGrid, clearances_m: Clearance, places: Sequence[Ce
     Outside the array everything is unknown.
 
     Args:
-        grid: The map.
         clearances_m: From each of its cells to the nearest obstacle.
-        places: The cells.
     """
     stride = max(round(STEP_M / grid.resolution_m), 1)
     steps = np.arange(stride, SIGHT_M / grid.resolution_m + 1e-6, stride)

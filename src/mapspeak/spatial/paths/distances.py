@@ -79,7 +79,6 @@ class DistanceField:
         """Find a way near the cheapest one where some floor costs more.
 
         Args:
-            point: Where to.
             weights: What a metre costs in each cell of the map, 1 or more.
         """
         goal = self._find_reached(point)
@@ -130,9 +129,6 @@ def distances_from(
     On large maps it works on cells of twice the size, with the same connections.
 
     Args:
-        grid: The map.
-        start: Where the robot is.
-        radius_m: Of the robot.
         leaves_pockets: See `open_pocket`; not for a radius that must be kept to the millimetre.
     """
     lattice = build_coarse_lattice(grid, radius_m)
@@ -178,8 +174,6 @@ def open_pocket(lattice: Lattice, costs: Costs, start: Point, *, radius_m: float
     Args:
         lattice: The map's, for the robot's radius.
         costs: What can be reached on it, from the start.
-        start: Where the robot is.
-        radius_m: Of the robot.
 
     Returns:
         The same lattice where no gap that lacks less than one cell on each side leads out, and on

@@ -41,7 +41,7 @@ def known_clearance_m(grid: OccupancyGrid) -> Clearance:
 
 
 def measure_away(mask: Mask) -> Clearance:
-    """Return for every cell the cells to the nearest one in a mask; infinite where there is none."""
+    """Return for each cell how many cells the nearest one in a mask is away; infinite without one."""
     if not mask.any():
         return np.full(mask.shape, np.inf, dtype=np.float32)
     source = np.logical_not(mask).view(np.uint8)

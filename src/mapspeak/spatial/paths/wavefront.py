@@ -59,7 +59,6 @@ def spread(
             the array, so the outermost cells have none outwards.
         weights: What a unit of way costs in each cell, at least 1; a move costs its length times
             the mean of both ends. None where all cells cost 1.
-        seeds: Where to start.
         goals: Stop once all these cells are settled.
     """
     front = _Front(moves, None if weights is None else weights.ravel(), seeds)

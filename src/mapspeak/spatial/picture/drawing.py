@@ -59,12 +59,10 @@ class MapPicture:
     """A drawn map, and what a text beside it has to say about it.
 
     Attributes:
-        view: The transform between the map and the pixels.
         spacing_m: Between the lines of the metric grid; None where none is drawn.
         labels_left_out: Texts of things in the picture whose label found no room.
         marks_outside: Labels of marks that lie outside the part of the map shown.
         regions_outside: Texts of regions of which no part is shown.
-        has_robot: The robot's arrow is in the picture.
     """
 
     png: bytes
@@ -95,8 +93,6 @@ def draw_map(
     """Draw the known part of a map, or a closer look at some of it, as a PNG.
 
     Args:
-        grid: The map.
-        layers: What is drawn on it.
         up_rad: The direction in the map that points up: pi/2 for y up, the robot's yaw for its own
             point of view.
         zoom: The part to show; None for all that is known, the robot, and
@@ -274,8 +270,6 @@ def _draw_symbols(
 
     Args:
         inside: The map area; changed in place.
-        view: Where the map lies.
-        shown: What is to be seen.
         labels: Those of zones and regions.
         regions: The region of each pixel.
     """

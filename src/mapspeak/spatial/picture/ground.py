@@ -144,8 +144,6 @@ def _coarse_from_fine(
     """Return the affine map from a point of the fine lattice to a coarse cell, both (x, y).
 
     Args:
-        grid: The turned grid.
-        view: The picture.
         n_fine: Lattice points per pixel along each axis.
         n_pooled: Cells per coarse cell along each axis.
         first: The (row, col) at which the coarse cells begin.

@@ -117,7 +117,6 @@ def stamp(
         canvas: Palette numbers; changed in place.
         patch: How much of each pixel is covered, 0 to 255.
         top_left: The column and row of the patch's first pixel.
-        colour: Of the ink.
         halo_px: How far white reaches around it.
     """
     padded = cv2.copyMakeBorder(

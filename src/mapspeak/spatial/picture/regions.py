@@ -51,8 +51,6 @@ def paint_regions(
     Args:
         ground: Palette numbers of the map area; changed in place.
         labels: The region of each pixel, from `sample`.
-        regions: What is to be seen of them.
-        colours: Of each region's label.
     """
     fill = np.take(_fill_by_label(regions, colours, FillPart.PLAIN), labels)
     is_filled = (ground == FREE) & (fill > 0)
@@ -173,7 +171,6 @@ def find_poles(
 
     Args:
         regions: The region of each pixel of the map area; 0 for none.
-        wanted: The regions that are looked for.
     """
     coarse = cv2.copyMakeBorder(regions[::2, ::2], 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=(0,))
     kernel = np.ones((3, 3), dtype=np.uint8)
@@ -219,7 +216,6 @@ def paint_zones(
 
     Args:
         ground: Palette numbers of the map area; changed in place, but for walls.
-        view: Where the map lies.
         zones: The later ones lie above; what they cover wholly has no place for a label.
     """
     numbers = np.zeros(ground.shape, dtype=np.uint16)

@@ -73,7 +73,6 @@ class PictureView:
         up_rad: The direction in the map that points up in the picture; pi/2 is y up.
         pixels_per_m: The scale, the same along both axes.
         area: The part of the picture that shows the map.
-        width_px: Columns of the whole picture.
     """
 
     corner: Point

@@ -53,10 +53,8 @@ def find_blocks(
     """Return 1 on furniture with its inside, and 1 on the walls behind it.
 
     Args:
-        raster: The map.
         wall: 1 on what was taken for wall; nothing else runs on behind furniture.
         angle_deg: The direction of its walls.
-        settings: The lengths.
     """
     free, occupied, wall = turn_upright(raster.free, raster.occupied, wall, angle_deg)
     solid = 1 - drop_specks(free, _SPECK_M2 / raster.cell_area_m2)

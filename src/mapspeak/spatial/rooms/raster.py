@@ -105,7 +105,6 @@ class Raster:
         occupied: 1 where something stands, else 0.
         cell_size_m: The side of one raster cell.
         first_row: The row of the grid at which the raster begins.
-        first_col: The column of the grid at which the raster begins.
         scale: Raster cells per grid cell along one side; below 1 when the raster is coarser.
     """
 

@@ -41,8 +41,6 @@ class Region:
         heading_rad: Direction of the longer side in the map frame, from 0 up to pi.
         widest: The floor point farthest from any wall; a good place for a label.
         clearance_m: How far that point is from the nearest wall.
-        door_ids: The doors that lead out of it.
-        neighbour_ids: The regions behind those doors.
     """
 
     id: str
