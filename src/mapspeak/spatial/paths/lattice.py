@@ -41,7 +41,7 @@ def known_clearance_m(grid: OccupancyGrid) -> Clearance:
 
 
 def measure_away(mask: Mask) -> Clearance:
-    """Return for each cell how many cells the nearest one in a mask is away; infinite without one."""
+    """Return for each cell how many cells away the nearest of a mask is; infinite for none."""
     if not mask.any():
         return np.full(mask.shape, np.inf, dtype=np.float32)
     source = np.logical_not(mask).view(np.uint8)
