@@ -334,7 +334,14 @@ class Session:
     async def keep_watch(self) -> None:
         """Stop a driving robot for a hold, a closed area, or want of clients; until cancelled."""
         with self._announced():
-            await self._keep_watch()
+            async with anyio.create_task_group() as tasks:
+                if self._guarded is not None:
+                    # Apart from each other: one that is slow to tell its map is stopped at once.
+                    tasks.start_soon(self._again_and_again, self._guarded.obey_hold, LOOK_S)
+                    tasks.start_soon(self._again_and_again, self._guarded.watch, LOOK_S)
+                    tasks.start_soon(self._again_and_again, self._guarded.watch_map, LOOK_S)
+                tasks.start_soon(self._again_and_again, self._watch, WATCH_S)
+                tasks.start_soon(self.warm_memory)
 
     @contextmanager
     def _announced(self) -> Generator[None]:
@@ -349,16 +356,6 @@ class Session:
             yield
         finally:
             self.guard.hold.leave(self._guarded.name)
-
-    async def _keep_watch(self) -> None:
-        async with anyio.create_task_group() as tasks:
-            if self._guarded is not None:
-                # Apart from each other: a robot that is slow to tell its map is stopped at once.
-                tasks.start_soon(self._again_and_again, self._guarded.obey_hold, LOOK_S)
-                tasks.start_soon(self._again_and_again, self._guarded.watch, LOOK_S)
-                tasks.start_soon(self._again_and_again, self._guarded.watch_map, LOOK_S)
-            tasks.start_soon(self._again_and_again, self._watch, WATCH_S)
-            tasks.start_soon(self.warm_memory)
 
     async def _again_and_again(self, look: Callable[[], Awaitable[None]], every_s: float) -> None:
         told = ""

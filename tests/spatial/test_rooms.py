@@ -185,20 +185,17 @@ def test_places_are_given_in_the_map_frame_of_a_turned_map() -> None:
         assert origin.transform(door.place).distance_to(other.place) < 1e-6
 
 
-def test_the_way_through_the_fewest_doors_is_found() -> None:
+def test_the_doors_between_two_rooms_are_found() -> None:
     rooms = find_rooms(drawn(OFFICE))
 
-    assert rooms.find_way("R2", "R6") == ("R2", "C1", "R6")
-    assert rooms.find_way("R2", "R2") == ("R2",)
     assert len(rooms.doors_between("R2", "C1")) == 1
     assert rooms.doors_between("R2", "R6") == ()
 
 
-def test_there_is_no_way_into_a_closed_room() -> None:
+def test_a_closed_room_has_no_doors() -> None:
     rooms = find_rooms(drawn(TWO_ROOMS.replace("." * 30, "." * 15 + "#" + "." * 14)))
 
     assert rooms.doors == ()
-    assert rooms.find_way("R1", "R2") is None
 
 
 def test_an_unknown_id_is_refused_with_the_ids_there_are() -> None:

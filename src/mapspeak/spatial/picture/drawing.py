@@ -11,7 +11,7 @@ from PIL import Image
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial.grid import FloatArray, OccupancyGrid
-from mapspeak.spatial.picture import axes, ground, ink, plan
+from mapspeak.spatial.picture import axes, ink, plan
 from mapspeak.spatial.picture.labels import (
     Label,
     draw_leaders,
@@ -45,7 +45,10 @@ from mapspeak.spatial.picture.view import (
     NORTH_UP_RAD,
     PictureView,
     even_spacing_m,
+    paint_ground,
+    paint_paper_ground,
     paper_spacing_m,
+    sample,
 )
 
 _GROUNDS = {FREE: "free", UNKNOWN_GROUND: "unknown", WALL: "wall"}
@@ -116,11 +119,11 @@ def draw_map(
     )
     canvas = np.full((view.height_px, view.width_px), PAPER, dtype=np.uint8)
     inside = view.area_of(canvas)
-    inside[:] = ground.paint_ground(grid, view)
+    inside[:] = paint_ground(grid, view)
     regions = None
     if layers.regions is not None:
         check_layer(layers.regions, grid)
-        regions = ground.sample(layers.regions.labels, grid, view)
+        regions = sample(layers.regions.labels, grid, view)
         colours = colour_regions(layers.regions, grid)
         paint_regions(inside, regions, layers.regions.regions, colours)
     seen = {number: text for number, text in _GROUNDS.items() if (inside == number).any()}
@@ -133,13 +136,13 @@ def draw_map_plain(grid: OccupancyGrid, *, max_edge_px: int = 1000) -> MapPictur
 
     In this and the next two row 0 of the grid is at the bottom, and a point of the world falls
     where eq. 3 says, times the whole number of pixels that one cell takes. Where the paper is
-    silent (a turned origin, a map larger than a model takes in) they follow `plan` and `ground`.
+    silent (a turned origin, a map larger than a model takes in) they follow `plan` and `view`.
     """
     extent = plan.extent_of_map(grid, NORTH_UP_RAD)
     view = plan.plan_view(
         grid, extent, up_rad=NORTH_UP_RAD, margins=plan.Margins(), max_edge_px=max_edge_px
     )
-    return MapPicture(png=_encode(ground.paint_paper_ground(grid, view)), view=view)
+    return MapPicture(png=_encode(paint_paper_ground(grid, view)), view=view)
 
 
 def draw_map_axis(grid: OccupancyGrid, *, max_edge_px: int = 1000) -> MapPicture:
@@ -158,7 +161,7 @@ def _draw_with_axes(grid: OccupancyGrid, layers: MapLayers, max_edge_px: int) ->
     legend = Legend(spacing_m=spacing_m, grounds=_PAPER_GROUNDS)
     view = _plan_sheet(grid, extent, legend, up_rad=NORTH_UP_RAD, max_edge_px=max_edge_px)
     canvas = np.full((view.height_px, view.width_px), PAPER, dtype=np.uint8)
-    view.area_of(canvas)[:] = ground.paint_paper_ground(grid, view)
+    view.area_of(canvas)[:] = paint_paper_ground(grid, view)
     axes.draw_axes(canvas, view, spacing_m)
     return _finish(canvas, view, layers, legend=legend, regions=None)
 

@@ -1,7 +1,7 @@
 """Rooms, corridors and doors found on an occupancy grid."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 
 import cv2
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.geometry import Point
-from mapspeak.spatial.grid import Mask, OccupancyGrid
+from mapspeak.spatial.grid import Mask, OccupancyGrid, Window
 from mapspeak.spatial.paths.lattice import measure_away
 from mapspeak.spatial.rooms.identity import match_rooms, sort_key
 from mapspeak.spatial.rooms.raster import Raster, RoomSettings, build_raster, find_cells
@@ -32,42 +32,35 @@ OPEN_SPACE_AREA_M2 = 100.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RegionShape:
-    """The measures of one region; the fields are those of `Region`, and two more.
+    """A region before it has an id, with two more measures.
 
     Attributes:
         open_clearance_m: The largest clearance if what stands free in the region were gone.
         mean_clearance_m: The mean distance of its floor from the nearest wall.
     """
 
-    free_area_m2: float
-    floor_area_m2: float
-    length_m: float
-    width_m: float
-    heading_rad: float
-    widest: Point
-    clearance_m: float
+    region: Region
     open_clearance_m: float
     mean_clearance_m: float
 
     @property
     def elongation(self) -> float:
         """Area over the square of the widest clearance diameter: 1 for a square, more if long."""
-        return self.floor_area_m2 / max(2 * self.open_clearance_m, 1e-6) ** 2
+        return self.region.floor_area_m2 / max(2 * self.open_clearance_m, 1e-6) ** 2
 
     @property
     def is_strip(self) -> bool:
         """True where it is much longer than wide, and hardly bends."""
-        return self.elongation > STRIP and self.length_m > STRIP * self.width_m
+        return self.elongation > STRIP and self.region.length_m > STRIP * self.region.width_m
 
 
 def measure_regions(segmentation: Segmentation) -> list[RegionShape]:
     """Return the measures of every region, in the order of their numbers."""
-    windows = _find_windows(segmentation)
+    windows = _find_windows(segmentation.labels)
     return [_measure(segmentation, index, window) for index, window in enumerate(windows, start=1)]
 
 
-def _find_windows(segmentation: Segmentation) -> list[tuple[slice, slice]]:
-    labels = segmentation.labels
+def _find_windows(labels: NDArray[np.int32]) -> list[Window]:
     n = int(labels.max(initial=0))
     if n == 0:
         return []
@@ -85,13 +78,16 @@ def _find_windows(segmentation: Segmentation) -> list[tuple[slice, slice]]:
     ]
 
 
-def _measure(segmentation: Segmentation, index: int, window: tuple[slice, slice]) -> RegionShape:
+def _measure(segmentation: Segmentation, index: int, window: Window) -> RegionShape:
     raster = segmentation.raster
     inside = segmentation.labels[window] == index
     clearance = np.where(inside, segmentation.floor.clearance_m[window], 0)
     row, col = np.unravel_index(int(np.argmax(clearance)), clearance.shape)
     length, width, heading = _bounding_rectangle(inside)
-    return RegionShape(
+    region = Region(
+        id="",
+        index=index,
+        room_class=RoomClass.ROOM,
         free_area_m2=int((inside & (raster.free[window] > 0)).sum()) * raster.cell_area_m2,
         floor_area_m2=int(inside.sum()) * raster.cell_area_m2,
         length_m=length * raster.cell_size_m,
@@ -99,6 +95,9 @@ def _measure(segmentation: Segmentation, index: int, window: tuple[slice, slice]
         heading_rad=(heading + raster.grid.origin.yaw_rad) % math.pi,
         widest=raster.point_at(window[0].start + row + 0.5, window[1].start + col + 0.5),
         clearance_m=float(clearance[row, col]),
+    )
+    return RegionShape(
+        region=region,
         open_clearance_m=max(clearance[row, col], _open_clearance(inside) * raster.cell_size_m),
         mean_clearance_m=float(clearance[inside].mean()),
     )
@@ -139,8 +138,8 @@ def classify(shape: RegionShape, *, n_neighbours: int) -> RoomClass:
     )
     if is_corridor:
         return RoomClass.CORRIDOR
-    is_wide = 2 * shape.clearance_m >= OPEN_SPACE_WIDTH_M
-    is_open = is_wide and shape.floor_area_m2 >= OPEN_SPACE_AREA_M2
+    is_wide = 2 * shape.region.clearance_m >= OPEN_SPACE_WIDTH_M
+    is_open = is_wide and shape.region.floor_area_m2 >= OPEN_SPACE_AREA_M2
     return RoomClass.OPEN_SPACE if is_open else RoomClass.ROOM
 
 
@@ -150,7 +149,7 @@ def walked_size(shape: RegionShape) -> tuple[float, float]:
     In a long strip the mean distance from the nearer side is a quarter of the width.
     """
     width_m = 4 * shape.mean_clearance_m
-    return shape.floor_area_m2 / width_m, width_m
+    return shape.region.floor_area_m2 / width_m, width_m
 
 
 _REACH_M = 0.3
@@ -272,22 +271,16 @@ def _name(
     ids = [f"{LETTER[room_class]}{number}" for number, room_class in enumerate(classes, start=1)]
     regions = []
     for index, (shape, room_class) in enumerate(zip(shapes, classes, strict=True)):
-        is_corridor = room_class is RoomClass.CORRIDOR
-        length_m, width_m = walked_size(shape) if is_corridor else (shape.length_m, shape.width_m)
-        region = Region(
+        region = replace(
+            shape.region,
             id=ids[index],
-            index=index + 1,
             room_class=room_class,
-            free_area_m2=shape.free_area_m2,
-            floor_area_m2=shape.floor_area_m2,
-            length_m=length_m,
-            width_m=width_m,
-            heading_rad=shape.heading_rad,
-            widest=shape.widest,
-            clearance_m=shape.clearance_m,
             door_ids=tuple(door_ids[index]),
             neighbour_ids=tuple(sorted((ids[other] for other in behind[index]), key=sort_key)),
         )
+        if room_class is RoomClass.CORRIDOR:
+            length_m, width_m = walked_size(shape)
+            region = replace(region, length_m=length_m, width_m=width_m)
         regions.append(region)
     doors = tuple(
         Door(

@@ -82,10 +82,8 @@ def _count_overlap(previous: RoomMap, current: RoomMap) -> NDArray[np.float64]:
     every = max(1, rows.size // _SAMPLES)
     rows, cols = rows[::every], cols[::every]
     here = previous.labels[rows, cols].astype(np.intp)
-    there_row, there_col = current.grid.cells_at(previous.grid.points_at(rows, cols))
-    inside = current.grid.contains_cells(there_row, there_col)
-    there = np.zeros(here.size, np.intp)
-    there[inside] = current.labels[there_row[inside], there_col[inside]]
+    points = previous.grid.points_at(rows, cols)
+    there = current.grid.look_up(current.labels, points, outside=0).astype(np.intp)
     shape = (len(previous.regions) + 1, len(current.regions) + 1)
     counts = np.bincount(here * shape[1] + there, minlength=shape[0] * shape[1]).reshape(shape)
     return np.asarray(counts * (every * previous.grid.resolution_m**2), np.float64)

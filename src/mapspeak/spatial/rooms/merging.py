@@ -158,12 +158,8 @@ class Frames:
         return is_wall
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Border:
-    """A saddle that divides two places, and the metres of wall in line with it."""
-
-    saddle: Saddle
-    wall_m: float
+_Border = tuple[Saddle, float]
+"""A saddle that divides two places, and the metres of wall in line with it."""
 
 
 class _Forest:
@@ -256,7 +252,7 @@ def _join_open_borders(
         if narrow == wide:
             continue
         if saddle.is_doorway:
-            borders.append(_Border(saddle=saddle, wall_m=settings.frame_m))
+            borders.append((saddle, settings.frame_m))
             continue
         # Taking furniture away may open a place, but makes no doors by widening what is beside.
         clearance_m, wide_m = forest.standing_m[narrow], forest.clearance_m[wide]
@@ -266,10 +262,10 @@ def _join_open_borders(
             share = min(wall_m / settings.frame_m, 1.0)
             ratio = settings.gap_ratio + share * (settings.door_ratio - settings.gap_ratio)
             if saddle.height <= ratio * clearance_m:
-                borders.append(_Border(saddle=saddle, wall_m=wall_m))
+                borders.append((saddle, wall_m))
                 continue
         if _is_mouth(forest, narrow, wide, saddle, settings):
-            borders.append(_Border(saddle=saddle, wall_m=0.0))
+            borders.append((saddle, 0.0))
         else:
             forest.join(narrow, wide)
     return borders
@@ -304,12 +300,12 @@ def _absorb_small(forest: _Forest, borders: list[_Border], settings: RoomSetting
     changed = True
     while changed:
         changed = False
-        for border in borders:
-            narrow, wide = forest.sides(border.saddle)
+        for saddle, wall_m in borders:
+            narrow, wide = forest.sides(saddle)
             area_m2 = min(forest.area_m2[narrow], forest.area_m2[wide])
             # A niche has no door frame: it must be larger than a room.
-            is_framed = border.wall_m >= settings.frame_m / 2
-            is_framed &= 2 * border.saddle.height >= settings.least_door_m
+            is_framed = wall_m >= settings.frame_m / 2
+            is_framed &= 2 * saddle.height >= settings.least_door_m
             least_m2 = settings.room_area_m2 if is_framed else settings.niche_area_m2
             if narrow != wide and area_m2 < least_m2:
                 forest.join(narrow, wide)

@@ -1,6 +1,5 @@
 """What a map looks like once it is divided: regions, the doors between them, and how they join."""
 
-from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -172,25 +171,3 @@ class RoomMap:
         """Return the doors that join two regions."""
         pair = {first_id, second_id}
         return tuple(door for door in self.doors if set(door.region_ids) == pair)
-
-    def find_way(self, start_id: str, goal_id: str) -> tuple[str, ...] | None:
-        """Return the regions from start to goal through the fewest doors, or None.
-
-        Raises:
-            MapError: One of the two is not a region of this map.
-        """
-        start, goal = self.region(start_id).id, self.region(goal_id).id
-        came_from: dict[str, str] = {start: start}
-        queue = deque([start])
-        while queue:
-            here = queue.popleft()
-            if here == goal:
-                way = [goal]
-                while way[-1] != start:
-                    way.append(came_from[way[-1]])
-                return tuple(reversed(way))
-            for neighbour in self.region(here).neighbour_ids:
-                if neighbour not in came_from:
-                    came_from[neighbour] = here
-                    queue.append(neighbour)
-        return None
