@@ -7,7 +7,7 @@ fewest walls and drawn things; a label with no free position gets none.
 import itertools
 import math
 from collections.abc import Callable
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -221,7 +221,7 @@ class _Search:
         self._taken = _Taken(obstacles)
         self._spared = np.zeros((0, 4), dtype=np.intp)
         self.wishes = {label: spot for label in labels if (spot := self._find_inside(label))}
-        wished = [astuple(spot.box) for spot in self.wishes.values()]
+        wished = [spot.box for spot in self.wishes.values()]
         self._spared = np.array(wished, dtype=np.intp).reshape(-1, 4)
 
     def place(self, label: Label) -> None:
@@ -299,13 +299,13 @@ class _Taken:
     """Boxes that no label may touch; grows as labels find their places."""
 
     def __init__(self, obstacles: tuple[Box, ...]) -> None:
-        self._boxes = np.array([astuple(box) for box in obstacles], dtype=np.intp).reshape(-1, 4)
+        self._boxes = np.array(obstacles, dtype=np.intp).reshape(-1, 4)
         self._owners: list[Label | None] = [None] * len(obstacles)
 
     def add(self, spot: Placed) -> None:
         """Take a label's box, and a rim around it and its leader."""
         rim = np.array([-HALO_PX, -HALO_PX, HALO_PX, HALO_PX])
-        boxes = np.array([astuple(spot.box)])
+        boxes = np.array([spot.box])
         if spot.has_leader:
             leader = leader_of(spot.label, spot.box)
             length_px = float(np.hypot(*(leader[1] - leader[0])))
@@ -323,7 +323,7 @@ class _Taken:
 
     def owners_at(self, box: Box) -> tuple[Label, ...]:
         """Return the labels that have taken some of a box, each once."""
-        found = np.flatnonzero(_overlaps(np.array([astuple(box)]), self._boxes)[0])
+        found = np.flatnonzero(_overlaps(np.array([box]), self._boxes)[0])
         owners = [self._owners[index] for index in found]
         return tuple(dict.fromkeys(owner for owner in owners if owner is not None))
 

@@ -5,10 +5,9 @@ stays a wall at any scale. Where the grid's axes are those of the picture, cells
 blocks of pixels; a turned grid is read at points so dense that none of its cells is missed.
 """
 
-import dataclasses
 import math
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import cv2
 import numpy as np
@@ -39,9 +38,8 @@ class Pixel:
     v: int
 
 
-@dataclass(frozen=True, slots=True)
-class Box:
-    """A rectangle of pixels; right and bottom are the first pixels outside."""
+class Box(NamedTuple):
+    """A rectangle of pixels, which arrays are made of; right and bottom are the first outside."""
 
     left: int
     top: int
@@ -141,7 +139,7 @@ class PictureView:
 
     def area_corners(self) -> FloatArray:
         """Return the four corners of the map area as points of the map, shape (4, 2)."""
-        left, top, right, bottom = dataclasses.astuple(self.area)
+        left, top, right, bottom = self.area
         corners = [[left, top], [right, top], [right, bottom], [left, bottom]]
         return self.points_at(np.array(corners, dtype=np.float64))
 

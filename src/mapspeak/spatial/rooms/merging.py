@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from mapspeak.spatial.grid import IntArray
 from mapspeak.spatial.rooms.floor import Floor
 from mapspeak.spatial.rooms.raster import Picture, RoomSettings, find_cells
 from mapspeak.spatial.visibility import cast_rays
@@ -49,7 +50,7 @@ def build_basins(height: Heights, floor: Picture) -> BasinLabels:
     step = _steepest_steps(height).ravel()
     peaks = floor & (step == 0).reshape(floor.shape)
     _, peak_label = cv2.connectedComponents(peaks, connectivity=8)
-    summit = _follow(np.arange(floor.size, dtype=np.int32) + step)
+    summit = _follow(np.arange(floor.size) + step)
     basins = np.asarray(peak_label, np.int32).ravel()[summit].reshape(floor.shape)
     basins[floor == 0] = 0
     return basins
@@ -75,10 +76,10 @@ def _steepest_steps(height: Heights) -> NDArray[np.int32]:
     return step
 
 
-def _follow(pointer: NDArray[np.int32]) -> NDArray[np.int32]:
+def _follow(pointer: IntArray) -> IntArray:
     """Follow every pointer to its end by doubling."""
     while True:
-        further = pointer[pointer]
+        further = np.take(pointer, pointer, mode="clip")
         if np.array_equal(further, pointer):
             return pointer
         pointer = further
