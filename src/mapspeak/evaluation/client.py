@@ -16,12 +16,7 @@ class OutOfBudgetError(MapspeakError):
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A picture in a tool's answer.
-
-    Attributes:
-        data: The encoded picture.
-        media_type: Such as "image/png".
-    """
+    """A picture in a tool's answer."""
 
     data: bytes
     media_type: str
@@ -37,8 +32,6 @@ class ToolAnswer:
     """What a tool answered.
 
     Attributes:
-        text: All text in it.
-        pictures: All pictures in it.
         report: The structured part; empty where there is none.
         is_error: The tool could not do what was asked; the text says why.
     """
@@ -83,7 +76,6 @@ class ToolClient:
 
     Attributes:
         client: The connected MCP client; None where the agent reaches the server by itself.
-        witness: Hears every call and answer.
     """
 
     client: Client | None

@@ -29,7 +29,6 @@ class Seen:
 
     Attributes:
         place: The id of the remembered place.
-        view: Where that is.
         bearing_rad: From the place's heading; None where it was not noted.
         range_m: From the place; infinite where it was not noted.
     """

@@ -44,7 +44,6 @@ class MapReading:
     """What the text of `look_at_map` says.
 
     Attributes:
-        pose: Where the robot is.
         tables: Rows by the name of their table: Rooms, Doors, Frontiers, Places.
     """
 

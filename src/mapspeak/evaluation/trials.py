@@ -36,8 +36,6 @@ class Trial:
         task: Its name, such as "smallest-room".
         world: A shipped world's name, or the path of a world file or map.
         seed: Of everything that is drawn: the start, the question, the robot's noise.
-        agent: Who answers.
-        representation: How the server shows the map.
         thinking: How much a model may think; None where nothing was said.
         number: Counts the trials that differ in nothing but the seed; from 1.
     """
@@ -84,7 +82,6 @@ class Setting:
     """What a task makes of a world for one trial.
 
     Attributes:
-        prompt: What the agent is asked.
         guidance: What it is told besides, before it begins, such as the exploration prompt.
         start: Where the robot stands at first, in the world's own frame.
         is_known: The robot has the finished map of the world and finds its place in it; else it
@@ -149,10 +146,8 @@ class Score:
     """What the simulator's truth says of a trial.
 
     Attributes:
-        is_success: The task was done.
         failure: What kind of mistake was made; None for a success.
         figures: By name with its unit: coverage_recall, distance_to_object_m, ...
-        reason: One sentence.
     """
 
     is_success: bool
@@ -175,10 +170,8 @@ class Turn:
 
     Attributes:
         role: "system" or "user" (what it was told), "agent", or "tool" (an answer).
-        text: What was said.
         call: The tool that the agent called, or that answers.
         is_error: The tool answered with an error.
-        pictures: Names of files in the trial's folder `pictures`.
         n_input_tokens: What the model read for this turn; None where nobody counted.
         n_output_tokens: What it wrote.
         n_picture_tokens: What of the input its pictures were.
@@ -205,9 +198,7 @@ class TrialResult:
     """Everything that is kept of a trial, but for its turns, which lie beside it.
 
     Attributes:
-        answer: The agent's last words.
         shortest_m: How far the robot had to drive; None where the task has no such way.
-        n_turns: Pieces of the conversation.
         n_decisions: Times that the agent chose what to do next: model turns, or calls of a script.
         n_errors: Tool calls that were answered with an error.
         n_input_tokens: Read by a model; None where there was none, or nobody counted.
@@ -255,7 +246,6 @@ class Assignment:
     """What an agent is given.
 
     Attributes:
-        prompt: What it is asked.
         system: The server's instructions and the guidance of the task.
         seed: Of anything it draws.
         server: The command line of its server, for agents that start it themselves.
@@ -275,7 +265,6 @@ class AgentEnd:
     """How an agent ended.
 
     Attributes:
-        answer: Its last words; questions are scored by them.
         state: finished, gave_up or out_of_budget.
         n_decisions: Model turns; None counts the calls.
         n_input_tokens: Read by the model; None where there was none.

@@ -23,12 +23,7 @@ MOST_GOALS = 6
 
 @dataclass(frozen=True, slots=True)
 class OracleAgent:
-    """Drives to where truth says, and answers what truth says; explores as the script does.
-
-    Attributes:
-        setting: The trial's, with its truth.
-        site: The world as the trial has set it.
-    """
+    """Drives to where truth says, and answers what truth says; explores as the script does."""
 
     setting: Setting
     site: GroundTruth

@@ -1,7 +1,7 @@
 """The scripted policy's diagnoses of a ROS, each from what the ros tools answer."""
 
 import re
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -15,89 +15,63 @@ PARAMETER = re.compile(r"^(\w+): (-?[\d.]+)(?: |$)", re.MULTILINE)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TopicReading:
-    """What ros_topic tells.
+    """What ros_topic tells; the node through which we look is left out.
 
     Attributes:
-        name: Of the topic.
-        publishers: Nodes; the one through which we look is left out.
-        hearers: Likewise.
         fields: The types of the messages' own fields, by name.
     """
 
     name: str
     publishers: tuple[str, ...]
-    hearers: tuple[str, ...]
+    subscribers: tuple[str, ...]
     fields: Mapping[str, str]
 
 
+@dataclass(frozen=True, slots=True)
 class RosReader:
-    """Calls the ros tools in a script's name.
+    """Calls the ros tools in a script's name."""
 
-    Args:
-        tools: Where calls go.
-    """
+    tools: ToolClient
 
-    def __init__(self, tools: ToolClient) -> None:
-        self._tools = tools
+    async def ask(self, tool: str, **arguments: object) -> str:
+        """Return the text of an answer."""
+        return (await self.tools.demand(tool, **arguments)).text
 
     async def list_topics(self, type_ending: str = "") -> list[str]:
-        """Return the topics, or those whose type ends so."""
-        text = (await self._tools.demand("ros_topics")).text
-        lines = [line.split() for line in text.splitlines()[1:]]
-        return [
-            line[0] for line in lines if line[1].endswith(f"/{type_ending}" * bool(type_ending))
-        ]
+        """Return the topics whose type ends so."""
+        lines = [line.split() for line in (await self.ask("ros_topics")).splitlines()[1:]]
+        ending = f"/{type_ending}" if type_ending else ""
+        return [line[0] for line in lines if line[1].endswith(ending)]
 
-    async def list_nodes(self) -> list[str]:
-        """Return the nodes."""
-        return (await self._tools.demand("ros_nodes")).text.splitlines()[1:]
-
-    async def list_services(self, part: str) -> list[str]:
-        """Return the services with a word in their names."""
-        return (await self._tools.demand("ros_services", filter=part)).text.splitlines()[1:]
+    async def find_topics(self, type_ending: str = "") -> AsyncIterator[TopicReading]:
+        """Yield the topics whose type ends so, each asked for when it is wanted."""
+        for name in await self.list_topics(type_ending):
+            yield await self.fetch_topic(name)
 
     async def fetch_topic(self, topic: str) -> TopicReading:
-        """Return who publishes a topic, who hears it, and of what fields."""
-        text = (await self._tools.demand("ros_topic", topic=topic)).text
+        """Return who publishes a topic, who subscribes to it, and of what fields it is."""
+        text = await self.ask("ros_topic", topic=topic)
         return TopicReading(
             name=topic,
             publishers=_nodes("published by", text),
-            hearers=_nodes("heard by", text),
+            subscribers=_nodes("heard by", text),
             fields=dict(FIELD.findall(text.partition("heard by: ")[2].partition("\n")[2])),
         )
 
-    async def fetch_heard(self, node: str) -> list[str]:
-        """Return the topics that a node hears."""
-        text = (await self._tools.demand("ros_node", node=node)).text
-        match = re.search(r"^hears: (.*)$", text, re.MULTILINE)
-        return match[1].split(", ") if match else []
-
-    async def fetch_parameters(self, node: str) -> dict[str, str]:
-        """Return a node's parameters that are numbers, as they are written."""
-        text = (await self._tools.demand("ros_parameters", node=node)).text
-        return dict(PARAMETER.findall(text))
-
-    async def fetch_service_type(self, service: str) -> str:
-        """Return the type of a service."""
-        text = (await self._tools.demand("ros_service", service=service)).text
-        return text.splitlines()[0].split()[1]
-
     async def fetch_time_s(self) -> float:
         """Return the robot's time; 0 where it does not say."""
-        text = (await self._tools.demand("ros_overview")).text
-        match = re.search(r"robot time (\d+(?:\.\d+)?) s", text)
-        return float(match[1]) if match else 0.0
+        return float(_first(r"robot time (\d+(?:\.\d+)?) s", await self.ask("ros_overview")) or 0)
 
-    async def read(self, topic: str, **how: object) -> str | None:
-        """Return what ros_read says of a topic; None where nothing came."""
-        answer = await self._tools.call("ros_read", topic=topic, **how)
-        return None if answer.is_error else answer.text
+    async def read(self, topic: str, **how: object) -> str:
+        """Return what ros_read says of a topic; nothing where nothing came."""
+        answer = await self.tools.call("ros_read", topic=topic, **how)
+        return "" if answer.is_error else answer.text
 
 
 def _nodes(what: str, text: str) -> tuple[str, ...]:
-    match = re.search(rf"^{what}: (.*)$", text, re.MULTILINE)
+    said = re.search(rf"^{what}: (.*)$", text, re.MULTILINE)
     # What a node does for us is marked behind its name.
-    named = [each.partition(" ")[0] for each in match[1].split(", ")] if match else []
+    named = [each.partition(" ")[0] for each in said[1].split(", ")] if said else []
     return tuple(each for each in named if each.startswith("/") and each != OURSELVES)
 
 
@@ -136,41 +110,39 @@ async def diagnose(tools: ToolClient, question: str) -> AgentEnd:
 
 async def _say_velocity(reader: RosReader, question: str) -> str | None:
     topic = await reader.fetch_topic(_first(rf"velocities on ({NAME})", question))
-    return ", ".join((*topic.publishers[:1], *topic.hearers[:1]))
+    return ", ".join((*topic.publishers[:1], *topic.subscribers[:1]))
 
 
 async def _say_fight(reader: RosReader, _question: str) -> str | None:
-    for name in await reader.list_topics("Twist"):
-        topic = await reader.fetch_topic(name)
+    async for topic in reader.find_topics("Twist"):
         if len(topic.publishers) > 1:
             return ", ".join(topic.publishers)
     return None
 
 
 async def _say_unheard(reader: RosReader, _question: str) -> str | None:
-    for name in await reader.list_topics():
-        topic = await reader.fetch_topic(name)
-        if topic.publishers and not topic.hearers:
-            return name
+    async for topic in reader.find_topics():
+        if topic.publishers and not topic.subscribers:
+            return topic.name
     return None
 
 
 async def _say_missing(reader: RosReader, question: str) -> str | None:
     launched = _names(_first(r"starts the nodes (.+?)\. One", question))
-    running = await reader.list_nodes()
+    running = (await reader.ask("ros_nodes")).splitlines()[1:]
     missing = [node for node in launched if node not in running]
-    for name in await reader.list_topics():
-        topic = await reader.fetch_topic(name)
-        if missing and topic.hearers and not topic.publishers:
-            return f"{missing[0]}, {name}"
+    async for topic in reader.find_topics():
+        if missing and topic.subscribers and not topic.publishers:
+            return f"{missing[0]}, {topic.name}"
     return None
 
 
 async def _say_remap(reader: RosReader, question: str) -> str | None:
     node = _first(rf"yet ({NAME}) gets no scans", question)
-    heard = await reader.fetch_heard(node)
-    scans = [await reader.fetch_topic(name) for name in await reader.list_topics("LaserScan")]
-    waits = next((each for each in scans if each.name in heard and not each.publishers), None)
+    heard = re.search(r"^hears: (.*)$", await reader.ask("ros_node", node=node), re.MULTILINE)
+    wanted = heard[1].split(", ") if heard else []
+    scans = [topic async for topic in reader.find_topics("LaserScan")]
+    waits = next((each for each in scans if each.name in wanted and not each.publishers), None)
     comes = next((each for each in scans if each.publishers), None)
     return None if waits is None or comes is None else f"{waits.name}, {comes.name}"
 
@@ -178,7 +150,7 @@ async def _say_remap(reader: RosReader, question: str) -> str | None:
 async def _say_parameter(reader: RosReader, question: str) -> str | None:
     node = _first(rf"the parameters of ({NAME}) are", question)
     sheet = re.findall(r"(\w+) ([\d.]+\d|\d)(?=,|\.)", _first(r"are: (.+?\.) One", question))
-    values = await reader.fetch_parameters(node)
+    values = dict(PARAMETER.findall(await reader.ask("ros_parameters", node=node)))
     for name, right in sheet:
         value = float(values.get(name, right))
         if abs(value - float(right)) > 1e-3 * abs(value):
@@ -188,11 +160,12 @@ async def _say_parameter(reader: RosReader, question: str) -> str | None:
 
 async def _say_service(reader: RosReader, question: str) -> str | None:
     word = next(there for here, there in SERVICE_WORDS.items() if here in question)
-    for name in await reader.list_services(word):
+    for name in (await reader.ask("ros_services", filter=word)).splitlines()[1:]:
         last = name[1:].partition("/")[2]
         is_other = word == "map" and "costmap" in last
         if word in last and not is_other and "parameter" not in last:
-            return f"{name}, {await reader.fetch_service_type(name)}"
+            text = await reader.ask("ros_service", service=name)
+            return f"{name}, {text.splitlines()[0].split()[1]}"
     return None
 
 
@@ -207,36 +180,36 @@ async def _say_type(reader: RosReader, question: str) -> str | None:
 
 async def _say_map(reader: RosReader, _question: str) -> str | None:
     found: list[tuple[float, str]] = []
-    for name in await reader.list_topics("OccupancyGrid"):
-        text = await reader.read(name)
-        match = re.search(r"Grid of (\d+) x (\d+) cells of ([\d.]+) m", text or "")
+    for topic in await reader.list_topics("OccupancyGrid"):
+        text = await reader.read(topic)
+        match = re.search(r"Grid of (\d+) x (\d+) cells of ([\d.]+) m", text)
         if match is not None:
             n_cols, n_rows, resolution_m = int(match[1]), int(match[2]), float(match[3])
-            said = f"{name}, {n_cols} x {n_rows}, {resolution_m:g} m"
+            said = f"{topic}, {n_cols} x {n_rows}, {resolution_m:g} m"
             found.append((n_cols * n_rows * resolution_m**2, said))
     return max(found)[1] if found else None
 
 
 async def _say_rate(reader: RosReader, _question: str) -> str | None:
-    for name in await reader.list_topics("LaserScan"):
-        text = await reader.read(name, duration_s=RATE_OVER_S)
-        match = re.search(r"(\d+) messages in ([\d.]+) s", text or "")
+    for topic in await reader.list_topics("LaserScan"):
+        text = await reader.read(topic, duration_s=RATE_OVER_S)
+        match = re.search(r"(\d+) messages in ([\d.]+) s", text)
         if match is not None:
-            return f"{name}, {int(match[1]) / float(match[2]):.2f} Hz"
+            return f"{topic}, {int(match[1]) / float(match[2]):.2f} Hz"
     return None
 
 
 async def _say_silent(reader: RosReader, question: str) -> str | None:
     for name in _names(_first(r"publish on (.+?)\. Which", question)):
-        if await reader.read(name, wait_s=SILENT_AFTER_S) is None:
+        if not await reader.read(name, wait_s=SILENT_AFTER_S):
             return name
     return None
 
 
 async def _say_battery(reader: RosReader, question: str) -> str | None:
     least = float(_first(r"below (\d+) %", question))
-    for name in await reader.list_topics("BatteryState"):
-        match = re.search(r"^percentage: ([\d.]+)", await reader.read(name) or "", re.MULTILINE)
+    for topic in await reader.list_topics("BatteryState"):
+        match = re.search(r"^percentage: ([\d.]+)", await reader.read(topic), re.MULTILINE)
         if match is not None:
             charge = 100 * float(match[1])
             return f"{charge:.0f} %, {'charge' if charge < least else 'stay'}"
@@ -246,7 +219,7 @@ async def _say_battery(reader: RosReader, question: str) -> str | None:
 async def _say_clock(reader: RosReader, question: str) -> str | None:
     lags: list[tuple[float, str]] = []
     for name in _names(_first(r"publish on (.+?)\. On which", question)):
-        match = re.search(r"stamp: ([\d.]+) s", await reader.read(name) or "")
+        match = re.search(r"stamp: ([\d.]+) s", await reader.read(name))
         if match is not None:
             lags.append((await reader.fetch_time_s() - float(match[1]), name))
     return f"{max(lags)[1]}, {max(lags)[0]:.1f} s" if lags else None
@@ -254,9 +227,9 @@ async def _say_clock(reader: RosReader, question: str) -> str | None:
 
 async def _say_transform(reader: RosReader, question: str) -> str | None:
     chain = _first(r": ([\w, ]+)\. Is the chain", question).split(", ")
-    moving = await reader.read("/tf", n=N_TRANSFORMS, duration_s=TRANSFORMS_OVER_S) or ""
+    moving = await reader.read("/tf", n=N_TRANSFORMS, duration_s=TRANSFORMS_OVER_S)
     now_s = await reader.fetch_time_s()
-    fixed = await reader.read("/tf_static") or ""
+    fixed = await reader.read("/tf_static")
     for parent, child in pairwise(chain):
         link = rf"^{parent} -> {child}: .*\(([\d.]+) s\)$"
         stamps = [float(stamp) for stamp in re.findall(link, moving, re.MULTILINE)]

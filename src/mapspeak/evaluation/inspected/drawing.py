@@ -92,14 +92,7 @@ def draw_names(random: np.random.Generator) -> Names:
 def draw_system(
     random: np.random.Generator, names: Names, grid: OccupancyGrid, *, dialect: Dialect
 ) -> InspectedSystem:
-    """Draw a system in which everything is as it should be.
-
-    Args:
-        random: Of the figures.
-        names: Of its parts.
-        grid: The map that it carries.
-        dialect: Which ROS it is.
-    """
+    """Draw a system in which everything is as it should be."""
     bare = InspectedSystem(
         dialect=dialect,
         started_s=float(random.integers(FIRST_S, LAST_S)),

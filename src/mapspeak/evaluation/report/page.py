@@ -44,8 +44,6 @@ def write_page(
     """Write the page of a run into its folder.
 
     Args:
-        run: The run's folder.
-        results: What came of the trials.
         page_limit_bytes: About how large the page may become. Above it each trial's replay is a
             page of its own in the trial's folder, with its pictures beside it.
     """

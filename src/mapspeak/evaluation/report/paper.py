@@ -21,11 +21,8 @@ class PaperRow:
     """What the paper printed of one model.
 
     Attributes:
-        model: Which one.
         coverage_paper_ratio: Task 1, between 0 and 1; one run.
         n_smallest_room: Of thirty trials of Task 2, how many were done.
-        n_fire_tool: Of thirty trials of Task 3.
-        n_trials: Thirty.
     """
 
     model: str

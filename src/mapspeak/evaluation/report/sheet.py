@@ -147,7 +147,6 @@ class Album:
 
     Attributes:
         is_inside: Pictures are part of the page; else they are linked.
-        root: The folder that the page lies in.
     """
 
     is_inside: bool

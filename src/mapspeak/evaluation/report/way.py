@@ -75,9 +75,6 @@ class StepMark:
     """Where the robot stood at a step of the replay, on the picture of its map.
 
     Attributes:
-        anchor: The id of the step.
-        u: Pixels from the left.
-        v: Pixels from the top.
         heading_deg: Clockwise from the picture's right.
         driven_ratio: The share of the whole line that lies behind it.
     """
@@ -95,7 +92,6 @@ class DrivenPath:
 
     Attributes:
         line: As SVG writes it; empty for a robot that never moved.
-        stops: Where the robot stood, by the ids of the steps.
     """
 
     sheet: Sheet
@@ -109,7 +105,6 @@ def lay_out_way(
     """Lay a trial's way out on its map; None where there is no map.
 
     Args:
-        course: How the trial went.
         poses: Of each step: its id, where the robot truly stood, and the robot time.
     """
     sheet = None if course.grid is None else draw_sheet(course.grid)

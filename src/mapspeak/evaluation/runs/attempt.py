@@ -47,13 +47,9 @@ class Transcript:
     """The witness of one trial.
 
     Args:
-        folder: The trial's.
         limits: What it may cost; wall time is watched from outside.
         look: Return how the simulation truly stands.
         on_turn: Told of every turn.
-
-    Attributes:
-        n_errors: Calls that were answered with an error.
     """
 
     def __init__(
@@ -164,9 +160,6 @@ def attempt(
     """Carry out a trial, write everything about it, its result last, and return that.
 
     Args:
-        run: The run's folder.
-        trial: Which attempt.
-        world: Its world.
         preparation: The trial whose map and memory this one starts from; None where there is none.
         connection: How the agent reaches the server; None for the way that the agent prefers.
         control: Where the robot is held and released; None for a folder of the trial.

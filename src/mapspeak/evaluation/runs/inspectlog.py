@@ -27,8 +27,6 @@ def write_log(
     """Write the log of a run into its folder.
 
     Args:
-        run: The run's folder.
-        results: What came of the trials.
         versions: Of everything that took part, by name.
         is_whole: All that was asked for has a result.
     """

@@ -28,15 +28,11 @@ class RunOptions:
     """What an evaluation was asked for.
 
     Attributes:
-        agents: Who answers.
         tasks: Names of tasks or of their groups.
         worlds: Names, paths, or "all" for those that are shipped.
         n_trials: Of each task in each world; a world is explored once.
         seed: The first trial's; each further one has the next.
-        folder: Where everything goes.
-        representations: How the server shows the map.
         thinking: How much models may think; None where nothing was said. Scripts are asked once.
-        n_jobs: Trials at a time.
         hang_s: Wall time after which a trial's process is killed.
         has_retry: Trials that crashed or hung before are run again.
 

@@ -13,14 +13,15 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
 from functools import partial
 from multiprocessing.connection import wait
 from multiprocessing.context import BaseContext
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
+import numpy as np
 from filelock import FileLock, Timeout
 from pydantic import ValidationError
 
@@ -59,7 +60,6 @@ class TrialJob:
     """A trial to be run.
 
     Attributes:
-        trial: Which one.
         work: Carries it out and writes its result; called in a process of its own.
         after: A trial that has to be finished before; None for none.
         wall_s: A process that takes longer is killed.
@@ -91,9 +91,8 @@ def make_jobs(
 
 def _floor_m2(world: World) -> float:
     """Return about how large a world is: the box around its walls."""
-    ends = [end for wall in world.walls for end in (wall.start, wall.end)]
-    xs, ys = [end.x for end in ends], [end.y for end in ends]
-    return (max(xs) - min(xs)) * (max(ys) - min(ys)) if ends else 0.0
+    ends = [(end.x, end.y) for wall in world.walls for end in (wall.start, wall.end)]
+    return float(np.prod(np.ptp(ends, axis=0))) if ends else 0.0
 
 
 # --- running it ----------------------------------------------------------------------------------
@@ -108,8 +107,6 @@ def run_evaluation(
     """Run every trial that has no result yet, and return the plan.
 
     Args:
-        options: What is asked for.
-        on_plan: Told of all trials before the first one.
         on_done: Told of every result, also of those that were there already.
 
     Raises:
@@ -127,16 +124,10 @@ def run_evaluation(
                 f"{folder} holds other things, such as {min(there)}, and no evaluation.",
                 hint="Choose a new or an empty folder with --out.",
             )
-        with _alone_in(folder):
+        with _lock(folder):
             on_plan(plan)
-            jobs = make_jobs(options, plan, worlds)
-            run_jobs(
-                folder,
-                jobs,
-                n_jobs=options.n_jobs,
-                on_done=on_done,
-                has_retry=options.has_retry,
-            )
+            jobs, has_retry = make_jobs(options, plan, worlds), options.has_retry
+            run_jobs(folder, jobs, n_jobs=options.n_jobs, on_done=on_done, has_retry=has_retry)
     return plan
 
 
@@ -158,20 +149,14 @@ def writing_to(folder: Path) -> Generator[None]:
         ) from error
 
 
-@contextmanager
-def _alone_in(folder: Path) -> Generator[None]:
+def _lock(folder: Path) -> AbstractContextManager[object]:
     """Keep other runs out of a folder; the lock of a killed run is free."""
-    lock = FileLock(folder / LOCK)
     try:
-        lock.acquire(timeout=0)
+        return FileLock(folder / LOCK).acquire(timeout=0)
     except Timeout as error:
         raise ConfigError(
             f"Another run is at work in {folder}.", hint="Wait for it, or choose another --out."
         ) from error
-    try:
-        yield
-    finally:
-        lock.release()
 
 
 @dataclass(slots=True)
@@ -179,31 +164,6 @@ class _Running:
     job: TrialJob
     process: BaseProcess
     ends_s: float
-
-
-@dataclass(slots=True)
-class _Progress:
-    """What is done, under way, and still to do."""
-
-    run: Path
-    on_done: Callable[[TrialResult], None]
-    done: dict[Trial, TrialResult] = field(default_factory=dict)
-    waiting: list[TrialJob] = field(default_factory=list)
-    running: list[_Running] = field(default_factory=list)
-
-    def settle(self, result: TrialResult) -> None:
-        self.done[result.trial] = result
-        self.on_done(result)
-
-    def take_next(self) -> TrialJob | None:
-        """Return the first job whose predecessor is done; None while all others have to wait."""
-        for job in self.waiting:
-            if job.after is None or job.after in self.done:
-                self.waiting.remove(job)
-                return job
-        if self.waiting and not self.running:
-            raise AssertionError("a job waits for one that is not there")
-        return None
 
 
 def run_jobs(
@@ -217,45 +177,60 @@ def run_jobs(
     """Run all jobs that have no result yet, in their order where nothing has to wait.
 
     Args:
-        run: The run's folder.
         jobs: What to do. A job's predecessor must be among them, or be done.
         n_jobs: Processes at a time.
         on_done: Told of each result, also of those that were there already.
-        has_retry: Trials that crashed or hung are run again.
 
     Raises:
         ConfigError: The disk is full, or a result in the folder is of another trial or not
             understood; what is done is kept.
     """
-    progress = _Progress(run, on_done)
-    earlier = [(job, _find_earlier(run, job.trial)) for job in jobs]
-    for job, result in earlier:
-        if result is None or (has_retry and result.state.is_broken):
-            progress.waiting.append(job)
+    done: dict[Trial, TrialResult] = {}
+    waiting: list[TrialJob] = []
+    running: list[_Running] = []
+
+    def settle(result: TrialResult) -> None:
+        done[result.trial] = result
+        on_done(result)
+
+    for each, earlier in [(each, _find_earlier(run, each.trial)) for each in jobs]:
+        if earlier is None or (has_retry and earlier.state.is_broken):
+            waiting.append(each)
         else:
-            progress.settle(result)
+            settle(earlier)
     processes = _processes()
     try:
-        while progress.waiting or progress.running:
-            _start_more(progress, processes, n_jobs)
-            for result in _await_some(run, progress.running):
-                progress.settle(result)
+        while waiting or running:
+            while len(running) < n_jobs and (job := _take_next(waiting, done)) is not None:
+                before = None if job.after is None else done[job.after]
+                if before is not None and before.state.is_broken:
+                    said = f"{before.trial.id} came to no result."
+                    settle(_write_broken(run, job, TrialState.CRASHED, said))
+                else:
+                    running.append(_start(run, job, processes))
+            if waiting and not running:
+                raise AssertionError("a job waits for one that is not there")
+            for result in _await_some(run, running):
+                settle(result)
     finally:
-        # All are told before one is waited for: a second Ctrl-C may end the waiting.
-        for each in progress.running:
-            each.process.kill()
-        for each in progress.running:
-            each.process.join()
+        _kill(running)
 
 
-def _start_more(progress: _Progress, processes: BaseContext, n_jobs: int) -> None:
-    while len(progress.running) < n_jobs and (job := progress.take_next()) is not None:
-        before = None if job.after is None else progress.done[job.after]
-        if before is not None and before.state.is_broken:
-            said = f"{before.trial.id} came to no result."
-            progress.settle(_write_broken(progress.run, job, TrialState.CRASHED, said))
-        else:
-            progress.running.append(_start(progress.run, job, processes))
+def _kill(running: Iterable[_Running]) -> None:
+    # All are told before one is waited for: a second Ctrl-C may end the waiting.
+    for each in running:
+        each.process.kill()
+    for each in running:
+        each.process.join()
+
+
+def _take_next(waiting: list[TrialJob], done: Mapping[Trial, TrialResult]) -> TrialJob | None:
+    """Take the first job whose predecessor is done; None while all others have to wait."""
+    for job in waiting:
+        if job.after is None or job.after in done:
+            waiting.remove(job)
+            return job
+    return None
 
 
 def _find_earlier(run: Path, trial: Trial) -> TrialResult | None:
@@ -317,8 +292,7 @@ def _await_some(run: Path, running: list[_Running]) -> Iterator[TrialResult]:
             running.remove(each)
             yield _settle(run, each)
         elif time.monotonic() >= each.ends_s:
-            each.process.kill()
-            each.process.join()
+            _kill([each])
             running.remove(each)
             said = f"It was killed after {each.job.wall_s:.0f} s of wall time."
             yield _write_broken(run, each.job, TrialState.HUNG, said)
@@ -360,7 +334,7 @@ def _work_apart(work: Callable[[], object], errors: Path) -> None:
     try:
         work()
     except BaseException as error:  # noqa: BLE001 - the process's last words, for the result
-        leaves = list(_leaves(error))
+        leaves = _leaves(error)
         if any(isinstance(leaf, OSError) and leaf.errno in NO_ROOM for leaf in leaves):
             os._exit(FULL_DISK)
         # What we raise on purpose says what to do; anything else is a bug, and needs its trace.
@@ -371,15 +345,6 @@ def _work_apart(work: Callable[[], object], errors: Path) -> None:
     sys.stderr.flush()
     # Nothing here is worth an orderly end: threads may wait for what never comes.
     os._exit(0)
-
-
-def _leaves(error: BaseException) -> Iterator[BaseException]:
-    """Yield all errors of a group of groups."""
-    if isinstance(error, BaseExceptionGroup):
-        for each in error.exceptions:
-            yield from _leaves(each)
-    else:
-        yield error
 
 
 def _end_with_parent() -> None:
@@ -393,3 +358,10 @@ def _end_with_parent() -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
+
+
+def _leaves(error: BaseException) -> list[BaseException]:
+    """Return all errors of a group of groups."""
+    if not isinstance(error, BaseExceptionGroup):
+        return [error]
+    return [leaf for each in error.exceptions for leaf in _leaves(each)]

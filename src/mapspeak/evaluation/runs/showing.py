@@ -75,10 +75,7 @@ class RunBar:
     """Counts results while they come in.
 
     Attributes:
-        progress: The bar.
-        bar: Its line.
         n_asked: Trials and preparations that were asked for; 0 before that is known.
-        n_done: Those with a result.
         n_broken: Trials that crashed or hung, preparations among them.
     """
 
@@ -131,12 +128,7 @@ def show_run(*, is_quiet: bool) -> Generator[RunBar]:
 
 @dataclass(slots=True)
 class TrialBar:
-    """Shows a trial while it goes on.
-
-    Attributes:
-        progress: The bar.
-        bar: Its line.
-    """
+    """Shows a trial while it goes on."""
 
     progress: Progress
     bar: TaskID

@@ -206,9 +206,6 @@ async def open_inspection(
     """Play a ROS system and connect to it as an agent wants it, read-only; nothing can drive.
 
     Args:
-        system: What is played, for as long as the context lasts.
-        connection: How the agent reaches the server.
-        toolsets: Groups of tools to offer.
         folder: Where the server keeps what it writes.
     """
     async with play(system) as url:

@@ -22,10 +22,6 @@ class Evidence:
         states: The simulator's truth from begin to end; poses in a map without errors.
         grid: The robot's map in the end; None where there is none.
         memory: The semantic map in the end, as YAML; None where there is none.
-        answer: The agent's last words; only questions are scored by them.
-        state: How the agent ended.
-        calls: What it called.
-        n_errors: Calls that were answered with an error.
     """
 
     states: tuple[StateRecord, ...]

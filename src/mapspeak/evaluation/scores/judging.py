@@ -23,13 +23,7 @@ RECORD = re.compile(r"^\s*- name:", re.MULTILINE)
 
 
 def spl(*, is_success: bool, shortest_m: float | None, driven_m: float) -> float | None:
-    """Return success weighted by path length (Anderson et al., 2018); None without a shortest way.
-
-    Args:
-        is_success: The task was done.
-        shortest_m: The shortest way to any right end.
-        driven_m: The way that was driven.
-    """
+    """Return success weighted by path length (Anderson et al., 2018); None without a way."""
     if shortest_m is None or not math.isfinite(shortest_m):
         return None
     if not is_success:

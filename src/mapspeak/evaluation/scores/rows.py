@@ -52,10 +52,8 @@ class TableRow:
 
     Attributes:
         agent: Who answered, with how much it may think where that was said.
-        representation: How the map was shown.
         n_broken: How many crashed or hung; they count as trials.
         figures: Means of everything that scores and results hold, by name.
-        failures: How often each kind of mistake was made.
     """
 
     task: str

@@ -61,11 +61,7 @@ class TruePassage:
 
 
 class GroundTruth:
-    """One world's truth.
-
-    Args:
-        world: The world, as its file says.
-    """
+    """One world's truth."""
 
     LOOK_EVERY_M = 0.2
     """How far apart the places are that `seen_near` gives."""

@@ -41,7 +41,6 @@ class InspectionPart:
     """One part of a right answer.
 
     Attributes:
-        said: As it is written.
         tolerance: How far a number may be off, in its own unit.
     """
 
@@ -72,13 +71,7 @@ class InspectionPart:
 def judge_parts(
     evidence: Evidence, truth: Sequence[InspectionPart], *, is_ordered: bool = True
 ) -> Score:
-    """Judge an answer in parts: all have to be right, and no other may be there.
-
-    Args:
-        evidence: The answer is in it.
-        truth: What is right.
-        is_ordered: The order counts.
-    """
+    """Judge an answer in parts: all have to be right, and no other may be there."""
     said = read_said(evidence.answer)
     parts = [] if said is None else [each.strip(QUOTES) for each in said.split(",")]
     if not any(parts):
@@ -109,14 +102,7 @@ COARSENINGS = (1, 2, 3, 4)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """A robot as it was drawn, in good order.
-
-    Attributes:
-        draw: For all further draws.
-        names: What its parts are called.
-        system: Its ROS.
-        grid: The map that it carries.
-    """
+    """A robot as it was drawn, in good order."""
 
     draw: Draw
     names: Names
@@ -135,11 +121,7 @@ class Case:
         """Return the setting of a question.
 
         Args:
-            text: The question.
             form: How the answer is to be written, with an example; after "ANSWER: ".
-            parts: The right answer.
-            system: The ROS with what is out of order; None for the one in good order.
-            is_ordered: The order of the parts counts.
         """
         return Setting(
             prompt=f"{OPENING} {text} {NO_DRIVING} End with a line of the form ANSWER: {form}.",

@@ -25,7 +25,6 @@ class Draw:
     """What a trial's setting is drawn from.
 
     Attributes:
-        site: A world in which the task is offered.
         random: Of all draws: another for each task, world and seed.
         memory: The semantic map that an exploration of the world has left, as YAML.
     """
@@ -86,8 +85,6 @@ class Task:
     """A kind of question; the same world, seed and memory give the same setting.
 
     Attributes:
-        name: Such as "smallest-room".
-        draw: Draws one trial's setting.
         judge: Scores a trial by the truth of its setting and of the world with what was added.
         is_offered: True for worlds that have what it asks about.
         needs_map: It starts from the map and memory of an exploration.

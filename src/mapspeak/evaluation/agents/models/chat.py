@@ -52,11 +52,9 @@ class Reply:
     """What a model answers to all that was said.
 
     Attributes:
-        text: In words.
         calls: Calls that it wants made, in their order; none when it has finished.
         n_input_tokens: Read, cached ones included; None where the API does not say.
         n_output_tokens: Written, thoughts included.
-        ending: Why it ends.
     """
 
     text: str
@@ -91,9 +89,6 @@ class ChatModel(Protocol):
         """Begin a conversation.
 
         Args:
-            system: What it is told before.
-            prompt: What it is asked.
-            tools: What it may call, as the server lists it.
             seed: Of its draws, where it takes one.
         """
         ...
@@ -121,9 +116,7 @@ def decide(seed: int, *, prompt: str, heard: Sequence[str], tools: Collection[st
 
     Args:
         seed: Of its draws.
-        prompt: What it was asked.
         heard: The answers to its calls so far, in their order.
-        tools: What it may call.
     """
     is_question = "Answer without driving" in prompt
     random = np.random.default_rng([seed, len(heard)])

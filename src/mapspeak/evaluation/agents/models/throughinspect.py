@@ -42,7 +42,6 @@ def open_model(name: str, thinking: Thinking | None) -> "InspectModel":
     """Return a model by the library's name for it, such as "anthropic/claude-opus-4-1".
 
     Args:
-        name: Provider and model.
         thinking: How much it may think; None leaves it to the provider.
 
     Raises:
@@ -73,7 +72,6 @@ class InspectModel:
     """A model behind the library.
 
     Attributes:
-        name: As the library calls it.
         thinking: How much it may think; None leaves it to the provider.
     """
 
