@@ -2,18 +2,18 @@
 
 from typing import Any
 
-from mapspeak.evaluation.client import OutOfBudgetError, ToolAnswer
+from mapspeak.evaluation.client import OutOfBudgetError, ToolAnswer, Witness
 from mapspeak.evaluation.trials import ToolCall
 
 
-class Hearing:
+class Hearing(Witness):
     """A witness that writes down what it hears, and lets only so many calls be made."""
 
     def __init__(self, most: int = 100) -> None:
         self.most = most
         self.made: list[ToolCall] = []
         self.answers: list[ToolAnswer] = []
-        self.words: list[tuple[str, dict[str, int | None]]] = []
+        self.words: list[tuple[str, int | None]] = []
 
     @property
     def calls(self) -> list[str]:
@@ -28,6 +28,15 @@ class Hearing:
         del tool
         self.answers.append(answer)
 
-    def hear_words(self, role: str, text: str, **n_tokens: int | None) -> None:
+    def hear_words(
+        self,
+        role: str,
+        text: str,
+        *,
+        n_input_tokens: int | None = None,
+        n_output_tokens: int | None = None,
+        n_picture_tokens: int | None = None,
+    ) -> None:
         assert role == "agent"
-        self.words.append((text, n_tokens))
+        self.words.append((text, n_picture_tokens))
+        del n_input_tokens, n_output_tokens

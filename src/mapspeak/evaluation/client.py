@@ -1,8 +1,8 @@
 """An MCP client of a trial: every call goes past a witness, who hears the answer too."""
 
 import base64
-from dataclasses import dataclass
-from typing import Any, Protocol
+from dataclasses import dataclass, field
+from typing import Any
 
 from mcp.client import Client
 from mcp_types import CallToolResult, ImageContent, TextContent, Tool
@@ -42,8 +42,8 @@ class ToolAnswer:
     is_error: bool
 
 
-class Witness(Protocol):
-    """Hears every call, and may refuse one."""
+class Witness:
+    """Hears every call, and may refuse one; this one hears nothing and refuses nothing."""
 
     def hear_call(self, tool: str, arguments: dict[str, Any]) -> None:
         """Hear of a call before it is made.
@@ -51,11 +51,9 @@ class Witness(Protocol):
         Raises:
             OutOfBudgetError: It must not be made.
         """
-        ...
 
     def hear_answer(self, tool: str, answer: ToolAnswer) -> None:
         """Hear what was answered."""
-        ...
 
     def hear_words(
         self,
@@ -67,7 +65,6 @@ class Witness(Protocol):
         n_picture_tokens: int | None = None,
     ) -> None:
         """Hear what was said besides calls: role is "system", "user" or "agent"."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +76,7 @@ class ToolClient:
     """
 
     client: Client | None
-    witness: Witness | None = None
+    witness: Witness = field(default_factory=Witness)
 
     async def call(self, tool: str, /, **arguments: object) -> ToolAnswer:
         """Call a tool and return its answer, also when that is an error.
@@ -89,11 +86,9 @@ class ToolClient:
             OutOfBudgetError: The witness does not let it be made.
         """
         client = self._connected()
-        if self.witness is not None:
-            self.witness.hear_call(tool, arguments)
+        self.witness.hear_call(tool, arguments)
         answer = _read(await client.call_tool(tool, arguments))
-        if self.witness is not None:
-            self.witness.hear_answer(tool, answer)
+        self.witness.hear_answer(tool, answer)
         return answer
 
     async def list_tools(self) -> list[Tool]:
@@ -128,10 +123,9 @@ def _read(result: CallToolResult) -> ToolAnswer:
         for part in result.content
         if isinstance(part, ImageContent)
     ]
-    report = result.structured_content or {}
     return ToolAnswer(
         text="\n".join(texts),
         pictures=tuple(pictures),
-        report=dict(report),
+        report=dict(result.structured_content or {}),
         is_error=bool(result.is_error),
     )

@@ -105,7 +105,7 @@ async def test_tokens_are_summed_and_pictures_count_in_every_request_after_them(
     end, _ = await run(ModelAgent(model, "x/y"), assignment(tmp_path), witness)
     one = estimate_picture_tokens(witness.answers[0].pictures[0])
     assert (end.n_input_tokens, end.n_output_tokens, end.n_picture_tokens) == (4600, 12, 3 * one)
-    counted = [tokens["n_picture_tokens"] for _, tokens in witness.words]
+    counted = [n_tokens for _, n_tokens in witness.words]
     assert counted == [0, one, 2 * one]
     assert [text for text, _ in witness.words] == ["I look.", "Again.", ""]
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING
 
 from mapspeak.errors import ConfigError
 from mapspeak.evaluation.agents.baselines import OracleAgent, RandomAgent
@@ -11,13 +12,20 @@ from mapspeak.evaluation.agents.command.program import find_program
 from mapspeak.evaluation.agents.exploring import NearestFrontierAgent, PaperLoopAgent
 from mapspeak.evaluation.agents.models.chat import MockModel, Thinking
 from mapspeak.evaluation.agents.models.loop import ModelAgent
-from mapspeak.evaluation.agents.models.throughinspect import find_client, open_model
 from mapspeak.evaluation.agents.scripted import ScriptedAgent
 from mapspeak.evaluation.scores.site import GroundTruth
 from mapspeak.evaluation.trials import Agent, Setting
+from mapspeak.installation import say_install
+
+if TYPE_CHECKING:
+    from mapspeak.evaluation.agents.models.throughinspect import InspectModel
 
 ORACLE, MOCK = "oracle", "mock"
 COMMAND = "command:"
+CLIENT = "openai"
+"""The package that inspect-ai speaks through where there is no other; the extra brings it."""
+CLIENTS = {"anthropic": "anthropic", "google": "google-genai"}
+"""Packages that it wants besides, by the provider."""
 SCRIPTS: dict[str, Callable[[], Agent]] = {
     "scripted": ScriptedAgent,
     "random": RandomAgent,
@@ -40,7 +48,7 @@ def check_agent(name: str, thinking: str | None = None) -> None:
     if name == ORACLE:
         return
     if _is_model(name):
-        open_model(name, read_thinking(thinking)).open()
+        _open_model(name, read_thinking(thinking)).open()
         return
     agent = find_agent(name, thinking)
     if isinstance(agent, CommandAgent):
@@ -71,7 +79,7 @@ def find_agent(
     if name.startswith(COMMAND):
         return CommandAgent(find_program(name.removeprefix(COMMAND)), name, amount)
     if _is_model(name):
-        return ModelAgent(open_model(name, amount), name)
+        return ModelAgent(_open_model(name, amount), name)
     raise ConfigError(
         f"There is no agent {name[:80]!r}.",
         hint=f"There are: {', '.join(agent_names())}; "
@@ -88,6 +96,26 @@ def _is_model(name: str) -> bool:
     return "/" in name and not name.startswith(COMMAND)
 
 
+def _open_model(name: str, thinking: Thinking | None) -> "InspectModel":
+    try:
+        from mapspeak.evaluation.agents.models.throughinspect import (  # noqa: PLC0415 - an extra
+            InspectModel,
+        )
+    except ImportError as error:
+        client = _find_client(name)
+        install = say_install("eval", *([] if client == CLIENT else [client]))
+        raise ConfigError(
+            f"{name} is asked through inspect-ai, which is not installed.",
+            hint=f"{install}, or take the agent mock.",
+        ) from error
+    return InspectModel(name, thinking)
+
+
+def _find_client(name: str) -> str:
+    """Return the package that inspect-ai speaks through to a model's provider."""
+    return CLIENTS.get(name.partition("/")[0], CLIENT)
+
+
 def find_versions(names: Iterable[str]) -> dict[str, str]:
     """Return the versions of what stands behind some agents, each by its own name.
 
@@ -101,7 +129,7 @@ def find_versions(names: Iterable[str]) -> dict[str, str]:
             if said is not None:
                 versions[name] = said
         elif _is_model(name):
-            for package in ("inspect-ai", find_client(name)):
+            for package in ("inspect-ai", _find_client(name)):
                 with suppress(PackageNotFoundError):
                     versions[package] = version(package)
     return versions

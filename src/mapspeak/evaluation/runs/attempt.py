@@ -12,7 +12,7 @@ import cv2
 
 from mapspeak.errors import ConfigError
 from mapspeak.evaluation.agents.finding import find_agent
-from mapspeak.evaluation.client import OutOfBudgetError, ToolAnswer, ToolClient
+from mapspeak.evaluation.client import OutOfBudgetError, ToolAnswer, ToolClient, Witness
 from mapspeak.evaluation.runs.workplace import CONTROL, Workshop, open_workplace
 from mapspeak.evaluation.scores.answers import Evidence
 from mapspeak.evaluation.scores.site import GroundTruth
@@ -43,7 +43,7 @@ from mapspeak.simulator import StateRecord, World, read_state_log
 from mapspeak.spatial.mapfiles import load_map
 
 
-class Transcript:
+class Transcript(Witness):
     """The witness of one trial.
 
     Args:

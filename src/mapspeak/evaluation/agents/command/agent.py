@@ -44,7 +44,7 @@ class ProgramRun:
     """
 
     log: Path
-    witness: Witness | None
+    witness: Witness
     said: bytearray = field(default_factory=bytearray)
     complained: bytearray = field(default_factory=bytearray)
     exit_code: int | None = None
@@ -106,8 +106,6 @@ class ProgramRun:
             self.over = self.over or error
 
     def _tell(self, line: dict[str, Any]) -> None:
-        if self.witness is None:
-            return
         answer = ToolAnswer(
             text=line["text"],
             pictures=tuple(self._read_picture(name) for name in line["pictures"]),

@@ -121,15 +121,14 @@ async def _converse(
     while True:
         reply = await conversation.ask()
         account.note(reply)
-        if tools.witness is not None:
-            tools.witness.hear_words(
-                "agent",
-                # The trial notes the last words.
-                reply.text if reply.calls else "",
-                n_input_tokens=reply.n_input_tokens,
-                n_output_tokens=reply.n_output_tokens,
-                n_picture_tokens=account.n_pictures_cost,
-            )
+        tools.witness.hear_words(
+            "agent",
+            # The trial notes the last words.
+            reply.text if reply.calls else "",
+            n_input_tokens=reply.n_input_tokens,
+            n_output_tokens=reply.n_output_tokens,
+            n_picture_tokens=account.n_pictures_cost,
+        )
         if not reply.calls:
             state, instead = ENDINGS[reply.ending]
             return account.end(reply.text or instead, state)
@@ -144,7 +143,6 @@ async def _make(tools: ToolClient, call: ToolCallRequest) -> ToolAnswer:
     if call.mistake is None:
         return await tools.call(call.tool, **call.arguments)
     answer = ToolAnswer(text=call.mistake, pictures=(), report={}, is_error=True)
-    if tools.witness is not None:
-        tools.witness.hear_call(call.tool, call.arguments)
-        tools.witness.hear_answer(call.tool, answer)
+    tools.witness.hear_call(call.tool, call.arguments)
+    tools.witness.hear_answer(call.tool, answer)
     return answer

@@ -1,15 +1,30 @@
 """Models through the library `inspect-ai`: OpenAI, Anthropic, Google, local servers.
 
-It speaks each provider's protocol and retries; what is said, called and counted stays ours. The
-library is imported only when a model is asked for: it is the optional extra `eval`.
+It speaks each provider's protocol and retries; what is said, called and counted stays ours. Only
+who asks a model imports this module: the library is the optional extra `eval`.
 """
 
 import base64
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
+# It has no public name, and is what a missing package or key is told with.
+from inspect_ai._util.error import PrerequisiteError
+from inspect_ai.model import (
+    ChatMessage,
+    ChatMessageSystem,
+    ChatMessageTool,
+    ChatMessageUser,
+    Content,
+    ContentImage,
+    ContentText,
+    GenerateConfig,
+    Model,
+    ModelOutput,
+    get_model,
+)
+from inspect_ai.tool import ToolCallError, ToolInfo, ToolParams
 from mcp_types import Tool
 
 from mapspeak.errors import ConfigError, LinkError
@@ -21,50 +36,13 @@ from mapspeak.evaluation.agents.models.chat import (
     ToolCallRequest,
 )
 from mapspeak.evaluation.client import ToolAnswer
-from mapspeak.installation import say_install, shell_command
+from mapspeak.installation import shell_command
 
-if TYPE_CHECKING:
-    from inspect_ai.model import ChatMessage, GenerateConfig, Model, ModelOutput
-    from inspect_ai.tool import ToolInfo
-
-CLIENT = "openai"
-"""The package that the library speaks through where there is no other; the extra brings it."""
-CLIENTS = {"anthropic": "anthropic", "google": "google-genai"}
-"""Packages that it wants besides, by the provider."""
 MOST_RETRIES = 5
 ANSWER_WITHIN_S = 300
 """A request that takes longer is given up and made anew: a lost connection is never answered."""
 MOST_SAID = 300
 """Characters of a provider's error that are passed on: some repeat the whole request."""
-
-
-def open_model(name: str, thinking: Thinking | None) -> "InspectModel":
-    """Return a model by the library's name for it, such as "anthropic/claude-opus-4-1".
-
-    Args:
-        thinking: How much it may think; None leaves it to the provider.
-
-    Raises:
-        ConfigError: The library, the provider's own or the key is missing.
-    """
-    try:
-        import inspect_ai.model  # noqa: F401, PLC0415 - an optional extra
-    except ImportError as error:
-        raise ConfigError(
-            f"{name} is asked through inspect-ai, which is not installed.",
-            hint=f"{_say_install(name)}, or take the agent mock.",
-        ) from error
-    return InspectModel(name, thinking)
-
-
-def _say_install(name: str) -> str:
-    client = find_client(name)
-    return say_install("eval", *([] if client == CLIENT else [client]))
-
-
-def find_client(name: str) -> str:
-    """Return the package that the library speaks through to a model's provider."""
-    return CLIENTS.get(name.partition("/")[0], CLIENT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,12 +64,6 @@ class InspectModel:
         Raises:
             ConfigError: The model cannot be asked: a package, a key or an address is missing.
         """
-        from inspect_ai.model import (  # noqa: PLC0415 - an optional extra
-            ChatMessageSystem,
-            ChatMessageUser,
-            GenerateConfig,
-        )
-
         config = GenerateConfig(
             max_retries=MOST_RETRIES,
             attempt_timeout=ANSWER_WITHIN_S,
@@ -106,16 +78,12 @@ class InspectModel:
             config=config,
         )
 
-    def open(self) -> "Model":
+    def open(self) -> Model:
         """Return the library's model, without asking it.
 
         Raises:
             ConfigError: A package, a key or an address is missing.
         """
-        # It has no public name, and is what a missing package or key is told with.
-        from inspect_ai._util.error import PrerequisiteError  # noqa: PLC0415
-        from inspect_ai.model import get_model  # noqa: PLC0415 - an optional extra
-
         try:
             return get_model(self.name, memoize=False)
         except (PrerequisiteError, ValueError) as error:
@@ -133,10 +101,10 @@ def _plain(error: Exception) -> str:
 
 @dataclass(slots=True)
 class _InspectConversation:
-    model: "Model"
-    messages: "list[ChatMessage]"
-    tools: "list[ToolInfo]"
-    config: "GenerateConfig"
+    model: Model
+    messages: list[ChatMessage]
+    tools: list[ToolInfo]
+    config: GenerateConfig
 
     async def ask(self) -> Reply:
         output = await self._generate()
@@ -164,7 +132,7 @@ class _InspectConversation:
             ending=_ENDINGS.get(output.stop_reason, Ending.ITS_OWN),
         )
 
-    async def _generate(self) -> "ModelOutput":
+    async def _generate(self) -> ModelOutput:
         try:
             return await self.model.generate(self.messages, tools=self.tools, config=self.config)
         except Exception as error:  # each provider has errors of its own, of no common kind
@@ -175,14 +143,6 @@ class _InspectConversation:
             ) from error
 
     def tell(self, call: ToolCallRequest, answer: ToolAnswer) -> None:
-        from inspect_ai.model import (  # noqa: PLC0415 - an optional extra
-            ChatMessageTool,
-            Content,
-            ContentImage,
-            ContentText,
-        )
-        from inspect_ai.tool import ToolCallError  # noqa: PLC0415
-
         content: list[Content] = [ContentText(text=answer.text)]
         for picture in answer.pictures:
             data = base64.b64encode(picture.data).decode()
@@ -209,10 +169,8 @@ def _say_cause(error: BaseException) -> str:
     return f"{type(error).__name__}: {said}."
 
 
-def _as_info(tool: Tool) -> "ToolInfo":
-    from inspect_ai.tool import ToolInfo, ToolParams  # noqa: PLC0415 - an optional extra
-
-    schema: dict[str, Any] = tool.input_schema
+def _as_info(tool: Tool) -> ToolInfo:
+    schema = tool.input_schema
     return ToolInfo(
         name=tool.name,
         description=tool.description or tool.name,
