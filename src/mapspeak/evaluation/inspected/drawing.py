@@ -13,7 +13,7 @@ from mapspeak.evaluation.inspected.playing import (
     Stream,
 )
 from mapspeak.geometry import Pose
-from mapspeak.ros.messages.fields import Dialect
+from mapspeak.ros.messages.fields import Dialect, Message
 from mapspeak.ros.messages.grids import write_grid
 from mapspeak.ros.messages.poses import FrameTransform
 from mapspeak.spatial import OccupancyGrid
@@ -111,73 +111,54 @@ def _sensors(random: np.random.Generator, names: Names) -> tuple[Stream, ...]:
     # Evenly on a logarithmic scale, so that no one figure is near to most of them.
     laser_hz = round(2 * SLOWEST_HZ * FASTER ** random.random()) / 2
     walls_m = round(float(random.uniform(1.0, 6.0)), 2)
-    said = _figures(random, names)
-    said["scan"] = {
-        "angle_min": -3.14,
-        "angle_max": 3.14,
-        "angle_increment": 6.28 / (N_BEAMS - 1),
-        "range_min": 0.05,
-        "range_max": 12.0,
-        "ranges": [walls_m] * N_BEAMS,
+    charge = round(float(random.uniform(0.06, 0.96)), 2)
+    range_m = round(float(random.uniform(0.3, 3.0)), 2)
+    upright = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+    place = {"x": 1.5, "y": 0.7, "z": 0.0}
+    scan = {
+        "angle_min": -3.14, "angle_max": 3.14, "angle_increment": 6.28 / (N_BEAMS - 1),
+        "range_min": 0.05, "range_max": 12.0, "ranges": [walls_m] * N_BEAMS,
     }
-    return tuple(
-        Stream(node=node, topic=topic, type=kind, values=values, frame_id=frame, rate_hz=rate_hz)
-        for node, topic, kind, values, frame, rate_hz in (
-            (names.laser, names.scan, SCAN, said["scan"], names.laser_frame, laser_hz),
-            (names.motors, "/odom", ODOMETRY, said["odometry"], "odom", 10.0),
-            (names.imu, names.imu_data, IMU, said["imu"], "imu_link", 20.0),
-            (names.sonar, names.range, SONAR, said["sonar"], "sonar_link", 5.0),
-            (names.battery, names.charge, BATTERY, said["battery"], names.base_frame, 2.0),
-            (names.joints, names.joint_states, JOINTS, said["joints"], "", 10.0),
-            (names.device, names.status, names.device_type, {}, None, 2.0),
-        )
+    odometry = {
+        "child_frame_id": names.base_frame,
+        "pose": {"pose": {"position": place, "orientation": upright}},
+    }
+    imu = {"orientation": upright, "linear_acceleration": {"x": 0.0, "y": 0.0, "z": 9.81}}
+    sonar = {"field_of_view": 0.5, "min_range": 0.05, "max_range": 4.0, "range": range_m}
+    battery = {
+        "voltage": round(22.0 + 4.0 * charge, 2), "current": -1.8, "percentage": charge,
+        "capacity": 10.0, "design_capacity": 10.0, "present": True,
+        "power_supply_status": 2, "power_supply_health": 1,
+    }
+    joints = {"name": ["shoulder", "elbow"], "position": [0.1, -0.4]}
+    return _streams(
+        (names.laser, names.scan, SCAN, scan, names.laser_frame, laser_hz),
+        (names.motors, "/odom", ODOMETRY, odometry, "odom", 10.0),
+        (names.imu, names.imu_data, IMU, imu, "imu_link", 20.0),
+        (names.sonar, names.range, SONAR, sonar, "sonar_link", 5.0),
+        (names.battery, names.charge, BATTERY, battery, names.base_frame, 2.0),
+        (names.joints, names.joint_states, JOINTS, joints, "", 10.0),
+        (names.device, names.status, names.device_type, {}, None, 2.0),
     )
 
 
-def _figures(random: np.random.Generator, names: Names) -> dict[str, dict[str, Any]]:
-    """Draw what the sensors say besides their stamps."""
-    charge = round(float(random.uniform(0.06, 0.96)), 2)
-    upright = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
-    place = {"x": 1.5, "y": 0.7, "z": 0.0}
-    return {
-        "odometry": {
-            "child_frame_id": names.base_frame,
-            "pose": {"pose": {"position": place, "orientation": upright}},
-        },
-        "imu": {
-            "orientation": upright,
-            "linear_acceleration": {"x": 0.0, "y": 0.0, "z": 9.81},
-        },
-        "sonar": {
-            "field_of_view": 0.5,
-            "min_range": 0.05,
-            "max_range": 4.0,
-            "range": round(float(random.uniform(0.3, 3.0)), 2),
-        },
-        "battery": {
-            "voltage": round(22.0 + 4.0 * charge, 2),
-            "current": -1.8,
-            "capacity": 10.0,
-            "design_capacity": 10.0,
-            "percentage": charge,
-            "power_supply_status": 2,
-            "power_supply_health": 1,
-            "present": True,
-        },
-        "joints": {"name": ["shoulder", "elbow"], "position": [0.1, -0.4]},
-    }
+def _streams(
+    *rows: tuple[str, str, str, Message, str | None, float | None],
+) -> tuple[Stream, ...]:
+    """Return streams, each from its node, topic, type, values, frame and rate."""
+    return tuple(
+        Stream(node=node, topic=topic, type=kind, values=values, frame_id=frame, rate_hz=rate_hz)
+        for node, topic, kind, values, frame, rate_hz in rows
+    )
 
 
 def _maps(names: Names, grid: OccupancyGrid, dialect: Dialect) -> tuple[Stream, ...]:
     cells = np.zeros((LOCAL_CELLS, LOCAL_CELLS), dtype=np.int8)
     around = OccupancyGrid(cells=cells, resolution_m=0.05)
     local = f"{names.navigator}/local_costmap"
-    return tuple(
-        Stream(node=node, topic=topic, type=GRID, values=values, rate_hz=rate_hz)
-        for node, topic, values, rate_hz in (
-            (names.map_server, names.map, write_grid(grid, dialect=dialect), None),
-            (names.navigator, local, write_grid(around, dialect=dialect), 2.0),
-        )
+    return _streams(
+        (names.map_server, names.map, GRID, write_grid(grid, dialect=dialect), None, None),
+        (names.navigator, local, GRID, write_grid(around, dialect=dialect), None, 2.0),
     )
 
 
@@ -196,14 +177,11 @@ def _motion(names: Names) -> tuple[Stream, ...]:
             (names.describer, "/tf_static", fixed, None),
         )
     )
-    commands = tuple(
-        Stream(node=node, topic=topic, type=kind, values=values, frame_id=frame, rate_hz=rate_hz)
-        for node, topic, kind, values, frame, rate_hz in (
-            (names.navigator, names.wish, TWIST, {}, None, 10.0),
-            (names.smoother, names.velocity, TWIST, {}, None, 10.0),
-            (names.joystick, "/joy", JOY, {"axes": [0.0, 0.0]}, "", 5.0),
-            (names.navigator, "/plan", PATH, {}, "map", 1.0),
-        )
+    commands = _streams(
+        (names.navigator, names.wish, TWIST, {}, None, 10.0),
+        (names.smoother, names.velocity, TWIST, {}, None, 10.0),
+        (names.joystick, "/joy", JOY, {"axes": [0.0, 0.0]}, "", 5.0),
+        (names.navigator, "/plan", PATH, {}, "map", 1.0),
     )
     return (*tf, *commands)
 

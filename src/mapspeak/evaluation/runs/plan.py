@@ -3,6 +3,7 @@
 import platform
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import chain, product
 from pathlib import Path
 
 import numpy as np
@@ -82,12 +83,8 @@ class RunOptions:
         Raises:
             ConfigError: There is no such world.
         """
-        names = (
-            each
-            for name in self.worlds
-            for each in (world_names() if name == ALL_WORLDS else [name])
-        )
-        return {name: load_world(name) for name in dict.fromkeys(names)}
+        groups = (world_names() if name == ALL_WORLDS else (name,) for name in self.worlds)
+        return {name: load_world(name) for name in dict.fromkeys(chain.from_iterable(groups))}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,20 +139,18 @@ def plan_run(options: RunOptions, worlds: Mapping[str, World]) -> RunPlan:
 
 def _trials_of(options: RunOptions, task: Task, world: str) -> Iterator[Trial]:
     n_trials = 1 if task.name == EXPLORE else options.n_trials
-    for number in range(1, n_trials + 1):
-        for agent in dict.fromkeys(options.agents):
-            amounts = options.thinking if can_think(agent) else (None,)
-            for representation in dict.fromkeys(options.representations):
-                for thinking in dict.fromkeys(amounts):
-                    yield Trial(
-                        task=task.name,
-                        world=world,
-                        seed=options.seed + number - 1,
-                        agent=agent,
-                        representation=representation,
-                        thinking=thinking,
-                        number=number,
-                    )
+    agents, representations = dict.fromkeys(options.agents), dict.fromkeys(options.representations)
+    for number, agent, representation in product(range(n_trials), agents, representations):
+        for thinking in dict.fromkeys(options.thinking if can_think(agent) else (None,)):
+            yield Trial(
+                task=task.name,
+                world=world,
+                seed=options.seed + number,
+                agent=agent,
+                representation=representation,
+                thinking=thinking,
+                number=number + 1,
+            )
 
 
 def prepare_world(options: RunOptions, world: str) -> Trial:

@@ -166,17 +166,16 @@ class GroundTruth:
     def passages(self) -> tuple[TruePassage, ...]:
         """Every place where the robot passes straight from one space into another."""
         labels, standable = self._labels, self.drivable
-        crossings: dict[tuple[int, int], np.ndarray[tuple[int, int], np.dtype[np.uint8]]] = {}
-        for axis in (0, 1):
-            here = (slice(None, -1), slice(None)) if axis == 0 else (slice(None), slice(None, -1))
-            next_ = (slice(1, None), slice(None)) if axis == 0 else (slice(None), slice(1, None))
-            is_crossing = standable[here] & standable[next_] & (labels[here] != labels[next_])
-            is_crossing &= (labels[here] > 0) & (labels[next_] > 0)
+        crossings: dict[tuple[int, int], NDArray[np.uint8]] = {}
+        for here, beside in (
+            (np.s_[:-1, :], np.s_[1:, :]),
+            (np.s_[:, :-1], np.s_[:, 1:]),
+        ):
+            is_crossing = standable[here] & standable[beside] & (labels[here] != labels[beside])
+            is_crossing &= (labels[here] > 0) & (labels[beside] > 0)
             for row, col in np.argwhere(is_crossing):
-                pair = sorted((int(labels[here][row, col]), int(labels[next_][row, col])))
-                cells = crossings.setdefault(
-                    (pair[0], pair[1]), np.zeros(labels.shape, dtype=np.uint8)
-                )
+                one, other = sorted((int(labels[here][row, col]), int(labels[beside][row, col])))
+                cells = crossings.setdefault((one, other), np.zeros(labels.shape, dtype=np.uint8))
                 cells[row, col] = 1
         return tuple(
             passage for pair, cells in crossings.items() for passage in self._split(pair, cells)
@@ -185,14 +184,10 @@ class GroundTruth:
     def neighbours(self, room: MeasuredRoom) -> tuple[str, ...]:
         """Return the names of the spaces that one passes into straight from a room."""
         name = room.room.name
-        others = (
-            set(passage.spaces) - {name} for passage in self.passages if name in passage.spaces
-        )
-        return tuple(sorted(set().union(*others)))
+        spaces = {space for each in self.passages if name in each.spaces for space in each.spaces}
+        return tuple(sorted(spaces - {name}))
 
-    def _split(
-        self, pair: tuple[int, int], cells: np.ndarray[tuple[int, int], np.dtype[np.uint8]]
-    ) -> list[TruePassage]:
+    def _split(self, pair: tuple[int, int], cells: NDArray[np.uint8]) -> list[TruePassage]:
         """Return one passage for each piece of a border that can be crossed."""
         names = {label: name for name, label in self._label_of.items()}
         spaces = sorted((names[pair[0]], names[pair[1]]))
@@ -289,11 +284,6 @@ class GroundTruth:
         found[rows[is_seen], cols[is_seen]] = True
         return found
 
-    @cached_property
-    def _walls(self) -> OccupancyGrid:
-        """The walls alone."""
-        return TrueFloor(replace(self.world, objects=())).solid
-
     def floor_area_m2(self, room: MeasuredRoom) -> float:
         """Return the floor between a room's walls, with what stands on it."""
         return self._floor_areas_m2[room.room.name]
@@ -301,16 +291,14 @@ class GroundTruth:
     @cached_property
     def _floor_areas_m2(self) -> dict[str, float]:
         """The floor between the walls of every space, by its name."""
+        walls = TrueFloor(replace(self.world, objects=())).solid
         rows, cols = np.nonzero(self._labels)
-        at_rows, at_cols = self._walls.cells_at(self.grid.points_at(rows, cols))
-        is_inside = self._walls.contains_cells(at_rows, at_cols)
-        is_free = ~self._walls.occupied[at_rows[is_inside], at_cols[is_inside]]
+        at_rows, at_cols = walls.cells_at(self.grid.points_at(rows, cols))
+        is_inside = walls.contains_cells(at_rows, at_cols)
+        is_free = ~walls.occupied[at_rows[is_inside], at_cols[is_inside]]
         labels = self._labels[rows[is_inside], cols[is_inside]][is_free]
-        n_free = np.bincount(labels, minlength=len(self._label_of) + 1)
-        return {
-            name: float(n_free[label]) * self.grid.resolution_m**2
-            for name, label in self._label_of.items()
-        }
+        n_free = np.bincount(labels, minlength=len(self._label_of) + 1) * self.grid.resolution_m**2
+        return {name: float(n_free[label]) for name, label in self._label_of.items()}
 
     def middle_of(self, room: MeasuredRoom) -> Point:
         """Return where in a room the robot has most room."""
