@@ -4,8 +4,7 @@ from urllib.parse import unquote
 
 import pytest
 
-from mapspeak.evaluation.report.page import write_page
-from mapspeak.evaluation.report.paper import PAPER_TASKS
+from mapspeak.evaluation.report.page import PAPER_TASKS, write_page
 from mapspeak.evaluation.tasks.catalogue import FAMILIES
 from mapspeak.evaluation.trials import (
     Failure,

@@ -116,8 +116,12 @@ def _sensors(random: np.random.Generator, names: Names) -> tuple[Stream, ...]:
     upright = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
     place = {"x": 1.5, "y": 0.7, "z": 0.0}
     scan = {
-        "angle_min": -3.14, "angle_max": 3.14, "angle_increment": 6.28 / (N_BEAMS - 1),
-        "range_min": 0.05, "range_max": 12.0, "ranges": [walls_m] * N_BEAMS,
+        "angle_min": -3.14,
+        "angle_max": 3.14,
+        "angle_increment": 6.28 / (N_BEAMS - 1),
+        "range_min": 0.05,
+        "range_max": 12.0,
+        "ranges": [walls_m] * N_BEAMS,
     }
     odometry = {
         "child_frame_id": names.base_frame,
@@ -126,9 +130,14 @@ def _sensors(random: np.random.Generator, names: Names) -> tuple[Stream, ...]:
     imu = {"orientation": upright, "linear_acceleration": {"x": 0.0, "y": 0.0, "z": 9.81}}
     sonar = {"field_of_view": 0.5, "min_range": 0.05, "max_range": 4.0, "range": range_m}
     battery = {
-        "voltage": round(22.0 + 4.0 * charge, 2), "current": -1.8, "percentage": charge,
-        "capacity": 10.0, "design_capacity": 10.0, "present": True,
-        "power_supply_status": 2, "power_supply_health": 1,
+        "voltage": round(22.0 + 4.0 * charge, 2),
+        "current": -1.8,
+        "percentage": charge,
+        "capacity": 10.0,
+        "design_capacity": 10.0,
+        "present": True,
+        "power_supply_status": 2,
+        "power_supply_health": 1,
     }
     joints = {"name": ["shoulder", "elbow"], "position": [0.1, -0.4]}
     return _streams(

@@ -12,8 +12,7 @@ from mapspeak import __version__
 from mapspeak.errors import ConfigError
 from mapspeak.evaluation.agents.finding import can_think, find_versions, read_thinking
 from mapspeak.evaluation.scores.site import GroundTruth
-from mapspeak.evaluation.tasks.catalogue import choose_tasks, find_task
-from mapspeak.evaluation.tasks.paper import EXPLORE
+from mapspeak.evaluation.tasks.catalogue import EXPLORE, choose_tasks, find_task
 from mapspeak.evaluation.tasks.task import Task
 from mapspeak.evaluation.trials import Trial
 from mapspeak.server.mapview.representations import Representation

@@ -28,8 +28,7 @@ from pydantic import ValidationError
 from mapspeak.errors import ConfigError, MapspeakError
 from mapspeak.evaluation.runs.attempt import attempt
 from mapspeak.evaluation.runs.plan import RunOptions, RunPlan, plan_run, prepare_world
-from mapspeak.evaluation.tasks.catalogue import find_task
-from mapspeak.evaluation.tasks.paper import EXPLORE
+from mapspeak.evaluation.tasks.catalogue import EXPLORE, find_task
 from mapspeak.evaluation.trials import (
     Failure,
     Score,

@@ -24,7 +24,7 @@ from rich.table import Column, Table
 from mapspeak.evaluation.agents.finding import can_think
 from mapspeak.evaluation.runs.plan import RunOptions, RunPlan
 from mapspeak.evaluation.scores.rows import TableRow, wilson_interval
-from mapspeak.evaluation.tasks.paper import EXPLORE
+from mapspeak.evaluation.tasks.catalogue import EXPLORE
 from mapspeak.evaluation.trials import TrialResult, Turn
 
 SHOWN = {
