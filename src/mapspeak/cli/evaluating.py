@@ -219,7 +219,7 @@ def _run(options: "RunOptions", *, is_quiet: bool) -> int:
         try:
             plan = run_evaluation(options, on_plan=on_plan, on_done=on_done)
         except KeyboardInterrupt:
-            bar.stop()
+            bar.progress.stop()
             click.echo(f"Stopped: {bar.n_done} of {bar.n_asked} are done.", err=True)
             return INTERRUPTED
     found = {result.trial: result for result in done}

@@ -73,12 +73,7 @@ def _header(
             "total_samples": len(results),
             "completed_samples": sum(not result.state.is_broken for result in results),
             "scores": [
-                {
-                    "name": SCORER,
-                    "scorer": SCORER,
-                    "params": {},
-                    "metrics": {"accuracy": metric},
-                }
+                {"name": SCORER, "scorer": SCORER, "params": {}, "metrics": {"accuracy": metric}}
             ],
         },
         "stats": {"started_at": now, "completed_at": now},
@@ -91,12 +86,11 @@ def _sample(run: Path, result: TrialResult) -> dict[str, Any]:
         name: getattr(result, name)
         for name in ("driven_m", "shortest_m", "robot_s", "wall_s", "cpu_s", "n_calls")
     }
-    tokens = (result.n_input_tokens, result.n_output_tokens)
-    usage = {
-        "input_tokens": tokens[0] or 0,
-        "output_tokens": tokens[1] or 0,
-        "total_tokens": (tokens[0] or 0) + (tokens[1] or 0),
-    }
+    usage = {}
+    if result.n_input_tokens is not None and result.n_output_tokens is not None:
+        n_read, n_written = result.n_input_tokens, result.n_output_tokens
+        counts = (("input_tokens", n_read), ("output_tokens", n_written))
+        usage = {trial.answerer: {**dict(counts), "total_tokens": n_read + n_written}}
     sample: dict[str, Any] = {
         "id": _sample_id(trial),
         "epoch": trial.number,
@@ -116,7 +110,7 @@ def _sample(run: Path, result: TrialResult) -> dict[str, Any]:
         "metadata": {"seed": trial.seed, "world": trial.world, **figures},
         "store": {},
         "events": [],
-        "model_usage": {} if None in tokens else {trial.answerer: usage},
+        "model_usage": usage,
         "total_time": result.wall_s,
         "attachments": {},
     }
@@ -154,7 +148,7 @@ def _messages(run: Path, trial: Trial) -> Iterator[dict[str, Any]]:
                 **({"error": {"type": "unknown", "message": turn.text}} if turn.is_error else {}),
             }
         else:
-            calls = [] if turn.call is None else [_call(turn, number)]
+            calls = _calls(turn, number)
             yield {
                 "id": message_id,
                 "role": "assistant",
@@ -163,15 +157,12 @@ def _messages(run: Path, trial: Trial) -> Iterator[dict[str, Any]]:
             }
 
 
-def _call(turn: Turn, number: int) -> dict[str, Any]:
-    if turn.call is None:
-        raise AssertionError("only calls are written as calls")
-    return {
-        "id": f"call-{number}",
-        "type": "function",
-        "function": turn.call.tool,
-        "arguments": turn.call.arguments,
-    }
+def _calls(turn: Turn, number: int) -> list[dict[str, Any]]:
+    call = turn.call
+    if call is None:
+        return []
+    said = {"function": call.tool, "arguments": call.arguments}
+    return [{"id": f"call-{number}", "type": "function", **said}]
 
 
 def _images(turn: Turn, pictures: Path) -> Iterator[dict[str, Any]]:

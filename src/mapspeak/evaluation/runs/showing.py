@@ -25,7 +25,7 @@ from mapspeak.evaluation.agents.finding import can_think
 from mapspeak.evaluation.runs.plan import RunOptions, RunPlan
 from mapspeak.evaluation.scores.rows import TableRow, wilson_interval
 from mapspeak.evaluation.tasks.catalogue import EXPLORE
-from mapspeak.evaluation.trials import TrialResult, Turn
+from mapspeak.evaluation.trials import Trial, TrialResult, Turn
 
 SHOWN = {
     "coverage_recall": "recall",
@@ -85,11 +85,11 @@ class RunBar:
     n_done: int = 0
     n_broken: int = 0
     _n_successes: int = 0
-    _preparations: frozenset[str] = frozenset()
+    _preparations: tuple[Trial, ...] = ()
 
     def begin(self, plan: RunPlan) -> None:
         """Take note of how much there is to do, and begin to show it."""
-        self._preparations = frozenset(trial.id for trial in plan.preparations)
+        self._preparations = plan.preparations
         self.n_asked = len(plan.trials) + len(plan.preparations)
         self.progress.update(self.bar, total=self.n_asked, description="starting")
         self.progress.start()
@@ -98,21 +98,15 @@ class RunBar:
         """Take note of a result."""
         self.n_broken += result.state.is_broken
         self.n_done += 1
-        if result.trial.id not in self._preparations:
+        if result.trial not in self._preparations:
             self._n_successes += result.score.is_success
         said = f"{self._n_successes} done, {self.n_broken} broken; last {result.trial.id}"
         self.progress.update(self.bar, advance=1, description=said)
         if not self.progress.console.is_terminal:
-            self.tell(f"{self.n_done}/{self.n_asked} {result.trial.id}: {result.score.reason}")
-
-    def tell(self, said: str) -> None:
-        """Say something besides."""
-        if not self.progress.disable or not self.progress.console.is_terminal:
-            self.progress.console.print(said, markup=False, highlight=False, soft_wrap=True)
-
-    def stop(self) -> None:
-        """Take the bar away for good."""
-        self.progress.stop()
+            _tell(
+                self.progress,
+                f"{self.n_done}/{self.n_asked} {result.trial.id}: {result.score.reason}",
+            )
 
 
 @contextmanager
@@ -142,17 +136,18 @@ class TrialBar:
 
     def note(self, turn: Turn) -> None:
         """Show a turn of it."""
-        if turn.call is None:
-            return
-        if turn.role != "tool":
+        if turn.call is not None and turn.role != "tool":
             self._n_calls += 1
-            values = [str(value) for value in turn.call.arguments.values()]
-            said = " ".join((turn.call.tool, *values))
+            said = " ".join((turn.call.tool, *map(str, turn.call.arguments.values())))
             self.progress.update(self.bar, n_calls=self._n_calls, description=escape(said))
 
     def tell(self, said: str) -> None:
         """Say something above the bar."""
-        self.progress.console.print(said, markup=False, highlight=False, soft_wrap=True)
+        _tell(self.progress, said)
+
+
+def _tell(progress: Progress, said: str) -> None:
+    progress.console.print(said, markup=False, highlight=False, soft_wrap=True)
 
 
 @contextmanager
