@@ -89,8 +89,8 @@ def _sample(run: Path, result: TrialResult) -> dict[str, Any]:
     usage = {}
     if result.n_input_tokens is not None and result.n_output_tokens is not None:
         n_read, n_written = result.n_input_tokens, result.n_output_tokens
-        counts = (("input_tokens", n_read), ("output_tokens", n_written))
-        usage = {trial.answerer: {**dict(counts), "total_tokens": n_read + n_written}}
+        spent = {"input_tokens": n_read, "output_tokens": n_written}
+        usage = {trial.answerer: {**spent, "total_tokens": n_read + n_written}}
     sample: dict[str, Any] = {
         "id": _sample_id(trial),
         "epoch": trial.number,
