@@ -1,4 +1,4 @@
-"""Client programs as data: how each is started, told of the server, and read."""
+"""Client programs as data, ours in the files beside this one: how each is started and read."""
 
 import json
 import os
@@ -165,16 +165,15 @@ def find_program(name: str) -> Program:
     Raises:
         ConfigError: There is none, or the file has a mistake.
     """
-    if name in _PROGRAMS:
-        return _PROGRAMS[name]
-    if Path(name).suffix in {".yaml", ".yml"}:
+    known = {path.stem: path for path in sorted(Path(__file__).parent.glob("*.yaml"))}
+    path = known.get(name, Path(name))
+    if path.suffix in {".yaml", ".yml"}:
         return read_settings(
-            Path(name), Program, name="the program's file", advice="See the guide to evaluations."
+            path, Program, name="the program's file", advice="See the guide to evaluations."
         )
-    known = ", ".join(_PROGRAMS)
     raise ConfigError(
         f"There is no client program {name[:80]!r}.",
-        hint=f"Choose from {known}, or give a .yaml file that describes one.",
+        hint=f"Choose from {', '.join(known)}, or give a .yaml file that describes one.",
     )
 
 
@@ -194,68 +193,3 @@ def _find(said: object, keys: list[str]) -> Iterator[object]:
         first, *others = keys
         for value in said.values() if first == "*" else [said[first]] if first in said else []:
             yield from _find(value, others)
-
-
-_PROGRAMS = {
-    "claude-code": Program(
-        command=(
-            *("claude", "-p", "{prompt}", "--output-format", "json"),
-            *("--mcp-config", "{config}", "--strict-mcp-config"),
-            *("--tools", "", "--allowedTools", f"mcp__{SERVER}", "--no-session-persistence"),
-        ),
-        # Else it may ask its model before the server has answered.
-        server={"alwaysLoad": True},
-        settings={
-            "MCP_CONNECTION_NONBLOCKING": "false",
-            "MCP_CONNECT_TIMEOUT_MS": "60000",
-            "MCP_TIMEOUT": "60000",
-            "CLAUDE_CODE_DISABLE_NONESSENTIAL_TRAFFIC": "1",
-        },
-        thinking=("--effort", "{thinking}"),
-        environment=("ANTHROPIC_API_KEY", "ANTHROPIC_BASE_URL", "CLAUDE_CODE_OAUTH_TOKEN"),
-        answer=AnswerForm.JSON,
-        input_tokens=(
-            "usage.input_tokens",
-            "usage.cache_read_input_tokens",
-            "usage.cache_creation_input_tokens",
-        ),
-        output_tokens=("usage.output_tokens",),
-        turns=("num_turns",),
-    ),
-    "codex": Program(
-        command=(
-            *("codex", "exec", "--skip-git-repo-check", "--sandbox", "read-only"),
-            *("--ephemeral", "--ignore-user-config", "--output-last-message", "{answer}"),
-            *("-c", f"mcp_servers.{SERVER}.command={{server}}"),
-            *("-c", f"mcp_servers.{SERVER}.args={{arguments}}"),
-            # Else it asks its model before the server has answered.
-            *("-c", f"mcp_servers.{SERVER}.required=true"),
-            *("-c", f"mcp_servers.{SERVER}.startup_timeout_sec=60"),
-            # The truth lies on the disk.
-            *("-c", "features.shell_tool=false", "-c", 'web_search="disabled"'),
-            *("-c", f'mcp_servers.{SERVER}.default_tools_approval_mode="approve"'),
-            "{prompt}",
-        ),
-        thinking=("-c", 'model_reasoning_effort="{thinking}"'),
-        environment=("OPENAI_API_KEY", "CODEX_API_KEY", "CODEX_HOME"),
-        answer=AnswerForm.FILE,
-    ),
-    "gemini": Program(
-        command=(
-            *("gemini", "-p", "{prompt}", "--output-format", "json"),
-            *("--allowed-mcp-server-names", SERVER, "--skip-trust"),
-        ),
-        config=".gemini/settings.json",
-        server={"trust": True},
-        # Else it leaves out every MCP server: the trial's folder is a new one to it.
-        settings={"GEMINI_CLI_TRUST_WORKSPACE": "true"},
-        environment=(
-            *("GEMINI_API_KEY", "GOOGLE_API_KEY", "GOOGLE_GENAI_USE_VERTEXAI"),
-            "GOOGLE_GEMINI_BASE_URL",
-        ),
-        answer=AnswerForm.JSON,
-        answer_key="response",
-        input_tokens=("stats.models.*.tokens.prompt",),
-        output_tokens=("stats.models.*.tokens.candidates", "stats.models.*.tokens.thoughts"),
-    ),
-}
