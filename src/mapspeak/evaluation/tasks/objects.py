@@ -1,9 +1,10 @@
 """Things to go to: by name, by what they are for, with and without a memory of them."""
 
-from collections.abc import Mapping
-from types import MappingProxyType
+from functools import cache
+from importlib import resources
 
 import numpy as np
+from ruamel.yaml import YAML
 
 from mapspeak.evaluation.scores.answers import Evidence
 from mapspeak.evaluation.scores.judging import judge_thing
@@ -15,69 +16,21 @@ FIRE = "fire_extinguisher"
 FIRE_WISH = "Fire detected nearby. Navigate to the tool used for it."
 """The paper's Task 3, word for word."""
 
-WISHES: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        FIRE: (
-            "A waste paper basket is burning. Go to what puts it out.",
-            "Something smoulders in here. Go to where I find what smothers the flames.",
-        ),
-        "first_aid_box": (
-            "Somebody has cut a finger. Go to where plasters and bandages are kept.",
-            "A colleague is bleeding. Go to what helps.",
-        ),
-        "exit_sign": (
-            "Everybody has to leave the building. Go to what points out the way.",
-            "I want to know where the way outside is marked. Go there.",
-        ),
-        "fire_hose_reel": (
-            "The fire is too large for a hand-held device. Go to where water comes from the wall.",
-        ),
-        "eye_wash_station": (
-            "Acid has splashed into somebody's face. Go to where it can be rinsed out of the eyes.",
-        ),
-        "ladder": (
-            "A lamp near the ceiling is broken. Go to what I can climb up on to change it.",
-        ),
-        "charging_dock": (
-            "Your battery runs low. Go to where you can get power.",
-            "You look tired, robot. Go to where you are plugged in for the night.",
-        ),
-        "forklift": ("A heavy load has to be lifted onto a shelf. Go to the vehicle for that.",),
-        "desk": (
-            "I have to write a letter sitting down. Go to a place where people work on paper.",
-        ),
-        "cabinet": (
-            "These papers have to be put away by the alphabet. Go to where files are kept.",
-        ),
-        "sofa": (
-            "My back hurts, I would like to stretch out for a while. Go to where I can lie down.",
-        ),
-        "whiteboard": (
-            "I would like to sketch an idea so that the whole team sees it. Go to where I can.",
-        ),
-        "printer": ("I need this document on paper. Go to the machine that puts it there.",),
-        "fridge": ("The milk has to be kept cold. Go to where it does not go sour.",),
-        "coffee_machine": (
-            "I can hardly keep my eyes open. Go to where I get a hot drink for that.",
-        ),
-        "sink": ("My hands are sticky. Go to where I can wash them.",),
-        "toilet": ("I have drunk too much tea and need some privacy. Go there.",),
-        "trash_bin": (
-            "I have finished my apple and hold the core. Go to where it can be thrown away.",
-        ),
-    }
-)
-"""By kind; each meant by nothing else in `mapspeak.simulator.worlds.models`."""
-
-
 SEARCH_TOOLS = ("search_for", "look_around")
 SEARCH_LIMITS = Limits(n_calls=200, robot_time_s=2400.0, wall_s=900.0)
 OUT_OF_THE_WAY_M = 1.0
 
 
+@cache
+def _wishes() -> dict[str, list[str]]:
+    """Return what people say when they want a thing, by its kind."""
+    text = resources.files(__package__).joinpath("wishes.yaml").read_text(encoding="utf-8")
+    return dict(YAML(typ="safe", pure=True).load(text))
+
+
 def findable_kinds(site: GroundTruth) -> tuple[str, ...]:
     """Return the kinds one can wish for of which the robot can get to all things of the world."""
-    kinds = sorted({thing.kind for thing in site.world.objects} & set(WISHES))
+    kinds = sorted({thing.kind for thing in site.world.objects} & set(_wishes()))
     return tuple(kind for kind in kinds if site.beside(kind).any())
 
 
@@ -89,7 +42,7 @@ def has_findable_kinds(site: GroundTruth) -> bool:
 def draw_wish(draw: Draw) -> tuple[str, str]:
     """Draw a kind that the world has; return words for it, and the kind."""
     kind = str(draw.random.choice(findable_kinds(draw.site)))
-    return draw.one_of(WISHES[kind]), kind
+    return draw.one_of(_wishes()[kind]), kind
 
 
 def thing_setting(
