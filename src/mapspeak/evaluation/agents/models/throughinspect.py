@@ -110,7 +110,12 @@ class _InspectConversation:
         output = await self._generate()
         # Said again as it is: some providers want their own thoughts back, signed.
         self.messages.append(output.message)
-        usage = output.usage
+        n_read = n_written = None
+        if (usage := output.usage) is not None:
+            # The library counts cached tokens apart.
+            cached = (usage.input_tokens_cache_read, usage.input_tokens_cache_write)
+            n_read = usage.input_tokens + sum(n_tokens or 0 for n_tokens in cached)
+            n_written = usage.output_tokens
         return Reply(
             text=output.completion,
             calls=tuple(
@@ -122,13 +127,8 @@ class _InspectConversation:
                 )
                 for call in output.message.tool_calls or ()
             ),
-            # The library counts cached tokens apart.
-            n_input_tokens=None
-            if usage is None
-            else usage.input_tokens
-            + (usage.input_tokens_cache_read or 0)
-            + (usage.input_tokens_cache_write or 0),
-            n_output_tokens=None if usage is None else usage.output_tokens,
+            n_input_tokens=n_read,
+            n_output_tokens=n_written,
             ending=_ENDINGS.get(output.stop_reason, Ending.ITS_OWN),
         )
 
