@@ -14,10 +14,9 @@ from mapspeak.geometry import Pose
 from mapspeak.ros.messages.fields import Dialect, Message
 from mapspeak.ros.messages.poses import Twist, read_twist, write_twist
 from mapspeak.rosbridge_server.drives import Drives, ServedDrive
-from mapspeak.rosbridge_server.graph import SLAM_NODES, navigator_of, topics_of
 from mapspeak.rosbridge_server.hub import Hub, Publication, Topic
 from mapspeak.rosbridge_server.serving import Reception
-from mapspeak.rosbridge_server.stack import RosStack
+from mapspeak.rosbridge_server.stack import NAVIGATORS, SLAM_NODES, RosStack, topics_of
 from mapspeak.spatial import OccupancyGrid
 
 START = Pose(1.5, 1.4)
@@ -101,19 +100,19 @@ class FaultyDrives(Drives):
 class FaultyStack(RosStack):
     """The robot's ROS, whose nodes can die and come back."""
 
-    def __init__(self, robot: FaultyRobot, *, dialect: Dialect, tasks: TaskGroup) -> None:
+    def __init__(self, robot: FaultyRobot, *, dialect: Dialect) -> None:
         self._faulty = robot
         self._nodes = FaultyHub(
             topics_of(dialect, robot.description), robot.faults, slam=SLAM_NODES[dialect]
         )
         self._goals = FaultyDrives(robot)
-        super().__init__(robot, dialect=dialect, tasks=tasks, hub=self._nodes, drives=self._goals)
-        self._offered = self.services.all
+        super().__init__(robot, dialect=dialect, hub=self._nodes, drives=self._goals)
+        self._offered = self.services
         robot.publish_velocity = self._publish_velocity
 
     @property
     def navigator(self) -> str:
-        return navigator_of(self.dialect)
+        return NAVIGATORS[self.dialect]
 
     @property
     def slam(self) -> str:
@@ -124,7 +123,7 @@ class FaultyStack(RosStack):
         self._nodes.dead.add(node)
         for service in self._offered:
             if service.node == node:
-                self.services._services.pop(service.name, None)
+                self._services.pop(service.name, None)
         if node == self.navigator:
             self._faulty.kill_navigation()
 
@@ -133,7 +132,7 @@ class FaultyStack(RosStack):
         self._nodes.dead.discard(node)
         for service in self._offered:
             if service.node == node:
-                self.services.add(service)
+                self._services[service.name] = service
         if node == self.navigator:
             self._goals.forget()
             self._faulty.restart_navigation()
@@ -235,7 +234,7 @@ async def open_faulty_bridge(
         grid or two_rooms(), pose=pose, speed_mps=speed_mps, rate=rate, faults=faults
     )
     async with anyio.create_task_group() as tasks:
-        ros = FaultyStack(robot, dialect=dialect, tasks=tasks)
+        ros = FaultyStack(robot, dialect=dialect)
         await tasks.start(ros.keep_going)
         tasks.start_soon(robot.run)
         bridge = FaultyBridge(robot, ros, tasks)

@@ -4,7 +4,6 @@ Of the parts that such a server is made of, those are public with which a ROS ca
 no robot behind it: topics, services, types and parameters, served by `serve_system`.
 """
 
-from mapspeak.rosbridge_server.graph import Service
 from mapspeak.rosbridge_server.hub import ROSBRIDGE_NODE, Hub, Topic
 from mapspeak.rosbridge_server.interfaces import Interfaces, RosSystem
 from mapspeak.rosbridge_server.parameters import Parameters, add_parameter_services
@@ -23,7 +22,6 @@ __all__ = [
     "Parameters",
     "RosSystem",
     "RosbridgeServer",
-    "Service",
     "Topic",
     "add_parameter_services",
     "add_rosapi",

@@ -1,7 +1,7 @@
 """One client's operations, on goals too: done as asked, and what is wrong mostly not told."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Awaitable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,6 +12,7 @@ from mapspeak.errors import LinkError, MapspeakError
 from mapspeak.links.rosbridge.protocol.bounds import FrameError
 from mapspeak.links.rosbridge.protocol.codec import decode_json
 from mapspeak.ros.messages.fields import Dialect, bare_type
+from mapspeak.rosbridge_server.connection import Outbox
 from mapspeak.rosbridge_server.drives import ServedDrive
 from mapspeak.rosbridge_server.hub import Compression, Frame, Publication, answer_frame
 from mapspeak.rosbridge_server.interfaces import RosSystem, refusal
@@ -24,7 +25,6 @@ from mapspeak.rosbridge_server.nav2 import (
     result_of,
     status_of,
 )
-from mapspeak.rosbridge_server.outbox import Outbox
 
 Operation = Mapping[str, Any]
 FEEDBACK_DEPTH = 5
@@ -272,34 +272,26 @@ class ClientConversation:
 
     async def _call_service(self, operation: Operation) -> None:
         name = _name(operation, "service")
-        service = self._stack.services.find(name)
+        service = self._stack.find_service(name)
         if service is not None and service.answer is None:
             return
+        answer: dict[str, Any] = {"op": "service_response", "service": name}
         try:
             if service is None or service.answer is None:
                 raise LinkError(f"Service {name} does not exist", hint="See /rosapi/services.")
             args = operation.get("args") or {}
             if not isinstance(args, dict):
                 raise LinkError(f"The arguments of {name} are no object.", hint="Name each one.")
-            values: object = await service.answer(args)
+            values = service.answer(args)
+            if isinstance(values, Awaitable):
+                values = await values
         except MapspeakError as error:
-            self._answer_call(operation, refusal(error), is_done=False)
+            answer |= {"values": refusal(error), "result": False}
         else:
-            self._answer_call(operation, values, is_done=True)
-
-    def _answer_call(self, operation: Operation, values: object, *, is_done: bool) -> None:
-        answer = {
-            "op": "service_response",
-            "service": operation["service"],
-            "values": values,
-            "result": is_done,
-        }
-        self._reply(operation, answer)
+            answer |= {"values": values, "result": True}
+        self._outbox.reply(answer_frame(operation, answer))
 
     # --- inside ---
-
-    def _reply(self, operation: Operation, answer: Mapping[str, Any]) -> None:
-        self._outbox.reply(answer_frame(operation, answer))
 
     def _is_broken(self, compression: Compression, message_type: str) -> bool:
         """Return True for what rosbridge on ROS 2 cannot send: png, lists of fixed length."""

@@ -10,8 +10,8 @@ from mapspeak.errors import GoalError, MapspeakError
 from mapspeak.geometry import Pose
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus, Robot
 from mapspeak.ros.messages.poses import FramedPose
-from mapspeak.rosbridge_server.graph import BASE_FRAME
 
+BASE_FRAME = "base_footprint"
 MOST_ENDED = 10
 """Ended goals that are still told about."""
 
@@ -50,6 +50,11 @@ class Drives:
     def all(self) -> list[ServedDrive]:
         """The goals under way and the last that ended, oldest first."""
         return list(self._drives)
+
+    @property
+    def under_way(self) -> list[ServedDrive]:
+        """The goals that have not ended."""
+        return [drive for drive in self._drives if not drive.is_over.is_set()]
 
     async def resolve(self, framed: FramedPose) -> Pose | None:
         """Return a pose in the map; None for a frame that nobody knows."""
@@ -91,13 +96,13 @@ class Drives:
 
     async def look(self) -> None:
         """Ask the robot how the goals under way stand."""
-        if any(not drive.is_over.is_set() for drive in self._drives):
+        if self.under_way:
             async with self._turn:
                 await self._look_at_all()
 
     async def _look_at_all(self) -> None:
-        for drive in self._drives:
-            if drive.is_over.is_set() or drive.robot_goal_id is None:
+        for drive in self.under_way:
+            if drive.robot_goal_id is None:
                 continue
             try:
                 status = await self._robot.fetch_goal_status(drive.robot_goal_id)
@@ -110,7 +115,8 @@ class Drives:
         drive.status = status
         if status.state.is_final:
             drive.is_over.set()
-        self._tell(drive)
+        for listener in self.listeners:
+            listener(drive)
 
     def _note(
         self, goal_id: str | None, robot_goal_id: str | None, status: GoalStatus
@@ -126,7 +132,3 @@ class Drives:
         self._drives = [*(each for each in self._drives if each not in forgotten), drive]
         self._renew(drive, status)
         return drive
-
-    def _tell(self, drive: ServedDrive) -> None:
-        for listener in self.listeners:
-            listener(drive)

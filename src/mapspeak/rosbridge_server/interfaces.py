@@ -1,17 +1,18 @@
 """A ROS as rosbridge's operations find it, with message types described and filled in."""
 
 from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
+import anyio.abc
 import numpy as np
 
 from mapspeak.errors import LinkError, MapspeakError
-from mapspeak.ros.definitions.texts import GENERATED, known_definitions, write_definition
-from mapspeak.ros.definitions.types import FLOATS, TIMES, WHOLES, Field, TypeBook
+from mapspeak.ros.definitions.texts import GENERATED, TIMES, known_definitions, write_definition
+from mapspeak.ros.definitions.types import FLOATS, WHOLES, Field, TypeBook
 from mapspeak.ros.messages.fields import Dialect, bare_type
-from mapspeak.rosbridge_server.graph import Services
-from mapspeak.rosbridge_server.hub import Hub
+from mapspeak.rosbridge_server.hub import ROSBRIDGE_NODE, Hub
 from mapspeak.rosbridge_server.nav2 import Nav2
 
 ROS2_DISTRIBUTION = "jazzy"
@@ -22,7 +23,8 @@ KIND_OF_GENERATED = {
 }
 
 NO_MORE: Mapping[str, str] = MappingProxyType({})
-Answer = Callable[[dict[str, Any]], Awaitable[dict[str, Any]]]
+Values = dict[str, Any]
+Answer = Callable[[Values], Values | Awaitable[Values]]
 
 
 class Interfaces:
@@ -95,14 +97,6 @@ class Interfaces:
             else self._book.default(each)
             for each in fields.values()
         }
-
-    def filled(self, name: str, answer: Answer) -> Answer:
-        """Return what answers a request of that type, once it has all its fields."""
-
-        async def reply(request: dict[str, Any]) -> dict[str, Any]:
-            return await answer(self.fill(name, request))
-
-        return reply
 
     def _fill_field(self, field: Field, value: object) -> Any:  # noqa: ANN401 - ROS JSON
         if field.length is None:
@@ -178,13 +172,29 @@ LOGGED_ERROR = 8
 """rosgraph_msgs/Log.ERROR."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Service:
+    """One service.
+
+    Attributes:
+        name: With its leading slash.
+        type: As "package/Type".
+        node: Which offers it.
+        answer: Gives the response for a request; None for a service that never answers.
+    """
+
+    name: str
+    type: str
+    node: str
+    answer: Answer | None
+
+
 class RosSystem:
     """What clients find.
 
     Attributes:
         dialect: Which ROS.
         hub: Its topics; on ROS 1 /rosout is one of them.
-        services: Its services.
         interfaces: Its message types.
         nav2: The navigation of ROS 2; None where there is none.
     """
@@ -192,15 +202,42 @@ class RosSystem:
     def __init__(self, hub: Hub, interfaces: Interfaces, *, dialect: Dialect) -> None:
         self.dialect = dialect
         self.hub = hub
-        self.services = Services()
         self.interfaces = interfaces
         self.nav2: Nav2 | None = None
+        self._services: dict[str, Service] = {}
+
+    @property
+    def services(self) -> list[Service]:
+        """The services by name."""
+        return sorted(self._services.values(), key=lambda service: service.name)
+
+    def offer(self, name: str, type_name: str, *, node: str, answer: Answer | None) -> None:
+        """Offer one more service."""
+        self._services[name] = Service(name=name, type=type_name, node=node, answer=answer)
+
+    def offer_typed(self, name: str, type_name: str, *, node: str, answer: Answer) -> None:
+        """Offer one more service, whose requests get all their fields before it answers."""
+        request = f"{type_name}_Request"
+        self.offer(
+            name,
+            type_name,
+            node=node,
+            answer=lambda values: answer(self.interfaces.fill(request, values)),
+        )
+
+    def find_service(self, name: str) -> Service | None:
+        """Find a service; a leading slash may be missing."""
+        return self._services.get(f"/{name.strip('/')}")
+
+    async def keep_going(self, *, task_status: anyio.abc.TaskStatus[None]) -> None:
+        """Do what it does by itself, until cancelled: this one does nothing."""
+        task_status.started()
 
     def complain(self, text: str) -> None:
         """Say what was wrong with an operation where rosbridge says it: on ROS 1, to /rosout."""
         if self.dialect is Dialect.ROS1:
             said = text[:LONGEST_COMPLAINT].encode(errors="replace").decode()
-            entry = {"level": LOGGED_ERROR, "name": "/rosbridge_websocket", "msg": said}
+            entry = {"level": LOGGED_ERROR, "name": ROSBRIDGE_NODE, "msg": said}
             self.hub.publish("/rosout", self.interfaces.fill("rosgraph_msgs/Log", entry))
 
 

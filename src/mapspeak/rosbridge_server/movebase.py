@@ -3,7 +3,6 @@
 from typing import Any
 
 from mapspeak.errors import LinkError, MapspeakError
-from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState, Robot
 from mapspeak.ros.messages.fields import Dialect, Message, read_stamp, write_header, write_stamp
 from mapspeak.ros.messages.poses import FramedPose, read_pose_stamped, write_pose_stamped
@@ -54,17 +53,14 @@ class MoveBase:
                 except MapspeakError:
                     continue
 
-    def publish_feedback(self, pose: Pose) -> None:
-        """Publish the feedback of the drive under way, if there is one."""
-        for drive in self._drives.all:
-            if not drive.is_over.is_set():
-                here = FramedPose(pose=pose, frame_id="map", stamp_s=self._robot.now_s)
-                base = write_pose_stamped(here, dialect=Dialect.ROS1)
-                self._publish("feedback", drive, {"feedback": {"base_position": base}})
+    def publish_feedback(self, drive: ServedDrive, here: FramedPose) -> None:
+        """Publish where the robot is on its way to a goal."""
+        base = write_pose_stamped(here, dialect=Dialect.ROS1)
+        self._publish("feedback", drive, {"feedback": {"base_position": base}})
 
     def publish_status(self) -> None:
         """Publish how all goals stand; actionlib does so five times a second."""
-        entries = [_status_message(drive) for drive in self._drives.all]
+        entries = [_status_of(drive) for drive in self._drives.all]
         self._hub.publish("/move_base/status", {"header": self._header(), "status_list": entries})
 
     async def _start(self, target: Message, goal_id: str) -> None:
@@ -82,16 +78,10 @@ class MoveBase:
 
     def _refuse(self, goal_id: str, error: MapspeakError) -> None:
         """End a goal that never began: with a bad quaternion move_base aborts it."""
-        stamp = write_stamp(self._robot.now_s, dialect=Dialect.ROS1)
         code = ABORTED if isinstance(error, LinkError) else REJECTED
-        status = {
-            "goal_id": {"stamp": stamp, "id": goal_id},
-            "status": code,
-            "text": error.message,
-        }
-        self._hub.publish(
-            "/move_base/result", {"header": self._header(), "status": status, "result": {}}
-        )
+        status = _status_message(goal_id, self._robot.now_s, code, error.message)
+        message = {"header": self._header(), "status": status, "result": {}}
+        self._hub.publish("/move_base/result", message)
 
     def _tell(self, drive: ServedDrive) -> None:
         if drive.is_over.is_set():
@@ -99,19 +89,23 @@ class MoveBase:
             self.publish_status()
 
     def _publish(self, last: str, drive: ServedDrive, content: dict[str, Any]) -> None:
-        message = {"header": self._header(), "status": _status_message(drive), **content}
+        message = {"header": self._header(), "status": _status_of(drive), **content}
         self._hub.publish(f"/move_base/{last}", message)
 
     def _header(self) -> dict[str, Any]:
         return write_header("", self._robot.now_s, dialect=Dialect.ROS1)
 
 
-def _status_message(drive: ServedDrive) -> dict[str, Any]:
+def _status_of(drive: ServedDrive) -> dict[str, Any]:
     code, text = PREEMPTING if drive.is_cancelling else ACTIVE, ""
     if drive.is_over.is_set():
         code, text = STATUS[drive.status.state]
-    stamp = write_stamp(drive.started_s, dialect=Dialect.ROS1)
-    return {"goal_id": {"stamp": stamp, "id": drive.goal_id}, "status": code, "text": text}
+    return _status_message(drive.goal_id, drive.started_s, code, text)
+
+
+def _status_message(goal_id: str, stamp_s: float, code: int, text: str) -> dict[str, Any]:
+    stamp = write_stamp(stamp_s, dialect=Dialect.ROS1)
+    return {"goal_id": {"stamp": stamp, "id": goal_id}, "status": code, "text": text}
 
 
 def _stamp_of(message: Message) -> float:

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any
 
 from mapspeak.errors import MapspeakError
-from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState, Robot
 from mapspeak.ros.messages.fields import Dialect, write_stamp
 from mapspeak.ros.messages.poses import FramedPose, read_pose_stamped, write_pose_stamped
@@ -51,9 +50,8 @@ class Nav2:
 
     async def cancel_operation(self, operation_id: str) -> None:
         """Ask the drive of one of rosbridge's operations to end, if it is under way."""
-        drive = self.by_operation.get(operation_id)
-        if drive is not None:
-            await self._drives.cancel(drive)
+        if operation_id in self.by_operation:
+            await self._drives.cancel(self.by_operation[operation_id])
 
     async def navigate(self, args: dict[str, Any]) -> ServedDrive | str:
         """Start a drive for a goal of the action; return a text where the goal is aborted at once.
@@ -73,28 +71,21 @@ class Nav2:
         except MapspeakError:
             return
 
-    def feedback_of(self, drive: ServedDrive, pose: Pose) -> dict[str, Any]:
-        """Return what the action feeds back, with the robot's pose in the map."""
-        now_s = self._robot.now_s
+    def publish_feedback(self, drive: ServedDrive, here: FramedPose) -> None:
+        """Publish how far a goal's drive has come, and tell the followers."""
         left_m = min(drive.status.distance_left_m or 0.0, FARTHEST_M)
-        here = FramedPose(pose=pose, frame_id="map", stamp_s=now_s)
-        return {
+        passed_s = self._robot.now_s - drive.started_s
+        feedback = {
             "current_pose": write_pose_stamped(here, dialect=Dialect.ROS2),
-            "navigation_time": write_stamp(now_s - drive.started_s, dialect=Dialect.ROS2),
+            "navigation_time": write_stamp(passed_s, dialect=Dialect.ROS2),
             "estimated_time_remaining": write_stamp(left_m / USUAL_SPEED_MPS, dialect=Dialect.ROS2),
             "number_of_recoveries": drive.status.n_recoveries,
             "distance_remaining": left_m,
         }
-
-    def publish_feedback(self, pose: Pose) -> None:
-        """Publish the feedback of the drive under way, if there is one."""
-        for drive in self._drives.all:
-            if not drive.is_over.is_set():
-                feedback = self.feedback_of(drive, pose)
-                message = {"goal_id": _uuid_message(drive), "feedback": feedback}
-                self._hub.publish(f"{ACTION}/_action/feedback", message)
-                for follow in self.followers:
-                    follow(drive, feedback)
+        message = {"goal_id": _uuid_message(drive), "feedback": feedback}
+        self._hub.publish(f"{ACTION}/_action/feedback", message)
+        for follow in self.followers:
+            follow(drive, feedback)
 
     async def cancel_goals(self, request: dict[str, Any]) -> dict[str, Any]:
         """Answer action_msgs/CancelGoal; an id of zeros means every goal (ROS 2 design)."""

@@ -5,23 +5,10 @@ from typing import Any
 
 from mapspeak.errors import LinkError
 from mapspeak.ros.messages.fields import Dialect
-from mapspeak.rosbridge_server.graph import (
-    BASE_FRAME,
-    BASE_NODE,
-    SLAM_NODES,
-    Service,
-    Services,
-    navigator_of,
-)
-from mapspeak.rosbridge_server.interfaces import Interfaces
+from mapspeak.rosbridge_server.interfaces import Answer, RosSystem, Values
 
-Values = dict[str, Any]
 ROS1_DISTRIBUTION = "noetic\n"
 NOT_SET = 0
-COSTMAP_OF = {
-    Dialect.ROS1: ("/move_base", "global_costmap/"),
-    Dialect.ROS2: ("/global_costmap/global_costmap", ""),
-}
 KINDS: dict[type, tuple[int, str]] = {
     bool: (1, "bool_value"),
     int: (2, "integer_value"),
@@ -49,19 +36,6 @@ class Parameters:
                 self.put(f"{node}:use_sim_time", value=True)
         if dialect is Dialect.ROS1:
             self._values |= {"/use_sim_time": True, "/rosdistro": ROS1_DISTRIBUTION}
-
-    @classmethod
-    def of_robot(cls, dialect: Dialect, *, radius_m: float) -> "Parameters":
-        """Return those of a robot with SLAM and navigation."""
-        frames = {"map_frame": "map", "odom_frame": "odom", "base_frame": BASE_FRAME}
-        by_node: dict[str, Values] = {
-            SLAM_NODES[dialect]: frames,
-            navigator_of(dialect): {"global_frame": "map", "robot_base_frame": BASE_FRAME},
-            BASE_NODE: {"robot_radius": radius_m},
-        }
-        costmap, prefix = COSTMAP_OF[dialect]
-        by_node.setdefault(costmap, {})[f"{prefix}robot_radius"] = radius_m
-        return cls(dialect, by_node)
 
     @property
     def names(self) -> list[str]:
@@ -95,80 +69,58 @@ class Parameters:
         }
 
 
-def add_parameter_services(
-    services: Services, parameters: Parameters, interfaces: Interfaces
-) -> None:
+def add_parameter_services(system: RosSystem, parameters: Parameters) -> None:
     """Offer for each node what every node of ROS 2 offers about its parameters."""
     for node in parameters.nodes:
-        of_node = ServedNodeParameters(node, parameters)
-        answers = {
-            "list_parameters": ("ListParameters", of_node.list_all),
-            "get_parameters": ("GetParameters", of_node.get),
-            "get_parameter_types": ("GetParameterTypes", of_node.get_types),
-            "describe_parameters": ("DescribeParameters", of_node.describe),
-            "set_parameters": ("SetParameters", of_node.set),
-        }
-        for name, (last, answer) in answers.items():
-            service_type = f"rcl_interfaces/{last}"
-            services.add(
-                Service(
-                    name=f"{node}/{name}",
-                    type=service_type,
-                    node=node,
-                    answer=interfaces.filled(f"{service_type}_Request", answer),
-                )
-            )
+        for name, answer in _answers_of(node, parameters).items():
+            last = name.title().replace("_", "")
+            system.offer_typed(f"{node}/{name}", f"rcl_interfaces/{last}", node=node, answer=answer)
 
 
-class ServedNodeParameters:
-    """The answers of one node, named after its services."""
+def _answers_of(node: str, parameters: Parameters) -> dict[str, Answer]:
+    def find_all(request: Values) -> list[tuple[str, object]]:
+        values = parameters.of_node(node)
+        return [(name, values.get(name)) for name in request["names"]]
 
-    def __init__(self, node: str, parameters: Parameters) -> None:
-        self._node = node
-        self._parameters = parameters
-
-    async def list_all(self, request: Values) -> Values:
-        """Return the names, those that begin as asked for."""
+    def list_names(request: Values) -> Values:
         begins = tuple(request["prefixes"])
-        names = self._parameters.of_node(self._node)
+        names = parameters.of_node(node)
         found = [name for name in names if not begins or name.startswith(begins)]
         return {"result": {"names": found, "prefixes": []}}
 
-    async def get(self, request: Values) -> Values:
-        """Return the values; one that is not there is not set."""
-        values = self._parameters.of_node(self._node)
-        return {"values": [_written(values.get(name)) for name in request["names"]]}
-
-    async def get_types(self, request: Values) -> Values:
-        """Return the kinds."""
-        values = self._parameters.of_node(self._node)
-        return {"types": bytes(_kind_of(values.get(name)) for name in request["names"])}
-
-    async def describe(self, request: Values) -> Values:
-        """Return the kinds with their names."""
-        values = self._parameters.of_node(self._node)
+    def describe(request: Values) -> Values:
         descriptors = [
-            {"name": name, "type": _kind_of(values.get(name)), "description": ""}
-            for name in request["names"]
+            {"name": name, "type": _kind_of(value), "description": ""}
+            for name, value in find_all(request)
         ]
         return {"descriptors": descriptors}
 
-    async def set(self, request: Values) -> Values:
-        """Set values of the kind that they have."""
-        return {"results": [self._set_one(each) for each in request["parameters"]]}
-
-    def _set_one(self, parameter: Values) -> Values:
-        name, known = parameter["name"], self._parameters.of_node(self._node)
+    def set_one(parameter: Values) -> Values:
+        name, known = parameter["name"], parameters.of_node(node)
+        reason = ""
         try:
             value = _read(parameter["value"])
         except LinkError as error:
             return {"successful": False, "reason": error.message}
         if name not in known:
-            return {"successful": False, "reason": f"parameter '{name}' has not been declared"}
-        if type(value) is not type(known[name]):
-            return {"successful": False, "reason": f"parameter '{name}' is of another type"}
-        self._parameters.put(f"{self._node}:{name}", value)
-        return {"successful": True, "reason": ""}
+            reason = f"parameter '{name}' has not been declared"
+        elif type(value) is not type(known[name]):
+            reason = f"parameter '{name}' is of another type"
+        else:
+            parameters.put(f"{node}:{name}", value)
+        return {"successful": not reason, "reason": reason}
+
+    return {
+        "list_parameters": list_names,
+        "get_parameters": lambda request: {"values": [_written(v) for _, v in find_all(request)]},
+        "get_parameter_types": lambda request: {
+            "types": bytes(_kind_of(value) for _, value in find_all(request))
+        },
+        "describe_parameters": describe,
+        "set_parameters": lambda request: {
+            "results": [set_one(each) for each in request["parameters"]]
+        },
+    }
 
 
 def _kind_of(value: object) -> int:

@@ -3,26 +3,25 @@
 import logging
 import signal
 from collections.abc import AsyncGenerator, Callable
-from contextlib import asynccontextmanager
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import dataclass
-from typing import Any
 
 import anyio
-from anyio.abc import ByteStream, Listener, SocketAttribute
+from anyio.abc import ByteStream, SocketAttribute
 from anyio.streams.memory import MemoryObjectReceiveStream
 
 from mapspeak.errors import ConfigError
 from mapspeak.robot import Robot
 from mapspeak.ros.messages.fields import Dialect
+from mapspeak.rosbridge_server.connection import Outbox, ServerWebSocket
 from mapspeak.rosbridge_server.conversation import ClientConversation
 from mapspeak.rosbridge_server.hub import Frame, fragments_of
 from mapspeak.rosbridge_server.interfaces import RosSystem
-from mapspeak.rosbridge_server.outbox import Outbox
 from mapspeak.rosbridge_server.stack import RosStack
-from mapspeak.rosbridge_server.websocket import ServerWebSocket
 
 LONGEST_FRAME = 10_000_000
 """rosbridge's `max_message_size`: on ROS 2 longer text is cut in pieces, longer CBOR is lost."""
+DEFAULT_HOST = "127.0.0.1"
 MOST_OPERATIONS = 1000
 """Operations that wait for one that takes long; then the network has to wait."""
 
@@ -43,19 +42,17 @@ class RosbridgeServer:
 
 
 @asynccontextmanager
-async def open_rosbridge_server(
-    robot: Robot,
+async def serve_system(
+    system: RosSystem,
     *,
-    dialect: Dialect,
-    host: str = "127.0.0.1",
+    host: str = DEFAULT_HOST,
     port: int = 0,
-    goals_in_new_thread: bool = False,
+    goals_in_new_thread: bool = True,
 ) -> AsyncGenerator[RosbridgeServer]:
-    """Offer a robot as a rosbridge server with rosapi while the context lasts.
+    """Offer a ROS as a rosbridge server while the context lasts.
 
     Args:
-        robot: Its `sleep` must give way to other tasks: time passes here, and only by it.
-        dialect: Which ROS to be.
+        system: What clients find.
         host: Where to listen.
         port: Where to listen; 0 takes any that is free.
         goals_in_new_thread: A goal does not hold up its client's further operations, as in newer
@@ -72,37 +69,36 @@ async def open_rosbridge_server(
             hint="Choose another port, or end the program that has this one.",
         ) from error
     async with listener, anyio.create_task_group() as tasks:
-        stack = RosStack(robot, dialect=dialect, tasks=tasks)
-        await tasks.start(stack.keep_going)
-        reception = Reception(stack, goals_in_new_thread=goals_in_new_thread)
+        await tasks.start(system.keep_going)
+        reception = Reception(system, goals_in_new_thread=goals_in_new_thread)
         tasks.start_soon(listener.serve, reception.receive)
-        yield _describe(listener, host)
+        port = listener.extra(SocketAttribute.local_port)  # noqa: S610 - anyio's, not Django's
+        name = f"[{host}]" if ":" in host else host
+        yield RosbridgeServer(url=f"ws://{name}:{port}", port=port)
         tasks.cancel_scope.cancel()
 
 
-@asynccontextmanager
-async def serve_system(
-    system: RosSystem, *, host: str = "127.0.0.1", port: int = 0
-) -> AsyncGenerator[RosbridgeServer]:
-    """Offer a ROS that stands for itself, with no robot behind it, while the context lasts.
+def open_rosbridge_server(
+    robot: Robot,
+    *,
+    dialect: Dialect,
+    host: str = DEFAULT_HOST,
+    port: int = 0,
+    goals_in_new_thread: bool = False,
+) -> AbstractAsyncContextManager[RosbridgeServer]:
+    """Offer a robot as a rosbridge server with rosapi, as `serve_system` does.
 
     Args:
-        system: What clients find; whoever made it publishes on its topics.
-        host: Where to listen.
-        port: Where to listen; 0 takes any that is free.
+        robot: Its `sleep` must give way to other tasks: time passes here, and only by it.
+        dialect: Which ROS to be.
+        host: Likewise, as are the others.
     """
-    listener = await anyio.create_tcp_listener(local_host=host, local_port=port)
-    async with listener, anyio.create_task_group() as tasks:
-        reception = Reception(system, goals_in_new_thread=True)
-        tasks.start_soon(listener.serve, reception.receive)
-        yield _describe(listener, host)
-        tasks.cancel_scope.cancel()
-
-
-def _describe(listener: Listener[Any], host: str) -> RosbridgeServer:
-    port = listener.extra(SocketAttribute.local_port)  # noqa: S610 - anyio's, not Django's
-    name = f"[{host}]" if ":" in host else host
-    return RosbridgeServer(url=f"ws://{name}:{port}", port=port)
+    return serve_system(
+        RosStack(robot, dialect=dialect),
+        host=host,
+        port=port,
+        goals_in_new_thread=goals_in_new_thread,
+    )
 
 
 class Reception:
@@ -177,9 +173,6 @@ async def _carry_out_all(
         except Exception:
             # A fault of ours; one client's odd operation must not end the others' robot.
             logger.exception("An operation could not be carried out")
-
-
-DEFAULT_HOST = "127.0.0.1"
 
 
 async def run_rosbridge_server(

@@ -22,7 +22,7 @@ from mapspeak.ros.messages.poses import (
     write_transforms,
 )
 from mapspeak.ros.messages.scans import CameraInfo, LaserScan, write_camera_info, write_scan
-from mapspeak.rosbridge_server.graph import BASE_FRAME
+from mapspeak.rosbridge_server.drives import BASE_FRAME
 from mapspeak.rosbridge_server.hub import Hub
 from mapspeak.spatial import OccupancyGrid
 

@@ -8,34 +8,112 @@ import anyio.lowlevel
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import MapspeakError
-from mapspeak.robot import Robot
+from mapspeak.robot import Robot, RobotDescription
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.grids import write_grid
-from mapspeak.ros.messages.poses import read_twist
-from mapspeak.rosbridge_server.drives import Drives
-from mapspeak.rosbridge_server.graph import SLAM_NODES, Service, navigator_of, topics_of
-from mapspeak.rosbridge_server.hub import Hub, Publication
-from mapspeak.rosbridge_server.interfaces import Interfaces, RosSystem
+from mapspeak.ros.messages.poses import FramedPose, read_twist
+from mapspeak.rosbridge_server.drives import BASE_FRAME, Drives
+from mapspeak.rosbridge_server.hub import ROSBRIDGE_NODE, Hub, Publication, Topic
+from mapspeak.rosbridge_server.interfaces import Interfaces, RosSystem, Values
 from mapspeak.rosbridge_server.movebase import MoveBase
 from mapspeak.rosbridge_server.nav2 import ACTION, Nav2
 from mapspeak.rosbridge_server.parameters import Parameters, add_parameter_services
 from mapspeak.rosbridge_server.rosapi import add_rosapi
-from mapspeak.rosbridge_server.sources import TICK_S, Sources
+from mapspeak.rosbridge_server.sources import (
+    IMAGE_TOPIC,
+    INFO_TOPIC,
+    SCAN_TOPIC,
+    TICK_S,
+    Sources,
+)
 
 STATUS_PERIOD_S = 0.2
 FEEDBACK_PERIOD_S = 0.1
+BASE_NODE = "/robot_base"
+CAMERA_NODE, LASER_NODE = "/camera", "/laser"
+STATE_NODE = "/robot_state_publisher"
+SLAM_NODES = {Dialect.ROS1: "/slam_gmapping", Dialect.ROS2: "/slam_toolbox"}
+NAVIGATORS = {Dialect.ROS1: "/move_base", Dialect.ROS2: "/bt_navigator"}
+COSTMAPS = {
+    Dialect.ROS1: ("/move_base", "global_costmap/"),
+    Dialect.ROS2: ("/global_costmap/global_costmap", ""),
+}
+"""The nodes that hold the global costmap's parameters, and how the names of these begin."""
+
+
+def topics_of(dialect: Dialect, offered: RobotDescription) -> list[Topic]:
+    """Return the topics of the robot's own nodes."""
+    slam, navigator = SLAM_NODES[dialect], NAVIGATORS[dialect]
+    estimate, pose = "geometry_msgs/PoseWithCovarianceStamped", "geometry_msgs/PoseStamped"
+    topics = [
+        _published("/clock", "rosgraph_msgs/Clock", BASE_NODE),
+        _latched("/map", "nav_msgs/OccupancyGrid", slam),
+        _latched("/map_metadata", "nav_msgs/MapMetaData", slam),
+        _published("/tf", "tf2_msgs/TFMessage", slam, BASE_NODE),
+        _latched("/tf_static", "tf2_msgs/TFMessage", STATE_NODE),
+        _published("/odom", "nav_msgs/Odometry", BASE_NODE),
+        _heard("/cmd_vel", "geometry_msgs/Twist", BASE_NODE),
+    ]
+    if offered.has_camera:
+        topics += [
+            _published(IMAGE_TOPIC, "sensor_msgs/CompressedImage", CAMERA_NODE, depth=1),
+            _published(INFO_TOPIC, "sensor_msgs/CameraInfo", CAMERA_NODE, depth=1),
+        ]
+    if offered.has_laser:
+        topics.append(_published(SCAN_TOPIC, "sensor_msgs/LaserScan", LASER_NODE, depth=1))
+    if dialect is Dialect.ROS2:
+        action = f"{ACTION}/_action"
+        return [
+            *topics,
+            _published("/pose", estimate, slam),
+            _heard("/goal_pose", pose, navigator),
+            _published(f"{action}/feedback", "nav2_msgs/NavigateToPose_FeedbackMessage", navigator),
+            _latched(f"{action}/status", "action_msgs/GoalStatusArray", navigator),
+        ]
+    action_type = "move_base_msgs/MoveBaseAction"
+    return [
+        *topics,
+        Topic(name="/amcl_pose", type=estimate, is_latched=True, publishers=("/amcl",)),
+        _published("/rosout", "rosgraph_msgs/Log", ROSBRIDGE_NODE),
+        _heard("/move_base/goal", f"{action_type}Goal", navigator),
+        _heard("/move_base/cancel", "actionlib_msgs/GoalID", navigator),
+        _heard("/move_base_simple/goal", pose, navigator),
+        _published("/move_base/feedback", f"{action_type}Feedback", navigator),
+        _published("/move_base/result", f"{action_type}Result", navigator),
+        _published("/move_base/status", "actionlib_msgs/GoalStatusArray", navigator),
+    ]
+
+
+def _published(name: str, message_type: str, *nodes: str, depth: int = 50) -> Topic:
+    return Topic(name=name, type=message_type, depth=depth, publishers=nodes)
+
+
+def _latched(name: str, message_type: str, node: str) -> Topic:
+    return Topic(name=name, type=message_type, is_latched=True, depth=1, publishers=(node,))
+
+
+def _heard(name: str, message_type: str, node: str) -> Topic:
+    return Topic(name=name, type=message_type, subscribers=(node,))
+
+
+def parameters_of(dialect: Dialect, *, radius_m: float) -> Parameters:
+    """Return the parameters of a robot with SLAM and navigation."""
+    by_node: dict[str, Values] = {
+        SLAM_NODES[dialect]: {"map_frame": "map", "odom_frame": "odom", "base_frame": BASE_FRAME},
+        NAVIGATORS[dialect]: {"global_frame": "map", "robot_base_frame": BASE_FRAME},
+        BASE_NODE: {"robot_radius": radius_m},
+    }
+    costmap, prefix = COSTMAPS[dialect]
+    by_node.setdefault(costmap, {})[f"{prefix}robot_radius"] = radius_m
+    return Parameters(dialect, by_node)
 
 
 class RosStack(RosSystem):
     """What a robot and its ROS would be.
 
-    Attributes:
-        drives: The goals it was given.
-
     Args:
         robot: Any robot; its `sleep` must give way to other tasks.
         dialect: Which ROS to be.
-        tasks: Where what takes long is done.
         hub: Carries the robot's topics; one is made of `topics_of` where none is given.
         drives: Takes the goals; likewise.
     """
@@ -45,57 +123,59 @@ class RosStack(RosSystem):
         robot: Robot,
         *,
         dialect: Dialect,
-        tasks: TaskGroup,
         hub: Hub | None = None,
         drives: Drives | None = None,
     ) -> None:
         hub = hub or Hub(topics_of(dialect, robot.description))
         super().__init__(hub, Interfaces(dialect), dialect=dialect)
-        self.drives = drives or Drives(robot)
+        self._drives = drives or Drives(robot)
         self._robot = robot
-        self._tasks = tasks
         self._sources = Sources(robot, self.hub, dialect=dialect)
-        self._move_base: MoveBase | None = None
+        self._navigation: Nav2 | MoveBase
+        self._tasks: TaskGroup
         self._feedback_due_s = self._status_due_s = 0.0
         self._take("/cmd_vel", self._take_velocity)
-        if dialect is Dialect.ROS2:
-            self._add_nav2()
-        else:
-            self._add_move_base()
-        self._add_map_service()
-        parameters = Parameters.of_robot(dialect, radius_m=robot.description.radius_m)
-        if dialect is Dialect.ROS2:
-            add_parameter_services(self.services, parameters, self.interfaces)
+        parameters = parameters_of(dialect, radius_m=robot.description.radius_m)
         add_rosapi(self, parameters, lambda: robot.now_s)
+        map_service = "/dynamic_map"
+        if dialect is Dialect.ROS2:
+            map_service = "/slam_toolbox/dynamic_map"
+            self._navigation = self._add_nav2()
+            add_parameter_services(self, parameters)
+        else:
+            self._navigation = self._add_move_base()
+        self.offer_typed(
+            map_service, "nav_msgs/GetMap", node=SLAM_NODES[dialect], answer=self._give_map
+        )
 
     async def keep_going(self, *, task_status: anyio.abc.TaskStatus[None]) -> None:
         """Publish and watch the drives as robot time passes, until cancelled."""
-        await self._sources.start()
-        task_status.started()
-        while True:
-            await self._robot.sleep(TICK_S)
-            # A robot whose time does not pass by itself must not keep others from their turn.
-            await anyio.lowlevel.checkpoint()
-            await self._sources.publish_due(self._tasks)
-            await self._watch_drives()
+        async with anyio.create_task_group() as self._tasks:
+            await self._sources.start()
+            task_status.started()
+            while True:
+                await self._robot.sleep(TICK_S)
+                # A robot whose time does not pass by itself must not keep others from their turn.
+                await anyio.lowlevel.checkpoint()
+                await self._sources.publish_due(self._tasks)
+                await self._watch_drives()
 
     async def _watch_drives(self) -> None:
         now_s = self._robot.now_s
-        if self._move_base is not None and now_s >= self._status_due_s:
+        if isinstance(self._navigation, MoveBase) and now_s >= self._status_due_s:
             self._status_due_s = now_s + STATUS_PERIOD_S
-            self._move_base.publish_status()
-        is_idle = all(drive.is_over.is_set() for drive in self.drives.all)
-        if is_idle or now_s < self._feedback_due_s:
+            self._navigation.publish_status()
+        if not self._drives.under_way or now_s < self._feedback_due_s:
             return
         self._feedback_due_s = now_s + FEEDBACK_PERIOD_S
-        navigation = self.nav2 or self._move_base
         try:
-            await self.drives.look()
+            await self._drives.look()
             here = await self._robot.fetch_pose()
         except MapspeakError:
             return
-        if navigation is not None:
-            navigation.publish_feedback(here.pose)
+        in_map = FramedPose(pose=here.pose, frame_id="map", stamp_s=self._robot.now_s)
+        for drive in self._drives.under_way:
+            self._navigation.publish_feedback(drive, in_map)
 
     def _take(self, topic: str, handle: Callable[[Publication], Coroutine[Any, Any, None]]) -> None:
         """Let the robot act on a topic; whoever published does not wait for it."""
@@ -110,40 +190,27 @@ class RosStack(RosSystem):
         try:
             if read_twist(publication.message).is_standing:
                 await self._robot.stop()
-                await self.drives.look()
+                await self._drives.look()
         except MapspeakError:
             return
 
-    def _add_nav2(self) -> None:
-        self.nav2 = Nav2(self._robot, self.hub, self.drives)
+    def _add_nav2(self) -> Nav2:
+        self.nav2 = Nav2(self._robot, self.hub, self._drives)
         self._take("/goal_pose", self.nav2.take_goal_pose)
-        self.services.add(
-            Service(
-                name=f"{ACTION}/_action/cancel_goal",
-                type="action_msgs/CancelGoal",
-                node=navigator_of(Dialect.ROS2),
-                answer=self.interfaces.filled(
-                    "action_msgs/CancelGoal_Request", self.nav2.cancel_goals
-                ),
-            )
+        self.offer_typed(
+            f"{ACTION}/_action/cancel_goal",
+            "action_msgs/CancelGoal",
+            node=NAVIGATORS[Dialect.ROS2],
+            answer=self.nav2.cancel_goals,
         )
+        return self.nav2
 
-    def _add_move_base(self) -> None:
-        self._move_base = MoveBase(self._robot, self.hub, self.drives)
-        self._take("/move_base/goal", self._move_base.take_goal)
-        self._take("/move_base/cancel", self._move_base.take_cancel)
-        self._take("/move_base_simple/goal", self._move_base.take_simple_goal)
+    def _add_move_base(self) -> MoveBase:
+        move_base = MoveBase(self._robot, self.hub, self._drives)
+        self._take("/move_base/goal", move_base.take_goal)
+        self._take("/move_base/cancel", move_base.take_cancel)
+        self._take("/move_base_simple/goal", move_base.take_simple_goal)
+        return move_base
 
-    def _add_map_service(self) -> None:
-        async def give_map(_request: dict[str, Any]) -> dict[str, Any]:
-            return {"map": write_grid(await self._robot.fetch_map(), dialect=self.dialect)}
-
-        is_ros1 = self.dialect is Dialect.ROS1
-        self.services.add(
-            Service(
-                name="/dynamic_map" if is_ros1 else "/slam_toolbox/dynamic_map",
-                type="nav_msgs/GetMap",
-                node=SLAM_NODES[self.dialect],
-                answer=self.interfaces.filled("nav_msgs/GetMap_Request", give_map),
-            )
-        )
+    async def _give_map(self, _request: Values) -> Values:
+        return {"map": write_grid(await self._robot.fetch_map(), dialect=self.dialect)}

@@ -3,6 +3,7 @@
 from collections.abc import AsyncGenerator, Callable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import anyio
@@ -14,7 +15,6 @@ from mapspeak.rosbridge_server import (
     Interfaces,
     Parameters,
     RosSystem,
-    Service,
     Topic,
     add_parameter_services,
     add_rosapi,
@@ -153,7 +153,12 @@ def _build(system: InspectedSystem, clock: Callable[[], float]) -> RosSystem:
     interfaces = Interfaces(system.dialect, more=system.types)
     played = RosSystem(Hub(_topics_of(system)), interfaces, dialect=system.dialect)
     for each in system.services:
-        played.services.add(_offer(each, interfaces))
+        played.offer_typed(
+            each.service,
+            each.type,
+            node=each.node,
+            answer=partial(_answer_emptily, interfaces, f"{each.type}_Response"),
+        )
     parameters = Parameters(
         system.dialect, {node: dict(values) for node, values in system.parameters.items()}
     )
@@ -162,7 +167,7 @@ def _build(system: InspectedSystem, clock: Callable[[], float]) -> RosSystem:
     for prefix in [f"{node}:" for node in system.parameters] if is_ros2 else ["/"]:
         parameters.put(f"{prefix}use_sim_time", value=False)
     if is_ros2:
-        add_parameter_services(played.services, parameters, interfaces)
+        add_parameter_services(played, parameters)
     add_rosapi(played, parameters, clock)
     return played
 
@@ -185,17 +190,10 @@ def _topics_of(system: InspectedSystem) -> list[Topic]:
     return topics
 
 
-def _offer(offered: OfferedService, interfaces: Interfaces) -> Service:
-    async def answer(_request: dict[str, Any]) -> dict[str, Any]:
-        return interfaces.fill(f"{offered.type}_Response", {})
-
-    request = f"{offered.type}_Request"
-    return Service(
-        name=offered.service,
-        type=offered.type,
-        node=offered.node,
-        answer=interfaces.filled(request, answer),
-    )
+def _answer_emptily(
+    interfaces: Interfaces, response: str, _request: dict[str, Any]
+) -> dict[str, Any]:
+    return interfaces.fill(response, {})
 
 
 async def _keep_publishing(

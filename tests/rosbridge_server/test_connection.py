@@ -2,8 +2,8 @@
 
 import pytest
 
+from mapspeak.rosbridge_server.connection import Lane, Outbox
 from mapspeak.rosbridge_server.hub import Frame, Publication
-from mapspeak.rosbridge_server.outbox import Lane, Outbox
 
 pytestmark = pytest.mark.anyio
 
