@@ -31,7 +31,8 @@ from mapspeak.memory.alignment import (
     placed,
     say_comparison,
 )
-from mapspeak.simulator import BODY_RADIUS_M, DriveState, Simulation, World, load_world
+from mapspeak.robot import GoalState
+from mapspeak.simulator import BODY_RADIUS_M, Simulation, World, load_world
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import find_frontiers
 from mapspeak.spatial.mapfiles import load_map, load_picture
@@ -137,7 +138,7 @@ def map_world(world: World, *, seed: int, n_drives: int) -> OccupancyGrid:
         goal_id = simulation.start_goal(goal)
         for _ in range(MOST_TICKS):
             simulation.step()
-            if simulation.goal_status(goal_id).state is not DriveState.DRIVING:
+            if simulation.goal_status(goal_id).state is not GoalState.DRIVING:
                 break
     return simulation.map()
 

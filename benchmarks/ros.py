@@ -16,8 +16,8 @@ import orjson
 from benchmarks.figure import Figure
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import open_rosbridge_robot
-from mapspeak.links.rosbridge.protocol import Conversation, Published
 from mapspeak.links.rosbridge.protocol.codec import to_cbor, to_json
+from mapspeak.links.rosbridge.protocol.conversation import Conversation, Published
 from mapspeak.links.simulated import Clock, open_simulated_robot
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.grids import read_grid, write_grid

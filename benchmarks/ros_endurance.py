@@ -21,8 +21,8 @@ from benchmarks.figure import Figure
 from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Pose
 from mapspeak.links.rosbridge import RosbridgeClient, Timing, open_rosbridge_robot
-from mapspeak.links.rosbridge.protocol import Conversation, FrameRefused, Published
 from mapspeak.links.rosbridge.protocol.codec import to_cbor, to_json
+from mapspeak.links.rosbridge.protocol.conversation import Conversation, FrameRefused, Published
 from mapspeak.robot import GoalState
 from mapspeak.ros.messages.fields import Dialect
 from mapspeak.ros.messages.grids import read_grid, write_grid

@@ -6,7 +6,8 @@ import time
 from collections.abc import Iterator
 
 from benchmarks.figure import Figure
-from mapspeak.simulator import DriveState, Simulation, load_world, world_names
+from mapspeak.robot import GoalState
+from mapspeak.simulator import Simulation, load_world, world_names
 from mapspeak.spatial.frontiers import find_frontiers
 
 __all__ = ["measure"]
@@ -46,7 +47,7 @@ def _explore(simulation: Simulation) -> tuple[float, list[float]]:
         while simulation.time_s < until_s:
             simulation.step()
             errors_m.append(simulation.truth.slam_error_m)
-            if simulation.goal_status(goal_id).state is not DriveState.DRIVING:
+            if simulation.goal_status(goal_id).state is not GoalState.DRIVING:
                 break
         spent_s += time.perf_counter() - begun_s
     return spent_s, errors_m

@@ -5,11 +5,11 @@ import pytest
 
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Pose
+from mapspeak.robot import GoalState, GoalStatus
 from mapspeak.simulator import (
+    HORIZONTAL_FOV_RAD,
     TICK_S,
     BodyVelocity,
-    DriveState,
-    DriveStatus,
     Simulation,
     World,
     load_world,
@@ -22,10 +22,10 @@ def warehouse() -> World:
     return load_world("warehouse")
 
 
-def drive(simulation: Simulation, goal: Pose, *, timeout_s: float = 60.0) -> DriveStatus:
+def drive(simulation: Simulation, goal: Pose, *, timeout_s: float = 60.0) -> GoalStatus:
     goal_id = simulation.start_goal(goal)
     until_s = simulation.time_s + timeout_s
-    while simulation.goal_status(goal_id).state is DriveState.DRIVING:
+    while simulation.goal_status(goal_id).state is GoalState.DRIVING:
         assert simulation.time_s < until_s
         simulation.step()
     return simulation.goal_status(goal_id)
@@ -90,7 +90,7 @@ def test_a_drive_through_the_warehouse_arrives_without_a_collision(warehouse: Wo
     first = drive(simulation, Pose(5.0, 3.2, 0.0))
     second = drive(simulation, Pose(9.6, 2.6, -1.0))
 
-    assert (first.state, second.state) == (DriveState.ARRIVED, DriveState.ARRIVED)
+    assert (first.state, second.state) == (GoalState.ARRIVED, GoalState.ARRIVED)
     truth = simulation.truth
     assert truth.n_collisions == 0
     assert truth.slam_error_m < 0.1
@@ -119,8 +119,8 @@ def test_a_newer_goal_replaces_the_drive_and_both_can_be_asked_about(warehouse: 
     second = simulation.start_goal(Pose(2.0, 1.0))
     simulation.step()
 
-    assert simulation.goal_status(first).state is DriveState.PREEMPTED
-    assert simulation.goal_status(second).state is DriveState.DRIVING
+    assert simulation.goal_status(first).state is GoalState.PREEMPTED
+    assert simulation.goal_status(second).state is GoalState.DRIVING
 
 
 def test_a_cancelled_drive_ends_and_the_robot_comes_to_a_stand(warehouse: World) -> None:
@@ -132,7 +132,7 @@ def test_a_cancelled_drive_ends_and_the_robot_comes_to_a_stand(warehouse: World)
     simulation.cancel_goal(goal_id)
     step_for(simulation, 1.5)
 
-    assert simulation.goal_status(goal_id).state is DriveState.CANCELLED
+    assert simulation.goal_status(goal_id).state is GoalState.CANCELLED
     assert simulation.velocity == BodyVelocity(0.0, 0.0)
 
 
@@ -144,7 +144,7 @@ def test_stop_ends_a_drive(warehouse: World) -> None:
     simulation.stop()
     step_for(simulation, 1.5)
 
-    assert simulation.goal_status(goal_id).state is DriveState.CANCELLED
+    assert simulation.goal_status(goal_id).state is GoalState.CANCELLED
     assert simulation.velocity == BodyVelocity(0.0, 0.0)
 
 
@@ -168,7 +168,7 @@ def test_a_velocity_by_hand_lasts_half_a_second_and_ends_the_drive(warehouse: Wo
     step_for(simulation, 1.0)
 
     assert simulation.velocity == BodyVelocity(0.0, 0.0)
-    assert simulation.goal_status(goal_id).state is DriveState.CANCELLED
+    assert simulation.goal_status(goal_id).state is GoalState.CANCELLED
 
 
 def test_driving_by_hand_into_a_wall_is_a_collision_that_only_truth_knows(
@@ -185,11 +185,11 @@ def test_driving_by_hand_into_a_wall_is_a_collision_that_only_truth_knows(
 def test_the_camera_looks_ahead_and_the_simulated_detector_reports_it(warehouse: World) -> None:
     simulation = Simulation(warehouse, seed=0)
 
-    shot = simulation.take_picture()
+    picture = simulation.take_picture()
     labels = {seen.label for seen in simulation.detect()}
 
-    assert shot.rgb.shape == (480, 640, 3)
-    assert math.radians(60) < shot.horizontal_fov_rad < math.radians(100)
+    assert picture.shape == (480, 640, 3)
+    assert math.radians(60) < HORIZONTAL_FOV_RAD < math.radians(100)
     assert "forklift" in labels
 
 

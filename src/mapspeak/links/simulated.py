@@ -15,8 +15,6 @@ from mapspeak.geometry import Pose
 from mapspeak.robot import (
     SCAN_PATIENCE_S,
     CameraPicture,
-    Cause,
-    CauseCode,
     Detection,
     GoalState,
     GoalStatus,
@@ -27,9 +25,9 @@ from mapspeak.robot import (
 from mapspeak.simulator import (
     BEAM_ANGLES_RAD,
     BODY_RADIUS_M,
+    HORIZONTAL_FOV_RAD,
     MAX_RANGE_M,
     TICK_S,
-    DriveState,
     Simulation,
 )
 from mapspeak.spatial import OccupancyGrid
@@ -49,15 +47,6 @@ class Clock(StrEnum):
 
     REAL = "real"
     VIRTUAL = "virtual"
-
-
-STATE_OF_DRIVE = {
-    DriveState.DRIVING: GoalState.DRIVING,
-    DriveState.ARRIVED: GoalState.ARRIVED,
-    DriveState.BLOCKED: GoalState.BLOCKED,
-    DriveState.CANCELLED: GoalState.CANCELLED,
-    DriveState.PREEMPTED: GoalState.PREEMPTED,
-}
 
 
 class SimulatedRobot:
@@ -123,7 +112,7 @@ class SimulatedRobot:
         if not self._has_detector:
             return ()
         async with self._looking:
-            return await anyio.to_thread.run_sync(self._detect)
+            return await anyio.to_thread.run_sync(self._simulation.detect)
 
     async def fetch_scan(self) -> RangeScan | None:
         """Return the latest turn of the simulated LiDAR, and where SLAM took the robot to be."""
@@ -151,7 +140,7 @@ class SimulatedRobot:
     async def fetch_goal_status(self, robot_goal_id: str) -> GoalStatus:
         """Return how a drive stands."""
         async with self._turn:
-            return self._goal_status(robot_goal_id)
+            return self._simulation.goal_status(_number(robot_goal_id))
 
     async def cancel_goal(self, robot_goal_id: str) -> None:
         """End a drive."""
@@ -174,41 +163,19 @@ class SimulatedRobot:
             self._simulation.step()
             self._after_step()
 
-    def _goal_status(self, robot_goal_id: str) -> GoalStatus:
-        status = self._simulation.goal_status(_number(robot_goal_id))
-        said = status.error_msg
-        cause = Cause(code=CauseCode.NAVIGATION_SAID, quote=said) if said else None
-        return GoalStatus(
-            state=STATE_OF_DRIVE[status.state],
-            distance_left_m=status.distance_left_m,
-            n_recoveries=status.n_recoveries,
-            cause=cause,
-        )
-
     def _take_picture(self) -> CameraPicture:
-        picture = self._simulation.take_picture()
+        rgb = self._simulation.take_picture()
         encoded = io.BytesIO()
-        Image.fromarray(picture.rgb).save(encoded, format="JPEG", quality=JPEG_QUALITY)
-        height_px, width_px = picture.rgb.shape[:2]
+        Image.fromarray(rgb).save(encoded, format="JPEG", quality=JPEG_QUALITY)
+        height_px, width_px = rgb.shape[:2]
         return CameraPicture(
             data=encoded.getvalue(),
             media_type="image/jpeg",
             width_px=width_px,
             height_px=height_px,
-            horizontal_fov_rad=picture.horizontal_fov_rad,
+            horizontal_fov_rad=HORIZONTAL_FOV_RAD,
             pose=self._simulation.pose_in_map,
             stamp_s=self._simulation.time_s,
-        )
-
-    def _detect(self) -> tuple[Detection, ...]:
-        return tuple(
-            Detection(
-                label=seen.label,
-                confidence_ratio=seen.confidence_ratio,
-                bearing_rad=seen.bearing_rad,
-                range_m=seen.range_m,
-            )
-            for seen in self._simulation.detect()
         )
 
 

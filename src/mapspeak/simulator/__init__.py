@@ -1,12 +1,16 @@
 """A world with one robot, stepped by hand: no clock, no network, no port."""
 
-from mapspeak.simulator.camera.camera import SimulatedDetection
+from mapspeak.simulator.camera.camera import HORIZONTAL_FOV_RAD
 from mapspeak.simulator.robot.controller import KEEP_OFF_M
 from mapspeak.simulator.robot.lidar import BEAM_ANGLES_RAD, MAX_RANGE_M, LidarScan
-from mapspeak.simulator.robot.navigator import DriveState, DriveStatus
 from mapspeak.simulator.robot.physics import MAX_SPEED_MPS, MAX_TURN_RADPS, BodyVelocity
-from mapspeak.simulator.simulation import TICK_S, CameraShot, Simulation
-from mapspeak.simulator.statelog import StateLog, StateRecord, read_state_log
+from mapspeak.simulator.simulation import (
+    TICK_S,
+    Simulation,
+    StateLog,
+    StateRecord,
+    read_state_log,
+)
 from mapspeak.simulator.truth import MeasuredRoom, TrueFloor, Truth, is_in_sight, slice_at_eye_level
 from mapspeak.simulator.worlds.world import (
     BODY_RADIUS_M,
@@ -21,18 +25,15 @@ from mapspeak.simulator.worlds.worldfiles import load_world, world_names
 __all__ = [
     "BEAM_ANGLES_RAD",
     "BODY_RADIUS_M",
+    "HORIZONTAL_FOV_RAD",
     "KEEP_OFF_M",
     "MAX_RANGE_M",
     "MAX_SPEED_MPS",
     "MAX_TURN_RADPS",
     "TICK_S",
     "BodyVelocity",
-    "CameraShot",
-    "DriveState",
-    "DriveStatus",
     "LidarScan",
     "MeasuredRoom",
-    "SimulatedDetection",
     "Simulation",
     "StateLog",
     "StateRecord",

@@ -4,24 +4,26 @@ Each step is one tick of 0.05 s of robot time: navigation or teleoperation comma
 body moves, the wheels report, and at every second tick the LiDAR measures and SLAM learns.
 """
 
+import json
 import math
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
+from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.errors import GoalError
+from mapspeak.errors import ConfigError, GoalError
 from mapspeak.geometry import Pose
+from mapspeak.robot import Detection, GoalState, GoalStatus
 from mapspeak.simulator.camera.camera import (
-    HORIZONTAL_FOV_RAD,
     PinholeCamera,
-    SimulatedDetection,
     SimulatedDetector,
 )
 from mapspeak.simulator.robot.controller import Obstacles
 from mapspeak.simulator.robot.lidar import Lidar, LidarScan
-from mapspeak.simulator.robot.navigator import DriveState, DriveStatus, Navigator, Senses
+from mapspeak.simulator.robot.navigator import Navigator, Senses
 from mapspeak.simulator.robot.physics import STANDING, BodyVelocity, Odometry, RobotBody
 from mapspeak.simulator.robot.slam import Localiser, Mapper
 from mapspeak.simulator.truth import Truth
@@ -34,19 +36,6 @@ _TICKS_PER_SCAN = 2
 _DETECTOR_SIZE_PX = (320, 240)
 """The detector judges by shares of the picture; half its size is as good and four times quicker."""
 _TELEOPERATION_TIMEOUT_S = 0.5
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class CameraShot:
-    """One picture of the front camera; compared by identity.
-
-    Attributes:
-        rgb: 0 to 255, shape (height, width, 3).
-        horizontal_fov_rad: The angle between the left and the right edge.
-    """
-
-    rgb: NDArray[np.uint8]
-    horizontal_fov_rad: float
 
 
 class Simulation:
@@ -87,7 +76,7 @@ class Simulation:
             pose = world.start.inverse() @ start
             self._mapper = Localiser(known, pose, random=for_guess)
         self._navigator = Navigator()
-        self._ended: dict[int, DriveStatus] = {}
+        self._ended: dict[int, GoalStatus] = {}
         self._goal_id = 0
         self._teleoperation = STANDING
         self._teleoperated_until_s = -math.inf
@@ -146,12 +135,11 @@ class Simulation:
         """Return the SLAM map; the same one until it has changed."""
         return self._mapper.publish(stamp_s=self.time_s)
 
-    def take_picture(self) -> CameraShot:
-        """Take a picture with the front camera."""
-        rgb = self._camera.render(self._body.world_from_base)
-        return CameraShot(rgb=rgb, horizontal_fov_rad=HORIZONTAL_FOV_RAD)
+    def take_picture(self) -> NDArray[np.uint8]:
+        """Take a picture with the front camera: 0 to 255, shape (height, width, 3)."""
+        return self._camera.render(self._body.world_from_base)
 
-    def detect(self) -> tuple[SimulatedDetection, ...]:
+    def detect(self) -> tuple[Detection, ...]:
         """Return what the simulated detector reports of the camera's view, from left to right."""
         width_px, height_px = _DETECTOR_SIZE_PX
         view = self._camera.observe(
@@ -163,14 +151,14 @@ class Simulation:
 
     def start_goal(self, goal: Pose) -> int:
         """Send the robot to a pose in the map and return the drive's id; an earlier drive ends."""
-        self._navigator.give_up(DriveState.PREEMPTED, "A newer goal replaced it.")
+        self._navigator.give_up(GoalState.PREEMPTED, "A newer goal replaced it.")
         self._keep_status()
         self._goal_id += 1
         self._teleoperated_until_s = -math.inf
         self._navigator.start(goal)
         return self._goal_id
 
-    def goal_status(self, goal_id: int) -> DriveStatus:
+    def goal_status(self, goal_id: int) -> GoalStatus:
         """Return how a drive stands, also after it has ended.
 
         Raises:
@@ -191,20 +179,20 @@ class Simulation:
         Raises:
             GoalError: No drive has that id.
         """
-        if self.goal_status(goal_id).state is DriveState.DRIVING:
-            self._navigator.give_up(DriveState.CANCELLED, "It was cancelled.")
+        if self.goal_status(goal_id).state is GoalState.DRIVING:
+            self._navigator.give_up(GoalState.CANCELLED, "It was cancelled.")
 
     def stop(self) -> None:
         """End every drive and stop the robot."""
         self._teleoperated_until_s = -math.inf
-        self._navigator.give_up(DriveState.CANCELLED, "The robot was stopped.")
+        self._navigator.give_up(GoalState.CANCELLED, "The robot was stopped.")
 
     def set_velocity(self, velocity: BodyVelocity) -> None:
         """Drive by hand for half a second at most; a drive under way ends.
 
         Nothing but the bumper protects the robot meanwhile, as on a real one.
         """
-        self._navigator.give_up(DriveState.CANCELLED, "The robot is driven by hand.")
+        self._navigator.give_up(GoalState.CANCELLED, "The robot is driven by hand.")
         self._teleoperation = velocity
         self._teleoperated_until_s = self.time_s + _TELEOPERATION_TIMEOUT_S
 
@@ -243,3 +231,87 @@ class Simulation:
     def _keep_status(self) -> None:
         if self._goal_id > 0:
             self._ended[self._goal_id] = self._navigator.status
+
+
+STATE_PERIOD_S = 0.2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StateRecord:
+    """How a simulation truly stood at one moment.
+
+    Attributes:
+        time_s: Robot time.
+        x: Metres, in a map without errors.
+        y: Likewise.
+        yaw_rad: Likewise.
+        slam_error_m: How far the robot's own pose was off.
+        driven_m: Metres driven since the start.
+        n_collisions: Bumps since the start.
+    """
+
+    time_s: float
+    x: float
+    y: float
+    yaw_rad: float
+    slam_error_m: float
+    driven_m: float
+    n_collisions: int
+
+    @property
+    def pose(self) -> Pose:
+        """Where the robot truly stood."""
+        return Pose(self.x, self.y, self.yaw_rad)
+
+    @classmethod
+    def of(cls, simulation: Simulation) -> Self:
+        """Return how a simulation truly stands now."""
+        truth = simulation.truth
+        pose = truth.pose
+        return cls(
+            time_s=round(simulation.time_s, 3),
+            x=pose.x,
+            y=pose.y,
+            yaw_rad=pose.yaw_rad,
+            slam_error_m=truth.slam_error_m,
+            driven_m=truth.driven_m,
+            n_collisions=truth.n_collisions,
+        )
+
+
+class StateLog:
+    """Writes a record at most five times per second of robot time."""
+
+    def __init__(self, simulation: Simulation, path: Path) -> None:
+        self._simulation = simulation
+        self._last_s = float("-inf")
+        try:
+            self._file = path.open("w", encoding="utf-8")
+            self.note()
+        except OSError as error:
+            raise ConfigError(
+                f"The state log {path} cannot be written: {error.strerror}.",
+                hint="Choose another file with --state-log.",
+            ) from error
+
+    def note(self) -> None:
+        """Write a record when the last one is old enough."""
+        now_s = self._simulation.time_s
+        if now_s - self._last_s < STATE_PERIOD_S:
+            return
+        self._last_s = now_s
+        record = StateRecord.of(self._simulation)
+        self._file.write(json.dumps(asdict(record)) + "\n")
+        self._file.flush()
+
+    def close(self) -> None:
+        """Write the last record and close the file."""
+        self._last_s = float("-inf")
+        self.note()
+        self._file.close()
+
+
+def read_state_log(path: Path) -> tuple[StateRecord, ...]:
+    """Read every whole line of a state log, which may still be growing."""
+    whole_lines = path.read_text(encoding="utf-8").rpartition("\n")[0].splitlines()
+    return tuple(StateRecord(**json.loads(line)) for line in whole_lines)

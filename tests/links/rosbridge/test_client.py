@@ -16,7 +16,7 @@ from benchmarks.mutations import mutate, seed_frames
 from mapspeak.errors import ConfigError, LinkError
 from mapspeak.links.rosbridge import RobotAddress, RosbridgeClient, Timing, open_client
 from mapspeak.links.rosbridge.connection import MAX_REFUSED
-from mapspeak.links.rosbridge.protocol import MAX_FRAME_BYTES
+from mapspeak.links.rosbridge.protocol.bounds import MAX_FRAME_BYTES
 from mapspeak.links.rosbridge.websocket import MAX_PARTS, MAX_SKIPPED_BYTES
 from rosbridge_script import (
     PATIENCE_S,

@@ -16,12 +16,13 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from mapspeak.errors import LinkError
-from mapspeak.links.rosbridge.protocol import (
+from mapspeak.links.rosbridge.protocol.bounds import FrameFault
+from mapspeak.links.rosbridge.protocol.codec import BARE_NUMBER
+from mapspeak.links.rosbridge.protocol.conversation import (
     LIGHT_BYTES,
     Conversation,
     Encoding,
     Event,
-    FrameFault,
     FrameRefused,
     GoalEnded,
     GoalFedBack,
@@ -30,7 +31,6 @@ from mapspeak.links.rosbridge.protocol import (
     StatusNoted,
     write_operation,
 )
-from mapspeak.links.rosbridge.protocol.codec import BARE_NUMBER
 from mapspeak.ros.port import new_id
 
 

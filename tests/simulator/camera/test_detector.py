@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from mapspeak.geometry import Pose
+from mapspeak.robot import Detection
 from mapspeak.simulator.camera.camera import (
     MAX_DETECTION_RANGE_M,
     PinholeCamera,
     SegmentedView,
-    SimulatedDetection,
     SimulatedDetector,
 )
 from mapspeak.simulator.worlds.world import World, WorldObject
@@ -21,7 +21,7 @@ def observe(world: World, pose: Pose = START) -> SegmentedView:
     return PinholeCamera(world).observe(pose, width_px=320, height_px=240)
 
 
-def detect_often(view: SegmentedView, *, seed: int = 1) -> list[tuple[SimulatedDetection, ...]]:
+def detect_often(view: SegmentedView, *, seed: int = 1) -> list[tuple[Detection, ...]]:
     detector = SimulatedDetector(random=np.random.default_rng(seed))
     return [detector.detect(view) for _ in range(N_LOOKS)]
 

@@ -6,7 +6,8 @@ import pytest
 from drawing import grid_from_text
 from mapspeak.errors import MapError
 from mapspeak.geometry import Point, Pose
-from mapspeak.simulator import DriveState, Simulation, TrueFloor, World, WorldObject
+from mapspeak.robot import GoalState
+from mapspeak.simulator import Simulation, TrueFloor, World, WorldObject
 from mapspeak.simulator.robot.gridmap import LogOddsMap
 from mapspeak.simulator.robot.scanmatch import FinishedField, SurfaceField
 from sites import make_flat
@@ -21,11 +22,11 @@ def flat(tmp_path_factory: pytest.TempPathFactory) -> World:
     return make_flat(tmp_path_factory.mktemp("flat"))
 
 
-def drive(simulation: Simulation, goal: Pose) -> DriveState:
+def drive(simulation: Simulation, goal: Pose) -> GoalState:
     """Drives to a goal, and gives how that ended."""
     goal_id = simulation.start_goal(goal)
     for _ in range(MOST_TICKS):
-        if simulation.goal_status(goal_id).state is not DriveState.DRIVING:
+        if simulation.goal_status(goal_id).state is not GoalState.DRIVING:
             break
         simulation.step()
     return simulation.goal_status(goal_id).state
@@ -34,7 +35,7 @@ def drive(simulation: Simulation, goal: Pose) -> DriveState:
 def test_a_robot_finds_its_place_in_a_known_map_and_keeps_it(flat: World) -> None:
     known = TrueFloor(flat).visible
     simulation = Simulation(flat, seed=1, known=known, start=START)
-    assert drive(simulation, Pose(5.5, 3.5)) is DriveState.ARRIVED
+    assert drive(simulation, Pose(5.5, 3.5)) is GoalState.ARRIVED
     assert simulation.truth.slam_error_m < 0.06
     assert simulation.truth.pose.point.distance_to(Point(5.5, 3.5)) < 0.2
     assert simulation.map() is known
@@ -57,7 +58,7 @@ def test_what_the_map_does_not_know_is_driven_around(flat: World) -> None:
     changed = replace(flat, objects=(*flat.objects, crate))
     known = TrueFloor(flat).visible
     simulation = Simulation(changed, seed=1, known=known, start=Pose(1.5, 0.9))
-    assert drive(simulation, Pose(5.5, -0.1)) is DriveState.ARRIVED
+    assert drive(simulation, Pose(5.5, -0.1)) is GoalState.ARRIVED
     assert simulation.truth.n_collisions == 0
 
 
@@ -68,7 +69,7 @@ def test_a_way_that_is_blocked_ends_blocked(flat: World) -> None:
     changed = replace(flat, objects=(*flat.objects, *crates))
     known = TrueFloor(flat).visible
     simulation = Simulation(changed, seed=1, known=known, start=START)
-    assert drive(simulation, Pose(1.5, 3.5)) is DriveState.BLOCKED
+    assert drive(simulation, Pose(1.5, 3.5)) is GoalState.BLOCKED
     assert simulation.truth.n_collisions == 0
 
 

@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from causes import quote_of
 from drawing import grid_from_text
 from mapspeak.geometry import Pose
-from mapspeak.simulator import DriveState, DriveStatus
+from mapspeak.robot import GoalState, GoalStatus
 from mapspeak.simulator.robot.controller import Obstacles
 from mapspeak.simulator.robot.lidar import LidarScan, measure_ranges
 from mapspeak.simulator.robot.navigator import Navigator, Senses
@@ -67,7 +68,7 @@ class Course:
         self.body.move(self.navigator.steer(senses), TICK_S)
         self.now_s += TICK_S
 
-    def drive_to(self, goal: Pose, *, timeout_s: float = 90.0) -> DriveStatus:
+    def drive_to(self, goal: Pose, *, timeout_s: float = 90.0) -> GoalStatus:
         self.navigator.start(goal)
         while self.navigator.is_driving and self.now_s < timeout_s:
             self.step()
@@ -81,7 +82,7 @@ def test_a_drive_through_a_door_ends_on_the_goal_with_its_heading(yaw_rad: float
 
     status = course.drive_to(goal)
 
-    assert status.state is DriveState.ARRIVED
+    assert status.state is GoalState.ARRIVED
     assert course.body.world_from_base.point.distance_to(goal.point) <= 0.15
     turn_left = math.remainder(course.body.world_from_base.yaw_rad - yaw_rad, math.tau)
     assert abs(turn_left) <= 0.1
@@ -104,7 +105,7 @@ def test_a_goal_where_the_robot_already_stands_is_reached_by_turning() -> None:
 
     status = course.drive_to(Pose(2.0, 2.0, 2.0))
 
-    assert status.state is DriveState.ARRIVED
+    assert status.state is GoalState.ARRIVED
     assert course.body.driven_m < 0.05
 
 
@@ -124,8 +125,8 @@ def test_a_goal_that_cannot_be_reached_is_blocked_at_once_with_the_reason(
 
     status = course.drive_to(goal)
 
-    assert status.state is DriveState.BLOCKED
-    assert reason in status.error_msg
+    assert status.state is GoalState.BLOCKED
+    assert reason in quote_of(status)
     assert course.body.driven_m == 0
 
 
@@ -136,7 +137,7 @@ def test_unknown_floor_is_not_driven_over() -> None:
         known=TWO_ROOMS.replace("#...................#", "#.........?.........#"),
     )
 
-    assert course.drive_to(Pose(9.0, 2.0)).state is DriveState.BLOCKED
+    assert course.drive_to(Pose(9.0, 2.0)).state is GoalState.BLOCKED
 
 
 def test_a_door_that_is_shut_against_the_map_blocks_the_drive_without_a_collision() -> None:
@@ -144,9 +145,9 @@ def test_a_door_that_is_shut_against_the_map_blocks_the_drive_without_a_collisio
 
     status = course.drive_to(Pose(9.0, 2.0))
 
-    assert status.state is DriveState.BLOCKED
+    assert status.state is GoalState.BLOCKED
     assert status.n_recoveries > 0
-    assert "no progress" in status.error_msg
+    assert "no progress" in quote_of(status)
     assert course.body.n_collisions == 0
 
 
@@ -183,7 +184,7 @@ def test_a_map_that_changes_on_the_way_makes_the_robot_plan_anew() -> None:
     while course.navigator.is_driving and course.now_s < 90:
         course.step()
 
-    assert course.navigator.status.state is DriveState.ARRIVED
+    assert course.navigator.status.state is GoalState.ARRIVED
     assert course.navigator.status.n_recoveries == 0
 
 
@@ -192,7 +193,7 @@ def test_a_robot_that_stands_too_near_to_a_wall_drives_away_from_it() -> None:
 
     status = course.drive_to(Pose(3.0, 2.0))
 
-    assert status.state is DriveState.ARRIVED
+    assert status.state is GoalState.ARRIVED
     assert course.body.n_collisions == 0
 
 
@@ -201,10 +202,10 @@ def test_a_drive_that_is_given_up_ends_with_the_reason_and_stands() -> None:
     course.navigator.start(Pose(9.0, 2.0))
     course.step()
 
-    course.navigator.give_up(DriveState.CANCELLED, "Enough.")
+    course.navigator.give_up(GoalState.CANCELLED, "Enough.")
 
-    assert course.navigator.status.state is DriveState.CANCELLED
-    assert course.navigator.status.error_msg == "Enough."
+    assert course.navigator.status.state is GoalState.CANCELLED
+    assert quote_of(course.navigator.status) == "Enough."
     assert not course.navigator.is_driving
 
 
@@ -232,9 +233,9 @@ NOOK = """
 """
 
 
-@pytest.mark.parametrize(("n_cells", "state"), [(10, DriveState.ARRIVED), (6, DriveState.BLOCKED)])
+@pytest.mark.parametrize(("n_cells", "state"), [(10, GoalState.ARRIVED), (6, GoalState.BLOCKED)])
 def test_a_robot_gets_out_of_a_nook_by_a_gap_that_its_map_shows_a_cell_too_narrow(
-    n_cells: int, state: DriveState
+    n_cells: int, state: GoalState
 ) -> None:
     course = Course(NOOK, Pose(1.5, 1.5))
     cells = course.grid.cells.copy()

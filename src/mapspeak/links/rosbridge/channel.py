@@ -13,7 +13,12 @@ from anyio.abc import TaskGroup
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge.address import RobotAddress, Timing
 from mapspeak.links.rosbridge.connection import SocketConnection
-from mapspeak.links.rosbridge.protocol import Encoding, Event, ServiceAnswered, write_operation
+from mapspeak.links.rosbridge.protocol.conversation import (
+    Encoding,
+    Event,
+    ServiceAnswered,
+    write_operation,
+)
 from mapspeak.links.rosbridge.websocket import open_websocket
 from mapspeak.ros.link import TopicRequest
 from mapspeak.ros.port import new_id

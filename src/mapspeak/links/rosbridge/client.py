@@ -12,14 +12,14 @@ from anyio.abc import TaskGroup
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge.address import RobotAddress, Timing
 from mapspeak.links.rosbridge.channel import Channel, RosbridgeTopicRequest, ServiceCaller
-from mapspeak.links.rosbridge.protocol import (
+from mapspeak.links.rosbridge.protocol.codec import require_cbor
+from mapspeak.links.rosbridge.protocol.conversation import (
     Event,
     FrameRefused,
     GoalEnded,
     GoalFedBack,
     Published,
     StatusNoted,
-    require_cbor,
     write_operation,
 )
 from mapspeak.links.rosbridge.rosapi import Rosapi

@@ -10,12 +10,11 @@ import anyio.to_thread
 
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge.address import Timing
-from mapspeak.links.rosbridge.protocol import (
+from mapspeak.links.rosbridge.protocol.bounds import MAX_FRAME_BYTES, FrameFault
+from mapspeak.links.rosbridge.protocol.conversation import (
     LIGHT_BYTES,
-    MAX_FRAME_BYTES,
     Conversation,
     Event,
-    FrameFault,
     FrameRefused,
     ServiceAnswered,
 )

@@ -17,7 +17,7 @@ from websockets.streams import StreamReader
 
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge.address import RobotAddress
-from mapspeak.links.rosbridge.protocol import MAX_FRAME_BYTES
+from mapspeak.links.rosbridge.protocol.bounds import MAX_FRAME_BYTES
 
 READ_BYTES = 262_144
 FED_BYTES = 4_096

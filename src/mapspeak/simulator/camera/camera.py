@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.geometry import Pose
+from mapspeak.robot import Detection
 from mapspeak.simulator.camera.rasteriser import Viewpoint, look
 from mapspeak.simulator.camera.scene import BUILDING, build_scene
 from mapspeak.simulator.camera.shading import draw_picture
@@ -97,23 +98,6 @@ _MISSES = (0.25, 0.02)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SimulatedDetection:
-    """One thing that the simulated detector reports.
-
-    Attributes:
-        label: What it takes the thing for.
-        confidence_ratio: Between 0 and 1.
-        bearing_rad: From the camera's heading, left positive.
-        range_m: Along the floor from the camera to its visible surface.
-    """
-
-    label: str
-    confidence_ratio: float
-    bearing_rad: float
-    range_m: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class _Sighting:
     """What is truly visible of one object.
 
@@ -136,7 +120,7 @@ class SimulatedDetector:
     def __init__(self, *, random: np.random.Generator) -> None:
         self._random = random
 
-    def detect(self, view: SegmentedView) -> tuple[SimulatedDetection, ...]:
+    def detect(self, view: SegmentedView) -> tuple[Detection, ...]:
         """Return what the simulated detector reports of a view, from left to right."""
         sightings = sorted(_find_sightings(view), key=lambda sighting: -sighting.bearing_rad)
         return tuple(self._report(sighting) for sighting in sightings if self._notices(sighting))
@@ -144,10 +128,10 @@ class SimulatedDetector:
     def _notices(self, sighting: _Sighting) -> bool:
         return self._random.random() >= _between(_MISSES, sighting.area_ratio)
 
-    def _report(self, sighting: _Sighting) -> SimulatedDetection:
+    def _report(self, sighting: _Sighting) -> Detection:
         bearing, spread, doubt = self._random.normal(size=3)
         confidence = _between(_CONFIDENCES, sighting.area_ratio) + _CONFIDENCE_NOISE_RATIO * doubt
-        return SimulatedDetection(
+        return Detection(
             label=find_kind(sighting.kind).label,
             confidence_ratio=float(np.clip(confidence, 0.0, 1.0)),
             bearing_rad=sighting.bearing_rad + _BEARING_NOISE_RAD * bearing,

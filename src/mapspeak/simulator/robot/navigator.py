@@ -5,11 +5,11 @@ It sees what a real navigation stack sees: the SLAM map and pose, odometry and t
 
 import math
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
+from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus
 from mapspeak.simulator.robot.controller import Obstacles, PathFollower
 from mapspeak.simulator.robot.physics import STANDING, BodyVelocity
 from mapspeak.simulator.worlds.world import BODY_RADIUS_M
@@ -35,34 +35,6 @@ _LOOK_AROUND_RADPS = 0.8
 _LOOK_AROUND_S = 2.5
 
 
-class DriveState(StrEnum):
-    """How a drive stands."""
-
-    DRIVING = "driving"
-    ARRIVED = "arrived"
-    BLOCKED = "blocked"
-    CANCELLED = "cancelled"
-    PREEMPTED = "preempted"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DriveStatus:
-    """How a drive stands, and why it ended.
-
-    Attributes:
-        state: See `DriveState`.
-        distance_left_m: Along the latest path; None before there was one.
-        n_recoveries: How often the robot backed off or turned to get free.
-        error_msg: What a client is told of its end, as Nav2 does; empty while it drives and when
-            it has arrived.
-    """
-
-    state: DriveState
-    distance_left_m: float | None = None
-    n_recoveries: int = 0
-    error_msg: str = ""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Senses:
     """What the robot knows at one moment.
@@ -82,22 +54,6 @@ class Senses:
     map: OccupancyGrid
 
 
-@dataclass(frozen=True, slots=True)
-class _Recovery:
-    """A motion that is done for a while to get free."""
-
-    velocity: BodyVelocity
-    ends_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class _Milestone:
-    """How near the robot had come to its goal, and when."""
-
-    left_m: float
-    passed_s: float
-
-
 class Navigator:
     """Drives to one goal at a time."""
 
@@ -107,12 +63,14 @@ class Navigator:
         self._planning_radius_m = _PLANNING_RADII_M[0]
         self._checked_s = -math.inf
         self._checked_map: OccupancyGrid | None = None
-        self._recovery: _Recovery | None = None
-        self._milestone: _Milestone | None = None
-        self._status = DriveStatus(state=DriveState.CANCELLED, error_msg="There was no goal yet.")
+        self._recovery: tuple[BodyVelocity, float] | None = None
+        """A motion to get free, and when it ends."""
+        self._milestone: tuple[float, float] | None = None
+        """How near the robot had come to its goal along the path, and when."""
+        self._status = GoalStatus(state=GoalState.CANCELLED)
 
     @property
-    def status(self) -> DriveStatus:
+    def status(self) -> GoalStatus:
         """How the latest drive stands."""
         return self._status
 
@@ -127,9 +85,9 @@ class Navigator:
         self._follower = None
         self._recovery = None
         self._milestone = None
-        self._status = DriveStatus(state=DriveState.DRIVING)
+        self._status = GoalStatus(state=GoalState.DRIVING)
 
-    def give_up(self, state: DriveState, reason: str) -> None:
+    def give_up(self, state: GoalState, reason: str) -> None:
         """End the drive, if there is one, because something else was commanded."""
         if self.is_driving:
             self._end(state, reason)
@@ -142,38 +100,37 @@ class Navigator:
         return senses.obstacles.limit(wanted)
 
     def _follow(self, senses: Senses, goal: Pose) -> BodyVelocity:
-        if not self._has_good_path(senses) and not self._plan(senses, goal):
-            return STANDING
+        if not self._has_good_path(senses):
+            self._plan(senses, goal)
         follower = self._follower
         if follower is None:
             return STANDING
         if follower.has_arrived(senses.pose):
-            self._end(DriveState.ARRIVED, "")
+            self._end(GoalState.ARRIVED, "")
             return STANDING
         velocity = follower.steer(senses.pose, senses.speed_mps, senses.obstacles)
-        self._tell(follower.distance_left_m)
+        self._status = replace(self._status, distance_left_m=follower.distance_left_m)
         self._watch_progress(senses.now_s, follower.distance_left_m)
         return velocity
 
     # --- planning ---
 
-    def _plan(self, senses: Senses, goal: Pose) -> bool:
+    def _plan(self, senses: Senses, goal: Pose) -> None:
         """Plan anew; without a way try to get free, and in the end give up."""
         path = self._find_path(senses, goal)
         if path is not None:
             self._follower = PathFollower(path, goal)
             self._milestone = None
             self._note_check(senses)
-            return True
+            return
         self._follower = None
         fault = _fault_of(senses.map, goal.point)
         if fault is not None:
-            self._end(DriveState.BLOCKED, fault)
+            self._end(GoalState.BLOCKED, fault)
         elif self._status.distance_left_m is None:
-            self._end(DriveState.BLOCKED, "No way to the goal over floor the map knows to be free.")
+            self._end(GoalState.BLOCKED, "No way to the goal over floor the map knows to be free.")
         else:
             self._start_recovery(senses.now_s, "The way to the goal is blocked.")
-        return False
 
     def _find_path(self, senses: Senses, goal: Pose) -> Path | None:
         for radius in _PLANNING_RADII_M:
@@ -207,41 +164,42 @@ class Navigator:
 
     def _watch_progress(self, now_s: float, distance_left_m: float) -> None:
         """Start a recovery when the robot has come no nearer for some seconds."""
-        if self._milestone is None or distance_left_m <= self._milestone.left_m - _PROGRESS_M:
-            self._milestone = _Milestone(distance_left_m, now_s)
-        elif now_s - self._milestone.passed_s > _PATIENCE_S:
+        nearest_m, passed_s = self._milestone or (math.inf, now_s)
+        if distance_left_m <= nearest_m - _PROGRESS_M:
+            self._milestone = (distance_left_m, now_s)
+        elif now_s - passed_s > _PATIENCE_S:
             self._follower = None
             self._start_recovery(now_s, "The robot made no progress.")
 
     def _start_recovery(self, now_s: float, reason: str) -> None:
         n_recoveries = self._status.n_recoveries
         if n_recoveries >= _MOST_RECOVERIES:
-            self._end(DriveState.BLOCKED, f"{reason} {n_recoveries} attempts to get free failed.")
+            self._end(GoalState.BLOCKED, f"{reason} {n_recoveries} attempts to get free failed.")
             return
         if n_recoveries % 2 == 0:
             motion, duration_s = BodyVelocity(_BACK_OFF_MPS, 0.0), _BACK_OFF_S
         else:
             motion, duration_s = BodyVelocity(0.0, _LOOK_AROUND_RADPS), _LOOK_AROUND_S
-        self._recovery = _Recovery(motion, now_s + duration_s)
+        self._recovery = (motion, now_s + duration_s)
         self._milestone = None
         self._status = replace(self._status, n_recoveries=n_recoveries + 1)
 
     def _recover(self, senses: Senses) -> BodyVelocity | None:
         """Return the motion of a recovery under way."""
-        if self._recovery is not None and senses.now_s >= self._recovery.ends_s:
+        if self._recovery is None:
+            return None
+        velocity, ends_s = self._recovery
+        if senses.now_s >= ends_s:
             self._recovery = None
-        return None if self._recovery is None else self._recovery.velocity
+            return None
+        return velocity
 
-    # --- telling ---
-
-    def _tell(self, distance_left_m: float) -> None:
-        self._status = replace(self._status, distance_left_m=distance_left_m)
-
-    def _end(self, state: DriveState, reason: str) -> None:
+    def _end(self, state: GoalState, reason: str) -> None:
         self._goal = None
         self._follower = None
         self._recovery = None
-        self._status = replace(self._status, state=state, error_msg=reason)
+        cause = Cause(code=CauseCode.NAVIGATION_SAID, quote=reason) if reason else None
+        self._status = replace(self._status, state=state, cause=cause)
 
 
 def _fault_of(grid: OccupancyGrid, goal: Point) -> str | None:
