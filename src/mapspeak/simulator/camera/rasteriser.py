@@ -6,10 +6,9 @@ none of them is negative; their sum is 1 / depth; and any quantity that is linea
 is, over depth, the same mixture of them (Olano and Greer, "Triangle scan conversion using 2D
 homogeneous coordinates", 1997).
 
-The depth buffer is filled tile by tile, from coarse to fine. At each level, every triangle is
-paired with the tiles that it may touch. A triangle that covers a whole tile hides all that lies
-behind it there, so most of what is hidden falls away before any pixel is looked at. What is left at
-the finest level is compared pixel by pixel.
+The depth buffer is filled tile by tile. Every triangle is paired with the tiles that it may touch.
+A triangle that covers a whole tile hides all that lies behind it there, so most of what is hidden
+falls away before any pixel is looked at. What is left is compared pixel by pixel.
 """
 
 import math
@@ -64,23 +63,13 @@ class Viewpoint:
         return replace(self, width_px=self.width_px * factor, height_px=self.height_px * factor)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Projection:
-    """The triangles that may be seen.
+def project(corners: FloatArray, viewpoint: Viewpoint) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return which triangles of shape (n, 3, 3) face the camera and touch its view.
 
-    Attributes:
-        triangles: Which of the triangles given, shape (n,).
-        edges: e_i(x, y) = edges[:, i] @ (x, y, 1), shape (n, 3, 3); pixel centres are at +0.5.
-        bounds_px: Left, top, right and bottom of each on the picture, shape (n, 4).
+    With them come their edge functions e_i(x, y) = edges[:, i] @ (x, y, 1), shape (n, 3, 3), where
+    pixel centres are at +0.5, and the left, top, right and bottom of each on the picture, shape
+    (n, 4).
     """
-
-    triangles: IntArray
-    edges: FloatArray
-    bounds_px: FloatArray
-
-
-def project(corners: FloatArray, viewpoint: Viewpoint) -> Projection:
-    """Return those triangles of shape (n, 3, 3) that face the camera and touch its view."""
     homogeneous = _to_picture(corners, viewpoint)
     chosen = np.flatnonzero(_is_in_view(homogeneous, viewpoint))
     homogeneous = homogeneous[chosen]
@@ -93,7 +82,7 @@ def project(corners: FloatArray, viewpoint: Viewpoint) -> Projection:
     edges = crosses[faces_camera] / volume[faces_camera, None, None]
     bounds = _bound(homogeneous[faces_camera], viewpoint)
     on_picture = (bounds[:, 0] < bounds[:, 2]) & (bounds[:, 1] < bounds[:, 3])
-    return Projection(chosen[faces_camera][on_picture], edges[on_picture], bounds[on_picture])
+    return chosen[faces_camera][on_picture], edges[on_picture], bounds[on_picture]
 
 
 def widen(edges: FloatArray) -> FloatArray:
@@ -161,8 +150,7 @@ def _bound(homogeneous: FloatArray, viewpoint: Viewpoint) -> FloatArray:
     return np.concatenate([np.clip(low, 0, size), np.clip(high, 0, size)], axis=1)
 
 
-FINE_PX = 8
-COARSE_PX = 32
+TILE_PX = 8
 NOTHING = -1
 
 
@@ -172,7 +160,7 @@ class Visibility:
 
     Attributes:
         triangles: Which triangles of the scene may be seen, shape (n,).
-        edges: Their edge functions, as in `Projection`, shape (n, 3, 3).
+        edges: Their edge functions, as `project` returns them, shape (n, 3, 3).
         rows: Which of these each pixel shows, shape (height, width); -1 for nothing.
         inverse_depth: One over the depth along the optical axis, 1/m, likewise; 0 for nothing.
     """
@@ -188,144 +176,104 @@ class _Pairs:
     """Triangles and the tiles they may touch.
 
     Attributes:
-        rows: Of the projection.
+        rows: Of the triangles' edge functions.
         columns_px: The left edge of the tile.
         lines_px: The top edge of the tile.
-        covers: The triangle fills the tile.
     """
 
     rows: IntArray
     columns_px: IntArray
     lines_px: IntArray
-    covers: NDArray[np.bool_]
 
     def chosen(self, which: NDArray[np.bool_] | IntArray) -> "_Pairs":
-        return _Pairs(
-            self.rows[which], self.columns_px[which], self.lines_px[which], self.covers[which]
-        )
+        return _Pairs(self.rows[which], self.columns_px[which], self.lines_px[which])
 
 
 def look(scene: Scene, viewpoint: Viewpoint) -> Visibility:
     """Return what each pixel of a view shows."""
     in_view = find_in_view(scene.group_centres, scene.group_radii_m, viewpoint)
     chosen = np.flatnonzero(in_view[scene.groups])
-    projection = project(scene.triangles.corners[chosen], viewpoint)
-    rows, inverse_depth = find_nearest(projection, viewpoint)
-    return Visibility(chosen[projection.triangles], projection.edges, rows, inverse_depth)
+    triangles, edges, bounds_px = project(scene.triangles.corners[chosen], viewpoint)
+    rows, inverse_depth = find_nearest(edges, bounds_px, viewpoint)
+    return Visibility(chosen[triangles], edges, rows, inverse_depth)
 
 
 def find_nearest(
-    projection: Projection, viewpoint: Viewpoint
+    edges: FloatArray, bounds_px: FloatArray, viewpoint: Viewpoint
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Return which row of a projection is nearest at each pixel, and one over its depth."""
-    pairs = _pair_with_tiles(projection, viewpoint)
-    return _compare_pixels(pairs, projection.edges, viewpoint)
+    """Return which row of projected triangles is nearest at each pixel, and one over its depth."""
+    pairs = _pair_with_tiles(bounds_px)
+    touches, covers = _compare_tiles(pairs, widen(edges))
+    pairs, covers = pairs.chosen(touches), covers[touches]
+    in_front = _is_in_front(pairs, covers, edges.sum(axis=1), viewpoint)
+    return _compare_pixels(pairs.chosen(in_front), covers[in_front], edges, viewpoint)
 
 
-def _pair_with_tiles(projection: Projection, viewpoint: Viewpoint) -> _Pairs:
-    """Return each triangle with the fine tiles in which it may be the nearest."""
-    edges, bounds_px = projection.edges, projection.bounds_px
-    wide = widen(edges)
-    pairs = _drop_missed(_pair_with_coarse_tiles(bounds_px), wide, COARSE_PX)
-    pairs = _drop_hidden(pairs, edges, viewpoint, COARSE_PX)
-    pairs = _drop_missed(_drop_outside(_split(pairs), bounds_px), wide, FINE_PX)
-    return _drop_hidden(pairs, edges, viewpoint, FINE_PX)
-
-
-def _pair_with_coarse_tiles(bounds_px: FloatArray) -> _Pairs:
-    low = np.floor(bounds_px[:, :2] / COARSE_PX).astype(np.intp)
-    high = np.ceil(bounds_px[:, 2:] / COARSE_PX).astype(np.intp)
+def _pair_with_tiles(bounds_px: FloatArray) -> _Pairs:
+    low = np.floor(bounds_px[:, :2] / TILE_PX).astype(np.intp)
+    high = np.ceil(bounds_px[:, 2:] / TILE_PX).astype(np.intp)
     size = np.maximum(high - low, 1)
     n_tiles = size[:, 0] * size[:, 1]
     rows = np.repeat(np.arange(len(bounds_px)), n_tiles)
     nth = np.arange(len(rows)) - np.repeat(np.cumsum(n_tiles) - n_tiles, n_tiles)
     line, column = np.divmod(nth, size[rows, 0])
-    columns_px = (low[rows, 0] + column) * COARSE_PX
-    lines_px = (low[rows, 1] + line) * COARSE_PX
-    return _Pairs(rows, columns_px, lines_px, np.zeros(len(rows), dtype=bool))
+    columns_px = (low[rows, 0] + column) * TILE_PX
+    lines_px = (low[rows, 1] + line) * TILE_PX
+    return _Pairs(rows, columns_px, lines_px)
 
 
-def _split(pairs: _Pairs) -> _Pairs:
-    """Return the fine tiles of each coarse one."""
-    offsets = np.arange(0, COARSE_PX, FINE_PX)
-    down, right = (grid.ravel() for grid in np.meshgrid(offsets, offsets, indexing="ij"))
-    return _Pairs(
-        np.repeat(pairs.rows, len(down)),
-        (pairs.columns_px[:, None] + right).ravel(),
-        (pairs.lines_px[:, None] + down).ravel(),
-        np.repeat(pairs.covers, len(down)),
-    )
-
-
-def _drop_outside(pairs: _Pairs, bounds_px: FloatArray) -> _Pairs:
-    """Drop the tiles beside a triangle's bounds."""
-    left, top, right, bottom = bounds_px.T
-    rows = pairs.rows
-    touches = pairs.covers | (
-        (pairs.columns_px + FINE_PX > left[rows])
-        & (pairs.columns_px < right[rows])
-        & (pairs.lines_px + FINE_PX > top[rows])
-        & (pairs.lines_px < bottom[rows])
-    )
-    return pairs.chosen(touches)
-
-
-def _drop_missed(pairs: _Pairs, edges: FloatArray, tile_px: int) -> _Pairs:
-    """Drop pairs whose tile lies wholly beyond an edge, and note which tiles are covered."""
+def _compare_tiles(pairs: _Pairs, edges: FloatArray) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Tell which tiles do not lie wholly beyond an edge, and which their triangle covers."""
     touches = np.ones(len(pairs.rows), dtype=bool)
-    covers = np.ones(len(pairs.rows), dtype=bool)
+    covers = touches.copy()
     for i in range(3):
-        lowest, highest = _range_on_tiles(edges[:, i], pairs, tile_px)
+        lowest, highest = _range_on_tiles(edges[:, i], pairs)
         touches &= highest >= 0
         covers &= lowest >= 0
-    return _Pairs(pairs.rows, pairs.columns_px, pairs.lines_px, covers).chosen(touches)
+    return touches, covers
 
 
-def _drop_hidden(pairs: _Pairs, edges: FloatArray, viewpoint: Viewpoint, tile_px: int) -> _Pairs:
-    """Drop pairs that lie behind a triangle which covers the tile."""
-    farthest, nearest = _range_on_tiles(edges.sum(axis=1), pairs, tile_px)
-    n_lines, n_columns = _count_tiles(viewpoint, tile_px)
-    tiles = pairs.lines_px // tile_px * n_columns + pairs.columns_px // tile_px
+def _is_in_front(
+    pairs: _Pairs, covers: NDArray[np.bool_], inverse_depth: FloatArray, viewpoint: Viewpoint
+) -> NDArray[np.bool_]:
+    """Return False for pairs that lie behind a triangle which covers the tile."""
+    farthest, nearest = _range_on_tiles(inverse_depth, pairs)
+    n_lines, n_columns = _count_tiles(viewpoint)
+    tiles = pairs.lines_px // TILE_PX * n_columns + pairs.columns_px // TILE_PX
     hidden_beyond = np.zeros(n_columns * n_lines)
-    np.maximum.at(hidden_beyond, tiles[pairs.covers], farthest[pairs.covers])
-    return pairs.chosen(nearest >= hidden_beyond[tiles])
+    np.maximum.at(hidden_beyond, tiles[covers], farthest[covers])
+    return np.asarray(nearest >= hidden_beyond[tiles])
 
 
-def _count_tiles(viewpoint: Viewpoint, tile_px: int) -> tuple[int, int]:
-    """Return how many lines and columns of tiles hold the picture, in whole coarse tiles."""
-    n_lines, n_columns = (
-        -(-size_px // COARSE_PX) * (COARSE_PX // tile_px)
-        for size_px in (viewpoint.height_px, viewpoint.width_px)
-    )
-    return n_lines, n_columns
+def _count_tiles(viewpoint: Viewpoint) -> tuple[int, int]:
+    """Return how many lines and columns of tiles hold the picture."""
+    return -(-viewpoint.height_px // TILE_PX), -(-viewpoint.width_px // TILE_PX)
 
 
-def _range_on_tiles(
-    plane: FloatArray, pairs: _Pairs, tile_px: int
-) -> tuple[FloatArray, FloatArray]:
+def _range_on_tiles(plane: FloatArray, pairs: _Pairs) -> tuple[FloatArray, FloatArray]:
     """Return the least and greatest value of linear functions on the pixel centres of tiles."""
     a, b, c = plane[pairs.rows].T
     at_first = a * (pairs.columns_px + 0.5) + b * (pairs.lines_px + 0.5) + c
-    across, along = a * (tile_px - 1), b * (tile_px - 1)
+    across, along = a * (TILE_PX - 1), b * (TILE_PX - 1)
     lowest = at_first + np.minimum(across, 0) + np.minimum(along, 0)
     highest = at_first + np.maximum(across, 0) + np.maximum(along, 0)
     return lowest, highest
 
 
 def _compare_pixels(
-    pairs: _Pairs, edges: FloatArray, viewpoint: Viewpoint
+    pairs: _Pairs, covers: NDArray[np.bool_], edges: FloatArray, viewpoint: Viewpoint
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    n_lines, n_columns = _count_tiles(viewpoint, FINE_PX)
-    rows = np.full((n_columns * n_lines, FINE_PX, FINE_PX), NOTHING, dtype=np.int32)
-    nearest = np.zeros((n_columns * n_lines, FINE_PX, FINE_PX), dtype=np.float32)
-    tiles = pairs.lines_px // FINE_PX * n_columns + pairs.columns_px // FINE_PX
+    n_lines, n_columns = _count_tiles(viewpoint)
+    rows = np.full((n_columns * n_lines, TILE_PX, TILE_PX), NOTHING, dtype=np.int32)
+    nearest = np.zeros((n_columns * n_lines, TILE_PX, TILE_PX), dtype=np.float32)
+    tiles = pairs.lines_px // TILE_PX * n_columns + pairs.columns_px // TILE_PX
     wide_edges, inverse_depth = widen(edges), edges.sum(axis=1)
     for layer in _layers(tiles):
         tile, row = tiles[layer], pairs.rows[layer]
         columns_px, lines_px = pairs.columns_px[layer], pairs.lines_px[layer]
         depth, so_far = _on_pixels(inverse_depth[row], columns_px, lines_px), nearest[tile]
         wins = depth > so_far
-        partial = np.flatnonzero(~pairs.covers[layer])
+        partial = np.flatnonzero(~covers[layer])
         sides = _on_pixels(
             wide_edges[row[partial]], columns_px[partial, None], lines_px[partial, None]
         )
@@ -351,13 +299,13 @@ def _on_pixels(planes: FloatArray, columns_px: IntArray, lines_px: IntArray) -> 
     """Return linear functions, shape (..., 3), at every pixel of their tiles: (..., tile, tile)."""
     a, b, c = planes[..., 0], planes[..., 1], planes[..., 2]
     at_corner = a * columns_px + b * lines_px + c
-    steps = np.arange(FINE_PX) + 0.5
+    steps = np.arange(TILE_PX) + 0.5
     along_line = (at_corner[..., None] + a[..., None] * steps).astype(np.float32)
     down = (b[..., None] * steps).astype(np.float32)
     return np.asarray(along_line[..., None, :] + down[..., :, None])
 
 
 def _as_picture(tiles: NDArray[Any], shape: tuple[int, int], viewpoint: Viewpoint) -> NDArray[Any]:
-    picture = tiles.reshape(*shape, FINE_PX, FINE_PX).swapaxes(1, 2)
-    flat = picture.reshape(shape[0] * FINE_PX, shape[1] * FINE_PX)
+    picture = tiles.reshape(*shape, TILE_PX, TILE_PX).swapaxes(1, 2)
+    flat = picture.reshape(shape[0] * TILE_PX, shape[1] * TILE_PX)
     return flat[: viewpoint.height_px, : viewpoint.width_px]
