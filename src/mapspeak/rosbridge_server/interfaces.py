@@ -9,8 +9,8 @@ import anyio.abc
 import numpy as np
 
 from mapspeak.errors import LinkError, MapspeakError
-from mapspeak.ros.definitions.texts import GENERATED, TIMES, known_definitions, write_definition
-from mapspeak.ros.definitions.types import FLOATS, WHOLES, Field, TypeBook
+from mapspeak.ros.definitions.texts import GENERATED, known_definitions, write_definition
+from mapspeak.ros.definitions.types import FLOATS, TIMES, WHOLES, Field, TypeBook
 from mapspeak.ros.messages.fields import Dialect, bare_type
 from mapspeak.rosbridge_server.hub import ROSBRIDGE_NODE, Hub
 from mapspeak.rosbridge_server.nav2 import Nav2
