@@ -48,9 +48,8 @@ class GoalOperations:
 
     async def cancel(self, operation: Operation) -> None:
         """Carry out `cancel_action_goal`; nothing is ever answered."""
-        nav2 = self._stack.nav2
-        if nav2 is not None:
-            await nav2.cancel_operation(str(operation.get("id")))
+        if self._stack.nav2 is not None:
+            await self._stack.nav2.cancel_operation(str(operation.get("id")))
 
     async def _carry_out(self, operation: Operation) -> None:
         action, action_type = operation.get("action"), operation.get("action_type")
@@ -60,38 +59,21 @@ class GoalOperations:
         if f"/{action.strip('/')}" != ACTION:
             return
         try:
-            drive = await self._start(nav2, operation, action_type)
-        except LinkError as error:
-            self._answer(operation, refusal(error), status=0, is_done=False)
+            if bare_type(action_type) != ACTION_TYPE:
+                raise LinkError(f"{ACTION} is no {action_type}.", hint=f"It is a {ACTION_TYPE}.")
+            args = operation.get("args") or {}
+            drive = await nav2.navigate(self._stack.interfaces.fill(f"{ACTION_TYPE}_Goal", args))
         except MapspeakError as error:
-            await self._reject(operation, error)
-        else:
-            await self._follow(nav2, operation, drive)
-
-    async def _start(self, nav2: Nav2, operation: Operation, action_type: str) -> ServedDrive | str:
-        if bare_type(action_type) != ACTION_TYPE:
-            raise LinkError(f"{ACTION} is no {action_type}.", hint=f"It is a {ACTION_TYPE}.")
-        args = operation.get("args") or {}
-        return await nav2.navigate(self._stack.interfaces.fill(f"{ACTION_TYPE}_Goal", args))
-
-    async def _reject(self, operation: Operation, error: MapspeakError) -> None:
-        """Answer as newer rosbridges do; 2.1 never says so, and blocks the socket for ever."""
-        if self._blocks:
-            await anyio.sleep_forever()
-        self._answer(operation, refusal(error), status=0, is_done=False)
-
-    async def _follow(self, nav2: Nav2, operation: Operation, drive: ServedDrive | str) -> None:
+            if self._blocks and not isinstance(error, LinkError):
+                # Version 2.1 never says that a goal is rejected, and blocks the socket for ever.
+                await anyio.sleep_forever()
+            self._answer(operation, refusal(error), status=0, is_done=False)
+            return
         if isinstance(drive, str):
             values = {"error_code": TF_ERROR, "error_msg": drive}
             self._answer(operation, values, status=ABORTED, is_done=True)
             return
-        operation_id = str(operation.get("id"))
-        nav2.by_operation[operation_id] = drive
-        try:
-            await self._feed_back(nav2, operation, drive)
-        finally:
-            if nav2.by_operation.get(operation_id) is drive:
-                del nav2.by_operation[operation_id]
+        await self._feed_back(nav2, operation, drive)
         self._answer(operation, result_of(drive), status=status_of(drive), is_done=True)
 
     async def _feed_back(self, nav2: Nav2, operation: Operation, drive: ServedDrive) -> None:
@@ -106,12 +88,16 @@ class GoalOperations:
 
         if operation.get("feedback") is True:
             self._outbox.open_lane(lane, depth=FEEDBACK_DEPTH, throttle_s=0.0, holds_back=False)
+        operation_id = str(operation.get("id"))
+        nav2.by_operation[operation_id] = drive
         nav2.followers.append(pass_on)
         try:
             await drive.is_over.wait()
         finally:
             nav2.followers.remove(pass_on)
             self._outbox.close_lane(lane)
+            if nav2.by_operation.get(operation_id) is drive:
+                del nav2.by_operation[operation_id]
 
     def _answer(self, operation: Operation, values: object, *, status: int, is_done: bool) -> None:
         answer = {
@@ -297,9 +283,8 @@ class ClientConversation:
         """Return True for what rosbridge on ROS 2 cannot send: png, lists of fixed length."""
         if self._stack.dialect is Dialect.ROS1 or compression is Compression.NONE:
             return False
-        return compression is Compression.PNG or self._stack.interfaces.has_fixed_array(
-            message_type
-        )
+        has_fixed_array = self._stack.interfaces.has_fixed_array
+        return compression is Compression.PNG or has_fixed_array(message_type)
 
     def _checked_type(self, topic: str, given: object) -> str:
         """Return the topic's type; what is given must be that type, in either ROS's words."""

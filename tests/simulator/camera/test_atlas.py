@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from mapspeak.simulator.camera.atlas import build_atlas, look_up, pack
+from mapspeak.simulator.camera.textures import build_atlas, look_up, pack
 
 RED, BLUE = (200, 0, 0), (0, 0, 200)
 

@@ -11,7 +11,7 @@ from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError
 from mapspeak.links.rosbridge.address import RobotAddress, Timing
-from mapspeak.links.rosbridge.channel import Channel, RosbridgeTopicRequest, ServiceCaller
+from mapspeak.links.rosbridge.channel import Channel, RosbridgeTopicRequest
 from mapspeak.links.rosbridge.protocol.codec import require_cbor
 from mapspeak.links.rosbridge.protocol.conversation import (
     Event,
@@ -36,6 +36,10 @@ logger = logging.getLogger(__name__)
 NODE = "rosbridge_websocket"
 """What rosbridge's node is called, whatever its namespace."""
 USUAL_TIMING = Timing()
+ROSAPI = "/rosapi/"
+UNKNOWN = "does not exist"
+"""In rosbridge's words; such a call has reached nobody, so it may be made again."""
+LOOK_AGAIN_S = 0.1
 
 
 class RosbridgeClient(Rosapi):
@@ -52,7 +56,6 @@ class RosbridgeClient(Rosapi):
         self.timing = timing
         self._control = self._channel()
         self._urgent = self._channel()
-        self._caller = ServiceCaller(self._free_for_calls)
         self._goals: dict[str, tuple[ActionGoal, Channel | None]] = {}
         self._tasks: TaskGroup | None = None
         self._published_s = float("-inf")
@@ -158,13 +161,45 @@ class RosbridgeClient(Rosapi):
         type_name: str | None = None,
         timeout_s: float | None = None,
     ) -> dict[str, Any]:
-        """Return what a service answers. The wait ends, the connection stays."""
-        return await self._caller.call(
-            service,
-            arguments or {},
-            type_name=type_name,
-            timeout_s=self.timing.answer_s if timeout_s is None else timeout_s,
+        """Return what a service answers. The wait ends, the connection stays.
+
+        rosbridge and rosapi are two nodes: what one of them knows the other may find a moment
+        later.
+        """
+        left_s = self.timing.answer_s if timeout_s is None else timeout_s
+        until_s = anyio.current_time() + left_s
+        while True:
+            try:
+                return await self._call_once(service, arguments or {}, type_name, left_s)
+            except LinkError as error:
+                is_unknown = UNKNOWN in error.message and not service.startswith(ROSAPI)
+                if not is_unknown or not await self._is_known_to_rosapi(service, until_s):
+                    raise
+            left_s = until_s - anyio.current_time() - LOOK_AGAIN_S
+            await anyio.sleep(LOOK_AGAIN_S)
+
+    async def _is_known_to_rosapi(self, service: str, until_s: float) -> bool:
+        """Return False also when there is no time to ask."""
+        left_s = until_s - anyio.current_time() - LOOK_AGAIN_S
+        if left_s <= 0.0:
+            return False
+        asked = {"service": service}
+        try:
+            answer = await self._call_once(f"{ROSAPI}service_type", asked, None, left_s)
+        except LinkError:
+            return False
+        return bool(answer.get("type")) and until_s - anyio.current_time() > 2 * LOOK_AGAIN_S
+
+    async def _call_once(
+        self, service: str, arguments: Mapping[str, Any], type_name: str | None, timeout_s: float
+    ) -> dict[str, Any]:
+        call_id = new_id()
+        text = write_operation(
+            "call_service", id=call_id, service=service, args=arguments, type=type_name
         )
+        channel = self._free_for_calls()
+        values = await channel.call(text, call_id=call_id, what=service, timeout_s=timeout_s)
+        return values if isinstance(values, dict) else {}
 
     async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
         """Send a goal to an action of ROS 2 and return what becomes of it, as it becomes."""

@@ -9,19 +9,21 @@ show, they are called those of a simulated detector.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.geometry import Pose
 from mapspeak.robot import Detection
-from mapspeak.simulator.camera.rasteriser import Viewpoint, look
-from mapspeak.simulator.camera.scene import BUILDING, build_scene
-from mapspeak.simulator.camera.shading import draw_picture
+from mapspeak.simulator.camera.rasteriser import FloatArray, IntArray, Viewpoint, Visibility, look
+from mapspeak.simulator.camera.scene import BUILDING, PLAIN, Scene, build_scene
 from mapspeak.simulator.worlds.models import find_kind
 from mapspeak.simulator.worlds.world import World, WorldObject
 
 Picture = NDArray[np.uint8]
+Float32Array = NDArray[np.float32]
+AnyFloats = NDArray[np.floating[Any]]
 
 HORIZONTAL_FOV_RAD = math.radians(85.0)
 CAMERA_HEIGHT_M = 1.1
@@ -162,3 +164,158 @@ def _between(ends: tuple[float, float], area_ratio: float) -> float:
     """
     smallest, whole = ends
     return whole + (smallest - whole) * math.sqrt(SMALLEST_AREA_RATIO / area_ratio)
+
+
+# --- from what is visible to colours: drawn surfaces, light, highlights, smooth edges ---------
+
+
+_BACKGROUND = (96.0, 98.0, 102.0)
+_FINER = 2
+"""How many times finer than the picture edges are looked at, across and down."""
+
+_HIGHLIGHT = 150.0
+_HIGHLIGHT_SHARPNESS = 18
+_LIGHT_FROM = (-0.55, -0.45, 0.70)
+"""Where highlights come from: in front of the thing (towards the eye), left of it, above it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Samples:
+    """Points of the picture that are given a colour.
+
+    Attributes:
+        rows: Of `Visibility.triangles`.
+        x: From the left edge, in the finer pixels.
+        y: From the top edge, likewise.
+    """
+
+    rows: IntArray
+    x: Float32Array
+    y: Float32Array
+
+    def chosen(self, which: IntArray) -> "_Samples":
+        return _Samples(self.rows[which], self.x[which], self.y[which])
+
+
+def draw_picture(scene: Scene, viewpoint: Viewpoint) -> NDArray[np.uint8]:
+    """Draw what a viewpoint sees: red, green and blue, 0 to 255, shape (height, width, 3).
+
+    A pixel whose four quarters show the same face gets one colour; others get the mean of four.
+    """
+    visibility = look(scene, viewpoint.with_finer_pixels(_FINER))
+    shader = _Shader(scene, visibility, viewpoint)
+    rows = visibility.rows
+    quarters = np.stack([rows[i::2, j::2] for i in (0, 1) for j in (0, 1)])
+    faces = shader.faces[quarters]
+    is_whole = (faces[1] == faces[0]) & (faces[2] == faces[0]) & (faces[3] == faces[0])
+    picture = np.empty((viewpoint.height_px, viewpoint.width_px, 3), dtype=np.float32)
+    v, u = np.nonzero(is_whole)
+    picture[v, u] = shader.colour(_sample(quarters[0][v, u], 2 * u + 1.0, 2 * v + 1.0))
+    v, u = np.nonzero(~is_whole)
+    total = np.zeros((len(v), 3), dtype=np.float32)
+    for i, quarter in enumerate(quarters):
+        down, right = divmod(i, 2)
+        total += shader.colour(_sample(quarter[v, u], 2 * u + right + 0.5, 2 * v + down + 0.5))
+    picture[v, u] = total / 4
+    return np.asarray(np.clip(picture + 0.5, 0, 255).astype(np.uint8))
+
+
+def _sample(rows: NDArray[np.int32], x: AnyFloats, y: AnyFloats) -> _Samples:
+    return _Samples(rows.astype(np.intp), x.astype(np.float32), y.astype(np.float32))
+
+
+class _Shader:
+    """The colour of any point of a picture, given the triangle it shows."""
+
+    def __init__(self, scene: Scene, visibility: Visibility, viewpoint: Viewpoint) -> None:
+        chosen, edges = visibility.triangles, visibility.edges
+        triangles = scene.triangles
+        self._scene = scene
+        self._colours = triangles.colours[chosen].astype(np.float32)
+        self._surfaces = triangles.surfaces[chosen]
+        self._panels = triangles.panels[chosen]
+        self.faces = np.append(triangles.faces[chosen], -1)
+        self._inverse_depth = edges.sum(axis=1).astype(np.float32)
+        self._light = _mix(triangles.light[chosen], edges)
+        self._highlight = _mix(_find_highlights(scene, chosen, viewpoint), edges)
+        self._u = _mix(triangles.uv[chosen, :, 0], edges)
+        self._v = _mix(triangles.uv[chosen, :, 1], edges)
+
+    def colour(self, samples: _Samples) -> Float32Array:
+        """Return the colours of samples, shape (n, 3)."""
+        colours = np.empty((len(samples.rows), 3), dtype=np.float32)
+        is_nothing = samples.rows < 0
+        is_drawn = self._surfaces[samples.rows] != PLAIN
+        plain = np.flatnonzero(~is_drawn & ~is_nothing)
+        drawn = np.flatnonzero(is_drawn & ~is_nothing)
+        colours[plain] = self._colour_plain(samples.chosen(plain))
+        colours[drawn] = self._colour_drawn(samples.chosen(drawn))
+        colours[is_nothing] = _BACKGROUND
+        return colours
+
+    def _colour_plain(self, samples: _Samples) -> Float32Array:
+        depth = 1.0 / _value(self._inverse_depth, samples)
+        light = _value(self._light, samples) * depth
+        highlight = _value(self._highlight, samples) * depth
+        colours = self._colours[samples.rows]
+        # Channel by channel: numpy is slow over rows of three.
+        for channel in range(3):
+            colours[:, channel] = colours[:, channel] * light + highlight
+        return colours
+
+    def _colour_drawn(self, samples: _Samples) -> Float32Array:
+        rows = samples.rows
+        depth = 1.0 / _value(self._inverse_depth, samples)
+        u = _value(self._u, samples) * depth
+        v = _value(self._v, samples) * depth
+        uv = np.stack([u, v], axis=1)
+        spread = self._find_spread(rows, uv, depth)
+        drawn = self._scene.atlas.sample(self._surfaces[rows], uv, spread)
+        light = _value(self._light, samples) * depth
+        panels = self._panels[rows]
+        on_panel = np.flatnonzero(panels != PLAIN)
+        light[on_panel] = self._scene.light_map.at(panels[on_panel], uv[on_panel])
+        highlight = _value(self._highlight, samples) * depth
+        colours, light = self._colours[rows], light / 255.0
+        for channel in range(3):
+            tint = colours[:, channel] * light
+            colours[:, channel] = drawn[:, channel] * tint + highlight
+        return colours
+
+    def _find_spread(self, rows: IntArray, uv: Float32Array, depth: Float32Array) -> Float32Array:
+        """Return the area of the picture's pixel on the surface: the Jacobian of (x, y) to uv."""
+        # Column by column: numpy is slow over rows of two.
+        by_x, by_y = self._inverse_depth[rows, 0], self._inverse_depth[rows, 1]
+        u, v = uv[:, 0], uv[:, 1]
+        du_dx = (self._u[rows, 0] - u * by_x) * depth
+        du_dy = (self._u[rows, 1] - u * by_y) * depth
+        dv_dx = (self._v[rows, 0] - v * by_x) * depth
+        dv_dy = (self._v[rows, 1] - v * by_y) * depth
+        return np.asarray(_FINER**2 * np.abs(du_dx * dv_dy - du_dy * dv_dx))
+
+
+def _find_highlights(scene: Scene, chosen: IntArray, viewpoint: Viewpoint) -> FloatArray:
+    """Return what shine adds at the corners of round things (Blinn's half vector, 1977)."""
+    shine = np.zeros((len(chosen), 3))
+    is_round = np.flatnonzero(scene.triangles.is_round[chosen])
+    corners = scene.triangles.corners[chosen[is_round]]
+    to_eye = viewpoint.place - corners
+    to_eye /= np.linalg.norm(to_eye, axis=-1, keepdims=True)
+    cos, sin = np.cos(viewpoint.pose.yaw_rad), np.sin(viewpoint.pose.yaw_rad)
+    ahead, right, up = _LIGHT_FROM
+    to_light = np.array([cos * ahead + sin * right, sin * ahead - cos * right, up])
+    half = to_eye + to_light / np.linalg.norm(to_light)
+    half /= np.linalg.norm(half, axis=-1, keepdims=True)
+    facing = np.einsum("ijk,ijk->ij", scene.triangles.normals[chosen[is_round]], half)
+    shine[is_round] = _HIGHLIGHT * np.maximum(facing, 0.0) ** _HIGHLIGHT_SHARPNESS
+    return shine
+
+
+def _mix(values: FloatArray, edges: FloatArray) -> Float32Array:
+    """Return the linear function that is a quantity at the corners, over depth; shape (n, 3)."""
+    return np.asarray(np.einsum("ni,nij->nj", values, edges), dtype=np.float32)
+
+
+def _value(plane: Float32Array, samples: _Samples) -> Float32Array:
+    rows = samples.rows
+    return np.asarray(plane[rows, 0] * samples.x + plane[rows, 1] * samples.y + plane[rows, 2])

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.simulator.camera.atlas import look_up, pack
 from mapspeak.simulator.camera.building import TILE_M, Panel, find_bounds, find_ceiling
+from mapspeak.simulator.camera.textures import look_up, pack
 from mapspeak.simulator.robot.lidar import N_BEAMS, measure_ranges
 from mapspeak.simulator.worlds.models import base_height_m, build_parts, find_kind
 from mapspeak.simulator.worlds.slices import fill_outlines, slice_world

@@ -7,10 +7,9 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.simulator.camera.atlas import TextureAtlas, build_atlas
 from mapspeak.simulator.camera.building import TILE_M, Panel, build_panels
 from mapspeak.simulator.camera.lighting import Light, LightMap, find_light, map_light
-from mapspeak.simulator.camera.textures import GLOWING, TILED, draw
+from mapspeak.simulator.camera.textures import GLOWING, TILED, TextureAtlas, build_atlas, draw
 from mapspeak.simulator.worlds.models import Surface, base_height_m, build_parts
 from mapspeak.simulator.worlds.world import World, WorldObject
 
