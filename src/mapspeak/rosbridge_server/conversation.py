@@ -141,8 +141,6 @@ class ClientConversation:
     """What one client has subscribed to, advertised and started.
 
     Args:
-        stack: The robot's ROS.
-        outbox: Where answers and messages go.
         tasks: Ends with the client.
         blocks: A goal holds up the client's further operations until it has ended.
     """

@@ -24,9 +24,6 @@ class ServedDrive:
         goal_id: The client's, or one made here.
         robot_goal_id: The robot's; None for a goal in a frame that nobody knows.
         started_s: Robot time.
-        status: What the robot said last.
-        is_cancelling: It was asked to end.
-        is_over: Set when it has ended.
     """
 
     goal_id: str

@@ -28,7 +28,6 @@ class Frame:
 
     Attributes:
         data: UTF-8 text, or bytes.
-        is_text: Which of them.
     """
 
     data: bytes
@@ -39,7 +38,6 @@ class Publication:
     """One message on one topic.
 
     Attributes:
-        topic: Its name.
         type: Of the message, as "package/Type".
         message: Its fields; arrays as numpy arrays, uint8[] as bytes.
     """
@@ -121,8 +119,6 @@ class Topic:
         type: Of its messages, as "package/Type".
         is_latched: Who subscribes later gets the last message at once.
         depth: How many messages wait for a client that is slow; the newest stay.
-        publishers: Nodes that publish it.
-        subscribers: Nodes that hear it.
     """
 
     name: str

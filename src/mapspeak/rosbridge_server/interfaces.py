@@ -31,7 +31,6 @@ class Interfaces:
     """The message types of one dialect.
 
     Args:
-        dialect: Which.
         more: The texts of types besides those that come with mapspeak, by "package/Type".
     """
 
@@ -179,7 +178,6 @@ class Service:
     Attributes:
         name: With its leading slash.
         type: As "package/Type".
-        node: Which offers it.
         answer: Gives the response for a request; None for a service that never answers.
     """
 
@@ -193,9 +191,7 @@ class RosSystem:
     """What clients find.
 
     Attributes:
-        dialect: Which ROS.
         hub: Its topics; on ROS 1 /rosout is one of them.
-        interfaces: Its message types.
         nav2: The navigation of ROS 2; None where there is none.
     """
 

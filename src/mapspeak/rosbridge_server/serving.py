@@ -34,7 +34,6 @@ class RosbridgeServer:
 
     Attributes:
         url: Where clients find it, as "ws://127.0.0.1:9090".
-        port: The port within it.
     """
 
     url: str

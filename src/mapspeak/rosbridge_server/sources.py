@@ -43,10 +43,8 @@ class Source:
     """Something published again and again.
 
     Attributes:
-        produce: Takes it from the robot and publishes it.
         period_s: Robot time between two.
         due_s: Robot time of the next.
-        is_busy: The last one is still under way.
     """
 
     produce: Callable[[], Awaitable[None]]

@@ -113,7 +113,6 @@ class RosStack(RosSystem):
 
     Args:
         robot: Any robot; its `sleep` must give way to other tasks.
-        dialect: Which ROS to be.
         hub: Carries the robot's topics; one is made of `topics_of` where none is given.
         drives: Takes the goals; likewise.
     """

@@ -45,7 +45,6 @@ class Simulation:
         truth: What no robot may know; for scoring alone.
 
     Args:
-        world: Where the robot drives.
         seed: Of all noise; the same seed and the same commands give the same run.
         known: A finished map of the world, whose frame starts at the world's start; the robot finds
             its place in it instead of making one.
@@ -241,13 +240,8 @@ class StateRecord:
     """How a simulation truly stood at one moment.
 
     Attributes:
-        time_s: Robot time.
         x: Metres, in a map without errors.
-        y: Likewise.
-        yaw_rad: Likewise.
         slam_error_m: How far the robot's own pose was off.
-        driven_m: Metres driven since the start.
-        n_collisions: Bumps since the start.
     """
 
     time_s: float

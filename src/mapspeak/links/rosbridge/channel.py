@@ -255,12 +255,7 @@ Where CBOR is beyond the server's size limit it is dropped in silence, while JSO
 
 @dataclass(slots=True, eq=False)
 class RosbridgeTopicRequest(TopicRequest):
-    """How a topic was asked for.
-
-    Attributes:
-        operation_id: Under which the server knows it.
-        channel: Over which it was asked for.
-    """
+    """How a topic was asked for."""
 
     operation_id: str = ""
     channel: Channel | None = None

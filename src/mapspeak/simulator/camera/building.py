@@ -40,9 +40,7 @@ class Panel:
         corner: Its lower left corner.
         right: From there to the lower right one.
         up: From there to the upper left one.
-        colour: Tints the surface.
         surface: What is drawn on it, repeated.
-        glows: It shines by itself.
     """
 
     corner: FloatArray

@@ -8,7 +8,7 @@ show, they are called those of a simulated detector.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -34,7 +34,6 @@ class SegmentedView:
     """Which object each pixel shows, and how far it is. Never leaves the simulator.
 
     Attributes:
-        objects: The world's objects.
         object_ids: Which of them each pixel shows, shape (height, width); -1 for none.
         range_m: Along the floor from the camera to what the pixel shows; infinite for nothing.
         bearing_rad: Of each column from the camera's heading, left positive, shape (width,).
@@ -99,23 +98,6 @@ _MISSES = (0.25, 0.02)
 """How often such a thing is missed."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Sighting:
-    """What is truly visible of one object.
-
-    Attributes:
-        kind: Of the object.
-        area_ratio: The share of the picture that shows it.
-        bearing_rad: The mean of its pixels.
-        range_m: The median of its pixels.
-    """
-
-    kind: str
-    area_ratio: float
-    bearing_rad: float
-    range_m: float
-
-
 class SimulatedDetector:
     """Makes up what an object detector would report. Its noise and its misses come from a seed."""
 
@@ -124,37 +106,43 @@ class SimulatedDetector:
 
     def detect(self, view: SegmentedView) -> tuple[Detection, ...]:
         """Return what the simulated detector reports of a view, from left to right."""
-        sightings = sorted(_find_sightings(view), key=lambda sighting: -sighting.bearing_rad)
-        return tuple(self._report(sighting) for sighting in sightings if self._notices(sighting))
+        sightings = sorted(_find_sightings(view), key=lambda sighting: -sighting[0].bearing_rad)
+        return tuple(
+            self._blur(seen)
+            for seen, area_ratio in sightings
+            if self._random.random() >= _between(_MISSES, area_ratio)
+        )
 
-    def _notices(self, sighting: _Sighting) -> bool:
-        return self._random.random() >= _between(_MISSES, sighting.area_ratio)
-
-    def _report(self, sighting: _Sighting) -> Detection:
+    def _blur(self, seen: Detection) -> Detection:
+        """Return a detection with noise on all that was measured."""
         bearing, spread, doubt = self._random.normal(size=3)
-        confidence = _between(_CONFIDENCES, sighting.area_ratio) + _CONFIDENCE_NOISE_RATIO * doubt
-        return Detection(
-            label=find_kind(sighting.kind).label,
+        confidence = seen.confidence_ratio + _CONFIDENCE_NOISE_RATIO * doubt
+        return replace(
+            seen,
             confidence_ratio=float(np.clip(confidence, 0.0, 1.0)),
-            bearing_rad=sighting.bearing_rad + _BEARING_NOISE_RAD * bearing,
-            range_m=sighting.range_m * max(1.0 + _RANGE_NOISE_RATIO * spread, 0.0),
+            bearing_rad=seen.bearing_rad + _BEARING_NOISE_RAD * bearing,
+            range_m=(seen.range_m or 0.0) * max(1.0 + _RANGE_NOISE_RATIO * spread, 0.0),
         )
 
 
-def _find_sightings(view: SegmentedView) -> Iterator[_Sighting]:
-    """Return what can be seen of each object that is near enough and large enough."""
+def _find_sightings(view: SegmentedView) -> Iterator[tuple[Detection, float]]:
+    """Return each object that is near and large enough, without noise, and its share of the view.
+
+    Its bearing is the mean of its pixels, its range their median.
+    """
     n_pixels = view.object_ids.size
     for owner in np.unique(view.object_ids[view.object_ids >= 0]):
         shown = view.object_ids == owner
         area_ratio = np.count_nonzero(shown) / n_pixels
         range_m = float(np.median(view.range_m[shown]))
         if area_ratio >= SMALLEST_AREA_RATIO and range_m <= MAX_DETECTION_RANGE_M:
-            yield _Sighting(
-                kind=view.objects[owner].kind,
-                area_ratio=area_ratio,
+            seen = Detection(
+                label=find_kind(view.objects[owner].kind).label,
+                confidence_ratio=_between(_CONFIDENCES, area_ratio),
                 bearing_rad=float(view.bearing_rad[np.nonzero(shown)[1]].mean()),
                 range_m=range_m,
             )
+            yield seen, area_ratio
 
 
 def _between(ends: tuple[float, float], area_ratio: float) -> float:

@@ -155,8 +155,6 @@ class Light:
     Attributes:
         lamps: Where they hang, shape (n, 3).
         reach_m: How far each shines along each of the LiDAR's directions, shape (n, 720).
-        crowding: Where things keep the light out.
-        ceiling_m: The height of the ceiling.
     """
 
     lamps: FloatArray

@@ -38,8 +38,6 @@ class Viewpoint:
         pose: In the world; it looks along its x axis.
         height_m: Above the floor.
         horizontal_fov_rad: The angle between the left and the right edge of the picture.
-        width_px: Columns.
-        height_px: Rows.
     """
 
     pose: Pose

@@ -131,12 +131,9 @@ class Scene:
 
     Attributes:
         objects: The world's objects; `Triangles.owners` counts them.
-        triangles: All of them.
         groups: Which group each triangle is in: each panel and each object is one.
         group_centres: Of a ball around each group, shape (n_groups, 3).
         group_radii_m: Of that ball, shape (n_groups,).
-        atlas: The drawn surfaces.
-        light_map: The light on the panels.
     """
 
     objects: tuple[WorldObject, ...]

@@ -56,7 +56,10 @@ class Obstacles:
     @cached_property
     def _nearest_m(self) -> float:
         """How far the nearest point is from the body's centre."""
-        return self._distance_from(Point(0.0, 0.0))
+        if not len(self._points):
+            return math.inf
+        x, y = self._points.T
+        return math.sqrt(float((x * x + y * y).min()))
 
     def is_way_free(self, target: Point) -> bool:
         """Return True when the body can move straight to a point with room on all sides."""
@@ -112,12 +115,6 @@ class Obstacles:
             return BODY_RADIUS_M + KEEP_OFF_M
         # A robot that is too near already may pass and leave, but not touch.
         return min(BODY_RADIUS_M + _SQUEEZE_M, here - 1e-3)
-
-    def _distance_from(self, place: Point) -> float:
-        if not len(self._points):
-            return math.inf
-        dx, dy = self._points[:, 0] - place.x, self._points[:, 1] - place.y
-        return math.sqrt(float((dx * dx + dy * dy).min()))
 
 
 _CRUISE_MPS = 0.8

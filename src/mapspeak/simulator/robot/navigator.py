@@ -40,7 +40,6 @@ class Senses:
     """What the robot knows at one moment.
 
     Attributes:
-        now_s: Robot time.
         pose: By SLAM, in the map frame.
         speed_mps: By the wheels.
         obstacles: By the latest scan.

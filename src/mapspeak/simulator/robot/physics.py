@@ -142,7 +142,6 @@ class RobotBody:
 
     Attributes:
         world_from_base: Where it truly stands.
-        n_collisions: How often it has bumped into something.
         driven_m: How far its centre has moved.
     """
 

@@ -55,7 +55,6 @@ class PoseTracker:
     """A pose in the map that follows odometry, and that some of the scans correct.
 
     Args:
-        map_from_odom: Where odometry starts in the map.
         step: After so many metres, or so much turning in radians, the next scan is worth a look.
     """
 
@@ -103,11 +102,7 @@ class PoseTracker:
 
 
 class Mapper(PoseTracker):
-    """Scan-to-map SLAM.
-
-    Attributes:
-        n_updates: How many scans the map was made from.
-    """
+    """Scan-to-map SLAM."""
 
     def __init__(self) -> None:
         super().__init__(Pose(0.0, 0.0, 0.0), step=_MAPPING_STEP)

@@ -73,7 +73,6 @@ class ObjectKind:
 
     Attributes:
         name: As world files write it.
-        label: As people say it.
         category: Fixed safety equipment, fixed equipment with a use, or anything else.
         base_height_m: How high above the floor its base usually is.
         is_wall_hung: Its back is at x = 0 and belongs on a wall; else the origin is its middle.

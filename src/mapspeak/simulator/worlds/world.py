@@ -13,14 +13,7 @@ BODY_BAND_M = (0.02, 1.2)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorldWall:
-    """A straight piece of wall, already cut where doors are.
-
-    Attributes:
-        start: One end of its centre line.
-        end: The other end.
-        thickness_m: Across the centre line.
-        height_m: From the floor.
-    """
+    """A straight piece of wall along its centre line, already cut where doors are."""
 
     start: Point
     end: Point
@@ -66,7 +59,6 @@ class TrueRoom:
 
     Attributes:
         name: Unique in its world.
-        room_class: What it is.
         outline: The corners, in order.
     """
 
@@ -90,12 +82,7 @@ class World:
 
     Attributes:
         name: Such as "warehouse".
-        title: A sentence about it.
-        walls: All walls.
-        objects: All things.
-        rooms: The truth about rooms.
         start: Where the robot stands at first, in the world's own frame.
-        doors: Where walls were cut.
     """
 
     name: str
