@@ -110,19 +110,15 @@ def _fill_corners(walls: Sequence[WorldWall]) -> Iterator[WorldWall]:
         for end in (wall.start, wall.end):
             meeting[_place_in_cm(end)].append(wall)
     for wall in walls:
-        bearing = wall.start.bearing_to(wall.end)
-        reach = [
+        bearing = wall.pose.yaw_rad
+        before_m, behind_m = (
             max(
                 (other.thickness_m / 2 for other in others if _is_across(other, bearing)), default=0
             )
             for others in (meeting[_place_in_cm(wall.start)], meeting[_place_in_cm(wall.end)])
-        ]
-        world_from_wall = Pose(wall.start.x, wall.start.y, bearing)
-        length = wall.start.distance_to(wall.end)
+        )
         yield replace(
-            wall,
-            start=world_from_wall.transform(Point(-reach[0], 0.0)),
-            end=world_from_wall.transform(Point(length + reach[1], 0.0)),
+            wall, start=wall.point_at(-before_m), end=wall.point_at(wall.length_m + behind_m)
         )
 
 
@@ -131,13 +127,12 @@ def _place_in_cm(point: Point) -> tuple[int, int]:
 
 
 def _is_across(wall: WorldWall, bearing_rad: float) -> bool:
-    return abs(math.sin(wall.start.bearing_to(wall.end) - bearing_rad)) > 0.1
+    return abs(math.sin(wall.pose.yaw_rad - bearing_rad)) > 0.1
 
 
 def _wall(wall: WorldWall, ceiling_m: float) -> Iterator[Panel]:
-    pose = Pose(wall.start.x, wall.start.y, wall.start.bearing_to(wall.end))
-    length, half = wall.start.distance_to(wall.end), wall.thickness_m / 2
-    height = wall.height_m
+    pose, height = wall.pose, wall.height_m
+    length, half = wall.length_m, wall.thickness_m / 2
     right_side = (Point(0, -half), Point(length, -half))
     left_side = (Point(length, half), Point(0, half))
     far_end = (Point(length, -half), Point(length, half))

@@ -170,13 +170,9 @@ def _sides_of(outlines: Sequence[FloatArray]) -> FloatArray:
 
 
 def _outline_wall(wall: WorldWall) -> FloatArray:
-    half = wall.thickness_m / 2
-    length = wall.start.distance_to(wall.end)
-    world_from_wall = Pose(wall.start.x, wall.start.y, wall.start.bearing_to(wall.end))
-    return _place(
-        (Point(0, -half), Point(length, -half), Point(length, half), Point(0, half)),
-        world_from_wall,
-    )
+    half, length = wall.thickness_m / 2, wall.length_m
+    corners = (Point(0, -half), Point(length, -half), Point(length, half), Point(0, half))
+    return _place(corners, wall.pose)
 
 
 def _outline_object(thing: WorldObject, low_m: float, high_m: float) -> Iterator[FloatArray]:

@@ -20,6 +20,20 @@ class WorldWall:
     thickness_m: float
     height_m: float
 
+    @property
+    def pose(self) -> Pose:
+        """Its start; the x axis looks along it."""
+        return Pose(self.start.x, self.start.y, self.start.bearing_to(self.end))
+
+    @property
+    def length_m(self) -> float:
+        """From one end to the other."""
+        return self.start.distance_to(self.end)
+
+    def point_at(self, along_m: float) -> Point:
+        """Return the point of the centre line that is so far from the start."""
+        return self.pose.transform(Point(along_m, 0.0))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorldDoor:

@@ -306,16 +306,15 @@ def _raise_walls(written: _WorldFile) -> Iterator[WorldWall]:
     for index, wall in enumerate(written.walls):
         thickness = wall.thickness_m or written.wall_thickness_m
         for first, second in zip(wall.line, wall.line[1:], strict=False):
-            start, end = Point(*first), Point(*second)
-            length = start.distance_to(end)
-            if length == 0:
+            if first == second:
                 raise _FaultError(("walls", index, "line"), f"the point {first} comes twice")
-            yield WorldWall(
-                start=_along(start, end, -thickness / 2),
-                end=_along(start, end, length + thickness / 2),
+            straight = WorldWall(
+                start=Point(*first),
+                end=Point(*second),
                 thickness_m=thickness,
                 height_m=wall.height_m or written.wall_height_m,
             )
+            yield _shorten(straight, -thickness / 2, straight.length_m + thickness / 2)
 
 
 def _place_doors(doors: Sequence[_WrittenDoor], walls: Sequence[WorldWall]) -> Iterator[WorldDoor]:
@@ -329,51 +328,41 @@ def _place_doors(doors: Sequence[_WrittenDoor], walls: Sequence[WorldWall]) -> I
             )
         yield WorldDoor(
             name=door.name or f"door {index + 1}",
-            pose=Pose(middle.x, middle.y, wrap_angle(nearest.start.bearing_to(nearest.end))),
+            pose=Pose(middle.x, middle.y, wrap_angle(nearest.pose.yaw_rad)),
             width_m=door.width_m,
         )
 
 
 def _distance_beside(wall: WorldWall, point: Point) -> float:
     """Return the distance from a point to a wall's centre line."""
-    length = wall.start.distance_to(wall.end)
-    turn = wall.start.bearing_to(point) - wall.start.bearing_to(wall.end)
-    along = math.cos(turn) * wall.start.distance_to(point)
-    return _along(wall.start, wall.end, min(max(along, 0.0), length)).distance_to(point)
-
-
-def _along(start: Point, end: Point, distance_m: float) -> Point:
-    yaw = start.bearing_to(end)
-    return Point(start.x + distance_m * math.cos(yaw), start.y + distance_m * math.sin(yaw))
+    along = wall.pose.inverse().transform(point).x
+    return wall.point_at(min(max(along, 0.0), wall.length_m)).distance_to(point)
 
 
 def _cut_wall(wall: WorldWall, doors: Sequence[WorldDoor]) -> Iterator[WorldWall]:
     """Return the pieces of a wall that its doors leave standing."""
-    length = wall.start.distance_to(wall.end)
     position = 0.0
     for low, high in sorted(_gaps(wall, doors)):
         if low > position:
             yield _shorten(wall, position, low)
         position = max(position, high)
-    if position < length:
-        yield _shorten(wall, position, length)
+    if position < wall.length_m:
+        yield _shorten(wall, position, wall.length_m)
 
 
 def _shorten(wall: WorldWall, low_m: float, high_m: float) -> WorldWall:
-    start, end = (_along(wall.start, wall.end, along_m) for along_m in (low_m, high_m))
-    return replace(wall, start=start, end=end)
+    return replace(wall, start=wall.point_at(low_m), end=wall.point_at(high_m))
 
 
 def _gaps(wall: WorldWall, doors: Sequence[WorldDoor]) -> Iterator[tuple[float, float]]:
     """Return from where to where each door cuts a wall: one it stands in line with."""
-    length = wall.start.distance_to(wall.end)
-    wall_from_world = Pose(wall.start.x, wall.start.y, wall.start.bearing_to(wall.end)).inverse()
+    wall_from_world = wall.pose.inverse()
     for door in doors:
         door_in_wall = wall_from_world @ door.pose
         is_in_line = abs(math.sin(door_in_wall.yaw_rad)) < _IN_LINE_SINE
         if is_in_line and abs(door_in_wall.y) <= wall.thickness_m / 2 + _DOOR_REACH_M:
             low = max(door_in_wall.x - door.width_m / 2, 0.0)
-            high = min(door_in_wall.x + door.width_m / 2, length)
+            high = min(door_in_wall.x + door.width_m / 2, wall.length_m)
             if low < high:
                 yield low, high
 
