@@ -304,4 +304,4 @@ class Robot(Protocol):
         """Ask the navigation to end a drive; the robot comes to a stand."""
 
     async def stop(self) -> None:
-        """End every drive and commands zero velocity, at once."""
+        """End every drive and command zero velocity, at once."""

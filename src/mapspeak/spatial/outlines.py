@@ -134,7 +134,7 @@ def _split(vertices: list[Vertex]) -> list[VertexRing]:
 
 
 def _assemble(rings: list[VertexRing]) -> tuple[VertexPolygon, ...]:
-    """Return each hole to the smallest outer ring around it."""
+    """Assign each hole to the smallest outer ring around it."""
     outers = sorted((ring for ring in rings if twice_area(ring) > 0), key=twice_area)
     holes: list[list[VertexRing]] = [[] for _ in outers]
     for ring in rings:
@@ -162,7 +162,7 @@ def twice_area(ring: VertexRing) -> int:
 
 
 def _holds(ring: VertexRing, point: tuple[float, float]) -> bool:
-    """Say by crossings whether a cell's centre lies in a ring."""
+    """Tell by crossings whether a cell's centre lies in a ring."""
     rows, cols = np.array(ring).T
     next_rows = np.roll(rows, -1)
     crosses = (rows > point[0]) != (next_rows > point[0])

@@ -1,6 +1,5 @@
 """The map under ids: rooms, doors, frontiers and remembered places, as everybody names them."""
 
-import math
 from collections.abc import Callable, MutableMapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -22,7 +21,7 @@ from mapspeak.spatial.frontiers import (
     match_frontiers,
     rerank_frontiers,
 )
-from mapspeak.spatial.paths import DistanceField
+from mapspeak.spatial.paths import DistanceField, Path
 from mapspeak.spatial.rooms import Door, RoomMap
 from mapspeak.worldmodel.recollection import (
     Judge,
@@ -298,7 +297,7 @@ class WorldModel:
         )
 
     def _find_fronts(self, remembered: RememberedThing) -> list[Point]:
-        """Return last floor before a thing for each who saw it; their own without a position."""
+        """Return the last floor before a thing for each who saw it, or where these stood."""
         seen_from, position = _seen_from(remembered), remembered.thing.position
         if position is None:
             return seen_from
@@ -306,13 +305,8 @@ class WorldModel:
         return _keep(self.reach.fronts, remembered, lambda: find_fronts(sight, position, seen_from))
 
     def _find_room_on_line(self, end: Point, start: Point) -> str | None:
-        """Return room of the last floor on a line: what hangs on a wall is in no room itself."""
-        n_steps = math.ceil(start.distance_to(end) / STEP_M)
-        shares = (step / max(n_steps, 1) for step in range(n_steps, -1, -1))
-        points = (
-            Point(start.x + share * (end.x - start.x), start.y + share * (end.y - start.y))
-            for share in shares
-        )
+        """Return the room of the last floor on a line: what hangs on a wall is in none itself."""
+        points = Path.through((end, start)).sampled(STEP_M)
         return next(filter(None, map(self.find_room_id, points)), None)
 
     @cached_property

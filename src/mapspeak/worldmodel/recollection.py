@@ -268,7 +268,7 @@ class Recollector:
 
 
 def number_places(waypoints: Sequence[Waypoint]) -> tuple[RememberedPlace, ...]:
-    """Return remembered places their ids, in the order of the file."""
+    """Return waypoints as remembered places with ids, in the order of the file."""
     return tuple(
         RememberedPlace(id=f"W{number}", waypoint=waypoint)
         for number, waypoint in enumerate(waypoints, start=1)
@@ -278,7 +278,7 @@ def number_places(waypoints: Sequence[Waypoint]) -> tuple[RememberedPlace, ...]:
 def number_things(
     things: Sequence[Thing], earlier: Sequence[RememberedThing], *, n_named: int
 ) -> tuple[tuple[RememberedThing, ...], int]:
-    """Return things the ids that they had before, and new ones to new things.
+    """Return things under the ids that they had before, and new things under new ones.
 
     Args:
         things: What is remembered now.

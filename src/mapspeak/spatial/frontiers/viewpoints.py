@@ -126,7 +126,7 @@ def _find_cells(distances: DistanceField, rows: IntArray, cols: IntArray) -> Int
 
 
 def _find_cells_off(distances: DistanceField, rows: IntArray, cols: IntArray) -> IntArray:
-    """Return the same for targets that the robot cannot stand on well, by looking around them."""
+    """Find the same for targets that the robot cannot stand on well, by looking around them."""
     reach_m = distances.radius_m + REACH_M
     n_steps = math.ceil(reach_m / distances.grid.resolution_m)
     steps = np.arange(n_steps + 1, dtype=np.float64)

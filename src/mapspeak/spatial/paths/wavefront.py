@@ -111,7 +111,7 @@ class _Front:
         self._wait(seeds.cells, seeds.costs)
 
     def next_ring(self) -> IntArray | None:
-        """Take the cells of the next bucket that holds any, each once, and settles them."""
+        """Take the cells of the next bucket that holds any, each once, and settle them."""
         while self._waiting:
             cells = np.concatenate(self._waiting.pop(min(self._waiting)))
             cells = cells[~self.is_settled[cells]]

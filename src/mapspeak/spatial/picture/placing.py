@@ -316,7 +316,7 @@ class _Taken:
         self._owners += [spot.label] * len(boxes)
 
     def remove(self, label: Label) -> None:
-        """Return a label's boxes free."""
+        """Free a label's boxes."""
         is_kept = [owner is not label for owner in self._owners]
         self._boxes = self._boxes[is_kept]
         self._owners = [owner for owner in self._owners if owner is not label]

@@ -1,10 +1,7 @@
 """The same room keeps the same id while the map grows, shifts its origin or is turned."""
 
-import math
-from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from itertools import product
 from typing import Any, TypeVar
 
 import numpy as np
@@ -125,7 +122,7 @@ def _used(previous: RoomMap) -> set[str]:
 
 
 def _fresh(wanted: Iterable[str], used: set[str]) -> dict[str, str]:
-    """Return each wanted id the next number after all that regions, or doors, have used."""
+    """Return for each wanted id one with the next number that no region, or door, has used."""
     highest = dict.fromkeys((True, False), 0)
     for name in used:
         is_door = name[0] == "D"
@@ -142,7 +139,7 @@ def _match_doors(previous: RoomMap, current: RoomMap, ids: dict[str, str]) -> di
     """Return the final id for each door id of the current map, the nearest doors matched first."""
     near = [
         (before.place.distance_to(now.place), before.id, now.id)
-        for before, now in _neighbours(previous.doors, current.doors)
+        for before, now in _find_near_doors(previous.doors, current.doors)
         if before.place.distance_to(now.place)
         <= _SAME_DOOR_M * (1 + (set(before.region_ids) == {ids[name] for name in now.region_ids}))
     ]
@@ -158,22 +155,17 @@ def _match_doors(previous: RoomMap, current: RoomMap, ids: dict[str, str]) -> di
     return matched | _fresh(new, _used(previous))
 
 
-def _neighbours(
+def _find_near_doors(
     previous: tuple[Door, ...], current: tuple[Door, ...]
 ) -> Iterator[tuple[Door, Door]]:
-    """Return the pairs of doors less than twice the matching distance apart, and a few more."""
-    tiles: defaultdict[tuple[int, int], list[Door]] = defaultdict(list)
-    for before in previous:
-        tiles[_tile(before)].append(before)
-    for now in current:
-        x, y = _tile(now)
-        for tile in product((x - 1, x, x + 1), (y - 1, y, y + 1)):
-            yield from ((before, now) for before in tiles.get(tile, ()))
-
-
-def _tile(door: Door) -> tuple[int, int]:
-    side_m = 2 * _SAME_DOOR_M
-    return math.floor(door.place.x / side_m), math.floor(door.place.y / side_m)
+    """Return the pairs of doors at most twice the matching distance apart."""
+    places = [
+        np.array([(door.place.x, door.place.y) for door in doors]).reshape(-1, 1, 2)
+        for doors in (previous, current)
+    ]
+    off_m = np.linalg.norm(places[0] - places[1].swapaxes(0, 1), axis=2)
+    for before, now in np.argwhere(off_m < 2 * _SAME_DOOR_M + 1e-6).tolist():
+        yield previous[before], current[now]
 
 
 def _rename(region: Region, ids: dict[str, str], door_ids: dict[str, str]) -> Region:

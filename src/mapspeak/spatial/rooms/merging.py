@@ -46,7 +46,7 @@ class Saddle:
 
 
 def build_basins(height: Heights, floor: Picture) -> BasinLabels:
-    """Return each floor cell the number of its basin, from 1; 0 elsewhere."""
+    """Return for each floor cell the number of its basin, from 1; 0 elsewhere."""
     step = _steepest_steps(height).ravel()
     peaks = floor & (step == 0).reshape(floor.shape)
     _, peak_label = cv2.connectedComponents(peaks, connectivity=8)

@@ -351,7 +351,7 @@ def _number_at(numbers: Labels, place: tuple[int, int]) -> int:
 
 
 def _fill(labels: Labels, cut: Picture) -> Labels:
-    """Return the cells of a cut to the regions beside it."""
+    """Add the cells of a cut to the regions beside it."""
     rows, cols = (places + 1 for places in find_cells(cut > 0))
     framed = cv2.copyMakeBorder(labels, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
     for _ in range(_CUT_CELLS + 1):
