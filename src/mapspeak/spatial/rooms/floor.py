@@ -155,7 +155,9 @@ def find_walls(
 
 def _open(picture: cv2.typing.MatLike, length: float, angle_deg: float) -> Picture:
     kernel = _line(length, angle_deg)
-    return np.asarray(cv2.morphologyEx(picture, cv2.MORPH_OPEN, kernel), np.uint8)
+    core = np.asarray(cv2.erode(picture, kernel), np.uint8)
+    # Most directions fit nowhere.
+    return np.asarray(cv2.dilate(core, kernel), np.uint8) if core.any() else core
 
 
 def _line(length: float, angle_deg: float) -> Picture:
