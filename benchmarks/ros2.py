@@ -106,10 +106,11 @@ def _map(side: int) -> OccupancyGrid:
 
 
 async def _receive(grid: OccupancyGrid) -> tuple[list[float], list[float]]:
-    from mapspeak.links.rclpy.types import find_message, read_message, write_message  # noqa: PLC0415
+    from mapspeak.links.rclpy.types import RclpyTypes, find_message  # noqa: PLC0415
 
     domain_id = _enter_domain()
-    message = write_message(find_message(TYPE), write_grid(grid, dialect=Dialect.ROS2))
+    types = RclpyTypes()
+    message = types.encode(TYPE, write_grid(grid, dialect=Dialect.ROS2))
     walls_ms: list[float] = []
     cpus_ms: list[float] = []
     with _publisher(find_message(TYPE), domain_id) as publish, anyio.fail_after(PATIENCE_S):
@@ -124,7 +125,7 @@ async def _receive(grid: OccupancyGrid) -> tuple[list[float], list[float]]:
                 read_grid(heard)
                 walls_ms.append((time.perf_counter() - before_s) * 1e3)
                 before_s = time.thread_time()
-                read_grid(read_message(message))
+                read_grid(types.decode(TYPE, message))
                 cpus_ms.append((time.thread_time() - before_s) * 1e3)
     return walls_ms, cpus_ms
 
@@ -165,11 +166,10 @@ async def _is_published(connection: RosConnection) -> bool:
 
 def _offer(side: int, domain_id: int, is_there: Any, is_over: Any) -> None:  # noqa: ANN401
     """Publish a map from one event until the other; a process of its own."""
-    from mapspeak.links.rclpy.types import find_message, write_message  # noqa: PLC0415
+    from mapspeak.links.rclpy.types import RclpyTypes, find_message  # noqa: PLC0415
 
-    message_class = find_message(TYPE)
-    with _publisher(message_class, domain_id) as publish:
-        publish(write_message(message_class, write_grid(_map(side), dialect=Dialect.ROS2)))
+    with _publisher(find_message(TYPE), domain_id) as publish:
+        publish(RclpyTypes().encode(TYPE, write_grid(_map(side), dialect=Dialect.ROS2)))
         is_there.set()
         is_over.wait()
 

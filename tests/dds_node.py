@@ -16,8 +16,8 @@ from typing import Any
 import anyio
 from cyclonedds.qos import Policy, Qos
 
-from mapspeak.links.dds import DdsConnection, DdsTiming, open_dds_connection
-from mapspeak.links.dds.cdr import HEADER_BYTES
+from mapspeak.links.cdr import HEADER_BYTES
+from mapspeak.links.dds import DdsConnection, open_dds_connection
 from mapspeak.links.dds.connection import LONG_NODES_TYPE
 from mapspeak.links.dds.discovery import Framing
 from mapspeak.links.dds.endpoints import (
@@ -26,7 +26,6 @@ from mapspeak.links.dds.endpoints import (
     Quality,
     RawReader,
     RawWriter,
-    Sample,
     dds_topic,
     reply_topic,
     request_topic,
@@ -34,13 +33,13 @@ from mapspeak.links.dds.endpoints import (
 from mapspeak.links.dds.network import DdsNetwork
 from mapspeak.links.dds.participant import DdsParticipant
 from mapspeak.links.dds.types import HUMBLE, Types, build_type_book
+from mapspeak.links.endpoints import Sample
 from mapspeak.ros.definitions.typestore import hash_type
 
 RELIABLE = Quality(is_reliable=True, is_latched=False, depth=10)
 LATCHED = Quality(is_reliable=True, is_latched=True, depth=10)
 BEST_EFFORT = Quality(is_reliable=False, is_latched=False, depth=10)
 PATIENCE_S = 60.0
-QUICK = DdsTiming(quiet_s=0.05)
 SET_BOOL = "std_srvs/srv/SetBool"
 GID_BYTES, LONG_GID_BYTES = 16, 24
 NUMBER_BYTES = struct.calcsize("<Qq")
@@ -246,9 +245,7 @@ async def open_here(
 
     All of DDS here is Cyclone's: that a node is on Fast DDS can only be claimed.
     """
-    async with open_dds_connection(
-        network, timing=QUICK, framing_of=lambda _key: framing
-    ) as connection:
+    async with open_dds_connection(network, framing_of=lambda _key: framing) as connection:
         yield connection
 
 

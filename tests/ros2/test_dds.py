@@ -209,7 +209,7 @@ async def test_a_node_describes_the_type_of_its_topic(robot: RobotProcess) -> No
     async with connected(robot) as connection:
         updates = connection.discovery.writers_of("rt/map_updates")[0]
         ours = connection.types.definitions(updates.type_name)
-        await connection.learn(updates, "my_msgs/msg/Unknown")
+        await connection.ask_type(updates)
         theirs = connection.types.definitions(updates.type_name)
         heard = connection.subscribe("/map_updates")
         with anyio.fail_after(PATIENCE_S):

@@ -1,4 +1,4 @@
-"""Messages of rclpy become mappings and come back as they were, or are refused with their field."""
+"""Mappings become messages of rclpy and come back as they were, or are refused with their field."""
 
 import base64
 from typing import Any
@@ -12,11 +12,15 @@ from ros2.conftest import import_what_warns
 pytestmark = pytest.mark.ros2
 
 
-def there_and_back(type_name: str, values: object) -> Any:  # noqa: ANN401 - rclpy has no types
+def there_and_back(type_name: str, values: Any) -> Any:  # noqa: ANN401 - rclpy has no types
     import_what_warns()
-    from mapspeak.links.rclpy.types import find_message, read_message, write_message  # noqa: PLC0415
+    from rclpy.serialization import deserialize_message, serialize_message  # noqa: PLC0415
 
-    return read_message(write_message(find_message(type_name), values))
+    from mapspeak.links.rclpy.types import RclpyTypes, find_message  # noqa: PLC0415
+
+    types = RclpyTypes()
+    message = deserialize_message(types.encode(type_name, values), find_message(type_name))
+    return types.decode(type_name, serialize_message(message))
 
 
 @pytest.mark.parametrize(

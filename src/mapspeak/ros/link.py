@@ -11,10 +11,9 @@ from typing import Any, Generic, TypeVar
 import anyio
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.activity import ActionGoal, Started, Subscription
+from mapspeak.ros.activity import Started, Subscription
 from mapspeak.ros.messages.fields import NAME, Message, bare_type
 from mapspeak.ros.parameters import ParameterServices
-from mapspeak.ros.port import OwnEnds
 
 NOTICE_S = 0.3
 """From a topic's first announcement until the robot's nodes listen, in wall time."""
@@ -210,26 +209,6 @@ class RosLink(ParameterServices, Generic[Request]):
     @abstractmethod
     def _prepare(self, topic: str, message: Message) -> Callable[[], int]:
         """Return what publishes a message to those who are connected; it tells by how many ways."""
-
-
-class NativeLink(RosLink[Request]):
-    """A member of the robot's own network: nothing stands between us and its nodes."""
-
-    @property
-    def lost_for_s(self) -> float | None:
-        """None: there is no connection to lose."""
-        return None
-
-    @property
-    def own_ends(self) -> OwnEnds:
-        """Nothing: what such a connection tells of the system leaves our own node out."""
-        return OwnEnds()
-
-    def clear_the_way(self) -> None:
-        """Do nothing: in ROS 2 itself, nothing is held up by what was sent before."""
-
-    def give_up_goal(self, goal: ActionGoal) -> None:
-        """Do nothing: in ROS 2 itself, a goal holds up nothing."""
 
 
 def check_name(name: str) -> None:

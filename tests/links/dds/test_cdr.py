@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 pytest.importorskip("cyclonedds", reason="has no wheel for this Python")
 
 from mapspeak.errors import LinkError
-from mapspeak.links.dds.cdr import Codec, Store
-from mapspeak.links.dds.types import action_parts, build_type_book, read_type_description
+from mapspeak.links.cdr import Codec, Store
+from mapspeak.links.dds.types import build_type_book, read_type_description
+from mapspeak.ros.definitions.texts import action_parts
 from mapspeak.ros.definitions.types import TypeBook, parse_definition
 from messaging import messages_of, plain
 

@@ -22,7 +22,7 @@ from dds_node import (
     until,
 )
 from mapspeak.errors import LinkError
-from mapspeak.links.dds import DdsNetwork, DdsTiming, open_dds_connection
+from mapspeak.links.dds import DdsNetwork, open_dds_connection
 from mapspeak.links.dds.types import Types
 from mapspeak.ros.messages.grids import read_grid
 
@@ -288,7 +288,7 @@ async def test_a_robot_on_humble_is_known_by_its_longer_ids() -> None:
 async def test_an_empty_domain_is_an_error_that_names_it() -> None:
     network = some_network()
     with pytest.raises(LinkError, match=f"domain {network.domain_id} "):
-        async with open_dds_connection(network, timing=DdsTiming(first_sign_s=0.1)):
+        async with open_dds_connection(network):
             pass
 
 

@@ -3,17 +3,15 @@ import pytest
 pytest.importorskip("cyclonedds", reason="has no wheel for this Python")
 
 from mapspeak.links.dds.endpoints import (
-    action_type_of,
     dds_topic,
     dds_type,
-    is_hidden,
     reply_topic,
     request_topic,
     ros_type,
     service_of,
-    service_type_of,
     topic_of,
 )
+from mapspeak.links.endpoints import is_hidden, whole_type
 
 
 def test_a_topic_and_its_type_are_named_as_ros_names_them_in_dds() -> None:
@@ -45,10 +43,10 @@ def test_what_is_no_topic_and_no_service_of_ros_is_nothing() -> None:
 
 def test_types_are_read_from_those_of_their_parts() -> None:
     assert ros_type("std_srvs::srv::dds_::SetBool_Response_") == "std_srvs/srv/SetBool_Response"
-    assert service_type_of("std_srvs/srv/SetBool_Response") == "std_srvs/SetBool"
+    assert whole_type("std_srvs/srv/SetBool_Response") == "std_srvs/srv/SetBool"
     action = "nav2_msgs/action/NavigateToPose"
     for part in ("SendGoal_Response", "GetResult_Request", "FeedbackMessage"):
-        assert action_type_of(f"{action}_{part}") == "nav2_msgs/NavigateToPose"
+        assert whole_type(f"{action}_{part}") == action
 
 
 def test_the_parts_of_actions_are_hidden() -> None:

@@ -1,31 +1,63 @@
 """A ROS 2 domain over DDS as a connection, and the robot behind it opened."""
 
+import logging
 from collections.abc import AsyncGenerator, Callable, Coroutine, Mapping
 from contextlib import asynccontextmanager
+from functools import partial
 from typing import Any
 
 import anyio
 from anyio.abc import TaskGroup
 
 from mapspeak.errors import LinkError
-from mapspeak.links.dds.calls import Calls
-from mapspeak.links.dds.discovery import Discovery, FramingOf, framing_by_vendor
-from mapspeak.links.dds.endpoints import DISCOVERY_TOPIC, DISCOVERY_TYPE, Quality, Sample
-from mapspeak.links.dds.graph import DdsGraph
-from mapspeak.links.dds.network import DdsNetwork, DdsTiming
+from mapspeak.links.dds.discovery import DdsEndpoint, Discovery, FramingOf, framing_by_vendor
+from mapspeak.links.dds.endpoints import (
+    DISCOVERY_TOPIC,
+    DISCOVERY_TYPE,
+    Quality,
+    RawReader,
+    RawWriter,
+    dds_topic,
+    reply_topic,
+    request_topic,
+)
+from mapspeak.links.dds.network import DdsNetwork
 from mapspeak.links.dds.participant import DdsParticipant
-from mapspeak.links.dds.types import Types
-from mapspeak.ros.activity import ActionGoal
+from mapspeak.links.dds.services import DdsService
+from mapspeak.links.dds.types import HUMBLE, Types
+from mapspeak.links.endpoints import (
+    SERVICE_PART,
+    Decode,
+    Sample,
+    Take,
+    nobody_serves,
+    unknown,
+)
+from mapspeak.links.native import SEND_GOAL, NativeLink, NativeRequest
 from mapspeak.ros.discovery.overrides import RobotOverrides
 from mapspeak.ros.link import plain_errors
-from mapspeak.ros.messages.fields import Message
-from mapspeak.ros.port import LinkKind, LinkName
+from mapspeak.ros.port import LinkKind, LinkName, NodeLinks, RosGraph
 from mapspeak.ros.robot import NOTHING_SAID, USUAL_PATIENCE, RosRobot, build_ros_robot
 from mapspeak.ros.robot.driving import DrivingPatience
 
+logger = logging.getLogger(__name__)
+
+FIRST_SIGN_S = 5.0
+"""For the first node of ROS to be found."""
+QUIET_S = 0.4
+"""Without anybody new, after which all who are there count as found."""
+LONGEST_LOOK_S = 3.0
+ARRIVAL_S = 0.5
+"""For what was published last to arrive, before we leave."""
+TIME_S = 2.0
+"""For a node to tell the time."""
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 30.0
+"""Before a node that did not tell a type is asked for it again."""
+ASKED_FOR_TIME = "/get_parameter_types"
+DESCRIBE = "get_type_description"
+DESCRIBE_TYPE = "type_description_interfaces/srv/GetTypeDescription"
 NODES_QUALITY = Quality(is_reliable=True, is_latched=True, depth=1000)
 LONG_NODES_TYPE = "rmw_dds_common/LongParticipantEntitiesInfo"
-USUAL_TIMING = DdsTiming()
 HINT = (
     "Check that the robot runs ROS 2 on Fast DDS or Cyclone DDS, that its ROS_DOMAIN_ID is this "
     "one (--robot dds:DOMAIN), and that the network lets multicast pass; else name the robot's "
@@ -33,8 +65,11 @@ HINT = (
 )
 
 
-class DdsConnection(DdsGraph):
+class DdsConnection(NativeLink):
     """One ROS 2 system, as a member of its DDS domain sees it.
+
+    A topic is read anew when somebody new writes it: Fast DDS serves at once a reader that comes
+    after its writer, and may take three seconds to serve one that was there before.
 
     Args:
         framing_of: Tells how a node frames services, by the id of its writer.
@@ -43,21 +78,20 @@ class DdsConnection(DdsGraph):
         LinkError: DDS cannot be started.
     """
 
-    def __init__(
-        self,
-        network: DdsNetwork,
-        *,
-        timing: DdsTiming = USUAL_TIMING,
-        framing_of: FramingOf = framing_by_vendor,
-    ) -> None:
+    reads_anew = True
+    server_s = 1.0
+
+    def __init__(self, network: DdsNetwork, *, framing_of: FramingOf = framing_by_vendor) -> None:
         self.network = network
-        self.timing = timing
-        participant = DdsParticipant(network)
-        discovery = Discovery(participant.key, on_change=self._note_change, framing_of=framing_of)
-        super().__init__(participant, discovery, Types())
+        self.types = Types()
+        super().__init__(self.types)
+        self._participant = DdsParticipant(network)
+        self.discovery = Discovery(
+            self._participant.key, on_change=self._note_change, framing_of=framing_of
+        )
+        self._services: dict[str, DdsService] = {}
         self._tasks: TaskGroup | None = None
         self._found_s: float | None = None
-        self._calls = Calls(self, participant)
 
     @property
     def link(self) -> LinkName:
@@ -75,6 +109,11 @@ class DdsConnection(DdsGraph):
         """Since when nodes have been there, in wall time; None while none is."""
         return None if self._found_s is None else anyio.current_time() - self._found_s
 
+    @property
+    def distro(self) -> str:
+        """Humble by its longer ids; empty for all others."""
+        return HUMBLE if self.discovery.has_long_ids else ""
+
     def start_soon(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Run something in the background until the connection is closed."""
         if self._tasks is not None:
@@ -89,7 +128,7 @@ class DdsConnection(DdsGraph):
         self._tasks = tasks
         self._participant.watch_endpoints(self.discovery.take_writer, self.discovery.take_reader)
         tasks.start_soon(self._participant.run)
-        await self._wait_for_node(self.timing.first_sign_s)
+        await self.wait_until_connected()
         # Fast DDS sends what is latched at once to a reader that knows the writer already, and
         # otherwise within three seconds. So no topic is read before somebody is there.
         self._participant.read(
@@ -99,67 +138,184 @@ class DdsConnection(DdsGraph):
             decode=self._decode_nodes,
             take=self._take_nodes,
         )
-        with anyio.move_on_after(self.timing.longest_look_s):
+        with anyio.move_on_after(LONGEST_LOOK_S):
             is_news = True
             while is_news:
-                with anyio.move_on_after(self.timing.quiet_s) as quiet:
+                with anyio.move_on_after(QUIET_S) as quiet:
                     await self.discovery.wait_for_news()
                 is_news = not quiet.cancelled_caught
 
     async def aclose(self) -> None:
         """Leave the domain, once what was published last has arrived."""
         if self._advertised:
-            await self._participant.flush(timeout_s=self.timing.arrival_s)
+            await self._participant.flush(timeout_s=ARRIVAL_S)
         self._participant.close()
 
     async def wait_until_connected(self) -> None:
         """Return at once, or when a node is there again."""
-        await self._wait_for_node(self.timing.answer_s)
-
-    # --- services and actions
-
-    async def call_service(
-        self,
-        service: str,
-        arguments: Mapping[str, Any] | None = None,
-        *,
-        type_name: str | None = None,
-        timeout_s: float | None = None,
-    ) -> dict[str, Any]:
-        """Return what a service answers."""
-        limit_s = self.timing.answer_s if timeout_s is None else timeout_s
-        answer = await self._calls.call(
-            service, arguments or {}, type_name=type_name, timeout_s=limit_s
-        )
-        content: dict[str, Any] = answer.content
-        return content
-
-    async def ask(self, service: str, arguments: Mapping[str, Any], *, timeout_s: float) -> Sample:
-        """Return what a service answers, and when it did."""
-        return await self._calls.call(service, arguments, type_name=None, timeout_s=timeout_s)
-
-    async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
-        """Send a goal to an action and return what becomes of it, as it becomes."""
-        return await self._calls.send_goal(
-            action, arguments, type_name=type_name, timeout_s=self.timing.answer_s
-        )
-
-    def cancel_goal(self, goal: ActionGoal) -> None:
-        """Ask for the end of a goal; its `end` tells whether that worked."""
-        self._calls.cancel_goal(goal)
-
-    # --- who is there
-
-    async def _wait_for_node(self, limit_s: float) -> None:
-        with anyio.move_on_after(limit_s):
+        with anyio.move_on_after(FIRST_SIGN_S):
             while self.discovery.is_empty:
                 await self.discovery.wait_for_news()
         if self.discovery.is_empty:
             raise LinkError(
                 f"No node of ROS 2 was found in DDS domain {self.network.domain_id} within "
-                f"{limit_s:g} s.",
+                f"{FIRST_SIGN_S:g} s.",
                 hint=HINT,
             )
+
+    # --- topics
+
+    def _writers_of(self, topic: str) -> list[DdsEndpoint]:
+        return self.discovery.writers_of(dds_topic(topic))
+
+    def _readers_of(self, topic: str) -> list[DdsEndpoint]:
+        return self.discovery.readers_of(dds_topic(topic))
+
+    def _quality(self, *, is_reliable: bool, is_latched: bool, depth: int) -> Quality:
+        return Quality(is_reliable=is_reliable, is_latched=is_latched, depth=depth)
+
+    def _read(
+        self, topic: str, type_name: str, quality: Quality, decode: Decode, take: Take
+    ) -> RawReader:
+        return self._participant.read(
+            dds_topic(topic), type_name, quality=quality, decode=decode, take=take
+        )
+
+    def _end_reading(self, reader: RawReader) -> None:
+        self._participant.end_reading(reader)
+
+    def _write_to(self, topic: str, type_name: str, quality: Quality) -> RawWriter:
+        return self._participant.write_to(dds_topic(topic), type_name, quality=quality)
+
+    def _end_writing(self, writer: RawWriter) -> None:
+        self._participant.end_writing(writer)
+
+    # --- types
+
+    def _learn(self, request: NativeRequest) -> None:
+        """Ask for a type that we do not know, or know in another version, until it is told once."""
+        if not request.has_learned:
+            request.has_learned = True
+            self.start_soon(partial(self._learn_and_renew, request))
+
+    async def _learn_and_renew(self, request: NativeRequest) -> None:
+        # A node's services may be found after its topics, and a busy node may answer too late.
+        topic = request.subscription.topic
+        pause_s = FIRST_PAUSE_S
+        while self.requests.get(topic) is request:
+            try:
+                # Whoever writes now: the node that was asked before may have gone.
+                for writer in self._writers_of(topic)[:1]:
+                    await self.ask_type(writer)
+                    self.renew(request.subscription)
+                    return
+            except LinkError as error:
+                if pause_s == FIRST_PAUSE_S:
+                    logger.warning("%s cannot be read: %s", topic, error)
+            await anyio.sleep(pause_s)
+            pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
+
+    async def ask_type(self, endpoint: DdsEndpoint) -> None:
+        """Ask the node behind a reader or writer of a topic for its type."""
+        service = f"{self.discovery.node_with(endpoint.key)}/{DESCRIBE}"
+        if not endpoint.type_hash or self.discovery.server_of(service) is None:
+            raise self.types.refusal(endpoint.type_name)
+        request = {
+            "type_name": endpoint.type_name,
+            "type_hash": endpoint.type_hash,
+            "include_type_sources": False,
+        }
+        answer = await self.call_service(service, request, type_name=DESCRIBE_TYPE)
+        self.types.take_description(answer)
+
+    async def fetch_definitions(self, type_name: str) -> Mapping[str, str]:
+        """Return the .msg texts of a type and of all within: ours, or those that a node tells.
+
+        Nodes find a type by its hash, and DDS tells no hash by which they find that of a service.
+        """
+        known = self.types.definitions(type_name)
+        for endpoint in () if known else self.discovery.with_type(type_name):
+            name = endpoint.type_name
+            try:
+                if not (self.types.knows(name) or SERVICE_PART.search(name)):
+                    await self.ask_type(endpoint)
+            except LinkError:
+                continue
+        return known or self.types.definitions(type_name)
+
+    # --- services and actions
+
+    async def _service(self, service: str, *, within_s: float) -> DdsService:
+        """Find who serves: right after opening, others are still found bit by bit.
+
+        Who serves it is found by its answers; what it takes is told by who reads the requests.
+        """
+        with anyio.move_on_after(within_s):
+            while self.discovery.server_of(service) is None:
+                await self.discovery.wait_for_news()
+            while not self.discovery.readers_of(request_topic(service)):
+                await self.discovery.wait_for_news()
+        server = self.discovery.server_of(service)
+        if server is None:
+            raise nobody_serves(service)
+        type_name = SERVICE_PART.sub("", server.type_name)
+        for part in ("Request", "Response"):
+            if not self.types.knows(f"{type_name}_{part}"):
+                raise self.types.refusal(f"{type_name}_{part}")
+        if service not in self._services:
+            self._services[service] = DdsService(
+                self._participant, service, type_name, framing=server.framing, types=self.types
+            )
+        return self._services[service]
+
+    def _note_servers(self, action: str) -> None:
+        servers = self.discovery.writers_of(reply_topic(action + SEND_GOAL))
+        self._actions[action].note_servers([each.key for each in servers])
+
+    # --- who is there
+
+    async def fetch_graph(self) -> RosGraph:
+        """Return the topics and actions there are."""
+        await self.wait_until_connected()
+        return await super().fetch_graph()
+
+    async def fetch_time_s(self) -> float | None:
+        """Return robot time: when some node answered a question that costs it nothing."""
+        servers = sorted(each for each in self.discovery.services if each.endswith(ASKED_FOR_TIME))
+        if not servers:
+            return None
+        try:
+            return (await self._call(servers[0], {"names": []}, timeout_s=TIME_S)).source_s
+        except LinkError:
+            return None
+
+    async def fetch_nodes(self) -> tuple[str, ...]:
+        """Return the full names of all nodes."""
+        return tuple(sorted(self.discovery.nodes))
+
+    async def fetch_node(self, node: str) -> NodeLinks:
+        """Return what a node publishes, subscribes to and serves."""
+        keys = self.discovery.nodes.get(node)
+        if keys is None:
+            raise unknown(node)
+        return self.discovery.links_of(keys)
+
+    async def fetch_publishers(self, topic: str) -> tuple[str, ...]:
+        """Return the nodes that publish on a topic."""
+        return self.discovery.nodes_with(self._writers_of(topic))
+
+    async def fetch_subscribers(self, topic: str) -> tuple[str, ...]:
+        """Return the nodes that listen to a topic."""
+        return self.discovery.nodes_with(self._readers_of(topic))
+
+    def _topic_types(self) -> dict[str, str]:
+        return self.discovery.topics
+
+    def _service_types(self) -> dict[str, str]:
+        return {
+            service: SERVICE_PART.sub("", server.type_name)
+            for service, server in self.discovery.services.items()
+        }
 
     def _note_change(self, dds_name: str) -> None:
         if self.discovery.is_empty:
@@ -168,8 +324,16 @@ class DdsConnection(DdsGraph):
             self._found_s = anyio.current_time()
         for each in self.discovery.ends_of(dds_name):
             self.types.take_hash(each.type_name, each.type_hash)
-        self._note_topic(dds_name)
-        self._calls.note_change(dds_name)
+        for request in self.requests.values():
+            if dds_topic(request.subscription.topic) == dds_name:
+                self._begin(request)
+        for action in self._actions:
+            if reply_topic(action + SEND_GOAL) == dds_name:
+                self._note_servers(action)
+        for service, asked in self._services.items():
+            if reply_topic(service) == dds_name:
+                server = self.discovery.server_of(service)
+                asked.note_server(None if server is None else server.framing)
 
     def _decode_nodes(self, data: bytes) -> dict[str, Any]:
         try:
@@ -187,10 +351,7 @@ class DdsConnection(DdsGraph):
 
 @asynccontextmanager
 async def open_dds_connection(
-    network: DdsNetwork,
-    *,
-    timing: DdsTiming = USUAL_TIMING,
-    framing_of: FramingOf = framing_by_vendor,
+    network: DdsNetwork, *, framing_of: FramingOf = framing_by_vendor
 ) -> AsyncGenerator[DdsConnection]:
     """Keep us in a domain while the context lasts; see `DdsConnection`.
 
@@ -199,7 +360,7 @@ async def open_dds_connection(
     """
     with plain_errors():
         async with anyio.create_task_group() as tasks:
-            connection = DdsConnection(network, timing=timing, framing_of=framing_of)
+            connection = DdsConnection(network, framing_of=framing_of)
             try:
                 await connection.start(tasks)
                 yield connection
@@ -214,7 +375,6 @@ async def open_dds_robot(
     network: DdsNetwork,
     *,
     overrides: RobotOverrides = NOTHING_SAID,
-    timing: DdsTiming = USUAL_TIMING,
     patience: DrivingPatience = USUAL_PATIENCE,
 ) -> AsyncGenerator[RosRobot]:
     """Offer the ROS 2 robot in a DDS domain while the context lasts.
@@ -224,5 +384,5 @@ async def open_dds_robot(
     Raises:
         LinkError: No robot is found there, or it does not say what it offers.
     """
-    async with open_dds_connection(network, timing=timing) as connection:
+    async with open_dds_connection(network) as connection:
         yield await build_ros_robot(connection, overrides=overrides, patience=patience)

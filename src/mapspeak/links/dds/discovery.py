@@ -12,16 +12,12 @@ from cyclonedds.core import InstanceState
 from cyclonedds.qos import Policy
 
 from mapspeak.links.dds.endpoints import (
-    Sample,
-    action_type_of,
-    dds_topic,
-    is_hidden,
     reply_topic,
     ros_type,
     service_of,
-    service_type_of,
     topic_of,
 )
+from mapspeak.links.endpoints import Endpoint, Sample, is_hidden, whole_type
 from mapspeak.ros.messages.fields import Message, bare_type
 from mapspeak.ros.port import NodeLinks
 
@@ -29,7 +25,6 @@ TYPE_HASH = re.compile(rb"typehash=(RIHS\d+_[0-9a-f]+)")
 PREFIX_BYTES = 12
 CYCLONE_VENDOR = b"\x01\x10"
 UNNAMED = "/_NODE_NAME_UNKNOWN_"
-STATUS, SEND_GOAL = "/_action/status", "/_action/send_goal"
 
 
 class Framing(Enum):
@@ -40,18 +35,14 @@ class Framing(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Endpoint:
-    """A reader or a writer of somebody else.
+class DdsEndpoint(Endpoint):
+    """A reader or a writer of another participant.
 
     Attributes:
         type_hash: Of its type, since ROS 2 Iron; empty before.
     """
 
-    key: bytes
     topic: str
-    type_name: str
-    is_reliable: bool
-    is_latched: bool
     type_hash: str
     framing: Framing
 
@@ -78,8 +69,8 @@ class Discovery:
         self._framing_of = framing_of
         self._own_key = own_key
         self._on_change = on_change
-        self._writers: dict[bytes, Endpoint] = {}
-        self._readers: dict[bytes, Endpoint] = {}
+        self._writers: dict[bytes, DdsEndpoint] = {}
+        self._readers: dict[bytes, DdsEndpoint] = {}
         self._nodes: dict[bytes, dict[str, tuple[bytes, ...]]] = {}
         self._news = anyio.Event()
         self.has_long_ids = False
@@ -103,7 +94,7 @@ class Discovery:
         self._nodes[prefix] = dict(_read_node(node) for node in message["node_entities_info_seq"])
         self._tell("")
 
-    def _take(self, endpoint: Any, known: dict[bytes, Endpoint]) -> None:  # noqa: ANN401
+    def _take(self, endpoint: Any, known: dict[bytes, DdsEndpoint]) -> None:  # noqa: ANN401
         key = endpoint.key.bytes
         if endpoint.sample_info.instance_state != InstanceState.Alive:
             gone = known.pop(key, None)
@@ -134,34 +125,25 @@ class Discovery:
         """True when nobody of ROS is there."""
         return not self._writers
 
-    def writers_of(self, topic: str) -> list[Endpoint]:
+    def writers_of(self, topic: str) -> list[DdsEndpoint]:
         """Return the writers on a topic of DDS."""
         return [each for each in self._writers.values() if each.topic == topic]
 
-    def readers_of(self, topic: str) -> list[Endpoint]:
+    def readers_of(self, topic: str) -> list[DdsEndpoint]:
         """Return the readers of a topic of DDS."""
         return [each for each in self._readers.values() if each.topic == topic]
 
-    def ends_of(self, topic: str) -> list[Endpoint]:
+    def ends_of(self, topic: str) -> list[DdsEndpoint]:
         """Return the writers on a topic of DDS, then its readers."""
         return [*self.writers_of(topic), *self.readers_of(topic)]
 
-    def type_of(self, topic: str) -> str | None:
-        """Return the type of a topic of DDS; None where nobody reads or writes it."""
-        return next((each.type_name for each in self.ends_of(topic)), None)
-
-    def with_type(self, type_name: str) -> list[Endpoint]:
+    def with_type(self, type_name: str) -> list[DdsEndpoint]:
         """Return the readers and writers of a type: of a message, a service or an action."""
         bare = bare_type(type_name)
         return [
             each
             for each in self._everybody()
-            if bare
-            in (
-                bare_type(each.type_name),
-                service_type_of(each.type_name),
-                action_type_of(each.type_name),
-            )
+            if bare in map(bare_type, (each.type_name, whole_type(each.type_name)))
         ]
 
     @property
@@ -175,32 +157,18 @@ class Discovery:
         return found
 
     @property
-    def services(self) -> dict[str, Endpoint]:
+    def services(self) -> dict[str, DdsEndpoint]:
         """Who answers each service, those that are parts of actions too."""
-        found: dict[str, Endpoint] = {}
+        found: dict[str, DdsEndpoint] = {}
         for each in self._writers.values():
             service = service_of(each.topic)
             if service is not None:
                 found[service] = each
         return found
 
-    @property
-    def actions(self) -> dict[str, str]:
-        """The types of all actions that somebody serves, as "package/Type"."""
-        return {
-            service.removesuffix(SEND_GOAL): action_type_of(endpoint.type_name)
-            for service, endpoint in self.services.items()
-            if service.endswith(SEND_GOAL)
-        }
-
-    def server_of(self, service: str) -> Endpoint | None:
+    def server_of(self, service: str) -> DdsEndpoint | None:
         """Return who answers a service; None where nobody does."""
         return next(iter(self.writers_of(reply_topic(service))), None)
-
-    def service_type(self, service: str) -> str | None:
-        """Return a service's type, as "package/Type"; None where nobody answers."""
-        server = self.server_of(service)
-        return None if server is None else service_type_of(server.type_name)
 
     @property
     def nodes(self) -> dict[str, tuple[bytes, ...]]:
@@ -226,22 +194,14 @@ class Discovery:
         """Return the full name of the node that has a reader or writer."""
         return next((name for name, keys in self.nodes.items() if key in keys), None)
 
-    def nodes_with(self, endpoints: list[Endpoint]) -> tuple[str, ...]:
+    def nodes_with(self, endpoints: list[DdsEndpoint]) -> tuple[str, ...]:
         """Return the full names of the nodes that have some readers or writers.
 
         Names come seconds after readers and writers: until then, ROS has this name for a node.
         """
         return _names(self.node_with(each.key) or UNNAMED for each in endpoints)
 
-    def publishers(self, topic: str) -> tuple[str, ...]:
-        """Return the nodes that publish on a topic of ROS."""
-        return self.nodes_with(self.writers_of(dds_topic(topic)))
-
-    def subscribers(self, topic: str) -> tuple[str, ...]:
-        """Return the nodes that listen to a topic of ROS."""
-        return self.nodes_with(self.readers_of(dds_topic(topic)))
-
-    def _everybody(self) -> Iterator[Endpoint]:
+    def _everybody(self) -> Iterator[DdsEndpoint]:
         yield from self._writers.values()
         yield from self._readers.values()
 
@@ -250,11 +210,11 @@ def _names(found: Iterator[str | None]) -> tuple[str, ...]:
     return tuple(sorted({name for name in found if name is not None}))
 
 
-def _read_endpoint(endpoint: Any, type_name: str, framing: Framing) -> Endpoint:  # noqa: ANN401
+def _read_endpoint(endpoint: Any, type_name: str, framing: Framing) -> DdsEndpoint:  # noqa: ANN401
     qos = endpoint.qos
     described = qos[Policy.Userdata]
     found = TYPE_HASH.search(described.data) if described is not None else None
-    return Endpoint(
+    return DdsEndpoint(
         key=endpoint.key.bytes,
         topic=endpoint.topic_name,
         type_name=type_name,

@@ -1,7 +1,5 @@
 """The names of ROS in DDS, and what discovery tells of DataWriters and DataReaders."""
 
-import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,19 +11,11 @@ from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 
 from mapspeak.errors import LinkError
-from mapspeak.ros.messages.fields import bare_type
+from mapspeak.links.endpoints import Decode, Sample, Take, full_type, understand
 
 TOPIC, REQUEST, REPLY = "rt", "rq", "rr"
 DISCOVERY_TOPIC = "ros_discovery_info"
 DISCOVERY_TYPE = "rmw_dds_common/msg/ParticipantEntitiesInfo"
-SERVICE_PART = re.compile(r"_(?:Request|Response)$")
-ACTION_PART = re.compile(r"_(?:SendGoal|GetResult)$|_FeedbackMessage$")
-
-
-def full_type(name: str, *, kind: str = "msg") -> str:
-    """Return a type as "package/kind/Type", however it was written."""
-    package, *middle, last = name.strip("/").split("/")
-    return f"{package}/{middle[0] if middle else kind}/{last}"
 
 
 def dds_type(name: str) -> str:
@@ -67,21 +57,6 @@ def service_of(dds_name: str) -> str | None:
     """Return the service whose answers come on a topic of DDS; None where none do."""
     is_reply = dds_name.startswith(f"{REPLY}/") and dds_name.endswith("Reply")
     return dds_name[len(REPLY) : -len("Reply")] if is_reply else None
-
-
-def is_hidden(name: str) -> bool:
-    """Return True for what `ros2 topic list` leaves out, such as the parts of actions."""
-    return any(part.startswith("_") for part in name.split("/"))
-
-
-def service_type_of(reply_type: str) -> str:
-    """Return a service's type for that of its answers: "std_srvs/SetBool"."""
-    return bare_type(SERVICE_PART.sub("", reply_type))
-
-
-def action_type_of(part_type: str) -> str:
-    """Return an action's type for that of one of its services: "nav2_msgs/NavigateToPose"."""
-    return bare_type(ACTION_PART.sub("", SERVICE_PART.sub("", part_type)))
 
 
 MOST_AT_ONCE = 256
@@ -142,25 +117,6 @@ class Quality:
         )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Sample:
-    """What one message brings.
-
-    Attributes:
-        content: The message, decoded; None where that failed.
-        source_s: When it was written, by its writer's clock.
-        refusal: Why it could not be decoded.
-    """
-
-    content: Any
-    source_s: float
-    refusal: LinkError | None = None
-
-
-Decode = Callable[[bytes], Any]
-Take = Callable[[Sample], None]
-
-
 class RawReader:
     """A reader of one topic. Both functions are given with it: one decodes, one takes."""
 
@@ -184,11 +140,7 @@ class RawReader:
         if not isinstance(sample, RawMessage):
             return None
         info: Any = getattr(sample, "sample_info")  # noqa: B009 - set by the library, undeclared
-        source_s = info.source_timestamp / 1e9
-        try:
-            return Sample(content=self.decode(sample.data), source_s=source_s)
-        except LinkError as error:
-            return Sample(content=None, source_s=source_s, refusal=error)
+        return understand(sample.data, self.decode, source_s=info.source_timestamp / 1e9)
 
     def close(self) -> None:
         """Let go of DDS's reader."""

@@ -1,4 +1,4 @@
-"""Which network interfaces and domain the DDS link uses, and how long it waits."""
+"""Which network interfaces and domain the DDS link uses."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -47,22 +47,3 @@ class DdsNetwork:
             f"<Compatibility><IgnoreTypeInformation>{FAST_DDS_VENDOR}</IgnoreTypeInformation>"
             "</Compatibility></Domain></CycloneDDS>"
         )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DdsTiming:
-    """The time limits of one connection; a test shortens them.
-
-    Attributes:
-        answer_s: For a service's answer, where the caller says nothing else.
-        first_sign_s: For the first node of ROS to be found.
-        quiet_s: Without anybody new, after which all who are there count as found.
-        longest_look_s: For all who are there to be found.
-        arrival_s: For what was published last to arrive, before we leave.
-    """
-
-    answer_s: float = 5.0
-    first_sign_s: float = 5.0
-    quiet_s: float = 0.4
-    longest_look_s: float = 3.0
-    arrival_s: float = 0.5

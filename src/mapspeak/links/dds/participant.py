@@ -26,17 +26,15 @@ from cyclonedds.topic import Topic
 
 from mapspeak.errors import LinkError
 from mapspeak.links.dds.endpoints import (
-    Decode,
     EndpointReader,
     Quality,
     RawMessage,
     RawReader,
     RawWriter,
-    Sample,
-    Take,
     dds_type,
 )
 from mapspeak.links.dds.network import DdsNetwork
+from mapspeak.links.endpoints import Decode, Sample, Take
 from mapspeak.ros.link import environment_with
 
 logger = logging.getLogger(__name__)

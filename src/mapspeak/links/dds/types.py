@@ -6,8 +6,8 @@ from functools import cache
 from typing import Any
 
 from mapspeak.errors import LinkError
-from mapspeak.links.dds.cdr import Codec
-from mapspeak.ros.definitions.texts import DISTROS, known_definitions, name_parts
+from mapspeak.links.cdr import Codec
+from mapspeak.ros.definitions.texts import DISTROS, action_parts, known_definitions, name_parts
 from mapspeak.ros.definitions.types import TypeBook
 from mapspeak.ros.definitions.typestore import hash_type
 from mapspeak.ros.messages.fields import Dialect, Message, bare_type
@@ -28,14 +28,6 @@ _TEXTS = {
     "rmw_dds_common/LongParticipantEntitiesInfo": (
         "rmw_dds_common/LongGid gid\nrmw_dds_common/LongNodeEntitiesInfo[] node_entities_info_seq"
     ),
-}
-
-_ACTION_PARTS = {
-    "SendGoal_Request": "unique_identifier_msgs/UUID goal_id\n{action}_Goal goal",
-    "SendGoal_Response": "bool accepted\nbuiltin_interfaces/Time stamp",
-    "GetResult_Request": "unique_identifier_msgs/UUID goal_id",
-    "GetResult_Response": "int8 status\n{action}_Result result",
-    "FeedbackMessage": "unique_identifier_msgs/UUID goal_id\n{action}_Feedback feedback",
 }
 
 _PLAIN_TYPES = {
@@ -60,14 +52,6 @@ def build_type_book(distro: str = "") -> TypeBook:
     for name in [name for name in texts if name.endswith("_Goal")]:
         texts |= action_parts(name.removesuffix("_Goal"))
     return TypeBook(texts)
-
-
-def action_parts(action_type: str) -> dict[str, str]:
-    """Return the texts of what ROS 2 makes of an action, by name."""
-    bare = bare_type(action_type)
-    return {
-        f"{bare}_{part}": text.replace("{action}", bare) for part, text in _ACTION_PARTS.items()
-    }
 
 
 def read_type_description(answer: Message) -> dict[str, str]:

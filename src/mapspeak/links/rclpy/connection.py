@@ -1,25 +1,28 @@
 """A ROS 2 system over rclpy, as one of its nodes sees it."""
 
-from collections.abc import AsyncGenerator, Callable, Coroutine, Mapping
+from collections.abc import AsyncGenerator, Callable, Coroutine, Iterable, Mapping
 from contextlib import asynccontextmanager, suppress
 from typing import Any, Protocol
 
 import anyio
 from anyio.abc import TaskGroup
 from anyio.from_thread import BlockingPortal
+from rclpy.exceptions import NameValidationException
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from mapspeak.errors import LinkError
-from mapspeak.links.rclpy.calls import Goals, RclpyServices
-from mapspeak.links.rclpy.graph import RclpyGraph
+from mapspeak.links.endpoints import Decode, Endpoint, Take, is_hidden, nobody_serves, unknown
+from mapspeak.links.native import NativeLink, NativeRequest
+from mapspeak.links.rclpy.endpoints import RclpyReader, RclpyService, RclpyWriter
 from mapspeak.links.rclpy.participant import RclpyParticipant, errors_of_ros, wait_until
-from mapspeak.links.rclpy.topics import RclpyTopics
-from mapspeak.ros.activity import ActionGoal
-from mapspeak.ros.link import plain_errors
-from mapspeak.ros.messages.fields import Message
+from mapspeak.links.rclpy.types import RclpyTypes, find_definitions, find_message
+from mapspeak.ros.link import check_name, plain_errors
+from mapspeak.ros.messages.fields import bare_type
 from mapspeak.ros.port import LinkKind, LinkName, NodeLinks, RosGraph
 
-ANSWER_S = 5.0
-"""For a service's answer, where the caller says nothing else, and for a first node."""
+UNNAMED = "_NODE_NAME_UNKNOWN_"
+"""A node of which more is not known yet."""
+NANOSECONDS = 1_000_000_000
 FIRST_SIGN_S = 5.0
 """For the first node of others to be found before we begin without.
 
@@ -36,20 +39,23 @@ HINT = (
 )
 
 
-class Ros2Connection(RclpyGraph, RclpyTopics):
+class Ros2Connection(NativeLink):
     """One ROS 2 system, as our node in it sees it.
 
     Args:
         distro: Such as "jazzy"; empty where that is unknown.
     """
 
+    distro = ""
+
     def __init__(self, participant: RclpyParticipant, tasks: TaskGroup, *, distro: str) -> None:
-        super().__init__(participant)
-        self._distro = distro
+        self._ours = RclpyTypes()
+        super().__init__(self._ours)
+        self.distro = distro
+        self._participant = participant
         self._tasks = tasks
         self._found_s: float | None = None
-        self._services = RclpyServices(participant)
-        self._goals = Goals(participant, self._services, start_soon=self.start_soon)
+        self._services: dict[str, RclpyService] = {}
 
     @property
     def link(self) -> LinkName:
@@ -79,45 +85,180 @@ class Ros2Connection(RclpyGraph, RclpyTopics):
 
     async def aclose(self) -> None:
         """Wait a moment until what was published last has arrived."""
-        await self._flush()
+        for _, writer in self._advertised.values():
+            await anyio.to_thread.run_sync(writer.flush)
 
     async def wait_until_connected(self) -> None:
         """Return at once, or when the first node of others is found."""
-        if not await wait_until(self._sees_others, within_s=ANSWER_S):
+        if not await wait_until(self._sees_others, within_s=FIRST_SIGN_S):
             raise LinkError("No other node of ROS 2 has been found in our domain.", hint=HINT)
+
+    # --- topics
+
+    def _writers_of(self, topic: str) -> list[Endpoint]:
+        infos = self._participant.node.get_publishers_info_by_topic(topic)
+        return [_read_endpoint(each) for each in infos]
+
+    def _readers_of(self, topic: str) -> list[Endpoint]:
+        infos = self._participant.node.get_subscriptions_info_by_topic(topic)
+        return [_read_endpoint(each) for each in infos if each.node_name != self._participant.name]
+
+    def _quality(self, *, is_reliable: bool, is_latched: bool, depth: int) -> QoSProfile:
+        reliability, durability = ReliabilityPolicy, DurabilityPolicy
+        return QoSProfile(
+            depth=depth,
+            reliability=reliability.RELIABLE if is_reliable else reliability.BEST_EFFORT,
+            durability=durability.TRANSIENT_LOCAL if is_latched else durability.VOLATILE,
+        )
+
+    def _read(
+        self, topic: str, type_name: str, quality: QoSProfile, decode: Decode, take: Take
+    ) -> RclpyReader:
+        return RclpyReader(self._participant, topic, type_name, quality, decode, take)
+
+    def _end_reading(self, reader: RclpyReader) -> None:
+        reader.close()
+
+    def _write_to(self, topic: str, type_name: str, quality: QoSProfile) -> RclpyWriter:
+        return RclpyWriter(self._participant, topic, type_name, quality)
+
+    def _end_writing(self, writer: RclpyWriter) -> None:
+        writer.close()
+
+    # --- types
+
+    def _check_type(self, type_name: str) -> None:
+        find_message(type_name)
+
+    def _learn(self, request: NativeRequest) -> None:
+        """Raise `LinkError`: what is not installed here cannot be learned."""
+        topic = request.subscription.topic
+        for writer in self._writers_of(topic):
+            find_message(writer.type_name)
+        raise LinkError(f"A message on {topic} cannot be read.", hint="Check its publisher.")
+
+    async def ask_type(self, endpoint: Endpoint) -> None:
+        """Raise `LinkError` for a type that is not installed here."""
+        find_message(endpoint.type_name)
+
+    async def fetch_definitions(self, type_name: str) -> Mapping[str, str]:
+        """Return the .msg texts of a type and of all within, as this machine's ROS has them."""
+        return find_definitions(type_name)
 
     # --- services and actions
 
-    async def call_service(
-        self,
-        service: str,
-        arguments: Mapping[str, Any] | None = None,
-        *,
-        type_name: str | None = None,
-        timeout_s: float | None = None,
-    ) -> dict[str, Any]:
-        """Return what a service answers."""
-        limit_s = ANSWER_S if timeout_s is None else timeout_s
-        return await self._services.call(
-            service, arguments or {}, type_name=type_name, timeout_s=limit_s
-        )
+    async def _service(self, service: str, *, within_s: float) -> RclpyService:
+        node = self._participant.node
 
-    async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
-        """Send a goal to an action and return what becomes of it, as it becomes."""
-        return await self._goals.send(action, arguments, type_name=type_name)
+        def types() -> list[str]:
+            return list(dict(node.get_service_names_and_types()).get(service, []))
 
-    def cancel_goal(self, goal: ActionGoal) -> None:
-        """Ask for the end of a goal; its `end` tells whether that worked."""
-        self._goals.cancel(goal)
+        if not await wait_until(lambda: bool(types()), within_s=within_s):
+            raise nobody_serves(service)
+        if service not in self._services:
+            self._services[service] = RclpyService(
+                self._participant, service, types()[0], types=self._ours
+            )
+        await self._services[service].wait_for_server(timeout_s=within_s)
+        return self._services[service]
+
+    def _note_servers(self, action: str) -> None:
+        # A server that was killed and started again has the same name, and another publisher.
+        keys = [each.key for each in self._writers_of(f"{action}/_action/feedback")]
+        if keys or not self._services[f"{action}/_action/send_goal"].is_served:
+            self._actions[action].note_servers(keys)
 
     # --- who is there
+
+    async def fetch_time_s(self) -> float | None:
+        """Return the time of this machine: the machines of a ROS 2 system have the same."""
+        return float(self._participant.node.get_clock().now().nanoseconds) / NANOSECONDS
+
+    async def fetch_nodes(self) -> tuple[str, ...]:
+        """Return the full names of all nodes but ours."""
+        return self.nodes()
+
+    def nodes(self) -> tuple[str, ...]:
+        """Return the full names of all nodes but ours, as they are known now."""
+        found = self._participant.node.get_node_names_and_namespaces()
+        names = {
+            f"{namespace.rstrip('/')}/{name}"
+            for name, namespace in found
+            if name not in (UNNAMED, self._participant.name)
+        }
+        return tuple(sorted(names))
+
+    async def fetch_node(self, node: str) -> NodeLinks:
+        """Return what a node publishes, subscribes to and serves."""
+        namespace, _, name = node.rpartition("/")
+        ours = self._participant.node
+        if node not in self.nodes():
+            raise unknown(node)
+        asked = (
+            ours.get_publisher_names_and_types_by_node,
+            ours.get_subscriber_names_and_types_by_node,
+            ours.get_service_names_and_types_by_node,
+        )
+        try:
+            publishes, subscribes, serves = [ask(name, namespace or "/") for ask in asked]
+        except (RuntimeError, NameValidationException) as error:
+            raise unknown(node) from error
+        return NodeLinks(
+            publishes=_shown(publishes), subscribes=_shown(subscribes), serves=_shown(serves)
+        )
+
+    async def fetch_publishers(self, topic: str) -> tuple[str, ...]:
+        """Return the nodes that publish on a topic."""
+        check_name(topic)
+        return self._nodes_of(self._participant.node.get_publishers_info_by_topic(topic))
+
+    async def fetch_subscribers(self, topic: str) -> tuple[str, ...]:
+        """Return the nodes that listen to a topic."""
+        check_name(topic)
+        return self._nodes_of(self._participant.node.get_subscriptions_info_by_topic(topic))
+
+    def _topic_types(self) -> dict[str, str]:
+        return {
+            topic: bare_type(types[0])
+            for topic, types in sorted(self._participant.node.get_topic_names_and_types())
+            if types and not is_hidden(topic) and self._is_of_others(topic)
+        }
+
+    def _service_types(self) -> dict[str, str]:
+        """Return the types of what somebody serves: a mere client shows as a service too."""
+        node, ours = self._participant.node, f"/{self._participant.name}/"
+        return {
+            service: types[0]
+            for service, types in node.get_service_names_and_types()
+            if types and node.count_services(service) and not service.startswith(ours)
+        }
+
+    def _is_of_others(self, topic: str) -> bool:
+        node = self._participant.node
+        # One after the other: most topics have somebody who writes them.
+        return bool(
+            self._nodes_of(node.get_publishers_info_by_topic(topic))
+            or self._nodes_of(node.get_subscriptions_info_by_topic(topic))
+        )
+
+    def _nodes_of(self, infos: Iterable[Any]) -> tuple[str, ...]:
+        names = {
+            f"{each.node_namespace.rstrip('/')}/{each.node_name}"
+            for each in infos
+            if each.node_name != self._participant.name
+        }
+        return tuple(sorted(names))
 
     async def _watch(self) -> None:
         while True:
             # What ROS cannot tell now, it is asked again.
-            with suppress(LinkError), errors_of_ros("ROS does not tell who is there"):
-                self._refresh_topics()
-                self._goals.refresh()
+            for request in list(self.requests.values()):
+                # What cannot be read stays silent; who waits for it is told so.
+                with suppress(LinkError), errors_of_ros("ROS does not tell who writes"):
+                    self._begin(request)
+            for action in list(self._actions):
+                with suppress(LinkError), errors_of_ros("ROS does not tell who serves"):
+                    self._note_servers(action)
             await anyio.sleep(WATCH_S)
 
     def _sees_others(self) -> bool:
@@ -128,6 +269,20 @@ class Ros2Connection(RclpyGraph, RclpyTopics):
         if self._found_s is None and self.nodes():
             self._found_s = anyio.current_time()
         return self._found_s is not None
+
+
+def _read_endpoint(info: Any) -> Endpoint:  # noqa: ANN401 - rclpy has no types
+    quality = info.qos_profile
+    return Endpoint(
+        key=bytes(info.endpoint_gid),
+        type_name=info.topic_type,
+        is_reliable=quality.reliability != ReliabilityPolicy.BEST_EFFORT,
+        is_latched=quality.durability == DurabilityPolicy.TRANSIENT_LOCAL,
+    )
+
+
+def _shown(found: Iterable[tuple[str, Any]]) -> tuple[str, ...]:
+    return tuple(sorted(name for name, _ in found if not is_hidden(name)))
 
 
 class RclpyContext(Protocol):

@@ -96,13 +96,11 @@ class RclpyParticipant:
             if not self._pause.is_set():
                 raise
 
-    async def wait_for(self, future: Any) -> Any:  # noqa: ANN401 - rclpy has no types
-        """Return the result of one of rclpy's futures."""
+    async def wait_for(self, future: Any) -> None:  # noqa: ANN401 - rclpy has no types
+        """Return when one of rclpy's futures is done."""
         is_done = anyio.Event()
         future.add_done_callback(lambda _: self.hand_over(is_done.set))
         await is_done.wait()
-        with errors_of_ros("The answer"):
-            return future.result()
 
     def _enter(self) -> None:
         # ROS and its middleware read their variables only when a domain is entered.

@@ -1,22 +1,19 @@
-"""The types of the ROS on this machine, and their messages as plain values."""
+"""The types of the ROS on this machine, as its own files and classes tell them."""
 
-import array
-import base64
 import importlib
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from mapspeak.errors import LinkError
-from mapspeak.ros.definitions.checking import check_message
-from mapspeak.ros.definitions.texts import ACTION_PARTS, SERVICE_PARTS, split_parts
-from mapspeak.ros.definitions.types import FLOATS, WHOLES, Field, TypeBook, parse_definition
+from mapspeak.links.cdr import Codec
+from mapspeak.links.endpoints import ACTION_PART, whole_type
+from mapspeak.ros.definitions.texts import ACTION_PARTS, SERVICE_PARTS, action_parts, split_parts
+from mapspeak.ros.definitions.types import TypeBook
 from mapspeak.ros.definitions.typestore import NOTHING
 from mapspeak.ros.messages.fields import TYPE, bare_type
 
@@ -26,23 +23,69 @@ FIELD = re.compile(
 TEXT = re.compile(r"(?P<text>w?string)<(?P<most>\d+)>")
 DEFINED_AS = {"boolean": "bool", "octet": "byte", "float": "float32", "double": "float64"}
 """As .msg files name what rclpy names as IDL does."""
-NUMBERS = frozenset((*FLOATS, *WHOLES)) - {"byte", "char"}
+IN_ACTION = {
+    "_SendGoal": "SendGoalService",
+    "_GetResult": "GetResultService",
+    "_FeedbackMessage": "FeedbackMessage",
+}
+"""Where rclpy keeps the classes of an action's parts."""
 
 
-@cache
-def fields_of(message_class: Any) -> dict[str, Field]:  # noqa: ANN401 - rclpy has no types
-    """Return the fields of a class of messages, in their order."""
-    message = parse_definition(name_of(message_class), write_definition(message_class))
-    return {field.name: field for field in message.fields}
+class RclpyTypes:
+    """Encodes and decodes, after the definitions of the ROS on this machine."""
+
+    def __init__(self) -> None:
+        self._book = TypeBook({})
+        self._codec = Codec(self._book)
+
+    def knows(self, type_name: str) -> bool:
+        """Return True for a type that is installed here."""
+        try:
+            self._find(type_name)
+        except LinkError:
+            return False
+        return True
+
+    def encode(self, type_name: str, message: Mapping[str, Any]) -> bytes:
+        """Return the bytes of a message; the fields it leaves out hold their defaults."""
+        return self._find(type_name).encode(type_name, message)
+
+    def decode(self, type_name: str, data: bytes) -> dict[str, Any]:
+        """Return the message in some bytes; rclpy may give more than it has filled."""
+        return self._find(type_name).decode(type_name, data, is_exact=False)
+
+    def _find(self, type_name: str) -> Codec:
+        """Return what encodes a type; rclpy's thread and the event loop may meet one at once."""
+        if self._book.knows(type_name):
+            return self._codec
+        whole = whole_type(type_name)
+        kind = next((kind for kind in KINDS if find_class(whole, kind) is not None), "msg")
+        find_message(whole, kind)
+        texts = dict(_texts_of(bare_type(whole), kind))
+        if kind == "action":
+            texts |= action_parts(whole)
+        _add_what_is_within(texts, tuple(texts))
+        book = TypeBook({**self._book.texts, **texts})
+        self._codec = codec = Codec(book, self._codec.store)
+        self._book = book
+        return codec
 
 
 def write_definition(message_class: Any) -> str:  # noqa: ANN401 - likewise
     """Return the definition of a class of messages, as far as rclpy tells it."""
-    types = message_class.get_fields_and_field_types()
+    types, usual = message_class.get_fields_and_field_types(), message_class()
     # An empty message has a field that ROS never shows.
     return "\n".join(
-        f"{_write_type(text)} {name}" for name, text in types.items() if name != NOTHING.name
+        f"{_write_type(text)} {name}{_write_default(getattr(usual, name))}"
+        for name, text in types.items()
+        if name != NOTHING.name
     )
+
+
+def _write_default(value: object) -> str:
+    if isinstance(value, bytes):
+        return f" {value[0]}"
+    return f" {value}" if isinstance(value, bool | int | float | str) and value else ""
 
 
 def _write_type(text: str) -> str:
@@ -88,6 +131,10 @@ def find_message(type_name: str, kind: str = "msg") -> RosClass:
 
 def find_class(type_name: str, kind: str) -> RosClass | None:
     """Return the class of a type of one kind (msg, srv, action), or None where there is none."""
+    part = ACTION_PART.search(type_name)
+    if part is not None:
+        action = find_class(type_name[: part.start()], "action")
+        return None if action is None else getattr(action.Impl, IN_ACTION[part[0]])
     parts = type_name.split("/")
     if not TYPE.fullmatch(type_name) or (len(parts) == 3 and parts[1] != kind):
         return None
@@ -97,11 +144,7 @@ def find_class(type_name: str, kind: str) -> RosClass | None:
     return getattr(importlib.import_module(f"{package}.{kind}"), name, None)
 
 
-def name_of(message_class: RosClass) -> str:
-    """Return the type of a class of messages, as "package/Type"."""
-    return f"{message_class.__module__.partition('.')[0]}/{message_class.__name__}"
-
-
+@cache
 def _has_types(package: str, kind: str) -> bool:
     """Return True for a package that ROS made.
 
@@ -169,97 +212,3 @@ def _read_file(found: Any, bare: str, kind: str) -> str | None:  # noqa: ANN401 
         if path.is_file():
             return path.read_text(encoding="utf-8")
     return None
-
-
-Reader = Callable[[Any], Any]
-
-
-def read_message(message: Any) -> dict[str, Any]:  # noqa: ANN401 - rclpy has no types
-    """Return a message as rosbridge does: uint8[] as bytes, other numbers as numpy arrays."""
-    return {
-        name: getattr(message, name) if read is None else read(getattr(message, name))
-        for name, read in _readers_of(message.__class__)
-    }
-
-
-@cache
-def _readers_of(message_class: Any) -> tuple[tuple[str, Reader | None], ...]:  # noqa: ANN401
-    return tuple((name, _reader_of(kind)) for name, kind in fields_of(message_class).items())
-
-
-def _reader_of(field: Field) -> Reader | None:
-    is_list = field.length is not None
-    if field.is_message:
-        return _read_all if is_list else read_message
-    if field.type == "byte":
-        return b"".join if is_list else _read_octet
-    if not is_list:
-        return None
-    if field.type == "uint8":
-        return bytes
-    return np.asarray if field.type in NUMBERS else list
-
-
-def _read_all(messages: Any) -> list[dict[str, Any]]:  # noqa: ANN401 - rclpy has no types
-    return [read_message(message) for message in messages]
-
-
-def _read_octet(octet: bytes) -> int:
-    return octet[0]
-
-
-RosMessage = Any  # rclpy has no types
-
-
-def write_message(message_class: Any, values: object) -> RosMessage:  # noqa: ANN401
-    """Return a message with these values; the fields they leave out keep their defaults."""
-    checked = check_message(_book_of(message_class), name_of(message_class), values)
-    return _fill(message_class, checked)
-
-
-@cache
-def _book_of(message_class: Any) -> TypeBook:  # noqa: ANN401 - rclpy has no types
-    texts: dict[str, str] = {}
-    _describe(message_class, texts)
-    return TypeBook(texts)
-
-
-def _describe(message_class: Any, texts: dict[str, str]) -> None:  # noqa: ANN401 - likewise
-    fields = fields_of(message_class)
-    texts[name_of(message_class)] = write_definition(message_class)
-    for field in fields.values():
-        if field.is_message and field.type not in texts:
-            _describe(find_message(field.type), texts)
-
-
-def _fill(message_class: Any, values: Mapping[str, Any]) -> RosMessage:  # noqa: ANN401 - likewise
-    message = message_class()
-    fields = fields_of(message_class)
-    for name, value in values.items():
-        setattr(message, name, _write_field(fields[name], value, getattr(message, name)))
-    return message
-
-
-def _write_field(field: Field, value: Any, default: Any) -> Any:  # noqa: ANN401
-    is_list = field.length is not None
-    if is_list and isinstance(value, str):
-        value = base64.b64decode(value, validate=True)
-    if is_list and field.type in NUMBERS:
-        return _write_numbers(value, default)
-    if field.is_message:
-        inner = find_message(field.type)
-        return [_fill(inner, each) for each in value] if is_list else _fill(inner, value)
-    if field.type == "byte":
-        octets = [bytes([each % 256]) for each in (value if is_list else [value])]
-        return octets if is_list else octets[0]
-    return value.tolist() if isinstance(value, np.ndarray) else value
-
-
-def _write_numbers(values: Any, default: Any) -> Any:  # noqa: ANN401
-    """Return many numbers as rclpy keeps them."""
-    is_fixed = isinstance(default, np.ndarray)
-    dtype = default.dtype if is_fixed else np.dtype(default.typecode)
-    if isinstance(values, bytes | bytearray | memoryview):
-        values = np.frombuffer(values, np.uint8)
-    packed = np.ascontiguousarray(values, dtype=dtype)
-    return packed if is_fixed else array.array(default.typecode, packed.tobytes())

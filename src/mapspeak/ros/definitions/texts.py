@@ -88,6 +88,23 @@ def find_actions_of_ros1(texts: Mapping[str, str]) -> dict[str, str]:
     }
 
 
+PARTS_OF_ACTION = {
+    "SendGoal_Request": "unique_identifier_msgs/UUID goal_id\n{action}_Goal goal",
+    "SendGoal_Response": "bool accepted\nbuiltin_interfaces/Time stamp",
+    "GetResult_Request": "unique_identifier_msgs/UUID goal_id",
+    "GetResult_Response": "int8 status\n{action}_Result result",
+    "FeedbackMessage": "unique_identifier_msgs/UUID goal_id\n{action}_Feedback feedback",
+}
+
+
+def action_parts(action_type: str) -> dict[str, str]:
+    """Return the texts of what ROS 2 makes of an action, by name."""
+    bare = bare_type(action_type)
+    return {
+        f"{bare}_{part}": text.replace("{action}", bare) for part, text in PARTS_OF_ACTION.items()
+    }
+
+
 DISTROS = ("kilted", "jazzy", "humble", "lyrical")
 """Of ROS 2, whose interfaces of Nav2 are known; the first stands for those that are not."""
 ENTRY = re.compile(r"^(?:MSG|SRV|ACTION): (?P<name>\S+)\n", re.MULTILINE)

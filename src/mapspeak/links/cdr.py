@@ -1,6 +1,7 @@
 """Messages as bytes: CDR, the encoding of DDS, by the code that rosbags makes of a definition."""
 
 import base64
+import struct
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -69,12 +70,13 @@ class Codec:
         self.store = store or Store()
         self._layouts: dict[str, _Layout] = {}
 
-    def decode(self, type_name: str, data: bytes) -> dict[str, Any]:
+    def decode(self, type_name: str, data: bytes, *, is_exact: bool = True) -> dict[str, Any]:
         """Return a message; arrays of numbers are numpy arrays upon these bytes, uint8[] is bytes.
 
         Args:
             type_name: Such as "nav_msgs/OccupancyGrid".
             data: With its header of four bytes.
+            is_exact: Nothing may follow the message: what has more fields is of another version.
         """
         layout = self._find(type_name)
         if len(data) > MOST_BYTES:
@@ -83,8 +85,8 @@ class Codec:
                 hint="Let the robot publish less at once.",
             )
         try:
-            return self.store.decode(layout.name, data)
-        except SerdeError as error:
+            return self.store.decode(layout.name, data, is_exact=is_exact)
+        except (SerdeError, struct.error, ValueError, IndexError) as error:
             raise LinkError(
                 f"What came is no {type_name}.",
                 hint="The robot may use another version of that type than we know, or a "
@@ -147,11 +149,18 @@ class Store(Typestore):
         self._layouts: dict[object, _Layout] = {}
         self._n_messages_left = 0
 
-    def decode(self, name: str, data: bytes) -> dict[str, Any]:
+    def decode(self, name: str, data: bytes, *, is_exact: bool) -> dict[str, Any]:
         """Return a message by its type's name here; raise `SerdeError`."""
         self._n_messages_left = MOST_MESSAGES
-        message: dict[str, Any] = self.deserialize_cdr(memoryview(data), name)  # type: ignore[assignment]
-        return message
+        message: Any
+        if is_exact:
+            message = self.deserialize_cdr(memoryview(data), name)
+        else:
+            definition = self.get_msgdef(name)
+            read = definition.deserialize_cdr_le if data[1] else definition.deserialize_cdr_be
+            message, _ = read(memoryview(data)[HEADER_BYTES:], 0, definition.cls, self)
+        decoded: dict[str, Any] = message
+        return decoded
 
     def lay_out(self, message: MessageType, inner: Mapping[str, _Layout]) -> _Layout:
         """Return the layout of a type, given those of the types within."""

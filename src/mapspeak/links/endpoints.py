@@ -1,0 +1,85 @@
+"""Readers and writers in the robot's own network: what their types are called, what they bring."""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from mapspeak.errors import LinkError
+
+SERVICE_PART = re.compile(r"_(?:Request|Response)$")
+ACTION_PART = re.compile(r"_(?:SendGoal|GetResult)$|_FeedbackMessage$")
+
+
+def full_type(name: str, *, kind: str = "msg") -> str:
+    """Return a type as "package/kind/Type", however it was written."""
+    package, *middle, last = name.strip("/").split("/")
+    return f"{package}/{middle[0] if middle else kind}/{last}"
+
+
+def whole_type(part_type: str) -> str:
+    """Return the service or action that a type is a part of, or the type itself."""
+    return ACTION_PART.sub("", SERVICE_PART.sub("", part_type))
+
+
+def is_hidden(name: str) -> bool:
+    """Return True for what `ros2 topic list` leaves out, such as the parts of actions."""
+    return "/_" in name
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sample:
+    """What one message brings.
+
+    Attributes:
+        content: The message, decoded; None where that failed, or where it is left out.
+        source_s: When it was written, by its writer's clock.
+        refusal: Why it could not be decoded.
+    """
+
+    content: Any
+    source_s: float = 0.0
+    refusal: LinkError | None = None
+
+
+Decode = Callable[[bytes], Any]
+Take = Callable[[Sample], None]
+
+
+def understand(data: bytes, decode: Decode, *, source_s: float = 0.0) -> Sample:
+    """Return what the bytes of a message bring."""
+    try:
+        return Sample(content=decode(data), source_s=source_s)
+    except LinkError as error:
+        return Sample(content=None, source_s=source_s, refusal=error)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Endpoint:
+    """A reader or a writer in the network.
+
+    Attributes:
+        key: Its id in the network, which no other has.
+        type_name: As "package/kind/Type".
+        is_latched: Who comes late gets what was sent last ("transient local").
+    """
+
+    key: bytes
+    type_name: str
+    is_reliable: bool
+    is_latched: bool
+
+
+def unknown(name: str) -> LinkError:
+    """Return the error for a node, service or action that is not there."""
+    return LinkError(
+        f"The robot knows no {name[:80]}.", hint="Ask for the list of what there is first."
+    )
+
+
+def nobody_serves(service: str) -> LinkError:
+    """Return the error for a service that is not there."""
+    return LinkError(
+        f"Nobody serves {service[:80]}.",
+        hint="Ask for the list of what there is; the node that offers it may have ended.",
+    )

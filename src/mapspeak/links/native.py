@@ -1,0 +1,384 @@
+"""What links have in common that are members of the robot's own network, with nothing between.
+
+Messages go as CDR, the encoding of DDS: each link moves bytes, and tells who reads and writes.
+"""
+
+import time
+from abc import abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Protocol
+
+from mapspeak.errors import LinkError
+from mapspeak.links.endpoints import (
+    Decode,
+    Endpoint,
+    Sample,
+    Take,
+    full_type,
+    is_hidden,
+    unknown,
+    whole_type,
+)
+from mapspeak.links.goals import ActionWire, ServiceClient
+from mapspeak.ros.activity import ActionGoal
+from mapspeak.ros.link import RosLink, TopicRequest, check_name, wrong_type
+from mapspeak.ros.messages.fields import TYPE, Dialect, Message, bare_type
+from mapspeak.ros.port import OwnEnds, RosGraph
+
+SEND_GOAL = "/_action/send_goal"
+DEPTH, BULKY_DEPTH = 200, 5
+"""How many messages are kept until we take them."""
+LISTENER_S = 1.0
+"""For a known listener to be connected to what we advertised."""
+
+
+class MessageTypes(Protocol):
+    """The types that are known, as the robot has them."""
+
+    def knows(self, type_name: str) -> bool:
+        """Return True for a type whose messages can be encoded and decoded."""
+        ...
+
+    def encode(self, type_name: str, message: Mapping[str, Any]) -> bytes:
+        """Return the bytes of a message."""
+        ...
+
+    def decode(self, type_name: str, data: bytes) -> dict[str, Any]:
+        """Return the message in some bytes."""
+        ...
+
+
+class Writer(Protocol):
+    """What writes on one topic for us."""
+
+    def write(self, data: bytes) -> None:
+        """Send the bytes of one message."""
+        ...
+
+    async def wait_for_reader(self, *, timeout_s: float) -> bool:
+        """Return once somebody reads, or the time is over; tell whether somebody does."""
+        ...
+
+
+@dataclass(slots=True, eq=False)
+class NativeRequest(TopicRequest):
+    """How a topic was asked for, and is read.
+
+    Attributes:
+        reader: The link's own; None while the topic is not read.
+        quality: The quality of service in which it is read now.
+        writers: The ids of those who wrote it when the reading began.
+        decoded_s: When the last message was decoded, by the monotonic clock.
+        has_learned: Its type was asked for already.
+    """
+
+    reader: Any = None
+    quality: object = None
+    writers: frozenset[bytes] = frozenset()
+    decoded_s: float = float("-inf")
+    has_learned: bool = False
+
+
+class NativeLink(RosLink[NativeRequest]):
+    """Reads and writes topics, calls services, and pursues goals.
+
+    A topic is read only once somebody writes it, because how it can be read depends on who does: a
+    reader that asks for more than a writer offers is not served, and one that asks for less misses
+    the latched map.
+
+    Attributes:
+        reads_anew: A topic is read anew when somebody new writes it.
+        answer_s: For a service's answer, where the caller says nothing else.
+        server_s: For somebody who serves to be found: right after opening, not all are known.
+    """
+
+    reads_anew = False
+    answer_s = 5.0
+    server_s = 2.0
+
+    def __init__(self, types: MessageTypes) -> None:
+        super().__init__(NativeRequest)
+        self._types = types
+        self._advertised: dict[str, tuple[str, Any]] = {}
+        self._actions: dict[str, ActionWire] = {}
+
+    @property
+    def lost_for_s(self) -> float | None:
+        """None: there is no connection to lose."""
+        return None
+
+    @property
+    def own_ends(self) -> OwnEnds:
+        """Nothing: what such a link tells of the system leaves our own node out."""
+        return OwnEnds()
+
+    def clear_the_way(self) -> None:
+        """Do nothing: in ROS 2 itself, nothing is held up by what was sent before."""
+
+    def give_up_goal(self, goal: ActionGoal) -> None:
+        """Do nothing: in ROS 2 itself, a goal holds up nothing."""
+
+    # --- what each link does in its own way
+
+    @abstractmethod
+    def _writers_of(self, topic: str) -> Sequence[Endpoint]:
+        """Return who writes a topic."""
+
+    @abstractmethod
+    def _readers_of(self, topic: str) -> Sequence[Endpoint]:
+        """Return who reads a topic, but us."""
+
+    @abstractmethod
+    def _quality(self, *, is_reliable: bool, is_latched: bool, depth: int) -> Any:  # noqa: ANN401
+        """Return a quality of service."""
+
+    @abstractmethod
+    def _read(self, topic: str, type_name: str, quality: Any, decode: Decode, take: Take) -> Any:  # noqa: ANN401
+        """Begin to read; `decode` is called in another thread, `take` in the event loop."""
+
+    @abstractmethod
+    def _end_reading(self, reader: Any) -> None:  # noqa: ANN401 - the link's own
+        """Read no longer."""
+
+    @abstractmethod
+    def _write_to(self, topic: str, type_name: str, quality: Any) -> Writer:  # noqa: ANN401
+        """Begin to write."""
+
+    @abstractmethod
+    def _end_writing(self, writer: Any) -> None:  # noqa: ANN401 - the link's own
+        """Write no longer."""
+
+    @abstractmethod
+    def _learn(self, request: NativeRequest) -> None:
+        """Find out a type that is unknown, or known in another version; it may raise."""
+
+    @abstractmethod
+    async def ask_type(self, endpoint: Any) -> None:  # noqa: ANN401 - the link's own
+        """Find out the type of a reader or writer now."""
+
+    @abstractmethod
+    async def _service(self, service: str, *, within_s: float) -> ServiceClient:
+        """Return the client of a service that somebody serves."""
+
+    @abstractmethod
+    def _topic_types(self) -> dict[str, str]:
+        """Return the types of all topics that others read or write, as "package/Type"."""
+
+    @abstractmethod
+    def _service_types(self) -> Mapping[str, str]:
+        """Return the types of what somebody serves, the parts of actions too."""
+
+    @property
+    @abstractmethod
+    def distro(self) -> str:
+        """Such as "jazzy"; empty where that is unknown."""
+
+    # --- reading
+
+    def _begin(self, request: NativeRequest) -> None:
+        """Read it in the best quality that all of its writers offer."""
+        topic = request.subscription.topic
+        writers = self._writers_of(topic)
+        if not writers:
+            return
+        type_name = request.subscription.type_name or writers[0].type_name
+        if not self._types.knows(type_name):
+            self._learn(request)
+            return
+        quality = self._quality(
+            is_reliable=all(each.is_reliable for each in writers),
+            is_latched=all(each.is_latched for each in writers),
+            depth=BULKY_DEPTH if request.is_bulky else DEPTH,
+        )
+        keys = frozenset(each.key for each in writers)
+        is_new = self.reads_anew and not keys <= request.writers
+        if request.quality == quality and not is_new:
+            return
+        self._end(request)
+        decode, take = partial(self._decode, request, type_name), partial(self._take, request)
+        request.reader = self._read(topic, type_name, quality, decode, take)
+        request.quality, request.writers = quality, keys
+
+    def _end(self, request: NativeRequest) -> None:
+        if request.reader is not None:
+            self._end_reading(request.reader)
+        request.reader = request.quality = None
+
+    def _decode(self, request: NativeRequest, type_name: str, data: bytes) -> Message | None:
+        now_s = time.monotonic()
+        if now_s - request.decoded_s < request.throttle_ms / 1e3:
+            return None
+        request.decoded_s = now_s
+        return self._types.decode(type_name, data)
+
+    def _take(self, request: NativeRequest, sample: Sample) -> None:
+        if sample.refusal is not None:
+            self._learn(request)
+        elif sample.content is not None:
+            request.subscription.take(sample.content)
+
+    # --- writing
+
+    def _announce(self, topic: str, type_name: str) -> None:
+        full = full_type(type_name)
+        known, _ = self._advertised.get(topic, (full, None))
+        if known != full:
+            raise wrong_type(topic, known, type_name)
+        if topic not in self._advertised:
+            is_latched = any(each.is_latched for each in self._readers_of(topic))
+            quality = self._quality(is_reliable=True, is_latched=is_latched, depth=DEPTH)
+            self._advertised[topic] = full, self._write_to(topic, full, quality)
+
+    def _take_back(self, topic: str) -> None:
+        if topic in self._advertised:
+            self._end_writing(self._advertised.pop(topic)[1])
+
+    async def publish(self, topic: str, message: Message) -> None:
+        """Publish, once those who are known to listen are connected."""
+        self.announcements.use(topic)
+        type_name, writer = self._wanted(topic)
+        listeners = self._readers_of(topic)
+        if listeners and not self._types.knows(type_name):
+            await self.ask_type(listeners[0])
+        data = self._types.encode(type_name, message)
+        if listeners:
+            await writer.wait_for_reader(timeout_s=LISTENER_S)
+        writer.write(data)
+
+    def _prepare(self, topic: str, message: Message) -> Callable[[], int]:
+        data = self._types.encode(self._wanted(topic)[0], message)
+
+        def send() -> int:
+            self._wanted(topic)[1].write(data)
+            return 1
+
+        return send
+
+    def _wanted(self, topic: str) -> tuple[str, Writer]:
+        if topic not in self._advertised:
+            raise LinkError(f"{topic[:80]} was not advertised.", hint="Advertise it first.")
+        return self._advertised[topic]
+
+    def _check(self, topic: str, type_name: str | None) -> None:
+        check_name(topic)
+        if type_name is None:
+            return
+        self._check_type(type_name)
+        ends = (*self._writers_of(topic), *self._readers_of(topic))
+        found = {bare_type(each.type_name) for each in ends}
+        if found and bare_type(type_name) not in found:
+            raise wrong_type(topic, min(found), type_name)
+
+    def _check_type(self, type_name: str) -> None:
+        """Raise `LinkError` for what is no type."""
+        if not TYPE.fullmatch(type_name):
+            raise LinkError(
+                f"{type_name[:80]!r} is no type.", hint='Types are written "package/msg/Type".'
+            )
+
+    # --- services and actions
+
+    async def call_service(
+        self,
+        service: str,
+        arguments: Mapping[str, Any] | None = None,
+        *,
+        type_name: str | None = None,
+        timeout_s: float | None = None,
+    ) -> dict[str, Any]:
+        """Return what a service answers."""
+        limit_s = self.answer_s if timeout_s is None else timeout_s
+        answer = await self._call(service, arguments or {}, type_name=type_name, timeout_s=limit_s)
+        content: dict[str, Any] = answer.content
+        return content
+
+    async def _call(
+        self,
+        service: str,
+        arguments: Mapping[str, Any],
+        *,
+        type_name: str | None = None,
+        timeout_s: float,
+    ) -> Sample:
+        check_name(service)
+        client = await self._service(service, within_s=min(self.server_s, timeout_s))
+        if type_name is not None and bare_type(type_name) != bare_type(client.type_name):
+            raise wrong_type(service, client.type_name, type_name)
+        return await client.call(client.encode(arguments), timeout_s=timeout_s)
+
+    async def send_goal(self, action: str, arguments: Message, *, type_name: str) -> ActionGoal:
+        """Send a goal to an action and return what becomes of it, as it becomes."""
+        check_name(action)
+        found = self._action_types().get(action)
+        if found not in (None, bare_type(type_name)):
+            raise wrong_type(action, str(found), type_name)
+        if action not in self._actions:
+            await self._open_action(action)
+        return await self._actions[action].send_goal(action, arguments, timeout_s=self.answer_s)
+
+    def cancel_goal(self, goal: ActionGoal) -> None:
+        """Ask for the end of a goal; its `end` tells whether that worked."""
+        if goal.action in self._actions:
+            self._actions[goal.action].cancel_goal(goal.goal_id)
+
+    async def _open_action(self, action: str) -> None:
+        send, result, cancel = [
+            await self._service(f"{action}/_action/{part}", within_s=self.server_s)
+            for part in ("send_goal", "get_result", "cancel_goal")
+        ]
+        if action in self._actions:
+            return
+        wire = ActionWire(send=send, result=result, cancel=cancel, start_soon=self.start_soon)
+        self._actions[action] = wire
+        self._note_servers(action)
+        for part, take in (("status", wire.take_statuses), ("feedback", wire.take_feedback)):
+            subscription = self.subscribe(f"{action}/_action/{part}")
+            subscription.listen(take)
+            if part == "status" and subscription.latest is not None:
+                take(subscription.latest)
+
+    @abstractmethod
+    def _note_servers(self, action: str) -> None:
+        """Tell an action of ours who serves it now."""
+
+    # --- who is there
+
+    async def fetch_graph(self) -> RosGraph:
+        """Return the topics and actions there are."""
+        return RosGraph(
+            dialect=Dialect.ROS2,
+            distro=self.distro,
+            types=self._topic_types(),
+            actions=tuple(sorted(self._action_types())),
+        )
+
+    async def fetch_topics(self) -> Mapping[str, str]:
+        """Return the type of each topic."""
+        return (await self.fetch_graph()).types
+
+    async def fetch_services(self) -> tuple[str, ...]:
+        """Return the full names of all services but the parts of actions."""
+        return tuple(sorted(name for name in self._service_types() if not is_hidden(name)))
+
+    async def fetch_service_type(self, service: str) -> str:
+        """Return a service's type."""
+        return _look_up(self._service_types(), service)
+
+    async def fetch_action_type(self, action: str) -> str:
+        """Return an action's type."""
+        return _look_up(self._action_types(), action)
+
+    def _action_types(self) -> dict[str, str]:
+        return {
+            service.removesuffix(SEND_GOAL): bare_type(whole_type(type_name))
+            for service, type_name in self._service_types().items()
+            if service.endswith(SEND_GOAL)
+        }
+
+
+def _look_up(types: Mapping[str, str], name: str) -> str:
+    if name not in types:
+        raise unknown(name)
+    return bare_type(types[name])
