@@ -181,7 +181,7 @@ class Store(Typestore):
             raise LinkError(
                 f"{message.name[:80]} is too large a type: more than {MOST_FIELDS} fields or "
                 f"{MOST_BYTES} bytes.",
-                hint="Take rosbridge or rclpy for it.",
+                hint="Take rosbridge for it.",
             )
         described = [
             (

@@ -81,8 +81,8 @@ def describe_field(field: Field, kind: str) -> Any:  # noqa: ANN401 - rosbags' n
 
     if field.type == "wstring":
         raise LinkError(
-            f"The field {field.name[:80]} holds a wstring, which mapspeak cannot write over DDS.",
-            hint="Take rosbridge or rclpy for it.",
+            f"The field {field.name[:80]} holds a wstring, which mapspeak cannot read or write as CDR.",
+            hint="Take rosbridge for it.",
         )
     is_name = field.is_message
     one: Any = (
