@@ -67,7 +67,6 @@ def measure() -> Iterator[Figure]:
             yield Figure(name=shown, value=statistics.median(taken_ms), unit="ms")
         yield from _by_meaning(store)
         yield from _writes(store)
-        yield Figure(name="index rebuilt", value=_taken_ms(store.rebuild_index) / 1e3, unit="s")
         size_mb = (Path(folder) / "drawn.memory" / "episodes.sqlite").stat().st_size / 1e6
         yield Figure(name="database", value=size_mb, unit="MB")
 

@@ -25,13 +25,14 @@ from benchmarks.figure import Figure
 from benchmarks.rooms import find_labelled_maps, list_labelled_maps
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory.alignment import (
+    MapComparison,
     MapRelation,
     MapSurfaces,
     compare_maps,
     placed,
-    say_comparison,
 )
 from mapspeak.robot import GoalState
+from mapspeak.server.text.maps import say_comparison
 from mapspeak.simulator import BODY_RADIUS_M, Simulation, World, load_world
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import find_frontiers
@@ -83,7 +84,6 @@ class Result:
         off_m: Where records come to lie, mean over the old map's walls; None where nothing moves.
         off_deg: The turn's error; likewise.
         spent_s: CPU time.
-        sentence: The answer in words.
     """
 
     kind: str
@@ -93,7 +93,7 @@ class Result:
     off_m: float | None
     off_deg: float | None
     spent_s: float
-    sentence: str
+    comparison: MapComparison
 
     @property
     def is_wrong(self) -> bool:
@@ -307,7 +307,7 @@ def judge(case: Case) -> Result:
         off_m=off_m,
         off_deg=off_deg,
         spent_s=spent_s,
-        sentence=say_comparison(comparison),
+        comparison=comparison,
     )
 
 
@@ -367,7 +367,9 @@ def main(*, shows_all: bool) -> None:
         if shows_all or each.is_wrong or is_missed:
             off = "" if each.off_m is None else f" off {each.off_m:.3f} m, {each.off_deg:.2f} deg"
             wrong = " WRONG" if each.is_wrong else ""
-            click.echo(f"{each.kind}, {each.building}:{wrong}{off} {each.sentence}")
+            click.echo(
+                f"{each.kind}, {each.building}:{wrong}{off} {say_comparison(each.comparison)}"
+            )
     for figure in _figures(results):
         click.echo(f"{figure.name}: {figure.value:.3f} {figure.unit}")
 

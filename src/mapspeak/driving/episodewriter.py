@@ -11,7 +11,7 @@ from mapspeak.memory.episodes import (
     EpisodeStore,
     Observation,
     ObservationKind,
-    observations_from,
+    observation_of,
 )
 
 
@@ -89,10 +89,8 @@ class EpisodeWriter:
 
     def keep_record(self, waypoint: Waypoint) -> Keeping:
         """Keep that a place was written down, with what was seen this time."""
-        if not self.is_open:
-            return Keeping()
-        kept = [self._write(each) for each in observations_from(waypoint)]
-        return kept[-1] if kept else Keeping()
+        observation = observation_of(waypoint) if self.is_open else None
+        return Keeping() if observation is None else self._write(observation)
 
     def _write(self, observation: Observation, picture: bytes | None = None) -> Keeping:
         try:

@@ -8,13 +8,13 @@ from alignment_maps import HOUSE, OTHER_HOUSE, TWIN_HOUSES, fine, moved
 from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory.alignment import (
+    LEAST_SHARED_M,
     Certainty,
     MapFit,
     MapRelation,
     MapSurfaces,
     compare_maps,
     find_fit,
-    say_comparison,
 )
 from mapspeak.spatial import OccupancyGrid
 
@@ -113,7 +113,6 @@ def test_a_building_that_looks_the_same_from_both_ends_is_ambiguous() -> None:
 
     assert fit.certainty is Certainty.AMBIGUOUS
     assert not fit.is_sure_enough
-    assert "looks alike in both places" in fit.sentence
     assert fit.rival is not None
     assert fit.rival.agreement_ratio > 0.9
 
@@ -139,7 +138,6 @@ def test_a_map_is_the_same_as_itself_grown_and_with_new_furniture() -> None:
 
     assert comparison.relation is MapRelation.SAME
     assert comparison.fit is None
-    assert "% of the walls that both maps show agree" in say_comparison(comparison)
 
 
 def test_a_map_in_another_frame_has_moved() -> None:
@@ -148,16 +146,15 @@ def test_a_map_in_another_frame_has_moved() -> None:
     comparison = compare_maps(house, moved(house, Pose(3.0, 1.0, math.radians(30))))
 
     assert comparison.relation is MapRelation.MOVED
-    assert "has moved" in say_comparison(comparison)
-    assert "turned by 30.0 degrees" in say_comparison(comparison)
-    assert "This is sure." in say_comparison(comparison)
+    assert comparison.fit is not None
+    assert math.degrees(comparison.fit.new_from_old.yaw_rad) == pytest.approx(30.0, abs=0.1)
+    assert comparison.fit.certainty is Certainty.SURE
 
 
 def test_another_building_is_told_apart() -> None:
     comparison = compare_maps(fine(HOUSE), fine(OTHER_HOUSE))
 
     assert comparison.relation is MapRelation.OTHER
-    assert "another building" in say_comparison(comparison)
 
 
 def test_a_symmetric_building_in_another_frame_is_not_decided() -> None:
@@ -176,4 +173,5 @@ def test_a_map_that_shows_hardly_a_wall_is_not_decided(turned_about: bool) -> No
     comparison = compare_maps(*pair)
 
     assert comparison.relation is MapRelation.UNKNOWN
-    assert "cannot be told yet" in say_comparison(comparison)
+    assert comparison.fit is None
+    assert comparison.shortest_m < LEAST_SHARED_M

@@ -21,7 +21,7 @@ from mapspeak.memory.episodes import (
     ObservationKind,
     VectorRank,
     memory_folder,
-    observations_from,
+    observation_of,
 )
 from mapspeak.memory.search.answer import Thresholds
 
@@ -216,26 +216,6 @@ def test_the_vectors_of_texts_are_made_once_whoever_asks(store: EpisodeStore) ->
     assert [text for text in second.embedded if text != "pallets door"] == ["Pallets at the door."]
 
 
-def test_the_index_is_built_anew_from_the_observations(store: EpisodeStore) -> None:
-    asked = [EpisodeQuery(words="ladder"), EpisodeQuery(label="sink"), EpisodeQuery(words="door")]
-    before = [store.find(query) for query in asked]
-    with sqlite3.connect(store.database.path) as connection:
-        for table in ("words", "vocabulary", "labels"):
-            connection.execute(f"DELETE FROM {table}")  # noqa: S608 - our own tables
-    connection.close()
-    assert store.find(asked[0]).n_matches == 0
-    assert store.rebuild_index() == 4
-    assert [store.find(query) for query in asked] == before
-
-
-def test_an_index_of_another_version_is_built_anew_without_being_asked(store: EpisodeStore) -> None:
-    with sqlite3.connect(store.database.path) as connection:
-        connection.execute("DELETE FROM words")
-        connection.execute("UPDATE facts SET value = '0' WHERE name = 'index_version'")
-    connection.close()
-    assert store.find(EpisodeQuery(words="ladder")).n_matches == 2
-
-
 def test_a_database_that_a_crash_left_half_made_is_made_anew(tmp_path: Path) -> None:
     (tmp_path / "episodes.new").write_bytes(b"SQLite form")
     (tmp_path / "episodes.new-wal").write_bytes(b"half")
@@ -291,11 +271,12 @@ def test_a_record_is_an_observation_of_all_that_it_names() -> None:
         recorded_at=NINE,
         map_id="hall",
     )
-    (observation,) = observations_from(waypoint)
+    observation = observation_of(waypoint)
+    assert observation is not None
     assert observation.text == "dock\nBy the gate."
     assert observation.labels == ("exit sign",)
     assert observation.kind is ObservationKind.RECORD
-    assert observations_from(Waypoint(name="undated", pose=Pose(0.0, 0.0))) == ()
+    assert observation_of(Waypoint(name="undated", pose=Pose(0.0, 0.0))) is None
 
 
 @settings(max_examples=25)

@@ -1,6 +1,6 @@
 """Which map remembered places belong to: told from its walls, and moved when the map moves."""
 
-from mapspeak.memory.alignment.fitting import Certainty, MapFit, find_fit
+from mapspeak.memory.alignment.fitting import LEAST_SHARED_M, Certainty, MapFit, find_fit
 from mapspeak.memory.alignment.keeping import (
     MapComparison,
     MapKeeper,
@@ -8,11 +8,11 @@ from mapspeak.memory.alignment.keeping import (
     RealignReceipt,
     SnapshotFolder,
     compare_maps,
-    say_comparison,
 )
 from mapspeak.memory.alignment.surfaces import MapAgreement, MapSurfaces, placed
 
 __all__ = [
+    "LEAST_SHARED_M",
     "Certainty",
     "MapAgreement",
     "MapComparison",
@@ -25,5 +25,4 @@ __all__ = [
     "compare_maps",
     "find_fit",
     "placed",
-    "say_comparison",
 ]

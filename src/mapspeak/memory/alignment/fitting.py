@@ -1,10 +1,11 @@
 """The rigid motion that lays an old map on a new one: guessed by the walls, then refined."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -97,7 +98,7 @@ class _Field:
         self._low = new.points.min(axis=0) - reach_m
         extent_m = float((new.points.max(axis=0) + reach_m - self._low).max()) + reach_m
         self._cell_m = max(CELL_M, extent_m / LARGEST_RASTER)
-        self._size = _smooth_size(int(np.ceil(extent_m / self._cell_m)))
+        self._size = cv2.getOptimalDFTSize(math.ceil(extent_m / self._cell_m))
         self._fits, self._walls = map(np.fft.rfft2, self._rasters(new))
 
     def find_shifts(self, turn_rad: float) -> Iterator[Pose]:
@@ -154,19 +155,6 @@ def _thinned(points: FloatArray) -> FloatArray:
     keys = np.floor(points / (CELL_M / 2)).astype(np.int64)
     _, first = np.unique(keys, axis=0, return_index=True)
     return points[np.sort(first)]
-
-
-def _smooth_size(least: int) -> int:
-    """Return a size with small factors alone, which fast Fourier transforms like."""
-    size = least
-    while True:
-        rest = size
-        for factor in (2, 3, 5):
-            while rest % factor == 0:
-                rest //= factor
-        if rest == 1:
-            return size
-        size += 1
 
 
 REACHES_M = (1.2, 0.7, 0.4, 0.25, 0.15)
@@ -265,27 +253,6 @@ class MapFit:
         """True when poses may be moved by it."""
         return self.certainty in (Certainty.SURE, Certainty.LIKELY)
 
-    @property
-    def sentence(self) -> str:
-        """The fit in words, with its figures."""
-        turn = f"turned by {math.degrees(self.new_from_old.yaw_rad):.1f} degrees"
-        said = (
-            f"Laid on the new map {turn} and shifted so that its middle moves {self.off_m:.2f} m, "
-            f"{_say(self.quality)}"
-        )
-        if self.rival is None:
-            return f"{said}; no other place comes near. {_REASONS[self.certainty]}"
-        return f"{said}; in the next best place, {_say(self.rival)}. {_REASONS[self.certainty]}"
-
-
-_REASONS = {
-    Certainty.SURE: "This is sure.",
-    Certainty.LIKELY: "This is likely right.",
-    Certainty.AMBIGUOUS: "The building looks alike in both places: which one is right cannot be "
-    "told from its walls.",
-    Certainty.UNSURE: "This is not enough to rely on.",
-}
-
 
 def find_fit(old: MapSurfaces, new: MapSurfaces) -> MapFit | None:
     """Find where an old map lies on a new one; None where nothing can be laid on anything."""
@@ -297,7 +264,8 @@ def find_fit(old: MapSurfaces, new: MapSurfaces) -> MapFit | None:
     best, quality = judged[0]
     middle = Point(*_middle(old.points).tolist())
     others = [each for transform, each in judged[1:] if not _is_same_place(transform, best, middle)]
-    rival = _strongest(others, quality)
+    # What competes most with the best place.
+    rival = max(others, key=lambda each: (_is_rival(each, quality), each.evidence_m), default=None)
     return MapFit(
         new_from_old=best,
         quality=quality,
@@ -305,11 +273,6 @@ def find_fit(old: MapSurfaces, new: MapSurfaces) -> MapFit | None:
         certainty=_certainty_of(quality, rival),
         off_m=middle.distance_to(best.transform(middle)),
     )
-
-
-def _strongest(others: Iterable[MapAgreement], best: MapAgreement) -> MapAgreement | None:
-    """Return what competes most with the best place."""
-    return max(others, key=lambda each: (_is_rival(each, best), each.evidence_m), default=None)
 
 
 def _is_rival(other: MapAgreement, best: MapAgreement) -> bool:
@@ -334,10 +297,3 @@ def _certainty_of(quality: MapAgreement, rival: MapAgreement | None) -> Certaint
 def _is_same_place(one: Pose, other: Pose, middle: Point) -> bool:
     turned = abs(wrap_angle(one.yaw_rad - other.yaw_rad))
     return turned < SAME_RAD and one.transform(middle).distance_to(other.transform(middle)) < SAME_M
-
-
-def _say(quality: MapAgreement) -> str:
-    return (
-        f"{quality.agreement_ratio:.0%} of the walls agree, of {quality.shared_m:.0f} m that both "
-        f"maps show ({quality.overlap_ratio:.0%} of the smaller map)"
-    )

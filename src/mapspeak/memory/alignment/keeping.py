@@ -168,31 +168,6 @@ def compare_maps(old: OccupancyGrid, new: OccupancyGrid) -> MapComparison:
     return MapComparison(relation=relation, as_it_lies=as_it_lies, fit=fit, shortest_m=shortest_m)
 
 
-def say_comparison(comparison: MapComparison) -> str:
-    """Return what a comparison gives, with figures: the message where records cannot be moved."""
-    relation, fit = comparison.relation, comparison.fit
-    figures = _figures(comparison.as_it_lies)
-    if fit is None and relation is MapRelation.SAME:
-        return f"The map is the one that the records belong to: {figures}."
-    if fit is None and relation is MapRelation.UNKNOWN:
-        return (
-            f"Whether this is the map that the records belong to cannot be told yet: one of the "
-            f"two maps shows {comparison.shortest_m:.0f} m of walls, and {LEAST_SHARED_M:.0f} m "
-            "are needed."
-        )
-    said = f"{_OPENINGS[relation]} As they lie, {figures}."
-    return said if fit is None else f"{said} {fit.sentence}"
-
-
-_OPENINGS = {
-    MapRelation.SAME: "The map is the one that the records belong to, with changes in it.",
-    MapRelation.MOVED: "The building is the one that the records belong to, but its map has moved.",
-    MapRelation.OTHER: "This map shows another building than the one that the records belong to, "
-    "or another part of it.",
-    MapRelation.UNKNOWN: "Whether this is the map that the records belong to cannot be told.",
-}
-
-
 def _relation_of(fit: MapFit | None) -> MapRelation:
     if fit is None:
         return MapRelation.OTHER
@@ -214,13 +189,6 @@ def _is_good(quality: MapAgreement) -> bool:
     )
 
 
-def _figures(quality: MapAgreement) -> str:
-    return (
-        f"{quality.agreement_ratio:.0%} of the walls that both maps show agree "
-        f"({quality.shared_m:.0f} m, {quality.overlap_ratio:.0%} of the smaller map)"
-    )
-
-
 GROWN_RATIO = 0.1
 """A map that shows so much more floor than the kept one is kept in its place."""
 KEY = "snapshot"
@@ -228,11 +196,11 @@ KEY = "snapshot"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RealignReceipt:
-    """What became of records whose map has moved.
+    """What became of records whose map may have moved.
 
     Attributes:
-        motion: From the old frame to the new one; None where nothing had to move.
-        certainty: How sure it is; None where nothing had to move.
+        motion: From the old frame to the new one; None where nothing was moved.
+        certainty: How sure it is; None where nothing was moved.
         undo_path: The file as it was before.
     """
 
@@ -295,11 +263,11 @@ class MapKeeper:
     def realign(self, grid: OccupancyGrid) -> RealignReceipt:
         """Move all records to the robot's map where it is sure how; all of them or none.
 
-        The file as it was is kept beside the old map; `undo_path` names it.
+        The file as it was is kept beside the old map; `undo_path` names it. Nothing moves where
+        the maps do not tell surely enough how one lies on the other: the comparison says so.
 
         Raises:
-            SemanticMapError: No map was kept, or the maps do not tell surely enough how one lies
-                on the other. Nothing was changed.
+            SemanticMapError: No map was kept, or the file cannot be written.
         """
         self.finish_move()
         kept = self._load(self._name())
@@ -309,16 +277,9 @@ class MapKeeper:
                 hint="Write one of them anew on this map; the map is kept with it.",
             )
         comparison = self._compare(kept, grid)
-        if comparison.relation is MapRelation.SAME:
+        if comparison.relation is not MapRelation.MOVED or comparison.fit is None:
             return RealignReceipt(comparison=comparison)
-        fit = comparison.fit
-        if comparison.relation is not MapRelation.MOVED or fit is None:
-            raise SemanticMapError(
-                f"The records stay where they are. {say_comparison(comparison)}",
-                hint="Let the robot see more of the building and try again, or use another file "
-                "for this map.",
-            )
-        return self._move(grid, comparison, fit.new_from_old, fit.certainty)
+        return self._move(grid, comparison, comparison.fit)
 
     def finish_move(self) -> int:
         """Move the observations where a crash has kept them from following their records.
@@ -328,13 +289,8 @@ class MapKeeper:
         """
         return 0 if self._episodes is None else self._episodes.finish_move(at=self._name())
 
-    def _move(
-        self,
-        grid: OccupancyGrid,
-        comparison: MapComparison,
-        motion: Pose,
-        certainty: Certainty,
-    ) -> RealignReceipt:
+    def _move(self, grid: OccupancyGrid, comparison: MapComparison, fit: MapFit) -> RealignReceipt:
+        motion = fit.new_from_old
         old_name, new_name = self._name(), self._folder.free_name()
         self._folder.keep(grid, new_name)
         undo_path = self._folder.path / f"before-{new_name}"
@@ -358,7 +314,7 @@ class MapKeeper:
         return RealignReceipt(
             comparison=comparison,
             motion=motion,
-            certainty=certainty,
+            certainty=fit.certainty,
             n_waypoints=len(after.records),
             n_events=len(after.events),
             n_observations=n_observations,
@@ -372,8 +328,7 @@ class MapKeeper:
         if self._loaded is None or self._loaded[0] != name:
             grid = self._folder.load(name)
             self._loaded = None if grid is None else (name, grid)
-            return grid
-        return self._loaded[1]
+        return None if self._loaded is None else self._loaded[1]
 
     def _keep(self, grid: OccupancyGrid, name: str) -> None:
         self._folder.keep(grid, name)

@@ -14,7 +14,7 @@ from mapspeak.memory.episodes.observation import (
     ObservationKind,
     Rank,
     named_pictures,
-    observations_from,
+    observation_of,
 )
 from mapspeak.memory.episodes.pictures import StoredPicture, ThinningRule, choose_dropped
 from mapspeak.memory.episodes.store import BroughtOver, EpisodeStore, bring_over, memory_folder
@@ -38,5 +38,5 @@ __all__ = [
     "choose_dropped",
     "memory_folder",
     "named_pictures",
-    "observations_from",
+    "observation_of",
 ]

@@ -6,8 +6,6 @@ on network drives.
 """
 
 import contextlib
-import json
-import math
 import sqlite3
 import weakref
 from collections.abc import Iterator
@@ -16,12 +14,9 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from mapspeak.errors import SemanticMapError
-from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.memory.store.durable import sync_folder
 
 SCHEMA_VERSION = 1
-INDEX_VERSION = "1"
-"""Changes with how texts become words; an index of another version is built anew."""
 
 _MOST_PAGES_IN_LOG = 4_000
 """The log is folded into the file when it has so many pages of 4 kB, by the write that fills it.
@@ -169,57 +164,8 @@ def _make_empty(path: Path) -> Path:
         path.with_name(path.name + ending).unlink(missing_ok=True)
     with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as connection:
         connection.execute("PRAGMA journal_mode = WAL")
-        fact = f"INSERT INTO facts VALUES ('index_version', '{INDEX_VERSION}');"  # noqa: S608 - our own constant
+        # Version 0.1 reads no database without it.
+        fact = "INSERT INTO facts VALUES ('index_version', '1');"
         version = f"PRAGMA user_version = {SCHEMA_VERSION};"
         connection.executescript(f"BEGIN; {_SCHEMA} {fact} {version} COMMIT;")
     return path
-
-
-_PLAN = "move to "
-
-
-def plan_move(database: EpisodeDatabase, motion: Pose, *, to: str) -> None:
-    """Note how poses move if the kept map becomes another one.
-
-    Args:
-        motion: From the frame of their poses to the new one.
-        to: The name of the map that would be kept.
-    """
-    if not database.exists():
-        return
-    plan = json.dumps([motion.x, motion.y, motion.yaw_rad])
-    with database.writing() as connection:
-        connection.execute("INSERT OR REPLACE INTO facts VALUES (?, ?)", (_PLAN + to, plan))
-
-
-def finish_move(database: EpisodeDatabase, *, at: str) -> int:
-    """Move all poses if that was planned for the map that is kept now; forget other plans.
-
-    Rooms of the old map are left away: their ids mean nothing on the new one.
-
-    Returns:
-        How many were moved.
-    """
-    if not database.exists() or not has_plans(database):
-        return 0
-    with database.writing() as connection:
-        select = "SELECT name, value FROM facts WHERE name GLOB ?"
-        plans = dict(connection.execute(select, [f"{_PLAN}*"]).fetchall())
-        connection.execute("DELETE FROM facts WHERE name GLOB ?", [f"{_PLAN}*"])
-        if _PLAN + at not in plans:
-            return 0
-        motion = Pose(*json.loads(plans[_PLAN + at]))
-        cos, sin = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
-        connection.create_function("turned", 1, lambda yaw: wrap_angle(yaw + motion.yaw_rad))
-        return connection.execute(
-            "UPDATE observations SET room_id = NULL, yaw_rad = turned(yaw_rad),"
-            " x = ? + ? * x - ? * y, y = ? + ? * x + ? * y",
-            (motion.x, cos, sin, motion.y, sin, cos),
-        ).rowcount
-
-
-def has_plans(database: EpisodeDatabase) -> bool:
-    """Return True where a move was planned and neither done nor dropped."""
-    with database.reading() as connection:
-        found = connection.execute("SELECT 1 FROM facts WHERE name GLOB ?", [f"{_PLAN}*"])
-        return found.fetchone() is not None

@@ -2,7 +2,7 @@
 
 import hashlib
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
@@ -153,7 +153,12 @@ class EpisodeQuery:
         _require_argument(
             is_ordered, "order", "one that words (best) or near (nearest) are given for"
         )
-        _require_argument(_n_hops(self) <= MOST_HOPS, "near", f"nested at most {MOST_HOPS} deep")
+        _require_argument(self.n_hops <= MOST_HOPS, "near", f"nested at most {MOST_HOPS} deep")
+
+    @property
+    def n_hops(self) -> int:
+        """How many queries are nested in it."""
+        return 1 + self.near.n_hops if isinstance(self.near, EpisodeQuery) else 0
 
     @property
     def effective_order(self) -> EpisodeOrder:
@@ -219,41 +224,34 @@ class EpisodePage:
     next_page: EpisodeQuery | None = None
 
 
-def _n_hops(query: EpisodeQuery) -> int:
-    return 1 + _n_hops(query.near) if isinstance(query.near, EpisodeQuery) else 0
-
-
 def _require_argument(is_right: object, what: str, expected: str) -> None:
     if not is_right:
         raise SemanticMapError(f"{what} is not {expected}.", hint=f"Give {what} as {expected}.")
 
 
-def observations_from(waypoint: Waypoint) -> tuple[Observation, ...]:
-    """Return the writing of a record as an observation; nothing where its time is not known."""
+def observation_of(waypoint: Waypoint) -> Observation | None:
+    """Return the writing of a record as an observation; None where its time is not known."""
     if waypoint.recorded_at is None:
-        return ()
+        return None
     said = (waypoint.name, waypoint.description, *waypoint.geometric_features)
-    return (
-        Observation(
-            recorded_at=waypoint.recorded_at,
-            stamp_s=waypoint.stamp_s,
-            pose=waypoint.pose,
-            map_id=waypoint.map_id,
-            room_id=waypoint.room_id,
-            kind=ObservationKind.RECORD,
-            text="\n".join(filter(None, said)),
-            labels=tuple(landmark.label for landmark in waypoint.landmarks),
-            picture=waypoint.picture,
-        ),
+    return Observation(
+        recorded_at=waypoint.recorded_at,
+        stamp_s=waypoint.stamp_s,
+        pose=waypoint.pose,
+        map_id=waypoint.map_id,
+        room_id=waypoint.room_id,
+        kind=ObservationKind.RECORD,
+        text="\n".join(filter(None, said)),
+        labels=tuple(landmark.label for landmark in waypoint.landmarks),
+        picture=waypoint.picture,
     )
 
 
 def named_pictures(semantic_map: SemanticMap) -> frozenset[str]:
     """Return the pictures that waypoints and their landmarks name."""
-    return frozenset(_names(semantic_map))
-
-
-def _names(semantic_map: SemanticMap) -> Iterator[str]:
-    for waypoint in semantic_map.waypoints:
-        pictures = (waypoint.picture, *(landmark.picture for landmark in waypoint.landmarks))
-        yield from filter(None, pictures)
+    return frozenset(
+        picture
+        for waypoint in semantic_map.waypoints
+        for picture in (waypoint.picture, *(landmark.picture for landmark in waypoint.landmarks))
+        if picture
+    )

@@ -20,7 +20,7 @@ from mapspeak.memory.episodes.observation import (
     Rank,
     microseconds_of,
 )
-from mapspeak.memory.episodes.textindex import Ids, Scores, read_ids, score_words, shared_words
+from mapspeak.memory.episodes.textindex import Scores, read_ids, score_words, shared_words
 from mapspeak.memory.quoting import name_key
 
 MOST_TEXTS = 2000
@@ -31,8 +31,8 @@ class TextScorer:
     """Scores texts, and keeps those that it has read: they never change."""
 
     def __init__(self) -> None:
-        # Of which index, since another one has other ids; the text with the id i is [i - 1].
-        self._known: tuple[str, tuple[str, ...]] = ("", ())
+        self._texts: tuple[str, ...] = ()
+        """The text with the id i is [i - 1]."""
 
     def score(
         self,
@@ -49,48 +49,23 @@ class TextScorer:
             rank: Who says how well a text fits; None compares words.
             among: A selection of text ids; empty for all texts.
         """
-        text_ids = read_ids(connection, among, values) if among else None
         if rank is None:
             scores = score_words(connection, words)
-            if text_ids is not None:
+            if among:
                 passing = np.zeros(len(scores))
-                passing[text_ids] = 1.0
+                passing[read_ids(connection, among, values)] = 1.0
                 scores *= passing
-        else:
-            scores = self._ranked(connection, words, rank, text_ids)
-        return _best(scores)
-
-    def _ranked(
-        self,
-        connection: sqlite3.Connection,
-        words: str,
-        rank: Rank,
-        text_ids: Ids | None,
-    ) -> Scores:
-        texts = self._read(connection)
+            return _best(scores)
+        texts = self._texts
+        selection = "SELECT text FROM texts WHERE text_id > ? ORDER BY text_id"
+        texts += tuple(row[0] for row in connection.execute(selection, [len(texts)]))
+        self._texts = texts
+        ids = np.arange(1, len(texts) + 1)
+        if among:
+            ids = np.unique(read_ids(connection, among, values))
         scores = np.zeros(len(texts) + 1)
-        if text_ids is None:
-            scores[1:] = rank(words, texts)
-            return scores
-        ids = np.unique(text_ids)
         scores[ids] = rank(words, [texts[i - 1] for i in ids.tolist()])
-        return scores
-
-    def _read(self, connection: sqlite3.Connection) -> tuple[str, ...]:
-        """Return all texts, reading only those that are new."""
-        selection = "SELECT value FROM facts WHERE name = 'generation'"
-        row = connection.execute(selection).fetchone()
-        generation = "" if row is None else str(row[0])
-        known_generation, known = self._known
-        if known_generation != generation:
-            known = ()
-        rows = connection.execute(
-            "SELECT text FROM texts WHERE text_id > ? ORDER BY text_id", [len(known)]
-        ).fetchall()
-        if rows or known_generation != generation:
-            known = (*known, *(row[0] for row in rows))
-            self._known = (generation, known)
-        return known
+        return _best(scores)
 
 
 def _best(scores: Scores) -> dict[int, float]:

@@ -5,6 +5,7 @@ Reading and writing are synchronous, and safe between processes and threads.
 
 import contextlib
 import json
+import math
 import shutil
 import sqlite3
 from collections.abc import Callable, Iterable
@@ -14,15 +15,9 @@ from pathlib import Path
 from types import MappingProxyType
 
 from mapspeak.errors import SemanticMapError
-from mapspeak.geometry import Pose
+from mapspeak.geometry import Pose, wrap_angle
 from mapspeak.installation import shell_command
-from mapspeak.memory.episodes.database import (
-    INDEX_VERSION,
-    EpisodeDatabase,
-    finish_move,
-    has_plans,
-    plan_move,
-)
+from mapspeak.memory.episodes.database import EpisodeDatabase
 from mapspeak.memory.episodes.observation import (
     EpisodePage,
     EpisodeQuery,
@@ -44,14 +39,15 @@ from mapspeak.memory.episodes.searching import (
     TextScorer,
     observation_from,
 )
-from mapspeak.memory.episodes.textindex import add_text, index_texts, text_hash
+from mapspeak.memory.episodes.textindex import add_text
 from mapspeak.memory.quoting import name_key
 
 LOCK_TIMEOUT_S = 5.0
 
 _AFTER_FULL_RATIO = 0.9
+_PLAN = "move to "
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-_FIRST_FACTS = MappingProxyType({"thinned_hour": "", "left_bytes": "0", "generation": "0"})
+_FIRST_FACTS = MappingProxyType({"thinned_hour": "", "left_bytes": "0"})
 
 
 def memory_folder(semantic_map: Path) -> Path:
@@ -155,10 +151,6 @@ class EpisodeStore:
         if not self.database.exists():
             return EpisodePage(matches=(), n_matches=0)
         with self.database.reading() as connection:
-            is_indexed = _fact(connection, "index_version") == INDEX_VERSION
-        if not is_indexed:
-            self.rebuild_index()
-        with self.database.reading() as connection:
             search = EpisodeSearch(connection=connection, scorer=self._scorer, rank=rank)
             return search.find(query)
 
@@ -178,47 +170,50 @@ class EpisodeStore:
     # --- moving with the map ----------------------------------------------------------------
 
     def plan_move(self, motion: Pose, *, to: str) -> None:
-        """Note how poses move if the kept map becomes another one (see `moving`)."""
-        plan_move(self.database, motion, to=to)
+        """Note how poses move if the kept map becomes another one.
+
+        Args:
+            motion: From the frame of their poses to the new one.
+            to: The name of the map that would be kept.
+        """
+        if self.database.exists():
+            with self.database.writing() as connection:
+                plan = json.dumps([motion.x, motion.y, motion.yaw_rad])
+                _note_fact(connection, _PLAN + to, plan)
 
     def finish_move(self, *, at: str) -> int:
-        """Move all poses if that was planned for the map that is kept now; return how many."""
-        return finish_move(self.database, at=at)
+        """Move all poses if that was planned for the map that is kept now; forget other plans.
+
+        Rooms of the old map are left away: their ids mean nothing on the new one.
+
+        Returns:
+            How many were moved.
+        """
+        if not self.has_plans():
+            return 0
+        with self.database.writing() as connection:
+            plan = _fact(connection, _PLAN + at)
+            connection.execute("DELETE FROM facts WHERE name GLOB ?", [f"{_PLAN}*"])
+            if not plan:
+                return 0
+            motion = Pose(*json.loads(plan))
+            cos, sin = math.cos(motion.yaw_rad), math.sin(motion.yaw_rad)
+            connection.create_function("turned", 1, lambda yaw: wrap_angle(yaw + motion.yaw_rad))
+            return connection.execute(
+                "UPDATE observations SET room_id = NULL, yaw_rad = turned(yaw_rad),"
+                " x = ? + ? * x - ? * y, y = ? + ? * x + ? * y",
+                (motion.x, cos, sin, motion.y, sin, cos),
+            ).rowcount
+
+    def has_plans(self) -> bool:
+        """Return True where a move was planned and neither done nor dropped."""
+        if not self.database.exists():
+            return False
+        with self.database.reading() as connection:
+            found = connection.execute("SELECT 1 FROM facts WHERE name GLOB ?", [f"{_PLAN}*"])
+            return found.fetchone() is not None
 
     # --- keeping order -----------------------------------------------------------------------
-
-    def rebuild_index(self) -> int:
-        """Build everything but the observations anew, and return how many there are."""
-        with self.database.writing() as connection:
-            for table in ("texts", "words", "vocabulary", "labels"):
-                connection.execute(f"DELETE FROM {table}")  # noqa: S608 - our own tables
-            connection.execute("DROP INDEX by_text")
-            rows = connection.execute(
-                "SELECT n, text, labels, text_id FROM observations"
-            ).fetchall()
-            ids: dict[str, int] = {}
-            named: dict[str, tuple[str, list[str]]] = {}
-            moved, labels = [], []
-            for n, text, said, text_id in rows:
-                if said not in named:
-                    names = json.loads(said)
-                    named[said] = "; ".join(names), [name_key(name) for name in names]
-                joined, keys = named[said]
-                whole = "\n".join(filter(None, (text, joined)))
-                new_id = ids.setdefault(whole, len(ids) + 1)
-                if new_id != text_id:
-                    moved.append((new_id, n))
-                labels += [(key, n) for key in keys]
-            texts = ((i, text_hash(text), text) for text, i in ids.items())
-            connection.executemany("INSERT INTO texts VALUES (?, ?, ?)", texts)
-            index_texts(connection, ((i, text) for text, i in ids.items()))
-            connection.executemany("INSERT OR IGNORE INTO labels VALUES (?, ?)", sorted(labels))
-            connection.executemany("UPDATE observations SET text_id = ? WHERE n = ?", moved)
-            connection.execute("CREATE INDEX by_text ON observations (text_id, recorded_us)")
-            _note_fact(connection, "index_version", INDEX_VERSION)
-            generation = int(_fact(connection, "generation")) + 1
-            _note_fact(connection, "generation", str(generation))
-        return len(rows)
 
     def thin(self, *, now: datetime, rule: ThinningRule | None = None) -> int:
         """Drop the pictures that the rule does not keep, and return how many files went.
@@ -356,7 +351,12 @@ def bring_over(*memories: Path, to: Path) -> BroughtOver:
     """
     sources = [EpisodeStore(memory_folder(path)) for path in memories]
     for source in sources:
-        _require_settled(source)
+        if source.has_plans():
+            raise SemanticMapError(
+                f"The observations in {source.folder} have not followed their map yet.",
+                hint=f"Start `{shell_command('serve --memory FILE')}` with it once, then merge "
+                "again.",
+            )
     folder = memory_folder(to)
     if folder.exists():
         message = f"{folder} is there already."
@@ -368,12 +368,3 @@ def bring_over(*memories: Path, to: Path) -> BroughtOver:
         shutil.rmtree(folder, ignore_errors=True)
         raise
     return BroughtOver(n_observations=sum(n for n, _ in came), n_pictures=sum(n for _, n in came))
-
-
-def _require_settled(store: EpisodeStore) -> None:
-    """Refuse observations that have not followed their records to a moved map yet."""
-    if store.database.exists() and has_plans(store.database):
-        raise SemanticMapError(
-            f"The observations in {store.folder} have not followed their map yet.",
-            hint=f"Start `{shell_command('serve --memory FILE')}` with it once, then merge again.",
-        )

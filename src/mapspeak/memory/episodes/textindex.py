@@ -3,9 +3,7 @@
 import difflib
 import hashlib
 import math
-import re
 import sqlite3
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 
@@ -15,16 +13,19 @@ from numpy.typing import NDArray
 from mapspeak.memory.episodes.database import EpisodeDatabase
 from mapspeak.memory.policy import words_of
 from mapspeak.memory.search import Embedder
-from mapspeak.memory.search.wordindex import content_words, split_words, stem
+from mapspeak.memory.search.answer import KIND_WEIGHTS, MatchKind
+from mapspeak.memory.search.wordindex import (
+    MIN_LETTERS,
+    MIN_LIKENESS_RATIO,
+    content_words,
+    split_words,
+    stem,
+)
 
 MIN_SCORE_RATIO = 0.25
 """Below, too little of the query was found to speak of a match."""
 
-_MISSPELT_WEIGHT = 0.75
-_MIN_MISSPELT_LETTERS = 4
-_MIN_LIKENESS_RATIO = 0.8
 
-Ids = NDArray[np.int64]
 Scores = NDArray[np.float64]
 
 
@@ -47,28 +48,13 @@ def add_text(connection: sqlite3.Connection, text: str) -> int:
     insertion = "INSERT INTO texts (hash, text) VALUES (?, ?)"
     text_id = connection.execute(insertion, (text_hash(text), text)).lastrowid
     assert text_id is not None  # noqa: S101 - a row was inserted
-    index_texts(connection, [(text_id, text)])
+    words = [(word, text_id) for word in sorted(words_in(text))]
+    connection.executemany("INSERT INTO words VALUES (?, ?)", words)
+    connection.executemany(
+        "INSERT INTO vocabulary VALUES (?, 1) ON CONFLICT DO UPDATE SET n_texts = n_texts + 1",
+        [(word,) for word, _ in words],
+    )
     return text_id
-
-
-def index_texts(connection: sqlite3.Connection, texts: Iterable[tuple[int, str]]) -> None:
-    """Note the words of texts that are not indexed yet, their ids ascending."""
-    stems: dict[str, str] = {}
-    said: defaultdict[str, list[int]] = defaultdict(list)
-    for text_id, text in texts:
-        shown = set(re.findall(r"\w+", text))
-        for word in shown:
-            if word not in stems:
-                # Most words need no look at their accents.
-                stems[word] = stem(word.lower()) if word.isascii() else next(iter(words_in(word)))
-        for compared in {stems[word] for word in shown}:
-            said[compared].append(text_id)
-    # In the table's own order, in which it grows fastest.
-    rows = ((word, text_id) for word in sorted(said) for text_id in said[word])
-    connection.executemany("INSERT INTO words VALUES (?, ?)", rows)
-    counted = "INSERT INTO vocabulary VALUES (?, ?) ON CONFLICT DO UPDATE SET n_texts = n_texts + "
-    counts = ((word, len(text_ids)) for word, text_ids in said.items())
-    connection.executemany(counted + "excluded.n_texts", counts)
 
 
 def score_words(connection: sqlite3.Connection, query: str) -> Scores:
@@ -90,7 +76,9 @@ def score_words(connection: sqlite3.Connection, query: str) -> Scores:
     return np.where(scores >= total * MIN_SCORE_RATIO, scores / max(total, 1e-9), 0.0)
 
 
-def read_ids(connection: sqlite3.Connection, selection: str, values: Iterable[object]) -> Ids:
+def read_ids(
+    connection: sqlite3.Connection, selection: str, values: Iterable[object]
+) -> NDArray[np.int64]:
     """Return the integers that a selection of one column finds."""
     cursor = connection.cursor()
     cursor.row_factory = None
@@ -101,7 +89,7 @@ def read_ids(connection: sqlite3.Connection, selection: str, values: Iterable[ob
 def shared_words(query: str, text: str) -> list[str]:
     """Return the words of a text that the query has too, as they stand in the text."""
     asked, said = _words_asked(query), words_in(text)
-    near = (difflib.get_close_matches(w, said, n=1, cutoff=_MIN_LIKENESS_RATIO) for w in asked)
+    near = (difflib.get_close_matches(w, said, n=1, cutoff=MIN_LIKENESS_RATIO) for w in asked)
     return [said[word] for word in dict.fromkeys(chain(*near))]
 
 
@@ -129,7 +117,7 @@ def _spellings(
     row = connection.execute(count, [word]).fetchone()
     if row is not None:
         yield word, (row[0], 1.0)
-    elif len(word) >= _MIN_MISSPELT_LETTERS and not word.isnumeric():
+    elif len(word) >= MIN_LETTERS and not word.isnumeric():
         # Who misspells a word seldom misspells its first letter.
         alike = connection.execute(
             "SELECT word, n_texts FROM vocabulary"
@@ -137,8 +125,8 @@ def _spellings(
             (word[0], chr(ord(word[0]) + 1), len(word) - 2, len(word) + 2),
         )
         counts = {known: n for known, n in alike}  # noqa: C416 - rows are no pairs for dict()
-        for near in difflib.get_close_matches(word, counts, n=3, cutoff=_MIN_LIKENESS_RATIO):
-            yield near, (counts[near], _MISSPELT_WEIGHT)
+        for near in difflib.get_close_matches(word, counts, n=3, cutoff=MIN_LIKENESS_RATIO):
+            yield near, (counts[near], KIND_WEIGHTS[MatchKind.MISSPELT])
 
 
 Vectors = NDArray[np.float32]

@@ -91,10 +91,10 @@ def stem(word: str) -> str:
     return word.removesuffix("e") if len(word) > 3 else word
 
 
-_MIN_LETTERS = 4
+MIN_LETTERS = 4
 """A shorter word has too many others near it."""
 
-_MIN_LIKENESS_RATIO = 0.8
+MIN_LIKENESS_RATIO = 0.8
 _MOST_MISSPELT = 3
 _N_BUCKETS = 32
 """Letters are counted in so many; two in one bucket let more words through, never fewer."""
@@ -152,19 +152,19 @@ class Vocabulary:
     def _parts(self, asked: str) -> list[str]:
         """Return the words that begin or end with this stem, or that it begins or ends with."""
         n = len(asked)
-        if n < _MIN_LETTERS:
+        if n < MIN_LETTERS:
             return []
-        begins = {asked[:end] for end in range(_MIN_LETTERS, n + 1)}
-        ends = {asked[start:] for start in range(n - _MIN_LETTERS + 1)}
+        begins = {asked[:end] for end in range(MIN_LETTERS, n + 1)}
+        ends = {asked[start:] for start in range(n - MIN_LETTERS + 1)}
         stems = {own for own in begins | ends if own in self._of_stem}
         stems.update(_beginning_with(self._stems, asked))
         stems.update(own[::-1] for own in _beginning_with(self._stems_backwards, asked[::-1]))
         return sorted(word for own in stems for word in self._of_stem[own])
 
     def _misspelt(self, word: str) -> list[str]:
-        if len(word) < _MIN_LETTERS or self._is_known(word):
+        if len(word) < MIN_LETTERS or self._is_known(word):
             return []
-        return self._look_alikes.find(word, least_ratio=_MIN_LIKENESS_RATIO, limit=_MOST_MISSPELT)
+        return self._look_alikes.find(word, least_ratio=MIN_LIKENESS_RATIO, limit=_MOST_MISSPELT)
 
 
 def _beginning_with(words: Sequence[str], start: str) -> Iterator[str]:
