@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 
 from benchmarks.figure import Figure
 from mapspeak.geometry import Point, Pose
-from mapspeak.memory.episodes import (
+from mapspeak.memory.episodes.observation import (
     EpisodeOrder,
     EpisodeQuery,
-    EpisodeStore,
     Observation,
     ObservationKind,
-    VectorRank,
 )
+from mapspeak.memory.episodes.store import EpisodeStore
+from mapspeak.memory.episodes.textindex import VectorRank
 from mapspeak.memory.search.answer import Thresholds
 
 __all__ = ["measure"]

@@ -29,14 +29,9 @@ from benchmarks.figure import Figure
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMapStore, Waypoint
-from mapspeak.memory.episodes import (
-    EpisodeQuery,
-    EpisodeStore,
-    Observation,
-    ObservationKind,
-    ThinningRule,
-    memory_folder,
-)
+from mapspeak.memory.episodes.observation import EpisodeQuery, Observation, ObservationKind
+from mapspeak.memory.episodes.pictures import ThinningRule
+from mapspeak.memory.episodes.store import EpisodeStore, memory_folder
 
 __all__ = ["main", "measure"]
 

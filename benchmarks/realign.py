@@ -24,13 +24,8 @@ from benchmarks.exploration import build_worlds, choose_start
 from benchmarks.figure import Figure
 from benchmarks.rooms import find_labelled_maps, list_labelled_maps
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.memory.alignment import (
-    MapComparison,
-    MapRelation,
-    MapSurfaces,
-    compare_maps,
-    placed,
-)
+from mapspeak.memory.alignment.keeping import MapComparison, MapRelation, compare_maps
+from mapspeak.memory.alignment.surfaces import MapSurfaces, placed
 from mapspeak.robot import GoalState
 from mapspeak.server.text.maps import say_comparison
 from mapspeak.simulator import BODY_RADIUS_M, Simulation, World, load_world

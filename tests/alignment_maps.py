@@ -4,7 +4,7 @@ import numpy as np
 
 from drawing import grid_from_text
 from mapspeak.geometry import Pose
-from mapspeak.memory.alignment import placed
+from mapspeak.memory.alignment.surfaces import placed
 from mapspeak.spatial import OccupancyGrid
 
 HOUSE = grid_from_text(

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.memory.search import Embedder, Thresholds, find_model
+from mapspeak.memory.search.answer import Thresholds
+from mapspeak.memory.search.meaningindex import Embedder, find_model
 from mapspeak.memory.search.wordindex import split_words, stem
 
 __all__ = ["ConceptEmbedder", "shipped_model"]

@@ -12,7 +12,7 @@ from benchmarks.memory.observer import Memory
 from benchmarks.memory.places import truth_of
 from benchmarks.memory.sites import Site, TrueThing
 from mapspeak.geometry import wrap_angle
-from mapspeak.memory.search import EntryKind, Verdict
+from mapspeak.memory.search.answer import EntryKind, Verdict
 from mapspeak.places.goalcheck import judge_goal
 from mapspeak.places.recall.asking import SURE_RATIO, Recall, RecallCandidate
 from mapspeak.worldmodel.model import WorldModel

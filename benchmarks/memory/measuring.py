@@ -20,7 +20,10 @@ from benchmarks.memory.observer import observe
 from benchmarks.memory.places import PlaceError, measure_places
 from benchmarks.memory.sites import Site, build_drawn, build_held_out, build_sites, build_worn
 from mapspeak.evaluation.scores.rows import wilson_interval
-from mapspeak.memory.search import Embedder, find_model
+from mapspeak.memory.search.meaningindex import (
+    Embedder,
+    find_model,
+)
 
 __all__ = ["main", "measure"]
 

@@ -11,7 +11,9 @@ from benchmarks.memory.observer import Memory, views_of
 from benchmarks.memory.sites import Site, TrueThing
 from mapspeak.geometry import Point
 from mapspeak.memory import Landmark, Waypoint
-from mapspeak.memory.things import SightMap, Thing, Things
+from mapspeak.memory.things.finding import Things
+from mapspeak.memory.things.sight import SightMap
+from mapspeak.memory.things.thing import Thing
 
 __all__ = ["PlaceError", "measure_places", "truth_of"]
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from ruamel.yaml import YAML
 
 from mapspeak.memory import SemanticMap
-from mapspeak.memory.search import Entry, EntryKind, list_entries
-from mapspeak.memory.store import parse_document
+from mapspeak.memory.search.answer import Entry, EntryKind, list_entries
+from mapspeak.memory.store.document import parse_document
 
 __all__ = ["HELD_OUT", "NOTHING", "TUNING", "Request", "read_maps", "read_requests", "things_of"]
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from benchmarks.requests.data import NOTHING, Request
 from benchmarks.requests.methods import FIRST, Method, Reply
-from mapspeak.memory.search import Verdict
+from mapspeak.memory.search.answer import Verdict
 
 __all__ = ["ABSTRACT", "ALL", "Judged", "Share", "judge", "kinds_of", "shares_of"]
 

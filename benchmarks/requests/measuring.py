@@ -15,7 +15,9 @@ from benchmarks.requests.data import HELD_OUT, TUNING, Request, read_maps, read_
 from benchmarks.requests.judging import ALL, Share, judge, kinds_of, shares_of
 from benchmarks.requests.methods import Method, list_methods
 from mapspeak.memory import SemanticMap
-from mapspeak.memory.search import Embedder, Entry, EntryIndex, TextVectors, list_entries
+from mapspeak.memory.search.answer import Entry, list_entries
+from mapspeak.memory.search.index import EntryIndex
+from mapspeak.memory.search.meaningindex import Embedder, TextVectors
 
 __all__ = ["main", "measure"]
 

@@ -12,15 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.requests.data import Request, read_maps, things_of
-from mapspeak.memory.search import (
-    Embedder,
-    Entry,
-    EntryIndex,
-    TextVectors,
-    Thresholds,
-    Verdict,
-    find_model,
-)
+from mapspeak.memory.search.answer import Entry, Thresholds, Verdict
+from mapspeak.memory.search.index import EntryIndex
+from mapspeak.memory.search.meaningindex import Embedder, TextVectors, find_model
 from mapspeak.memory.search.wordindex import split_words
 
 __all__ = ["FIRST", "Method", "Reply", "list_methods"]

@@ -19,18 +19,12 @@ from mapspeak.driving.stops import Lease
 from mapspeak.errors import LinkError, MapError, MapspeakError, SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.memory import PictureBook, SemanticMap, SemanticMapStore
-from mapspeak.memory.alignment import MapComparison, MapKeeper
-from mapspeak.memory.episodes import (
-    EpisodePage,
-    EpisodeQuery,
-    EpisodeStore,
-    ObservationKind,
-    VectorRank,
-    memory_folder,
-    named_pictures,
-)
+from mapspeak.memory.alignment.keeping import MapComparison, MapKeeper
+from mapspeak.memory.episodes.observation import EpisodePage, EpisodeQuery, ObservationKind, named_pictures
+from mapspeak.memory.episodes.store import EpisodeStore, memory_folder
+from mapspeak.memory.episodes.textindex import VectorRank
 from mapspeak.memory.events import Event
-from mapspeak.memory.search import Embedder, find_model
+from mapspeak.memory.search.meaningindex import Embedder, find_model
 from mapspeak.places.relations.choosing import CheckedGoal, choose_goal
 from mapspeak.robot import CameraPicture, Cause, CauseCode, Robot
 from mapspeak.ros.port import RosConnection, started_over

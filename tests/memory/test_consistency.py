@@ -4,8 +4,9 @@ from dataclasses import replace
 from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint
-from mapspeak.memory.consistency import FindingKind, MemoryFinding, check_memory, judge_trust
-from mapspeak.memory.things import Things, find_things
+from mapspeak.memory.consistency.checking import check_memory
+from mapspeak.memory.consistency.findings import FindingKind, MemoryFinding, judge_trust
+from mapspeak.memory.things.finding import Things, find_things
 from mapspeak.spatial.paths import distances_from
 from mapspeak.spatial.rooms import find_rooms
 

@@ -10,7 +10,7 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory import LaserFan, LaserRing, build_ring
 from mapspeak.memory.laserfan import HALF_FAN_RAD, SAME_STAND_M, STEP_RAD
-from mapspeak.memory.things import NOISE
+from mapspeak.memory.things.thing import NOISE
 from waypoints import laser_fans
 
 HERE = Pose(1.0, 2.0, math.radians(90))

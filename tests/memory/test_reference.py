@@ -4,7 +4,7 @@ from pathlib import Path
 
 from mapspeak.geometry import Point
 from mapspeak.memory.events import Effect, Event
-from mapspeak.memory.store import parse_document
+from mapspeak.memory.store.document import parse_document
 from mapspeak.memory.store.eventschema import event_data
 from mapspeak.memory.store.schema import record_data
 

@@ -10,7 +10,7 @@ from fakes import two_rooms
 from mapspeak.errors import ConfigError, GoalError
 from mapspeak.geometry import Point
 from mapspeak.memory import Landmark, SemanticMap, Waypoint
-from mapspeak.memory.search import Basis, EntryKind, Verdict
+from mapspeak.memory.search.answer import Basis, EntryKind, Verdict
 from mapspeak.places.naming import AmbiguousPlaceError
 from mapspeak.places.recall.asking import RecallDoubt, RecallQuery, recall
 from mapspeak.places.relations.choosing import check_place, find_place

@@ -5,7 +5,7 @@ import pytest
 from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import SemanticMap, Waypoint
-from mapspeak.memory.search import Verdict
+from mapspeak.memory.search.answer import Verdict
 from mapspeak.places.recall.asking import RecallQuery, recall
 from mapspeak.worldmodel.model import WorldModel
 from remembering import look

@@ -12,7 +12,8 @@ from mcp.client import Client
 from fakes import FakeRobot, two_rooms
 from guarding import make_guard
 from mapspeak.geometry import Pose
-from mapspeak.memory.episodes import EpisodeStore, Observation, ObservationKind, memory_folder
+from mapspeak.memory.episodes.observation import Observation, ObservationKind
+from mapspeak.memory.episodes.store import EpisodeStore, memory_folder
 from served import connect, pictures_of, text_of
 
 pytestmark = pytest.mark.anyio

@@ -14,7 +14,8 @@ from mapspeak.errors import ConfigError
 
 if TYPE_CHECKING:
     from mapspeak.memory import SemanticMap, SemanticMapStore
-    from mapspeak.memory.episodes import EpisodeMatch, EpisodeQuery, EpisodeStore, Rank
+    from mapspeak.memory.episodes.observation import EpisodeMatch, EpisodeQuery, Rank
+    from mapspeak.memory.episodes.store import EpisodeStore
 
 
 MEMORY_OPTION = click.option(
@@ -82,7 +83,7 @@ def rename_memory(old: Path, new: Path) -> None:
         old: The file as it was named once.
         new: The file as it is named today.
     """
-    from mapspeak.memory.episodes import memory_folder  # noqa: PLC0415 - heavy
+    from mapspeak.memory.episodes.store import memory_folder  # noqa: PLC0415 - heavy
 
     if old == new or not old.exists():
         return
@@ -178,7 +179,7 @@ def read_place(text: str) -> tuple[float, ...]:
 @JSON_OPTION
 def episodes(semantic_map: Path | None, as_json: bool, **asked: Any) -> None:  # noqa: ANN401, FBT001 - click's options
     """List observations that pass every filter, each with the reason why."""
-    from mapspeak.memory.episodes import EpisodeStore, memory_folder  # noqa: PLC0415 - heavy
+    from mapspeak.memory.episodes.store import EpisodeStore, memory_folder  # noqa: PLC0415 - heavy
 
     store = EpisodeStore(memory_folder(find_memory(semantic_map)))
     query = _query(**asked)
@@ -206,7 +207,11 @@ def _query(
     **same: Any,  # noqa: ANN401 - what a query calls as the command line does
 ) -> "EpisodeQuery":
     from mapspeak.geometry import Point  # noqa: PLC0415 - heavy; help must be quick
-    from mapspeak.memory.episodes import EpisodeOrder, EpisodeQuery, ObservationKind  # noqa: PLC0415
+    from mapspeak.memory.episodes.observation import (  # noqa: PLC0415
+        EpisodeOrder,
+        EpisodeQuery,
+        ObservationKind,
+    )
 
     if near is not None and near_words is not None:
         raise click.UsageError("Give --near or --near-words, not both.")
@@ -225,8 +230,10 @@ def _query(
 
 def _rank(store: "EpisodeStore") -> "Rank | None":
     """Compare meanings where a model is installed; else words are compared."""
-    from mapspeak.memory.episodes import VectorRank  # noqa: PLC0415 - heavy; help must be quick
-    from mapspeak.memory.search import find_model  # noqa: PLC0415
+    from mapspeak.memory.episodes.textindex import (  # noqa: PLC0415 - heavy; help must be quick
+        VectorRank,
+    )
+    from mapspeak.memory.search.meaningindex import find_model  # noqa: PLC0415
 
     model = find_model()
     return None if model is None else VectorRank(store.database, model)

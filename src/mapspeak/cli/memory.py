@@ -23,8 +23,8 @@ from mapspeak.installation import say_install, shell_command
 
 if TYPE_CHECKING:
     from mapspeak.memory import SemanticMap, Waypoint
-    from mapspeak.memory.exchange import Union
-    from mapspeak.memory.search import EntryCandidate
+    from mapspeak.memory.exchange.uniting import Union
+    from mapspeak.memory.search.answer import EntryCandidate
 
 
 @click.command()
@@ -40,7 +40,9 @@ def export(
     out: Path | None, anchor: tuple[float, float, float] | None, semantic_map: Path | None
 ) -> None:
     """Write the places as GeoJSON."""
-    from mapspeak.memory.exchange import to_geojson  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.memory.exchange.geojson import (  # noqa: PLC0415 - heavy; help must be quick
+        to_geojson,
+    )
     from mapspeak.spatial.areagraph import MapAnchor  # noqa: PLC0415
 
     if out is not None and out.suffix.lower() not in (".geojson", ".json"):
@@ -61,7 +63,8 @@ def export(
 def import_(file: Path, semantic_map: Path | None) -> None:
     """Join exported, perhaps edited GeoJSON into the semantic map file: all of it or nothing."""
     from mapspeak.memory import SemanticMapStore  # noqa: PLC0415 - heavy; help must be quick
-    from mapspeak.memory.exchange import from_geojson, merge_into  # noqa: PLC0415
+    from mapspeak.memory.exchange.geojson import from_geojson  # noqa: PLC0415
+    from mapspeak.memory.exchange.uniting import merge_into  # noqa: PLC0415
 
     try:
         text = file.read_text(encoding="utf-8-sig")
@@ -79,7 +82,9 @@ def import_(file: Path, semantic_map: Path | None) -> None:
 @click.option("--out", type=FILE, required=True, help="The new file; must not be there yet.")
 def merge(first: Path, second: Path, out: Path) -> None:
     """Join two semantic map files of one map, and their observations, into a new one."""
-    from mapspeak.memory.exchange import merge_files  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.memory.exchange.uniting import (  # noqa: PLC0415 - heavy; help must be quick
+        merge_files,
+    )
 
     union, came = merge_files(first, second, out=out)
     _tell(union, out)
@@ -147,14 +152,12 @@ def find(
 
     Ends with 1 when nothing of the kind is remembered.
     """
-    from mapspeak.memory.episodes import memory_folder  # noqa: PLC0415 - heavy; help must be quick
-    from mapspeak.memory.search import (  # noqa: PLC0415
-        EntryIndex,
-        TextVectors,
-        Verdict,
-        find_model,
-        list_entries,
+    from mapspeak.memory.episodes.store import (  # noqa: PLC0415 - heavy; help must be quick
+        memory_folder,
     )
+    from mapspeak.memory.search.answer import Verdict, list_entries  # noqa: PLC0415
+    from mapspeak.memory.search.index import EntryIndex  # noqa: PLC0415
+    from mapspeak.memory.search.meaningindex import TextVectors, find_model  # noqa: PLC0415
 
     store = open_memory(semantic_map)
     places = read_places(store)
@@ -213,10 +216,10 @@ for command in (episodes, export, import_, merge):
 
 
 def _findings(places: "SemanticMap", map_file: Path) -> list[dict[str, object]]:
-    from mapspeak.memory.consistency import (  # noqa: PLC0415 - heavy; help must be quick
+    from mapspeak.memory.consistency.checking import (  # noqa: PLC0415 - heavy; help must be quick
         check_memory,
     )
-    from mapspeak.memory.things import find_things  # noqa: PLC0415
+    from mapspeak.memory.things.finding import find_things  # noqa: PLC0415
     from mapspeak.server.text.findings import say_finding  # noqa: PLC0415
     from mapspeak.spatial.mapfiles import load_map  # noqa: PLC0415
     from mapspeak.spatial.rooms import find_rooms  # noqa: PLC0415
@@ -261,7 +264,7 @@ def _facts_of(places: "SemanticMap") -> dict[str, object]:
 
 
 def _facts(place: "Waypoint") -> dict[str, object]:
-    from mapspeak.memory.exchange import facts_of, place_of  # noqa: PLC0415 - heavy
+    from mapspeak.memory.exchange.geojson import facts_of, place_of  # noqa: PLC0415 - heavy
 
     point, facts = place_of(place), facts_of(place)
     return {"name": facts.pop("name"), "x_m": point.x, "y_m": point.y} | facts

@@ -7,12 +7,8 @@ from datetime import datetime
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory import Waypoint
-from mapspeak.memory.episodes import (
-    EpisodeStore,
-    Observation,
-    ObservationKind,
-    observation_of,
-)
+from mapspeak.memory.episodes.observation import Observation, ObservationKind, observation_of
+from mapspeak.memory.episodes.store import EpisodeStore
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

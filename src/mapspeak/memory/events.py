@@ -89,8 +89,8 @@ class Event:
         until: The first moment after; None where nobody knows.
 
     Raises:
-        SemanticMapError: It has no words, an id that is none, no place where it needs one, a time
-            without a zone, an outline that is none, or it ends before it begins.
+        SemanticMapError: It has no words, an id that is none, no place where it needs one, or it
+            ends before it begins.
     """
 
     text: str
@@ -113,17 +113,6 @@ class Event:
             self.effect is Effect.NONE or self.place or self.outlines,
             f"The event {self.told_text} is {self.effect}, but at no place",
             "Name the place, such as C1 or D2.",
-        )
-        _require(
-            all(len(outline) >= 3 for outline in self.outlines),
-            f"The outline of the event {self.told_text} has fewer than three corners",
-            "Give three corners or more.",
-        )
-        times = (self.begins, self.until, self.recorded_at)
-        _require(
-            all(time is None or time.tzinfo is not None for time in times),
-            f"A time of the event {self.told_text} has no zone",
-            "Write times like 2026-11-22T14:00:00+01:00.",
         )
         _require(
             self.begins is None or self.until is None or self.begins < self.until,

@@ -81,17 +81,7 @@ def words_of(entry: str) -> frozenset[str]:
 
 @dataclass(frozen=True, slots=True)
 class _Patterns:
-    """What texts are searched for.
-
-    Attributes:
-        told: Words that the thing itself speaks.
-        carrier: A thing that words stand on.
-        after_carrier: What those words are.
-        names_a_carrier: A text of such a thing alone.
-        doubt: That somebody does not know.
-        order: What tells a reader what to do.
-        addressed: What tells a robot so.
-    """
+    """What texts are searched for: a carrier is a thing that words stand on."""
 
     told: re.Pattern[str]
     carrier: re.Pattern[str]

@@ -1,6 +1,5 @@
 """A remembered place, what is seen from it, and all places of one map (paper eq. 8 and 9)."""
 
-import math
 from dataclasses import dataclass, replace
 from datetime import datetime
 from enum import StrEnum
@@ -38,8 +37,7 @@ class Landmark:
         laser: What the robot's laser met around that direction, from that pose.
 
     Raises:
-        SemanticMapError: The label is empty, a number is not finite or below zero, or the time has
-            no zone.
+        SemanticMapError: The label is empty.
     """
 
     label: str
@@ -59,15 +57,7 @@ class Landmark:
         object.__setattr__(self, "label", _required_line(self.label, "A landmark's label"))
         _clean_lines(self, "purpose", "note", "picture", "range_from")
         if self.bearing_rad is not None:
-            require(math.isfinite(self.bearing_rad), f"The bearing of {self.label!r}", "an angle")
             object.__setattr__(self, "bearing_rad", wrap_angle(self.bearing_rad))
-        if self.range_m is not None:
-            is_distance = math.isfinite(self.range_m) and self.range_m >= 0
-            require(is_distance, f"The range of {self.label!r}", "0 m or more")
-        if self.pose is not None:
-            is_finite = self.pose.is_finite()
-            require(is_finite, f"The pose of {self.label!r}", "three finite numbers")
-        _require_time(self.stamp_s, self.recorded_at, self.label)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,7 +76,7 @@ class Waypoint:
         picture: The picture that was taken there, by its relative name.
 
     Raises:
-        SemanticMapError: The name is empty, the pose or stamp not finite, or the time has no zone.
+        SemanticMapError: The name is empty.
     """
 
     name: str
@@ -106,9 +96,7 @@ class Waypoint:
         object.__setattr__(self, "description", clean_text(self.description))
         features = (clean_line(feature) for feature in self.geometric_features)
         object.__setattr__(self, "geometric_features", tuple(filter(None, features)))
-        require(self.pose.is_finite(), f"The pose of {self.name!r}", "three finite numbers")
         _clean_lines(self, "room_id", "picture")
-        _require_time(self.stamp_s, self.recorded_at, self.name)
 
     @property
     def landmarks(self) -> tuple[Landmark, ...]:
@@ -202,26 +190,10 @@ def _clean_lines(value: Landmark | Waypoint, *names: str) -> None:
             object.__setattr__(value, name, clean_line(text) or None)
 
 
-def _require_time(stamp_s: float | None, recorded_at: datetime | None, name: str) -> None:
-    if stamp_s is not None:
-        is_finite = math.isfinite(stamp_s)
-        require(is_finite, f"The stamp of {name!r}", "a finite number of seconds")
-    if recorded_at is not None:
-        require(recorded_at.tzinfo is not None, f"The time of {name!r}", "a time with its zone")
-
-
 def _required_line(text: str, what: str) -> str:
     line = clean_line(text)
-    require(bool(line), what, "at least one visible character")
+    if not line:
+        message = f"{what} is not at least one visible character."
+        hint = "Give at least one visible character and write it again."
+        raise SemanticMapError(message, hint=hint)
     return line
-
-
-def require(is_right: object, what: str, expected: str) -> None:
-    """Refuse what is not as expected.
-
-    Raises:
-        SemanticMapError: It is not.
-    """
-    if not is_right:
-        message = f"{what} is not {expected}."
-        raise SemanticMapError(message, hint=f"Give {expected} and write it again.")

@@ -9,7 +9,7 @@ from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.memory import name_key
 from mapspeak.memory.quoting import quote_name
-from mapspeak.memory.search import Answer, Basis, Verdict
+from mapspeak.memory.search.answer import Answer, Basis, Verdict
 from mapspeak.places.goalcheck import FARTHEST_M
 from mapspeak.places.standing import stand_before
 from mapspeak.spatial.frontiers import Frontier

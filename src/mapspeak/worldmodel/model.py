@@ -11,8 +11,13 @@ import numpy as np
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import SemanticMap
-from mapspeak.memory.consistency import check_memory
-from mapspeak.memory.things import find_approach, find_fronts, find_least_path_m, measure_faced
+from mapspeak.memory.consistency.checking import check_memory
+from mapspeak.memory.things.approach import (
+    find_approach,
+    find_fronts,
+    find_least_path_m,
+    measure_faced,
+)
 from mapspeak.robot import PoseDoubt
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import (

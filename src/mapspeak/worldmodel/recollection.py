@@ -14,18 +14,12 @@ from pathlib import Path
 from mapspeak.errors import ConfigError
 from mapspeak.geometry import Point
 from mapspeak.memory import SemanticMap, Waypoint
-from mapspeak.memory.consistency import MemoryFinding, Trust, judge_trust
-from mapspeak.memory.search import (
-    Answer,
-    Basis,
-    Embedder,
-    Entry,
-    EntryIndex,
-    EntryKind,
-    TextVectors,
-    list_entries,
-)
-from mapspeak.memory.things import Category, Thing, Things, find_things, name_the_same
+from mapspeak.memory.consistency.findings import MemoryFinding, Trust, judge_trust
+from mapspeak.memory.search.answer import Answer, Basis, Entry, EntryKind, list_entries
+from mapspeak.memory.search.index import EntryIndex
+from mapspeak.memory.search.meaningindex import Embedder, TextVectors
+from mapspeak.memory.things.finding import Things, find_things
+from mapspeak.memory.things.thing import Category, Thing, name_the_same
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.rooms.identity import match_best_first
 

@@ -10,14 +10,10 @@ from alignment_maps import HOUSE, OTHER_HOUSE, fine, moved
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMapStore, Waypoint
-from mapspeak.memory.alignment import Certainty, MapKeeper, MapRelation
-from mapspeak.memory.alignment.keeping import FIRST_NAME
-from mapspeak.memory.episodes import (
-    EpisodeStore,
-    Observation,
-    ObservationKind,
-    memory_folder,
-)
+from mapspeak.memory.alignment.fitting import Certainty
+from mapspeak.memory.alignment.keeping import FIRST_NAME, MapKeeper, MapRelation
+from mapspeak.memory.episodes.observation import Observation, ObservationKind
+from mapspeak.memory.episodes.store import EpisodeStore, memory_folder
 from mapspeak.memory.events import Effect, Event
 from mapspeak.server.text.maps import say_receipt
 from mapspeak.spatial import OccupancyGrid

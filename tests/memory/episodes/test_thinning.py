@@ -8,15 +8,9 @@ from hypothesis import strategies as st
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
-from mapspeak.memory.episodes import (
-    EpisodeQuery,
-    EpisodeStore,
-    Observation,
-    ObservationKind,
-    StoredPicture,
-    ThinningRule,
-    choose_dropped,
-)
+from mapspeak.memory.episodes.observation import EpisodeQuery, Observation, ObservationKind
+from mapspeak.memory.episodes.pictures import StoredPicture, ThinningRule, choose_dropped
+from mapspeak.memory.episodes.store import EpisodeStore
 
 NOW = datetime(2026, 11, 20, 12, 30, tzinfo=UTC)
 RULE = ThinningRule()

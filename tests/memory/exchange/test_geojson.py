@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint, name_key
-from mapspeak.memory.exchange import from_geojson, to_geojson
+from mapspeak.memory.exchange.geojson import from_geojson, to_geojson
 from mapspeak.memory.store.schema import record_data
 from mapspeak.spatial.areagraph import MapAnchor
 from waypoints import waypoints

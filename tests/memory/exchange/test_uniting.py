@@ -9,7 +9,7 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, SemanticMap, SemanticMapStore, Waypoint, name_key
 from mapspeak.memory.events import Effect, Event
-from mapspeak.memory.exchange import merge_files, merge_into, unite
+from mapspeak.memory.exchange.uniting import merge_files, merge_into, unite
 from waypoints import waypoints
 
 MONDAY = datetime(2026, 11, 16, 9, 0, tzinfo=UTC)

@@ -10,19 +10,18 @@ from hypothesis import strategies as st
 from embedding import ConceptEmbedder
 from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint, name_key
-from mapspeak.memory.search import (
-    WORDS_ONLY,
+from mapspeak.memory.search.answer import (
     Answer,
     Basis,
     Entry,
-    EntryIndex,
     EntryKind,
     MatchField,
     MatchKind,
-    TextVectors,
     Verdict,
     list_entries,
 )
+from mapspeak.memory.search.index import WORDS_ONLY, EntryIndex
+from mapspeak.memory.search.meaningindex import TextVectors
 
 HERE = Pose(0.0, 0.0)
 MEMORY = SemanticMap(
@@ -342,15 +341,14 @@ def test_a_request_costs_one_embedding() -> None:
 
 def test_kept_vectors_are_used_by_the_same_model_only(tmp_path: Path) -> None:
     path = tmp_path / "vectors.npz"
-    first = TextVectors(ConceptEmbedder())
+    first = TextVectors(ConceptEmbedder(), kept=path)
     first.find(["ladder", "sink"])
-    first.write(path)
+    first.keep()
     again, other = ConceptEmbedder(), ConceptEmbedder()
     other.name = "another"
 
     for embedder in (again, other):
-        vectors = TextVectors(embedder)
-        vectors.read(path)
+        vectors = TextVectors(embedder, kept=path)
         vectors.find(["sink", "ladder"])
 
     assert again.asked == []
@@ -389,13 +387,12 @@ def test_kept_vectors_that_are_missing_or_broken_are_computed_again(
     path = tmp_path / "vectors.npz"
     if content is not None:
         path.write_bytes(content)
-    vectors = TextVectors(ConceptEmbedder())
 
-    vectors.read(path)
+    vectors = TextVectors(ConceptEmbedder(), kept=path)
 
     assert len(vectors) == 0
     vectors.find(["ladder"])
-    vectors.write(path)
+    vectors.keep()
     assert [each.name for each in tmp_path.iterdir()] == ["vectors.npz"]
 
 

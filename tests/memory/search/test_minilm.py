@@ -5,7 +5,7 @@ import pytest
 
 from embedding import shipped_model
 from mapspeak.errors import ConfigError
-from mapspeak.memory.search import Embedder
+from mapspeak.memory.search.meaningindex import Embedder
 
 TEXTS = ["ladder", "sink", "something to reach the top shelf", "anvil", "a much longer text, that"]
 

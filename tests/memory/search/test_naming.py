@@ -5,15 +5,10 @@ from functools import cache
 import pytest
 
 from embedding import shipped_model
-from mapspeak.memory.search import (
-    Answer,
-    Entry,
-    EntryIndex,
-    EntryKind,
-    TextVectors,
-    Verdict,
-)
+from mapspeak.memory.search.answer import Answer, Entry, EntryKind, Verdict
+from mapspeak.memory.search.index import EntryIndex
 from mapspeak.memory.search.kinds import calls_by_name, is_carrier, says_purpose
+from mapspeak.memory.search.meaningindex import TextVectors
 
 OTHERS = ("desk", "whiteboard")
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mapspeak.memory.search import MatchKind
+from mapspeak.memory.search.answer import MatchKind
 from mapspeak.memory.search.wordindex import LookAlikes, Vocabulary, content_words
 
 WORDS = Vocabulary(["charger", "charging", "dishwasher", "kitchen", "sink", "vegetable"])

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory import Waypoint
-from mapspeak.memory.store import parse_document, with_waypoint
+from mapspeak.memory.store.document import parse_document
+from mapspeak.memory.store.rewriting import with_waypoint
 
 FILE = b"""\
 # places #1

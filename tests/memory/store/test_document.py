@@ -5,7 +5,7 @@ import pytest
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory import Confidence, Landmark, SemanticMap
-from mapspeak.memory.store import parse_document
+from mapspeak.memory.store.document import parse_document
 
 
 def read(text: str) -> SemanticMap:

@@ -10,14 +10,9 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Waypoint
 from mapspeak.memory.events import Effect, Event
-from mapspeak.memory.store import (
-    MapDocument,
-    moved,
-    parse_document,
-    with_event,
-    with_waypoint,
-)
+from mapspeak.memory.store.document import MapDocument, parse_document
 from mapspeak.memory.store.eventschema import event_data
+from mapspeak.memory.store.rewriting import moved, with_event, with_waypoint
 from mapspeak.memory.store.schema import record_data
 from waypoints import _LINES, waypoints
 

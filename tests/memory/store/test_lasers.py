@@ -7,8 +7,9 @@ import pytest
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, LaserFan, Waypoint
-from mapspeak.memory.store import MapDocument, moved, parse_document, with_waypoint
+from mapspeak.memory.store.document import MapDocument, parse_document
 from mapspeak.memory.store.layout import read_plain_record
+from mapspeak.memory.store.rewriting import moved, with_waypoint
 
 FAN = "from -4.0 to 4.0 deg at 2.2 2.1 - >20 3.4 m"
 FILE = f"""\

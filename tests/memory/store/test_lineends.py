@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 from mapspeak.geometry import Pose
 from mapspeak.memory import Waypoint
 from mapspeak.memory.events import Event
-from mapspeak.memory.store import parse_document, with_event, with_waypoint
+from mapspeak.memory.store.document import parse_document
 from mapspeak.memory.store.layout import LineEnds
+from mapspeak.memory.store.rewriting import with_event, with_waypoint
 
 RECORD = b"  - name: dock\n    pose: {x: 1.00, y: 2.00, yaw_deg: 0.0}\n"
 LIKE_UNIX = b"version: 1\r\n# own comment\nwaypoints:\n" + RECORD + b"other: x\r\nmine: y\n"

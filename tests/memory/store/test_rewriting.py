@@ -9,14 +9,8 @@ from ruamel.yaml.tokens import ScalarToken
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, Waypoint, name_key
-from mapspeak.memory.store import (
-    MapDocument,
-    bound_to,
-    moved,
-    parse_document,
-    with_waypoint,
-    without_waypoint,
-)
+from mapspeak.memory.store.document import MapDocument, parse_document
+from mapspeak.memory.store.rewriting import bound_to, moved, with_waypoint, without_waypoint
 from mapspeak.memory.store.schema import record_data
 from waypoints import waypoints
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose
-from mapspeak.memory.things import build_sight_map, find_approach, measure_faced
+from mapspeak.memory.things.approach import find_approach, measure_faced
+from mapspeak.memory.things.sight import build_sight_map
 from mapspeak.spatial.grid import FloatArray
 from mapspeak.spatial.paths import distances_from
 

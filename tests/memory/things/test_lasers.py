@@ -10,9 +10,10 @@ from drawing import grid_from_text
 from fakes import scan_of
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint, build_ring
-from mapspeak.memory.things import NOISE, Thing, build_sight_map, find_things
+from mapspeak.memory.things.finding import find_things
 from mapspeak.memory.things.likelihood import ViewLikelihood, build_outlook, weigh_view
-from mapspeak.memory.things.sight import SightMap, find_log_priors, look_around
+from mapspeak.memory.things.sight import SightMap, build_sight_map, find_log_priors, look_around
+from mapspeak.memory.things.thing import NOISE, Thing
 from mapspeak.spatial import OccupancyGrid
 
 CELL_M = 0.1

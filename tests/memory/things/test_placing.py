@@ -5,7 +5,8 @@ import pytest
 from drawing import grid_from_text
 from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint
-from mapspeak.memory.things import Thing, find_things
+from mapspeak.memory.things.finding import find_things
+from mapspeak.memory.things.thing import Thing
 
 CORRIDOR = """
     ##################################################

@@ -9,14 +9,10 @@ from hypothesis import strategies as st
 from drawing import grid_from_text
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMap, Waypoint, merge_waypoint
-from mapspeak.memory.things import (
-    Category,
-    Thing,
-    build_sight_map,
-    find_approach,
-    find_things,
-    name_the_same,
-)
+from mapspeak.memory.things.approach import find_approach
+from mapspeak.memory.things.finding import find_things
+from mapspeak.memory.things.sight import build_sight_map
+from mapspeak.memory.things.thing import Category, Thing, name_the_same
 from mapspeak.memory.waypoint import Confidence
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import distances_from

@@ -5,9 +5,8 @@ import pytest
 
 from mapspeak.geometry import Point
 from mapspeak.memory import Landmark
-from mapspeak.memory.consistency import FindingKind, MemoryFinding, Trust
-from mapspeak.memory.things import Thing, View
-from mapspeak.memory.things.thing import Category
+from mapspeak.memory.consistency.findings import FindingKind, MemoryFinding, Trust
+from mapspeak.memory.things.thing import Category, Thing, View
 from mapspeak.server.text.findings import say_conflict, say_finding, say_support, say_trust
 
 VIEW = View(

@@ -8,8 +8,12 @@ import pytest
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark
-from mapspeak.memory.episodes import EpisodeFilter, EpisodeMatch
-from mapspeak.memory.episodes.observation import Observation, ObservationKind
+from mapspeak.memory.episodes.observation import (
+    EpisodeFilter,
+    EpisodeMatch,
+    Observation,
+    ObservationKind,
+)
 from mapspeak.server.text.episodes import say_reasons
 from mapspeak.server.text.memory import say_episode
 from mapspeak.server.text.things import say_landmark

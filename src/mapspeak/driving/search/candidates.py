@@ -11,7 +11,7 @@ from mapspeak.driving.search.evidence import Opinions, weight_of
 from mapspeak.driving.search.seenfloor import REACH_M, SeenFloor
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory import TakenPicture
-from mapspeak.memory.search import Verdict
+from mapspeak.memory.search.answer import Verdict
 from mapspeak.places.naming import Place
 from mapspeak.places.relations.choosing import check_place
 from mapspeak.spatial.frontiers import Frontier

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import SemanticMap, TakenPicture
-from mapspeak.memory.search import Entry, EntryIndex, EntryKind
+from mapspeak.memory.search.answer import Entry, EntryKind
+from mapspeak.memory.search.index import EntryIndex
 
 LEAST_SAID_RATIO = 0.25
 """Of what is looked for, words say at least so much that speak of it.

@@ -24,8 +24,9 @@ from mapspeak.memory.alignment.fitting import (
     find_fit,
 )
 from mapspeak.memory.alignment.surfaces import MapAgreement, MapSurfaces, judge
-from mapspeak.memory.episodes import EpisodeStore
-from mapspeak.memory.store import MapDocument, moved
+from mapspeak.memory.episodes.store import EpisodeStore
+from mapspeak.memory.store.document import MapDocument
+from mapspeak.memory.store.rewriting import moved
 from mapspeak.memory.store.semanticmap import SemanticMapStore
 from mapspeak.spatial import UNKNOWN, OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map, write_map

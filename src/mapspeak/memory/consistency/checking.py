@@ -3,15 +3,15 @@
 import math
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import groupby, pairwise
 
 import numpy as np
 
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.memory.consistency.findings import FindingKind, MemoryFinding
-from mapspeak.memory.things import Thing, Things, name_the_same
+from mapspeak.memory.things.finding import Things
 from mapspeak.memory.things.sight import BODY_M, OWN_M
+from mapspeak.memory.things.thing import Thing, name_the_same
 from mapspeak.memory.waypoint import Landmark, SemanticMap, Waypoint
 from mapspeak.spatial import FREE_MAX, UNKNOWN, OccupancyGrid
 from mapspeak.spatial.grid import FloatArray
@@ -57,39 +57,41 @@ def check_rays(found: Things, waypoint: Waypoint) -> Iterator[MemoryFinding]:
     """Return landmarks of a waypoint that lie behind a wall or where nobody has seen."""
     for stand in waypoint.standpoints:
         for landmark in stand.landmarks:
-            if landmark.bearing_rad is not None:
-                yield from _check(found, stand, landmark, landmark.bearing_rad)
+            kind_at = None if landmark.bearing_rad is None else _check(found, stand, landmark)
+            if kind_at is not None:
+                kind, open_m = kind_at
+                yield MemoryFinding(
+                    kind=kind,
+                    waypoints=(waypoint.name,),
+                    label=landmark.label,
+                    told_m=landmark.range_m,
+                    open_m=open_m,
+                )
 
 
-def _check(
-    found: Things, waypoint: Waypoint, landmark: Landmark, bearing_rad: float
-) -> Iterator[MemoryFinding]:
-    pose = waypoint.pose
-    way = pose.yaw_rad + bearing_rad
-    ahead = Point(pose.x + math.cos(way), pose.y + math.sin(way))
-    open_m = found.open_m(waypoint, ahead)
+def _check(found: Things, stand: Waypoint, landmark: Landmark) -> tuple[FindingKind, float] | None:
+    """Return what is odd about a landmark's line of sight, and how far it is free; else None."""
+    way = stand.pose.yaw_rad + (landmark.bearing_rad or 0.0)
+    open_m = _open_m(found, stand, way)
     if open_m <= OWN_M:
-        return  # It stands in an obstacle, which is another finding.
-    if _ends_in_unknown(found, waypoint, way, open_m):
-        if landmark.range_m is None or landmark.range_m > open_m:
-            yield _landmark_finding(FindingKind.THROUGH_UNKNOWN, waypoint, landmark, open_m)
-        return
+        return None  # It stands in an obstacle, which is another finding.
+    if _ends_in_unknown(found, stand, way, open_m):
+        is_beyond = landmark.range_m is None or landmark.range_m > open_m
+        return (FindingKind.THROUGH_UNKNOWN, open_m) if is_beyond else None
     if landmark.range_m is None:
-        return
+        return None
     noise = found.sight.noise
     spread_m = noise.range_m + noise.range_ratio * landmark.range_m
-    if landmark.range_m > _widest_m(found, waypoint, way) + BODY_M + N_SIGMAS * spread_m:
-        yield _landmark_finding(FindingKind.BEHIND_WALL, waypoint, landmark, open_m)
+    # How far one sees at most within the noise of the direction.
+    turns = (-noise.bearing_rad, 0.0, noise.bearing_rad)
+    widest_m = max(_open_m(found, stand, way + turn_rad) for turn_rad in turns)
+    is_behind = landmark.range_m > widest_m + BODY_M + N_SIGMAS * spread_m
+    return (FindingKind.BEHIND_WALL, open_m) if is_behind else None
 
 
-def _widest_m(found: Things, waypoint: Waypoint, way: float) -> float:
-    """Return how far one sees at most within the noise of a direction."""
-    noise_rad = found.sight.noise.bearing_rad
-    pose = waypoint.pose
-    return max(
-        found.open_m(waypoint, Point(pose.x + math.cos(turned), pose.y + math.sin(turned)))
-        for turned in (way - noise_rad, way, way + noise_rad)
-    )
+def _open_m(found: Things, stand: Waypoint, way: float) -> float:
+    pose = stand.pose
+    return found.open_m(stand, Point(pose.x + math.cos(way), pose.y + math.sin(way)))
 
 
 def _ends_in_unknown(found: Things, waypoint: Waypoint, way: float, open_m: float) -> bool:
@@ -103,18 +105,6 @@ def _ends_in_unknown(found: Things, waypoint: Waypoint, way: float, open_m: floa
     around = grid.cells[max(end.row - 1, 0) : end.row + 2, max(end.col - 1, 0) : end.col + 2]
     # A ray that grazes a wall may end in the unknown behind it.
     return int(grid.cells[end.row, end.col]) == UNKNOWN and not (around > FREE_MAX).any()
-
-
-def _landmark_finding(
-    kind: FindingKind, waypoint: Waypoint, landmark: Landmark, open_m: float
-) -> MemoryFinding:
-    return MemoryFinding(
-        kind=kind,
-        waypoints=(waypoint.name,),
-        label=landmark.label,
-        told_m=landmark.range_m,
-        open_m=open_m,
-    )
 
 
 TWIN_M = 0.3
@@ -213,19 +203,6 @@ LEAST_OF_MANY = 3
 """From so many records on, most of which are off, it is the ids that are others."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Filing:
-    """A record with the room that it names and the one that it stands in."""
-
-    waypoint: Waypoint
-    told: Region
-    here: Region
-
-    @property
-    def is_off(self) -> bool:
-        return self.told.id != self.here.id
-
-
 def find_misfiled(
     rooms: RoomMap, waypoints: Iterable[Waypoint]
 ) -> dict[str, tuple[Region, Region]]:
@@ -234,46 +211,41 @@ def find_misfiled(
     Args:
         waypoints: All records, since together they tell whether ids have changed.
     """
-    filed = [each for waypoint in waypoints for each in _file(rooms, waypoint)]
-    off = [each for each in filed if each.is_off]
+    filed = [(each, *filing) for each in waypoints if (filing := _file(rooms, each)) is not None]
+    off = [each for each in filed if each[1].id != each[2].id]
     if len(off) >= LEAST_OF_MANY and 2 * len(off) > len(filed):
         return {}
-    moved = _find_moved(filed)
+    moved = _find_moved((told.id, here.id) for _, told, here in filed)
     return {
-        each.waypoint.name: (each.told, each.here)
-        for each in off
-        if moved.get(each.told.id) != each.here.id and not _may_be_recut(rooms, each)
+        waypoint.name: (told, here)
+        for waypoint, told, here in off
+        if moved.get(told.id) != here.id
+        # The border between both rooms may be found anew where it is near or a wide opening.
+        and not any(door.width_m > DOOR_M for door in rooms.doors_between(told.id, here.id))
+        and _distance_m(rooms, told, waypoint.pose.point) > BORDER_M
     }
 
 
-def _file(rooms: RoomMap, waypoint: Waypoint) -> Iterable[_Filing]:
+def _file(rooms: RoomMap, waypoint: Waypoint) -> tuple[Region, Region] | None:
+    """Return the room that a record names and the one that it stands in, where both are known."""
     told = rooms.find_region(waypoint.room_id) if waypoint.room_id else None
     point = waypoint.pose.point
     is_near = max(abs(point.x), abs(point.y)) < FARTHEST_M
     here = rooms.find_region_at(point) if is_near else None
-    if told is not None and here is not None:
-        yield _Filing(waypoint, told, here)
+    return None if told is None or here is None else (told, here)
 
 
-def _find_moved(filed: Iterable[_Filing]) -> dict[str, str]:
+def _find_moved(filed: Iterable[tuple[str, str]]) -> dict[str, str]:
     """Return ids under which several records, and more than stand there, are in another room."""
     standing: defaultdict[str, Counter[str]] = defaultdict(Counter)
-    for each in filed:
-        standing[each.told.id][each.here.id] += 1
+    for told, here in filed:
+        standing[told][here] += 1
     commonest = {told: count.most_common(1)[0] for told, count in standing.items()}
     return {
         told: here
         for told, (here, n) in commonest.items()
         if n > 1 and n > standing[told][told] and here != told
     }
-
-
-def _may_be_recut(rooms: RoomMap, filing: _Filing) -> bool:
-    """Return True where the border between both rooms is near or a wide opening."""
-    doors = rooms.doors_between(filing.told.id, filing.here.id)
-    if any(door.width_m > DOOR_M for door in doors):
-        return True
-    return _distance_m(rooms, filing.told, filing.waypoint.pose.point) <= BORDER_M
 
 
 def _distance_m(rooms: RoomMap, region: Region, point: Point) -> float:

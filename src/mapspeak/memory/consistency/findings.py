@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from mapspeak.geometry import Point
-from mapspeak.memory.things import Thing, View
+from mapspeak.memory.things.thing import Thing, View
 
 
 class FindingKind(StrEnum):

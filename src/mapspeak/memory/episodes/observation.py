@@ -10,7 +10,7 @@ from enum import StrEnum
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory.quoting import clean_line, clean_text
-from mapspeak.memory.waypoint import SemanticMap, Waypoint, require
+from mapspeak.memory.waypoint import SemanticMap, Waypoint
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _ID_BYTES = 6
@@ -37,9 +37,6 @@ class Observation:
         room_id: The room or corridor it was observed from, by the id that it had then.
         id: The same for the same content, so that writing twice is writing once; made from the
             content unless given.
-
-    Raises:
-        SemanticMapError: The time has no zone, or a number is not finite.
     """
 
     recorded_at: datetime
@@ -54,11 +51,6 @@ class Observation:
     id: str = ""
 
     def __post_init__(self) -> None:
-        is_timed = self.recorded_at.tzinfo is not None
-        require(is_timed, "The time of an observation", "a time with its zone")
-        require(self.pose.is_finite(), "The pose of an observation", "three finite numbers")
-        is_stamped = self.stamp_s is None or math.isfinite(self.stamp_s)
-        require(is_stamped, "The stamp of an observation", "a finite number of seconds")
         labels = dict.fromkeys(filter(None, map(clean_line, self.labels)))
         object.__setattr__(self, "text", clean_text(self.text))
         object.__setattr__(self, "labels", tuple(labels))
@@ -91,9 +83,6 @@ def microseconds_of(time: datetime) -> int:
     return (time - _EPOCH) // timedelta(microseconds=1)
 
 
-MOST_ROWS = 1000
-MOST_HOPS = 5
-
 Rank = Callable[[str, Sequence[str]], Sequence[float]]
 """Says of each text how well it fits a query: up to 1; 0 or less where it does not fit."""
 
@@ -120,8 +109,8 @@ class EpisodeQuery:
         as_of: Only the first so many that were ever written, so that pages do not shift.
 
     Raises:
-        SemanticMapError: A number is out of bounds, a time has no zone, an order has nothing to
-            order by, or queries are nested more than five deep.
+        SemanticMapError: A radius has no place or is not above 0, or an order has nothing to order
+            by.
     """
 
     words: str | None = None
@@ -139,26 +128,12 @@ class EpisodeQuery:
     as_of: int | None = None
 
     def __post_init__(self) -> None:
-        is_number = 1 <= self.limit <= MOST_ROWS and self.offset >= 0
-        _require_argument(is_number, "limit or offset", f"1 to {MOST_ROWS}, and 0 or more")
         is_radius = self.radius_m is None or (math.isfinite(self.radius_m) and self.radius_m > 0)
-        _require_argument(is_radius, "radius_m", "more than 0 m")
-        _require_argument(
-            self.radius_m is None or self.near is not None, "near", "given with radius_m"
-        )
-        for name, time in (("since", self.since), ("until", self.until)):
-            _require_argument(time is None or time.tzinfo is not None, name, "a time with its zone")
+        _require(is_radius, "radius_m", "more than 0 m")
+        _require(self.radius_m is None or self.near is not None, "near", "given with radius_m")
         needed = {EpisodeOrder.BEST: self.words, EpisodeOrder.NEAREST: self.near}
         is_ordered = self.order is None or needed.get(self.order, True)
-        _require_argument(
-            is_ordered, "order", "one that words (best) or near (nearest) are given for"
-        )
-        _require_argument(self.n_hops <= MOST_HOPS, "near", f"nested at most {MOST_HOPS} deep")
-
-    @property
-    def n_hops(self) -> int:
-        """How many queries are nested in it."""
-        return 1 + self.near.n_hops if isinstance(self.near, EpisodeQuery) else 0
+        _require(is_ordered, "order", "one that words (best) or near (nearest) are given for")
 
     @property
     def effective_order(self) -> EpisodeOrder:
@@ -224,7 +199,7 @@ class EpisodePage:
     next_page: EpisodeQuery | None = None
 
 
-def _require_argument(is_right: object, what: str, expected: str) -> None:
+def _require(is_right: object, what: str, expected: str) -> None:
     if not is_right:
         raise SemanticMapError(f"{what} is not {expected}.", hint=f"Give {what} as {expected}.")
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from mapspeak.memory.episodes.database import EpisodeDatabase
 from mapspeak.memory.policy import words_of
-from mapspeak.memory.search import Embedder
 from mapspeak.memory.search.answer import KIND_WEIGHTS, MatchKind
+from mapspeak.memory.search.meaningindex import Embedder
 from mapspeak.memory.search.wordindex import (
     MIN_LETTERS,
     MIN_LIKENESS_RATIO,

@@ -6,17 +6,12 @@ from itertools import count
 from pathlib import Path
 
 from mapspeak.errors import SemanticMapError
-from mapspeak.memory.episodes import BroughtOver, bring_over
+from mapspeak.memory.episodes.store import BroughtOver, bring_over
 from mapspeak.memory.merging import merge_waypoint
 from mapspeak.memory.quoting import name_key
-from mapspeak.memory.store import (
-    MapDocument,
-    bound_to,
-    parse_document,
-    with_event,
-    with_waypoint,
-)
+from mapspeak.memory.store.document import MapDocument, parse_document
 from mapspeak.memory.store.durable import DurableFile
+from mapspeak.memory.store.rewriting import bound_to, with_event, with_waypoint
 from mapspeak.memory.store.schema import record_data
 from mapspeak.memory.store.semanticmap import SemanticMapStore
 from mapspeak.memory.waypoint import SemanticMap, Waypoint

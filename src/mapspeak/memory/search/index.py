@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mapspeak.memory.quoting import name_key
 from mapspeak.memory.search.answer import (
@@ -27,8 +26,8 @@ from mapspeak.memory.search.answer import (
     Thresholds,
     Verdict,
 )
-from mapspeak.memory.search.kinds import KindIndex, Missing, calls_by_name, says_purpose
-from mapspeak.memory.search.meaningindex import Likeness, MeaningIndex, TextVectors
+from mapspeak.memory.search.kinds import KindIndex, calls_by_name, says_purpose
+from mapspeak.memory.search.meaningindex import Floats, MeaningIndex, TextVectors
 from mapspeak.memory.search.wordindex import (
     AskedWords,
     LookAlikes,
@@ -66,22 +65,22 @@ class _Asked:
         common: The same, as they stand in what is commonly known.
         ratios: By all that is said and commonly known of the entry.
         said_ratios: By what is said of it alone.
-        likeness: Where meanings were compared.
-        missing: What else may be meant.
+        part_ratios: Where meanings were compared, by all that is said of any entry.
+        missing: A kind that is not remembered and may be meant, and how alike both are.
     """
 
     request: str
     words: tuple[AskedWords, ...]
     common: tuple[AskedWords, ...]
-    ratios: NDArray[np.float64]
-    said_ratios: NDArray[np.float64]
-    likeness: Likeness | None
-    missing: Missing | None
+    ratios: Floats
+    said_ratios: Floats
+    part_ratios: Floats | None
+    missing: tuple[str, float] | None
 
     def basis(self, number: int) -> Basis:
         if self.ratios[number] > _MOST_WITHOUT_NAME:
             return Basis.NAME
-        return Basis.WORDS if self.likeness is None else Basis.MEANING
+        return Basis.WORDS if self.part_ratios is None else Basis.MEANING
 
 
 class EntryIndex:
@@ -153,7 +152,7 @@ class EntryIndex:
 
     def _compare(self, query: str, understood: str, words: tuple[AskedWords, ...]) -> _Asked:
         common: tuple[AskedWords, ...] = ()
-        likeness, missing = None, None
+        part_ratios, missing = None, None
         if self._vectors is None or self._meanings is None or not _is_in_latin_letters(understood):
             said_ratios = self._words.score_ratios(words)
             ratios = said_ratios
@@ -163,15 +162,16 @@ class EntryIndex:
                 missing = self._kinds.find_missing_called(understood)
         else:
             vector = self._vectors.embedder.embed([understood])[0].astype(np.float64)
-            likeness, missing = self._meanings.compare(vector), self._kinds.find_missing(vector)
-            ratios, said_ratios = likeness.ratios, likeness.said_ratios
+            part_ratios, missing = self._meanings.compare(vector), self._kinds.find_missing(vector)
+            ratios = self._meanings.ratios(part_ratios)
+            said_ratios = self._meanings.said_ratios(part_ratios)
         ratios = np.clip(ratios, 0.0, _MOST_WITHOUT_NAME)
         ratios[self._of_stems.get(content_stems(understood), [])] = _SAME_WORDS_MISSPELT
         ratios[self._of_stems.get(content_stems(query), [])] = _SAME_WORDS
         ratios[self._of_key.get(name_key(query), [])] = _SAME_NAME
-        return _Asked(understood, words, common, ratios, said_ratios, likeness, missing)
+        return _Asked(understood, words, common, ratios, said_ratios, part_ratios, missing)
 
-    def _order(self, ratios: NDArray[np.float64], among: Container[str] | None) -> list[int]:
+    def _order(self, ratios: Floats, among: Container[str] | None) -> list[int]:
         """Return the numbers of the entries that say anything of it, the likeliest first."""
         likely = np.flatnonzero(ratios > 0)
         if among is not None:
@@ -215,7 +215,7 @@ class EntryIndex:
         is_called = calls_by_name(request, entry.names, other_names=other_names)
         return is_called or says_purpose(request, entry.purpose)
 
-    def _lead_ratio(self, ratios: NDArray[np.float64], first: int) -> float:
+    def _lead_ratio(self, ratios: Floats, first: int) -> float:
         """Say how far one is ahead of the next of all that is remembered and called otherwise.
 
         Of all, also where only some may be chosen: that a sink stands in another room makes a
@@ -226,12 +226,12 @@ class EntryIndex:
         is_other[self._of_key[name]] = False
         return float(ratios[first] - ratios[is_other].max()) if is_other.any() else 0.0
 
-    def _candidate(self, number: int, asked: _Asked, said: NDArray[np.float64]) -> EntryCandidate:
+    def _candidate(self, number: int, asked: _Asked, said: Floats) -> EntryCandidate:
         entry, basis = self._entries[number], asked.basis(number)
         evidence = self._explain(asked, number)
         field, text = entry.texts[0]
-        if basis is Basis.MEANING and asked.likeness is not None:
-            field, text = asked.likeness.nearest_text(number)
+        if basis is Basis.MEANING and self._meanings and asked.part_ratios is not None:
+            field, text = self._meanings.nearest_text(asked.part_ratios, number)
         elif basis is Basis.WORDS:
             best = max(evidence, key=lambda each: each.weight)
             field, text = best.field, best.text
@@ -257,14 +257,14 @@ def _missing_ratio(asked: _Asked, order: list[int]) -> float:
         return -math.inf
     if not order:
         return math.inf
-    return asked.missing.ratio - float(asked.ratios[order[0]])
+    return asked.missing[1] - float(asked.ratios[order[0]])
 
 
 def _find_missing(asked: _Asked, order: list[int]) -> str | None:
     """Return the name of what is more like the request than anything that is remembered."""
     if asked.missing is None or _missing_ratio(asked, order) <= 0:
         return None
-    return asked.missing.name
+    return asked.missing[0]
 
 
 def _numbers_by(keys: Iterable[Iterable[_Key]]) -> dict[_Key, list[int]]:

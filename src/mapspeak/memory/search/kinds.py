@@ -146,18 +146,6 @@ _NAMING = frozenset(MatchField) - {MatchField.PURPOSE, MatchField.CATEGORY}
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class Missing:
-    """A kind of thing of which none is remembered.
-
-    Attributes:
-        ratio: How alike its name and a request are.
-    """
-
-    name: str
-    ratio: float
-
-
 class KindIndex:
     """The kinds of some entries, and the names of all other kinds.
 
@@ -171,7 +159,7 @@ class KindIndex:
         names = [(name, kind) for kind in read_kinds() for name in kind.names]
         self._names = [name for name, _ in names]
         self._kinds = [kind for _, kind in names]
-        self._vectors = None if vectors is None else _find(vectors, self._names)
+        self._vectors = None if vectors is None else vectors.find(self._names).astype(np.float64)
         labels = {name for entry in entries for name in entry.names}
         self._kinds_of = {label: find_kinds(label) for label in labels}
         if vectors is not None and self._vectors is not None:
@@ -204,21 +192,25 @@ class KindIndex:
             *((MatchField.USE, use) for use in uses),
         )
 
-    def find_missing(self, vector: Floats) -> Missing | None:
-        """Find the kind whose name is most like a request, of those that are not remembered."""
+    def find_missing(self, vector: Floats) -> tuple[str, float] | None:
+        """Find the kind that is not remembered and whose name is most like a request.
+
+        Returns:
+            That name, and how alike it and the request are.
+        """
         if self._vectors is None or not self._absent.any():
             return None
         ratios = np.where(self._absent, np.round(self._vectors @ vector, 6), -1.0)
         number = int(ratios.argmax())
-        return Missing(self._names[number], float(ratios[number]))
+        return self._names[number], float(ratios[number])
 
-    def find_missing_called(self, request: str) -> Missing | None:
+    def find_missing_called(self, request: str) -> tuple[str, float] | None:
         """Find the kind that a request names and nothing else, if it is not remembered."""
         stems = content_stems(request)
         is_absent = dict(zip(self._kinds, self._absent.tolist(), strict=True))
         called = (kind for kind in find_kinds_called(request) if is_absent[kind])
         names = (name for kind in called for name in kind.names if content_stems(name) == stems)
-        return next((Missing(name, 1.0) for name in names), None)
+        return next(((name, 1.0) for name in names), None)
 
     def _find_by_meaning(self, vectors: TextVectors, of_names: Floats) -> None:
         """Return labels that name no kind the one whose name is most like them."""
@@ -230,15 +222,11 @@ class KindIndex:
         if not unknown:
             return
         heads = [" ".join(find_head(label)) or label for label in unknown]
-        ratios = np.round(_find(vectors, heads) @ of_names.T, 6)
+        ratios = np.round(vectors.find(heads).astype(np.float64) @ of_names.T, 6)
         for label, own in zip(unknown, ratios, strict=True):
             number = int(own.argmax())
             if own[number] >= _SAME_KIND_RATIO:
                 self._kinds_of[label] = (self._kinds[number],)
-
-
-def _find(vectors: TextVectors, texts: Sequence[str]) -> Floats:
-    return vectors.find(texts).astype(np.float64)
 
 
 def is_carrier(label: str) -> bool:

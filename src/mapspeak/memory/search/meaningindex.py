@@ -62,6 +62,7 @@ class TextVectors:
 
     Args:
         kept: A file with those of an earlier session, which `keep` writes; None where none is kept.
+            One that is missing, broken or of another model is passed over.
     """
 
     def __init__(self, embedder: Embedder, *, kept: Path | None = None) -> None:
@@ -69,16 +70,30 @@ class TextVectors:
         self._vectors: dict[str, NDArray[np.float32]] = {}
         self._kept = kept
         if kept is not None:
-            self.read(kept)
+            with (
+                contextlib.suppress(BadZipFile, EOFError, KeyError, OSError, ValueError),
+                kept.open("rb") as file,
+                np.load(file) as found,
+            ):
+                if str(found["model"]) == embedder.name:
+                    rows = zip(found["texts"].tolist(), found["vectors"], strict=True)
+                    self._vectors = dict(rows)
         self._n_kept = len(self._vectors)
 
     def keep(self) -> None:
-        """Write the file if there are new vectors; one that cannot be written costs only time."""
+        """Write the file if there are new vectors; one that cannot be written costs only time.
+
+        The file is replaced as a whole.
+        """
         if self._kept is None or len(self) == self._n_kept:
             return
+        texts = sorted(self._vectors)
+        unfinished = self._kept.with_name(f"{self._kept.name}.{os.getpid()}.tmp")
         with contextlib.suppress(OSError):
             self._kept.parent.mkdir(parents=True, exist_ok=True)
-            self.write(self._kept)
+            with unfinished.open("wb") as file:
+                np.savez(file, model=self.embedder.name, texts=texts, vectors=self.find(texts))
+            unfinished.replace(self._kept)
             self._n_kept = len(self)
 
     def __len__(self) -> int:
@@ -93,30 +108,6 @@ class TextVectors:
         if not wanted:
             return self.embedder.embed([])
         return np.array([self._vectors[text] for text in wanted], dtype=np.float32)
-
-    def write(self, path: Path) -> None:
-        """Keep the vectors in an .npz file; a later session need not compute them again.
-
-        The file is replaced as a whole.
-        """
-        texts = sorted(self._vectors)
-        unfinished = path.with_name(f"{path.name}.{os.getpid()}.tmp")
-        with unfinished.open("wb") as file:
-            np.savez(file, model=self.embedder.name, texts=texts, vectors=self.find(texts))
-        unfinished.replace(path)
-
-    def read(self, path: Path) -> None:
-        """Take the vectors of an earlier session, if the same model gave them.
-
-        A file that is missing or broken is passed over: all it holds can be computed again.
-        """
-        try:
-            with path.open("rb") as file, np.load(file) as kept:
-                model, texts, rows = str(kept["model"]), kept["texts"].tolist(), kept["vectors"]
-        except (BadZipFile, EOFError, KeyError, OSError, ValueError):
-            return
-        if model == self.embedder.name:
-            self._vectors |= dict(zip(texts, rows, strict=True))
 
 
 _COMPARED = (
@@ -142,48 +133,6 @@ class _Part(NamedTuple):
     name: str
     field: MatchField
     text: str
-
-
-class Likeness:
-    """How alike some entries and a phrase are.
-
-    Args:
-        parts: What is said of all entries.
-        numbers: Which of these are said of the first entry, then of the next, and so on.
-        starts: Where each entry's first number stands.
-        part_ratios: How alike each part and the phrase are, from -1 to 1.
-        is_common: Which parts are what is commonly known of such a thing.
-
-    Attributes:
-        ratios: How alike each entry and the phrase are.
-        said_ratios: The same by what is said of it alone, not by what is commonly known.
-    """
-
-    def __init__(
-        self,
-        parts: Sequence[_Part],
-        numbers: NDArray[np.int64],
-        starts: NDArray[np.int64],
-        part_ratios: Floats,
-        is_common: NDArray[np.bool_],
-    ) -> None:
-        self._parts, self._numbers, self._starts = parts, numbers, starts
-        self._part_ratios = np.where(is_common, part_ratios - _LESS_FOR_COMMON, part_ratios)
-        self.ratios = self._most_by_entry(self._part_ratios)
-        self.said_ratios = self._most_by_entry(np.where(is_common, -1.0, part_ratios))
-
-    def nearest_text(self, number: int) -> tuple[MatchField, str]:
-        """Return the text of an entry that is most like the phrase, and which part it is."""
-        following = self._starts[number + 1 :]
-        own = self._numbers[self._starts[number] : following[0] if len(following) else None]
-        part = self._parts[own[int(self._part_ratios[own].argmax())]]
-        return part.field, part.text
-
-    def _most_by_entry(self, part_ratios: Floats) -> Floats:
-        if not len(self._starts):
-            return part_ratios
-        most: Floats = np.maximum.reduceat(part_ratios[self._numbers], self._starts)
-        return most
 
 
 class MeaningIndex:
@@ -222,13 +171,34 @@ class MeaningIndex:
         # Never 0: halves may be unknown words, or say the very opposite.
         self._lengths = np.maximum(self._lengths_of_sums(), _LEAST_LENGTH)
 
-    def compare(self, vector: Floats) -> Likeness:
-        """Return how alike each entry and the phrase of a vector are: by the part most like it."""
+    def compare(self, vector: Floats) -> Floats:
+        """Return how alike each part and the phrase of a vector are, from -1 to 1.
+
+        What is commonly known of a thing counts a little less than what is said of it.
+        """
         likeness = self._texts @ vector
         ratios = likeness[self._names] + likeness[self._contexts]
         # Rounded, since the order of the rows may change the last digit of a product.
         ratios = np.round(ratios / self._lengths, 6)
-        return Likeness(self._parts, self._numbers, self._starts, ratios, self._is_common)
+        return np.asarray(np.where(self._is_common, ratios - _LESS_FOR_COMMON, ratios))
+
+    def ratios(self, part_ratios: Floats) -> Floats:
+        """Return how alike each entry and a phrase are: by the part most like it."""
+        if not len(self._starts):
+            return part_ratios
+        most: Floats = np.maximum.reduceat(part_ratios[self._numbers], self._starts)
+        return most
+
+    def said_ratios(self, part_ratios: Floats) -> Floats:
+        """Return the same by what is said of each entry alone, not by what is commonly known."""
+        return self.ratios(np.where(self._is_common, -1.0, part_ratios))
+
+    def nearest_text(self, part_ratios: Floats, number: int) -> tuple[MatchField, str]:
+        """Return the text of an entry that is most like a phrase, and which part it is."""
+        following = self._starts[number + 1 :]
+        own = self._numbers[self._starts[number] : following[0] if len(following) else None]
+        part = self._parts[own[int(part_ratios[own].argmax())]]
+        return part.field, part.text
 
     def _lengths_of_sums(self) -> Floats:
         lengths = np.empty(len(self._parts))
@@ -240,25 +210,14 @@ class MeaningIndex:
 
 
 def _all_parts(entry: Entry, said: Texts, common: Texts) -> Iterator[_Part]:
-    yield from _parts(entry, said)
-    yield from _common_parts(entry, common)
-
-
-def _parts(entry: Entry, texts: Texts) -> Iterator[_Part]:
-    for field, text in texts[: len(entry.names)]:
+    n_names = len(entry.names)
+    for field, text in said[:n_names]:
         yield _Part(text, field, text)
-    for field, text in texts[len(entry.names) :]:
+    for field, text in said[n_names:]:
         if field in _COMPARED and text not in entry.surroundings:
-            for sentence in _sentences(text):
+            for sentence in filter(None, _BETWEEN_SENTENCES.split(text)):
                 yield _Part(entry.name, field, sentence)
-
-
-def _common_parts(entry: Entry, texts: Texts) -> Iterator[_Part]:
-    for field, text in texts:
+    for field, text in common:
         yield _Part(text, field, text)
         if field is MatchField.USE:
             yield _Part(entry.name, field, text)
-
-
-def _sentences(text: str) -> list[str]:
-    return [part for part in _BETWEEN_SENTENCES.split(text) if part]

@@ -2,22 +2,3 @@
 
 Nothing here opens a file; `mapspeak.memory.store.semanticmap` does.
 """
-
-from mapspeak.memory.store.document import MapDocument, parse_document
-from mapspeak.memory.store.rewriting import (
-    bound_to,
-    moved,
-    with_event,
-    with_waypoint,
-    without_waypoint,
-)
-
-__all__ = [
-    "MapDocument",
-    "bound_to",
-    "moved",
-    "parse_document",
-    "with_event",
-    "with_waypoint",
-    "without_waypoint",
-]

@@ -19,7 +19,6 @@ from mapspeak.memory.store.eventschema import read_events
 from mapspeak.memory.store.layout import (
     Layout,
     LineEnds,
-    find_changed_records,
     find_records,
     read_plain_record,
     whole,
@@ -191,10 +190,7 @@ def _at_its_place(fault: TextError, source: str, text: str) -> SemanticMapError:
 
 
 def _cut(text: str, previous: MapDocument | None) -> tuple[Layout, MappingNode | None]:
-    if previous is not None and previous.layout.spans:
-        layout = find_changed_records(text, before=previous.text, layout=previous.layout)
-    else:
-        layout = find_records(text)
+    layout = find_records(text)
     root = _known_root(text, layout, previous) or _root(text, layout)
     if layout.spans and _list_items(root):
         # A part of the list stands where its dashes do not show it.

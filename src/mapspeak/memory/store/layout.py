@@ -2,7 +2,6 @@
 
 import json
 import re
-from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from difflib import SequenceMatcher
@@ -12,7 +11,7 @@ from mapspeak.memory.store.tree import Data
 
 _LIST_KEY = re.compile(r"^waypoints:[ \t]*(?:#[^\n]*)?$", re.MULTILINE)
 _CONTENT = re.compile(r"^( *)([^ #\n])", re.MULTILINE)
-_UNUSUAL_BREAK = re.compile("[\r\x85\u2028\u2029]")
+_UNUSUAL_BREAKS = "\r\x85\u2028\u2029"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,71 +45,21 @@ def find_records(text: str) -> Layout:
     """Find the records of a text whose lines end in a line feed."""
     key = _LIST_KEY.search(text)
     first = _CONTENT.search(text, key.end()) if key else None
-    if first is None or _UNUSUAL_BREAK.search(text):
+    if first is None or any(each in text for each in _UNUSUAL_BREAKS):
         return whole(text)
     indent = len(first[1])
-    dash, behind = _patterns(indent)
-    if not dash.match(text, first.start()):
-        return whole(text)
-    after = behind.search(text, first.start())
-    end = after.start() if after else len(text)
-    spans = _find_spans(text, first.start(), end, indent)
-    return Layout(spans=spans, indent=indent, start=first.start(), end=end)
-
-
-def find_changed_records(text: str, *, before: str, layout: Layout) -> Layout:
-    """Find the records of a text that was changed, by looking only at what changed."""
-    n_same = _count_same(before, text)
-    n_same_behind = _count_same(before[n_same:][::-1], text[n_same:][::-1])
-    starts = [start for start, _ in layout.spans]
-    # From the record before the first change, whose end may depend on what follows it.
-    first = bisect_right(starts, n_same) - 2
-    last = bisect_left(starts, len(before) - n_same_behind + 1)
-    n_more = len(text) - len(before)
-    if first < 0 or len(before) - n_same_behind > layout.end:
-        return find_records(text)
-    if layout.end < len(before) and text[layout.end + n_more - 1] != "\n":
-        # What followed the records has become a part of their last line.
-        return find_records(text)
-    start, end = starts[first], (starts[last] if last < len(starts) else layout.end) + n_more
-    dash, behind = _patterns(layout.indent)
-    is_list = dash.match(text, start) and not behind.search(text, start, end)
-    if not is_list or _UNUSUAL_BREAK.search(text, start, end):
-        return find_records(text)
-    spans = (
-        *layout.spans[:first],
-        *_find_spans(text, start, end, layout.indent),
-        *((a + n_more, b + n_more) for a, b in layout.spans[last:]),
-    )
-    return Layout(spans=spans, indent=layout.indent, start=layout.start, end=layout.end + n_more)
-
-
-def _patterns(indent: int) -> tuple[re.Pattern[str], re.Pattern[str]]:
-    """Return what begins a record, and what begins a line that belongs to none."""
     item = rf" {{{indent}}}-(?:[ \t\n]|\Z)"
     dash = re.compile(rf"^{item}", re.MULTILINE)
-    return dash, re.compile(rf"^(?!{item}) {{0,{indent}}}[^ #\n]", re.MULTILINE)
-
-
-def _find_spans(text: str, start: int, end: int, indent: int) -> tuple[tuple[int, int], ...]:
-    dash, _ = _patterns(indent)
-    starts = [match.start() for match in dash.finditer(text, start, end)]
-    return tuple(
-        (a, _content_end(text, a, b, indent))
-        for a, b in zip(starts, [*starts[1:], end], strict=True)
-    )
-
-
-def _count_same(one: str, other: str) -> int:
-    """Count the letters that two texts begin with alike."""
-    low, high = 0, min(len(one), len(other))
-    while low < high:
-        middle = (low + high + 1) // 2
-        if one[low:middle] == other[low:middle]:
-            low = middle
-        else:
-            high = middle - 1
-    return low
+    if not dash.match(text, first.start()):
+        return whole(text)
+    # What begins a line that belongs to no record.
+    behind = re.compile(rf"^(?!{item}) {{0,{indent}}}[^ #\n]", re.MULTILINE)
+    after = behind.search(text, first.start())
+    end = after.start() if after else len(text)
+    starts = [match.start() for match in dash.finditer(text, first.start(), end)]
+    ends = [*starts[1:], end]
+    spans = tuple((a, _content_end(text, a, b, indent)) for a, b in zip(starts, ends, strict=True))
+    return Layout(spans=spans, indent=indent, start=first.start(), end=end)
 
 
 def whole(text: str) -> Layout:

@@ -13,15 +13,9 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.memory.events import Event
 from mapspeak.memory.merging import Merge, merge_waypoint
 from mapspeak.memory.quoting import clean_line, name_key, quote_name
-from mapspeak.memory.store import (
-    MapDocument,
-    bound_to,
-    parse_document,
-    with_event,
-    with_waypoint,
-    without_waypoint,
-)
+from mapspeak.memory.store.document import MapDocument, parse_document
 from mapspeak.memory.store.durable import DurableFile, Fingerprint
+from mapspeak.memory.store.rewriting import bound_to, with_event, with_waypoint, without_waypoint
 from mapspeak.memory.waypoint import SemanticMap, Waypoint
 
 LOCK_TIMEOUT_S = 5.0

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapspeak.geometry import Point, Pose
-from mapspeak.memory.laserfan import LaserFan
 from mapspeak.memory.things.sight import (
     BODY_M,
     LaserUpdate,
     SightMap,
     bearing_index,
+    correct_by_laser,
     look_around,
-    read_update,
 )
 from mapspeak.memory.things.thing import Category, NoiseModel
 from mapspeak.memory.waypoint import Landmark, Waypoint
@@ -159,31 +158,20 @@ def weigh_view(
         bell = np.exp(-0.5 * (off[near] / sigma) ** 2) * (math.sqrt(math.tau) / sigma)
         cells, ratios, ranges_m = cells[near], ratios[near], ranges_m[near]
         if landmark.laser is not None:
-            update, ratios = _correct(sight, outlook, pose, landmark.laser, near)
+            update, ratios = correct_by_laser(
+                sight,
+                pose,
+                landmark.laser,
+                near_m=outlook.near_m,
+                cells=cells,
+                angles=outlook.angles[near],
+                ranges_m=ranges_m,
+                seen=ratios,
+            )
         ratios = ratios * bell
     if landmark.range_m is not None:
         ratios = ratios * _weigh_range(sight, ranges_m, landmark.range_m)
     return ViewLikelihood(cells=cells, ratios=ratios, update=update)
-
-
-def _correct(
-    sight: SightMap, outlook: Outlook, pose: Pose, fan: LaserFan, near: IntArray
-) -> tuple[LaserUpdate | None, FloatArray]:
-    """Return what the laser knows better, and how likely one sees as far as each cell with it."""
-    seen = outlook.sight[near]
-    found = read_update(
-        sight,
-        pose,
-        fan,
-        near_m=outlook.near_m,
-        cells=outlook.cells[near],
-        angles=outlook.angles[near],
-        ranges_m=outlook.ranges_m[near],
-    )
-    if found is None:
-        return None, seen
-    seen[found.changed] = found.sight
-    return found.update, seen
 
 
 def _weigh_range(sight: SightMap, ranges_m: FloatArray, told_m: float) -> FloatArray:

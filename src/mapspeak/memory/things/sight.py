@@ -177,36 +177,7 @@ class LaserUpdate:
     log_priors: FloatArray
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Correction:
-    """How a laser corrects the map for one look.
-
-    Attributes:
-        changed: The numbers of the cells in directions where it is.
-        sight: How likely one sees each of these: what counts instead of `Outlook.sight`.
-    """
-
-    update: LaserUpdate
-    changed: IntArray
-    sight: FloatArray
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Beams:
-    """A fan over the map, by beam.
-
-    Attributes:
-        is_new: It ended where the map has nothing.
-        is_through: It passed what the map has, and so did the one beside it.
-        end_m: Where it ended, or how far it met nothing.
-    """
-
-    is_new: Mask
-    is_through: Mask
-    end_m: FloatArray
-
-
-def read_update(
+def correct_by_laser(
     sight: SightMap,
     pose: Pose,
     fan: LaserFan,
@@ -215,40 +186,38 @@ def read_update(
     cells: IntArray,
     angles: FloatArray,
     ranges_m: FloatArray,
-) -> Correction | None:
-    """Return how a fan corrects the map; None where the map is right.
+    seen: FloatArray,
+) -> tuple[LaserUpdate | None, FloatArray]:
+    """Return what a fan knows better than the map, and how likely one sees each cell with it.
 
     Args:
         near_m: How far one sees on the map to the first obstacle, by ray.
         cells: Lattice cells in sight around the direction that was told, rising.
         angles: Where they are, in the frame of the grid.
         ranges_m: How far they are.
+        seen: How likely one sees each by the map alone.
     """
     ahead = pose.yaw_rad - sight.grid.origin.yaw_rad
-    beams = _compare(sight, pose, fan, ahead, near_m)
-    is_update = beams.is_new | beams.is_through
+    is_new, is_through, end_m = _compare(sight, pose, fan, ahead, near_m)
+    is_update = is_new | is_through
     if not is_update.any():
-        return None
+        return None, seen
     off = np.remainder(angles - ahead - fan.first_rad + fan.step_rad / 2, math.tau)
     number = (off / fan.step_rad).astype(np.intp)
     inside = np.flatnonzero(number < len(is_update))
     inside = inside[is_update[number[inside]]]
     beam, far_m, cells = number[inside], ranges_m[inside], cells[inside]
-    behind_m = far_m - beams.end_m[beam]
+    behind_m = far_m - end_m[beam]
     log_priors = sight.log_prior.ravel()[cells]
     noise = sight.noise
-    met = np.exp(-0.5 * (behind_m / noise.laser_m) ** 2) * (
-        noise.laser_met_ratio * beams.is_new[beam]
-    )
+    met = np.exp(-0.5 * (behind_m / noise.laser_m) ** 2) * (noise.laser_met_ratio * is_new[beam])
     likelier = np.log(np.exp(log_priors) + (1 - np.exp(log_priors)) * met)
-    is_passed = beams.is_through[beam] & (behind_m < -noise.laser_update_m) & (log_priors == 0.0)
+    is_passed = is_through[beam] & (behind_m < -noise.laser_update_m) & (log_priors == 0.0)
     told = np.where(is_passed, math.log(noise.laser_through_ratio), likelier)
     kept = is_passed | (met > _LEAST_MET)
-    return Correction(
-        update=LaserUpdate(cells=cells[kept], log_priors=told[kept]),
-        changed=inside,
-        sight=np.where(behind_m <= BODY_M, 1.0, noise.seen_over_ratio),
-    )
+    seen = seen.copy()
+    seen[inside] = np.where(behind_m <= BODY_M, 1.0, noise.seen_over_ratio)
+    return LaserUpdate(cells=cells[kept], log_priors=told[kept]), seen
 
 
 def find_log_priors(
@@ -274,7 +243,13 @@ def find_log_priors(
 
 def _compare(
     sight: SightMap, pose: Pose, fan: LaserFan, ahead: float, near_m: FloatArray
-) -> _Beams:
+) -> tuple[Mask, Mask, FloatArray]:
+    """Lay a fan over the map; return three values for each beam.
+
+    The first is True where it ended at nothing that the map has; the second where it passed what
+    the map has, and so did the one beside it; the third is where it ended, or how far it met
+    nothing.
+    """
     met_m = np.array([math.nan if each is None else each for each in fan.ranges_m])
     angles = ahead + fan.first_rad + fan.step_rad * np.arange(len(met_m), dtype=np.float64)
     is_end = np.isfinite(met_m)
@@ -288,11 +263,8 @@ def _compare(
     has_past_beside = np.zeros_like(is_past)
     has_past_beside[1:] |= is_past[:-1]
     has_past_beside[:-1] |= is_past[1:]
-    return _Beams(
-        is_new=is_end & (_off_m(sight, pose, angles, np.where(is_end, end_m, 0.0)) > update_m),
-        is_through=is_past & has_past_beside,
-        end_m=np.where(np.isnan(end_m), 0.0, end_m),
-    )
+    is_new = is_end & (_off_m(sight, pose, angles, np.where(is_end, end_m, 0.0)) > update_m)
+    return is_new, is_past & has_past_beside, np.where(np.isnan(end_m), 0.0, end_m)
 
 
 def _off_m(sight: SightMap, pose: Pose, angles: FloatArray, ends_m: FloatArray) -> FloatArray:

@@ -11,8 +11,8 @@ from itertools import islice
 
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark
-from mapspeak.memory.consistency import Trust
-from mapspeak.memory.search import Answer, Basis, EntryCandidate, EntryKind, Verdict
+from mapspeak.memory.consistency.findings import Trust
+from mapspeak.memory.search.answer import Answer, Basis, EntryCandidate, EntryKind, Verdict
 from mapspeak.places.goalcheck import GoalCheck, judge_goal
 from mapspeak.places.naming import Place, split_room
 from mapspeak.places.relations.choosing import stand_at

@@ -8,9 +8,11 @@ from pydantic import Field
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.memory import find_concern
-from mapspeak.memory.episodes import EpisodeQuery, EpisodeStore, Observation, ObservationKind
+from mapspeak.memory.episodes.observation import EpisodeQuery, Observation, ObservationKind
+from mapspeak.memory.episodes.store import EpisodeStore
 from mapspeak.memory.quoting import quote_name
-from mapspeak.memory.search import EntryKind, Verdict, calls_by_name
+from mapspeak.memory.search.answer import EntryKind, Verdict
+from mapspeak.memory.search.kinds import calls_by_name
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.recall.asking import Recall, RecallCandidate, RecallQuery
 from mapspeak.server.reports.robot import PoseReport, Report

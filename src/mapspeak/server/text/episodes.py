@@ -1,6 +1,6 @@
 """Why an observation was found, in words: one for each filter that it has passed."""
 
-from mapspeak.memory.episodes import EpisodeFilter, EpisodeMatch
+from mapspeak.memory.episodes.observation import EpisodeFilter, EpisodeMatch
 from mapspeak.memory.quoting import quote, quote_name
 
 _NOT_SHOWN = (EpisodeFilter.WORDS, EpisodeFilter.MEANING, EpisodeFilter.LABEL)

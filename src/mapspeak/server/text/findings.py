@@ -3,9 +3,9 @@
 import math
 
 from mapspeak.geometry import Point
-from mapspeak.memory.consistency import FindingKind, MemoryFinding, Trust
+from mapspeak.memory.consistency.findings import FindingKind, MemoryFinding, Trust
 from mapspeak.memory.quoting import quote_name
-from mapspeak.memory.things import Thing, View
+from mapspeak.memory.things.thing import Thing, View
 
 FARTHEST_M = 1e6
 

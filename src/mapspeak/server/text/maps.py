@@ -4,14 +4,18 @@ import math
 from collections.abc import Awaitable
 
 from mapspeak.errors import SemanticMapError
-from mapspeak.memory.alignment import (
+from mapspeak.memory.alignment.fitting import (
     LEAST_SHARED_M,
     Certainty,
-    MapAgreement,
-    MapComparison,
     MapFit,
+)
+from mapspeak.memory.alignment.keeping import (
+    MapComparison,
     MapRelation,
     RealignReceipt,
+)
+from mapspeak.memory.alignment.surfaces import (
+    MapAgreement,
 )
 from mapspeak.server.text.offered import lead
 from mapspeak.spatial.mapfiles import MapFileWarning, MapOddity

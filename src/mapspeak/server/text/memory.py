@@ -8,8 +8,8 @@ from datetime import datetime, timedelta
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import wrap_angle
 from mapspeak.memory import Confidence, Landmark, Merge, Reunion, Waypoint
-from mapspeak.memory.consistency import MemoryFinding
-from mapspeak.memory.episodes import EpisodeMatch, EpisodePage
+from mapspeak.memory.consistency.findings import MemoryFinding
+from mapspeak.memory.episodes.observation import EpisodeMatch, EpisodePage
 from mapspeak.memory.quoting import quote, quote_name, tell_name
 from mapspeak.places.recall.nearby import Nearby
 from mapspeak.server.text.episodes import say_evidence

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from mapspeak.geometry import Point
 from mapspeak.memory.quoting import name_key, quote
-from mapspeak.memory.search import Answer, Basis, EntryCandidate, MatchEvidence, Verdict
+from mapspeak.memory.search.answer import Answer, Basis, EntryCandidate, MatchEvidence, Verdict
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import say_spot
 from mapspeak.places.recall.asking import Recall, RecallCandidate, RecallDoubt

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from mapspeak.memory import Landmark
-from mapspeak.memory.consistency import Trust
+from mapspeak.memory.consistency.findings import Trust
 from mapspeak.memory.quoting import quote, tell_name
 from mapspeak.places.recall.asking import SURE_RATIO, describe_candidate
 from mapspeak.server.text.findings import say_conflict, say_finding, say_support

@@ -25,7 +25,9 @@ from mapspeak.memory import (
     noted_at,
     tells_what_to_do,
 )
-from mapspeak.memory.things import name_the_same
+from mapspeak.memory.things.thing import (
+    name_the_same,
+)
 from mapspeak.server.text.offered import lead
 
 SAME_VIEW_RAD = math.radians(15.0)

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from mapspeak.errors import GoalError
 from mapspeak.geometry import Point
-from mapspeak.memory.search import EntryKind
+from mapspeak.memory.search.answer import EntryKind
 from mapspeak.places.naming import split_room
 from mapspeak.places.recall.asking import RecallQuery, recall
 from mapspeak.places.relations.choosing import find_place

@@ -9,7 +9,7 @@ from mcp.server.mcpserver import Image
 from pydantic import Field
 
 from mapspeak.errors import LinkError, MapError, SemanticMapError
-from mapspeak.memory.episodes import (
+from mapspeak.memory.episodes.observation import (
     EpisodeMatch,
     EpisodeOrder,
     EpisodePage,
@@ -18,7 +18,7 @@ from mapspeak.memory.episodes import (
 )
 from mapspeak.memory.events import Effect as EventEffect
 from mapspeak.memory.events import is_name_of_robot
-from mapspeak.memory.things import name_the_same
+from mapspeak.memory.things.thing import name_the_same
 from mapspeak.places.recall import notices
 from mapspeak.places.recall.nearby import find_nearby
 from mapspeak.server.text.maps import say_moved, say_receipt

@@ -14,7 +14,7 @@ from alignment_maps import HOUSE
 from fakes import FakeRobot, two_rooms
 from guarding import MONDAY_NOON, WallClock, audit_of, make_guard
 from mapspeak.geometry import Pose
-from mapspeak.memory.episodes import memory_folder
+from mapspeak.memory.episodes.store import memory_folder
 from mapspeak.robot import Detection
 from mapspeak.spatial import OccupancyGrid
 from remembering import EXTINGUISHER
