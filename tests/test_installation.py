@@ -70,7 +70,7 @@ def test_what_only_a_sourced_ros_has_is_still_found(monkeypatch: pytest.MonkeyPa
 
 
 OPTIONAL = ("cyclonedds", "onnxruntime", "tokenizers", "inspect_ai", "openai", "rclpy")
-PARTS = ("mapspeak.cli.commands", "mapspeak.server.app", "mapspeak.evaluation.runs.inspecting")
+PARTS = ("mapspeak.cli.commands", "mapspeak.server.app", "mapspeak.evaluation.runs.workplace")
 
 
 @pytest.mark.parametrize("part", PARTS)

@@ -20,7 +20,12 @@ from mapspeak.errors import LinkError, MapError, MapspeakError, SemanticMapError
 from mapspeak.geometry import Point
 from mapspeak.memory import PictureBook, SemanticMap, SemanticMapStore
 from mapspeak.memory.alignment.keeping import MapComparison, MapKeeper
-from mapspeak.memory.episodes.observation import EpisodePage, EpisodeQuery, ObservationKind, named_pictures
+from mapspeak.memory.episodes.observation import (
+    EpisodePage,
+    EpisodeQuery,
+    ObservationKind,
+    named_pictures,
+)
 from mapspeak.memory.episodes.store import EpisodeStore, memory_folder
 from mapspeak.memory.episodes.textindex import VectorRank
 from mapspeak.memory.events import Event

@@ -81,7 +81,7 @@ def describe_field(field: Field, kind: str) -> Any:  # noqa: ANN401 - rosbags' n
 
     if field.type == "wstring":
         raise LinkError(
-            f"The field {field.name[:80]} holds a wstring, which mapspeak cannot read or write as CDR.",
+            f"The field {field.name[:80]} holds a wstring, which mapspeak has no CDR for.",
             hint="Take rosbridge for it.",
         )
     is_name = field.is_message
