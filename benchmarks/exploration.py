@@ -27,7 +27,7 @@ from rich.table import Table
 
 from benchmarks.figure import Figure
 from mapspeak.driving.drivereport import DriveReport
-from mapspeak.driving.exploration import Explorer, Pick, take_first
+from mapspeak.driving.exploration.explorer import Explorer, Pick, take_first
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.links.simulated import SimulatedRobot
 from mapspeak.memory import SemanticMapStore

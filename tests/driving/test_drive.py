@@ -19,13 +19,9 @@ pytestmark = pytest.mark.anyio
 NEAR, FAR = Pose(2.5, 1.4), Pose(6.0, 1.4)
 
 
-async def start(
-    drives: DriveBook, goal: Pose, *, client: str = "", when_busy: WhenBusy | None = None
-) -> Drive:
+async def start(drives: DriveBook, goal: Pose, *, client: str = "") -> Drive:
     with drives.preparing() as ticket:
-        return await drives.start(
-            goal, place="there", ticket=ticket, client=client, when_busy=when_busy
-        )
+        return await drives.start(goal, place="there", ticket=ticket, client=client)
 
 
 async def state_of(drives: DriveBook, drive: Drive) -> GoalState:
@@ -66,9 +62,9 @@ async def test_a_drive_that_waits_its_turn_begins_when_the_one_before_has_ended(
 
 async def test_a_drive_that_waits_begins_though_nobody_waits_for_it() -> None:
     robot = FakeRobot(two_rooms())
-    drives = DriveBook(robot)
+    drives = DriveBook(robot, when_busy=WhenBusy.WAIT)
     await start(drives, NEAR)
-    second = await start(drives, FAR, when_busy=WhenBusy.WAIT)
+    second = await start(drives, FAR, client="two")
     await robot.sleep(5.0)
     await drives.watch()
     assert await state_of(drives, second) is GoalState.DRIVING
@@ -76,10 +72,10 @@ async def test_a_drive_that_waits_begins_though_nobody_waits_for_it() -> None:
 
 async def test_a_drive_that_waits_can_be_cancelled_and_is_stopped_with_the_rest() -> None:
     robot = FakeRobot(two_rooms())
-    drives = DriveBook(robot)
+    drives = DriveBook(robot, when_busy=WhenBusy.WAIT)
     await start(drives, FAR)
-    second = await start(drives, NEAR, when_busy=WhenBusy.WAIT)
-    third = await start(drives, NEAR, when_busy=WhenBusy.WAIT)
+    second = await start(drives, NEAR, client="two")
+    third = await start(drives, NEAR, client="three")
     assert (await drives.cancel(second.goal_id)).status.state is GoalState.CANCELLED
     await drives.stop()
     assert await state_of(drives, third) is GoalState.CANCELLED
@@ -112,9 +108,9 @@ async def test_a_goal_that_is_refused_leaves_the_drive_under_way_as_it_is() -> N
 
 async def test_a_drive_that_waited_and_is_refused_then_says_why() -> None:
     robot = StubbornRobot(two_rooms())
-    drives = DriveBook(robot)
+    drives = DriveBook(robot, when_busy=WhenBusy.WAIT)
     await start(drives, NEAR)
-    second = await start(drives, FAR, when_busy=WhenBusy.WAIT)
+    second = await start(drives, FAR, client="two")
     robot.refuses = True
     ended = await drives.wait(second.goal_id, wait_s=25.0, on_progress=tell_nobody)
     assert ended.status.state is GoalState.REJECTED

@@ -7,15 +7,9 @@ import pytest
 from causes import CRATE
 from drawing import grid_from_text
 from mapspeak.driving.drivereport import DriveReport
-from mapspeak.driving.exploration import (
-    BlockedPlaces,
-    BoundKind,
-    Bounds,
-    ExplorationState,
-    Explorer,
-    Progress,
-    TripEnd,
-)
+from mapspeak.driving.exploration.blocked import BlockedPlaces, TripEnd
+from mapspeak.driving.exploration.explorer import Explorer
+from mapspeak.driving.exploration.progress import BoundKind, Bounds, ExplorationState, Progress
 from mapspeak.errors import GoalError, PolicyError
 from mapspeak.geometry import Pose
 from mapspeak.robot import GoalState

@@ -6,21 +6,11 @@ import pytest
 from drawing import grid_from_text
 from embedding import ConceptEmbedder
 from mapspeak.driving.drivereport import DriveReport
-from mapspeak.driving.search import (
-    Budget,
-    CandidateKind,
-    Judgement,
-    Opinions,
-    SearchCandidate,
-    Searcher,
-    SearchProgress,
-    SearchState,
-    SeenFloor,
-    find_company_score,
-    speaks_of,
-)
-from mapspeak.driving.search.candidates import find_candidates
-from mapspeak.driving.search.evidence import weight_of
+from mapspeak.driving.search.candidates import CandidateKind, SearchCandidate, find_candidates
+from mapspeak.driving.search.evidence import Opinions, find_company_score, speaks_of, weight_of
+from mapspeak.driving.search.searcher import Judgement, Searcher
+from mapspeak.driving.search.seenfloor import SeenFloor
+from mapspeak.driving.search.standing import Budget, SearchProgress, SearchState
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMapStore, Waypoint
 from mapspeak.robot import Detection

@@ -8,8 +8,10 @@ import pytest
 from closing import EAST, LATER, NOW, RADIUS_M, WEST, event, office, revision_with, world_on
 from fakes import FakeRobot
 from guarding import WallClock, corners, make_guard, rectangle
-from mapspeak.driving.exploration import Bounds, ExplorationState, Progress
 from mapspeak.driving.exploration.progress import (
+    Bounds,
+    ExplorationState,
+    Progress,
     find_unreachable,
     judge_end,
     known_area_m2,

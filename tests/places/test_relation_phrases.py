@@ -3,7 +3,6 @@ from pathlib import Path
 
 import pytest
 
-from mapspeak.places.relations import parse_relation
 from mapspeak.places.relations.grammar import (
     Away,
     Between,
@@ -16,6 +15,7 @@ from mapspeak.places.relations.grammar import (
     Towards,
     Turned,
     WallSide,
+    parse_relation,
 )
 
 REFERENCE = Path(__file__).parents[2] / "docs" / "reference" / "relations.md"

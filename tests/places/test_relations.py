@@ -48,7 +48,7 @@ def _world(
 def _go(world: WorldModel, words: str) -> tuple[Place, Pose]:
     place = find_place(world, words)
     goal = check_place(world, place)
-    assert goal.check.is_ok, goal.sentence
+    assert goal.check.is_ok, goal.check
     return place, goal.pose
 
 

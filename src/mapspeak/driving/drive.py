@@ -99,21 +99,16 @@ class DriveBook:
         finally:
             self._n_preparing -= 1
 
-    async def start(
-        self,
-        goal: Pose,
-        *,
-        place: str,
-        ticket: int,
-        client: str = "",
-        when_busy: WhenBusy | None = None,
-    ) -> Drive:
+    async def start(self, goal: Pose, *, place: str, ticket: int, client: str = "") -> Drive:
         """Send a goal to the robot, or let it wait its turn.
 
+        A newer drive of the same client replaces the older one.
+
         Args:
+            goal: Where to.
+            place: What it was called.
             ticket: From `preparing`.
-            when_busy: What becomes of it while another drive is under way; by default a newer
-                drive of the same client replaces the older one.
+            client: Who asks.
 
         Raises:
             GoalError: The robot was stopped after the ticket was given, or another drive is under
@@ -125,12 +120,21 @@ class DriveBook:
             busy = await self._find_busy()
             await self._monitor.find_robot()
             self._check_ticket(ticket)
-            drive = self._make(goal, place, client)
-            if busy is None or self._choose(busy, client, when_busy) is WhenBusy.REPLACE:
+            drive = Drive(
+                goal_id=f"G{self._n_started + 1}",
+                goal=goal,
+                place=place,
+                robot_goal_id=None,
+                started_s=self._robot.now_s,
+                client=client,
+            )
+            is_other = busy is not None and busy.client != client
+            when_busy = self._when_busy if is_other else WhenBusy.REPLACE
+            if busy is None or when_busy is WhenBusy.REPLACE:
                 drive = await self._send(replace(drive, begun_at=self._monitor.here.point))
                 self._end_all(Cause(code=CauseCode.REPLACED), but=drive)
                 return drive
-            if self._choose(busy, client, when_busy) is WhenBusy.WAIT:
+            if when_busy is WhenBusy.WAIT:
                 return self._keep(drive)
             raise GoalError(
                 f"{busy.goal_id} to {busy.place} is under way.",
@@ -274,21 +278,6 @@ class DriveBook:
                 hint="Send the robot again when it may drive.",
                 step=NextStep.DRIVE_AGAIN,
             )
-
-    def _choose(self, busy: Drive, client: str, when_busy: WhenBusy | None) -> WhenBusy:
-        if when_busy is not None:
-            return when_busy
-        return WhenBusy.REPLACE if busy.client == client else self._when_busy
-
-    def _make(self, goal: Pose, place: str, client: str) -> Drive:
-        return Drive(
-            goal_id=f"G{self._n_started + 1}",
-            goal=goal,
-            place=place,
-            robot_goal_id=None,
-            started_s=self._robot.now_s,
-            client=client,
-        )
 
     async def _send(self, drive: Drive) -> Drive:
         """Send a drive to the robot, which gives up whatever it was doing."""

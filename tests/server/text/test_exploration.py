@@ -1,5 +1,5 @@
 from causes import CRATE
-from mapspeak.driving.exploration import TripEnd
+from mapspeak.driving.exploration.blocked import TripEnd
 from mapspeak.robot import GoalState
 from mapspeak.server.text.exploration import say_trip_end
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 
+from mapspeak.driving.drive import OnProgress
 from mapspeak.driving.exploration.blocked import BlockedPlace, has_room_at
 from mapspeak.driving.exploration.progress import (
     BoundKind,
@@ -17,7 +18,6 @@ from mapspeak.driving.exploration.progress import (
 )
 from mapspeak.driving.exploration.trips import (
     SLACK_S,
-    OnTrip,
     Target,
     TripContext,
     Trips,
@@ -69,7 +69,7 @@ class Explorer:
         return not self._state.is_end
 
     async def advance(
-        self, bounds: Bounds | None, *, wait_s: float, on_trip: OnTrip, client: str = ""
+        self, bounds: Bounds | None, *, wait_s: float, on_trip: OnProgress, client: str = ""
     ) -> Progress:
         """Explore until it ends, pauses, or so much robot time has passed; begin where needed.
 
@@ -89,7 +89,7 @@ class Explorer:
         async with self._trips.given_up_with_call():
             return await self._advance(wait_s, on_trip, client)
 
-    async def _advance(self, wait_s: float, on_trip: OnTrip, client: str) -> Progress:
+    async def _advance(self, wait_s: float, on_trip: OnProgress, client: str) -> Progress:
         begun_s, before_s = self._site.robot.now_s, self._elapsed_s
         while True:
             with self._site.drives.preparing() as ticket:

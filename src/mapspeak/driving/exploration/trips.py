@@ -1,7 +1,7 @@
 """Trips: drives to one target after the other that may be given up on the way for a better one."""
 
 import math
-from collections.abc import AsyncGenerator, Awaitable, Callable
+from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from enum import StrEnum
@@ -68,9 +68,6 @@ def spread_headings(first_rad: float, n_headings: int) -> list[float]:
     """Return headings all around, in radians, evenly spread, counter-clockwise."""
     step_rad = math.tau / n_headings
     return [wrap_angle(first_rad + index * step_rad) for index in range(n_headings)]
-
-
-OnTrip = Callable[[DriveReport], Awaitable[None]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,7 +152,9 @@ class Trips:
         self.n_begun += 1
         return TripState.UNDER_WAY
 
-    async def follow(self, *, until_s: float, grid: OccupancyGrid, on_trip: OnTrip) -> TripState:
+    async def follow(
+        self, *, until_s: float, grid: OccupancyGrid, on_trip: OnProgress
+    ) -> TripState:
         """Wait until it is time to think again of the trip under way, and say how it stands.
 
         Args:

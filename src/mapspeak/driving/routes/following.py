@@ -12,7 +12,7 @@ import anyio
 
 from mapspeak.driving.drive import OnProgress
 from mapspeak.driving.drivereport import DriveReport
-from mapspeak.driving.exploration import TripContext
+from mapspeak.driving.exploration.trips import TripContext
 from mapspeak.driving.routes.planning import RoutePlan, StopState, plan_route
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Pose

@@ -9,8 +9,9 @@ from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point
 from mapspeak.places.goalcheck import GoalCheck, say_refusal
 from mapspeak.places.naming import AmbiguousPlaceError, Place
-from mapspeak.places.relations import Nearest, find_all_near, parse_relation
 from mapspeak.places.relations.choosing import CheckedGoal, check_place, find_place
+from mapspeak.places.relations.grammar import Nearest, parse_relation
+from mapspeak.places.relations.proximity import find_all_near
 from mapspeak.robot import GoalStatus
 from mapspeak.spatial.paths import DistanceField
 from mapspeak.worldmodel.model import WorldModel

@@ -6,15 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mapspeak.driving.exploration import (
-    SLACK_S,
-    OnTrip,
-    Target,
-    TripContext,
-    Trips,
-    TripState,
-    has_room_at,
-)
+from mapspeak.driving.drive import OnProgress
+from mapspeak.driving.exploration.blocked import has_room_at
+from mapspeak.driving.exploration.trips import SLACK_S, Target, TripContext, Trips, TripState
 from mapspeak.driving.search.candidates import (
     CandidateKind,
     SearchCandidate,
@@ -130,7 +124,7 @@ class Searcher:
         budget: Budget,
         *,
         wait_s: float,
-        on_trip: OnTrip,
+        on_trip: OnProgress,
         client: str = "",
         earlier: Sequence[TakenPicture] = (),
     ) -> SearchProgress:
@@ -167,7 +161,7 @@ class Searcher:
         self._has_new_opinion = bool(judgement.scores) or judgement.likely is not None
 
     async def _advance(
-        self, judgement: Judgement, budget: Budget, wait_s: float, on_trip: OnTrip, client: str
+        self, judgement: Judgement, budget: Budget, wait_s: float, on_trip: OnProgress, client: str
     ) -> SearchProgress:
         self._budget, self._label = budget, None
         if judgement.is_seen:
@@ -181,7 +175,9 @@ class Searcher:
                 ended = SearchState.DRIVING
         return await self._end(ended)
 
-    async def _step(self, deadline_s: float, on_trip: OnTrip, client: str) -> SearchState | None:
+    async def _step(
+        self, deadline_s: float, on_trip: OnProgress, client: str
+    ) -> SearchState | None:
         """Drive on for a moment; return how the call ends, None where it goes on."""
         with self._site.drives.preparing() as ticket:
             world = await self._site.fetch_world_model()

@@ -6,7 +6,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from mapspeak.driving.exploration import BlockedPlace, TripEnd
+from mapspeak.driving.exploration.blocked import BlockedPlace, TripEnd
 from mapspeak.driving.search.candidates import SearchCandidate
 from mapspeak.driving.search.evidence import Earlier
 from mapspeak.geometry import Pose

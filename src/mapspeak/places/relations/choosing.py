@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from mapspeak.errors import GoalError, NextStep
 from mapspeak.geometry import Point, Pose, wrap_angle
-from mapspeak.places.goalcheck import GoalCheck, check_goal, say_check, say_refusal
+from mapspeak.places.goalcheck import GoalCheck, check_goal, say_refusal
 from mapspeak.places.naming import (
     Place,
     Spot,
@@ -72,11 +72,6 @@ class CheckedGoal:
         reason = self.place.reason
         is_told = reason and not is_taken_name(self.name)
         return f"{self.name}: {reason}" if is_told else self.name
-
-    @property
-    def sentence(self) -> str:
-        """Why there, and what is to be said of it."""
-        return "; ".join(filter(None, (self.place.reason, say_check(self.check))))
 
 
 def choose_goal(

@@ -293,13 +293,6 @@ def _split(by: str, words: str) -> list[tuple[str, str]]:
     ]
 
 
-def _read_corner(match: re.Match[str]) -> Relation:
-    found = match.groupdict()
-    return Corner(
-        of=found.get("of"), compass=read_compass(found.get("compass")), near=found.get("near")
-    )
-
-
 def _read_wall(match: re.Match[str]) -> Relation:
     is_along = match["along"].casefold() == "along" if match["along"] else False
     return WallSide(of=match["of"], compass=read_compass(match["compass"]), is_along=is_along)
@@ -323,13 +316,11 @@ FORMS: tuple[tuple[re.Pattern[str], Read], ...] = (
     (pattern(rf"(?:in )?between{OPEN}(?P<of>.+)"), _read_between),
     (
         pattern(
-            rf"{AT}(?:nearest |closest )?(?:{COMPASS} )?corner (?:of|in) (?P<of>.+?)"
+            rf"{AT}(?:nearest |closest )?(?:{COMPASS} )?corner(?: (?:of|in) (?P<of>.+?))?"
             rf"(?: {BY} (?P<near>.+))?"
         ),
-        _read_corner,
+        lambda m: Corner(of=m["of"], compass=read_compass(m["compass"]), near=m["near"]),
     ),
-    (pattern(rf"{AT}(?:nearest |closest )?corner {BY} (?P<near>.+)"), _read_corner),
-    (pattern(rf"{AT}(?:nearest |closest )?(?:{COMPASS} )?corner"), _read_corner),
     (
         pattern(
             rf"(?:(?P<along>along|at|by|next to|beside|near|facing) )?{THE}"

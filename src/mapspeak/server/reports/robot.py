@@ -11,7 +11,7 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, Merge, SemanticMap, WriteReceipt, name_key
 from mapspeak.memory.quoting import quote_name
-from mapspeak.places.goalcheck import GoalVerdict
+from mapspeak.places.goalcheck import GoalVerdict, say_check
 from mapspeak.places.relations.choosing import CheckedGoal
 from mapspeak.robot import CauseCode, GoalState, StampedPose
 from mapspeak.server.text.drives import say_end
@@ -174,7 +174,7 @@ class GoalAnswer(Report):
         return cls(
             place=goal.name,
             verdict=check.verdict,
-            reason=goal.sentence,
+            reason="; ".join(filter(None, (goal.place.reason, say_check(check)))),
             pose=PoseReport.of(goal.pose),
             room=room,
             clearance_m=round(check.clearance_m, 2) if math.isfinite(check.clearance_m) else None,

@@ -2,14 +2,9 @@
 
 from collections import Counter
 
-from mapspeak.driving.exploration import (
-    BlockedPlace,
-    BoundKind,
-    ExplorationState,
-    Progress,
-    Target,
-    TripEnd,
-)
+from mapspeak.driving.exploration.blocked import BlockedPlace, TripEnd
+from mapspeak.driving.exploration.progress import BoundKind, ExplorationState, Progress
+from mapspeak.driving.exploration.trips import Target
 from mapspeak.robot import GoalState
 from mapspeak.server.text.drives import say_cause
 from mapspeak.server.text.frontiers import say_merits, say_refusal

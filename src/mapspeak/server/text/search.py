@@ -1,13 +1,8 @@
 """A search in words: why a call ended, and what earlier pictures count for."""
 
-from mapspeak.driving.search import (
-    BudgetKind,
-    CandidateKind,
-    Earlier,
-    SearchCandidate,
-    SearchProgress,
-    SearchState,
-)
+from mapspeak.driving.search.candidates import CandidateKind, SearchCandidate
+from mapspeak.driving.search.evidence import Earlier
+from mapspeak.driving.search.standing import BudgetKind, SearchProgress, SearchState
 from mapspeak.server.text.exploration import say_trip_end
 
 STATES = {

@@ -10,14 +10,12 @@ from mcp_types import CallToolResult, ImageContent, TextContent
 from pydantic import Field
 
 from mapspeak.driving.drivereport import DriveReport
-from mapspeak.driving.exploration import (
-    Bounds,
-    ExplorationState,
-    Explorer,
-    spread_headings,
-    turn_to,
-)
-from mapspeak.driving.search import Budget, Judgement, Searcher, leave_out_shown
+from mapspeak.driving.exploration.explorer import Explorer
+from mapspeak.driving.exploration.progress import Bounds, ExplorationState
+from mapspeak.driving.exploration.trips import spread_headings, turn_to
+from mapspeak.driving.search.evidence import leave_out_shown
+from mapspeak.driving.search.searcher import Judgement, Searcher
+from mapspeak.driving.search.standing import Budget
 from mapspeak.errors import GoalError, LinkError, SemanticMapError
 from mapspeak.memory import TakenPicture
 from mapspeak.robot import CameraPicture, GoalState
