@@ -13,10 +13,10 @@ from mapspeak.memory import SemanticMapStore
 from mapspeak.memory.events import Effect
 from mapspeak.places.recall.notices import (
     close_floor_of,
+    closes_robot_in,
     end_event,
     find_hindrances,
     note_event,
-    say_consequences,
     say_events,
     say_unplaced,
 )
@@ -195,7 +195,7 @@ def test_a_closure_to_come_around_the_robot_is_noted_with_a_warning(
         world, store, text="x", effect=Effect.CLOSED, place=room.id, begins=LATER, now=NOW
     )
 
-    assert "drive out before" in " ".join(say_consequences(world, noted, NOW))
+    assert closes_robot_in(world, noted, NOW)
 
 
 def test_an_event_at_a_point_tells_how_much_floor_it_takes(store: SemanticMapStore) -> None:

@@ -296,17 +296,13 @@ def _away_m(world: WorldModel, remembered: RememberedThing, start: Place | None)
 
 
 def _path_m(world: WorldModel, remembered: RememberedThing) -> float | None:
-    stand: Point = stand_before(world, remembered).point
-    return world.path_m(stand)
+    return world.path_m(stand_before(world, remembered).point)
 
 
 def _say_candidates(world: WorldModel, called: Sequence[RememberedThing]) -> str:
-    told = [_say_candidate(world, each) for each in called[:MOST_NAMED]]
+    told = []
+    for each in called[:MOST_NAMED]:
+        rooms, path_m = " or ".join(world.rooms_before(each)) or "no room", _path_m(world, each)
+        told.append(f"{each.id} in {rooms}, {'no way' if path_m is None else f'{path_m:.1f} m'}")
     n_more = len(called) - len(told)
     return ", ".join(told) + (f" and {n_more} more" if n_more else "")
-
-
-def _say_candidate(world: WorldModel, remembered: RememberedThing) -> str:
-    rooms = " or ".join(world.rooms_before(remembered)) or "no room"
-    path_m = _path_m(world, remembered)
-    return f"{remembered.id} in {rooms}, {'no way' if path_m is None else f'{path_m:.1f} m'}"

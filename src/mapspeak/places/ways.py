@@ -41,7 +41,9 @@ def measure_path(world: WorldModel, start: Place, goal: Place) -> float | None:
     end = standing_point(world, goal)
     if distances is None or world.map.weights is None:
         return None if distances is None else distances.distance_to(end)
-    return _measure(world, distances, world.map.find_path_over(distances, end), end)
+    # The way round is not the shortest one.
+    path = world.map.find_path_over(distances, end)
+    return None if path is None else path.length_m
 
 
 def find_way(world: WorldModel, start: Place, goal: Place) -> Way:
@@ -50,7 +52,7 @@ def find_way(world: WorldModel, start: Place, goal: Place) -> Way:
     straight_m = begin.distance_to(end)
     distances = _distances_from(world, start)
     path = None if distances is None else world.map.find_path_over(distances, end)
-    path_m = _measure(world, distances, path, end)
+    path_m = None if path is None else measure_path(world, start, goal)
     if path is None or path_m is None:
         return Way(start=start, goal=goal, end=end, straight_m=straight_m)
     cells = _cells_along(world, path)
@@ -63,16 +65,6 @@ def find_way(world: WorldModel, start: Place, goal: Place) -> Way:
         through=_name_regions(world, *cells),
         clearance_m=float(world.map.clearance_m[cells].min()),
     )
-
-
-def _measure(
-    world: WorldModel, distances: DistanceField | None, path: Path | None, end: Point
-) -> float | None:
-    """Return the metres to the end: by the way round where that is not the shortest one."""
-    if distances is None or path is None:
-        return None
-    is_shortest = world.map.weights is None
-    return distances.distance_to(end) if is_shortest else path.length_m
 
 
 def _distances_from(world: WorldModel, start: Place) -> DistanceField | None:

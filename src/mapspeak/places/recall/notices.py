@@ -16,7 +16,7 @@ from mapspeak.memory.events import (
     find_place_ids,
     gives_orders,
 )
-from mapspeak.places.naming import Place, Spot
+from mapspeak.places.naming import Place, Spot, Thing
 from mapspeak.places.relations.choosing import find_place
 from mapspeak.spatial.rooms import Door, Region, RoomMap
 from mapspeak.worldmodel.closures import (
@@ -72,7 +72,7 @@ def note_event(
         place="" if found is None else _name_of(found, place or "", effect),
         effect=effect,
         at=None if found is None else found.point,
-        outlines=() if found is None or effect is Effect.NONE else _outlines_of(world.rooms, found),
+        outlines=() if found is None or effect is Effect.NONE else _outline(world.rooms, found),
         begins=begins,
         until=until,
         source=source,
@@ -92,31 +92,15 @@ def _require_no_orders(**said: str) -> None:
             )
 
 
-def say_consequences(world: WorldModel, event: Event, now: datetime) -> tuple[str, ...]:
-    """Return what an event that closes floor means for the robot, where it stands now.
-
-    Args:
-        world: The map before the event.
-    """
-    if event.effect is not Effect.CLOSED:
-        return ()
-    area = _area_of(event, world.map, now)
-    if area is None:
-        return ()
-    if area.contains(world.robot.point):
-        return ("The robot stands inside: it has to drive out before that begins.",)
-    cut_off = _find_cut_off(world, area)
-    if not cut_off:
-        return ()
-    return (f"While it lasts the robot cannot get to {', '.join(cut_off)} from where it is.",)
+def closes_robot_in(world: WorldModel, event: Event, now: datetime) -> bool:
+    """Return True for an event that closes the floor below the robot, now or later."""
+    area = _area_of(event, world.map, now) if event.effect is Effect.CLOSED else None
+    return area is not None and area.contains(world.robot.point)
 
 
 def _require_robot_outside(world: WorldModel, event: Event, now: datetime) -> None:
     """Refuse what would close the floor below the robot: it could drive nowhere any more."""
-    if event.effect is not Effect.CLOSED or not event.is_current(now):
-        return
-    area = _area_of(event, world.map, now)
-    if area is not None and area.contains(world.robot.point):
+    if event.is_current(now) and closes_robot_in(world, event, now):
         raise SemanticMapError(
             f"The robot itself stands in {event.place or 'what is to be closed'}; closed, it could "
             "not drive out. Nothing was noted.",
@@ -124,8 +108,15 @@ def _require_robot_outside(world: WorldModel, event: Event, now: datetime) -> No
         )
 
 
-def _find_cut_off(world: WorldModel, area: ClosedArea) -> list[str]:
-    """Return the rooms beside a closed area that the robot gets to only while it is open."""
+def find_cut_off(world: WorldModel, event: Event, now: datetime) -> list[str]:
+    """Return the rooms beside what an event closes that the robot gets to only before and after.
+
+    Args:
+        world: The map before the event, with the robot outside what it closes.
+    """
+    area = _area_of(event, world.map, now) if event.effect is Effect.CLOSED else None
+    if area is None:
+        return []
     before = world.distances.reachable
     closed = world.map.with_areas((*world.map.areas, area), world.map.hindrances)
     after = closed.distances_from(world.robot.point).reachable
@@ -235,25 +226,27 @@ def _find_outlines(event: Event, revision: MapRevision) -> tuple[Outline, ...]:
     for place_id in find_place_ids(event.place):
         # Rooms are found only where somebody has written an event without an outline.
         rooms = revision.rooms
-        region = rooms.find_region(place_id)
         door = next((each for each in rooms.doors if each.id == place_id), None)
-        if region is not None:
-            found += outlines_of_region(rooms, region)
-        elif door is not None:
-            found.append(outline_of_door(rooms, door))
+        found += _outlines_of(rooms, rooms.find_region(place_id) or door)
     if not found and event.at is not None:
         found.append(outline_around(event.at, radius_m=SPOT_RADIUS_M))
     return tuple(found)
 
 
-def _outlines_of(rooms: RoomMap, place: Place) -> tuple[Outline, ...]:
-    match place.thing:
+def _outlines_of(rooms: RoomMap, thing: Thing | None) -> tuple[Outline, ...]:
+    """Return the outlines of a region or a door; none of what has no extent."""
+    match thing:
         case Region() as region:
             return outlines_of_region(rooms, region)
         case Door() as door:
             return (outline_of_door(rooms, door),)
         case _:
-            return (outline_around(place.point, radius_m=SPOT_RADIUS_M),)
+            return ()
+
+
+def _outline(rooms: RoomMap, place: Place) -> tuple[Outline, ...]:
+    around = outline_around(place.point, radius_m=SPOT_RADIUS_M)
+    return _outlines_of(rooms, place.thing) or (around,)
 
 
 def _name_of(place: Place, words: str, effect: Effect) -> str:

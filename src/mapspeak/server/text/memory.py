@@ -10,8 +10,10 @@ from mapspeak.geometry import wrap_angle
 from mapspeak.memory import Confidence, Landmark, Merge, Reunion, Waypoint
 from mapspeak.memory.consistency.findings import MemoryFinding
 from mapspeak.memory.episodes.observation import EpisodeMatch, EpisodePage
+from mapspeak.memory.events import Event
 from mapspeak.memory.quoting import quote, quote_name, tell_name
 from mapspeak.places.recall.nearby import Nearby
+from mapspeak.places.recall.notices import closes_robot_in, find_cut_off
 from mapspeak.server.text.episodes import say_evidence
 from mapspeak.server.text.findings import say_finding, say_trust
 from mapspeak.server.text.offered import lead
@@ -174,6 +176,16 @@ def _say_moment(time: datetime, now: datetime | None) -> str:
     local = time.astimezone(now.tzinfo)
     day = "" if local.date() == now.date() else f"{local:%Y-%m-%d} "
     return f"{day}{local:%H:%M}, {say_age(time, now)}"
+
+
+def say_consequences(world: WorldModel, event: Event, now: datetime) -> str:
+    """Say what an event that closes floor means for the robot, where it stands now."""
+    if closes_robot_in(world, event, now):
+        return "The robot stands inside: it has to drive out before that begins."
+    cut_off = find_cut_off(world, event, now)
+    if not cut_off:
+        return ""
+    return f"While it lasts the robot cannot get to {', '.join(cut_off)} from where it is."
 
 
 def describe_nearby(world: WorldModel, nearby: Nearby) -> str:

@@ -29,6 +29,7 @@ from mapspeak.server.text.memory import (
     describe_episodes,
     describe_nearby,
     read_moment,
+    say_consequences,
     say_episode,
 )
 from mapspeak.server.text.offered import lead
@@ -222,7 +223,7 @@ class MemoryTools:
             )
             said = event.sentence(now)
             fault = self._keep_note(world, f"Noted {said}")
-            told = (said, *notices.say_consequences(world, event, now), fault)
+            told = (said, say_consequences(world, event, now), fault)
             return " ".join(filter(None, told))
 
         return f"Noted as {await session.compute(note)}"
