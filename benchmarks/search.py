@@ -27,8 +27,8 @@ from rich.table import Table
 from benchmarks.figure import Figure
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.search.candidates import CandidateKind, SearchCandidate
+from mapspeak.driving.search.progress import Budget
 from mapspeak.driving.search.searcher import Choose, Judgement, Searcher
-from mapspeak.driving.search.standing import Budget
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.links.simulated import SimulatedRobot
 from mapspeak.memory import SemanticMapStore

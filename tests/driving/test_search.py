@@ -7,10 +7,10 @@ from drawing import grid_from_text
 from embedding import ConceptEmbedder
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.driving.search.candidates import CandidateKind, SearchCandidate, find_candidates
-from mapspeak.driving.search.evidence import Opinions, find_company_score, speaks_of, weight_of
+from mapspeak.driving.search.evidence import Opinions, find_context_score, speaks_of, weight_of
+from mapspeak.driving.search.progress import Budget, SearchProgress, SearchState
 from mapspeak.driving.search.searcher import Judgement, Searcher
 from mapspeak.driving.search.seenfloor import SeenFloor
-from mapspeak.driving.search.standing import Budget, SearchProgress, SearchState
 from mapspeak.geometry import Point, Pose
 from mapspeak.memory import Landmark, SemanticMapStore, Waypoint
 from mapspeak.robot import Detection
@@ -325,13 +325,13 @@ def test_words_speak_of_a_thing_by_the_rules_of_the_memory(
 def test_things_are_likely_near_what_belongs_to_the_same_room(
     words: str, thing: str, score: float | None
 ) -> None:
-    assert find_company_score(words, thing) == (score and pytest.approx(score))
+    assert find_context_score(words, thing) == (score and pytest.approx(score))
 
 
 def test_what_the_model_says_of_a_view_counts_more_than_what_stands_there() -> None:
     opinions = Opinions()
-    assert opinions.add_company(Point(0.0, 0.0), 0.8)
-    assert not opinions.add_company(Point(0.5, 0.0), 0.8)
+    assert opinions.add_context(Point(0.0, 0.0), 0.8)
+    assert not opinions.add_context(Point(0.5, 0.0), 0.8)
     assert opinions.score_at(Point(0.0, 0.0), ids=()) == pytest.approx(0.65)
     opinions.add_view(Point(0.0, 0.0), 0.0)
     assert opinions.score_at(Point(0.0, 0.0), ids=()) < 0.5

@@ -1,4 +1,4 @@
-"""What speaks for a thing being at a place: its company, earlier pictures, the model's opinion."""
+"""What speaks for a thing being at a place: things around it, earlier pictures, the model."""
 
 import math
 import re
@@ -50,7 +50,7 @@ _PATTERNS = tuple(
 )
 
 
-def find_company_score(words: str, thing: str) -> float | None:
+def find_context_score(words: str, thing: str) -> float | None:
     """Find how likely a thing is near what words name, from 0 to 1; None where nobody can say."""
     named, wanted = _rooms_of(words), _rooms_of(thing)
     if not named or not wanted:
@@ -147,10 +147,10 @@ REACH_M = 5.0
 """A view says something about what lies this near to the middle of it."""
 VIEW_STRENGTH = 2.0
 """What the model says of a view counts so many times as much as that nobody knows."""
-COMPANY_STRENGTH = 1.0
+CONTEXT_STRENGTH = 1.0
 """What stands at a place counts less: nobody has looked at it with the thing in mind."""
-COMPANY_APART_M = 1.5
-"""The same score this near to an earlier one is of the same company."""
+CONTEXT_APART_M = 1.5
+"""The same score this near to an earlier one is of the same thing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,13 +180,13 @@ class Opinions:
         """Take in how likely the thing is near what a picture showed."""
         self._views.append(_ViewOpinion(point, score, VIEW_STRENGTH))
 
-    def add_company(self, point: Point, score: float) -> bool:
+    def add_context(self, point: Point, score: float) -> bool:
         """Take in how likely the thing is near another one; return False where that is no news."""
         for known in self._views:
-            is_alike = known.strength == COMPANY_STRENGTH and known.score == score
-            if is_alike and known.point.distance_to(point) <= COMPANY_APART_M:
+            is_alike = known.strength == CONTEXT_STRENGTH and known.score == score
+            if is_alike and known.point.distance_to(point) <= CONTEXT_APART_M:
                 return False
-        self._views.append(_ViewOpinion(point, score, COMPANY_STRENGTH))
+        self._views.append(_ViewOpinion(point, score, CONTEXT_STRENGTH))
         return True
 
     def score_at(self, point: Point, *, ids: tuple[str, ...]) -> float:

@@ -19,18 +19,18 @@ from mapspeak.driving.search.evidence import (
     Earlier,
     Look,
     Opinions,
-    find_company_score,
+    find_context_score,
     read_earlier,
     speaks_of,
 )
-from mapspeak.driving.search.seenfloor import REACH_M, SeenFloor
-from mapspeak.driving.search.standing import (
+from mapspeak.driving.search.progress import (
     Budget,
     BudgetKind,
     SearchProgress,
     SearchState,
     find_seen_regions,
 )
+from mapspeak.driving.search.seenfloor import REACH_M, SeenFloor
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory import TakenPicture, name_key
 from mapspeak.robot import CameraPicture, Detection
@@ -239,7 +239,7 @@ class Searcher:
         return await self._trips.set_out(target, ticket=ticket, client=client, grid=world.grid)
 
     def _find_candidates(self, world: WorldModel) -> list[SearchCandidate]:
-        self._recall_company(world)
+        self._recall_context(world)
         found = find_candidates(
             world,
             self._thing,
@@ -256,14 +256,14 @@ class Searcher:
             and (each.kind is CandidateKind.REMEMBERED or not self._seen.has_look_from(each.pose))
         ]
 
-    def _recall_company(self, world: WorldModel) -> None:
+    def _recall_context(self, world: WorldModel) -> None:
         """Take in what remembered places say of where the thing may be; a kitchen has fridges."""
         for place in world.places:
             waypoint = place.waypoint
             named = (*waypoint.safety_landmarks, *waypoint.functional_landmarks)
             words = ", ".join((waypoint.name, *(each.label for each in named)))
-            if (score := find_company_score(words, self._thing)) is not None:
-                self._opinions.add_company(waypoint.pose.point, score)
+            if (score := find_context_score(words, self._thing)) is not None:
+                self._opinions.add_context(waypoint.pose.point, score)
 
     async def _is_pointless(self, world: WorldModel, here: SearchCandidate) -> bool:
         """Return True when what the place shows was seen on the way, or nobody can stand there."""
@@ -294,8 +294,8 @@ class Searcher:
             if speaks_of(each.label, self._thing):
                 if is_new and found is None:
                     self._reported, found = place, each.label
-            elif (score := find_company_score(each.label, self._thing)) is not None:
-                self._has_new_opinion |= self._opinions.add_company(place, score)
+            elif (score := find_context_score(each.label, self._thing)) is not None:
+                self._has_new_opinion |= self._opinions.add_context(place, score)
         return found
 
     def _find_spent(self) -> BudgetKind | None:

@@ -10,7 +10,7 @@ from mapspeak.errors import GoalError
 from mapspeak.geometry import Point
 from mapspeak.places.naming import Place
 from mapspeak.places.relations.grammar import Compass, Side, Towards, read_heading
-from mapspeak.places.relations.placement import find_footing, refuse, stand, tolerance_m
+from mapspeak.places.relations.placement import find_reachable_floor, refuse, stand, tolerance_m
 from mapspeak.places.relations.referents import (
     ROBOT,
     Referent,
@@ -196,22 +196,22 @@ def _search(
     edge_m = float((offsets @ along).max())
     sideways = offsets @ np.array([-along[1], along[0]])
     reach_m = edge_m + float(np.abs(sideways).max()) + max(aim.away_m, FARTHEST_M) + 1.0
-    footing = find_footing(world, thing.anchor, reach_m)
-    forward_m = footing.along_m(thing.anchor, aim.heading_rad) - edge_m
-    lateral_m = footing.along_m(thing.anchor, aim.heading_rad + math.pi / 2)
+    floor = find_reachable_floor(world, thing.anchor, reach_m)
+    forward_m = floor.along_m(thing.anchor, aim.heading_rad) - edge_m
+    lateral_m = floor.along_m(thing.anchor, aim.heading_rad + math.pi / 2)
     outside_m = np.maximum(
         np.maximum(float(sideways.min()) - lateral_m, lateral_m - float(sideways.max())), 0.0
     )
     away_m = np.hypot(forward_m, outside_m)
     allowed = (forward_m > 0) & (outside_m <= math.tan(SECTOR_RAD) * forward_m)
-    allowed &= footing.is_beside(aim.home, thing.region)
+    allowed &= floor.is_beside(aim.home, thing.region)
     if is_asked:
         allowed &= np.abs(away_m - aim.away_m) <= tolerance_m(world.grid.resolution_m)
     else:
         allowed &= (away_m >= 0.4 * aim.away_m) & (away_m <= FARTHEST_M)
     costs = np.hypot(forward_m - aim.away_m, outside_m) + 0.1 * np.abs(lateral_m)
-    point = footing.choose(world, allowed, costs, in_sight_of=aim.sees)
-    return None if point is None else (point, footing.at(away_m, point))
+    point = floor.choose(world, allowed, costs, in_sight_of=aim.sees)
+    return None if point is None else (point, floor.at(away_m, point))
 
 
 def _what_works(

@@ -11,7 +11,7 @@ import numpy as np
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.places.naming import Place, say_spot
 from mapspeak.places.relations.grammar import Compass, read_heading
-from mapspeak.places.relations.placement import find_footing, join_or, refuse, stand
+from mapspeak.places.relations.placement import find_reachable_floor, join_or, refuse, stand
 from mapspeak.places.standing import cells_of, facing_in
 from mapspeak.spatial import Cell
 from mapspeak.spatial.grid import Mask
@@ -156,10 +156,10 @@ def stand_in_middle(world: WorldModel, region: Region) -> Place:
         GoalError: The robot gets nowhere near it.
     """
     middle = find_middle(world, region)
-    footing = find_footing(world, middle, MIDDLE_M)
-    away_m = footing.away_m(middle)
-    is_here = (footing.regions == region.index) & (away_m <= MIDDLE_M)
-    point = footing.choose(world, is_here, away_m)
+    floor = find_reachable_floor(world, middle, MIDDLE_M)
+    away_m = floor.away_m(middle)
+    is_here = (floor.regions == region.index) & (away_m <= MIDDLE_M)
+    point = floor.choose(world, is_here, away_m)
     if point is None:
         raise refuse(
             f"The robot can stand nowhere within {MIDDLE_M:.0f} m of the middle of {region.id}."
@@ -176,10 +176,10 @@ def stand_in_corner(world: WorldModel, corners: Sequence[RoomCorner]) -> Place:
         GoalError: It can in none.
     """
     for corner in corners:
-        footing = find_footing(world, corner.point, AT_CORNER_M + 1.0)
-        away_m = footing.away_m(corner.point)
-        is_here = (footing.regions == corner.region.index) & (away_m <= AT_CORNER_M)
-        point = footing.choose(world, is_here, away_m, in_sight_of=corner.point)
+        floor = find_reachable_floor(world, corner.point, AT_CORNER_M + 1.0)
+        away_m = floor.away_m(corner.point)
+        is_here = (floor.regions == corner.region.index) & (away_m <= AT_CORNER_M)
+        point = floor.choose(world, is_here, away_m, in_sight_of=corner.point)
         if point is not None:
             off_m = point.distance_to(corner.point)
             reason = f"{off_m:.1f} m from {corner.name}, facing it"
@@ -192,9 +192,9 @@ def stand_in_corner(world: WorldModel, corners: Sequence[RoomCorner]) -> Place:
 
 def _corners_that_work(world: WorldModel, tried: Sequence[RoomCorner]) -> Iterator[str]:
     for corner in find_corners(world, tried[0].region):
-        footing = find_footing(world, corner.point, AT_CORNER_M)
-        is_here = footing.regions == corner.region.index
-        is_near = footing.away_m(corner.point) <= AT_CORNER_M
+        floor = find_reachable_floor(world, corner.point, AT_CORNER_M)
+        is_here = floor.regions == corner.region.index
+        is_near = floor.away_m(corner.point) <= AT_CORNER_M
         if corner not in tried and (is_here & is_near).any():
             yield corner.name
 
@@ -213,16 +213,16 @@ def stand_at_wall(world: WorldModel, walls: Sequence[Wall], *, is_along: bool) -
 
 
 def _stand_at(world: WorldModel, wall: Wall, *, is_along: bool) -> Place | None:
-    footing = find_footing(world, wall.middle, wall.length_m / 2 + world.radius_m + AT_WALL_M)
-    off_m = -footing.along_m(wall.start, wall.outward_rad)
-    aside_m = np.abs(footing.along_m(wall.middle, wall.heading_rad))
-    allowed = (footing.regions == wall.region.index) & (aside_m <= wall.length_m / 2)
+    floor = find_reachable_floor(world, wall.middle, wall.length_m / 2 + world.radius_m + AT_WALL_M)
+    off_m = -floor.along_m(wall.start, wall.outward_rad)
+    aside_m = np.abs(floor.along_m(wall.middle, wall.heading_rad))
+    allowed = (floor.regions == wall.region.index) & (aside_m <= wall.length_m / 2)
     least_m = world.radius_m - world.grid.resolution_m
     allowed &= (off_m >= least_m) & (off_m <= world.radius_m + AT_WALL_M)
-    point = footing.choose(world, allowed, off_m + 0.5 * aside_m)
+    point = floor.choose(world, allowed, off_m + 0.5 * aside_m)
     if point is None:
         return None
-    beside = f"{footing.at(off_m, point):.1f} m from {wall.name}"
+    beside = f"{floor.at(off_m, point):.1f} m from {wall.name}"
     if not is_along:
         return stand(point, f"{beside}, facing it", wall.outward_rad)
     yaw_rad = wall.heading_rad

@@ -10,8 +10,8 @@ from mapspeak.places.naming import Place
 from mapspeak.places.relations.directions import front_of_region
 from mapspeak.places.relations.grammar import Kind
 from mapspeak.places.relations.placement import (
-    Footing,
-    find_footing,
+    ReachableFloor,
+    find_reachable_floor,
     is_in_sight,
     refuse,
     stand,
@@ -39,18 +39,18 @@ def stand_away(world: WorldModel, thing: Referent, away_m: float) -> Place:
     Raises:
         GoalError: There is none; the hint names the distances between which there are some.
     """
-    footing, from_edge_m = _find_around(world, thing, away_m)
-    at_home = footing.is_beside(thing.home, thing.region)
+    floor, from_edge_m = _find_around(world, thing, away_m)
+    at_home = floor.is_beside(thing.home, thing.region)
     is_right = np.abs(from_edge_m - away_m) <= tolerance_m(world.grid.resolution_m)
-    costs = footing.paths_m + 10 * np.abs(from_edge_m - away_m)
+    costs = floor.paths_m + 10 * np.abs(from_edge_m - away_m)
     sees = _find_sight(world, thing)
-    point = footing.choose(world, at_home & is_right, costs, in_sight_of=sees)
+    point = floor.choose(world, at_home & is_right, costs, in_sight_of=sees)
     if point is None:
         off_m = np.abs(from_edge_m - away_m)
-        other = footing.choose(world, at_home, off_m, in_sight_of=sees)
-        works = [] if other is None else [f"{footing.at(from_edge_m, other):.1f} m from it"]
+        other = floor.choose(world, at_home, off_m, in_sight_of=sees)
+        works = [] if other is None else [f"{floor.at(from_edge_m, other):.1f} m from it"]
         raise refuse(f"The robot can stand nowhere {away_m:g} m from {thing.name}.", works)
-    return _facing(thing, point, f"{footing.at(from_edge_m, point):.1f} m from {thing.name}")
+    return _facing(thing, point, f"{floor.at(from_edge_m, point):.1f} m from {thing.name}")
 
 
 def stand_next_to(world: WorldModel, thing: Referent) -> Place:
@@ -59,19 +59,19 @@ def stand_next_to(world: WorldModel, thing: Referent) -> Place:
     Raises:
         GoalError: There is none.
     """
-    footing, from_edge_m = _find_around(world, thing, NEARLY_M)
+    floor, from_edge_m = _find_around(world, thing, NEARLY_M)
     low_m, high_m = (world.radius_m + gap_m for gap_m in NEAR_M)
     is_near = (from_edge_m >= low_m) & (from_edge_m <= high_m)
     sees = _find_sight(world, thing)
-    at_home = footing.is_beside(thing.home, thing.region)
-    is_there = at_home & _is_out_of_the_way(world, footing, thing)
+    at_home = floor.is_beside(thing.home, thing.region)
+    is_there = at_home & _is_out_of_the_way(world, floor, thing)
     for allowed, costs in (
-        (is_there & is_near, footing.paths_m),
+        (is_there & is_near, floor.paths_m),
         (is_there & (from_edge_m <= NEARLY_M), from_edge_m),
     ):
-        point = footing.choose(world, allowed, costs, in_sight_of=sees)
+        point = floor.choose(world, allowed, costs, in_sight_of=sees)
         if point is not None:
-            away_m = footing.at(from_edge_m, point)
+            away_m = floor.at(from_edge_m, point)
             return _facing(thing, point, f"next to {thing.name}, {away_m:.1f} m from it")
     nowhere = f"The robot can stand nowhere within {NEARLY_M:.1f} m of {thing.name}"
     if thing.door is not None:
@@ -95,10 +95,10 @@ def stand_facing(world: WorldModel, thing: Referent) -> Place:
         raise refuse("The robot cannot face itself.", ["2 m in front of the robot"])
     if thing.region is not None:
         thing = front_of_region(world, thing.region)
-    footing, from_edge_m = _find_around(world, thing, SIGHT_M)
-    allowed = footing.is_beside(thing.home, thing.region) & (from_edge_m <= SIGHT_M)
-    allowed &= footing.away_m(thing.anchor) >= world.radius_m + LEAST_SIGHT_M
-    point = footing.choose(world, allowed, footing.paths_m, in_sight_of=_find_sight(world, thing))
+    floor, from_edge_m = _find_around(world, thing, SIGHT_M)
+    allowed = floor.is_beside(thing.home, thing.region) & (from_edge_m <= SIGHT_M)
+    allowed &= floor.away_m(thing.anchor) >= world.radius_m + LEAST_SIGHT_M
+    point = floor.choose(world, allowed, floor.paths_m, in_sight_of=_find_sight(world, thing))
     if point is None:
         raise refuse(
             f"From nowhere within {SIGHT_M:.0f} m does the robot see {thing.name} freely.",
@@ -108,25 +108,27 @@ def stand_facing(world: WorldModel, thing: Referent) -> Place:
     return _facing(thing, point, f"{away_m:.1f} m from {thing.name}, in sight of it")
 
 
-def _find_around(world: WorldModel, thing: Referent, away_m: float) -> tuple[Footing, np.ndarray]:
+def _find_around(
+    world: WorldModel, thing: Referent, away_m: float
+) -> tuple[ReachableFloor, np.ndarray]:
     offsets = thing.extent - np.array([thing.anchor.x, thing.anchor.y])
     reach_m = float(np.hypot(offsets[:, 0], offsets[:, 1]).max()) + away_m + 1.0
-    footing = find_footing(world, thing.anchor, reach_m)
-    return footing, footing.extent_away_m(thing.extent)
+    floor = find_reachable_floor(world, thing.anchor, reach_m)
+    return floor, floor.extent_away_m(thing.extent)
 
 
-def _is_out_of_the_way(world: WorldModel, footing: Footing, thing: Referent) -> np.ndarray:
+def _is_out_of_the_way(world: WorldModel, floor: ReachableFloor, thing: Referent) -> np.ndarray:
     """Return True beside a door's opening and not before it; at a room's doors; anywhere else."""
     if thing.door is not None and thing.home is not None:
         along_rad = find_normal(world, thing.door, thing.home) + math.pi / 2
-        aside_m = np.abs(footing.along_m(thing.door.place, along_rad))
+        aside_m = np.abs(floor.along_m(thing.door.place, along_rad))
         return np.asarray(aside_m >= thing.door.width_m / 2)
     if thing.region is None:
-        return np.ones(len(footing.points), dtype=np.bool_)
-    is_near = np.zeros(len(footing.points), dtype=np.bool_)
+        return np.ones(len(floor.points), dtype=np.bool_)
+    is_near = np.zeros(len(floor.points), dtype=np.bool_)
     for door in world.rooms.doors_of(thing.region):
         if world.find_crossing(door) is not None:
-            is_near |= footing.away_m(door.place) <= NEAR_DOOR_M + door.width_m / 2
+            is_near |= floor.away_m(door.place) <= NEAR_DOOR_M + door.width_m / 2
     return is_near if is_near.any() else ~is_near
 
 
@@ -195,11 +197,11 @@ def _stand_in_door(world: WorldModel, one: Region, other: Region) -> Place | Non
 def _stand_straight(world: WorldModel, one: Point, other: Point, both: str) -> Place | None:
     gap_m, heading_rad = one.distance_to(other), one.bearing_to(other)
     middle = Point((one.x + other.x) / 2, (one.y + other.y) / 2)
-    footing = find_footing(world, middle, gap_m / 2)
-    share = footing.along_m(one, heading_rad) / gap_m
-    aside_m = np.abs(footing.along_m(one, heading_rad + math.pi / 2))
+    floor = find_reachable_floor(world, middle, gap_m / 2)
+    share = floor.along_m(one, heading_rad) / gap_m
+    aside_m = np.abs(floor.along_m(one, heading_rad + math.pi / 2))
     allowed = (share >= SHARE[0]) & (share <= SHARE[1]) & (aside_m <= ASIDE_RATIO * gap_m)
-    point = footing.choose(world, allowed, footing.away_m(middle), in_sight_of=one)
+    point = floor.choose(world, allowed, floor.away_m(middle), in_sight_of=one)
     if point is None:
         return None
     one_m, other_m = point.distance_to(one), point.distance_to(other)
@@ -215,10 +217,10 @@ def _stand_on_way(world: WorldModel, one: Point, other: Point, both: str) -> Pla
     if path is None:
         return None
     middle = point_along(path.points, path.length_m / 2)
-    footing = find_footing(world, middle, STEP_OFF_M)
-    away_m = footing.away_m(middle)
+    floor = find_reachable_floor(world, middle, STEP_OFF_M)
+    away_m = floor.away_m(middle)
     allowed = away_m <= min(STEP_OFF_M, ASIDE_RATIO * path.length_m)
-    point = footing.choose(world, allowed, away_m, in_sight_of=middle)
+    point = floor.choose(world, allowed, away_m, in_sight_of=middle)
     if point is None:
         return None
     return stand(point, f"half way between {both}, on the way of {path.length_m:.1f} m")
@@ -226,11 +228,11 @@ def _stand_on_way(world: WorldModel, one: Point, other: Point, both: str) -> Pla
 
 def _step_off(world: WorldModel, point: Point) -> Point | None:
     """Return the nearest place to a thing where the robot can be."""
-    footing = find_footing(world, point, STEP_OFF_M)
-    away_m = footing.away_m(point)
+    floor = find_reachable_floor(world, point, STEP_OFF_M)
+    away_m = floor.away_m(point)
     if not away_m.size or float(away_m.min()) > STEP_OFF_M:
         return None
-    return Point(*footing.points[int(np.argmin(away_m))].tolist())
+    return Point(*floor.points[int(np.argmin(away_m))].tolist())
 
 
 CLASSES = {

@@ -34,7 +34,7 @@ from mapspeak.places.relations.outlines import (
     stand_in_corner,
     stand_in_middle,
 )
-from mapspeak.places.relations.placement import find_footing, refuse, stand
+from mapspeak.places.relations.placement import find_reachable_floor, refuse, stand
 from mapspeak.places.relations.proximity import (
     find_nearest,
     stand_away,
@@ -236,8 +236,8 @@ class Reader:
 
     def _path_m(self, point: Point) -> float:
         """Return how far it is to the floor beside a point that the robot cannot stand in."""
-        footing = find_footing(self._world, point, BESIDE_M)
-        return float(footing.paths_m.min(initial=math.inf))
+        floor = find_reachable_floor(self._world, point, BESIDE_M)
+        return float(floor.paths_m.min(initial=math.inf))
 
 
 def _check_distance(away_m: float | None) -> None:

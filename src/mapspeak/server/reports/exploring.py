@@ -5,7 +5,7 @@ from typing import Self
 from pydantic import Field
 
 from mapspeak.driving.exploration.progress import ExplorationState, Progress
-from mapspeak.driving.search.standing import SearchProgress, SearchState
+from mapspeak.driving.search.progress import SearchProgress, SearchState
 from mapspeak.server.reports.robot import PoseReport, Report
 from mapspeak.server.text.exploration import (
     say_blocked,

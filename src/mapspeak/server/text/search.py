@@ -2,7 +2,7 @@
 
 from mapspeak.driving.search.candidates import CandidateKind, SearchCandidate
 from mapspeak.driving.search.evidence import Earlier
-from mapspeak.driving.search.standing import BudgetKind, SearchProgress, SearchState
+from mapspeak.driving.search.progress import BudgetKind, SearchProgress, SearchState
 from mapspeak.server.text.exploration import say_trip_end
 
 STATES = {

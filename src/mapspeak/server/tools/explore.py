@@ -14,8 +14,8 @@ from mapspeak.driving.exploration.explorer import Explorer
 from mapspeak.driving.exploration.progress import Bounds, ExplorationState
 from mapspeak.driving.exploration.trips import spread_headings, turn_to
 from mapspeak.driving.search.evidence import leave_out_shown
+from mapspeak.driving.search.progress import Budget
 from mapspeak.driving.search.searcher import Judgement, Searcher
-from mapspeak.driving.search.standing import Budget
 from mapspeak.errors import GoalError, LinkError, SemanticMapError
 from mapspeak.memory import TakenPicture
 from mapspeak.robot import CameraPicture, GoalState
