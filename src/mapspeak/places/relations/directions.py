@@ -10,7 +10,7 @@ from mapspeak.errors import GoalError
 from mapspeak.geometry import Point
 from mapspeak.places.naming import Place
 from mapspeak.places.relations.grammar import Compass, Side, Towards, read_heading
-from mapspeak.places.relations.placement import find_reachable_floor, refuse, stand, tolerance_m
+from mapspeak.places.relations.placement import find_reachable_cells, refuse, stand, tolerance_m
 from mapspeak.places.relations.referents import (
     ROBOT,
     Referent,
@@ -196,7 +196,7 @@ def _search(
     edge_m = float((offsets @ along).max())
     sideways = offsets @ np.array([-along[1], along[0]])
     reach_m = edge_m + float(np.abs(sideways).max()) + max(aim.away_m, FARTHEST_M) + 1.0
-    floor = find_reachable_floor(world, thing.anchor, reach_m)
+    floor = find_reachable_cells(world, thing.anchor, reach_m)
     forward_m = floor.along_m(thing.anchor, aim.heading_rad) - edge_m
     lateral_m = floor.along_m(thing.anchor, aim.heading_rad + math.pi / 2)
     outside_m = np.maximum(

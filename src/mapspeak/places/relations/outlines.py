@@ -11,7 +11,7 @@ import numpy as np
 from mapspeak.geometry import Point, wrap_angle
 from mapspeak.places.naming import Place, say_spot
 from mapspeak.places.relations.grammar import Compass, read_heading
-from mapspeak.places.relations.placement import find_reachable_floor, join_or, refuse, stand
+from mapspeak.places.relations.placement import find_reachable_cells, join_or, refuse, stand
 from mapspeak.places.standing import cells_of, facing_in
 from mapspeak.spatial import Cell
 from mapspeak.spatial.grid import Mask
@@ -156,7 +156,7 @@ def stand_in_middle(world: WorldModel, region: Region) -> Place:
         GoalError: The robot gets nowhere near it.
     """
     middle = find_middle(world, region)
-    floor = find_reachable_floor(world, middle, MIDDLE_M)
+    floor = find_reachable_cells(world, middle, MIDDLE_M)
     away_m = floor.away_m(middle)
     is_here = (floor.regions == region.index) & (away_m <= MIDDLE_M)
     point = floor.choose(world, is_here, away_m)
@@ -176,7 +176,7 @@ def stand_in_corner(world: WorldModel, corners: Sequence[RoomCorner]) -> Place:
         GoalError: It can in none.
     """
     for corner in corners:
-        floor = find_reachable_floor(world, corner.point, AT_CORNER_M + 1.0)
+        floor = find_reachable_cells(world, corner.point, AT_CORNER_M + 1.0)
         away_m = floor.away_m(corner.point)
         is_here = (floor.regions == corner.region.index) & (away_m <= AT_CORNER_M)
         point = floor.choose(world, is_here, away_m, in_sight_of=corner.point)
@@ -192,7 +192,7 @@ def stand_in_corner(world: WorldModel, corners: Sequence[RoomCorner]) -> Place:
 
 def _corners_that_work(world: WorldModel, tried: Sequence[RoomCorner]) -> Iterator[str]:
     for corner in find_corners(world, tried[0].region):
-        floor = find_reachable_floor(world, corner.point, AT_CORNER_M)
+        floor = find_reachable_cells(world, corner.point, AT_CORNER_M)
         is_here = floor.regions == corner.region.index
         is_near = floor.away_m(corner.point) <= AT_CORNER_M
         if corner not in tried and (is_here & is_near).any():
@@ -213,7 +213,7 @@ def stand_at_wall(world: WorldModel, walls: Sequence[Wall], *, is_along: bool) -
 
 
 def _stand_at(world: WorldModel, wall: Wall, *, is_along: bool) -> Place | None:
-    floor = find_reachable_floor(world, wall.middle, wall.length_m / 2 + world.radius_m + AT_WALL_M)
+    floor = find_reachable_cells(world, wall.middle, wall.length_m / 2 + world.radius_m + AT_WALL_M)
     off_m = -floor.along_m(wall.start, wall.outward_rad)
     aside_m = np.abs(floor.along_m(wall.middle, wall.heading_rad))
     allowed = (floor.regions == wall.region.index) & (aside_m <= wall.length_m / 2)

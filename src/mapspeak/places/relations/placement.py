@@ -21,7 +21,7 @@ MOST_EXTENT = 256
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ReachableFloor:
+class ReachableCells:
     """The cells of a part of the map that the robot can get to; arrays of one length.
 
     Attributes:
@@ -96,7 +96,7 @@ class ReachableFloor:
         return None
 
 
-def find_reachable_floor(world: WorldModel, centre: Point, reach_m: float) -> ReachableFloor:
+def find_reachable_cells(world: WorldModel, centre: Point, reach_m: float) -> ReachableCells:
     """Find the reachable cells at most so far from a place to each side."""
     grid = world.grid
     window = grid.window_around(centre, reach_m)
@@ -106,7 +106,7 @@ def find_reachable_floor(world: WorldModel, centre: Point, reach_m: float) -> Re
     is_reached = np.isfinite(paths_m)
     at_rows, at_cols = at_rows[is_reached], at_cols[is_reached]
     points = grid.points_at(at_rows, at_cols)
-    return ReachableFloor(
+    return ReachableCells(
         points=points,
         paths_m=paths_m[is_reached],
         clear_m=world.map.clearance_m[at_rows, at_cols].astype(np.float64),

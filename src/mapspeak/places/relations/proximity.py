@@ -10,8 +10,8 @@ from mapspeak.places.naming import Place
 from mapspeak.places.relations.directions import front_of_region
 from mapspeak.places.relations.grammar import Kind
 from mapspeak.places.relations.placement import (
-    ReachableFloor,
-    find_reachable_floor,
+    ReachableCells,
+    find_reachable_cells,
     is_in_sight,
     refuse,
     stand,
@@ -110,14 +110,14 @@ def stand_facing(world: WorldModel, thing: Referent) -> Place:
 
 def _find_around(
     world: WorldModel, thing: Referent, away_m: float
-) -> tuple[ReachableFloor, np.ndarray]:
+) -> tuple[ReachableCells, np.ndarray]:
     offsets = thing.extent - np.array([thing.anchor.x, thing.anchor.y])
     reach_m = float(np.hypot(offsets[:, 0], offsets[:, 1]).max()) + away_m + 1.0
-    floor = find_reachable_floor(world, thing.anchor, reach_m)
+    floor = find_reachable_cells(world, thing.anchor, reach_m)
     return floor, floor.extent_away_m(thing.extent)
 
 
-def _is_out_of_the_way(world: WorldModel, floor: ReachableFloor, thing: Referent) -> np.ndarray:
+def _is_out_of_the_way(world: WorldModel, floor: ReachableCells, thing: Referent) -> np.ndarray:
     """Return True beside a door's opening and not before it; at a room's doors; anywhere else."""
     if thing.door is not None and thing.home is not None:
         along_rad = find_normal(world, thing.door, thing.home) + math.pi / 2
@@ -197,7 +197,7 @@ def _stand_in_door(world: WorldModel, one: Region, other: Region) -> Place | Non
 def _stand_straight(world: WorldModel, one: Point, other: Point, both: str) -> Place | None:
     gap_m, heading_rad = one.distance_to(other), one.bearing_to(other)
     middle = Point((one.x + other.x) / 2, (one.y + other.y) / 2)
-    floor = find_reachable_floor(world, middle, gap_m / 2)
+    floor = find_reachable_cells(world, middle, gap_m / 2)
     share = floor.along_m(one, heading_rad) / gap_m
     aside_m = np.abs(floor.along_m(one, heading_rad + math.pi / 2))
     allowed = (share >= SHARE[0]) & (share <= SHARE[1]) & (aside_m <= ASIDE_RATIO * gap_m)
@@ -217,7 +217,7 @@ def _stand_on_way(world: WorldModel, one: Point, other: Point, both: str) -> Pla
     if path is None:
         return None
     middle = point_along(path.points, path.length_m / 2)
-    floor = find_reachable_floor(world, middle, STEP_OFF_M)
+    floor = find_reachable_cells(world, middle, STEP_OFF_M)
     away_m = floor.away_m(middle)
     allowed = away_m <= min(STEP_OFF_M, ASIDE_RATIO * path.length_m)
     point = floor.choose(world, allowed, away_m, in_sight_of=middle)
@@ -228,7 +228,7 @@ def _stand_on_way(world: WorldModel, one: Point, other: Point, both: str) -> Pla
 
 def _step_off(world: WorldModel, point: Point) -> Point | None:
     """Return the nearest place to a thing where the robot can be."""
-    floor = find_reachable_floor(world, point, STEP_OFF_M)
+    floor = find_reachable_cells(world, point, STEP_OFF_M)
     away_m = floor.away_m(point)
     if not away_m.size or float(away_m.min()) > STEP_OFF_M:
         return None

@@ -34,7 +34,7 @@ from mapspeak.places.relations.outlines import (
     stand_in_corner,
     stand_in_middle,
 )
-from mapspeak.places.relations.placement import find_reachable_floor, refuse, stand
+from mapspeak.places.relations.placement import find_reachable_cells, refuse, stand
 from mapspeak.places.relations.proximity import (
     find_nearest,
     stand_away,
@@ -236,7 +236,7 @@ class Reader:
 
     def _path_m(self, point: Point) -> float:
         """Return how far it is to the floor beside a point that the robot cannot stand in."""
-        floor = find_reachable_floor(self._world, point, BESIDE_M)
+        floor = find_reachable_cells(self._world, point, BESIDE_M)
         return float(floor.paths_m.min(initial=math.inf))
 
 
