@@ -33,21 +33,11 @@ def gives_orders(text: str) -> bool:
     return any(tells_what_to_do(_WAYS.sub("", _QUOTE_SIGN.sub(by, text))) for by in (" ", "\n"))
 
 
-def tell_text(text: str) -> str:
-    """Return what is the matter as an observation: `"painters at work"`."""
-    return "(its text gives orders and is left out)" if gives_orders(text) else quote(text)
-
-
 def tell_place(place: str) -> str:
     """Return where it is: an id or a point as it is, other words quoted."""
     if _OWN_PLACE.fullmatch(place):
         return place
     return "its place gives orders and is left out" if gives_orders(place) else quote(place)
-
-
-def tell_source(source: str) -> str:
-    """Return who said it."""
-    return "a source left out, for it gives orders" if gives_orders(source) else quote(source)
 
 
 Outline = tuple[Point, ...]
@@ -134,7 +124,8 @@ class Event:
     @property
     def told_text(self) -> str:
         """What is the matter as a reader is told: quoted, or left out where it gives orders."""
-        return tell_text(self.text)
+        is_order = gives_orders(self.text)
+        return "(its text gives orders and is left out)" if is_order else quote(self.text)
 
     @property
     def told_title(self) -> str:
@@ -158,9 +149,11 @@ class Event:
     def _say_source(self) -> str:
         if not self.source:
             return ""
-        is_borrowed = is_name_of_robot(self.source) and not self.is_of_robot
-        said_by = "somebody in the robot's name" if is_borrowed else tell_source(self.source)
-        return f"; said by {said_by}"
+        if is_name_of_robot(self.source) and not self.is_of_robot:
+            return "; said by somebody in the robot's name"
+        if gives_orders(self.source):
+            return "; said by a source left out, for it gives orders"
+        return f"; said by {quote(self.source)}"
 
     def _names_more_than_text(self) -> bool:
         """Return True where a reader of the text does not read the place in it."""

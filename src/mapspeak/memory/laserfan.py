@@ -121,7 +121,10 @@ class LaserFan:
         return cls(
             first_rad=math.radians(float(match[1])),
             last_rad=math.radians(float(match[2])),
-            ranges_m=tuple(_read_range(token) for token in tokens),
+            ranges_m=tuple(
+                None if token == _UNKNOWN else math.inf if token[0] == ">" else float(token)
+                for token in tokens
+            ),
             reach_m=next((float(token[1:]) for token in reaches), None),
         )
 
@@ -201,12 +204,6 @@ def build_ring(
     if reach_m < NEAREST_M:
         ring[np.isinf(ring)] = np.nan
     return LaserRing(pose=pose, ranges_m=ring, reach_m=min(reach_m, FARTHEST_M))
-
-
-def _read_range(token: str) -> float | None:
-    if token == _UNKNOWN:
-        return None
-    return math.inf if token.startswith(">") else float(token)
 
 
 def _decimals(value: float) -> str:

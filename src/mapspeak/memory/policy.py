@@ -147,11 +147,8 @@ def gives_orders(text: str) -> bool:
 
 def tells_what_to_do(text: str) -> bool:
     """Return True for a text of one or more sentences of which one gives orders."""
-    return any(gives_orders(part) for part in _SENTENCE_END.split(_unquoted(text)))
-
-
-def _unquoted(text: str) -> str:
-    return _QUOTED.sub(" ", text.translate(_STRAIGHT))
+    unquoted = _QUOTED.sub(" ", text.translate(_STRAIGHT))
+    return any(gives_orders(part) for part in _SENTENCE_END.split(unquoted))
 
 
 def _plain(text: str) -> str:

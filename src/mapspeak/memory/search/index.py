@@ -126,6 +126,7 @@ class EntryIndex:
         order = self._order(asked.ratios, among)
         n_meant = self._count_meant(asked, order)
         verdict, is_sure = self._judge(asked, order, n_meant)
+        is_missing = asked.missing is not None and _missing_ratio(asked, order) > 0
         said = self._words.said_ratios(words)
         return Answer(
             query=query,
@@ -134,7 +135,7 @@ class EntryIndex:
             candidates=tuple(self._candidate(number, asked, said) for number in order[:limit]),
             n_meant=n_meant,
             is_sure=is_sure,
-            missing=_find_missing(asked, order),
+            missing=asked.missing[0] if asked.missing is not None and is_missing else None,
             limits=WORDS_ONLY if self._meanings is None else None,
         )
 
@@ -258,13 +259,6 @@ def _missing_ratio(asked: _Asked, order: list[int]) -> float:
     if not order:
         return math.inf
     return asked.missing[1] - float(asked.ratios[order[0]])
-
-
-def _find_missing(asked: _Asked, order: list[int]) -> str | None:
-    """Return the name of what is more like the request than anything that is remembered."""
-    if asked.missing is None or _missing_ratio(asked, order) <= 0:
-        return None
-    return asked.missing[0]
 
 
 def _numbers_by(keys: Iterable[Iterable[_Key]]) -> dict[_Key, list[int]]:

@@ -1,7 +1,7 @@
 """Kinds of things, as general knowledge has them, and what a request calls by its name."""
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -34,7 +34,9 @@ class ThingKind:
 def read_kinds() -> tuple[ThingKind, ...]:
     """Read the kinds in the order of the list, once: nothing ever changes them."""
     text = resources.files("mapspeak.memory").joinpath("data/kinds.txt").read_text(encoding="utf-8")
-    return tuple(_kinds_in(text))
+    lines = (line for line in text.splitlines() if line and not line.startswith("#"))
+    parts = (line.split(": ", 1) for line in lines)
+    return tuple(ThingKind(tuple(n.split(", ")), tuple(uses.split("; "))) for n, uses in parts)
 
 
 def find_kinds(label: str) -> tuple[ThingKind, ...]:
@@ -114,13 +116,6 @@ def _tells_little(ending: tuple[str, ...]) -> bool:
         for kind in kinds
     }
     return len(found) > 1
-
-
-def _kinds_in(text: str) -> Iterator[ThingKind]:
-    for line in text.splitlines():
-        if line and not line.startswith("#"):
-            names, uses = line.split(": ", 1)
-            yield ThingKind(tuple(names.split(", ")), tuple(uses.split("; ")))
 
 
 @cache

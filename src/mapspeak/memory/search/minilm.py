@@ -1,8 +1,7 @@
 """Turn a text into a vector whose direction is what the text means, with MiniLM."""
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
-from itertools import count, takewhile
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -87,7 +86,8 @@ class MiniLM:
             if any(piece != self._unknown for piece in ids[1:-1]):
                 of_length[len(ids)].append(number)
         for length, numbers in of_length.items():
-            for some in _in_portions(numbers, max(1, _AT_ONCE // length)):
+            n_each = max(1, _AT_ONCE // length)
+            for some in (numbers[i : i + n_each] for i in range(0, len(numbers), n_each)):
                 rows[some] = self._embed_of_one_length([pieces[number] for number in some])
         return rows
 
@@ -111,10 +111,6 @@ def _on_one_thread() -> onnxruntime.SessionOptions:
     options.enable_cpu_mem_arena = False
     options.log_severity_level = 3
     return options
-
-
-def _in_portions(numbers: list[int], n_each: int) -> Iterator[list[int]]:
-    return takewhile(bool, (numbers[start : start + n_each] for start in count(0, n_each)))
 
 
 def _no_model(path: Path) -> ConfigError:

@@ -53,10 +53,11 @@ _ENDING = re.compile(r"(?<=\w)['\u2019](?:d|ll|m|re|s|t|ve)\b", re.IGNORECASE)
 def split_words(text: str) -> Iterator[tuple[str, str]]:
     """Return each word as it stands and as it is compared: small letters without accents."""
     for shown in re.findall(r"\w+", text):
-        yield shown, shown.lower() if shown.isascii() else _without_accents(shown)
+        yield shown, shown.lower() if shown.isascii() else without_accents(shown)
 
 
-def _without_accents(word: str) -> str:
+def without_accents(word: str) -> str:
+    """Return a text in small letters without accents."""
     letters = unicodedata.normalize("NFKD", word.casefold())
     return "".join(letter for letter in letters if not unicodedata.combining(letter))
 

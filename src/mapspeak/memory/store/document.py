@@ -146,7 +146,8 @@ def parse_document(
         layout, root = _cut(text, previous)
         map_id = _map_id(root, layout)
         known = previous.readings if previous and previous.map_id == map_id else {}
-        records = [*_cut_records(text, layout, map_id, known), *_listed_records(root, map_id)]
+        listed = (Record(_read_node(n, map_id), n.start, n.end) for n in _list_items(root))
+        records = [*_cut_records(text, layout, map_id, known), *listed]
         by_key = _by_key(records)
         events = _events(root, layout)
     except TextError as fault:
@@ -191,19 +192,16 @@ def _at_its_place(fault: TextError, source: str, text: str) -> SemanticMapError:
 
 def _cut(text: str, previous: MapDocument | None) -> tuple[Layout, MappingNode | None]:
     layout = find_records(text)
-    root = _known_root(text, layout, previous) or _root(text, layout)
+    root = None
+    if previous is not None and previous.layout.spans and layout.spans:
+        # Only records may have changed: what was read before holds.
+        is_same = previous.layout.skeleton(previous.text) == layout.skeleton(text)
+        root = previous.root if is_same else None
+    root = root or _root(text, layout)
     if layout.spans and _list_items(root):
         # A part of the list stands where its dashes do not show it.
         return whole(text), _root(text, whole(text))
     return layout, root
-
-
-def _known_root(text: str, layout: Layout, previous: MapDocument | None) -> MappingNode | None:
-    """Return what was read before where only records have changed."""
-    if previous is None or not (previous.layout.spans and layout.spans):
-        return None
-    is_same = previous.layout.skeleton(previous.text) == layout.skeleton(text)
-    return previous.root if is_same else None
 
 
 def _root(text: str, layout: Layout) -> MappingNode | None:
@@ -257,11 +255,6 @@ def _cut_records(
             yield Record(known.get(block) or _read_block(block, map_id), start, end)
         except TextError as fault:
             raise fault.moved(partial(add, start)) from fault
-
-
-def _listed_records(root: MappingNode | None, map_id: str | None) -> Iterator[Record]:
-    for node in _list_items(root):
-        yield Record(_read_node(node, map_id), node.start, node.end)
 
 
 def _read_block(block: str, map_id: str | None) -> Reading:

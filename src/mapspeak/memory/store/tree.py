@@ -72,7 +72,7 @@ class ScalarNode:
     @property
     def data(self) -> str | None:
         """What it says; None for an unquoted null or nothing at all."""
-        return plain_data(self.text) if self.is_plain else self.text
+        return None if self.is_plain and self.text in _NULLS else self.text
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,11 +114,6 @@ class MappingNode:
 
 
 Node = ScalarNode | ListNode | MappingNode
-
-
-def plain_data(text: str) -> str | None:
-    """Return what unquoted text means: itself, or None."""
-    return None if text in _NULLS else text
 
 
 def line_and_column(text: str, offset: int) -> tuple[int, int]:

@@ -159,7 +159,12 @@ def _solve(
     ]
     return (
         *(
-            Located(group=tuple(group), placement=placement, agreements=_filled(group, shares))
+            Located(
+                group=tuple(group),
+                placement=placement,
+                # A view without a direction, which came later, says nothing of it.
+                agreements=shares + (1.0,) * (len(group) - len(shares)),
+            )
             for (group, placement), shares in zip(located, agreed, strict=True)
         ),
         *(Located(group=tuple(group), placement=None, agreements=(1.0,)) for group in lost),
@@ -178,11 +183,6 @@ def _agreeing(group: Group, agreements: Sequence[float]) -> Group:
     """Return the views of a thing that say where it is: two or more that go with each other."""
     kept = [each for each, share in zip(group, agreements, strict=True) if share >= LEAST_AGREEMENT]
     return kept if len(kept) >= 2 else group
-
-
-def _filled(group: Group, agreements: tuple[float, ...]) -> tuple[float, ...]:
-    """Return a view without a direction an agreement that says nothing."""
-    return agreements + (1.0,) * (len(group) - len(agreements))
 
 
 def _add_to_nearest(
@@ -208,15 +208,7 @@ def _add_to_nearest(
 
 def _describe(found: Things, pool: Sequence[Located], same_name: SameName) -> tuple[Thing, ...]:
     alone = [each for each in pool if len(each.group) == 1 and each.placement is not None]
-    return tuple(
-        describe_group(
-            each.group,
-            each.placement,
-            agreements=each.agreements,
-            conflicting=_against(found, each, alone, same_name),
-        )
-        for each in pool
-    )
+    return tuple(_describe_one(each, _against(found, each, alone, same_name)) for each in pool)
 
 
 def _against(
@@ -258,23 +250,13 @@ _SAME_PLACE_M = 0.3
 """Views from nearer to each other share their mistakes and count once."""
 
 
-def describe_group(
-    group: Sequence[WeighedView],
-    placement: Placement | None,
-    *,
-    agreements: Sequence[float],
-    conflicting: Iterable[WeighedView],
-) -> Thing:
-    """Return the thing that a group of views has seen.
-
-    Args:
-        placement: Where it is; None where no view says.
-        agreements: How well each view goes with the others; 1 is chance.
-        conflicting: Views that say it is elsewhere.
-    """
-    ordered = sorted(group, key=lambda each: name_key(each.waypoint.name))
+def _describe_one(located: Located, conflicting: Iterable[WeighedView]) -> Thing:
+    """Return the thing that a group of views has seen, and others say is elsewhere."""
+    placement = located.placement
+    ordered = sorted(located.group, key=lambda each: name_key(each.waypoint.name))
     labels = _by_votes(each.landmark.label for each in ordered)
     position = placement.position if placement else None
+    apart = list(_from_different_places(located))
     return Thing(
         label=labels[0],
         other_labels=tuple(labels[1:]),
@@ -284,8 +266,8 @@ def describe_group(
         uncertainty_m=placement.uncertainty_m if placement else None,
         supporting=tuple(_view(each, position) for each in ordered),
         conflicting=tuple(_view(each, position) for each in conflicting),
-        confidence_ratio=_confidence(group, agreements),
-        n_agreeing=_count_agreeing(group, agreements),
+        confidence_ratio=_confidence(apart),
+        n_agreeing=sum(agreement >= LEAST_AGREEMENT for _, agreement in apart),
         whereabouts=placement.whereabouts if placement else None,
     )
 
@@ -307,29 +289,22 @@ def _view(sighting: WeighedView, position: Point | None) -> View:
     )
 
 
-def _confidence(group: Sequence[WeighedView], agreements: Sequence[float]) -> float:
+def _confidence(apart: Iterable[tuple[WeighedView, float]]) -> float:
     """Return how likely it is that not all views are wrong: the odds of each, multiplied.
 
     The first view may be wrong in any way; a further one must be wrong and agree by chance.
     """
     odds = 1.0
-    for i, (each, agreement) in enumerate(_from_different_places(group, agreements)):
+    for i, (each, agreement) in enumerate(apart):
         odds *= (1 - each.wrong_ratio) / each.wrong_ratio * (agreement if i else 1.0)
     odds = min(odds, _BEST_ODDS)
     return odds / (1 + odds)
 
 
-def _count_agreeing(group: Sequence[WeighedView], agreements: Sequence[float]) -> int:
-    apart = _from_different_places(group, agreements)
-    return sum(agreement >= LEAST_AGREEMENT for _, agreement in apart)
-
-
-def _from_different_places(
-    group: Sequence[WeighedView], agreements: Sequence[float]
-) -> Iterator[tuple[WeighedView, float]]:
+def _from_different_places(located: Located) -> Iterator[tuple[WeighedView, float]]:
     """Return the first view from each place, with its agreement."""
     places = list[Point]()
-    for each, agreement in zip(group, agreements, strict=True):
+    for each, agreement in zip(located.group, located.agreements, strict=True):
         here = each.waypoint.pose.point
         if all(here.distance_to(other) >= _SAME_PLACE_M for other in places):
             places.append(here)

@@ -29,11 +29,7 @@ things makes one in a wrong place that nothing tells. Hence no wider; narrower s
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RangedSpot:
-    """A point in the map frame, and its covariance in square metres.
-
-    Attributes:
-        point: The end of the line of sight.
-    """
+    """The end of a line of sight in the map frame, and its covariance in square metres."""
 
     point: Point
     xx: float
@@ -74,7 +70,7 @@ _FARTHEST_SIGMAS = 3.5
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Outlook:
-    """The lattice cells in sight of a place; arrays of one length but for the two by ray.
+    """The lattice cells in sight of a place; arrays of one length but for the one by ray.
 
     Attributes:
         cells: Flat indices into the lattice, rising.
@@ -82,7 +78,6 @@ class Outlook:
         ranges_m: How far they are.
         sight: How likely one sees that far: 1, or less behind what one may see over.
         near_m: To the first obstacle, by ray.
-        far_m: To the first wall, by ray.
     """
 
     cells: IntArray
@@ -90,7 +85,6 @@ class Outlook:
     ranges_m: FloatArray
     sight: FloatArray
     near_m: FloatArray
-    far_m: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -138,7 +132,6 @@ def build_outlook(sight: SightMap, pose: Pose, near_m: FloatArray, far_m: FloatA
         ranges_m=ranges_m[is_far],
         sight=np.where(is_near[is_far], 1.0, sight.noise.seen_over_ratio),
         near_m=near_m,
-        far_m=far_m,
     )
 
 

@@ -2,13 +2,13 @@
 
 import math
 import re
-import unicodedata
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import lru_cache
 
 from mapspeak.geometry import Point
 from mapspeak.memory.policy import words_of
+from mapspeak.memory.search.wordindex import without_accents
 from mapspeak.memory.waypoint import Confidence, Landmark
 from mapspeak.spatial.grid import FloatArray
 
@@ -25,8 +25,7 @@ def name_the_same(label: str, other: str) -> bool:
 
 @lru_cache(maxsize=4096)
 def _words_of(label: str) -> tuple[str, ...]:
-    letters = unicodedata.normalize("NFKD", label.casefold())
-    plain = "".join(c for c in letters if not unicodedata.combining(c))
+    plain = without_accents(label)
     # A place or a detail after the noun, as in "sink with a mirror", does not change the noun.
     head = re.split(r"\b(?:with|on|in|at|near|under|behind|beside|for|of)\b|[,(;]", plain)[0]
     words = [_singular(word) for word in re.findall(r"[^\W\d_]+", head) or [plain.strip()]]
