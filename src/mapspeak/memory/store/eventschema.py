@@ -4,6 +4,7 @@ import re
 from typing import Annotated
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -14,7 +15,7 @@ from pydantic import (
 
 from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import Point
-from mapspeak.memory.events import Effect, Event, Outline
+from mapspeak.memory.events import ID_RULE, Effect, Event, Outline, is_event_id
 from mapspeak.memory.quoting import quote_name
 from mapspeak.memory.store.schema import Time, length_text, time_text
 from mapspeak.memory.store.tree import Data, ListNode, MappingNode, Node, TextError
@@ -45,6 +46,14 @@ def _corner_of(text: str) -> Point:
     return Point(float(found[1]), float(found[2]))
 
 
+def _event_id(value: str | None) -> str | None:
+    # One that is empty is none, as ever.
+    if value and not is_event_id(value):
+        message = f"is not {ID_RULE}"
+        raise ValueError(message)
+    return value
+
+
 class _PointEntry(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
@@ -57,7 +66,7 @@ class _EventEntry(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    id: str | None = None
+    id: Annotated[str | None, AfterValidator(_event_id)] = None
     text: Annotated[str, Field(pattern=r"\S")]
     place: str | None = None
     effect: Effect = Effect.NONE
