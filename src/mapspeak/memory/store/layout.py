@@ -48,15 +48,16 @@ def find_records(text: str) -> Layout:
     if first is None or any(each in text for each in _UNUSUAL_BREAKS):
         return whole(text)
     indent = len(first[1])
-    item = rf" {{{indent}}}-(?:[ \t\n]|\Z)"
-    dash = re.compile(rf"^{item}", re.MULTILINE)
-    if not dash.match(text, first.start()):
+    item = rf" {{{indent}}}-(?=[ \t\n]|\Z)"
+    # To look for line feeds is several times as fast as for ^.
+    dash = re.compile(rf"\n{item}")
+    if not dash.match(text, first.start() - 1):
         return whole(text)
     # What begins a line that belongs to no record.
-    behind = re.compile(rf"^(?!{item}) {{0,{indent}}}[^ #\n]", re.MULTILINE)
+    behind = re.compile(rf"\n(?!{item}) {{0,{indent}}}[^ #\n]")
     after = behind.search(text, first.start())
-    end = after.start() if after else len(text)
-    starts = [match.start() for match in dash.finditer(text, first.start(), end)]
+    end = after.start() + 1 if after else len(text)
+    starts = [match.start() + 1 for match in dash.finditer(text, first.start() - 1, end)]
     ends = [*starts[1:], end]
     spans = tuple((a, _content_end(text, a, b, indent)) for a, b in zip(starts, ends, strict=True))
     return Layout(spans=spans, indent=indent, start=first.start(), end=end)
