@@ -6,7 +6,6 @@ import re
 import shlex
 import shutil
 import sys
-from importlib.metadata import requires
 from pathlib import Path
 
 
@@ -33,6 +32,8 @@ def say_install(extra: str, *others: str) -> str:
         extra: Such as "dds".
         others: Packages that are needed besides.
     """
+    from importlib.metadata import requires  # noqa: PLC0415 - slow, and for a mistake only
+
     pattern = re.compile(rf"([^;]+);.*extra == ['\"]{extra}['\"]")
     matches = map(pattern.match, requires("mapspeak") or ())
     listed = [match[1].strip() for match in matches if match is not None]

@@ -3,6 +3,8 @@
 import io
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +14,7 @@ from PIL import Image
 from drawing import grid_from_text
 from mapspeak.cli import main
 from mapspeak.geometry import Pose
-from mapspeak.spatial.areagraph import read_area_graph
+from mapspeak.spatial.areagraph.osm import read_area_graph
 from mapspeak.spatial.mapfiles import write_map
 
 TWO_ROOMS = """
@@ -344,3 +346,15 @@ def test_what_was_written_is_told(
     put_map(folder / "hall.yaml")
     assert run_map(monkeypatch, "hall.yaml", "--out", "pictures", "--json", "facts.json") == 0
     assert "Written: pictures, facts.json\n" in capsys.readouterr().out
+
+
+def test_a_map_is_shown_without_loading_memory_or_driving() -> None:
+    script = (
+        "import sys, mapspeak.cli.mapping\n"
+        "heavy = {'memory', 'driving', 'worldmodel', 'places', 'server.reports'}\n"
+        "print(*({f'mapspeak.{name}' for name in heavy} & sys.modules.keys()))"
+    )
+    done = subprocess.run(  # noqa: S603 - our own words
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == ""

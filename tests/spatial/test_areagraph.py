@@ -16,19 +16,9 @@ from drawing import grid_from_text
 from mapspeak.errors import MapError
 from mapspeak.geometry import Point, Pose
 from mapspeak.spatial import OccupancyGrid
-from mapspeak.spatial.areagraph import (
-    AreaGraph,
-    MapAnchor,
-    Polygon,
-    Ring,
-    build_area_graph,
-    from_geojson,
-    from_json,
-    from_osm,
-    to_geojson,
-    to_json,
-    to_osm,
-)
+from mapspeak.spatial.areagraph import AreaGraph, MapAnchor, Polygon, Ring, build_area_graph
+from mapspeak.spatial.areagraph.jsonforms import from_geojson, from_json, to_geojson, to_json
+from mapspeak.spatial.areagraph.osm import from_osm, to_osm
 from mapspeak.spatial.rooms import Door, Region, RoomClass, RoomMap, find_rooms
 
 Labels = NDArray[np.int16]

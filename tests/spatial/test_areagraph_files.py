@@ -13,19 +13,9 @@ import pytest
 from drawing import grid_from_text
 from mapspeak.errors import MapError
 from mapspeak.geometry import Point
-from mapspeak.spatial.areagraph import (
-    AreaGraph,
-    LatLon,
-    MapAnchor,
-    build_area_graph,
-    from_geojson,
-    from_json,
-    from_osm,
-    read_area_graph,
-    to_geojson,
-    to_json,
-    to_osm,
-)
+from mapspeak.spatial.areagraph import AreaGraph, LatLon, MapAnchor, build_area_graph
+from mapspeak.spatial.areagraph.jsonforms import from_geojson, from_json, to_geojson, to_json
+from mapspeak.spatial.areagraph.osm import from_osm, read_area_graph, to_osm
 from mapspeak.spatial.rooms import find_rooms
 
 TWO_ROOMS = """

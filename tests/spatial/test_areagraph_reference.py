@@ -2,14 +2,8 @@ import json
 import re
 from pathlib import Path
 
-from mapspeak.spatial.areagraph import (
-    from_geojson,
-    from_json,
-    from_osm,
-    to_geojson,
-    to_json,
-    to_osm,
-)
+from mapspeak.spatial.areagraph.jsonforms import from_geojson, from_json, to_geojson, to_json
+from mapspeak.spatial.areagraph.osm import from_osm, to_osm
 
 REFERENCE = Path(__file__).parents[2] / "docs" / "reference" / "area-graph.md"
 

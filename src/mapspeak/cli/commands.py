@@ -1,23 +1,60 @@
 """All commands, and what becomes of errors."""
 
 import sys
+from collections.abc import Mapping
+from importlib import import_module
 
 import click
 
 from mapspeak import __version__
-from mapspeak.cli.demonstrating import demo
-from mapspeak.cli.evaluating import evaluate
-from mapspeak.cli.examining import doctor
 from mapspeak.cli.guarding import keep_private
-from mapspeak.cli.mapping import map_command
-from mapspeak.cli.memory import memory
-from mapspeak.cli.operating import approve, release, replay, stop
-from mapspeak.cli.serving import serve
-from mapspeak.cli.simulating import simulate
 from mapspeak.errors import MapspeakError
 
+COMMANDS: Mapping[str, tuple[str, str]] = {
+    "approve": ("operating:approve", "agree to a command that waits for a person's word"),
+    "demo": ("demonstrating:demo", "watch a script do three tasks with the simulated robot"),
+    "doctor": (
+        "examining:doctor",
+        "check a robot: what was found, what is missing, how to start it",
+    ),
+    "eval": ("evaluating:evaluate", "run and score tasks in simulated worlds"),
+    "map": ("mapping:map_command", "show map files as a model sees a map; no robot is needed"),
+    "memory": ("memory:memory", "look at, edit, check and share what a robot remembers"),
+    "release": ("operating:release", "let held robots drive again"),
+    "replay": ("operating:replay", "show an audit log: who wanted what, and what became of it"),
+    "serve": ("serving:serve", "offer a robot to a language model, over MCP"),
+    "simulate": ("simulating:simulate", "offer the simulated robot to any rosbridge client"),
+    "stop": ("operating:stop", "stop every robot that is served from here, and hold it"),
+}
+"""Where each command is, and what it does; a module is imported when its command is wanted."""
 
-@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+
+class CommandGroup(click.Group):
+    """All commands, by name."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - as in click
+        """Return the names of all commands."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002 - as in click
+        """Import a command; None where there is none of that name."""
+        if cmd_name not in COMMANDS:
+            return None
+        module, _, name = COMMANDS[cmd_name][0].partition(":")
+        command: click.Command = getattr(import_module(f"mapspeak.cli.{module}"), name)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - as in click
+        """Write what each command does, without importing it."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, what) for name, (_, what) in COMMANDS.items()])
+
+
+@click.group(
+    cls=CommandGroup,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 @click.version_option(__version__, prog_name="mapspeak")
 @click.pass_context
 def cli(context: click.Context) -> None:
@@ -26,25 +63,9 @@ def cli(context: click.Context) -> None:
     Without a command it serves the simulated robot over stdio, as an MCP client expects.
     """
     if context.invoked_subcommand is None:
+        from mapspeak.cli.serving import serve  # noqa: PLC0415 - only where it is wanted
+
         context.invoke(serve)
-
-
-COMMANDS = {
-    demo: "watch a script do three tasks with the simulated robot",
-    serve: "offer a robot to a language model, over MCP",
-    doctor: "check a robot: what was found, what is missing, how to start it",
-    map_command: "show map files as a model sees a map; no robot is needed",
-    memory: "look at, edit, check and share what a robot remembers",
-    stop: "stop every robot that is served from here, and hold it",
-    release: "let held robots drive again",
-    approve: "agree to a command that waits for a person's word",
-    replay: "show an audit log: who wanted what, and what became of it",
-    simulate: "offer the simulated robot to any rosbridge client",
-    evaluate: "run and score tasks in simulated worlds",
-}
-for command, what in COMMANDS.items():
-    command.short_help = what
-    cli.add_command(command)
 
 
 def main() -> None:

@@ -1,7 +1,6 @@
 """`mapspeak memory`: the remembered places without a robot, also for other programs and people."""
 
 import json
-import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,7 +16,7 @@ from mapspeak.cli.episodes import (
     read_places,
     write_out,
 )
-from mapspeak.cli.options import FILE
+from mapspeak.cli.options import ANCHOR_OPTION, FILE
 from mapspeak.errors import ConfigError, SemanticMapError, say_cause
 from mapspeak.installation import say_install, shell_command
 
@@ -25,34 +24,23 @@ if TYPE_CHECKING:
     from mapspeak.memory import SemanticMap, Waypoint
     from mapspeak.memory.exchange.uniting import Union
     from mapspeak.memory.search.answer import EntryCandidate
+    from mapspeak.spatial.areagraph import MapAnchor
 
 
 @click.command()
 @click.option("--out", type=FILE, help="The file, such as hall.geojson; stdout without.")
-@click.option(
-    "--anchor",
-    type=(float, float, float),
-    metavar="LAT LON YAW",
-    help="Where on Earth the map's (0, 0) lies, and its x axis from east, in degrees.",
-)
+@ANCHOR_OPTION
 @MEMORY_OPTION
-def export(
-    out: Path | None, anchor: tuple[float, float, float] | None, semantic_map: Path | None
-) -> None:
+def export(out: Path | None, anchor: "MapAnchor | None", semantic_map: Path | None) -> None:
     """Write the places as GeoJSON."""
     from mapspeak.memory.exchange.geojson import (  # noqa: PLC0415 - heavy; help must be quick
         to_geojson,
     )
-    from mapspeak.spatial.areagraph import MapAnchor  # noqa: PLC0415
 
     if out is not None and out.suffix.lower() not in (".geojson", ".json"):
         raise ConfigError(f"--out {out} is no GeoJSON file.", hint="End its name in .geojson.")
-    place = None
-    if anchor is not None:
-        lat_deg, lon_deg, yaw_deg = anchor
-        place = MapAnchor(lat_deg=lat_deg, lon_deg=lon_deg, yaw_rad=math.radians(yaw_deg))
     places = read_places(open_memory(semantic_map))
-    write_out(to_geojson(places, anchor=place), out)
+    write_out(to_geojson(places, anchor=anchor), out)
     if out is not None:
         click.echo(f"{len(places.waypoints)} places written to {out}.")
 

@@ -3,11 +3,14 @@
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from mapspeak.geometry import Pose
+
+if TYPE_CHECKING:
+    from mapspeak.spatial.areagraph import MapAnchor
 
 Command = Callable[..., Any]
 Decorator = Callable[[Command], Command]
@@ -36,6 +39,26 @@ ROBOT_OPTIONS = (
     ),
     click.option("--ca-file", type=FILE, help="Whose certificates a wss robot may show, as PEM."),
     SEED_OPTION,
+)
+
+
+def _read_anchor(
+    _context: click.Context, _parameter: click.Parameter, value: tuple[float, float, float] | None
+) -> "MapAnchor | None":
+    if value is None:
+        return None
+    from mapspeak.spatial.areagraph import MapAnchor  # noqa: PLC0415 - heavy; help must be quick
+
+    lat_deg, lon_deg, yaw_deg = value
+    return MapAnchor(lat_deg=lat_deg, lon_deg=lon_deg, yaw_rad=math.radians(yaw_deg))
+
+
+ANCHOR_OPTION = click.option(
+    "--anchor",
+    type=(float, float, float),
+    callback=_read_anchor,
+    metavar="LAT LON YAW",
+    help="Where on Earth the map's (0, 0) lies, and its x axis from east, in degrees.",
 )
 
 

@@ -15,7 +15,7 @@ from mapspeak.memory.alignment.keeping import FIRST_NAME, MapKeeper, MapRelation
 from mapspeak.memory.episodes.observation import Observation, ObservationKind
 from mapspeak.memory.episodes.store import EpisodeStore, memory_folder
 from mapspeak.memory.events import Effect, Event
-from mapspeak.server.text.maps import say_receipt
+from mapspeak.server.text.findings import say_receipt
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.mapfiles import load_map
 

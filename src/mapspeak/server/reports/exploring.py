@@ -6,7 +6,7 @@ from pydantic import Field
 
 from mapspeak.driving.exploration.progress import ExplorationState, Progress
 from mapspeak.driving.search.progress import SearchProgress, SearchState
-from mapspeak.server.reports.robot import PoseReport, Report
+from mapspeak.server.reports.maps import PoseReport, Report
 from mapspeak.server.text.exploration import (
     say_blocked,
     say_progress,

@@ -15,7 +15,7 @@ from mapspeak.memory.search.answer import EntryKind, Verdict
 from mapspeak.memory.search.kinds import calls_by_name
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.recall.asking import Recall, RecallCandidate, RecallQuery
-from mapspeak.server.reports.robot import PoseReport, Report
+from mapspeak.server.reports.maps import PoseReport, Report
 from mapspeak.server.text.findings import say_trust
 from mapspeak.server.text.memory import say_age
 from mapspeak.server.text.offered import lead

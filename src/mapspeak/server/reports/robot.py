@@ -4,16 +4,16 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from mapspeak.driving.drivereport import DriveReport
 from mapspeak.errors import SemanticMapError
-from mapspeak.geometry import Pose
 from mapspeak.memory import Landmark, Merge, SemanticMap, WriteReceipt, name_key
 from mapspeak.memory.quoting import quote_name
 from mapspeak.places.goalcheck import GoalVerdict, say_check
 from mapspeak.places.relations.choosing import CheckedGoal
 from mapspeak.robot import CauseCode, GoalState, StampedPose
+from mapspeak.server.reports.maps import PoseReport, Report
 from mapspeak.server.text.drives import say_end
 from mapspeak.server.text.memory import say_landmarks, say_replaced
 from mapspeak.server.text.offered import lead
@@ -23,29 +23,6 @@ from mapspeak.worldmodel.recollection import RememberedPlace, number_places
 MOST_NAMED = 12
 AT_GOAL_M = 0.5
 """Navigation ends a drive within its tolerance, usually 0.25 m; farther off is worth a word."""
-
-
-class Report(BaseModel):
-    """Base of all reports: frozen."""
-
-    model_config = ConfigDict(frozen=True)
-
-
-class PoseReport(Report):
-    """A pose in the map frame."""
-
-    x: float = Field(description="metres")
-    y: float = Field(description="metres")
-    yaw_deg: float = Field(description="counter-clockwise from +x")
-
-    @classmethod
-    def of(cls, pose: Pose) -> Self:
-        """Make the report of a pose, rounded to millimetres and tenths of a degree."""
-        return cls(
-            x=round(pose.x, 3) + 0.0,
-            y=round(pose.y, 3) + 0.0,
-            yaw_deg=round(math.degrees(pose.yaw_rad), 1) + 0.0,
-        )
 
 
 class PoseAnswer(Report):

@@ -21,7 +21,8 @@ from mapspeak.memory import TakenPicture
 from mapspeak.robot import CameraPicture, GoalState
 from mapspeak.safety import Errand, on_errand
 from mapspeak.server.reports.exploring import ExploreAnswer, SearchAnswer
-from mapspeak.server.reports.robot import DriveAnswer, Report
+from mapspeak.server.reports.maps import Report
+from mapspeak.server.reports.robot import DriveAnswer
 from mapspeak.server.text.drives import say_cause
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import shorten

@@ -12,7 +12,7 @@ from mapspeak.places.naming import split_room
 from mapspeak.places.recall.asking import RecallQuery, recall
 from mapspeak.places.relations.choosing import find_place
 from mapspeak.server.reports.memory import RecallAnswer, say_reported
-from mapspeak.server.text.maps import say_moved
+from mapspeak.server.text.findings import say_moved
 from mapspeak.server.text.memory import read_moment
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session

@@ -8,8 +8,8 @@ from pydantic import Field
 from mapspeak.errors import LinkError, MapError
 from mapspeak.server.mapview.representations import Representation, show
 from mapspeak.server.reports.robot import PoseAnswer
+from mapspeak.server.text.findings import say_moved
 from mapspeak.server.text.look import Layer, Up, look_at, view_of
-from mapspeak.server.text.maps import say_moved
 from mapspeak.server.tools.sightings import look_ahead
 from mapspeak.server.tools.toolset import ToolEffect, tool
 from mapspeak.session import Session

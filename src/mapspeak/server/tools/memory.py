@@ -21,7 +21,7 @@ from mapspeak.memory.events import is_name_of_robot
 from mapspeak.memory.things.thing import name_the_same
 from mapspeak.places.recall import notices
 from mapspeak.places.recall.nearby import find_nearby
-from mapspeak.server.text.maps import say_moved, say_receipt
+from mapspeak.server.text.findings import say_moved, say_receipt
 from mapspeak.server.text.memory import (
     AHEAD,
     PAST,

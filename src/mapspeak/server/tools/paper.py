@@ -15,7 +15,7 @@ from mapspeak.places.recall.asking import find_speaking_places
 from mapspeak.robot import PoseDoubt
 from mapspeak.server.mapview.drawing import say_axes, say_plain
 from mapspeak.server.reports.robot import MemoryAnswer, WriteAnswer
-from mapspeak.server.text.maps import say_moved
+from mapspeak.server.text.findings import say_moved
 from mapspeak.server.text.memory import say_far
 from mapspeak.server.text.recall import say_advice
 from mapspeak.server.text.wording import say_pose, say_pose_doubt

@@ -1,4 +1,4 @@
-"""The area graph: rooms as polygons, doors as the edges between them, and its text forms."""
+"""The area graph: rooms as polygons, doors as the edges between them; its forms are modules."""
 
 from mapspeak.spatial.areagraph.building import build_area_graph
 from mapspeak.spatial.areagraph.graph import (
@@ -11,8 +11,6 @@ from mapspeak.spatial.areagraph.graph import (
     Polygon,
     Ring,
 )
-from mapspeak.spatial.areagraph.jsonforms import from_geojson, from_json, to_geojson, to_json
-from mapspeak.spatial.areagraph.osm import from_osm, read_area_graph, to_osm
 
 __all__ = [
     "Area",
@@ -24,11 +22,4 @@ __all__ = [
     "Polygon",
     "Ring",
     "build_area_graph",
-    "from_geojson",
-    "from_json",
-    "from_osm",
-    "read_area_graph",
-    "to_geojson",
-    "to_json",
-    "to_osm",
 ]

@@ -1,18 +1,40 @@
-"""A map file as facts: what the picture of it shows, for programs and people, without a robot."""
+"""What all reports share, and a map file as facts, for programs and people, without a robot."""
 
 import math
 from typing import Self
 
-from pydantic import Field
+from pydantic import BaseModel, ConfigDict, Field
 
-from mapspeak.geometry import Point
-from mapspeak.server.reports.robot import PoseReport, Report
+from mapspeak.geometry import Point, Pose
 from mapspeak.server.text.maps import say_map_warning, say_size
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.areagraph import AreaGraph, Passage
 from mapspeak.spatial.coverage import measure_known_area
 from mapspeak.spatial.mapfiles import LoadedMap
 from mapspeak.spatial.rooms import Region
+
+
+class Report(BaseModel):
+    """Base of all reports: frozen."""
+
+    model_config = ConfigDict(frozen=True)
+
+
+class PoseReport(Report):
+    """A pose in the map frame."""
+
+    x: float = Field(description="metres")
+    y: float = Field(description="metres")
+    yaw_deg: float = Field(description="counter-clockwise from +x")
+
+    @classmethod
+    def of(cls, pose: Pose) -> Self:
+        """Make the report of a pose, rounded to millimetres and tenths of a degree."""
+        return cls(
+            x=round(pose.x, 3) + 0.0,
+            y=round(pose.y, 3) + 0.0,
+            yaw_deg=round(math.degrees(pose.yaw_rad), 1) + 0.0,
+        )
 
 
 class PointFacts(Report):
