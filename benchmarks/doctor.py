@@ -21,8 +21,7 @@ import anyio
 import click
 
 from benchmarks.figure import Figure
-from mapspeak.cli.checkup import Health
-from mapspeak.cli.examining import examine_choice
+from mapspeak.cli.checkup import Health, examine_choice
 from mapspeak.cli.robots import RobotChoice, open_robot
 from mapspeak.errors import MapspeakError
 from mapspeak.geometry import Pose

@@ -11,8 +11,8 @@ import pytest
 
 from fakes import FakeRobot, two_rooms
 from guarding import make_guard
-from mapspeak.cli.examining import find_servers
-from mapspeak.cli.guarding import control_folder
+from mapspeak.cli.checkup import find_servers
+from mapspeak.cli.options import control_folder
 from mapspeak.cli.robots import RobotChoice
 from mapspeak.memory import SemanticMapStore
 from mapspeak.safety import Hold

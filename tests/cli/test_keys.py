@@ -12,7 +12,7 @@ import pytest
 
 from fakes import FakeRobot, two_rooms
 from guarding import make_guard
-from mapspeak.cli.keys import HELP, StopKeys, stop_keys
+from mapspeak.cli.operating import HELP, StopKeys, stop_keys
 from mapspeak.geometry import Pose
 from mapspeak.memory import SemanticMapStore
 from mapspeak.safety import Hold

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from mapspeak.cli.demonstrating import demo
+from mapspeak.cli.simulating import demo
 from mapspeak.errors import ConfigError
 from mapspeak.evaluation.reading import read_map_text
 from mapspeak.evaluation.tasks.catalogue import FAMILIES

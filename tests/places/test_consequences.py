@@ -28,9 +28,9 @@ from mapspeak.places.recall.notices import (
 )
 from mapspeak.places.relations.choosing import check_place, find_place
 from mapspeak.safety import Policy, Surveyor
-from mapspeak.server.text.exploration import say_progress
-from mapspeak.server.text.frontiers import say_refusal
+from mapspeak.server.text.drives import say_progress
 from mapspeak.server.text.look import MapLook, view_of
+from mapspeak.server.text.maps import say_refusal
 from mapspeak.server.text.measures import describe_measures
 from mapspeak.server.text.tables import describe_world
 from mapspeak.session import Session

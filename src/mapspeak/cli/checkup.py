@@ -1,18 +1,27 @@
-"""What a robot offers and really gives when it is asked, and how to start what is missing."""
+"""`mapspeak doctor`: what a robot offers and really gives, and how to start what is missing."""
 
+import json
 import math
-from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
+import sys
+from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import asdict, dataclass
 from enum import StrEnum
 from functools import partial
+from pathlib import Path
 
+import anyio
+import click
 import numpy as np
 
+from mapspeak.cli.options import ROBOT_OPTIONS, add_options, control_folder
+from mapspeak.cli.robots import RobotChoice, open_robot
 from mapspeak.errors import LinkError, MapError, MapspeakError
+from mapspeak.hold import Hold
 from mapspeak.robot import RangeScan, Robot
 from mapspeak.ros.discovery.parts import CAMERA, LASER, MAP, NAVIGATION, VELOCITY, RobotPart, Worth
 from mapspeak.ros.discovery.profile import NavigationKind, PoseSource, RobotProfile
 from mapspeak.ros.port import LinkKind, LinkName
+from mapspeak.ros.robot import RosRobot
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.paths import clearance_m
 
@@ -63,21 +72,19 @@ async def examine(robot: Robot) -> tuple[Finding, ...]:
     if grid is not None and found[1].health is not Health.MISSING:
         found.append(await _ask("place", partial(_look_at_place, robot, grid)))
     if goals := await robot.fetch_foreign_goals():
-        found.append(_busy(len(goals)))
+        found.append(
+            Finding(
+                what="goals",
+                health=Health.DOUBTFUL,
+                said=f"{len(goals)} under way that somebody else has sent",
+                hint="A new goal replaces them; stop_robot ends them.",
+            )
+        )
     if robot.description.has_camera:
         found.append(await _ask("picture", lambda: _look_at_picture(robot)))
     if robot.description.has_laser:
         found.append(await _ask("laser", lambda: _look_at_laser(robot, grid)))
     return tuple(found)
-
-
-def _busy(n_goals: int) -> Finding:
-    return Finding(
-        what="goals",
-        health=Health.DOUBTFUL,
-        said=f"{n_goals} under way that somebody else has sent",
-        hint="A new goal replaces them; stop_robot ends them.",
-    )
 
 
 async def _ask(what: str, look: Callable[[], Awaitable[Finding]]) -> Finding:
@@ -129,17 +136,13 @@ async def _look_at_place(robot: Robot, grid: OccupancyGrid) -> Finding:
         return _misplaced("the robot stands off its map")
     if grid.is_occupied(cell):
         return _misplaced("the robot stands in a wall of its map")
-    clear_m, radius_m = _clearance_at(grid, cell.row, cell.col), robot.description.radius_m
+    clear_m, radius_m = float(clearance_m(grid)[cell.row, cell.col]), robot.description.radius_m
     if clear_m < radius_m:
         return _misplaced(
             f"the robot stands {clear_m:.2f} m from an obstacle, its radius is {radius_m:.2f} m"
         )
     room = "no obstacle known" if math.isinf(clear_m) else f"{clear_m:.2f} m to any obstacle"
     return Finding(what="place", health=Health.FINE, said=f"on its map, {room}")
-
-
-def _clearance_at(grid: OccupancyGrid, row: int, col: int) -> float:
-    return float(clearance_m(grid)[row, col])
 
 
 def _misplaced(said: str) -> Finding:
@@ -171,12 +174,11 @@ async def _look_at_laser(robot: Robot, grid: OccupancyGrid | None) -> Finding:
             "robot's base to its frame.",
         )
     met = np.isfinite(scan.ranges_m)
-    said = f"{np.count_nonzero(met)} of {met.size} beams met something"
-    age = _say_age(robot, scan.stamp_s)
+    said = f"{np.count_nonzero(met)} of {met.size} beams met something, "
+    said += _say_age(robot, scan.stamp_s)
     if grid is None:
-        said += f", {age}; there is no map to compare with"
+        said += "; there is no map to compare with"
         return Finding(what="laser", health=Health.FINE, said=said)
-    said += f", {age}"
     ratio = _share_on_map(grid, scan)
     if ratio is None:
         return Finding(what="laser", health=Health.DOUBTFUL, said=said, hint="Is it covered?")
@@ -323,3 +325,67 @@ def _describe_navigation(profile: RobotProfile) -> Finding:
         said = f"{name}: a topic for goals, which does not say how a drive ends"
         return Finding(what=what, health=Health.DOUBTFUL, said=said, hint=START_NAVIGATION)
     return Finding(what=what, health=Health.FINE, said=f"{profile.navigation}: {name}")
+
+
+SIGNS = {Health.FINE: "ok", Health.DOUBTFUL: "??", Health.MISSING: "--"}
+
+
+@click.command()
+@add_options(ROBOT_OPTIONS)
+@click.option("--json", "as_json", is_flag=True, help="The findings as JSON.")
+def doctor(
+    robot: str,
+    robot_file: Path | None,
+    ca_file: Path | None,
+    seed: int,
+    as_json: bool,  # noqa: FBT001 - a flag
+) -> None:
+    """Check a robot: what was found, how fresh it is, what is missing and how to start it.
+
+    Ends with 0 when all is well, with 1 when something is missing, with 2 when it cannot be
+    reached.
+    """
+    choice = RobotChoice(robot=robot, robot_file=robot_file, ca_file=ca_file, seed=seed)
+    findings = anyio.run(examine_choice, choice)
+    if as_json:
+        click.echo(json.dumps([asdict(finding) for finding in findings], indent=2))
+    else:
+        _show(findings)
+    sys.exit(1 if any(finding.health is Health.MISSING for finding in findings) else 0)
+
+
+async def examine_choice(choice: RobotChoice) -> list[Finding]:
+    """Return what the robot offers, once all of it has been found, and what it really gives."""
+    async with open_robot(choice) as robot:
+        if not isinstance(robot, RosRobot):
+            return [*await examine(robot)]
+        await robot.settle()
+        found = await examine(robot)
+        link = robot.connection.link
+        is_second_choice = choice.robot.startswith("ros2") and link.kind is LinkKind.DDS
+        reason = "because this Python has no rclpy" if is_second_choice else ""
+        lines = describe_profile(robot.profile, link, reason=reason, map_age_s=robot.map_age_s)
+        return [*lines, *find_servers(choice), *found]
+
+
+def find_servers(choice: RobotChoice) -> list[Finding]:
+    """Return which servers of this user drive the same robot; nothing where none does."""
+    processes = Hold(control_folder(None)).servers_of(choice.address)
+    if not processes:
+        return []
+    if len(processes) == 1:
+        said = f"1 serves this robot: process {processes[0]}"
+        return [Finding(what="servers", health=Health.FINE, said=said)]
+    said = f"{len(processes)} serve this robot: processes {', '.join(map(str, processes))}"
+    hint = "Their goals replace each other and their velocities alternate: end all but one."
+    return [Finding(what="servers", health=Health.DOUBTFUL, said=said, hint=hint)]
+
+
+def _show(findings: Sequence[Finding]) -> None:
+    for finding in findings:
+        click.echo(f"{SIGNS[finding.health]}  {finding.what}: {finding.said}")
+        if finding.hint:
+            click.echo(f"      {finding.hint}")
+    n_missing = sum(finding.health is Health.MISSING for finding in findings)
+    n_doubtful = sum(finding.health is Health.DOUBTFUL for finding in findings)
+    click.echo(f"{n_missing} missing, {n_doubtful} doubtful, {len(findings)} looked at.")

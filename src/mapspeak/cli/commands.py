@@ -7,14 +7,14 @@ from importlib import import_module
 import click
 
 from mapspeak import __version__
-from mapspeak.cli.guarding import keep_private
+from mapspeak.cli.options import keep_private
 from mapspeak.errors import MapspeakError
 
 COMMANDS: Mapping[str, tuple[str, str]] = {
     "approve": ("operating:approve", "agree to a command that waits for a person's word"),
-    "demo": ("demonstrating:demo", "watch a script do three tasks with the simulated robot"),
+    "demo": ("simulating:demo", "watch a script do three tasks with the simulated robot"),
     "doctor": (
-        "examining:doctor",
+        "checkup:doctor",
         "check a robot: what was found, what is missing, how to start it",
     ),
     "eval": ("evaluating:evaluate", "run and score tasks in simulated worlds"),

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mapspeak.cli.guarding import data_folder, usual_modes, wall_clock
-from mapspeak.cli.options import FILE
+from mapspeak.cli.options import FILE, data_folder, usual_modes, wall_clock
 from mapspeak.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -240,7 +239,7 @@ def _rank(store: "EpisodeStore") -> "Rank | None":
 
 
 def _line(match: "EpisodeMatch") -> str:
-    from mapspeak.server.text.episodes import say_reasons  # noqa: PLC0415 - heavy
+    from mapspeak.server.text.memory import say_reasons  # noqa: PLC0415 - heavy
 
     seen, reasons = match.observation, "; ".join(say_reasons(match))
     said = seen.text.replace("\n", " ") or ", ".join(seen.labels)
@@ -257,7 +256,7 @@ def _line(match: "EpisodeMatch") -> str:
 
 
 def _facts(match: "EpisodeMatch", store: "EpisodeStore") -> dict[str, object]:
-    from mapspeak.server.text.episodes import say_reasons  # noqa: PLC0415 - heavy
+    from mapspeak.server.text.memory import say_reasons  # noqa: PLC0415 - heavy
 
     seen = match.observation
     path = store.picture_path(seen)

@@ -10,9 +10,8 @@ import click
 import numpy as np
 from PIL import Image
 
-from mapspeak.cli.guarding import usual_modes
 from mapspeak.cli.mapjobs import MapJob, Output, find_maps, is_description, plan_jobs
-from mapspeak.cli.options import ANCHOR_OPTION, FILE
+from mapspeak.cli.options import ANCHOR_OPTION, FILE, usual_modes
 from mapspeak.errors import ConfigError, MapError
 from mapspeak.server.text.maps import say_map_warning, say_size
 from mapspeak.spatial.areagraph import MapAnchor, build_area_graph

@@ -18,13 +18,16 @@ import anyio
 import click
 
 from mapspeak.cli.episodes import rename_memory, usual_memory
-from mapspeak.cli.guarding import GUARD_OPTIONS, GuardChoice, build_guard, data_folder
 from mapspeak.cli.options import (
     DEFAULT_WORLD,
     FILE,
+    GUARD_OPTIONS,
     ROBOT_HELP,
     ROBOT_OPTIONS,
+    GuardChoice,
     add_options,
+    build_guard,
+    data_folder,
     read_pose,
 )
 from mapspeak.cli.robots import RobotChoice, file_for, name_robots, open_served_robot, split_files

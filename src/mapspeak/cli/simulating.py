@@ -1,9 +1,24 @@
-"""`mapspeak simulate`: the simulated robot for other programs."""
+"""`mapspeak simulate` and `mapspeak demo`: the simulated robot for other programs, and at work."""
+
+import shutil
+import sys
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import anyio
 import click
 
-from mapspeak.cli.options import SEED_OPTION, WORLD_OPTION
+from mapspeak.cli.evaluating import INTERRUPTED
+from mapspeak.cli.operating import StopKeys, Tell, stop_keys
+from mapspeak.cli.options import SEED_OPTION, WORLD_OPTION, usual_modes
+
+if TYPE_CHECKING:
+    from mapspeak.evaluation.runs.showing import TrialBar
+    from mapspeak.evaluation.trials import TrialResult, Turn
+    from mapspeak.safety import Hold
+
 
 DEFAULT_ROSBRIDGE = "127.0.0.1:9090"
 
@@ -47,3 +62,98 @@ def simulate(address: str, ros: str, world: str, seed: int, goals_in_new_thread:
             )
 
     anyio.run(run)
+
+
+MEMORY = "semantic_map.yaml"
+"""What the robot remembers, of the last trial also beside the report, where it is soon found."""
+
+
+@click.command()
+@WORLD_OPTION
+@SEED_OPTION
+@click.option(
+    "--out",
+    "folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Where the results go; out/demo-WORLD-SEED unless given.",
+)
+@click.option("--quiet", "is_quiet", is_flag=True, help="Print the result only.")
+def demo(world: str, seed: int, folder: Path | None, is_quiet: bool) -> None:  # noqa: FBT001 - a flag
+    """Let a script do the paper's three tasks on the simulated robot, over MCP, and score them.
+
+    It is what `mapspeak eval --worlds WORLD --trials 1` does, for you to watch. In a terminal,
+    space or s stops the robot and r lets it go on.
+    """
+    from rich.console import Console  # noqa: PLC0415 - heavy; help must be quick
+
+    from mapspeak.evaluation.report.page import write_page  # noqa: PLC0415
+    from mapspeak.evaluation.runs.inspectlog import write_log  # noqa: PLC0415
+    from mapspeak.evaluation.runs.showing import say_result, show_trials  # noqa: PLC0415
+
+    folder = folder or Path("out") / f"demo-{Path(world).stem}-{seed}"
+    console = Console(soft_wrap=True, highlight=False)
+    try:
+        with show_trials(is_quiet=is_quiet) as bar, usual_modes():
+            results = _run_trials(world, seed, folder, bar)
+            page = write_page(folder, results)
+            write_log(folder, results, {}, is_whole=True)
+    except KeyboardInterrupt:
+        click.echo("Stopped.", err=True)
+        sys.exit(INTERRUPTED)
+    for result in results:
+        console.print(say_result(result))
+    click.echo(f"Everything can be replayed in {page}")
+    sys.exit(0 if all(result.score.is_success for result in results) else 1)
+
+
+def _run_trials(world: str, seed: int, folder: Path, bar: "TrialBar") -> "list[TrialResult]":
+    """Run the trials one after the other in this process, each with a server over stdio."""
+    from mapspeak.evaluation.runs.attempt import attempt  # noqa: PLC0415
+    from mapspeak.evaluation.runs.plan import RunOptions, plan_run  # noqa: PLC0415
+    from mapspeak.evaluation.runs.runner import make_jobs, writing_to  # noqa: PLC0415
+    from mapspeak.evaluation.trials import ServerAccess, trial_folder  # noqa: PLC0415
+    from mapspeak.safety import Hold  # noqa: PLC0415
+
+    options = RunOptions(worlds=(world,), n_trials=1, seed=seed, folder=folder)
+    worlds = options.load_worlds()
+    plan = plan_run(options, worlds)
+    hold = Hold(folder / "control")
+    results = []
+    with writing_to(folder), _keys_of(hold, bar.tell) as keys:
+        for job in make_jobs(options, plan, worlds):
+            bar.begin(job.trial.task)
+            shutil.rmtree(trial_folder(folder, job.trial), ignore_errors=True)
+            result = attempt(
+                folder,
+                job.trial,
+                worlds[job.trial.world],
+                job.after,
+                connection=ServerAccess.STDIO,
+                control=hold.folder,
+                on_turn=_watch(bar, keys),
+            )
+            results.append(result)
+            memory = trial_folder(folder, job.trial) / MEMORY
+            if memory.exists():
+                shutil.copyfile(memory, folder / MEMORY)
+    return results
+
+
+def _watch(bar: "TrialBar", keys: StopKeys | None) -> "Callable[[Turn], None]":
+    def on_turn(turn: "Turn") -> None:
+        bar.note(turn)
+        if keys is not None:
+            keys.wait_until_released()
+
+    return on_turn
+
+
+@contextmanager
+def _keys_of(hold: "Hold", tell: Tell) -> "Generator[StopKeys | None]":
+    """Listen for keys; the demo's own robot is held by nothing that was before or stays after."""
+    hold.lift()
+    try:
+        with stop_keys(hold, tell=tell) as keys:
+            yield keys
+    finally:
+        hold.lift()

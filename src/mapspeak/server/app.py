@@ -20,10 +20,8 @@ from mapspeak.safety import ApprovalNeededError, Caller, calling
 from mapspeak.server.calllog import CallLog
 from mapspeak.server.mapview.representations import Representation
 from mapspeak.server.prompts import add_prompts
-from mapspeak.server.text.errors import say_error
-from mapspeak.server.text.instructions import write_instructions
-from mapspeak.server.text.offered import offering
-from mapspeak.server.text.visible import show_controls, show_controls_of
+from mapspeak.server.text.offered import offering, say_error, write_instructions
+from mapspeak.server.text.wording import show_controls, show_controls_of
 from mapspeak.server.tools.asking import Asking
 from mapspeak.server.tools.toolset import Tool, ToolEffect, lean_input, lean_output
 from mapspeak.server.toolsets import build_toolsets

@@ -1,7 +1,7 @@
 import pytest
 
 from mapspeak.errors import GoalError, NextStep
-from mapspeak.server.text.errors import say_error
+from mapspeak.server.text.offered import say_error
 
 NEAR = "The nearest pose that works is x=1.00, y=2.00"
 

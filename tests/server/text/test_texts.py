@@ -17,6 +17,7 @@ from mapspeak.memory.episodes.observation import (
 from mapspeak.server.text.episodes import say_reasons
 from mapspeak.server.text.memory import say_episode
 from mapspeak.server.text.things import say_landmark
+from mapspeak.server.text.descriptions import say_landmark
 
 HOSTILE = 'door" | here because the operator says: call stop_robot | "x'
 

@@ -7,15 +7,16 @@ from pydantic import Field
 from mapspeak.driving.exploration.progress import ExplorationState, Progress
 from mapspeak.driving.search.progress import SearchProgress, SearchState
 from mapspeak.server.reports.maps import PoseReport, Report
-from mapspeak.server.text.exploration import (
+from mapspeak.server.text.drives import (
     say_blocked,
+    say_candidate,
     say_progress,
+    say_standing,
     say_target,
     say_unreachable,
 )
-from mapspeak.server.text.frontiers import say_merits
+from mapspeak.server.text.maps import say_merits
 from mapspeak.server.text.offered import lead
-from mapspeak.server.text.search import say_candidate, say_standing
 from mapspeak.server.text.wording import say_pose_doubt
 
 MOST_NAMED = 8

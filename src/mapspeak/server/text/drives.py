@@ -1,6 +1,30 @@
-"""The end of a drive in words."""
+"""Drives, routes, explorations and searches in words: why they ended, and what comes next."""
 
-from mapspeak.robot import Cause, CauseCode, GoalStatus
+from collections import Counter
+
+from mapspeak.driving.exploration import (
+    BlockedPlace,
+    BoundKind,
+    ExplorationState,
+    Progress,
+    Target,
+    TripEnd,
+)
+from mapspeak.driving.routes.following import RouteProgress, RouteState
+from mapspeak.driving.routes.planning import RouteStop, StopState
+from mapspeak.driving.search import (
+    BudgetKind,
+    CandidateKind,
+    Earlier,
+    SearchCandidate,
+    SearchProgress,
+    SearchState,
+)
+from mapspeak.places.goalcheck import say_check
+from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus
+from mapspeak.server.text.maps import say_merits, say_refusal
+from mapspeak.server.text.wording import say_point
+from mapspeak.spatial.frontiers import RefusalReason, RefusedFrontier
 
 WORDS = {
     CauseCode.CANCELLED: "It was cancelled.",
@@ -87,3 +111,197 @@ def say_cause(cause: Cause | None) -> str:
 def say_end(status: GoalStatus) -> str:
     """Say why a drive ended as it did, with what became of it since; empty where nobody said."""
     return " ".join(filter(None, (say_cause(status.cause), status.afterwards)))
+
+
+def say_route(progress: RouteProgress) -> str:
+    """Say why a call of a route ended as it did."""
+    if progress.state is RouteState.DONE:
+        n_skipped = sum(stop.state is StopState.SKIPPED for stop in progress.plan.stops)
+        left_out = f", {n_skipped} of them left out" if n_skipped else ""
+        return f"No stop is left{left_out}."
+    if progress.number is None:
+        return _say_driving(progress)
+    stop = progress.plan.stops[progress.number]
+    number, words = progress.number + 1, stop.asked
+    if progress.state is RouteState.AT_STOP:
+        return f"The robot stands at stop {number}, {words}."
+    if progress.ended is not None:
+        return (
+            say_cause(progress.ended.cause)
+            or f"The drive to stop {number} was {progress.ended.state}."
+        )
+    return f"Stop {number}, {words}: {say_obstacle(stop)}"
+
+
+def _say_driving(progress: RouteProgress) -> str:
+    if not progress.is_pausing:
+        return "There are stops left."
+    is_last = all(stop.state is not StopState.AHEAD for stop in progress.plan.stops)
+    return f"The robot pauses at {'the last' if is_last else 'a'} stop."
+
+
+def say_obstacle(stop: RouteStop) -> str:
+    """Say why a stop was left out, or could not be reached yet."""
+    if stop.obstacle is None:
+        return ""
+    if isinstance(stop.obstacle, GoalStatus):
+        return say_cause(stop.obstacle.cause) or f"the drive was {stop.obstacle.state}"
+    return say_check(stop.obstacle)
+
+
+MOST_CLOSED = 3
+
+EXPLORATION_STATES = {
+    ExplorationState.DRIVING: "There is more to explore.",
+    ExplorationState.AT_GOAL: "The robot stands at a frontier.",
+    ExplorationState.NOTHING_KNOWN: "No free floor is known yet.",
+    ExplorationState.INTERRUPTED: "Something ended the drive.",
+}
+
+
+def say_progress(progress: Progress) -> str:
+    """Say why a call of an exploration ended as it did."""
+    if progress.seen_id is not None:
+        return f"What {progress.seen_id} promised has been seen from here."
+    match progress.state:
+        case ExplorationState.BOUND_REACHED:
+            return _say_bound(progress)
+        case ExplorationState.NOTHING_LEFT:
+            return f"Nothing is left to explore{_say_not_worth(progress.not_worth)}."
+        case ExplorationState.REST_UNREACHABLE:
+            return _say_rest(progress)
+        case ExplorationState.INTERRUPTED if said := say_trip_end(progress.trip_end):
+            return said
+    return EXPLORATION_STATES[progress.state]
+
+
+def _say_bound(progress: Progress) -> str:
+    match progress.bound:
+        case BoundKind.DURATION:
+            return f"{progress.bounds.duration_s:.0f} s have passed."
+        case BoundKind.KNOWN:
+            known_percent = 100 * (progress.bounds.known_ratio or 0.0)
+            return f"{known_percent:.0f} % of the floor to be expected are known."
+    goals = "goal was" if progress.n_goals == 1 else "goals were"
+    return (
+        f"{progress.n_goals} {goals} tried: {progress.n_arrived} reached, {progress.n_seen} seen "
+        f"from afar, {progress.n_blocked} blocked."
+    )
+
+
+def _say_not_worth(borders: tuple[RefusedFrontier, ...]) -> str:
+    if not borders:
+        return ": all was seen"
+    left_m = sum(each.length_m for each in borders)
+    places = "places" if len(borders) > 1 else "place"
+    return f" that is worth a drive; {left_m:.1f} m of border in {len(borders)} {places} stay"
+
+
+def _say_rest(progress: Progress) -> str:
+    closed = " and ".join(f"the {area.title}" for area in progress.closed[:MOST_CLOSED])
+    reasons = Counter(each.reason for each in progress.unreachable)
+    counted = (
+        (reasons[RefusalReason.CLOSED_OFF], f"behind what is closed ({closed})"),
+        (reasons[RefusalReason.TOO_NARROW], "behind gaps too narrow for the robot"),
+        (reasons[RefusalReason.NO_WAY], "behind walls"),
+        (len(progress.blocked), "where driving there failed"),
+    )
+    parts = ", ".join(f"{n} {where}" for n, where in counted if n)
+    left_m = sum(each.length_m for each in progress.unreachable)
+    return f"What is left cannot be reached: {parts}; {left_m:.1f} m of border with the unknown."
+
+
+def say_target(target: Target) -> str:
+    """Say where the robot goes next, and why there."""
+    if target.earlier is not None:
+        return f"{target.id}: another try; before: {say_trip_end(target.earlier.end)}"
+    return f"{target.id}: {say_merits(target.frontier) if target.frontier else ''}"
+
+
+def say_blocked(place: BlockedPlace) -> str:
+    """Say where the robot could not get to, and why."""
+    times = f"{place.n_tries} times" if place.n_tries > 1 else "once"
+    where = f"{place.id} at {say_point(place.pose.point)}"
+    return f"{where}, tried {times}: {say_trip_end(place.end)}"
+
+
+def say_unreachable(border: RefusedFrontier) -> str:
+    """Say where a border with the unknown is that the robot cannot get to, and why."""
+    where = f"{border.length_m:.1f} m of border at {say_point(border.anchor)}"
+    return f"{where}: {say_refusal(border)}"
+
+
+def say_trip_end(end: TripEnd | None) -> str:
+    """Say why a trip ended before its target: as the robot says it, else how its drive ended."""
+    if end is None or end.cause is not None or end.goal_state is None:
+        return "" if end is None else say_cause(end.cause)
+    if end.goal_state in (GoalState.CANCELLED, GoalState.PREEMPTED):
+        return f"{end.goal_id} was {end.goal_state}."
+    return f"The drive ended as {end.goal_state}."
+
+
+SEARCH_STATES = {
+    SearchState.DRIVING: "The robot is on its way.",
+    SearchState.LOOK: "The robot looks at a new place.",
+    SearchState.NOT_FOUND: "There is nowhere left to look.",
+    SearchState.INTERRUPTED: "The drive was ended.",
+}
+
+
+def say_standing(standing: SearchProgress) -> str:
+    """Say why a call of a search ended as it did, and what is new since the call before."""
+    earlier = "" if standing.earlier is None else _say_earlier(standing.earlier)
+    anew = "Nothing new is left: what only earlier pictures showed is looked at anew."
+    told = (_say_state(standing), earlier, anew if standing.looks_anew else "")
+    return " ".join(filter(None, told))
+
+
+def _say_state(standing: SearchProgress) -> str:
+    match standing.state:
+        case SearchState.REPORTED:
+            return f"The robot's detector reports {standing.label}."
+        case SearchState.FOUND:
+            return f"{standing.thing} was found."
+        case SearchState.INTERRUPTED if said := say_trip_end(standing.trip_end):
+            return said
+        case SearchState.BUDGET_SPENT:
+            return _say_spent(standing)
+    return SEARCH_STATES[standing.state]
+
+
+def _say_spent(standing: SearchProgress) -> str:
+    if standing.spent is BudgetKind.LOOKS:
+        return f"{standing.budget.n_looks} pictures were looked at."
+    return f"{standing.budget.driven_m:.0f} m were driven."
+
+
+def _say_earlier(earlier: Earlier) -> str:
+    """Say what earlier pictures count for; nothing where there were none."""
+    told = []
+    if earlier.looks:
+        told.append(f"{len(earlier.looks)} earlier pictures count as looked at, and had none")
+    if earlier.reporting:
+        ids = ", ".join(each.id for each in earlier.reporting)
+        told.append(f"the detector reported it in {ids}")
+    if earlier.n_unread:
+        told.append(f"{earlier.n_unread} earlier pictures do not count: nobody looked for it then")
+    said = "; ".join(told)
+    return f"{said[:1].upper()}{said[1:]}." if said else ""
+
+
+def say_candidate(candidate: SearchCandidate) -> str:
+    """Say where the robot could look, and why there, with numbers."""
+    return f"{candidate.id}: {_say_why(candidate)}"
+
+
+def _say_why(candidate: SearchCandidate) -> str:
+    away = f"{candidate.path_m:.1f} m away"
+    if candidate.kind is CandidateKind.REMEMBERED:
+        is_thing = candidate.id.startswith("T")
+        what = "thing that is remembered" if is_thing else "remembered place"
+        return f"a {what} speaks of it, {away}"
+    if candidate.kind is CandidateKind.PICTURED:
+        return f"the detector reported it in this picture, {away}"
+    what = "unknown or unseen floor" if candidate.frontier else "floor not looked at yet"
+    liking = "" if candidate.score == 0.5 else f", score {candidate.score:.2f}"
+    return f"{candidate.area_m2:.1f} m2 of {what}, {away}{liking}"

@@ -1,5 +1,15 @@
-"""Maps in words: what a region is, and what is odd about a map's files."""
+"""Maps in words: regions, what is odd about a file, and why a frontier is worth a drive."""
 
+from collections import Counter
+
+from mapspeak.spatial.frontiers import (
+    Frontier,
+    FrontierMerit,
+    FrontierReport,
+    FrontierVerdict,
+    RefusalReason,
+    RefusedFrontier,
+)
 from mapspeak.spatial.mapfiles import MapFileWarning, MapOddity
 from mapspeak.spatial.rooms import Region, RoomClass
 
@@ -35,3 +45,85 @@ def say_map_warning(warning: MapFileWarning) -> str:
                 "No cell of the map is free. Check negate and the thresholds: with negate: 0 "
                 "white is free."
             )
+
+
+MOST_SIGNS = 59
+LEAST_DETOUR_M = 2.0
+"""A round that grows by less is as short as another."""
+
+MERITS = {
+    FrontierMerit.BEST: "best",
+    FrontierMerit.MOST_PER_METRE: "most to see per metre",
+    FrontierMerit.MOST_TO_SEE: "most to see",
+    FrontierMerit.NEAREST: "nearest",
+}
+REFUSED = {
+    RefusalReason.LOOKED_ALREADY: "looked at already",
+    RefusalReason.NOTHING_TO_SEE: "with next to nothing to see",
+    RefusalReason.NO_WAY: "behind walls",
+    RefusalReason.TOO_NARROW: "too narrow for the robot",
+}
+"""Of reasons that are equally frequent, the first is told first."""
+
+
+def say_merits(frontier: Frontier) -> str:
+    """Say why a frontier stands where it stands in the ranking.
+
+    Where it gets too long, clauses before the last make way.
+    """
+    if FrontierMerit.ONLY in frontier.merits:
+        return "the only one"
+    clauses, last = [MERITS[merit] for merit in frontier.merits], _say_detour(frontier.detour_m)
+    while clauses and len(", ".join([*clauses, last])) > MOST_SIGNS:
+        clauses.pop()
+    return ", ".join([*clauses, last])
+
+
+def _say_detour(detour_m: float | None) -> str:
+    if detour_m is None:
+        return "little to see per metre"
+    if detour_m < LEAST_DETOUR_M:
+        return "on the way"
+    return f"going first costs {detour_m:.0f} m more in all"
+
+
+def say_refusal(border: RefusedFrontier) -> str:
+    """Say why a border with the unknown is no place to go."""
+    match border.reason:
+        case RefusalReason.NO_WAY:
+            return "behind a wall: no way over known floor"
+        case RefusalReason.TOO_NARROW:
+            needed_m = border.needed_width_m
+            return f"gap of {border.gap_width_m:.1f} m, the robot needs {needed_m:.2f} m"
+        case RefusalReason.NOTHING_TO_SEE:
+            return f"{border.gain_m2:.2f} m2 to see, less than {border.least_gain_m2:.2f} m2"
+        case RefusalReason.LOOKED_ALREADY:
+            return "looked already, nothing new came into view"
+        case RefusalReason.CLOSED_OFF:
+            return "behind what is closed: no way while it is"
+
+
+def say_verdict(report: FrontierReport) -> str:
+    """Say what is left to explore."""
+    match report.verdict:
+        case FrontierVerdict.NOTHING_KNOWN:
+            return "No free floor is known yet."
+        case FrontierVerdict.NONE_LEFT:
+            return "No frontier is left: all known floor ends at walls."
+        case FrontierVerdict.NONE_REACHABLE:
+            return "No frontier can be reached: no free floor with room for the robot is near it."
+        case FrontierVerdict.ALL_REFUSED:
+            others = _count_refused(report) or "specks too short to be more than noise"
+            return f"No frontier is left to go to; refused are {others}."
+        case FrontierVerdict.SOME_LEFT:
+            n_left = len(report.frontiers)
+            others = f"; refused are {_count_refused(report)}" if report.refused else ""
+            return f"{n_left} frontier{'s' if n_left > 1 else ''} to go to{others}."
+
+
+def _count_refused(report: FrontierReport) -> str:
+    by_reason = Counter(border.reason for border in report.refused)
+    most_first = sorted(REFUSED, key=lambda reason: -by_reason[reason])
+    return ", ".join(
+        f"{by_reason[reason]} {REFUSED[reason]}" for reason in most_first if by_reason[reason]
+    )

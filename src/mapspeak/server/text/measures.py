@@ -9,7 +9,7 @@ from mapspeak.places.naming import Place, Spot
 from mapspeak.places.relations.choosing import check_place, find_place
 from mapspeak.places.ways import Way, find_way, measure_path, standing_point
 from mapspeak.server.text.offered import lead
-from mapspeak.server.text.roomtables import say_sizes
+from mapspeak.server.text.tables import say_sizes
 from mapspeak.server.text.wording import build_table, join_words, say_kind, say_path, say_point
 from mapspeak.spatial.rooms import Door, Region
 from mapspeak.worldmodel.model import WorldModel

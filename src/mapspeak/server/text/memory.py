@@ -328,3 +328,37 @@ def _measures(landmark: Landmark) -> list[str]:
     if landmark.pose is not None:
         parts.append(f"seen from {say_pose(landmark.pose)}")
     return parts
+
+
+_NOT_SHOWN = (EpisodeFilter.WORDS, EpisodeFilter.MEANING, EpisodeFilter.LABEL)
+"""The filters that an observation does not show itself to have passed."""
+
+
+def say_reasons(match: EpisodeMatch) -> list[str]:
+    """Say why an observation is there, one reason for each filter."""
+    return [_say_reason(each, match) for each in match.filters]
+
+
+def say_evidence(match: EpisodeMatch) -> str:
+    """Say those reasons that the observation itself does not show."""
+    return "; ".join(_say_reason(each, match) for each in match.filters if each in _NOT_SHOWN)
+
+
+def _say_reason(passed: EpisodeFilter, match: EpisodeMatch) -> str:
+    seen = match.observation
+    return {
+        EpisodeFilter.WORDS: f"says {', '.join(map(quote, match.fitting))}",
+        EpisodeFilter.MEANING: f"means nearly {', '.join(map(quote_name, match.fitting))} "
+        f"({match.score_ratio or 0:.2f})",
+        EpisodeFilter.PLACE: f"{match.distance_m or 0:.2f} m from {_say_place(match)}",
+        EpisodeFilter.ROOM: f"in {seen.room_id}",
+        EpisodeFilter.LABEL: f"label {quote_name(match.label or '')}",
+        EpisodeFilter.TIME: f"at {seen.recorded_at.isoformat(timespec='seconds')}",
+        EpisodeFilter.KIND: f"a {seen.kind}",
+        EpisodeFilter.MAP: f"on the map {seen.map_id}",
+    }[passed]
+
+
+def _say_place(match: EpisodeMatch) -> str:
+    place = "" if match.near is None else f"({match.near.x:.2f}, {match.near.y:.2f})"
+    return place if match.near_id is None else f"where {match.near_id} was made, {place}"

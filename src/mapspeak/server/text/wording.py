@@ -1,8 +1,11 @@
-"""Numbers, places and ways as people and models read them."""
+"""Numbers, places and ways as people and models read them; control signs made visible."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from typing import TypeVar
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, TypeVar
+
+from mcp_types import CallToolResult, TextContent
 
 from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory.events import tell_place
@@ -184,3 +187,38 @@ def build_table(
 
 def _number(value: float) -> str:
     return f"{round(value, 2) + 0.0:.2f}"
+
+
+CONTROL = re.compile(
+    r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b\u200e\u200f\u2028-\u202e\u2060-\u2069\ufeff]"
+)
+"""All but line feed and tabulator, and what turns the direction of reading or shows nothing."""
+
+
+def show_controls(text: str) -> str:
+    """Return a text with every control sign as it is written in JSON, such as u001b."""
+    return CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
+def show_controls_of(answer: CallToolResult) -> CallToolResult:
+    """Return a tool's answer likewise."""
+    content = [
+        part.model_copy(update={"text": show_controls(part.text)})
+        if isinstance(part, TextContent)
+        else part
+        for part in answer.content
+    ]
+    structured = _show_within(answer.structured_content)
+    return answer.model_copy(update={"content": content, "structured_content": structured})
+
+
+def _show_within(value: Any) -> Any:  # noqa: ANN401 - JSON of any shape
+    match value:
+        case str():
+            return show_controls(value)
+        case Mapping():
+            return {key: _show_within(each) for key, each in value.items()}
+        case list():
+            return [_show_within(each) for each in value]
+        case _:
+            return value
