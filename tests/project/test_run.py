@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from mapspeak.cli import cli
+from mapspeak.cli.commands import COMMANDS
 
 CHECKOUT = Path(__file__).parents[2]
 SYSTEM_TOOLS = "cat chmod cksum dirname ls mkdir rm rmdir sed sh"
@@ -185,7 +185,7 @@ def test_help_is_of_the_product_first_and_needs_no_environment(desk: Desk, word:
     assert code == 0
     products, developers = stdout.split("For those who change mapspeak:")
     told = dict(re.findall(r"^  \./run (\w+) +(.+)$", products, re.MULTILINE))
-    assert told == {name: command.short_help for name, command in cli.commands.items()}
+    assert told == {name: what for name, (_, what) in COMMANDS.items()}
     assert "./run check" in developers
     assert not (desk.checkout / ".venv").exists()
 
