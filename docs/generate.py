@@ -37,7 +37,7 @@ SOURCES = {
         "spatial/mapfiles.py",
         "simulator/worlds/worldfiles.py",
         "cli/mapjobs.py",
-        "cli/mapshowing.py",
+        "cli/mapping.py",
     ),
 }
 """Where the messages of each group are written, below src/mapspeak."""
