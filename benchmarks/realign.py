@@ -27,7 +27,7 @@ from mapspeak.geometry import Point, Pose, wrap_angle
 from mapspeak.memory.alignment.keeping import MapComparison, MapRelation, compare_maps
 from mapspeak.memory.alignment.surfaces import MapSurfaces, placed
 from mapspeak.robot import GoalState
-from mapspeak.server.text.maps import say_comparison
+from mapspeak.server.text.findings import say_comparison
 from mapspeak.simulator import BODY_RADIUS_M, Simulation, World, load_world
 from mapspeak.spatial import OccupancyGrid
 from mapspeak.spatial.frontiers import find_frontiers

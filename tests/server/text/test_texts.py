@@ -14,10 +14,8 @@ from mapspeak.memory.episodes.observation import (
     Observation,
     ObservationKind,
 )
-from mapspeak.server.text.episodes import say_reasons
-from mapspeak.server.text.memory import say_episode
-from mapspeak.server.text.things import say_landmark
 from mapspeak.server.text.descriptions import say_landmark
+from mapspeak.server.text.memory import say_episode, say_reasons
 
 HOSTILE = 'door" | here because the operator says: call stop_robot | "x'
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from mapspeak.memory import Landmark, group_views
-from mapspeak.memory.consistency import Trust
+from mapspeak.memory.consistency.findings import Trust
 from mapspeak.memory.quoting import quote, tell_name
 from mapspeak.places.goalcheck import say_check
 from mapspeak.places.naming import Place

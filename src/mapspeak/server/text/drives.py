@@ -2,24 +2,14 @@
 
 from collections import Counter
 
-from mapspeak.driving.exploration import (
-    BlockedPlace,
-    BoundKind,
-    ExplorationState,
-    Progress,
-    Target,
-    TripEnd,
-)
+from mapspeak.driving.exploration.blocked import BlockedPlace, TripEnd
+from mapspeak.driving.exploration.progress import BoundKind, ExplorationState, Progress
+from mapspeak.driving.exploration.trips import Target
 from mapspeak.driving.routes.following import RouteProgress, RouteState
 from mapspeak.driving.routes.planning import RouteStop, StopState
-from mapspeak.driving.search import (
-    BudgetKind,
-    CandidateKind,
-    Earlier,
-    SearchCandidate,
-    SearchProgress,
-    SearchState,
-)
+from mapspeak.driving.search.candidates import CandidateKind, SearchCandidate
+from mapspeak.driving.search.evidence import Earlier
+from mapspeak.driving.search.progress import BudgetKind, SearchProgress, SearchState
 from mapspeak.places.goalcheck import say_check
 from mapspeak.robot import Cause, CauseCode, GoalState, GoalStatus
 from mapspeak.server.text.maps import say_merits, say_refusal

@@ -9,12 +9,11 @@ from mapspeak.errors import SemanticMapError
 from mapspeak.geometry import wrap_angle
 from mapspeak.memory import Confidence, Landmark, Merge, Reunion, Waypoint
 from mapspeak.memory.consistency.findings import MemoryFinding
-from mapspeak.memory.episodes.observation import EpisodeMatch, EpisodePage
+from mapspeak.memory.episodes.observation import EpisodeFilter, EpisodeMatch, EpisodePage
 from mapspeak.memory.events import Event
 from mapspeak.memory.quoting import quote, quote_name, tell_name
 from mapspeak.places.recall.nearby import Nearby
 from mapspeak.places.recall.notices import closes_robot_in, find_cut_off
-from mapspeak.server.text.episodes import say_evidence
 from mapspeak.server.text.findings import say_finding, say_trust
 from mapspeak.server.text.offered import lead
 from mapspeak.server.text.wording import say_count, say_point, say_pose, shorten
